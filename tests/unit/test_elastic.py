@@ -38,13 +38,13 @@ def test_it_is_newtons_contact_and_one_step_of_newtons_says_so(sq, monkeypatch):
 
 def test_only_lines_that_can_touch_take_part(monkeypatch):
     windows = []
-    around = elastic._Lines.around
+    around = elastic._ContactLines.window
 
     def seen(self, touching):
         windows.append(around(self, touching)[0].undeformed.shape[0] / self.undeformed.shape[0])
         return around(self, touching)
 
-    monkeypatch.setattr(elastic._Lines, "around", seen)
+    monkeypatch.setattr(elastic._ContactLines, "window", seen)
     solve_contact(contact(), None, rough(grid((96, 80)), 0.2e-6), options=TIGHT)
     assert windows
     assert max(windows) < 0.6

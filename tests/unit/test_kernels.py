@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.ehl import Options, Scales
-from asperity.ehl.linear_solvers.single_pressure import Linear, NestedBlocks, five_point_pattern
+from asperity.ehl.linear_solvers.single_pressure import Linear, MultigridSolver, five_point_pattern
 from asperity.ehl.problem_setup import contact_problem, first_guess
 from asperity.kernels import line_relaxation, multigrid, reynolds, stencils
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows
@@ -437,7 +437,7 @@ def test_nested_blocks_answer_what_the_factored_sum_does(rng, cells):
     exact = five_point_pattern(wanted.shape).solve(
         five_point_pattern(wanted.shape).factored(sums), wanted
     )
-    found = NestedBlocks(stencil, weight)(residual)
+    found = MultigridSolver(stencil, weight)(residual)
     expected = np.where(
         weight > 0.0, np.repeat(np.repeat(exact, 2, 0), 2, 1)[: cells[0], : cells[1]], 0.0
     )
@@ -482,7 +482,9 @@ def balance():
     problem = contact_problem(
         conditions, oil, rough(on, 0.7e-6, correlation_length=40e-6), Options()
     )
-    pressure, approach = first_guess(problem, conditions, oil, Scales.of(conditions, oil))
+    pressure, approach = first_guess(
+        problem, conditions, oil, Scales.from_conditions(conditions, oil)
+    )
     uneven = 1.0 + 0.3 * np.sin(np.arange(problem.cells[1]) * np.pi / 8.0)
     pressure = np.maximum(pressure * uneven + 0.02 * np.exp(-(problem.x**2) / 9.0)[:, None], 0.0)
     return problem.evaluate(pressure, approach - 0.3)

@@ -113,7 +113,7 @@ def solve_film(
     line = gaps.ndim == 1
     dx, dy = (spacing, 1.0) if isinstance(spacing, (int, float)) else spacing
     law = Barus(float(viscosity), 1e-30) if isinstance(viscosity, (int, float)) else viscosity
-    channel = Channel(
+    channel = RoughChannel(
         gap=gaps[:, None] if line else gaps,
         spacing=(float(dx), float(dy)),
         speed=require_positive("entrainment speed", entrainment_speed, "m/s"),
@@ -124,7 +124,7 @@ def solve_film(
         inflow_content=inflow_content,
     )
     _check(channel, line=line, field_spacing=not isinstance(spacing, (int, float)))
-    signed, flows, residual, steps = _balanced(channel, tolerance)
+    signed, flows, residual, steps = _solve_newton(channel, tolerance)
     pressure, content = channel.split(signed)
     shown = np.s_[:, 0] if line else np.s_[:]
     film = FilmSolution(
@@ -143,23 +143,23 @@ def solve_film(
     return film
 
 
-def _balanced(channel: "Channel", tolerance: float) -> tuple[Field, "Flows", float, int]:
+def _solve_newton(channel: "RoughChannel", tolerance: float) -> tuple[Field, "Flows", float, int]:
     """Newton's steps from a film without pressure: the signed unknown, its flows, the residual, and how many steps."""
     signed = np.zeros(channel.gap.shape)
-    best, idle, share, steps = np.inf, 0, 1.0, 0
+    best, stagnation, share, steps = np.inf, 0, 1.0, 0
     while True:
         flows = channel.flows(signed)
         residual = float(np.max(np.abs(flows.outflow)) / flows.through)
         if residual < tolerance or steps == RIGID_FILM.max_steps or not np.isfinite(residual):
             return signed, flows, residual, steps
-        idle += 1
+        stagnation += 1
         if residual < 0.9 * best:
-            best, idle, share = residual, 0, min(1.0, 1.5 * share)
+            best, stagnation, share = residual, 0, min(1.0, 1.5 * share)
         elif (
-            idle == RIGID_FILM.stagnation_iterations
+            stagnation == RIGID_FILM.stagnation_iterations
         ):  # cells that flip to and fro settle in shorter steps
-            best, idle, share = residual, 0, max(0.5 * share, RIGID_FILM.min_damping)
-        signed = signed + share * channel.limited(signed, -_solved(flows))
+            best, stagnation, share = residual, 0, max(0.5 * share, RIGID_FILM.min_damping)
+        signed = signed + share * channel.limit_step(signed, -_newton_step(flows))
         steps += 1
 
 
@@ -191,7 +191,7 @@ class Flows(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Channel:
+class RoughChannel:
     """A rigid gap, its oil and what holds at its borders."""
 
     gap: Field
@@ -213,7 +213,7 @@ class Channel:
         """Pressure [Pa] and content of a signed unknown."""
         return np.maximum(signed, 0.0) * self.pressure_scale, 1.0 + np.minimum(signed, 0.0)
 
-    def limited(self, signed: Field, change: Field) -> Field:
+    def limit_step(self, signed: Field, change: Field) -> Field:
         """A change no longer than the oil's laws are straight."""
         steep = (
             self.viscosity.log_slope(np.maximum(signed, 0.0) * self.pressure_scale)
@@ -310,7 +310,9 @@ class Channel:
             (index[:-1], index[1:], by_right),
             (index[1:], index[:-1], -by_left),
         ]
-        outflow += self._across(pressure, conductance, d_conductance, d_pressure, index, entries)
+        outflow += self._flow_across(
+            pressure, conductance, d_conductance, d_pressure, index, entries
+        )
         rows, columns = (
             np.concatenate([entry[place].ravel() for entry in entries]) for place in (0, 1)
         )
@@ -318,7 +320,7 @@ class Channel:
         through = float(np.max(np.abs(along.mean(axis=1))))
         return Flows(along, outflow, through, rows, columns, slopes)
 
-    def _across(
+    def _flow_across(
         self,
         pressure: Field,
         conductance: Field,
@@ -360,7 +362,7 @@ class Channel:
         return outflow + flow - np.roll(flow, 1, 1)
 
 
-def _solved(flows: Flows) -> Field:
+def _newton_step(flows: Flows) -> Field:
     """Change of the signed unknown whose linear answer is the cells' loss."""
     size = flows.outflow.size
     matrix = scipy.sparse.csc_array((flows.slopes, (flows.rows, flows.columns)), shape=(size, size))
@@ -371,16 +373,16 @@ def _solved(flows: Flows) -> Field:
     return np.asarray(change).reshape(flows.outflow.shape)
 
 
-def _check(channel: Channel, *, line: bool, field_spacing: bool) -> None:
+def _check(channel: RoughChannel, *, line: bool, field_spacing: bool) -> None:
     gap = channel.gap
     if gap.ndim != 2 or len(gap) < 2:
         raise BadInput(
             f"gap must have shape (nx,) or (nx, ny) with two cells or more along x, got {gap.shape}"
         )
     if line == field_spacing:
-        wanted = "one size of cell" if line else "(dx, dy)"
+        expected = "one size of cell" if line else "(dx, dy)"
         raise BadInput(
-            f"spacing must be {wanted} for a gap of shape {gap.shape[: 1 if line else 2]}"
+            f"spacing must be {expected} for a gap of shape {gap.shape[: 1 if line else 2]}"
         )
     if not np.all((gap > 0.0) & (gap < np.inf)):
         raise BadInput(

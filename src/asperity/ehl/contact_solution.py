@@ -47,7 +47,7 @@ STEPS = {  # variable: what it is
 }
 
 
-class Contents(NamedTuple):
+class FileContents(NamedTuple):
     """What a netCDF file holds: variables and coordinates by name, as (dimensions, values, attributes), and attributes.
 
     Written without xarray, which with pandas takes longer to load than to write.
@@ -168,7 +168,7 @@ class ContactSolution:
         """The solution as an xarray dataset: its `contents`; raises what they do."""
         return self.contents().to_dataset()
 
-    def contents(self) -> Contents:
+    def contents(self) -> FileContents:
         """The solution with CF attributes; all that `load_solution` needs is in it.
 
         Fields lie on (x, y), the convergence history on (step). What is not a field travels as
@@ -199,7 +199,7 @@ class ContactSolution:
             **{name: json.dumps(value) for name, value in described.items()},
             **self.attributes,
         }
-        return Contents({**self._maps(), **self._steps()}, coordinates, attributes)
+        return FileContents({**self._maps(), **self._steps()}, coordinates, attributes)
 
     def _maps(self) -> dict[str, Any]:
         fields = {
@@ -261,5 +261,5 @@ class ContactSolution:
         }
 
     def save(self, path: str | Path) -> Path:
-        """Write the solution as netCDF, whole or not at all, and return the path; raises what `Contents.save` does."""
+        """Write the solution as netCDF, whole or not at all, and return the path; raises what `FileContents.save` does."""
         return self.contents().save(path)

@@ -17,17 +17,17 @@ import scipy
 
 from asperity.core.arrays import Field
 
-BETWEEN, THROUGH = (
+MIRROR_BETWEEN, MIRROR_THROUGH = (
     1,
     2,
 )  # where a mirror across y stands: behind the last line of cells, or in its middle
 COSINES: dict[int, Literal[2, 3]] = {
-    BETWEEN: 2,
-    THROUGH: 3,
+    MIRROR_BETWEEN: 2,
+    MIRROR_THROUGH: 3,
 }  # transforms into those counted from the mirror on
-FAR = 8  # cells along x beyond which the compliance counts as a background
-ALL_OF_K0 = 32.0  # to which its integral from 0 is π/2 to 3e-15
-SMALL, DEGREE = 3.0, 14  # argument from which a polynomial gives it, of that degree
+FAR_CELLS = 8  # cells along x beyond which the compliance counts as a background
+K0_CUTOFF = 32.0  # to which its integral from 0 is π/2 to 3e-15
+POLYNOMIAL_FROM, DEGREE = 3.0, 14  # argument from which a polynomial gives it, of that degree
 ALIASES = 18  # on either side, for the sum of all
 
 
@@ -52,7 +52,7 @@ class Deflection:
         waves *= self.spectrum[pressure.dtype == np.float32]
         return self._field(waves)
 
-    def undone(self, displacement: Field) -> Field:
+    def approximate_inverse(self, displacement: Field) -> Field:
         """About the pressure that displaces the surface so and leaves all around it where it was, shape (nx, ny)."""
         waves = self._waves(displacement)
         waves /= np.abs(
@@ -84,20 +84,20 @@ class Deflection:
             ]
         )
 
-    def among(self, lines: int) -> "Deflection":
+    def restrict_to(self, lines: int) -> "Deflection":
         """The same among that many neighbouring lines along x, none longer than the grid is."""
         (_, ny), (_, wide) = self.cells, self.padded
         kernel = scipy.fft.ifft(self.spectrum[0], axis=0)[:lines].real
         long = scipy.fft.next_fast_len(2 * lines - 1)
-        spectrum = np.ascontiguousarray(scipy.fft.fft(_mirrored(kernel, long), axis=0).real)
+        spectrum = np.ascontiguousarray(scipy.fft.fft(_even_extension(kernel, long), axis=0).real)
         return Deflection(
             (lines, ny), (long, wide), (spectrum, spectrum.astype(np.float32)), self.row[:lines]
         )
 
     @property
-    def near(self) -> Field:
+    def near_compliance(self) -> Field:
         """Compliance of cells 0, 1, 2 along x and of the first far one: what the preconditioner keeps of the kernel."""
-        return self.row[[0, 1, 2, min(FAR, self.row.size - 1)]].copy()
+        return self.row[[0, 1, 2, min(FAR_CELLS, self.row.size - 1)]].copy()
 
 
 @lru_cache(maxsize=16)
@@ -124,30 +124,32 @@ def deflection(
         kernel = compliance * _love_kernel((nx, lines), spacing)
         row = kernel[:, 0].copy()
         spectrum = scipy.fft.rfft(
-            _mirrored(_cosines(kernel, padded[1], mirror), padded[0]), axis=0
+            _even_extension(_cosine_waves(kernel, padded[1], mirror), padded[0]), axis=0
         ).real
     elif periodic:
         kernel = 2.0 * compliance * _line_kernel(cells, spacing)
         row = scipy.fft.irfft(kernel, n=ny, axis=1)[:, 0]
-        spectrum = scipy.fft.fft(_mirrored(kernel, padded[0]), axis=0).real
+        spectrum = scipy.fft.fft(_even_extension(kernel, padded[0]), axis=0).real
     else:
         kernel = compliance * _love_kernel(cells, spacing)
         row = kernel[:, 0].copy()
-        spectrum = scipy.fft.rfft2(_mirrored(_mirrored(kernel, padded[0]).T, padded[1]).T).real
+        spectrum = scipy.fft.rfft2(
+            _even_extension(_even_extension(kernel, padded[0]).T, padded[1]).T
+        ).real
     both = np.ascontiguousarray(spectrum), spectrum.astype(np.float32)
     for array in (*both, row):
         array.flags.writeable = False
     return Deflection(cells, padded, both, row, mirror)
 
 
-def _cosines(kernel: Field, count: int, mirror: int) -> Field:
+def _cosine_waves(kernel: Field, count: int, mirror: int) -> Field:
     """The waves across y of a kernel of distances 0, 1, ..., made even about 0: whole ones, or halves in between."""
-    if mirror == BETWEEN:
+    if mirror == MIRROR_BETWEEN:
         return np.asarray(scipy.fft.dct(kernel, type=1, n=count + 1, axis=1)[:, :count])
     return np.asarray(scipy.fft.dct(kernel, type=3, n=count, axis=1))
 
 
-def _mirrored(kernel: Field, length: int) -> Field:
+def _even_extension(kernel: Field, length: int) -> Field:
     """A kernel of distances 0, 1, ... along the first axis, made even about 0 on a ring of `length`."""
     ring = np.zeros((length, kernel.shape[1]))
     ring[: len(kernel)] = kernel
@@ -168,11 +170,11 @@ def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
     for alias, weight in _aliases(wave):
         beyond[0] += (np.pi / 2.0) * weight
         wavenumber = alias * (2.0 * np.pi / dy)
-        reached = 1 + int(ALL_OF_K0 / (wavenumber.min(initial=np.inf) * dx) + 0.5)
+        reached = 1 + int(K0_CUTOFF / (wavenumber.min(initial=np.inf) * dx) + 0.5)
         if reached > 1:
             argument = np.outer(edges[1:reached], wavenumber)
-            row, column = np.nonzero(argument < ALL_OF_K0)
-            beyond[row + 1, column] += weight[column] * _k0_beyond(argument[row, column])
+            row, column = np.nonzero(argument < K0_CUTOFF)
+            beyond[row + 1, column] += weight[column] * _k0_integral(argument[row, column])
     beyond *= np.sin(np.pi * wave) * dy / (2.0 * np.pi**2)
     kernel[:, 1:] = -np.diff(beyond, axis=0)
     kernel[0, 1:] *= 2.0  # its other half
@@ -198,29 +200,32 @@ def _aliases(wave: Field) -> Iterator[tuple[Field, Field]]:
         term *= (k + ALIASES) * (k - ALIASES) / ((k + 0.5) * (k + 1.0))
 
 
-def _k0_beyond(argument: Field) -> Field:
+def _k0_integral(argument: Field) -> Field:
     """∫ K₀ from each argument on, to ALL_OF_K0 at most, of any shape."""
-    centre, reach, series = _large_arguments()
-    inverse = 1.0 / argument.clip(SMALL)
+    centre, reach, series = _k0_polynomial()
+    inverse = 1.0 / argument.clip(POLYNOMIAL_FROM)
     place = (inverse - centre) / reach
     integral = np.full(argument.shape, series[-1])
     for coefficient in series[-2::-1]:
         integral *= place
         integral += coefficient
     integral *= np.sqrt(inverse) * np.exp(-argument)
-    small = argument < SMALL
+    small = argument < POLYNOMIAL_FROM
     integral[small] = np.pi / 2.0 - scipy.special.iti0k0(argument[small])[1]
     return integral
 
 
 @lru_cache(maxsize=1)
-def _large_arguments() -> tuple[float, float, Field]:
+def _k0_polynomial() -> tuple[float, float, Field]:
     """√z exp(z) ∫ K₀ from z on, as a polynomial: of 1/z less the first number, over the second, the coefficients.
 
     Interpolated (to 3e-14 of the integral from 0) between ∫ exp(z - z cosh t)/cosh t dt, t from 0
     on, by trapezoids.
     """
-    centre, reach = 0.5 * (1.0 / SMALL + 1.0 / ALL_OF_K0), 0.5 * (1.0 / SMALL - 1.0 / ALL_OF_K0)
+    centre, reach = (
+        0.5 * (1.0 / POLYNOMIAL_FROM + 1.0 / K0_CUTOFF),
+        0.5 * (1.0 / POLYNOMIAL_FROM - 1.0 / K0_CUTOFF),
+    )
     cosh = np.cosh(0.125 * np.arange(40))
 
     def scaled(place: Any) -> Any:

@@ -17,9 +17,7 @@ Regime = Literal[
     "isoviscous-rigid", "isoviscous-elastic", "piezoviscous-rigid", "piezoviscous-elastic"
 ]
 Place = Literal["central", "least"]
-AT_THE_PRESSURE_PEAK = (
-    1.2257  # film of a rigid cylinder under the highest pressure over its least one
-)
+PEAK_TO_MIN_FILM = 1.2257  # film of a rigid cylinder under the highest pressure over its least one
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.roller_profile import Along
+from asperity.ehl.roller_profile import RollerProfile
 
 CENTRE = 0.1  # half-widths each side of x = 0 that count as the centre of the contact
 
@@ -23,7 +23,7 @@ def hertz_zone(conditions: ContactConditions, grid: Grid, share: float = 1.0) ->
     """Cells within a share of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
     (a, b), (dx, dy) = conditions.hertz.half_widths, grid.spacing
     if conditions.geometry == "roller":
-        along = Along(conditions, a, a**2 / conditions.radius_along_rolling)
+        along = RollerProfile(conditions, a, a**2 / conditions.radius_along_rolling)
         return along.zone(grid.x / a, grid.y / a, share, (dx / a, dy / a))
     return within_ellipse(
         grid.x, grid.y, (share * a, np.inf if conditions.endless else share * b), grid.spacing

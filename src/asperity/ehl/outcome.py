@@ -13,7 +13,7 @@ ContactModel = Literal["unified", "paper", "mixed", "conserving"]
 UNIFIED, PAPER, MIXED, CONSERVING = MODELS = get_args(ContactModel)  # the first two are one
 TWO_PRESSURES = (MIXED, CONSERVING)
 Start = Literal["steady", "stationary"]
-LONGEST_STEP = 8.0  # cells that the oil may travel in one step of time
+MAX_CELLS_PER_TIME_STEP = 8.0  # cells that the oil may travel in one step of time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,31 +94,31 @@ class Figures:
     edge_pressure: float | None = None
     end_film: float | None = None
 
-    def off(self, other: "Figures") -> "Figures":
+    def abs_difference(self, other: "Figures") -> "Figures":
         """Absolute differences."""
-        return self._each(other, lambda mine, theirs: abs(mine - theirs))
+        return self._combine(other, lambda mine, theirs: abs(mine - theirs))
 
-    def minus(self, other: "Figures") -> "Figures":
+    def difference(self, other: "Figures") -> "Figures":
         """Differences."""
-        return self._each(other, lambda mine, theirs: mine - theirs)
+        return self._combine(other, lambda mine, theirs: mine - theirs)
 
-    def signed(self, other: "Figures") -> "Figures":
+    def copysign(self, other: "Figures") -> "Figures":
         """Each with the other's sign."""
-        return self._each(other, math.copysign)
+        return self._combine(other, math.copysign)
 
-    def plus(self, other: "Figures") -> "Figures":
+    def add(self, other: "Figures") -> "Figures":
         """Sums."""
-        return self._each(other, lambda mine, theirs: mine + theirs)
+        return self._combine(other, lambda mine, theirs: mine + theirs)
 
-    def at_least(self, other: "Figures") -> "Figures":
+    def maximum(self, other: "Figures") -> "Figures":
         """The larger of each pair."""
-        return self._each(other, max)
+        return self._combine(other, max)
 
-    def times(self, factor: float) -> "Figures":
+    def scale(self, factor: float) -> "Figures":
         """All of them times a factor."""
-        return self._each(self, lambda mine, _: factor * mine)
+        return self._combine(self, lambda mine, _: factor * mine)
 
-    def _each(self, other: "Figures", merge: Callable[[float, float], float]) -> "Figures":
+    def _combine(self, other: "Figures", merge: Callable[[float, float], float]) -> "Figures":
         pairs = ((name, getattr(self, name), getattr(other, name)) for name in FIGURES)
         return Figures(
             **{name: merge(mine, its) for name, mine, its in pairs if None not in (mine, its)}
@@ -167,7 +167,7 @@ class Convergence:
         """How far off the figures may be: iteration and discretisation error together."""
         if self.iteration_error is None or self.discretisation_error is None:
             return None
-        return self.iteration_error.plus(self.discretisation_error)
+        return self.iteration_error.add(self.discretisation_error)
 
     @property
     def converged(self) -> bool:

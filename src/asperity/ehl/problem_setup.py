@@ -7,12 +7,12 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.ehl.controls import GRID_CONTINUATION
-from asperity.ehl.deflection import BETWEEN, THROUGH
+from asperity.ehl.deflection import MIRROR_BETWEEN, MIRROR_THROUGH
 from asperity.ehl.film_formulas import central_film, least_films
-from asperity.ehl.grid_design import FEWEST_BESIDE, FEWEST_COARSE_CELLS, inlet_length
-from asperity.ehl.models.single_pressure import Form, Problem
+from asperity.ehl.grid_design import MIN_CELLS_SHORT_AXIS, MIN_COARSE_CELLS, inlet_length
+from asperity.ehl.models.single_pressure import BodyShape, Problem
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, Options
-from asperity.ehl.roller_profile import Along
+from asperity.ehl.roller_profile import RollerProfile
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
@@ -28,18 +28,18 @@ def contact_problem(
     attempt: str = ATTEMPTS[0],
 ) -> Problem:
     """The dimensionless problem on the surface's own grid, as the attempt poses it."""
-    scales = Scales.of(conditions, lubricant)
+    scales = Scales.from_conditions(conditions, lubricant)
     grid, line = surface.grid, conditions.endless
     (dx, dy), (left, front) = grid.spacing, grid.lower
     load = conditions.line_load * grid.extent[1] if line else conditions.load
     radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
     return Problem(
-        form=Form(
+        form=BodyShape(
             flatness=radius / conditions.radius_across_rolling,
             compliance=2.0 * scales.pressure * radius / (np.pi * modulus * scales.length),
             aspect=np.inf if line else conditions.hertz.half_widths[1] / scales.length,
             periodic=line,
-            along=Along(conditions, scales.length, scales.gap)
+            roller=RollerProfile(conditions, scales.length, scales.gap)
             if conditions.geometry == "roller"
             else None,
         ),
@@ -99,7 +99,7 @@ def grid_levels(finest: Problem) -> list[Problem]:
     return levels
 
 
-def coarser_all_along(problem: Problem, finest: Problem) -> bool:
+def coarser_in_all_axes(problem: Problem, finest: Problem) -> bool:
     """Whether a grid tells what the finest one's cells did: coarser along each axis of more than one, or itself."""
     several = [
         (few, many) for few, many in zip(problem.cells, finest.cells, strict=True) if many > 1
@@ -107,7 +107,7 @@ def coarser_all_along(problem: Problem, finest: Problem) -> bool:
     return problem.cells == finest.cells or all(few < many for few, many in several)
 
 
-def levels_in_reach(
+def usable_levels(
     finest: Problem, conditions: ContactConditions, lubricant: Lubricant | None
 ) -> list[Problem]:
     """The levels of a climb; those of a smooth line contact down to the coarsest that has 2 cells across the inlet.
@@ -127,19 +127,19 @@ def levels_in_reach(
 
 
 def _halved(cells: tuple[int, int]) -> tuple[int, int]:
-    fewest = FEWEST_BESIDE if max(cells) // 2 >= FEWEST_COARSE_CELLS else FEWEST_COARSE_CELLS
+    fewest = MIN_CELLS_SHORT_AXIS if max(cells) // 2 >= MIN_COARSE_CELLS else MIN_COARSE_CELLS
     nx, ny = ((n + 1) // 2 if n // 2 >= fewest else n for n in cells)
     return nx, ny
 
 
-def least_part(problem: Problem) -> Problem:
+def reduced_problem(problem: Problem) -> Problem:
     """What tells all of a lubricated contact: one line of cells, or those on one side of Y = 0, if that will do."""
     if problem.uniform:
         return on_one_line(problem)
-    return one_side(problem) if problem.symmetric and problem.lubricant is not None else problem
+    return half_domain(problem) if problem.symmetric and problem.lubricant is not None else problem
 
 
-def one_side(problem: Problem) -> Problem:
+def half_domain(problem: Problem) -> Problem:
     """What has a mirror at Y = 0, on the cells up to there."""
     factor, lines = problem.viscosity_factor, problem.cells[1]
     half = -(-lines // 2)
@@ -147,7 +147,7 @@ def one_side(problem: Problem) -> Problem:
         problem,
         roughness=problem.roughness[:, :half],
         viscosity_factor=None if factor is None else factor[:, :half],
-        mirror=THROUGH if lines % 2 else BETWEEN,
+        mirror=MIRROR_THROUGH if lines % 2 else MIRROR_BETWEEN,
     )
 
 

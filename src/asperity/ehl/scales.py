@@ -16,7 +16,9 @@ class Scales:
     speed: float
 
     @classmethod
-    def of(cls, conditions: ContactConditions, lubricant: Lubricant | None) -> "Scales":
+    def from_conditions(
+        cls, conditions: ContactConditions, lubricant: Lubricant | None
+    ) -> "Scales":
         """Scales of a contact; a and R are those along rolling."""
         a, p_h, radius = (
             conditions.hertz.half_widths[0],

@@ -17,7 +17,7 @@ from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
 from asperity.ehl.outcome import ATTEMPTS, PAPER, Options
-from asperity.ehl.problem_setup import contact_problem, first_guess, least_part, levels_in_reach
+from asperity.ehl.problem_setup import contact_problem, first_guess, reduced_problem, usable_levels
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import Progress, Search
 from asperity.ehl.strategies.mixed_search import solve_mixed
@@ -93,13 +93,13 @@ def solve_unified(
 ) -> ContactSolution:
     """Solve the contact with one pressure for oil and asperities, or dry; as `solve_contact`, which calls this."""
     began = time.perf_counter()
-    scales = Scales.of(conditions, lubricant)
+    scales = Scales.from_conditions(conditions, lubricant)
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = least_part(whole)
+    finest = reduced_problem(whole)
     elastic = lubricant is None and conditions.hardness is None
     search = (ElasticSearch if elastic else Search)(options, scales.gap, progress)
     if start is None:
-        levels = levels_in_reach(finest, conditions, lubricant)
+        levels = usable_levels(finest, conditions, lubricant)
         guess = first_guess(levels[-1], conditions, lubricant, scales)
     else:
         levels = [finest]
@@ -109,8 +109,8 @@ def solve_unified(
             if not finest.accurate:
                 continue
             levels = [replace(level, accurate=False) for level in levels]
-        step = search.climb(levels, *guess, held=attempt == ATTEMPTS[2])
-        if search.settled(options.tolerance):
+        step = search.solve_levels(levels, *guess, fixed=attempt == ATTEMPTS[2])
+        if search.converged(options.tolerance):
             break
     return search.solution(
         step,
@@ -127,12 +127,12 @@ def solve_unified(
 class ElasticSearch(Search):
     """Dry elastic bodies coarse to fine; a step of Newton's on the finest grid says whether it is solved."""
 
-    def climb(
-        self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool
+    def solve_levels(
+        self, levels: Sequence[Problem], pressure: Field, approach: float, *, fixed: bool
     ) -> Step:
-        """Solve on grid after grid; by Newton's steps alone where the bodies are `held`."""
-        if held:
-            return super().climb(levels, pressure, approach, held=True)
+        """Solve on grid after grid; by Newton's steps alone where the bodies are `fixed`."""
+        if fixed:
+            return super().solve_levels(levels, pressure, approach, fixed=True)
         options, start = self.options, pressure
         self.figures, self.smooth, self.cell = (
             [],
@@ -147,15 +147,15 @@ class ElasticSearch(Search):
                 else max(GRID_CONTINUATION.coarse_tolerance, options.tolerance)
             )
             if problem.cells != pressure.shape:
-                pressure = problem.brought(pressure)
-            pressure, near, met = elastic_contact(
+                pressure = problem.interpolate(pressure)
+            pressure, dry_approach, converged = elastic_contact(
                 problem, pressure, GRID_CONTINUATION.elastic_tolerance * tolerance
             )
-            if not met:
-                return super().climb(levels, start, approach, held=False)
+            if not converged:
+                return super().solve_levels(levels, start, approach, fixed=False)
             step = self.run(
                 problem,
-                newton(problem, pressure, near),
+                newton(problem, pressure, dry_approach),
                 tolerance,
                 options.max_iterations if finest else 0,
             )

@@ -32,7 +32,7 @@ def balance_of(solution: ContactSolution, *, whole: bool = True) -> Balance | Mi
 
     Unless `whole`, a contact in which nothing varies along y is taken on one line of cells.
     """
-    scales = Scales.of(solution.conditions, solution.lubricant)
+    scales = Scales.from_conditions(solution.conditions, solution.lubricant)
     problem = contact_problem(
         solution.conditions,
         solution.lubricant,
@@ -58,7 +58,7 @@ def plastic_overlap(solution: ContactSolution) -> Field:
     depth = (
         depth
         * (balance.pressure >= balance.problem.p_cap)
-        * Scales.of(solution.conditions, solution.lubricant).gap
+        * Scales.from_conditions(solution.conditions, solution.lubricant).gap
     )
     return np.broadcast_to(depth, solution.grid.cells)
 

@@ -21,7 +21,7 @@ Operator = Callable[[Any], Vector]
 ADJOINT = 2  # what BLAS calls the conjugate transpose
 
 
-class Room:
+class Workspace:
     """Memory for the vectors of one GMRES after the other: fresh memory takes as long as what is done with it."""
 
     def __init__(self) -> None:
@@ -47,39 +47,39 @@ class Room:
 def gmres(
     product: Operator,
     precondition: Operator,
-    wanted: Vector,
+    rhs: Vector,
     *,
     tolerance: float,
-    most_steps: int,
-    room: Room | None = None,
+    max_steps: int,
+    workspace: Workspace | None = None,
 ) -> Vector:
     """Solve product(x) = wanted until the residual has fallen by `tolerance` or steps run out; return the best x.
 
-    Where many are solved one after the other, all of them may have one `room`.
+    Where many are solved one after the other, all of them may have one `workspace`.
     """
-    exact = np.result_type(wanted.dtype, float)
-    norm = _length(wanted)
+    exact = np.result_type(rhs.dtype, float)
+    norm = _norm(rhs)
     if norm == 0.0:
-        return np.zeros_like(wanted)
-    room = room or Room()
-    basis, corrections = room.rows(min(KRYLOV.initial_vectors, most_steps) + 1, wanted)
-    triangle = np.zeros((most_steps, most_steps), exact)
+        return np.zeros_like(rhs)
+    workspace = workspace or Workspace()
+    basis, corrections = workspace.rows(min(KRYLOV.initial_vectors, max_steps) + 1, rhs)
+    triangle = np.zeros((max_steps, max_steps), exact)
     turns = np.zeros(
-        (most_steps, 2), exact
+        (max_steps, 2), exact
     )  # cosine and sine of the rotations that make the Hessenberg matrix a triangle
-    target = np.zeros(most_steps + 1, exact)
+    target = np.zeros(max_steps + 1, exact)
     target[0] = norm
-    np.divide(wanted, norm, out=basis[0])
-    for step in range(most_steps):
+    np.divide(rhs, norm, out=basis[0])
+    for step in range(max_steps):
         if step + 1 == len(basis):
-            basis, corrections = room.rows(2 * len(basis), wanted)
+            basis, corrections = workspace.rows(2 * len(basis), rhs)
         corrections[step] = precondition(basis[step])
         new = product(corrections[step])
         known = basis[: step + 1]
-        before = _length(new)
+        before = _norm(new)
         overlaps = (known @ new.conj()).conj()
         new -= overlaps @ known
-        column, length = overlaps.astype(exact), _length(new)
+        column, length = overlaps.astype(exact), _norm(new)
         if not np.isfinite(
             length
         ):  # out of this precision's range: what is known already has to do
@@ -88,7 +88,7 @@ def gmres(
         if length < KRYLOV.reorthogonalise * before:
             overlaps = (known @ new.conj()).conj()
             new -= overlaps @ known
-            column, length = column + overlaps, _length(new)
+            column, length = column + overlaps, _norm(new)
         for i, (cosine, sine) in enumerate(turns[:step]):
             column[i : i + 2] = (
                 cosine.conj() * column[i] + sine * column[i + 1],
@@ -99,17 +99,17 @@ def gmres(
         column[step] = slant
         triangle[: step + 1, step] = column
         target[step : step + 2] = np.conj(cosine) * target[step], -sine * target[step]
-        if abs(target[step + 1]) < tolerance * norm or length < np.finfo(wanted.dtype).eps * before:
+        if abs(target[step + 1]) < tolerance * norm or length < np.finfo(rhs.dtype).eps * before:
             break
         np.divide(new, length, out=basis[step + 1])
     count = step + 1
     if count == 0:
-        return np.full_like(wanted, np.nan)
+        return np.full_like(rhs, np.nan)
     weights = np.linalg.lstsq(triangle[:count, :count], target[:count], rcond=None)[0]
-    return np.asarray(weights.astype(wanted.dtype) @ corrections[:count])
+    return np.asarray(weights.astype(rhs.dtype) @ corrections[:count])
 
 
-def _length(vector: Vector) -> float:
+def _norm(vector: Vector) -> float:
     return float(np.sqrt(np.vdot(vector, vector).real))
 
 
@@ -133,23 +133,21 @@ class Shifted:
         self,
         product: Callable[[Any], tuple[Vector, Vector]],
         precondition: Operator,
-        wanted: tuple[Vector, Vector],
+        rhs: tuple[Vector, Vector],
         bearing: Vector,
         frequency: float,
-        most_steps: int,
+        max_steps: int,
     ) -> None:
-        self.product, self.precondition, self.wanted, self.frequency = (
+        self.product, self.precondition, self.rhs, self.frequency = (
             product,
             precondition,
-            wanted,
+            rhs,
             frequency,
         )
-        self.kind = wanted[0].dtype
+        self.kind = rhs[0].dtype
         self.bearing, self.count = bearing.astype(self.kind), 0
-        self.basis, self.corrections, self.stored = np.empty(
-            (3, most_steps, wanted[0].size), self.kind
-        )
-        self.triangle = np.zeros((most_steps, most_steps), complex)
+        self.basis, self.corrections, self.stored = np.empty((3, max_steps, rhs[0].size), self.kind)
+        self.triangle = np.zeros((max_steps, max_steps), complex)
         self.times, self.plus = scipy.linalg.get_blas_funcs(("gemv", "axpy"), (self.basis,))
         self.sums: list[complex] = []
         self.falls: bool
@@ -158,7 +156,7 @@ class Shifted:
     @property
     def left(self) -> float:
         """Share of the equations that is left, as far as this precision tells."""
-        return _length(self.rest) / self.size
+        return _norm(self.rest) / self.size
 
     @property
     def sum(self) -> complex:
@@ -176,15 +174,15 @@ class Shifted:
 
     def step(self) -> bool:
         """One correction more; False where it told nothing new."""
-        before = _length(self.rest)
+        before = _norm(self.rest)
         tried = self.rest / self.kind.type(before) if self.falls else self.basis[self.count - 1]
         correction = self.precondition(tried)
         rows, stored = self.product(correction)
-        if not self._met(self.plus(stored, rows, a=1j * self.frequency)):
+        if not self._append(self.plus(stored, rows, a=1j * self.frequency)):
             return False
         self.corrections[self.count], self.stored[self.count] = correction, stored
         self.sums.append(complex(correction @ self.bearing))
-        self.count, self.falls = self.count + 1, _length(self.rest) < KRYLOV.stagnation * before
+        self.count, self.falls = self.count + 1, _norm(self.rest) < KRYLOV.stagnation * before
         return True
 
     def move(self, frequency: float) -> None:
@@ -195,33 +193,33 @@ class Shifted:
         self.frequency, self.count = frequency, 0
         self._begin()
         for row in rows:
-            if not self._met(row):
+            if not self._append(row):
                 raise ArithmeticError(
                     f"corrections that are no longer independent at frequency {frequency:g}"
                 )
             self.count += 1
 
     def _begin(self) -> None:
-        a, b = self.wanted
+        a, b = self.rhs
         self.rest = a + self.kind.type(1j * self.frequency) * b
-        self.size = _length(self.rest)
+        self.size = _norm(self.rest)
         self.falls = True
         self.target: list[complex] = []
 
-    def _met(self, new: Vector) -> bool:
+    def _append(self, new: Vector) -> bool:
         """What is left without what another correction makes of the equations; False where that is nothing new."""
         count = self.count
-        known, before = self.basis[:count].T, _length(new)
+        known, before = self.basis[:count].T, _norm(new)
         column = np.zeros(count, complex)
         for _ in range(2 if count else 0):
             overlaps = self.times(1.0, known, new, trans=ADJOINT)
             new = self.times(-1.0, known, overlaps, beta=1.0, y=new, overwrite_y=True)
             column += overlaps
-            length = _length(new)
+            length = _norm(new)
             if length >= KRYLOV.reorthogonalise_shifted * before:
                 break
         else:
-            length = _length(new)
+            length = _norm(new)
         if not length > np.finfo(self.kind).eps * before:
             return False
         self.triangle[:count, count], self.triangle[count, count] = column, length

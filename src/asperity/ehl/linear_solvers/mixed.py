@@ -21,26 +21,26 @@ import numpy as np
 
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.controls import MIXED_LINEAR_SOLVER
-from asperity.ehl.linear_solvers.gmres import Room, gmres
+from asperity.ehl.linear_solvers.gmres import Workspace, gmres
 from asperity.ehl.linear_solvers.single_pressure import (
-    Blocks,
-    Kept,
+    BlockSolver,
     LineRelaxation,
-    NestedBlocks,
+    MultigridSolver,
+    StoredOil,
+    fold_at_mirror,
     single_faces,
-    turn_back,
 )
 from asperity.ehl.models.mixed import (
-    OPEN_FROM,
+    OPENING_RANGE,
     MixedBalance,
     Pressures,
-    added_by_lean,
-    lean_slopes,
+    advected_outflow,
+    limiter_outflow,
+    limiter_slopes,
     opening_slopes,
-    transported,
     upwind_at_outlet,
 )
-from asperity.ehl.models.single_pressure import CLOSED_WITHIN, Past
+from asperity.ehl.models.single_pressure import CLOSED_WITHIN, TransientTerm
 from asperity.kernels import load_sharing, reynolds, stencils
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
@@ -50,7 +50,7 @@ from asperity.kernels.stencils import OuterNeighbours, Stencil
 class MixedLinear:
     """The linearisation of a balance: `product` applies it, `answer` approximately inverts it; all (nx, ny).
 
-    `closely` lets the lines follow how the wedge leans, too: where the equations are met far
+    `with_limiter` lets the lines follow how the wedge leans, too: where the equations are met far
     closer than to a tenth.
     """
 
@@ -60,7 +60,7 @@ class MixedLinear:
         dtype: Any = np.float32,
         settled: Mask | None = None,
         *,
-        closely: bool = False,
+        with_limiter: bool = False,
     ) -> None:
         self.balance, problem = balance, balance.problem
         self.cells, self.real = problem.cells, dtype
@@ -81,9 +81,9 @@ class MixedLinear:
             pressed = (balance.unknowns.oil > problem.p_cap) & self.lubricated
             self.growth_by_oil = np.where(pressed, self.real(problem.softness), self.real(0.0))
             self.surplus_by_gap = (missing * balance.film.content_by_gap).astype(self.real)
-        self.leans = bool(np.any(balance.lean))
-        if self.leans:
-            self.lean_own, self.lean_upstream = lean_slopes(balance, dtype)
+        self.has_limiter = bool(np.any(balance.limiter))
+        if self.has_limiter:
+            self.limiter_own, self.limiter_upstream = limiter_slopes(balance, dtype)
         state = np.where(self.lubricated, np.int8(LUBRICATED), balance.rows.state)
         self.rows = Rows(
             state, balance.rows.fluid_scale.astype(self.real), balance.rows.contact_scale
@@ -95,29 +95,29 @@ class MixedLinear:
             self.film.content_by_gap,
             self.film.content_by_pressure,
         )
-        self.kept = self._kept(problem.past)
-        self.follows_oil = problem.past is not None and problem.past.followed
+        self.storage = self._storage(problem.past)
+        self.lagrangian = problem.past is not None and problem.past.lagrangian
         self.opening = None
-        if self.leans and settled is not None and not self.follows_oil:
+        if self.has_limiter and settled is not None and not self.lagrangian:
             self.opening = opening_slopes(balance, settled)
-        if self.follows_oil:
+        if self.lagrangian:
             self.film = self.film.without_wedge
-        self.closely = closely and self.leans
+        self.with_limiter = with_limiter and self.has_limiter
 
     @cached_property
-    def inverse(self) -> tuple[Blocks | NestedBlocks, LineRelaxation]:
+    def inverse(self) -> tuple[BlockSolver | MultigridSolver, LineRelaxation]:
         """Blocks and lines, made when they are first asked for."""
         stencil, far = self._stencil()
         weight = np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
         alike = (
             not self.follows_wedge
             and min(self.cells) >= MIXED_LINEAR_SOLVER.min_multigrid_cells
-            and (self.closely or firm(self.balance))
+            and (self.with_limiter or is_firm(self.balance))
         )
-        blocks = (NestedBlocks if alike else Blocks)(stencil, weight)
-        return blocks, LineRelaxation(*self._leaning(stencil)) if self.closely else LineRelaxation(
-            stencil, far
-        )
+        blocks = (MultigridSolver if alike else BlockSolver)(stencil, weight)
+        return blocks, LineRelaxation(
+            *self._with_limiter(stencil)
+        ) if self.with_limiter else LineRelaxation(stencil, far)
 
     def _stencil(self) -> tuple[Stencil, OuterNeighbours | None]:
         problem, stencil = self.balance.problem, Stencil(*np.empty((5, *self.cells), self.real))
@@ -125,33 +125,33 @@ class MixedLinear:
         rows, film = self.rows._replace(state=state), self.film.with_fixed_gap(~self.free)
         own, far = 1.0 / self.rows.contact_scale, None
         if self.follows_wedge:
-            far, near = (
+            far, compliance = (
                 OuterNeighbours(*np.empty((2, *self.cells), self.real)),
-                problem.deflection.near,
+                problem.deflection.near_compliance,
             )
             stencils.wedge_stencil(
                 rows,
                 film,
                 self.faces,
                 self.oil,
-                (own, near[1] - near[3]),
+                (own, compliance[1] - compliance[3]),
                 problem.spacing,
                 stencil,
                 far,
             )
         else:
             stencils.own_stencil(rows, film, self.faces, self.oil, own, problem.spacing, stencil)
-        if self.kept is not None:
-            by_gap = np.where(self.free, self.kept.by_gap, self.real(0.0))
+        if self.storage is not None:
+            by_gap = np.where(self.free, self.storage.by_gap, self.real(0.0))
             stencil.centre[:] += np.where(
-                self.lubricated, by_gap * self.real(own) + self.kept.by_pressure, 0.0
+                self.lubricated, by_gap * self.real(own) + self.storage.by_pressure, 0.0
             )
-        turn_back(stencil, problem.mirror)
+        fold_at_mirror(stencil, problem.mirror)
         if self.conserves:
-            self._loosen(stencil)
+            self._advect_surplus(stencil)
         return stencil, far
 
-    def _leaning(self, stencil: Stencil) -> tuple[Stencil, OuterNeighbours]:
+    def _with_limiter(self, stencil: Stencil) -> tuple[Stencil, OuterNeighbours]:
         """The stencil and what it has of cells further upstream, with the wedge leaning.
 
         Beside closed cells films thin many times over from one cell to the next. The wedge leans
@@ -166,20 +166,20 @@ class MixedLinear:
             np.zeros_like(content),
             np.zeros_like(content),
         )  # of what the eastern faces pass on besides
-        own[1:-1] = (self.lean_own * content)[1:-1] / dx
-        upstream[1:-1] = self.lean_upstream[1:-1] * content[:-2] / dx
+        own[1:-1] = (self.limiter_own * content)[1:-1] / dx
+        upstream[1:-1] = self.limiter_upstream[1:-1] * content[:-2] / dx
         far = OuterNeighbours(*np.zeros((2, *self.cells), self.real))
         stencil.centre[:] += self.scale * own
         stencil.west[1:] -= self.scale[1:] * (upstream[1:] + own[:-1])
         far.west[2:] += self.scale[2:] * upstream[1:-1]
         return stencil, far
 
-    def _loosen(self, stencil: Stencil) -> None:
+    def _advect_surplus(self, stencil: Stencil) -> None:
         """Cells whose unknown is not a pressure hand what they hold to the next cell downstream, and to no other."""
         past, real, scale = self.balance.problem.past, self.real, self.rows.fluid_scale
         loose = self.lubricated & ~self.full
-        followed = past is not None and past.followed
-        wedge = real(0.0 if followed else 1.0 / self.balance.problem.spacing[0])
+        lagrangian = past is not None and past.lagrangian
+        wedge = real(0.0 if lagrangian else 1.0 / self.balance.problem.spacing[0])
         own = wedge + real(0.0 if past is None else past.rate)
         stencil.centre[loose] = (self.surplus_by_oil * own * scale)[loose]
         stencil.west[1:][loose[:-1]] = (-wedge * self.surplus_by_oil[:-1] * scale[1:])[loose[:-1]]
@@ -188,12 +188,12 @@ class MixedLinear:
         stencil.north[np.roll(loose, -1, axis=1)] = 0.0
         stencil.south[np.roll(loose, 1, axis=1)] = 0.0
 
-    def _kept(self, past: Past | None) -> Kept | None:
+    def _storage(self, past: TransientTerm | None) -> StoredOil | None:
         """What the first rows of followed oil draw in by the wedge is left out, as in `asperity.ehl.linear_solvers.single_pressure`."""
         if past is None:
             return None
         scaled = self.scale * self.real(past.rate)
-        return Kept(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
+        return StoredOil(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
 
     def product(self, d_oil: Field, d_total: Field, d_approach: float) -> tuple[Field, Field]:
         """Changes of the oil's equations and of touching cells'; of the unknown itself where it is known."""
@@ -214,24 +214,27 @@ class MixedLinear:
         )
         if self.conserves:
             d_height = (
-                np.where(self.balance.shut, self.real(0.0), d_gap) + self.growth_by_oil * d_oil
+                np.where(self.balance.sealed, self.real(0.0), d_gap) + self.growth_by_oil * d_oil
             )
         change = reynolds.PressureChange(d_pressure, d_height)
         reynolds.jacobian_product(
             self.rows, self.film, self.faces, self.oil, change, spacing, 0.0, wet
         )
-        if self.kept is not None:
-            wet += self.kept.by_gap * d_height + self.kept.by_pressure * d_pressure
+        if self.storage is not None:
+            wet += self.storage.by_gap * d_height + self.storage.by_pressure * d_pressure
         if self.conserves:
-            rest = transported(
+            rest = advected_outflow(
                 problem, self.missing_by_oil * d_oil + self.surplus_by_gap * d_height
             )
             d_content = self.content_by_gap * d_height + self.content_by_pressure * d_pressure
             upwind_at_outlet(problem, d_content, rest)
             wet += rest * self.scale
-        elif self.leans:
+        elif self.has_limiter:
             d_content = self.content_by_gap * d_gap + self.content_by_pressure * d_pressure
-            wet += added_by_lean(problem, d_content, self.lean_own, self.lean_upstream) * self.scale
+            wet += (
+                limiter_outflow(problem, d_content, self.limiter_own, self.limiter_upstream)
+                * self.scale
+            )
         if self.opening is not None:
             faces, cells, slopes = self.opening
             through = (slopes / spacing[0]).astype(self.real) * d_gap.ravel()[cells]
@@ -265,9 +268,9 @@ class _Step:
     def __init__(self, linear: MixedLinear) -> None:
         self.linear, self.problem = linear, linear.balance.problem
         self.count, self.touching = linear.balance.gap.size, np.flatnonzero(linear.touching)
-        self.moves = self.problem.held is None
+        self.approach_is_free = self.problem.fixed is None
         self.weight = linear.real(1.0 / np.sqrt(self.count))
-        self.bearing = (linear.free & linear.full if linear.conserves else linear.free).astype(
+        self.load_weights = (linear.free & linear.full if linear.conserves else linear.free).astype(
             linear.real
         )
         by_approach = linear.of_gap(
@@ -276,7 +279,7 @@ class _Step:
         self.response = self._answered(
             self.joined(np.where(linear.lubricated, by_approach[0], 0.0), by_approach[1], 0.0)
         )
-        self.whole = self._borne(self.response)
+        self.whole = self._load_change(self.response)
 
     def joined(self, oil: Field, solid: Field, last: float) -> Field:
         """A vector of what is known of the oil, of touching cells (both (nx, ny)) and of the load or the approach."""
@@ -294,7 +297,7 @@ class _Step:
 
     def total(self, vector: Field) -> Field:
         """Change of the total pressure, (nx, ny): the oil's in free cells, their own in touching ones."""
-        total: Field = self.oil(vector) * self.bearing
+        total: Field = self.oil(vector) * self.load_weights
         total.ravel()[self.touching] = vector[self.count : -1]
         return total
 
@@ -303,15 +306,19 @@ class _Step:
         total, rows = self.total(vector), np.empty_like(vector)
         wet, closed = self.linear.product(self.oil(vector), total, float(vector[-1]))
         rows[: self.count], rows[self.count : -1] = wet.ravel(), closed.ravel()[self.touching]
-        rows[-1] = self.weight * self.problem.summed(total) if self.moves else vector[-1]
+        rows[-1] = (
+            self.weight * self.problem.sum_over_cells(total)
+            if self.approach_is_free
+            else vector[-1]
+        )
         return rows
 
     def precondition(self, rows: Field) -> Field:
         """About what answers them."""
         change = self._answered(rows)
-        if self.moves:
+        if self.approach_is_free:
             d_approach = self.linear.real(
-                (self._borne(change) - rows[-1] / self.weight) / self.whole
+                (self._load_change(change) - rows[-1] / self.weight) / self.whole
             )
             change -= d_approach * self.response
             change[-1] = d_approach
@@ -322,20 +329,22 @@ class _Step:
         change[: self.count] = self.linear.answer(self.oil(rows)).ravel()
         return change
 
-    def _borne(self, vector: Field) -> float:
+    def _load_change(self, vector: Field) -> float:
         """By how much more the pressures bear."""
         if self.problem.mirror:
-            return float(self.problem.summed(self.total(vector)))
-        return float(vector[: self.count] @ self.bearing.ravel() + vector[self.count : -1].sum())
+            return float(self.problem.sum_over_cells(self.total(vector)))
+        return float(
+            vector[: self.count] @ self.load_weights.ravel() + vector[self.count : -1].sum()
+        )
 
 
-def flattened(balance: MixedBalance) -> Mask:
+def flattened_cells(balance: MixedBalance) -> Mask:
     """Cells that the cap holds closed: no oil that comes lifts them."""
     closed = balance.gap <= (1.0 + CLOSED_WITHIN) * balance.problem.contact_gap
     return np.asarray(closed & (balance.solid == CAPPED))
 
 
-def foreseen(balance: MixedBalance) -> MixedBalance:
+def extend_streaks(balance: MixedBalance) -> MixedBalance:
     """The same, but that flattened cells without oil are lubricated as far down the stream as oil fills those before.
 
     A cell is ruptured until oil has come to it: oil that fills a streak of closed cells would go
@@ -350,7 +359,7 @@ def foreseen(balance: MixedBalance) -> MixedBalance:
     return replace(balance, rows=rows._replace(state=state), oil_residual=residual)
 
 
-def firm(balance: MixedBalance) -> bool:
+def is_firm(balance: MixedBalance) -> bool:
     """Whether few cells are nearly closed beside those that are flattened.
 
     Where many are, films of about the contact film close and open from step to step. How they open
@@ -358,29 +367,31 @@ def firm(balance: MixedBalance) -> bool:
     when they are summed again and again.
     """
     gap, film = balance.gap, balance.problem.contact_gap
-    nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPEN_FROM) * film)
-    return bool(nearly.sum() < MIXED_LINEAR_SOLVER.max_nearly_closed * flattened(balance).sum())
+    nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPENING_RANGE) * film)
+    return bool(
+        nearly.sum() < MIXED_LINEAR_SOLVER.max_nearly_closed * flattened_cells(balance).sum()
+    )
 
 
 def newton_step(
-    balance: MixedBalance, settled: Mask | None = None, room: Room | None = None
+    balance: MixedBalance, settled: Mask | None = None, workspace: Workspace | None = None
 ) -> Pressures:
     """Changes of all unknowns that meet every linearised equation, and the load, to a tenth.
 
     How the wedge opens is linearised in cells whose gap has `settled`, where bodies touch firmly,
     and oil is foreseen in flattened streaks; neither without `settled`. Steps of one grid may
-    share GMRES's `room`.
+    share GMRES's `workspace`.
     """
     problem = balance.problem
     stands = (
         settled is not None
         and not problem.conserve
         and problem.past is None
-        and problem.held is None
+        and problem.fixed is None
     )
     if stands:
-        balance = foreseen(balance)
-    settled = settled if stands and firm(balance) else None
+        balance = extend_streaks(balance)
+    settled = settled if stands and is_firm(balance) else None
     linear = MixedLinear(balance, settled=settled)
     real, zero = linear.real, linear.real(0.0)
     known_oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
@@ -393,8 +404,8 @@ def newton_step(
     dx, dy = problem.spacing
     step = _Step(linear)
     missing = (
-        -balance.load_error * problem.load / (dx * dy) - problem.summed(known)
-        if step.moves
+        -balance.load_error * problem.load / (dx * dy) - problem.sum_over_cells(known)
+        if step.approach_is_free
         else 0.0
     )
     if (
@@ -407,9 +418,7 @@ def newton_step(
             * float(np.sign(missing))
             / balance.rows.contact_scale,
         )
-    wanted = step.joined(
-        np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing)
-    )
+    rhs = step.joined(np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing))
     left = (
         MIXED_LINEAR_SOLVER.tolerance_smooth
         if linear.follows_wedge
@@ -417,17 +426,17 @@ def newton_step(
     )
     if (
         problem.conserve
-        and linear.follows_oil
+        and linear.lagrangian
         and balance.residual_rms < MIXED_LINEAR_SOLVER.conserving_residual
     ):
         left = MIXED_LINEAR_SOLVER.tolerance_conserving
     solved = gmres(
         step.product,
         step.precondition,
-        wanted,
+        rhs,
         tolerance=left,
-        most_steps=MIXED_LINEAR_SOLVER.max_krylov_steps,
-        room=room,
+        max_steps=MIXED_LINEAR_SOLVER.max_krylov_steps,
+        workspace=workspace,
     )
     d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), zero)
     d_total = np.where(linear.free, linear.pressure_of(d_oil) - balance.solid_residual, known)

@@ -29,7 +29,7 @@ from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
 Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 
 
-class Answer(NamedTuple):
+class OscillationResponse(NamedTuple):
     """Complex amplitudes of the oil's and the total pressure, (nx, ny), per change of approach, bodies coming closer.
 
     `left` is the share of the equations that was left, `steps` those of GMRES, `unknowns` the
@@ -58,7 +58,7 @@ class _Equations(Protocol):
     def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
         """Oil's and total pressure, (nx, ny)."""
 
-    def bearing(self) -> Field:
+    def load_weights(self) -> Field:
         """Weight of each unknown in the sum of the total pressure."""
 
 
@@ -95,7 +95,7 @@ class _OnePressure:
         pressure = vector.reshape(self.cells)
         return pressure, pressure
 
-    def bearing(self) -> Field:
+    def load_weights(self) -> Field:
         return np.ones(self.size, self.real)
 
 
@@ -103,7 +103,7 @@ class _TwoPressures:
     """The oil's pressure in every cell and, after these, the total one of touching cells."""
 
     def __init__(self, balance: MixedBalance, real: Any) -> None:
-        self.real, self.linear = real, (linear := MixedLinear(balance, real, closely=True))
+        self.real, self.linear = real, (linear := MixedLinear(balance, real, with_limiter=True))
         self.cells, self.count = linear.cells, balance.gap.size
         self.touching = np.flatnonzero(linear.touching)
         self.size = self.count + self.touching.size
@@ -113,7 +113,7 @@ class _TwoPressures:
         self.by_pressure = (scale * balance.film.content_by_pressure).astype(real)
         self.own, self.stiff = real(1.0 / linear.rows.contact_scale), self._stiff()
         self.weights = self._weights()
-        self.lifted = 1.0 / self.weights
+        self.opening_cells = 1.0 / self.weights
 
     @cached_property
     def patch(self) -> tuple[slice, Deflection] | None:
@@ -136,18 +136,20 @@ class _TwoPressures:
         stored = self.by_gap * d_gap + self.by_pressure * d_oil
         rows = self._joined(np.where(self.linear.lubricated, wet, d_oil), gap_rows)
         rows *= self.weights
-        kept = np.zeros_like(rows)
-        np.multiply(stored.ravel(), self.weights[: self.count], out=kept[: self.count])
-        return rows, kept
+        storage = np.zeros_like(rows)
+        np.multiply(stored.ravel(), self.weights[: self.count], out=storage[: self.count])
+        return rows, storage
 
     def answer(self, rows: Field) -> Field:
         """As in Newton's step, but that cells whose gap is known answer together: here none of them changes sides."""
-        wet, gap_rows = self._split(rows * self.lifted)
+        wet, gap_rows = self._split(rows * self.opening_cells)
         oil, closed = self.linear.answer(wet), gap_rows * self.own
         if self.patch is not None:
             lines, deflection = self.patch
             stiff = self.stiff[lines]
-            together = deflection.undone(np.where(stiff, self.own * oil[lines], closed[lines]))
+            together = deflection.approximate_inverse(
+                np.where(stiff, self.own * oil[lines], closed[lines])
+            )
             oil[lines] = np.where(stiff, together, oil[lines])
             closed[lines] = together
         return self._joined(oil, closed)
@@ -175,7 +177,7 @@ class _TwoPressures:
         if self.deflection.mirror:
             return slice(None), self.deflection
         span = slice(int(lines[0]), int(lines[-1]) + 1)
-        return span, self.deflection.among(span.stop - span.start)
+        return span, self.deflection.restrict_to(span.stop - span.start)
 
     def _weights(self) -> Field:
         """Of the rows: a touching cell's oil counts by what flows on from it, as free cells' does, not by its pressure.
@@ -193,7 +195,7 @@ class _TwoPressures:
         oil, closed = self._split(vector)
         return oil, np.where(self.linear.free, oil, closed)
 
-    def bearing(self) -> Field:
+    def load_weights(self) -> Field:
         return self._joined(self.linear.free.astype(self.real), np.ones(self.cells, self.real))
 
 
@@ -210,25 +212,27 @@ class Oscillating:
         self.rough = self.exact if one_line else _equations(balance, np.float32)
         self.by_approach = self.exact.product(np.zeros(self.exact.size), 1.0)
 
-    def answer(self, frequency: float, *, tolerance: float, start: Answer | None = None) -> Answer:
+    def answer(
+        self, frequency: float, *, tolerance: float, start: OscillationResponse | None = None
+    ) -> OscillationResponse:
         """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`.
 
         `start` is an answer at the same frequency: of another one the oil's lag would stay.
         """
         steps, solver = 0, self.rough
         rows, stored = self.by_approach
-        wanted = rows + 1j * frequency * stored
-        size = float(np.linalg.norm(wanted))
-        vector, left, share = np.zeros(self.exact.size, complex), wanted, 1.0
+        rhs = rows + 1j * frequency * stored
+        size = float(np.linalg.norm(rhs))
+        vector, left, share = np.zeros(self.exact.size, complex), rhs, 1.0
         if start is not None:
             vector = start.unknowns
-            left, share = self._left(wanted, vector, frequency, size)
+            left, share = self._residual(rhs, vector, frequency, size)
         for _ in range(OSCILLATION.max_rounds):
             if share <= tolerance:
                 break
             leaving = max(tolerance / share, OSCILLATION.round_tolerance)
             change, taken = _solved(solver, left, frequency, leaving)
-            left, now = self._left(wanted, vector + change, frequency, size)
+            left, now = self._residual(rhs, vector + change, frequency, size)
             steps += taken
             if (
                 now
@@ -243,8 +247,8 @@ class Oscillating:
             if now < share:
                 vector, share = vector + change, now
             else:
-                left, share = self._left(wanted, vector, frequency, size)
-        return Answer(*self.exact.pressures(vector), share, steps, vector)
+                left, share = self._residual(rhs, vector, frequency, size)
+        return OscillationResponse(*self.exact.pressures(vector), share, steps, vector)
 
     def sweep(self, frequency: float) -> Shifted:
         """The answer at Ω = `frequency` on its way, one round of GMRES whose Ω may move."""
@@ -254,29 +258,29 @@ class Oscillating:
             lambda vector: _both(equations, vector),
             lambda vector: np.asarray(_each_part(equations.answer, vector)),
             (self.by_approach[0].astype(kind), self.by_approach[1].astype(kind)),
-            self.bearing,
+            self.load_weights,
             frequency,
             OSCILLATION.max_krylov_steps,
         )
 
-    def swept(self, sweep: Shifted) -> Answer:
+    def swept(self, sweep: Shifted) -> OscillationResponse:
         """Where a sweep has come to; what it leaves is measured in double."""
         rows, stored = self.by_approach
         vector = sweep.answer().astype(complex)
-        wanted = rows + 1j * sweep.frequency * stored
-        _, share = self._left(wanted, vector, sweep.frequency, float(np.linalg.norm(wanted)))
-        return Answer(*self.exact.pressures(vector), share, sweep.count, vector)
+        rhs = rows + 1j * sweep.frequency * stored
+        _, share = self._residual(rhs, vector, sweep.frequency, float(np.linalg.norm(rhs)))
+        return OscillationResponse(*self.exact.pressures(vector), share, sweep.count, vector)
 
     @cached_property
-    def bearing(self) -> Field:
+    def load_weights(self) -> Field:
         """Weights of the unknowns in the sum of the total pressure."""
-        return self.rough.bearing()
+        return self.rough.load_weights()
 
-    def _left(
-        self, wanted: Waves, vector: Waves, frequency: float, size: float
+    def _residual(
+        self, rhs: Waves, vector: Waves, frequency: float, size: float
     ) -> tuple[Waves, float]:
         """What of the equations is left, and its share of all."""
-        left = wanted - _product(self.exact, vector, frequency)
+        left = rhs - _product(self.exact, vector, frequency)
         return left, float(np.linalg.norm(left)) / size
 
 
@@ -289,7 +293,7 @@ def _equations(balance: Balance | MixedBalance, real: Any) -> _Equations:
 
 
 def _solved(
-    equations: _Equations, wanted: Waves, frequency: float, tolerance: float
+    equations: _Equations, rhs: Waves, frequency: float, tolerance: float
 ) -> tuple[Waves, int]:
     """The unknowns that answer, but for a share `tolerance`, in the equations' own precision; and the steps it took."""
     steps = 0
@@ -303,13 +307,13 @@ def _solved(
         return np.asarray(_each_part(equations.answer, vector))
 
     kind = np.result_type(equations.real, np.complex64)
-    scale = float(np.linalg.norm(wanted))
+    scale = float(np.linalg.norm(rhs))
     found = gmres(
         product,
         precondition,
-        (wanted / scale).astype(kind),
+        (rhs / scale).astype(kind),
         tolerance=tolerance,
-        most_steps=OSCILLATION.max_krylov_steps,
+        max_steps=OSCILLATION.max_krylov_steps,
     )
     return np.asarray(scale * found, dtype=complex), steps
 

@@ -12,15 +12,15 @@ import scipy
 
 from asperity.core.arrays import Field
 from asperity.ehl.controls import PRECONDITIONER
-from asperity.ehl.deflection import BETWEEN
-from asperity.ehl.models.single_pressure import Balance, Past
+from asperity.ehl.deflection import MIRROR_BETWEEN
+from asperity.ehl.models.single_pressure import Balance, TransientTerm
 from asperity.kernels import line_relaxation, multigrid, reynolds, stencils
 from asperity.kernels.multigrid import GridHierarchy
 from asperity.kernels.reynolds import LUBRICATED, Faces, Film
 from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 
-class Kept(NamedTuple):
+class StoredOil(NamedTuple):
     """What lubricated cells store, as it stands in their scaled equations: by a change of gap and of pressure."""
 
     by_gap: Field
@@ -46,17 +46,17 @@ class Linear:
             None if balance.film is None else Film(*(part.astype(dtype) for part in balance.film))
         )
         self.faces = None if balance.faces is None else single_faces(balance.faces, dtype)
-        self.storing, self.kept = storing, self._kept(balance.problem.past, storing)
+        self.storing, self.storage = storing, self._storage(balance.problem.past, storing)
         if (
             self.film is not None
             and balance.problem.past is not None
-            and balance.problem.past.followed
+            and balance.problem.past.lagrangian
         ):
             self.film = self.film.without_wedge
         self.stencil = self._stencil()
         self.lines = LineRelaxation(self.stencil)
         if self.film is not None:
-            self.blocks = Blocks(
+            self.blocks = BlockSolver(
                 self.stencil, np.where(balance.rows.state == LUBRICATED, 1.0 / scale, dtype(0.0))
             )
 
@@ -84,9 +84,9 @@ class Linear:
             self.storing,
             out,
         )
-        if self.kept is not None:
-            out += self.kept.by_gap * d_gap
-            out += self.kept.by_pressure * d_pressure
+        if self.storage is not None:
+            out += self.storage.by_gap * d_gap
+            out += self.storage.by_pressure * d_pressure
         return out
 
     def __call__(self, residual: Field) -> Field:
@@ -94,7 +94,7 @@ class Linear:
         change = np.zeros(self.cells, self.dtype) if self.film is None else self.blocks(residual)
         return self.lines(residual, change)
 
-    def _kept(self, past: Past | None, storing: float) -> Kept | None:
+    def _storage(self, past: TransientTerm | None, storing: float) -> StoredOil | None:
         """What the kernels leave to be added; they store for followed oil nothing.
 
         What the first two rows then draw in by the wedge is left out: so far from the contact the
@@ -102,11 +102,11 @@ class Linear:
         """
         if past is None or self.film is None:
             return None
-        rate = self.dtype(past.rate + (storing if past.followed else 0.0))
+        rate = self.dtype(past.rate + (storing if past.lagrangian else 0.0))
         scaled = np.where(
             self.rows.state == LUBRICATED, self.rows.fluid_scale * rate, self.dtype(0.0)
         )
-        return Kept(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
+        return StoredOil(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
 
     def _stencil(self) -> Stencil:
         stencil = Stencil(*np.empty((5, *self.cells), self.dtype))
@@ -116,21 +116,23 @@ class Linear:
             nothing, nothing, nothing, nothing, nothing, nothing, nothing[0], nothing[0]
         )
         problem = self.balance.problem
-        near = problem.deflection.near
-        stencils.local_stencil(self.rows, film, faces, near, problem.spacing, self.storing, stencil)
-        if self.kept is not None:
-            own, neighbour = (self.dtype(near[k] - near[3]) for k in (0, 1))
-            stencil.centre[:] += self.kept.by_gap * own + self.kept.by_pressure
-            stencil.west[:] += self.kept.by_gap * neighbour
-            stencil.east[:] += self.kept.by_gap * neighbour
-        turn_back(stencil, problem.mirror)
+        compliance = problem.deflection.near_compliance
+        stencils.local_stencil(
+            self.rows, film, faces, compliance, problem.spacing, self.storing, stencil
+        )
+        if self.storage is not None:
+            own, neighbour = (self.dtype(compliance[k] - compliance[3]) for k in (0, 1))
+            stencil.centre[:] += self.storage.by_gap * own + self.storage.by_pressure
+            stencil.west[:] += self.storage.by_gap * neighbour
+            stencil.east[:] += self.storage.by_gap * neighbour
+        fold_at_mirror(stencil, problem.mirror)
         return stencil
 
 
-def turn_back(stencil: Stencil, mirror: int) -> None:
+def fold_at_mirror(stencil: Stencil, mirror: int) -> None:
     """Couple the last line of cells to what is on its side of the mirror, where there is one, in place."""
     if mirror:
-        image = stencil.centre if mirror == BETWEEN else stencil.south
+        image = stencil.centre if mirror == MIRROR_BETWEEN else stencil.south
         image[:, -1] += stencil.north[:, -1]
         stencil.north[:, -1] = 0.0
 
@@ -146,9 +148,13 @@ class LineRelaxation:
         nothing = np.empty((0, 0), stencil.centre.dtype)
         self.stencil, self.far = stencil, far or OuterNeighbours(nothing, nothing)
         for parity in (0, 1):
-            near = np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)
-            beyond = np.empty((2, *near.shape[1:]), near.dtype) if far else (nothing, nothing)
-            lines = line_relaxation.LineFactors(*near, *beyond)
+            compliance = np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)
+            beyond = (
+                np.empty((2, *compliance.shape[1:]), compliance.dtype)
+                if far
+                else (nothing, nothing)
+            )
+            lines = line_relaxation.LineFactors(*compliance, *beyond)
             line_relaxation.factor_lines(
                 stencil, self.far, parity, PRECONDITIONER.min_pivot if far else 0.0, lines
             )
@@ -167,12 +173,12 @@ class SingularFactor(ArithmeticError):
     """Linearised equations that have no solution, or no single one."""
 
 
-class Blocks:
+class BlockSolver:
     """A five-point stencil, its rows times `weight`, summed over blocks of cells and factored by sparse LU."""
 
     def __init__(self, stencil: Stencil, weight: Field) -> None:
         self.weight, (nx, ny) = weight, weight.shape
-        self.block = _block(nx), _block(ny)
+        self.block = _block_size(nx), _block_size(ny)
         self.cells = -(-nx // self.block[0]), -(-ny // self.block[1])
         coarse = Stencil(*np.empty((5, *self.cells)))
         line_relaxation.aggregate_stencil(stencil, weight, self.block, coarse)
@@ -189,23 +195,25 @@ class Blocks:
         return change
 
 
-class NestedBlocks:
+class MultigridSolver:
     """The same summed over blocks of two by two again and again, relaxed on each grid, and inverted on the last."""
 
     def __init__(self, stencil: Stencil, weight: Field) -> None:
         self.weight = weight
-        self.nest = _nest(weight.shape, weight.dtype)
-        if not multigrid.build_hierarchy(stencil, weight, PRECONDITIONER.min_pivot, self.nest):
+        self.hierarchy = _allocate_hierarchy(weight.shape, weight.dtype)
+        if not multigrid.build_hierarchy(stencil, weight, PRECONDITIONER.min_pivot, self.hierarchy):
             raise SingularFactor("the last of nested grids has no inverse")
 
     def __call__(self, residual: Field) -> Field:
         """The change, one number a block, that answers a residual; none in cells without weight."""
         change = np.zeros_like(self.weight)
-        multigrid.apply_hierarchy(self.nest, residual, self.weight, PRECONDITIONER.cycles, change)
+        multigrid.apply_hierarchy(
+            self.hierarchy, residual, self.weight, PRECONDITIONER.cycles, change
+        )
         return change
 
 
-def _nest(cells: tuple[int, int], dtype: Any) -> GridHierarchy:
+def _allocate_hierarchy(cells: tuple[int, int], dtype: Any) -> GridHierarchy:
     """Room for the grids of nested blocks, down to one that is no wider than it has to be."""
     grids = [(-(-cells[0] // 2), -(-cells[1] // 2))]
     while max(grids[-1]) >= PRECONDITIONER.min_halved_cells:
@@ -221,7 +229,7 @@ def _nest(cells: tuple[int, int], dtype: Any) -> GridHierarchy:
     return GridHierarchy._make([places, *(np.empty(shape, dtype) for shape in shapes)])
 
 
-def _block(cells: int) -> int:
+def _block_size(cells: int) -> int:
     """How many cells along an axis the factored grid puts into one."""
     smallest = 1 if cells < 32 else 2 if cells < 128 else 4
     return max(smallest, -(-cells // PRECONDITIONER.max_coarse_cells))
@@ -267,10 +275,10 @@ class _Pattern(NamedTuple):
         except RuntimeError as error:
             raise SingularFactor(str(error)) from None
 
-    def solve(self, factors: Any, wanted: Field) -> Field:
-        """What the factored matrix turns into `wanted`, (cx, cy)."""
+    def solve(self, factors: Any, rhs: Field) -> Field:
+        """What the factored matrix turns into `rhs`, (cx, cy)."""
         solved = np.empty(self.order.size)
-        solved[self.order] = factors.solve(wanted.ravel()[self.order])
+        solved[self.order] = factors.solve(rhs.ravel()[self.order])
         return solved.reshape(self.cells)
 
 

@@ -17,7 +17,7 @@ from asperity.ehl.deflection import Deflection
 from asperity.ehl.models.single_pressure import Problem
 
 
-class _Lines(NamedTuple):
+class _ContactLines(NamedTuple):
     """Neighbouring lines of a problem, (lines, ny), that hold all that touches."""
 
     deflection: Deflection
@@ -28,13 +28,13 @@ class _Lines(NamedTuple):
     cells: int  # of the whole problem
 
     @classmethod
-    def all_of(cls, problem: Problem) -> "_Lines":
+    def from_problem(cls, problem: Problem) -> "_ContactLines":
         inside = np.broadcast_to(~problem.rim, problem.cells)
         dx, dy = problem.spacing
         load, stiffness = problem.load / (dx * dy), 1.0 / problem.softness
         return cls(problem.deflection, problem.undeformed, inside, stiffness, load, inside.size)
 
-    def around(self, touching: Mask) -> tuple["_Lines", slice]:
+    def window(self, touching: Mask) -> tuple["_ContactLines", slice]:
         """Those that touch, and some more."""
         margin, lines = (
             self.undeformed.shape[0] // ELASTIC_DRY.window_margin,
@@ -42,9 +42,9 @@ class _Lines(NamedTuple):
         )
         window = slice(max(lines[0] - margin, 0), lines[-1] + 1 + margin)
         undeformed = self.undeformed[window]
-        among = self.deflection.among(undeformed.shape[0])
+        restrict_to = self.deflection.restrict_to(undeformed.shape[0])
         return self._replace(
-            deflection=among, undeformed=undeformed, inside=self.inside[window]
+            deflection=restrict_to, undeformed=undeformed, inside=self.inside[window]
         ), window
 
     def state(self, pressure: Field) -> tuple[Field, float, float]:
@@ -52,8 +52,8 @@ class _Lines(NamedTuple):
         gap = self.undeformed + self.deflection(pressure)
         approach = -float(gap[pressure > 0.0].mean())
         gap += approach
-        left = np.minimum(pressure, gap * self.stiffness)[self.inside]
-        return gap, approach, float(np.sqrt(np.vdot(left, left) / self.cells))
+        residual = np.minimum(pressure, gap * self.stiffness)[self.inside]
+        return gap, approach, float(np.sqrt(np.vdot(residual, residual) / self.cells))
 
 
 def elastic_contact(
@@ -63,30 +63,30 @@ def elastic_contact(
 
     The tolerance is of the equations' root mean square, as a share of p_h.
     """
-    whole = _Lines.all_of(problem)
+    whole = _ContactLines.from_problem(problem)
     pressure = np.where(whole.inside, np.maximum(pressure, 0.0), 0.0)
     pressure *= whole.load / pressure.sum()
     steps = ELASTIC_DRY.max_krylov_steps
     for _ in range(ELASTIC_DRY.max_windows):
-        gap, approach, left = whole.state(pressure)
-        if left < tolerance or steps <= 0:
+        gap, approach, residual = whole.state(pressure)
+        if residual < tolerance or steps <= 0:
             break
-        lines, window = whole.around(whole.inside & ((pressure > 0.0) | (gap < 0.0)))
-        found, taken = _pressed(lines, pressure[window], tolerance, steps)
+        lines, window = whole.window(whole.inside & ((pressure > 0.0) | (gap < 0.0)))
+        found, taken = _solve_window(lines, pressure[window], tolerance, steps)
         pressure = np.zeros_like(pressure)
         pressure[window] = found
         steps -= taken
-    return pressure, approach, left < tolerance
+    return pressure, approach, residual < tolerance
 
 
-def _pressed(
-    lines: _Lines, pressure: Field, tolerance: float, most_steps: int
+def _solve_window(
+    lines: _ContactLines, pressure: Field, tolerance: float, max_steps: int
 ) -> tuple[Field, int]:
     """Pressures on some lines, none below 0, and the steps they took: met, or out of steps or sets."""
     steps, before = 0, pressure > 0.0
     for _ in range(ELASTIC_DRY.max_active_sets):
-        gap, _, left = lines.state(pressure)
-        if left < tolerance or steps >= most_steps:
+        gap, _, residual = lines.state(pressure)
+        if residual < tolerance or steps >= max_steps:
             break
         touching = lines.inside & (pressure > gap * lines.stiffness)
         count = np.count_nonzero(touching)
@@ -99,17 +99,17 @@ def _pressed(
             ELASTIC_DRY.loose
             if changing
             else ELASTIC_DRY.tight
-            if left > ELASTIC_DRY.final_residual
+            if residual > ELASTIC_DRY.final_residual
             else ELASTIC_DRY.exact
         )
-        share = max(share, 0.2 * tolerance / left)
-        change, _, taken = levelled(lines.deflection, touching, gap, share, most_steps - steps)
+        share = max(share, 0.2 * tolerance / residual)
+        change, _, taken = level_gaps(lines.deflection, touching, gap, share, max_steps - steps)
         pressure, before, steps = settled + change, touching, steps + taken
     pressure = np.maximum(pressure, 0.0)
     return pressure * (lines.load / pressure.sum()), steps
 
 
-def levelled(
+def level_gaps(
     deflection: Deflection, touching: Mask, gap: Field, share: float, most: int
 ) -> tuple[Field, float, int]:
     """A change of touching cells' pressures, in sum nothing, that levels their gaps but for a share.
@@ -117,9 +117,9 @@ def levelled(
     With it the level, and the steps that were taken.
     """
     count, level = np.float32(np.count_nonzero(touching)), gap[touching].mean()
-    left = np.where(touching, level - gap, 0.0).astype(np.float32)
-    change, direction, step = np.zeros_like(left), left.copy(), 0
-    size = first = float(np.vdot(left, left))
+    residual = np.where(touching, level - gap, 0.0).astype(np.float32)
+    change, direction, step = np.zeros_like(residual), residual.copy(), 0
+    size = first = float(np.vdot(residual, residual))
     while size > share**2 * first and step < most:
         answer = deflection(direction)
         answer[~touching] = 0.0
@@ -128,10 +128,10 @@ def levelled(
         length = np.float32(size / float(np.vdot(answer, direction)))
         change += length * direction
         level += length * mean
-        left -= length * answer
-        before, size = size, float(np.vdot(left, left))
+        residual -= length * answer
+        before, size = size, float(np.vdot(residual, residual))
         direction *= np.float32(size / before)
-        direction += left
+        direction += residual
         step += 1
     exact = change.astype(float)
     exact[touching] -= exact[touching].mean()

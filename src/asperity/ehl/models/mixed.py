@@ -42,7 +42,7 @@ from asperity.kernels.reynolds import (
 )
 from asperity.lubricant import Lubricant
 
-OPEN_FROM = 0.5  # contact films of gap beyond the contact film
+OPENING_RANGE = 0.5  # contact films of gap beyond the contact film
 
 
 class Pressures(NamedTuple):
@@ -75,9 +75,9 @@ class MixedBalance:
     solid: Codes
     film: Film
     faces: Faces
-    lean: Field
+    limiter: Field
     outflow: Field  # net oil outflow per cell area
-    shut: Mask  # cells whose film does not change with the gap
+    sealed: Mask  # cells whose film does not change with the gap
     surplus: Field | None = (
         None  # content beyond the full film's, where oil is conserved: what is missing, negative
     )
@@ -103,9 +103,9 @@ class MixedBalance:
         return self.unknowns.total
 
     @property
-    def leant(self) -> Field:
+    def limiter_correction(self) -> Field:
         """How far the wedge leans back from first order, in content, (nx, ny)."""
-        return self.lean * (self.film.content - _upstream(self.problem, self.film.content))
+        return self.limiter * (self.film.content - _upstream(self.problem, self.film.content))
 
     @property
     def film_share(self) -> Field:
@@ -180,7 +180,7 @@ def evaluate(
     """
     gap = problem.undeformed + problem.deflection(unknowns.total)
     gap += unknowns.approach
-    return _evaluate(problem, unknowns, gap, second_order, freed, may_lift=True)
+    return _evaluate(problem, unknowns, gap, second_order, freed, may_open=True)
 
 
 def _evaluate(
@@ -190,7 +190,7 @@ def _evaluate(
     second_order: bool,
     freed: Mask | None,
     *,
-    may_lift: bool,
+    may_open: bool,
 ) -> MixedBalance:
     signed, pressure, approach = unknowns
     assert problem.lubricant is not None
@@ -199,43 +199,49 @@ def _evaluate(
     oil = np.clip(signed, 0.0, problem.p_cap)
     height = np.maximum(gap, closed) + _growth(problem, signed) if problem.conserve else gap
     film, faces, outflow, fluid_scale = _flow(problem, oil, height, problem.lubricant)
-    lean = (
-        _lean(problem, film.content, gap)
-        if second_order and may_lean(problem)
+    limiter = (
+        _limiter(problem, film.content, gap)
+        if second_order and uses_limiter(problem)
         else np.zeros_like(gap)
     )
     surplus, surplus_by_oil = _surplus(problem, film, signed) if problem.conserve else (None, None)
-    outflow += _beyond_first_order(problem, film.content, lean, second_order=second_order)
+    outflow += _second_order_outflow(problem, film.content, limiter, second_order=second_order)
     if surplus is not None:
-        outflow += transported(problem, surplus)
+        outflow += advected_outflow(problem, surplus)
         upwind_at_outlet(problem, film.content, outflow)
 
     cells = CellState(signed, oil, pressure, gap, outflow, np.empty_like(gap))
     load_sharing.outflow_by_pressure(
-        film, faces, _carried(problem), *problem.spacing, cells.own_outflow
+        film, faces, _outflow_by_content(problem), *problem.spacing, cells.own_outflow
     )
     freed = np.zeros(gap.shape, dtype=bool) if freed is None else freed
-    lifted, sunk, shut = np.empty((3, *gap.shape), dtype=bool)
-    if load_sharing.mark_opening(cells, bounds, lifted) and may_lift:
+    opening_cells, sunk, sealed = np.empty((3, *gap.shape), dtype=bool)
+    if load_sharing.mark_opening(cells, bounds, opening_cells) and may_open:
         unknowns = Pressures(
-            np.where(lifted & (pressure > oil), pressure, signed), pressure, approach
+            np.where(opening_cells & (pressure > oil), pressure, signed), pressure, approach
         )
-        return _evaluate(problem, unknowns, gap, second_order, freed | lifted, may_lift=False)
+        return _evaluate(
+            problem, unknowns, gap, second_order, freed | opening_cells, may_open=False
+        )
     solid, solid_residual = np.empty(gap.shape, dtype=np.int8), np.empty_like(gap)
-    if load_sharing.fill_contact_rows(cells, bounds, lifted, freed, solid, solid_residual, sunk):
+    if load_sharing.fill_contact_rows(
+        cells, bounds, opening_cells, freed, solid, solid_residual, sunk
+    ):
         lacking = np.where(sunk, film.content_by_gap * (gap - closed), 0.0)
-        outflow += transported(problem, lacking) + added_by_lean(problem, lacking, lean, lean)
-    load_sharing.mark_sealed(cells, bounds, solid, sunk, fluid_scale, shut)
+        outflow += advected_outflow(problem, lacking) + limiter_outflow(
+            problem, lacking, limiter, limiter
+        )
+    load_sharing.mark_sealed(cells, bounds, solid, sunk, fluid_scale, sealed)
     oil_residual, state = np.empty_like(gap), np.empty(gap.shape, dtype=np.int8)
     if surplus_by_oil is None:
         load_sharing.fill_oil_rows(cells, bounds, fluid_scale, oil_residual, state)
-        load_sharing.fix_film_gap(shut, film)
+        load_sharing.fix_film_gap(sealed, film)
     else:
         # a cell closed to the contact film holds next to no oil: what it lacks counts as what would
         # lift it
         loose, lacks = (
             surplus_by_oil > 0.0,
-            np.maximum(surplus_by_oil, problem.softness) * _carried(problem),
+            np.maximum(surplus_by_oil, problem.softness) * _outflow_by_content(problem),
         )
         fluid_scale = np.where(loose, 1.0 / lacks, fluid_scale)
         oil_residual = outflow * fluid_scale
@@ -243,7 +249,7 @@ def _evaluate(
             np.int8
         )
         pressed = signed > problem.p_cap  # opened by the oil, not by the bodies' distance
-        load_sharing.fix_film_gap(shut & ~pressed, film)
+        load_sharing.fix_film_gap(sealed & ~pressed, film)
         stiff = pressed & (film.log_mobility_by_gap == 0.0)
         film = film._replace(
             log_mobility_by_gap=np.where(stiff, -3.0 / height, film.log_mobility_by_gap)
@@ -251,12 +257,12 @@ def _evaluate(
     if np.any(rim := problem.rim):
         state[:, rim], oil_residual[:, rim] = RUPTURED, signed[:, rim]
         solid[:, rim], solid_residual[:, rim] = FREE, (pressure - oil)[:, rim]
-    if problem.held is not None:
-        state[problem.held], solid[problem.held] = RUPTURED, FREE
-        oil_residual[problem.held] = solid_residual[problem.held] = 0.0
+    if problem.fixed is not None:
+        state[problem.fixed], solid[problem.fixed] = RUPTURED, FREE
+        oil_residual[problem.fixed] = solid_residual[problem.fixed] = 0.0
     rows, left = Rows(state, fluid_scale, scale), (oil_residual, solid_residual)
     balance = MixedBalance(
-        problem, unknowns, gap, *left, rows, solid, film, faces, lean, outflow, shut
+        problem, unknowns, gap, *left, rows, solid, film, faces, limiter, outflow, sealed
     )
     return (
         replace(balance, surplus=surplus, surplus_by_oil=surplus_by_oil)
@@ -293,13 +299,13 @@ def _flow(
     )
 
 
-def may_lean(problem: Problem) -> bool:
+def uses_limiter(problem: Problem) -> bool:
     """Whether the wedge leans back from first order: on smooth bodies it has its own, and borders of cavities jump."""
     return not problem.accurate and not problem.conserve
 
 
-def _followed(problem: Problem) -> bool:
-    return problem.past is not None and problem.past.followed
+def _is_lagrangian(problem: Problem) -> bool:
+    return problem.past is not None and problem.past.lagrangian
 
 
 def _upstream(problem: Problem, content: Field) -> Field:
@@ -310,20 +316,20 @@ def _upstream(problem: Problem, content: Field) -> Field:
     return upstream
 
 
-def _lean(problem: Problem, content: Field, gap: Field) -> Field:
+def _limiter(problem: Problem, content: Field, gap: Field) -> Field:
     """Half of 2 m₁ m₂/(m₁² + m₂²) of each cell and what is upstream of it, (nx, ny): 1/2 where the film is even.
 
     Less beside cells that are nearly closed, and nothing beside closed ones: there the film is
     even, and its content the oil's density.
     """
-    closed, lean = problem.contact_gap, np.empty_like(content)
+    closed, limiter = problem.contact_gap, np.empty_like(content)
     load_sharing.limiter(
-        content, _upstream(problem, content), gap, closed, OPEN_FROM * closed, lean
+        content, _upstream(problem, content), gap, closed, OPENING_RANGE * closed, limiter
     )
-    return lean
+    return limiter
 
 
-def lean_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
+def limiter_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
     """How far the wedge leans for a change of each cell's content, and back for one of that upstream, both (nx, ny).
 
     How open the cells are is held, see `opening_slopes`.
@@ -331,7 +337,7 @@ def lean_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
     content = balance.film.content
     own, by_upstream = np.empty((2, *content.shape), dtype)
     load_sharing.limiter_slopes(
-        balance.lean, content, _upstream(balance.problem, content), own, by_upstream
+        balance.limiter, content, _upstream(balance.problem, content), own, by_upstream
     )
     return own, by_upstream
 
@@ -344,49 +350,53 @@ def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Any, Any, Field]
     """
     problem, (_, ny) = balance.problem, balance.problem.cells
     gap, content, closed = balance.gap, balance.film.content.ravel(), problem.contact_gap
-    cells = np.flatnonzero(moved & (gap > closed) & (gap < (1.0 + OPEN_FROM) * closed))
+    cells = np.flatnonzero(moved & (gap > closed) & (gap < (1.0 + OPENING_RANGE) * closed))
     faces = np.concatenate([cells, cells + ny])
     inner = (faces >= ny) & (faces < content.size - ny)
     faces, cells = faces[inner], np.tile(cells, 2)[inner]
     here, upstream = content[faces], content[faces - ny]
     other = np.clip(
-        (gap.ravel()[np.where(faces == cells, faces - ny, faces)] / closed - 1.0) / OPEN_FROM,
+        (gap.ravel()[np.where(faces == cells, faces - ny, faces)] / closed - 1.0) / OPENING_RANGE,
         0.0,
         1.0,
     )
     leaning = upstream * here / (upstream**2 + here**2) * (here - upstream)
-    return faces, cells, leaning * other / (OPEN_FROM * closed)
+    return faces, cells, leaning * other / (OPENING_RANGE * closed)
 
 
-def _beyond_first_order(
-    problem: Problem, content: Field, lean: Field, *, second_order: bool
+def _second_order_outflow(
+    problem: Problem, content: Field, limiter: Field, *, second_order: bool
 ) -> Field:
     """What the wedge's second order adds to each cell's outflow, (nx, ny)."""
-    if not _followed(problem):
-        return added_by_lean(problem, content, lean, lean)
+    if not _is_lagrangian(problem):
+        return limiter_outflow(problem, content, limiter, limiter)
     assert problem.past is not None
-    added = lean * (content - _upstream(problem, content)) / problem.spacing[0]
-    leant = problem.past.leant
-    return added - leant / problem.spacing[0] if second_order and leant is not None else added
+    added = limiter * (content - _upstream(problem, content)) / problem.spacing[0]
+    limiter_correction = problem.past.limiter_correction
+    return (
+        added - limiter_correction / problem.spacing[0]
+        if second_order and limiter_correction is not None
+        else added
+    )
 
 
-def added_by_lean(problem: Problem, content: Field, own: Field, upstream: Field) -> Field:
+def limiter_outflow(problem: Problem, content: Field, own: Field, upstream: Field) -> Field:
     """What second order adds to each cell's outflow for a content on top of the film's own, (nx, ny).
 
     The wedge leans by `own` of a cell's content less `upstream` of that before it: the lean
     itself, or its slopes.
     """
-    if _followed(problem):
+    if _is_lagrangian(problem):
         return own * content * content.dtype.type(1.0 / problem.spacing[0])
     added = np.empty_like(content)
     limited_outflow(content, own, upstream, problem.spacing[0], added)
     return added
 
 
-def transported(problem: Problem, content: Field) -> Field:
+def advected_outflow(problem: Problem, content: Field) -> Field:
     """What each cell gains and passes on of a content that moves with the oil, upwind to first order, (nx, ny)."""
     past, dx = problem.past, problem.spacing[0]
-    if past is None or not past.followed:
+    if past is None or not past.lagrangian:
         outflow = content.copy()
         outflow[1:] -= content[:-1]
         outflow /= dx
@@ -399,13 +409,13 @@ def transported(problem: Problem, content: Field) -> Field:
 
 def upwind_at_outlet(problem: Problem, content: Field, outflow: Field) -> None:
     """Take the film's last face, which leans, back to first order: where oil is missing, all of it has to be upwind."""
-    if not _followed(problem):
+    if not _is_lagrangian(problem):
         dx = problem.spacing[0]
         outflow[-1] -= (content[-1] - content[-2]) * content.dtype.type(0.5 / dx)
 
 
-def _carried(problem: Problem) -> float:
+def _outflow_by_content(problem: Problem) -> float:
     """Derivative of a cell's outflow by its own content."""
     past = problem.past
-    wedge = 0.0 if past is not None and past.followed else 1.0 / problem.spacing[0]
+    wedge = 0.0 if past is not None and past.lagrangian else 1.0 / problem.spacing[0]
     return wedge if past is None else wedge + past.rate

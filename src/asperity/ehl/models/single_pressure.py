@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.deflection import THROUGH, Deflection, deflection
-from asperity.ehl.grid_transfer import averaged, interpolated, mirrored
+from asperity.ehl.deflection import MIRROR_THROUGH, Deflection, deflection
+from asperity.ehl.grid_transfer import average, interpolate, mirror_field
 from asperity.ehl.load_shares import within_ellipse
-from asperity.ehl.roller_profile import Along
+from asperity.ehl.roller_profile import RollerProfile
 from asperity.kernels import reynolds
 from asperity.kernels.reynolds import (
     CAPPED,
@@ -38,10 +38,10 @@ THIRD_ORDER, SECOND_ORDER, FIRST_ORDER = (0.375, 0.125), (0.0, 0.5), (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class BodyShape:
     """Shape and compliance of the smooth bodies.
 
-    The gap grows as X^2/2 + `flatness` Y^2/2, or on a roller by its drop `along` it; `compliance`
+    The gap grows as X^2/2 + `flatness` Y^2/2, or on a roller by its drop `roller`; `compliance`
     scales the half-space's deflection, V = compliance times the integral of P/distance; `aspect`
     is the Hertz contact's half-width across over along rolling (infinite for a line); `periodic`
     tells whether the contact repeats in y.
@@ -51,48 +51,48 @@ class Form:
     compliance: float
     aspect: float
     periodic: bool
-    along: Along | None = None
+    roller: RollerProfile | None = None
 
     def gap(self, x: Field, y: Field) -> Field:
         """Gap at H0 = 0, shape (x, y)."""
-        across = self.flatness * (y**2 / 2.0) if self.along is None else self.along.drop(y)
+        across = self.flatness * (y**2 / 2.0) if self.roller is None else self.roller.drop(y)
         return np.asarray((x**2 / 2.0)[:, None] + across)
 
     def hertz(self, x: Field, y: Field) -> Field:
         """Pressure of the smooth, dry contact, that of a roller by slices, shape (x, y)."""
-        if self.along is None:
+        if self.roller is None:
             across = y / self.aspect
             return np.asarray(np.sqrt(np.maximum(1.0 - (x**2)[:, None] - across**2, 0.0)))
-        load = np.where(self.along.beyond(y), 0.0, self.along.load(y))
+        load = np.where(self.roller.outside(y), 0.0, self.roller.load(y))
         return np.asarray(np.sqrt(np.maximum(load - (x**2)[:, None], 0.0)))
 
 
 @dataclass(frozen=True, slots=True)
-class Past:
+class TransientTerm:
     """What a step in time adds to the oil's balance: `rate` times its content now, and `source` from before, (nx, ny).
 
-    `followed` oil is balanced along its way, so that `source` holds the wedge too (unless oil is
-    conserved, not in the first two rows of cells, which it has no way to). `leant` is then by how
-    much the wedge, second order, leant back a cell and a step before, and `upstream` the content
+    `lagrangian` oil is balanced along its way, so that `source` holds the wedge too (unless oil is
+    conserved, not in the first two rows of cells, which it has no way to). `limiter_correction` is then by how
+    much the wedge, second order, limiter_correction back a cell and a step before, and `upstream` the content
     there; None where the source is of second order already.
     """
 
     rate: float
     source: Field
-    followed: bool
+    lagrangian: bool
     upstream: Field | None = None
-    leant: Field | None = None
+    limiter_correction: Field | None = None
 
     @property
-    def on_one_line(self) -> "Past":
+    def on_one_line(self) -> "TransientTerm":
         """The same where nothing varies along y, on the first line of cells."""
         parts = (
             None if part is None else part[:, :1]
-            for part in (self.source, self.upstream, self.leant)
+            for part in (self.source, self.upstream, self.limiter_correction)
         )
-        source, upstream, leant = parts
+        source, upstream, limiter_correction = parts
         assert source is not None
-        return Past(self.rate, source, self.followed, upstream, leant)
+        return TransientTerm(self.rate, source, self.lagrangian, upstream, limiter_correction)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,13 +106,13 @@ class Problem:
     None for all of it. A contact that does not repeat in y is bounded by lines of cells at ambient
     pressure, a roller by all beyond its ends. `accurate` takes the third-order wedge and
     logarithmic mean mobilities. `conserve` lets no oil appear or vanish. `past` is None where
-    nothing moves but the oil. `held` tells of the cells, (nx, ny), whose pressures are given, and
+    nothing moves but the oil. `fixed` tells of the cells, (nx, ny), whose pressures are given, and
     the distance of the bodies with them. Where `mirror` is not 0, cells are those up to the plane
     Y = 0, BETWEEN two lines of cells or THROUGH the last one, and what lies behind it is their
     image.
     """
 
-    form: Form
+    form: BodyShape
     roughness: Field
     lower: tuple[float, float]
     spacing: tuple[float, float]
@@ -126,8 +126,8 @@ class Problem:
     viscosity_factor: Field | None = None
     accurate: bool = False
     conserve: bool = False
-    past: Past | None = None
-    held: Mask | None = None
+    past: TransientTerm | None = None
+    fixed: Mask | None = None
     mirror: int = 0
 
     @property
@@ -142,22 +142,22 @@ class Problem:
         nx, ny = self.cells
         return nx, 2 * ny + 1 - self.mirror if self.mirror else ny
 
-    def whole(self, field: Any) -> Any:
+    def unfold(self, field: Any) -> Any:
         """A field, (nx', ny'), with its image behind the mirror, of this grid or a coarser one."""
-        return mirrored(field, 2 * field.shape[1] + 1 - self.mirror) if self.mirror else field
+        return mirror_field(field, 2 * field.shape[1] + 1 - self.mirror) if self.mirror else field
 
-    def brought(self, field: Field, *, cubic: bool = False) -> Field:
+    def interpolate(self, field: Field, *, cubic: bool = False) -> Field:
         """A coarser grid's field on this one, (nx, ny), by lines or cubics."""
-        finer = interpolated(self.whole(field), self.all_cells, cubic=cubic)
+        finer = interpolate(self.unfold(field), self.all_cells, cubic=cubic)
         return np.ascontiguousarray(finer[:, : self.cells[1]])
 
-    def summed(self, field: Field) -> Any:
+    def sum_over_cells(self, field: Field) -> Any:
         """Of a field, (nx, ny), over all cells of the contact, those behind a mirror too."""
         total = field.sum()
         return (
             total
             if not self.mirror
-            else 2.0 * total - (field[:, -1].sum() if self.mirror == THROUGH else 0.0)
+            else 2.0 * total - (field[:, -1].sum() if self.mirror == MIRROR_THROUGH else 0.0)
         )
 
     @property
@@ -167,15 +167,15 @@ class Problem:
         return self.load / (nx * ny * dx * dy)
 
     @property
-    def unmirrored(self) -> "Problem":
+    def unfolded(self) -> "Problem":
         """The same contact on all its cells."""
         if not self.mirror:
             return self
         factor = self.viscosity_factor
         return replace(
             self,
-            roughness=self.whole(self.roughness),
-            viscosity_factor=None if factor is None else self.whole(factor),
+            roughness=self.unfold(self.roughness),
+            viscosity_factor=None if factor is None else self.unfold(factor),
             mirror=0,
         )
 
@@ -197,17 +197,17 @@ class Problem:
     @cached_property
     def rim(self) -> Mask:
         """Lines of cells along x that are held at ambient pressure, shape (ny,)."""
-        held = np.zeros(self.cells[1], dtype=bool)
+        fixed = np.zeros(self.cells[1], dtype=bool)
         if not self.form.periodic:
-            held[[0] if self.mirror else [0, -1]] = True
-        if self.form.along is not None:
-            held |= self.form.along.beyond(self.y)
-        return held
+            fixed[[0] if self.mirror else [0, -1]] = True
+        if self.form.roller is not None:
+            fixed |= self.form.roller.outside(self.y)
+        return fixed
 
     @cached_property
     def _nearest(self) -> np.ndarray | None:
         """Of each line of cells the nearest one on the roller; None where there are no ends."""
-        if self.form.along is None:
+        if self.form.roller is None:
             return None
         inside = np.flatnonzero(~self.rim)
         return np.asarray(inside[np.abs(np.arange(self.cells[1])[:, None] - inside).argmin(axis=1)])
@@ -216,7 +216,7 @@ class Problem:
     def _ends(self) -> Mask:
         """Lines of cells behind which, towards larger y, a roller ends or begins, shape (ny,)."""
         changes = self.rim != np.roll(self.rim, -1)
-        return np.asarray(changes & (self.form.along is not None))
+        return np.asarray(changes & (self.form.roller is not None))
 
     def filmed(self, gap: Field) -> Field:
         """A gap, or its change, as the oil has it: beyond a roller's ends that at the ends, where it flows out."""
@@ -232,7 +232,7 @@ class Problem:
     @property
     def softness(self) -> float:
         """Compliance of a cell to its own pressure, less that of one far off."""
-        near = self.deflection.near
+        near = self.deflection.near_compliance
         return float(near[0] - near[3])
 
     @property
@@ -248,7 +248,7 @@ class Problem:
     @property
     def symmetric(self) -> bool:
         """Whether the half of smooth bodies' contact up to Y = 0 tells all."""
-        if self.form.periodic or self.form.along is not None or np.any(self.roughness):
+        if self.form.periodic or self.form.roller is not None or np.any(self.roughness):
             return False
         (_, ny), dy, factor = self.cells, self.spacing[1], self.viscosity_factor
         even = factor is None or bool(
@@ -267,26 +267,26 @@ class Problem:
         cells, kept = (
             (cells, cells[1]) if not self.mirror else ((cells[0], 2 * half + 1 - self.mirror), half)
         )
-        roughness, factor = self.whole(self.roughness), self.viscosity_factor
+        roughness, factor = self.unfold(self.roughness), self.viscosity_factor
         return replace(
             self,
-            roughness=averaged(roughness, cells)[:, :kept],
+            roughness=average(roughness, cells)[:, :kept],
             viscosity_factor=None
             if factor is None
-            else averaged(self.whole(factor), cells)[:, :kept],
+            else average(self.unfold(factor), cells)[:, :kept],
             spacing=(dx * (nx / cells[0]), dy * (ny / cells[1])),
         )
 
     def zone(self, share: float = 1.0) -> Mask:
         """Cells within `share` of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
-        if self.form.along is not None:
-            return self.form.along.zone(self.x, self.y, share, self.spacing)
+        if self.form.roller is not None:
+            return self.form.roller.zone(self.x, self.y, share, self.spacing)
         return within_ellipse(self.x, self.y, (share, share * self.form.aspect), self.spacing)
 
     def load_error(self, pressure: Field) -> float:
         """By how much a pressure carries more than the load, relative."""
         dx, dy = self.spacing
-        return float(self.summed(pressure) * dx * dy / self.load - 1.0)
+        return float(self.sum_over_cells(pressure) * dx * dy / self.load - 1.0)
 
     def evaluate(self, pressure: Field, approach: float) -> "Balance":
         """What is left of every equation at a pressure and a rigid approach H0."""
@@ -381,7 +381,7 @@ class Problem:
         dx, dy = self.spacing
         outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
         entering = self.entering(gap)
-        near = self.deflection.near
+        near = self.deflection.near_compliance
         if self.past is None:
             reynolds.net_outflow(pressure, film.content, faces, entering, dx, dy, outflow)
             reynolds.fluid_diagonal(film, faces, near, dx, dy, diagonal)
@@ -401,7 +401,7 @@ class Problem:
 
     def _move(
         self,
-        past: Past,
+        past: TransientTerm,
         pressure: Field,
         film: Film,
         faces: Faces,
@@ -410,8 +410,8 @@ class Problem:
         diagonal: Field,
     ) -> None:
         """Fill in the net outflow and its diagonal of a contact in which more moves than the oil."""
-        (dx, dy), near, content = self.spacing, self.deflection.near, film.content
-        if past.followed:
+        (dx, dy), near, content = self.spacing, self.deflection.near_compliance, film.content
+        if past.lagrangian:
             nothing = np.zeros_like(content)
             reynolds.net_outflow(pressure, nothing, faces, nothing[0], dx, dy, outflow)
             reynolds.fluid_diagonal(film.without_wedge, faces, near, dx, dy, diagonal)

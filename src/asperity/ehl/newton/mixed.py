@@ -8,7 +8,7 @@ import numpy as np
 
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.controls import MIXED_NEWTON
-from asperity.ehl.linear_solvers.gmres import Room
+from asperity.ehl.linear_solvers.gmres import Workspace
 from asperity.ehl.linear_solvers.mixed import newton_step
 from asperity.ehl.linear_solvers.single_pressure import SingularFactor
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
@@ -19,30 +19,30 @@ from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED
 
 
-class _Moves(NamedTuple):
+class _StepProposal(NamedTuple):
     """Where to from a balance: changes of all unknowns, as long as the steps before allow, and which share is taken."""
 
     balance: MixedBalance
-    by: Pressures
+    step: Pressures
     share: float
 
-    def taken(self, cut: float = 1.0) -> tuple[Pressures, Mask]:
+    def apply(self, damping: float = 1.0) -> tuple[Pressures, Mask]:
         """The unknowns after a part of it, and which cells are then to be taken as free."""
         problem, (_, total, approach), share = (
             self.balance.problem,
             self.balance.unknowns,
-            cut * self.share,
+            damping * self.share,
         )
         free = self.balance.solid == FREE
-        signed = _moved(self.balance, share * self.by.oil)
+        signed = _updated_oil(self.balance, share * self.step.oil)
         oil = np.clip(signed, 0.0, problem.p_cap)
-        total = np.where(free, oil, np.clip(total + share * self.by.total, 0.0, problem.p_cap))
-        overborne = ~free & (oil > total)
-        freed = overborne & (
+        total = np.where(free, oil, np.clip(total + share * self.step.total, 0.0, problem.p_cap))
+        overloaded = ~free & (oil > total)
+        freed = overloaded & (
             self.balance.solid != CAPPED
         )  # in deep overlap it would be pressed shut and freed in turn
         unknowns = Pressures(
-            np.where(overborne, total, signed), total, approach + share * self.by.approach
+            np.where(overloaded, total, signed), total, approach + share * self.step.approach
         )
         return unknowns, freed
 
@@ -57,11 +57,11 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     pressure, and is free in the next step: the oil lifts the bodies apart. Not one that the cap
     decides.
     """
-    wanted_mean = problem.mean_pressure
+    mean_pressure = problem.mean_pressure
     oil_limit, limit = (StepLimit(unknowns.total) for _ in range(2))
     approach_limit, change = ApproachLimit(problem.roughness), np.inf
-    lowest, idle, share, astray, room = np.inf, 0, 1.0, False, Room()
-    balance, settled = (
+    lowest, stagnation, share, stagnated, workspace = np.inf, 0, 1.0, False, Workspace()
+    balance, settled_cells = (
         evaluate(problem, unknowns, second_order=second_order),
         np.zeros(problem.cells, dtype=bool),
     )
@@ -69,16 +69,16 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         unknowns = balance.unknowns
         yield Step(number, balance, unknowns.approach, change)
         try:
-            step = newton_step(balance, None if astray else settled, room)
+            step = newton_step(balance, None if stagnated else settled_cells, workspace)
         except SingularFactor:  # strayed so far that no step leads on
             yield Step(number + 1, balance, unknowns.approach, np.inf)
             return
-        change, gap = float(np.mean(np.abs(step.total)) / wanted_mean), balance.gap
-        idle += 1
+        change, gap = float(np.mean(np.abs(step.total)) / mean_pressure), balance.gap
+        stagnation += 1
         if balance.residual_rms < MIXED_NEWTON.required_decrease * lowest:
-            lowest, idle = balance.residual_rms, 0
-        elif idle == MIXED_NEWTON.stagnation_iterations:
-            lowest, idle, share, astray = balance.residual_rms, 0, 1.5 - share, True
+            lowest, stagnation = balance.residual_rms, 0
+        elif stagnation == MIXED_NEWTON.stagnation_iterations:
+            lowest, stagnation, share, stagnated = balance.residual_rms, 0, 1.5 - share, True
         closed = (
             (balance.solid != FREE)
             & (balance.gap <= problem.contact_gap)
@@ -90,28 +90,30 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
             oil_limit(step.oil, np.abs(unknowns.oil)),
         )
         d_total = limit(step.total, unknowns.total)
-        by = Pressures(d_oil, d_total, approach_limit(step.approach))
-        balance = _led(_Moves(balance, by, share), second_order=second_order)
-        settled = np.abs(balance.gap - gap) < MIXED_NEWTON.settled_gap_change * problem.contact_gap
+        step = Pressures(d_oil, d_total, approach_limit(step.approach))
+        balance = _line_search(_StepProposal(balance, step, share), second_order=second_order)
+        settled_cells = (
+            np.abs(balance.gap - gap) < MIXED_NEWTON.settled_gap_change * problem.contact_gap
+        )
 
 
-def _led(moves: _Moves, *, second_order: bool) -> MixedBalance:
+def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance:
     """Where a step leads, cut short as long as near a solution it leads away: thin films close and open by turns."""
-    problem, left = moves.balance.problem, moves.balance.residual_rms
-    cut = 1.0
+    problem, residual = proposal.balance.problem, proposal.balance.residual_rms
+    damping = 1.0
     while True:
-        unknowns, freed = moves.taken(cut)
+        unknowns, freed = proposal.apply(damping)
         balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
         if (
-            left >= MIXED_NEWTON.line_search_residual
-            or balance.residual_rms <= MIXED_NEWTON.max_residual_growth * left
-            or cut <= MIXED_NEWTON.min_damping
+            residual >= MIXED_NEWTON.line_search_residual
+            or balance.residual_rms <= MIXED_NEWTON.max_residual_growth * residual
+            or damping <= MIXED_NEWTON.min_damping
         ):
             return balance
-        cut *= 0.5
+        damping *= 0.5
 
 
-def _moved(balance: MixedBalance, step: Field) -> Field:
+def _updated_oil(balance: MixedBalance, step: Field) -> Field:
     """The oil's unknown after a step: within its bounds; where oil is conserved, up to the next state."""
     before, cap = balance.unknowns.oil, balance.problem.p_cap
     signed = before + step

@@ -21,7 +21,7 @@ from asperity.ehl.models.single_pressure import Balance, Problem
 from asperity.ehl.newton.step_limit import ApproachLimit, StepLimit
 
 
-class Manner(NamedTuple):
+class Damping(NamedTuple):
     """How steps are taken: which share of them, and over how many cells the oil may travel in one (the inverse)."""
 
     share: float
@@ -31,15 +31,15 @@ class Manner(NamedTuple):
 # Steps that go round in circles leave them another way: in time steps (pseudo-transient
 # continuation, Kelley and Keyes, SIAM J. Numer. Anal. 35 (1998)) where waves travel with the oil,
 # shortened where cells flip to and fro.
-MANNERS = (
-    Manner(1.0, 0.0),
-    Manner(1.0, 0.5),
-    Manner(0.5, 0.0),
-    Manner(1.0, 2.0),
-    Manner(0.5, 0.5),
-    Manner(1.0, 8.0),
-    Manner(0.25, 0.0),
-    Manner(0.5, 2.0),
+DAMPINGS = (
+    Damping(1.0, 0.0),
+    Damping(1.0, 0.5),
+    Damping(0.5, 0.0),
+    Damping(1.0, 2.0),
+    Damping(0.5, 0.5),
+    Damping(1.0, 8.0),
+    Damping(0.25, 0.0),
+    Damping(0.5, 2.0),
 )
 
 
@@ -54,52 +54,52 @@ class Step:
 
 
 def newton(
-    problem: Problem, pressure: Field, approach: float, *, held: bool = False
+    problem: Problem, pressure: Field, approach: float, *, fixed: bool = False
 ) -> Iterator[Step]:
     """Yield the start and then where each Newton step leads.
 
-    With the bodies `held` at their approach the load is whatever it becomes.
+    With the bodies `fixed` at their approach the load is whatever it becomes.
     """
-    wanted_mean = problem.mean_pressure
+    mean_pressure = problem.mean_pressure
     limit = StepLimit(pressure, initial=STEP_LIMITS.max_pressure_step, bound_reversals=False)
     approach_limit = ApproachLimit(problem.roughness)
-    lowest, idle, tried, change = np.inf, 0, 0, np.inf
+    lowest, stagnation, attempt, change = np.inf, 0, 0, np.inf
     for number in count():
         balance = problem.evaluate(pressure, approach)
         yield Step(number, balance, approach, change)
-        manner = MANNERS[tried % len(MANNERS)]
+        damping = DAMPINGS[attempt % len(DAMPINGS)]
         storing = (
-            manner.storing
+            damping.storing
             / problem.spacing[0]
             * min(1.0, balance.residual_rms / SINGLE_PRESSURE_NEWTON.time_step_residual)
         )
-        d_pressure, d_approach = newton_step(balance, storing=storing, held=held)
-        change = float(np.mean(np.abs(d_pressure)) / wanted_mean)
-        idle += 1
+        d_pressure, d_approach = newton_step(balance, storing=storing, fixed=fixed)
+        change = float(np.mean(np.abs(d_pressure)) / mean_pressure)
+        stagnation += 1
         if balance.residual_rms < 0.9 * lowest:
-            lowest, idle = balance.residual_rms, 0
-        elif idle == SINGLE_PRESSURE_NEWTON.stagnation_iterations:
-            lowest, idle, tried = balance.residual_rms, 0, tried + 1
+            lowest, stagnation = balance.residual_rms, 0
+        elif stagnation == SINGLE_PRESSURE_NEWTON.stagnation_iterations:
+            lowest, stagnation, attempt = balance.residual_rms, 0, attempt + 1
         limited = limit(d_pressure, pressure)
-        pressure = np.clip(pressure + manner.share * limited, 0.0, problem.p_cap)
-        approach += manner.share * approach_limit(d_approach)
+        pressure = np.clip(pressure + damping.share * limited, 0.0, problem.p_cap)
+        approach += damping.share * approach_limit(d_approach)
 
 
 def newton_step(
-    balance: Balance, *, storing: float = 0.0, held: bool = False
+    balance: Balance, *, storing: float = 0.0, fixed: bool = False
 ) -> tuple[Field, float]:
-    """Change of pressure and approach that meets every linearised equation and, unless `held`, the load, to a tenth."""
+    """Change of pressure and approach that meets every linearised equation and, unless `fixed`, the load, to a tenth."""
     problem, unknown = balance.problem, balance.unknown
     linear = Linear(balance, storing=storing)
     cells, real = linear.cells, linear.dtype
     known_change = np.where(unknown, 0.0, -balance.residual)
     rows = -balance.residual - linear.product(known_change.astype(real), 0.0)
-    wanted = np.where(unknown, rows, 0.0).astype(real).ravel()
-    if held:
+    rhs = np.where(unknown, rows, 0.0).astype(real).ravel()
+    if fixed:
         d_pressure = _solved(
             lambda vector: linear.product(vector.reshape(cells), 0.0).ravel(),
             lambda vector: linear(vector.reshape(cells)).ravel(),
-            wanted,
+            rhs,
         )
         return known_change + d_pressure.reshape(cells), 0.0
 
@@ -107,10 +107,10 @@ def newton_step(
     # missing load
     weight = 1.0 / np.sqrt(unknown.size)
     dx, dy = problem.spacing
-    missing = -balance.load_error * problem.load / (dx * dy) - problem.summed(known_change)
+    missing = -balance.load_error * problem.load / (dx * dy) - problem.sum_over_cells(known_change)
     response = np.where(unknown, linear.product(np.zeros(cells, real), 1.0), real(0.0))
     answer = linear(response)
-    total = float(problem.summed(answer))
+    total = float(problem.sum_over_cells(answer))
     if (
         total == 0.0
     ):  # every cell is ruptured or capped: only the distance of the bodies can change the load
@@ -123,22 +123,22 @@ def newton_step(
         left = linear.product(d_pressure, 0.0)
         if d_approach:
             left += real(d_approach) * response
-        return np.append(left.ravel(), real(weight * problem.summed(d_pressure)))
+        return np.append(left.ravel(), real(weight * problem.sum_over_cells(d_pressure)))
 
     def precondition(vector: Field) -> Field:
         d_pressure = linear(vector[:-1].reshape(cells))
-        d_approach = real((problem.summed(d_pressure) - vector[-1] / weight) / total)
+        d_approach = real((problem.sum_over_cells(d_pressure) - vector[-1] / weight) / total)
         return np.append((d_pressure - d_approach * answer).ravel(), d_approach)
 
-    solved = _solved(product, precondition, np.append(wanted, real(weight * missing)))
+    solved = _solved(product, precondition, np.append(rhs, real(weight * missing)))
     return known_change + solved[:-1].reshape(cells), float(solved[-1])
 
 
-def _solved(product: Operator, precondition: Operator, wanted: Field) -> Field:
+def _solved(product: Operator, precondition: Operator, rhs: Field) -> Field:
     return gmres(
         product,
         precondition,
-        wanted,
+        rhs,
         tolerance=SINGLE_PRESSURE_NEWTON.linear_tolerance,
-        most_steps=SINGLE_PRESSURE_NEWTON.max_krylov_steps,
+        max_steps=SINGLE_PRESSURE_NEWTON.max_krylov_steps,
     )

@@ -24,7 +24,7 @@ from asperity.ehl.outcome import (
     Options,
     SolveStatus,
 )
-from asperity.ehl.problem_setup import coarser_all_along
+from asperity.ehl.problem_setup import coarser_in_all_axes
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
@@ -48,7 +48,7 @@ class Search:
             False,
             1 if options.model == CONSERVING else 2,
         )  # bodies, and wedge
-        self.lost = False
+        self.failed = False
         self.work, self.most_work = 0.0, np.inf  # cells of all steps
 
     @property
@@ -63,17 +63,17 @@ class Search:
         )
 
     @property
-    def given_up(self) -> bool:
+    def exhausted(self) -> bool:
         """Whether all the work that the search may take is done."""
         return self.work >= self.most_work
 
-    def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
-        """Whether the last step met the tolerance in residual, change and, `of_load`, load."""
+    def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
+        """Whether the last step met the tolerance in residual, change and, `check_load`, load."""
         last = self.history[-1]
-        return max(last.residual, last.load_error if of_load else 0.0, last.change) < tolerance
+        return max(last.residual, last.load_error if check_load else 0.0, last.change) < tolerance
 
-    def climb(
-        self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool
+    def solve_levels(
+        self, levels: Sequence[Problem], pressure: Field, approach: float, *, fixed: bool
     ) -> Step:
         """Solve on grid after grid, from the last, coarsest one to the first."""
         options, self.figures, self.smooth = self.options, [], not np.any(levels[0].roughness)
@@ -86,9 +86,11 @@ class Search:
                 else max(GRID_CONTINUATION.coarse_tolerance, options.tolerance)
             )
             if problem.cells != pressure.shape:
-                pressure = problem.brought(pressure)
-            if held:
-                step = self.position(problem, pressure, approach, tolerance, from_outside=coarsest)
+                pressure = problem.interpolate(pressure)
+            if fixed:
+                step = self.bracket_approach(
+                    problem, pressure, approach, tolerance, from_outside=coarsest
+                )
             else:
                 most = (
                     options.max_iterations
@@ -101,25 +103,33 @@ class Search:
                     steps,
                     tolerance,
                     most,
-                    stray=GRID_CONTINUATION.divergence if problem.accurate else np.inf,
+                    divergence=GRID_CONTINUATION.divergence if problem.accurate else np.inf,
                 )
                 if (
                     problem.accurate
                     and step.number < most
-                    and not (self.settled(tolerance) or self.lost)
+                    and not (self.converged(tolerance) or self.failed)
                 ):  # astray
-                    pressure, approach = self.nearer(problem, pressure, approach)
+                    pressure, approach = self.robust_start(problem, pressure, approach)
                     step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
-                if coarsest and not finest and not self.settled(GRID_CONTINUATION.failed_residual):
+                if (
+                    coarsest
+                    and not finest
+                    and not self.converged(GRID_CONTINUATION.failed_residual)
+                ):
                     # a capped contact answers its approach too unevenly for Newton
-                    found = self.position(problem, pressure, approach, tolerance, from_outside=True)
-                    step = found if self.settled(GRID_CONTINUATION.failed_residual) else step
+                    found = self.bracket_approach(
+                        problem, pressure, approach, tolerance, from_outside=True
+                    )
+                    step = found if self.converged(GRID_CONTINUATION.failed_residual) else step
             pressure, approach = step.balance.pressure, step.approach
-            if coarser_all_along(problem, levels[0]):
+            if coarser_in_all_axes(problem, levels[0]):
                 self.figures.append(self._figures(step))
         return step
 
-    def nearer(self, problem: Problem, pressure: Field, approach: float) -> tuple[Field, float]:
+    def robust_start(
+        self, problem: Problem, pressure: Field, approach: float
+    ) -> tuple[Field, float]:
         """A start for the accurate wedge by a step or two with the sturdy one; as it was, where these lead nowhere."""
         sturdy = replace(problem, accurate=False)
         step = self.run(
@@ -130,7 +140,7 @@ class Search:
         )
         return (
             (step.balance.pressure, step.approach)
-            if self.settled(GRID_CONTINUATION.failed_residual)
+            if self.converged(GRID_CONTINUATION.failed_residual)
             else (pressure, approach)
         )
 
@@ -141,35 +151,35 @@ class Search:
         tolerance: float,
         most: int,
         *,
-        of_load: bool = True,
-        stray: float = np.inf,
+        check_load: bool = True,
+        divergence: float = np.inf,
         after: Step | None = None,
     ) -> Step:
-        """Take steps until they meet the tolerance, `of_load` too, or there have been too many.
+        """Take steps until they meet the tolerance, `check_load` too, or there have been too many.
 
-        Or until what is left is `stray` times what was left at first: `after` the step that they
+        Or until what is left is `divergence` times what was left at first: `after` the step that they
         go on from, if any.
         """
         step = next(steps)
         before = after or step
-        astray = stray * max(before.balance.residual_rms, GRID_CONTINUATION.min_residual)
+        astray = divergence * max(before.balance.residual_rms, GRID_CONTINUATION.min_residual)
         while True:
             self._record(problem, step)
-            self.lost = step.number > 0 and not np.isfinite(step.change)
+            self.failed = step.number > 0 and not np.isfinite(step.change)
             if (
-                self.settled(tolerance, of_load=of_load)
+                self.converged(tolerance, check_load=check_load)
                 or step.number >= most
-                or self.lost
-                or self.given_up
+                or self.failed
+                or self.exhausted
             ):
                 break
             if step.balance.residual_rms > astray:
                 break
             before, step = step, next(steps)
-        self.iteration_error = self._figures(step).off(self._figures(before))
+        self.iteration_error = self._figures(step).abs_difference(self._figures(before))
         return step
 
-    def position(
+    def bracket_approach(
         self,
         problem: Problem,
         pressure: Field,
@@ -194,14 +204,14 @@ class Search:
             most = min(left, GRID_CONTINUATION.max_fixed_iterations)
             step = self.run(
                 problem,
-                newton(problem, pressure, approach, held=True),
+                newton(problem, pressure, approach, fixed=True),
                 tolerance,
                 most,
-                of_load=False,
+                check_load=False,
             )
             left -= max(step.number, 1)
             pressure, error = step.balance.pressure, step.balance.load_error
-            if left <= 0 or self.lost or self.settled(tolerance):
+            if left <= 0 or self.failed or self.converged(tolerance):
                 return step
             side = error > 0.0
             bracket[side] = approach, error
@@ -248,11 +258,11 @@ class Search:
             )
             discretisation = start.convergence.discretisation_error if same else None
         scales, balance, lines = (
-            Scales.of(conditions, lubricant),
+            Scales.from_conditions(conditions, lubricant),
             step.balance,
             surface.grid.cells[1],
         )
-        stopped = SolveStatus.STALLED if self.lost else SolveStatus.OUT_OF_ITERATIONS
+        stopped = SolveStatus.STALLED if self.failed else SolveStatus.OUT_OF_ITERATIONS
         touching = balance.in_contact & (balance.pressure > 0.0)
         pressure, height, in_contact = (
             on_all_lines(balance.problem, part, lines)
@@ -268,7 +278,7 @@ class Search:
             in_contact=in_contact,
             rigid_approach=step.approach * scales.gap,
             convergence=Convergence(
-                status=SolveStatus.CONVERGED if self.settled(self.options.tolerance) else stopped,
+                status=SolveStatus.CONVERGED if self.converged(self.options.tolerance) else stopped,
                 history=tuple(self.history),
                 tolerance=self.options.tolerance,
                 seconds=seconds,
@@ -281,9 +291,9 @@ class Search:
 
     def _figures(self, step: Step) -> Figures:
         balance = step.balance
-        touching, whole = balance.in_contact & (balance.pressure > 0.0), balance.problem.whole
+        touching, whole = balance.in_contact & (balance.pressure > 0.0), balance.problem.unfold
         parts = whole(balance.pressure), whole(touching), whole(balance.height)
-        return figures(balance.problem.unmirrored, *parts, self.gap_scale)
+        return figures(balance.problem.unfolded, *parts, self.gap_scale)
 
     def _record(self, problem: Problem, step: Step) -> None:
         balance = step.balance
@@ -297,7 +307,7 @@ class Search:
 
 def on_all_lines(problem: Problem, field: Any, lines: int) -> Any:
     """A field on the part of a contact that tells all, (nx', ny'), on all of so many lines of cells."""
-    whole = problem.whole(field)
+    whole = problem.unfold(field)
     return np.repeat(whole, lines // whole.shape[1], axis=1)
 
 
@@ -326,29 +336,31 @@ def grid_error(
     if len(on_grids) < 2:
         return None
     *before, coarse, fine = on_grids
-    nothing, apart = fine.off(fine), fine.off(coarse)
+    nothing, apart = fine.abs_difference(fine), fine.abs_difference(coarse)
     figures_of_ends = (
         (name, [getattr(each, name) for each in on_grids]) for name in ("edge_pressure", "end_film")
     )
     ends = {name: ends_error(found) for name, found in figures_of_ends if None not in found}
     if before:
-        apart = apart.at_least(coarse.off(before[-1]).times(DISCRETISATION_ERROR.min_difference))
+        apart = apart.maximum(
+            coarse.abs_difference(before[-1]).scale(DISCRETISATION_ERROR.min_difference)
+        )
     if smooth:
         return GridError(
-            **asdict(replace(apart if order > 1 else apart.times(3.0), **ends)), lean=nothing
+            **asdict(replace(apart if order > 1 else apart.scale(3.0), **ends)), lean=nothing
         )
     share = 1.0
     if by_first_order is not None:
         apart, share = (
-            apart.at_least(fine.off(by_first_order)),
+            apart.maximum(fine.abs_difference(by_first_order)),
             DISCRETISATION_ERROR.two_order_share,
         )
-    half = apart.times(
+    half = apart.scale(
         0.5 * share * (DISCRETISATION_ERROR.forward + DISCRETISATION_ERROR.backward)
-    ).plus(replace(nothing, clr=share * DISCRETISATION_ERROR.load_share_per_cell * cell**2))
-    lean = apart.times(
+    ).add(replace(nothing, clr=share * DISCRETISATION_ERROR.load_share_per_cell * cell**2))
+    lean = apart.scale(
         0.5 * share * (DISCRETISATION_ERROR.forward - DISCRETISATION_ERROR.backward)
-    ).signed(fine.minus(coarse))
+    ).copysign(fine.difference(coarse))
     if by_first_order is not None and before:
         half = replace(
             half,
@@ -394,11 +406,14 @@ def figures(
     problem: Problem, pressure: Field, touching: Mask, gap: Field, gap_scale: float
 ) -> Figures:
     """The first figures of dimensionless fields; lengths in the unit of `gap_scale`."""
-    along, ends = problem.form.along, {}
+    along, ends = problem.form.roller, {}
     if along is not None:
         dome, film = (
-            along.at_ends(problem.y, of)
-            for of in (along.dome(problem.x, pressure, problem.spacing[0]), gap.min(axis=0))
+            along.end_values(problem.y, of)
+            for of in (
+                along.central_pressure(problem.x, pressure, problem.spacing[0]),
+                gap.min(axis=0),
+            )
         )
         if dome.size:
             ends = {

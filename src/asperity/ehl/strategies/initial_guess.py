@@ -9,23 +9,23 @@ from asperity.core.arrays import Field
 from asperity.ehl.controls import GRID_CONTINUATION, INITIAL_GUESS
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.mixed import Pressures
-from asperity.ehl.models.plastic_dry import dry_contact, roughly_dry
+from asperity.ehl.models.plastic_dry import active_set_dry, dry_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.strategies.local_refinement import smoothed
+from asperity.ehl.strategies.local_refinement import refine_locally
 
 
-class Lubricated(NamedTuple):
+class DryAndLubricated(NamedTuple):
     """A contact on one grid without oil and with it."""
 
     dry: Pressures
     wet: Pressures
 
-    def granted(self, problem: Problem, dry: Pressures) -> Pressures:
+    def transfer_to(self, problem: Problem, dry: Pressures) -> Pressures:
         """About what oil makes of the dry contact on another grid."""
-        changed = problem.brought(self.wet.total - self.dry.total)
+        changed = problem.interpolate(self.wet.total - self.dry.total)
         total = np.clip(dry.total + changed, 0.0, problem.p_cap)
-        oil = np.minimum(problem.brought(np.maximum(self.wet.oil, 0.0)), total)
+        oil = np.minimum(problem.interpolate(np.maximum(self.wet.oil, 0.0)), total)
         return Pressures(oil, total, dry.approach + self.wet.approach - self.dry.approach)
 
 
@@ -37,62 +37,72 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
     conjugate gradients, and by Newton's steps where the cap is too busy for these.
     """
     if problem.mirror:
-        whole = None if coarser is None else coarser._replace(total=problem.whole(coarser.total))
-        pressure, approach = dry_start(problem.unmirrored, whole)
+        whole = None if coarser is None else coarser._replace(total=problem.unfold(coarser.total))
+        pressure, approach = dry_start(problem.unfolded, whole)
         return np.ascontiguousarray(pressure[:, : problem.cells[1]]), approach
     dry, guess = (
         replace(problem, lubricant=None, contact_gap=0.0),
         problem.form.hertz(problem.x, problem.y),
     )
     if coarser is not None:
-        guess = problem.brought(coarser.total)
+        guess = problem.interpolate(coarser.total)
     if np.all(guess < problem.p_cap):
-        pressure, approach, met = elastic_contact(dry, guess, GRID_CONTINUATION.coarse_tolerance)
-        if met and np.all(pressure < problem.p_cap):
+        pressure, approach, converged = elastic_contact(
+            dry, guess, GRID_CONTINUATION.coarse_tolerance
+        )
+        if converged and np.all(pressure < problem.p_cap):
             return pressure, approach
-    near = _just_touching(dry, guess) if coarser is None else coarser.approach - problem.contact_gap
-    pressure, approach, met = roughly_dry(dry, guess, near, INITIAL_GUESS.dry_tolerance)
-    if met:
+    approach_guess = (
+        _first_contact(dry, guess) if coarser is None else coarser.approach - problem.contact_gap
+    )
+    pressure, approach, converged = active_set_dry(
+        dry, guess, approach_guess, INITIAL_GUESS.dry_tolerance
+    )
+    if converged:
         return pressure, approach
     if coarser is not None:
-        step, met = _settled(dry, guess, near)
-        if met:
+        step, converged = _by_newton(dry, guess, approach_guess)
+        if converged:
             return step.balance.pressure, step.approach
         guess = problem.form.hertz(problem.x, problem.y)
-    pressure, approach, met = dry_contact(dry, guess, most_steps=INITIAL_GUESS.max_gradient_steps)
-    if not met:
-        step, _ = _settled(dry, pressure, approach)
+    pressure, approach, converged = dry_contact(
+        dry, guess, max_steps=INITIAL_GUESS.max_gradient_steps
+    )
+    if not converged:
+        step, _ = _by_newton(dry, pressure, approach)
         pressure, approach = step.balance.pressure, step.approach
     return pressure, approach
 
 
-def _just_touching(dry: Problem, pressure: Field) -> float:
+def _first_contact(dry: Problem, pressure: Field) -> float:
     """The approach at which only high asperities touch, under the smooth bodies' pressure."""
     smooth = dry.form.gap(dry.x, dry.y) + dry.deflection(pressure)
     return INITIAL_GUESS.first_asperities * float(np.std(dry.roughness)) - float(smooth.min())
 
 
-def _settled(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bool]:
+def _by_newton(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bool]:
     """Where Newton's steps lead, and whether that is near enough for a start."""
     for step in newton(dry, pressure, approach):
-        left = max(step.balance.residual_rms, abs(step.balance.load_error))
-        if left < INITIAL_GUESS.dry_tolerance or step.number == INITIAL_GUESS.max_newton_steps:
+        residual = max(step.balance.residual_rms, abs(step.balance.load_error))
+        if residual < INITIAL_GUESS.dry_tolerance or step.number == INITIAL_GUESS.max_newton_steps:
             break
-    return step, left < INITIAL_GUESS.dry_tolerance
+    return step, residual < INITIAL_GUESS.dry_tolerance
 
 
-def handed_up(problem: Problem, unknowns: Pressures) -> Pressures:
+def interpolate_unknowns(problem: Problem, unknowns: Pressures) -> Pressures:
     """A coarser grid's pressures on this one; those of smooth bodies nearer to what this one has, where they jump."""
     total, oil = (
-        np.clip(problem.brought(np.maximum(part, 0.0), cubic=problem.accurate), 0.0, problem.p_cap)
+        np.clip(
+            problem.interpolate(np.maximum(part, 0.0), cubic=problem.accurate), 0.0, problem.p_cap
+        )
         for part in (unknowns.total, unknowns.oil)
     )
     handed = Pressures(np.minimum(oil, total), total, unknowns.approach)
-    return smoothed(problem, handed) if problem.accurate else handed
+    return refine_locally(problem, handed) if problem.accurate else handed
 
 
-def on_a_roller(
-    problem: Problem, before: Lubricated | None, pressure: Field, approach: float
+def roller_start(
+    problem: Problem, before: DryAndLubricated | None, pressure: Field, approach: float
 ) -> tuple[Pressures, Pressures]:
     """The dry contact of a smooth roller that ends, and where to start: there, with what oil changed on a coarser grid.
 
@@ -105,5 +115,5 @@ def on_a_roller(
     if before is None:
         film = approach + float((problem.undeformed + problem.deflection(pressure)).min())
         return dry, Pressures(total, total, distance + film)
-    start = before.granted(problem, dry)
-    return dry, smoothed(problem, Pressures(start.total, start.total, start.approach))
+    start = before.transfer_to(problem, dry)
+    return dry, refine_locally(problem, Pressures(start.total, start.total, start.approach))

@@ -21,12 +21,12 @@ from asperity.ehl.newton.mixed import newton
 Box = tuple[slice, slice]
 
 
-def smoothed(problem: Problem, unknowns: Pressures) -> Pressures:
+def refine_locally(problem: Problem, unknowns: Pressures) -> Pressures:
     """The start of a grid with its worst cells solved for what is around them; or as it is, if they are not few."""
     balance = evaluate(problem, unknowns, second_order=False)
     oil, total = unknowns.oil.copy(), unknowns.total.copy()
-    for box in _boxes(balance):
-        part, start = _within(balance, box)
+    for box in _worst_boxes(balance):
+        part, start = _subproblem(balance, box)
         oil[box], total[box] = _solved(part, start)
     return Pressures(oil, total, unknowns.approach)
 
@@ -35,26 +35,26 @@ def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
     """Pressures of the oil and in all that leave least, of the start and of a few of Newton's steps from it."""
     best = start
     for step in newton(problem, start, second_order=False):
-        left = step.balance.residual_rms
+        residual = step.balance.residual_rms
         if step.number == 0:
-            first = least = left
-        elif left < least:
+            first = least = residual
+        elif residual < least:
             assert isinstance(step.balance, MixedBalance)
-            least, best = left, step.balance.unknowns
+            least, best = residual, step.balance.unknowns
         if (
             least < LOCAL_REFINEMENT.target * first
             or step.number == LOCAL_REFINEMENT.max_steps
-            or not np.isfinite(left)
+            or not np.isfinite(residual)
         ):
             break
     return best.oil, best.total
 
 
-def _boxes(balance: MixedBalance) -> list[Box]:
+def _worst_boxes(balance: MixedBalance) -> list[Box]:
     """Around the cells that leave most; none where these are many, or leave little."""
-    problem, left = balance.problem, np.abs(balance.oil_residual)
-    worst = left > LOCAL_REFINEMENT.worst_residual * left.max()
-    share = float((left[worst] ** 2).sum() / max((left**2).sum(), np.finfo(float).tiny))
+    problem, residual = balance.problem, np.abs(balance.oil_residual)
+    worst = residual > LOCAL_REFINEMENT.worst_residual * residual.max()
+    share = float((residual[worst] ** 2).sum() / max((residual**2).sum(), np.finfo(float).tiny))
     if (
         balance.residual_rms < LOCAL_REFINEMENT.min_residual
         or share < LOCAL_REFINEMENT.min_residual_share
@@ -67,20 +67,20 @@ def _boxes(balance: MixedBalance) -> list[Box]:
     )
     boxes: list[Box] = scipy.ndimage.find_objects(groups)  # type: ignore[assignment]
     size = sum((x.stop - x.start) * (y.stop - y.start) for x, y in boxes)
-    return boxes if size < LOCAL_REFINEMENT.max_box_share * left.size else []
+    return boxes if size < LOCAL_REFINEMENT.max_box_share * residual.size else []
 
 
-def _within(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
+def _subproblem(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
     """The contact in a box, and its pressures; what the pressures around it displace counts as shape."""
     problem, (along, across) = balance.problem, box
     (x, y), (dx, dy) = problem.lower, problem.spacing
     start = Pressures(balance.unknowns.oil[box], balance.unknowns.total[box], 0.0)
-    held = np.ones(start.total.shape, dtype=bool)
+    fixed = np.ones(start.total.shape, dtype=bool)
     inner, mirror = (
         slice(LOCAL_REFINEMENT.fixed_margin, -LOCAL_REFINEMENT.fixed_margin),
         problem.mirror if across.stop == problem.cells[1] else 0,
     )
-    held[
+    fixed[
         inner,
         slice(None)
         if problem.form.periodic
@@ -94,7 +94,7 @@ def _within(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
         lower=(x + along.start * dx, y + across.start * dy),
         roughness=problem.roughness[box],
         viscosity_factor=None if factor is None else factor[box],
-        held=held,
+        fixed=fixed,
         mirror=mirror,
     )
     shape = balance.gap[box] - part.deflection(start.total)

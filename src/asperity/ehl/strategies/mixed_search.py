@@ -14,28 +14,33 @@ from asperity.core.errors import BadInput
 from asperity.ehl.contact_solution import ContactSolution, Oil
 from asperity.ehl.controls import GRID_CONTINUATION, MIXED_SEARCH, TIME_MARCHING
 from asperity.ehl.load_shares import carried_share
-from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, may_lean
-from asperity.ehl.models.single_pressure import Past, Problem
+from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, uses_limiter
+from asperity.ehl.models.single_pressure import Problem, TransientTerm
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step
 from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, Options
 from asperity.ehl.problem_setup import (
-    coarser_all_along,
+    coarser_in_all_axes,
     contact_problem,
     first_guess,
     grid_levels,
-    least_part,
-    levels_in_reach,
+    reduced_problem,
     smooth_film,
+    usable_levels,
 )
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import Progress, Search, on_all_lines
-from asperity.ehl.strategies.initial_guess import Lubricated, dry_start, handed_up, on_a_roller
-from asperity.ehl.strategies.local_refinement import smoothed
+from asperity.ehl.strategies.initial_guess import (
+    DryAndLubricated,
+    dry_start,
+    interpolate_unknowns,
+    roller_start,
+)
+from asperity.ehl.strategies.local_refinement import refine_locally
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
-CLIMB, STURDY = ATTEMPTS[:2]
+COARSE_TO_FINE, ROBUST = ATTEMPTS[:2]
 
 
 def solve_mixed(
@@ -51,29 +56,38 @@ def solve_mixed(
     """Solve the contact with a pressure each for oil and asperities; as `solve_contact`, which calls this."""
     began = time.perf_counter()
     assert lubricant is not None  # without oil there is one pressure
-    scales = Scales.of(conditions, lubricant)
+    scales = Scales.from_conditions(conditions, lubricant)
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = least_part(whole)
+    finest = reduced_problem(whole)
     search = MixedSearch(options, scales.gap, progress)
     if conditions.geometry == "roller":
         search.most_work = (
             MIXED_SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
         )
     if start is not None:
-        way, step = CLIMB, search.go_on(finest, pressures_of(start, finest, scales))
+        strategy, step = (
+            COARSE_TO_FINE,
+            search.continue_from(finest, pressures_of(start, finest, scales)),
+        )
     else:
-        for way in _ways(surface, smooth_film(conditions, lubricant), options.contact_film):
-            posed = finest if way == CLIMB else replace(finest, accurate=False)
-            levels = levels_in_reach(posed, conditions, lubricant)
-            step = search.along(
-                way, levels, lambda on: first_guess(on, conditions, lubricant, scales)
+        for strategy in _strategies(
+            surface, smooth_film(conditions, lubricant), options.contact_film
+        ):
+            problem = finest if strategy == COARSE_TO_FINE else replace(finest, accurate=False)
+            levels = usable_levels(problem, conditions, lubricant)
+            step = search.solve_by(
+                strategy, levels, lambda on: first_guess(on, conditions, lubricant, scales)
             )
-            if search.settled(options.tolerance):
-                if way != CLIMB and finest.accurate and finest.form.along is not None:
-                    way, step = search.refined(finest, step)
-                search.coarser(finest)
+            if search.converged(options.tolerance):
+                if (
+                    strategy != COARSE_TO_FINE
+                    and finest.accurate
+                    and finest.form.roller is not None
+                ):
+                    strategy, step = search.refine_third_order(finest, step)
+                search.solve_coarser_grid(finest)
                 break
-            if search.given_up:
+            if search.exhausted:
                 break
     return search.solution(
         step,
@@ -81,18 +95,22 @@ def solve_mixed(
         conditions,
         lubricant,
         seconds=time.perf_counter() - began,
-        attempt=way,
+        attempt=strategy,
         start=start,
         viscosity_factor=viscosity_factor,
     )
 
 
-def _ways(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
+def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
     """What is tried, one after the other, on a film [m] of the bodies if they were smooth."""
     if not np.any(surface.heights):
-        return (FROM_DRY, CLIMB, STURDY) if film < contact_film else (CLIMB, STURDY)
+        return (
+            (FROM_DRY, COARSE_TO_FINE, ROBUST) if film < contact_film else (COARSE_TO_FINE, ROBUST)
+        )
     return (
-        (FROM_DRY, CLIMB) if film < MIXED_SEARCH.dry_film_ratio * surface.sq else (CLIMB, FROM_DRY)
+        (FROM_DRY, COARSE_TO_FINE)
+        if film < MIXED_SEARCH.dry_film_ratio * surface.sq
+        else (COARSE_TO_FINE, FROM_DRY)
     )
 
 
@@ -101,10 +119,10 @@ class MixedSearch(Search):
 
     imbalance = 0.0  # of the last step, where no oil may be lost
 
-    def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
+    def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
         """Whether the last step met the tolerance, and the one of the whole solve with all oil accounted for."""
         closely = tolerance <= self.options.tolerance
-        return super().settled(tolerance, of_load=of_load) and not (
+        return super().converged(tolerance, check_load=check_load) and not (
             closely and self.imbalance > MIXED_SEARCH.max_imbalance
         )
 
@@ -118,94 +136,103 @@ class MixedSearch(Search):
     ) -> ContactSolution:
         """Where the search ended, the oil's own pressure with it."""
         solution = super().solution(step, surface, conditions, lubricant, **how)
-        return replace(solution, oil=_oil(step, surface, Scales.of(conditions, lubricant)))
+        return replace(
+            solution, oil=_oil(step, surface, Scales.from_conditions(conditions, lubricant))
+        )
 
-    def along(
-        self, way: str, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
+    def solve_by(
+        self,
+        strategy: str,
+        levels: Sequence[Problem],
+        guess: Callable[[Problem], tuple[Field, float]],
     ) -> Step:
         """Solve in one of the manners that are tried, on the first of the levels."""
         self.cell, self.by_first_order = (
             levels[0].spacing[0],
             None,
         )  # what a way before has left is not this one's
-        if way == FROM_DRY:
+        if strategy == FROM_DRY:
             return self.from_dry(levels)
-        step = self.climb_from(levels, guess)
+        step = self.coarse_to_fine(levels, guess)
         ends = (
-            levels[0].form.along is not None and way == CLIMB
+            levels[0].form.roller is not None and strategy == COARSE_TO_FINE
         )  # sharp ones go on the sturdier way
-        one_is_all = (
+        single_pressure_suffices = (
             self.smooth and not ends
         )  # that bodies without roughness have: oil and asperities never share
-        if one_is_all and not self.settled(self.options.tolerance):
-            step = self.from_one(levels, guess)
+        if single_pressure_suffices and not self.converged(self.options.tolerance):
+            step = self.from_single_pressure(levels, guess)
         return step
 
-    def from_one(
+    def from_single_pressure(
         self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
     ) -> Step:
         """From the paper's solution, in which oil and asperities have one pressure."""
         finest = levels[0]
-        for held in (False, True):
-            step = self.climb(levels, *guess(levels[-1]), held=held)
-            if self.settled(self.options.tolerance):
+        for fixed in (False, True):
+            step = self.solve_levels(levels, *guess(levels[-1]), fixed=fixed)
+            if self.converged(self.options.tolerance):
                 break
         self.figures = self.figures[:-1]
-        step = self.go_on(
+        step = self.continue_from(
             finest, Pressures(step.balance.pressure, step.balance.pressure, step.approach)
         )
         self.figures.append(self._figures(step))
         return step
 
-    def go_on(self, problem: Problem, unknowns: Pressures) -> Step:
+    def continue_from(self, problem: Problem, unknowns: Pressures) -> Step:
         """From a neighbouring solution: second order at once, or if that leads nowhere as from afar."""
         most = min(self.options.max_iterations, MIXED_SEARCH.max_second_order_iterations)
         step = self.run(
             problem, newton(problem, unknowns, second_order=True), self.options.tolerance, most
         )
-        return step if self.settled(self.options.tolerance) else self.finish(problem, unknowns)
+        return (
+            step
+            if self.converged(self.options.tolerance)
+            else self.solve_from_afar(problem, unknowns)
+        )
 
-    def at_once(
-        self, problem: Problem, unknowns: Pressures, *, coarsely: bool = False, last: bool = True
+    def solve_from_coarse(
+        self, problem: Problem, unknowns: Pressures, *, coarse: bool = False, last: bool = True
     ) -> Step:
         """From a coarser grid's solution: second order, or if that gains little as from afar.
 
         What the order of the wedge makes of the figures is then told on the way back to first
         order.
         """
-        tolerance, most = self._wanted(problem, coarsely=coarsely, near=True)
+        tolerance, most = self._targets(problem, coarse=coarse, near=True)
         roughly, soon = (
             max(MIXED_SEARCH.first_order_tolerance, tolerance),
             min(MIXED_SEARCH.max_second_order_iterations, most),
         )
-        if may_lean(problem):
+        if uses_limiter(problem):
             steps = newton(problem, unknowns, second_order=True)
             step = self.run(
                 problem,
                 steps,
                 roughly,
                 min(MIXED_SEARCH.max_restart_iterations, soon),
-                stray=MIXED_SEARCH.divergence,
+                divergence=MIXED_SEARCH.divergence,
             )
-            if self.settled(roughly) and not self.settled(tolerance):
+            if self.converged(roughly) and not self.converged(tolerance):
                 step = self.run(
                     problem,
                     steps,
                     tolerance,
                     step.number + soon,
-                    stray=MIXED_SEARCH.divergence,
+                    divergence=MIXED_SEARCH.divergence,
                     after=step,
                 )
-            if self.settled(tolerance):
-                if not coarsely:
+            if self.converged(tolerance):
+                if not coarse:
                     self.by_first_order = self._figures(_back_to_first_order(problem, step))
                 return step
-        return self.finish(problem, unknowns, coarsely=coarsely, last=last)
+        return self.solve_from_afar(problem, unknowns, coarse=coarse, last=last)
 
-    def _wanted(self, problem: Problem, *, coarsely: bool, near: bool = False) -> tuple[float, int]:
+    def _targets(self, problem: Problem, *, coarse: bool, near: bool = False) -> tuple[float, int]:
         """Tolerance and most steps, of the whole solve or of a grid that is only the way."""
         tolerance, most = self.options.tolerance, self.options.max_iterations
-        if not coarsely:
+        if not coarse:
             return tolerance, most
         roughly = (
             GRID_CONTINUATION.coarse_tolerance
@@ -214,48 +241,48 @@ class MixedSearch(Search):
         )
         return max(roughly, tolerance), min(MIXED_SEARCH.max_error_grid_iterations, most)
 
-    def refined(self, problem: Problem, step: Step) -> tuple[str, Step]:
+    def refine_third_order(self, problem: Problem, step: Step) -> tuple[str, Step]:
         """A sturdy solution of smooth bodies led on to the accurate wedge and its way; or as it is, if that fails."""
         history, figures, error = list(self.history), list(self.figures), self.iteration_error
         better = self.run(
             problem,
-            newton(problem, _reached(step), second_order=False),
+            newton(problem, _unknowns(step), second_order=False),
             self.options.tolerance,
             MIXED_SEARCH.max_second_order_iterations,
         )
-        if self.settled(self.options.tolerance):
+        if self.converged(self.options.tolerance):
             self.figures[-1] = self._figures(better)
-            return CLIMB, better
+            return COARSE_TO_FINE, better
         self.history, self.figures, self.iteration_error = history, figures, error
-        return STURDY, step
+        return ROBUST, step
 
-    def finish(
+    def solve_from_afar(
         self,
         problem: Problem,
         unknowns: Pressures,
         *,
-        coarsely: bool = False,
+        coarse: bool = False,
         length: float = 1.0,
         last: bool = True,
     ) -> Step:
-        """From afar: in steps of time first, from `length` half-widths on; then what stands still; `coarsely` roughly.
+        """From afar: in steps of time first, from `length` half-widths on; then what stands still; `coarse` roughly.
 
         The wedge is of first order until that is met roughly, then of second; where oil is
         conserved of first order throughout. Where time leads nowhere the `last` resort is the
         contact whose cavities are refilled, if oil is conserved, and then what stands still at
         once.
         """
-        tolerance, most = self._wanted(problem, coarsely=coarsely)
+        tolerance, most = self._targets(problem, coarse=coarse)
         if problem.conserve or not problem.accurate:
-            step = self.march(problem, unknowns, length)
-            if not self.settled(TIME_MARCHING.tolerance) and not last:
+            step = self.march_in_time(problem, unknowns, length)
+            if not self.converged(TIME_MARCHING.tolerance) and not last:
                 return step
-            if not self.settled(TIME_MARCHING.tolerance) and problem.conserve:
-                step = self.refilled(problem, unknowns, length)
-            unknowns = _reached(step) if self.settled(TIME_MARCHING.tolerance) else unknowns
-        if problem.accurate and problem.form.along is not None:
+            if not self.converged(TIME_MARCHING.tolerance) and problem.conserve:
+                step = self.from_refilled_cavities(problem, unknowns, length)
+            unknowns = _unknowns(step) if self.converged(TIME_MARCHING.tolerance) else unknowns
+        if problem.accurate and problem.form.roller is not None:
             most = min(most, MIXED_SEARCH.max_roller_iterations)
-        if not may_lean(problem):
+        if not uses_limiter(problem):
             return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
         roughly = max(MIXED_SEARCH.first_order_tolerance, tolerance)
         steps = newton(problem, unknowns, second_order=False)
@@ -264,11 +291,13 @@ class MixedSearch(Search):
             steps,
             roughly,
             min(most, MIXED_SEARCH.max_first_order_iterations),
-            stray=MIXED_SEARCH.divergence,
+            divergence=MIXED_SEARCH.divergence,
         )
-        if not self.settled(roughly):  # too much was left to the last: closer now
-            unknowns = _reached(
-                self.march(problem, unknowns, length, met=MIXED_SEARCH.first_order_tolerance)
+        if not self.converged(roughly):  # too much was left to the last: closer now
+            unknowns = _unknowns(
+                self.march_in_time(
+                    problem, unknowns, length, met=MIXED_SEARCH.first_order_tolerance
+                )
             )
             step = self.run(
                 problem,
@@ -276,14 +305,14 @@ class MixedSearch(Search):
                 roughly,
                 min(most, MIXED_SEARCH.max_first_order_iterations),
             )
-        if not self.settled(GRID_CONTINUATION.failed_residual):
+        if not self.converged(GRID_CONTINUATION.failed_residual):
             return step
         self.by_first_order = self._figures(step)
         return self.run(
-            problem, newton(problem, _reached(step), second_order=True), tolerance, most
+            problem, newton(problem, _unknowns(step), second_order=True), tolerance, most
         )
 
-    def march(
+    def march_in_time(
         self,
         problem: Problem,
         unknowns: Pressures,
@@ -300,16 +329,16 @@ class MixedSearch(Search):
         length, content = first, evaluate(problem, unknowns, second_order=False).content
         most = min(TIME_MARCHING.max_newton_steps, self.options.max_iterations)
         for _ in range(TIME_MARCHING.max_steps):
-            led = replace(problem, past=_kept_for(problem, length, content))
+            stepped = replace(problem, past=_implicit_step(problem, length, content))
             step = self.run(
-                led,
-                newton(led, unknowns, second_order=False),
+                stepped,
+                newton(stepped, unknowns, second_order=False),
                 met,
                 most,
-                stray=MIXED_SEARCH.divergence,
+                divergence=MIXED_SEARCH.divergence,
             )
-            if self.settled(met):
-                unknowns, content = _reached(step), step.balance.content
+            if self.converged(met):
+                unknowns, content = _unknowns(step), step.balance.content
                 if length >= TIME_MARCHING.final_length:
                     break
                 length *= (
@@ -325,66 +354,66 @@ class MixedSearch(Search):
                 length, met = 0.25 * length, min(met, MIXED_SEARCH.first_order_tolerance)
         return step
 
-    def refilled(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
+    def from_refilled_cavities(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
         """Towards what loses no oil from the contact whose cavities are refilled."""
         start = Pressures(
             np.clip(unknowns.oil, 0.0, problem.p_cap), unknowns.total, unknowns.approach
         )
-        step = self.march(replace(problem, conserve=False), start, length)
+        step = self.march_in_time(replace(problem, conserve=False), start, length)
         return (
-            self.march(problem, _reached(step), length)
-            if self.settled(TIME_MARCHING.tolerance)
+            self.march_in_time(problem, _unknowns(step), length)
+            if self.converged(TIME_MARCHING.tolerance)
             else step
         )
 
-    def climb_from(
+    def coarse_to_fine(
         self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
     ) -> Step:
         """Coarse to fine from Hertz's pressure, all of it the oil's; from there again after a grid that led nowhere."""
         self.figures, self.smooth = [], not np.any(levels[0].roughness)
         unknowns = None
-        roller = levels[0].accurate and levels[0].form.along is not None
-        before: Lubricated | None = None
+        roller = levels[0].accurate and levels[0].form.roller is not None
+        coarser: DryAndLubricated | None = None
         for problem in reversed(levels):
             if roller:
-                dry, unknowns = on_a_roller(problem, before, *guess(problem))
+                dry, unknowns = roller_start(problem, coarser, *guess(problem))
             elif unknowns is None:
                 pressure, approach = guess(problem)
                 unknowns = Pressures(pressure, pressure, approach)
             elif problem.cells != unknowns.total.shape:
-                unknowns = handed_up(problem, unknowns)
+                unknowns = interpolate_unknowns(problem, unknowns)
             if problem is levels[0]:
                 step = (
-                    self.at_once(problem, unknowns)
+                    self.solve_from_coarse(problem, unknowns)
                     if self.figures
-                    else self.finish(problem, unknowns)
+                    else self.solve_from_afar(problem, unknowns)
                 )
             else:
-                step = self.coarsely(problem, unknowns)
-            if self.smooth and not self.settled(MIXED_SEARCH.smooth_coarse_residual):
-                self.figures, unknowns, before = [], None, None
+                step = self.solve_coarse(problem, unknowns)
+            if self.smooth and not self.converged(MIXED_SEARCH.smooth_coarse_residual):
+                self.figures, unknowns, coarser = [], None, None
                 continue
-            if problem is not levels[0] and not self.settled(MIXED_SEARCH.first_order_tolerance):
+            if problem is not levels[0] and not self.converged(MIXED_SEARCH.first_order_tolerance):
                 self.figures = []  # a start, but no solution to compare with
-            elif coarser_all_along(problem, levels[0]):
+            elif coarser_in_all_axes(problem, levels[0]):
                 self.figures.append(self._figures(step))
-            unknowns = _reached(step)
-            before = Lubricated(dry, unknowns) if roller else None
+            unknowns = _unknowns(step)
+            coarser = DryAndLubricated(dry, unknowns) if roller else None
         if levels[0].conserve:  # on coarser grids oil was made
             self.figures = self.figures[-1:]
         return step
 
-    def coarsely(self, problem: Problem, unknowns: Pressures) -> Step:
+    def solve_coarse(self, problem: Problem, unknowns: Pressures) -> Step:
         """A start for the next finer grid; of smooth bodies by a few steps, then the worst cells, in turns."""
         tolerance = max(GRID_CONTINUATION.coarse_tolerance, self.options.tolerance)
         steps = newton(replace(problem, conserve=False), unknowns, second_order=False)
         for _ in range(MIXED_SEARCH.max_smooth_turns if problem.accurate else 0):
             step = self.run(problem, steps, tolerance, MIXED_SEARCH.steps_per_turn)
-            if self.settled(tolerance):
+            if self.converged(tolerance):
                 return step
             if step.balance.residual_rms < MIXED_SEARCH.first_order_tolerance:
                 break
-            steps = newton(problem, smoothed(problem, _reached(step)), second_order=False)
+            steps = newton(problem, refine_locally(problem, _unknowns(step)), second_order=False)
         return self.run(problem, steps, tolerance, GRID_CONTINUATION.max_coarse_iterations)
 
     def from_dry(self, levels: Sequence[Problem]) -> Step:
@@ -393,30 +422,30 @@ class MixedSearch(Search):
         What oil changed on a grid is granted to the dry contact of the next finer one.
         """
         self.figures, self.smooth = [], False
-        before, dry = None, None
+        coarser, dry = None, None
         for problem in reversed(levels):
             total, approach = dry_start(problem, dry)
             dry = Pressures(np.zeros_like(total), total, approach + problem.contact_gap)
             finest = problem is levels[0]
-            start = dry if before is None else before.granted(problem, dry)
-            if before is None:
-                step = self.finish(problem, start, coarsely=not finest)
+            start = dry if coarser is None else coarser.transfer_to(problem, dry)
+            if coarser is None:
+                step = self.solve_from_afar(problem, start, coarse=not finest)
             else:
-                step = self.at_once(problem, start, coarsely=not finest, last=False)
-            if before is not None and not self.settled(
+                step = self.solve_from_coarse(problem, start, coarse=not finest, last=False)
+            if coarser is not None and not self.converged(
                 GRID_CONTINUATION.failed_residual
             ):  # what oil changed on the coarser grid was no start
-                step = self.finish(
-                    problem, dry, coarsely=not finest, length=2.0 * problem.spacing[0]
+                step = self.solve_from_afar(
+                    problem, dry, coarse=not finest, length=2.0 * problem.spacing[0]
                 )
-            if finest or self.settled(
+            if finest or self.converged(
                 max(MIXED_SEARCH.first_order_tolerance, self.options.tolerance)
             ):
-                if coarser_all_along(problem, levels[0]):
+                if coarser_in_all_axes(problem, levels[0]):
                     self.figures.append(self._figures(step))
-                before = Lubricated(dry, _reached(step))
+                coarser = DryAndLubricated(dry, _unknowns(step))
             else:
-                self.figures, before = [], None
+                self.figures, coarser = [], None
         return step
 
     def _record(self, problem: Problem, step: Step) -> None:
@@ -426,20 +455,20 @@ class MixedSearch(Search):
         )
         super()._record(problem, step)
 
-    def coarser(self, finest: Problem) -> None:
+    def solve_coarser_grid(self, finest: Problem) -> None:
         """Solve the next coarser grid from dry, for what the cells' size may have done; nothing if that fails."""
         levels = grid_levels(finest)
-        if len(levels) == 1 or len(self.figures) != 1 or not coarser_all_along(levels[1], finest):
+        if len(levels) == 1 or len(self.figures) != 1 or not coarser_in_all_axes(levels[1], finest):
             return
-        beside = MixedSearch(
+        coarse_search = MixedSearch(
             replace(self.options, max_iterations=MIXED_SEARCH.max_error_grid_iterations),
             self.gap_scale,
             self.progress,
         )
-        beside.from_dry(levels[1:2])
-        self.history = [*beside.history, *self.history]
-        if beside.settled(self.options.tolerance):
-            self.figures = [*beside.figures, *self.figures]
+        coarse_search.from_dry(levels[1:2])
+        self.history = [*coarse_search.history, *self.history]
+        if coarse_search.converged(self.options.tolerance):
+            self.figures = [*coarse_search.figures, *self.figures]
 
 
 def pressures_of(solution: ContactSolution, problem: Problem, scales: Scales) -> Pressures:
@@ -469,37 +498,41 @@ def _signed(oil: Oil, problem: Problem, scales: Scales) -> Field:
     )
 
 
-def _kept_for(problem: Problem, length: float, content: Field) -> Past:
+def _implicit_step(problem: Problem, length: float, content: Field) -> TransientTerm:
     """The problem's past, or none, and on top the oil that was there when it was `length` farther back."""
     past = (
-        Past(0.0, np.zeros_like(content), followed=False) if problem.past is None else problem.past
+        TransientTerm(0.0, np.zeros_like(content), lagrangian=False)
+        if problem.past is None
+        else problem.past
     )
     return replace(past, rate=past.rate + 1.0 / length, source=past.source - content / length)
 
 
 def _back_to_first_order(problem: Problem, step: Step) -> Step:
     """From the second-order wedge's solution to the first-order one, met roughly, or as far as steps move the load."""
-    told = back = step
+    previous = back = step
     for back in islice(
-        newton(problem, _reached(step), second_order=False),
+        newton(problem, _unknowns(step), second_order=False),
         MIXED_SEARCH.max_backward_iterations + 1,
     ):
         if back.number > 0:
-            moved, all_of_it = (abs(_clr(back) - _clr(other)) for other in (told, step))
+            moved, all_of_it = (
+                abs(_load_share(back) - _load_share(other)) for other in (previous, step)
+            )
             if (
                 back.balance.residual_rms < MIXED_SEARCH.first_order_tolerance
                 or moved < MIXED_SEARCH.backward_tolerance * all_of_it
             ):
                 break
-            told = back
+            previous = back
     return back
 
 
-def _clr(step: Step) -> float:
+def _load_share(step: Step) -> float:
     return carried_share(step.balance.pressure, step.balance.in_contact)
 
 
-def _reached(step: Step) -> Pressures:
+def _unknowns(step: Step) -> Pressures:
     assert isinstance(step.balance, MixedBalance)
     return step.balance.unknowns
 
