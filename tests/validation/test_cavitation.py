@@ -282,7 +282,7 @@ def test_a_film_that_is_not_solved_says_so():
     [
         ({"gap": np.zeros(20)}, "gap must be positive"),
         ({"gap": np.ones((2, 2, 2))}, "gap must have shape"),
-        ({"spacing": (1.0, 1.0)}, "spacing must be one size"),
+        ({"spacing": (1.0, 1.0)}, "spacing must be one cell size"),
         ({"spacing": 0.0}, "spacing dx must be positive"),
         ({"entrainment_speed": -1.0}, "entrainment speed must be positive"),
         ({"ends": (-1.0, 0.0)}, "ends must be pressures"),

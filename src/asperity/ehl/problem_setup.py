@@ -1,4 +1,4 @@
-"""A contact posed as the dimensionless problem to solve: on which grids, and from which guess."""
+"""Setup of the dimensionless problem: grid levels and initial guess."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ def contact_problem(
     *,
     attempt: str = ATTEMPTS[0],
 ) -> Problem:
-    """The dimensionless problem on the surface's own grid, as the attempt poses it."""
+    """Return the dimensionless problem of an attempt on the surface's grid."""
     scales = Scales.from_conditions(conditions, lubricant)
     grid, line = surface.grid, conditions.endless
     (dx, dy), (left, front) = grid.spacing, grid.lower
@@ -64,35 +64,32 @@ def contact_problem(
 def first_guess(
     problem: Problem, conditions: ContactConditions, lubricant: Lubricant | None, scales: Scales
 ) -> tuple[Field, float]:
-    """Hertz pressure, with the bodies as far apart as the film of a smooth contact holds them."""
+    """Return Hertz pressure and an approach that leaves the film of a smooth contact."""
     pressure = np.minimum(problem.form.hertz(problem.x, problem.y), problem.p_cap)
     film = 0.0
     if lubricant:
         film = smooth_film(conditions, lubricant) / scales.gap
-        if not np.any(
-            problem.roughness
-        ):  # too near, smooth bodies touch where oil has to part them, and stay so
+        # too close, smooth bodies touch where oil should separate them, and remain in contact
+        if not np.any(problem.roughness):
             film = max(
                 film, least_films(conditions, lubricant)["isoviscous-elastic"].film / scales.gap
             )
-            if (
-                not conditions.long
-            ):  # under Hertz's pressure the gap is even: it is that in the middle
+            if not conditions.long:  # the gap is uniform under Hertz pressure: the central film
                 film = max(film, central_film(conditions, lubricant) / scales.gap)
     smooth = problem.form.gap(problem.x, problem.y) + problem.deflection(pressure)
     return pressure, film - float(np.min(smooth))
 
 
 def smooth_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
-    """Least film of the smooth contact [m] by the fits of hard bodies and thickening oils, Dowson's and Hamrock's.
+    """Return the minimum film [m] of a smooth piezoviscous-elastic contact by Dowson or Hamrock.
 
-    A guess to start from, in every regime: `least_film` is the film to report.
+    An initial guess in every regime; report `least_film` instead.
     """
     return least_films(conditions, lubricant)["piezoviscous-elastic"].film
 
 
 def grid_levels(finest: Problem) -> list[Problem]:
-    """The problem on its own grid and on coarser and coarser ones."""
+    """Return the problem on its own grid and on successively coarser ones."""
     levels = [finest]
     while (cells := _halved(levels[-1].all_cells)) != levels[-1].all_cells:
         levels.append(levels[-1].coarsened(cells))
@@ -100,7 +97,10 @@ def grid_levels(finest: Problem) -> list[Problem]:
 
 
 def coarser_in_all_axes(problem: Problem, finest: Problem) -> bool:
-    """Whether a grid tells what the finest one's cells did: coarser along each axis of more than one, or itself."""
+    """Return True for the finest grid and for grids that refine to it along every axis.
+
+    Axes of one cell do not count. Only such grids estimate the discretisation error.
+    """
     several = [
         (few, many) for few, many in zip(problem.cells, finest.cells, strict=True) if many > 1
     ]
@@ -110,10 +110,10 @@ def coarser_in_all_axes(problem: Problem, finest: Problem) -> bool:
 def usable_levels(
     finest: Problem, conditions: ContactConditions, lubricant: Lubricant | None
 ) -> list[Problem]:
-    """The levels of a climb; those of a smooth line contact down to the coarsest that has 2 cells across the inlet.
+    """Return the levels of a coarse-to-fine solve.
 
-    On coarser ones the bodies touch, which is a worse start than Hertz's pressure. One is kept to
-    tell the error.
+    A smooth line contact needs 2 cells across the inlet: on coarser grids the bodies touch, which
+    is a worse initial guess than Hertz pressure. One coarser level is kept for the error estimate.
     """
     levels = grid_levels(finest)
     if not finest.uniform or lubricant is None:
@@ -133,14 +133,14 @@ def _halved(cells: tuple[int, int]) -> tuple[int, int]:
 
 
 def reduced_problem(problem: Problem) -> Problem:
-    """What tells all of a lubricated contact: one line of cells, or those on one side of Y = 0, if that will do."""
+    """Return the smallest equivalent problem: one line of cells, half the domain, or all."""
     if problem.uniform:
         return on_one_line(problem)
     return half_domain(problem) if problem.symmetric and problem.lubricant is not None else problem
 
 
 def half_domain(problem: Problem) -> Problem:
-    """What has a mirror at Y = 0, on the cells up to there."""
+    """Return a symmetric problem on the cells up to its mirror plane Y = 0."""
     factor, lines = problem.viscosity_factor, problem.cells[1]
     half = -(-lines // 2)
     return replace(
@@ -152,7 +152,7 @@ def half_domain(problem: Problem) -> Problem:
 
 
 def on_one_line(problem: Problem) -> Problem:
-    """What does not vary along y, on one line of cells that is as wide as all."""
+    """Return a problem uniform along y on one line of cells of the full width."""
     factor, (dx, dy) = problem.viscosity_factor, problem.spacing
     return replace(
         problem,

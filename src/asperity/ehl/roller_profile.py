@@ -1,7 +1,7 @@
-"""A roller along its length, in the solver's units: how its surface falls back, what it may carry, where it ends.
+"""Profile, load and ends of a roller along its axis, in the solver's units.
 
-A place is beyond the roller past its ends, and where its surface has fallen back so far that no
-oil between the bodies carries any pressure: there the solver holds ambient pressure.
+The solver holds ambient pressure outside the roller: past its ends, and where its surface has
+dropped so far that oil carries no pressure.
 """
 
 from dataclasses import dataclass
@@ -11,34 +11,37 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field, Mask
 
-# a²/R from where the dry roller still touches: as far as before an inlet of 7.7 half-widths
+# a²/R beyond contact; equals the gap before an inlet of 7.7 half-widths
 NO_PRESSURE_GAP = 30.0
-END_SHARE = 0.05  # share of the length, at either end, that counts as the end
+END_SHARE = 0.05  # share of the length at either end
 
 
 @dataclass(frozen=True)
 class RollerProfile:
-    """Of a roller under these conditions; Y in half-widths, lengths across the gap in a²/R."""
+    """Profile of a roller; Y in half-widths, gaps in a²/R."""
 
     conditions: ContactConditions
     length: float  # unit along the surface [m]
     gap: float  # unit across it [m]
 
     def drop(self, y: Field) -> Field:
-        """How far the surface falls back, shape (ny,); beyond the roller there is none, and the gap is wide."""
+        """Return the drop of the surface, shape (ny,); a wide gap outside the roller."""
         return np.asarray(
             np.where(self.outside(y), self._contact_drop + NO_PRESSURE_GAP, self._profile_drop(y))
         )
 
     def load(self, y: Field) -> Field:
-        """Load per length by slices over its mean, shape (ny,)."""
+        """Return the load per length, by slices, over its mean, shape (ny,)."""
         sliced = self.conditions.sliced_load
         return np.asarray(
             np.interp(y * self.length, sliced.y, sliced.line_load / sliced.line_load.mean())
         )
 
     def zone(self, x: Field, y: Field, share: float, spacing: tuple[float, float]) -> Mask:
-        """Cells within `share` of the smooth, dry contact by slices, at least the middle ones, shape (nx, ny)."""
+        """Return the cells within `share` of the smooth dry contact by slices, shape (nx, ny).
+
+        At least the central ones.
+        """
         (dx, dy), (low, high) = spacing, self.conditions.sliced_load.ends
         half = np.where(self.outside(y), 0.0, np.sqrt(self.load(y)))
         within = np.abs(y - 0.5 * (low + high) / self.length) <= max(
@@ -49,18 +52,21 @@ class RollerProfile:
         )
 
     def outside(self, y: Field) -> Mask:
-        """Places past the roller, shape (ny,)."""
+        """Return the places outside the roller, shape (ny,)."""
         return np.asarray(
             ~self.inside(y) | (self._profile_drop(y) > self._contact_drop + NO_PRESSURE_GAP)
         )
 
     @staticmethod
     def central_pressure(x: Field, pressure: Field, dx: float) -> Field:
-        """Largest pressure of every line of cells up to its middle, before oil's spike at the outlet, shape (ny,)."""
+        """Return the largest pressure of every line up to its centre, shape (ny,).
+
+        Excludes the outlet spike.
+        """
         return np.asarray(pressure[x <= 0.5 * dx].max(axis=0))
 
     def end_values(self, y: Field, values: Field) -> Field:
-        """Values of lines on the outer twentieth of the length at either end, and where it begins."""
+        """Return values of lines on the outer twentieth at either end, with its inner border."""
         begins, inside = (
             (0.5 - END_SHARE) * self.conditions.line_length / self.length,
             self.inside(y),
@@ -72,15 +78,16 @@ class RollerProfile:
         return np.concatenate([values[np.abs(y) >= begins], borders])
 
     def inside(self, y: Field) -> Mask:
-        """Places between the ends of the roller, shape (ny,)."""
+        """Return the places between the ends of the roller, shape (ny,)."""
         return np.asarray(np.abs(y) * self.length < self.conditions.end * (1.0 - 1e-9))
 
     @property
     def _contact_drop(self) -> float:
-        """Drop down to which the dry roller touches."""
+        """Largest drop at which the dry roller touches."""
         return self.conditions.sliced_load.approach / self.gap
 
     def _profile_drop(self, y: Field) -> Field:
+        """Return the drop of the profile."""
         conditions = self.conditions
         return np.asarray(
             conditions.roller.drop(y * self.length, conditions.length or 0.0) / self.gap

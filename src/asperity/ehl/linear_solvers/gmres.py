@@ -1,10 +1,8 @@
-"""GMRES, right-preconditioned, without restart, in the precision of what is wanted; real or complex.
+"""GMRES, right-preconditioned, without restart, in the precision of the right-hand side.
 
-And the same of equations with a frequency in them, which may move between two steps.
-
-SciPy's preconditions from the left, so that it stops on a residual nobody asked for, and
-orthogonalises vector by vector; at 65 000 unknowns and a few dozen steps that costs as much as the
-physics.
+Real or complex; also for equations with a frequency that may change between steps. SciPy's GMRES
+preconditions from the left, so that it stops on the preconditioned residual, and orthogonalises
+vector by vector; at 65 000 unknowns and a few dozen steps that costs as much as the physics.
 """
 
 from collections.abc import Callable
@@ -18,17 +16,17 @@ from asperity.ehl.controls import KRYLOV
 Vector = np.ndarray[Any, Any]
 Operator = Callable[[Any], Vector]
 
-ADJOINT = 2  # what BLAS calls the conjugate transpose
+ADJOINT = 2  # BLAS code of the conjugate transpose
 
 
 class Workspace:
-    """Memory for the vectors of one GMRES after the other: fresh memory takes as long as what is done with it."""
+    """Memory for successive GMRES solves: allocating it anew takes as long as the solve."""
 
     def __init__(self) -> None:
         self.parts: tuple[Vector, Vector] = (np.empty(0), np.empty(0))
 
     def rows(self, count: int, vector: Vector) -> tuple[Vector, Vector]:
-        """Two arrays of at least `count` rows like `vector`; rows of the same length are what they were before."""
+        """Return two arrays of at least `count` rows like `vector`, keeping earlier rows."""
         size = vector.size
         if self.parts[0].dtype != vector.dtype or self.parts[0].size < count * size:
             before = self.parts
@@ -41,9 +39,7 @@ class Workspace:
         return first, second
 
 
-@np.errstate(
-    over="ignore", invalid="ignore"
-)  # what leaves this precision's range is found out below
+@np.errstate(over="ignore", invalid="ignore")  # overflow is detected below
 def gmres(
     product: Operator,
     precondition: Operator,
@@ -53,9 +49,9 @@ def gmres(
     max_steps: int,
     workspace: Workspace | None = None,
 ) -> Vector:
-    """Solve product(x) = wanted until the residual has fallen by `tolerance` or steps run out; return the best x.
+    """Solve product(x) = rhs to a relative residual `tolerance` or in `max_steps`; return the best x.
 
-    Where many are solved one after the other, all of them may have one `workspace`.
+    Successive solves may share one `workspace`.
     """
     exact = np.result_type(rhs.dtype, float)
     norm = _norm(rhs)
@@ -64,9 +60,7 @@ def gmres(
     workspace = workspace or Workspace()
     basis, corrections = workspace.rows(min(KRYLOV.initial_vectors, max_steps) + 1, rhs)
     triangle = np.zeros((max_steps, max_steps), exact)
-    turns = np.zeros(
-        (max_steps, 2), exact
-    )  # cosine and sine of the rotations that make the Hessenberg matrix a triangle
+    rotations = np.zeros((max_steps, 2), exact)  # Givens rotations, cosine and sine
     target = np.zeros(max_steps + 1, exact)
     target[0] = norm
     np.divide(rhs, norm, out=basis[0])
@@ -80,22 +74,22 @@ def gmres(
         overlaps = (known @ new.conj()).conj()
         new -= overlaps @ known
         column, length = overlaps.astype(exact), _norm(new)
-        if not np.isfinite(
-            length
-        ):  # out of this precision's range: what is known already has to do
+        if not np.isfinite(length):  # overflow: use the corrections so far
             step -= 1
             break
         if length < KRYLOV.reorthogonalise * before:
             overlaps = (known @ new.conj()).conj()
             new -= overlaps @ known
             column, length = column + overlaps, _norm(new)
-        for i, (cosine, sine) in enumerate(turns[:step]):
+        for i, (cosine, sine) in enumerate(rotations[:step]):
             column[i : i + 2] = (
                 cosine.conj() * column[i] + sine * column[i + 1],
                 cosine * column[i + 1] - sine * column[i],
             )
         slant = float(np.hypot(abs(column[step]), length))
-        cosine, sine = turns[step] = (column[step] / slant, length / slant) if slant else (1.0, 0.0)
+        cosine, sine = rotations[step] = (
+            (column[step] / slant, length / slant) if slant else (1.0, 0.0)
+        )
         column[step] = slant
         triangle[: step + 1, step] = column
         target[step : step + 2] = np.conj(cosine) * target[step], -sine * target[step]
@@ -110,23 +104,25 @@ def gmres(
 
 
 def _norm(vector: Vector) -> float:
+    """Return the Euclidean norm."""
     return float(np.sqrt(np.vdot(vector, vector).real))
 
 
 class Shifted:
-    """(A + iΩ B) x = a + iΩ b: corrections x one by one, their best combination at an Ω that may move on the way.
+    """Solver of (A + iΩ B) x = a + iΩ b whose frequency Ω may change between steps.
 
-    Adaptive simpler GMRES: a step answers what is left, or, where that hardly fell, what the last
-    step made of it. Either alone loses its digits, the one while nothing falls, the other once
-    much has fallen. Source: P. Jiránek and M. Rozložník, Numerical Algorithms 53 (2010) 93-112.
+    Adaptive simpler GMRES: a step preconditions the residual or, if that hardly fell, the last
+    basis vector. Either alone loses digits: the former while nothing falls, the latter once the
+    residual has fallen far. Source: P. Jiránek and M. Rozložník, Numerical Algorithms 53 (2010)
+    93-112.
 
     Parameters
     ----------
-    product, precondition : A v and B v of a complex vector; about what A turns into one
-    wanted : a and b
-    bearing : weights of the unknowns in `sum`, which is known after every step
-    frequency : the Ω to begin with
-    most_steps : room for corrections
+    product, precondition : A v and B v of a complex vector; approximate inverse of A
+    rhs : a and b
+    bearing : weights of the unknowns in `sum`, available after every step
+    frequency : initial Ω
+    max_steps : largest number of corrections
     """
 
     def __init__(
@@ -155,7 +151,7 @@ class Shifted:
 
     @property
     def left(self) -> float:
-        """Share of the equations that is left, as far as this precision tells."""
+        """Relative residual, within this precision."""
         return _norm(self.rest) / self.size
 
     @property
@@ -165,15 +161,15 @@ class Shifted:
 
     @property
     def full(self) -> bool:
-        """Whether there is no room for further corrections."""
+        """True if no further correction can be stored."""
         return self.count == len(self.basis)
 
     def answer(self) -> Vector:
-        """The unknowns."""
+        """Return the unknowns."""
         return np.asarray(self._combination().astype(self.kind) @ self.corrections[: self.count])
 
     def step(self) -> bool:
-        """One correction more; False where it told nothing new."""
+        """Add a correction; return False if it is linearly dependent."""
         before = _norm(self.rest)
         tried = self.rest / self.kind.type(before) if self.falls else self.basis[self.count - 1]
         correction = self.precondition(tried)
@@ -186,7 +182,7 @@ class Shifted:
         return True
 
     def move(self, frequency: float) -> None:
-        """Combine what is known anew, for another Ω."""
+        """Recombine the corrections for another Ω."""
         count, further = self.count, self.kind.type(1j * (frequency - self.frequency))
         rows = self.triangle[:count, :count].T.astype(self.kind) @ self.basis[:count]
         rows += further * self.stored[:count]
@@ -195,11 +191,12 @@ class Shifted:
         for row in rows:
             if not self._append(row):
                 raise ArithmeticError(
-                    f"corrections that are no longer independent at frequency {frequency:g}"
+                    f"corrections are linearly dependent at frequency {frequency:g}"
                 )
             self.count += 1
 
     def _begin(self) -> None:
+        """Reset the residual."""
         a, b = self.rhs
         self.rest = a + self.kind.type(1j * self.frequency) * b
         self.size = _norm(self.rest)
@@ -207,7 +204,7 @@ class Shifted:
         self.target: list[complex] = []
 
     def _append(self, new: Vector) -> bool:
-        """What is left without what another correction makes of the equations; False where that is nothing new."""
+        """Orthogonalise a vector and update the residual; return False if it is dependent."""
         count = self.count
         known, before = self.basis[:count].T, _norm(new)
         column = np.zeros(count, complex)
@@ -230,5 +227,6 @@ class Shifted:
         return True
 
     def _combination(self) -> Vector:
+        """Return the weights of the corrections."""
         triangle = self.triangle[: self.count, : self.count]
         return np.asarray(scipy.linalg.solve_triangular(triangle, np.array(self.target)))

@@ -1,16 +1,14 @@
-"""The mixed contact linearised, and Newton's step of it by GMRES, in single precision.
+"""Linearised mixed contact, and its Newton step by GMRES, in single precision.
 
-Unknown are the changes of the oil's pressure where it is lubricated and of the total one where
-bodies touch; free cells have one pressure, ruptured and capped ones know theirs. The approximate
-inverse answers the oil's rows by blocks and lines, as
-`asperity.ehl.linear_solvers.single_pressure` does, and a touching cell's row by its own
-compliance.
+Unknowns are the changes of oil pressure in lubricated cells and of total pressure in touching ones;
+free cells have one pressure, those of ruptured and capped cells are known. The approximate inverse
+treats the oil's rows by blocks and lines, like `asperity.ehl.linear_solvers.single_pressure`, and a
+touching cell's row by its own compliance.
 
-Two things differ from there, and GMRES needs a fifth of the steps for them where oil is stiff. A
-cell's pressure moves its own gap only: oil carries its film downstream unchanged, which the
-differences of a stencil cut off after three cells let decay. And mobilities answer: beside
-asperities the oil's pressure changes so much from cell to cell that this outweighs the mobilities
-themselves.
+Two differences reduce GMRES steps fivefold where oil is stiff. A cell's pressure changes its own
+gap only: oil carries its film downstream unchanged, while the differences of a stencil truncated
+after three cells make it decay. And mobilities are linearised: beside asperities the oil pressure
+varies so strongly from cell to cell that this outweighs the mobilities themselves.
 """
 
 from dataclasses import replace
@@ -48,10 +46,10 @@ from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 
 class MixedLinear:
-    """The linearisation of a balance: `product` applies it, `answer` approximately inverts it; all (nx, ny).
+    """Linearisation of a balance: `product` applies it, `answer` approximately inverts it.
 
-    `with_limiter` lets the lines follow how the wedge leans, too: where the equations are met far
-    closer than to a tenth.
+    All fields are (nx, ny). `with_limiter` includes the slope limiter of the wedge in the lines,
+    for equations solved far closer than to a tenth.
     """
 
     def __init__(
@@ -69,9 +67,8 @@ class MixedLinear:
         self.free, self.touching = balance.solid == FREE, balance.solid == TOUCHING
         self.oil = balance.oil_pressure.astype(self.real)
         self.conserves = balance.surplus is not None
-        self.follows_wedge = (
-            problem.accurate and problem.cells[1] > 1
-        )  # on one line own pressures tell more
+        # on one line the stencil of own pressures works better
+        self.follows_wedge = problem.accurate and problem.cells[1] > 1
         if balance.surplus is not None and balance.surplus_by_oil is not None:
             self.surplus_by_oil = balance.surplus_by_oil.astype(self.real)
             missing = np.minimum(balance.unknowns.oil, 0.0)
@@ -106,7 +103,7 @@ class MixedLinear:
 
     @cached_property
     def inverse(self) -> tuple[BlockSolver | MultigridSolver, LineRelaxation]:
-        """Blocks and lines, made when they are first asked for."""
+        """Blocks and lines, built on first use."""
         stencil, far = self._stencil()
         weight = np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
         alike = (
@@ -120,6 +117,7 @@ class MixedLinear:
         ) if self.with_limiter else LineRelaxation(stencil, far)
 
     def _stencil(self) -> tuple[Stencil, OuterNeighbours | None]:
+        """Return the stencil, with outer neighbours if it includes the wedge."""
         problem, stencil = self.balance.problem, Stencil(*np.empty((5, *self.cells), self.real))
         state = np.where(self.lubricated, np.int8(LUBRICATED), np.int8(RUPTURED))
         rows, film = self.rows._replace(state=state), self.film.with_fixed_gap(~self.free)
@@ -152,20 +150,17 @@ class MixedLinear:
         return stencil, far
 
     def _with_limiter(self, stencil: Stencil) -> tuple[Stencil, OuterNeighbours]:
-        """The stencil and what it has of cells further upstream, with the wedge leaning.
+        """Return the stencil and its outer neighbours with the limited correction of the wedge.
 
-        Beside closed cells films thin many times over from one cell to the next. The wedge leans
-        there by so much that a cell's own entry may be a sixth of what first order makes it.
+        Beside closed cells films thin many times over from one cell to the next; the correction
+        there may reduce a cell's own entry to a sixth of its first-order value.
         """
         film, dx = self.film.with_fixed_gap(~self.free), self.real(self.balance.problem.spacing[0])
         content = (
             film.content_by_gap * self.real(1.0 / self.rows.contact_scale)
             + film.content_by_pressure
         )
-        own, upstream = (
-            np.zeros_like(content),
-            np.zeros_like(content),
-        )  # of what the eastern faces pass on besides
+        own, upstream = np.zeros_like(content), np.zeros_like(content)  # limited flow, east faces
         own[1:-1] = (self.limiter_own * content)[1:-1] / dx
         upstream[1:-1] = self.limiter_upstream[1:-1] * content[:-2] / dx
         far = OuterNeighbours(*np.zeros((2, *self.cells), self.real))
@@ -175,7 +170,7 @@ class MixedLinear:
         return stencil, far
 
     def _advect_surplus(self, stencil: Stencil) -> None:
-        """Cells whose unknown is not a pressure hand what they hold to the next cell downstream, and to no other."""
+        """Couple cells whose unknown is not a pressure to the next one downstream only."""
         past, real, scale = self.balance.problem.past, self.real, self.rows.fluid_scale
         loose = self.lubricated & ~self.full
         lagrangian = past is not None and past.lagrangian
@@ -189,14 +184,20 @@ class MixedLinear:
         stencil.south[np.roll(loose, 1, axis=1)] = 0.0
 
     def _storage(self, past: TransientTerm | None) -> StoredOil | None:
-        """What the first rows of followed oil draw in by the wedge is left out, as in `asperity.ehl.linear_solvers.single_pressure`."""
+        """Return the storage of oil; see `asperity.ehl.linear_solvers.single_pressure`.
+
+        Neglects the wedge in the first rows of Lagrangian oil.
+        """
         if past is None:
             return None
         scaled = self.scale * self.real(past.rate)
         return StoredOil(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
 
     def product(self, d_oil: Field, d_total: Field, d_approach: float) -> tuple[Field, Field]:
-        """Changes of the oil's equations and of touching cells'; of the unknown itself where it is known."""
+        """Return changes of the oil's equations and of touching cells' equations.
+
+        Known unknowns have identity rows.
+        """
         problem = self.balance.problem
         d_gap = problem.deflection(d_total)
         if d_approach:
@@ -204,7 +205,7 @@ class MixedLinear:
         return self.of_gap(d_oil, d_gap)
 
     def of_gap(self, d_oil: Field, d_gap: Field) -> tuple[Field, Field]:
-        """The same, of a change of the oil's unknown and that of the gap."""
+        """Return the same for a change of the oil's unknown and of the gap."""
         problem = self.balance.problem
         wet = np.empty(self.cells, self.real)
         spacing, d_pressure, d_height = (
@@ -243,7 +244,7 @@ class MixedLinear:
         return wet, d_gap * self.real(self.rows.contact_scale)
 
     def answer(self, wet: Field) -> Field:
-        """Approximate change of the oil's pressure that answers its rows; touching cells' answer themselves."""
+        """Return an approximate change of the oil's pressure for a residual of its rows."""
         blocks, lines = self.inverse
         change = blocks(wet)
         if self.follows_wedge:
@@ -251,18 +252,18 @@ class MixedLinear:
         return lines(wet, change)
 
     def total(self, d_oil: Field, d_closed: Field) -> Field:
-        """Change of the total pressure: the oil's in free cells, their own in touching ones."""
+        """Return the change of total pressure: the oil's in free cells, `d_closed` in touching ones."""
         return np.where(self.free, self.pressure_of(d_oil), d_closed)
 
     def pressure_of(self, d_oil: Field) -> Field:
-        """Change of the oil's pressure: none where its unknown is no pressure."""
+        """Return the change of the oil's pressure: zero where its unknown is not a pressure."""
         return np.where(self.full, d_oil, d_oil.dtype.type(0.0)) if self.conserves else d_oil
 
 
 class _Step:
-    """Newton's step as one vector: of the oil, of the total pressure of touching cells, and of the approach.
+    """Newton step as one vector: oil, total pressure of touching cells, approach.
 
-    The last equation is the missing load, or nothing where the bodies are held.
+    The last equation is the load, or an identity at fixed approach.
     """
 
     def __init__(self, linear: MixedLinear) -> None:
@@ -279,10 +280,10 @@ class _Step:
         self.response = self._answered(
             self.joined(np.where(linear.lubricated, by_approach[0], 0.0), by_approach[1], 0.0)
         )
-        self.whole = self._load_change(self.response)
+        self.load_response = self._load_change(self.response)
 
     def joined(self, oil: Field, solid: Field, last: float) -> Field:
-        """A vector of what is known of the oil, of touching cells (both (nx, ny)) and of the load or the approach."""
+        """Assemble a vector from fields of the oil and of touching cells, and its last entry."""
         vector = np.empty(self.count + self.touching.size + 1, self.linear.real)
         vector[: self.count], vector[self.count : -1], vector[-1] = (
             oil.ravel(),
@@ -292,17 +293,17 @@ class _Step:
         return vector
 
     def oil(self, vector: Field) -> Field:
-        """The part of the oil, (nx, ny)."""
+        """Return the part of the oil, (nx, ny)."""
         return vector[: self.count].reshape(self.linear.cells)
 
     def total(self, vector: Field) -> Field:
-        """Change of the total pressure, (nx, ny): the oil's in free cells, their own in touching ones."""
+        """Return the change of the total pressure, (nx, ny)."""
         total: Field = self.oil(vector) * self.load_weights
         total.ravel()[self.touching] = vector[self.count : -1]
         return total
 
     def product(self, vector: Field) -> Field:
-        """The linearised equations applied to it."""
+        """Apply the linearised equations."""
         total, rows = self.total(vector), np.empty_like(vector)
         wet, closed = self.linear.product(self.oil(vector), total, float(vector[-1]))
         rows[: self.count], rows[self.count : -1] = wet.ravel(), closed.ravel()[self.touching]
@@ -314,23 +315,24 @@ class _Step:
         return rows
 
     def precondition(self, rows: Field) -> Field:
-        """About what answers them."""
+        """Apply the approximate inverse."""
         change = self._answered(rows)
         if self.approach_is_free:
             d_approach = self.linear.real(
-                (self._load_change(change) - rows[-1] / self.weight) / self.whole
+                (self._load_change(change) - rows[-1] / self.weight) / self.load_response
             )
             change -= d_approach * self.response
             change[-1] = d_approach
         return change
 
     def _answered(self, rows: Field) -> Field:
+        """Apply the approximate inverse to the oil's rows."""
         change = rows.copy()
         change[: self.count] = self.linear.answer(self.oil(rows)).ravel()
         return change
 
     def _load_change(self, vector: Field) -> float:
-        """By how much more the pressures bear."""
+        """Return the change of the load."""
         if self.problem.mirror:
             return float(self.problem.sum_over_cells(self.total(vector)))
         return float(
@@ -339,16 +341,16 @@ class _Step:
 
 
 def flattened_cells(balance: MixedBalance) -> Mask:
-    """Cells that the cap holds closed: no oil that comes lifts them."""
+    """Return the cells that the cap keeps closed and oil cannot open."""
     closed = balance.gap <= (1.0 + CLOSED_WITHIN) * balance.problem.contact_gap
     return np.asarray(closed & (balance.solid == CAPPED))
 
 
 def extend_streaks(balance: MixedBalance) -> MixedBalance:
-    """The same, but that flattened cells without oil are lubricated as far down the stream as oil fills those before.
+    """Return the balance with flattened cells lubricated as far downstream as oil fills them.
 
-    A cell is ruptured until oil has come to it: oil that fills a streak of closed cells would go
-    on by one a step.
+    Otherwise a cell is ruptured until oil has arrived: a streak of closed cells would fill by one
+    cell per step.
     """
     problem, rows, residual = balance.problem, balance.rows, balance.oil_residual.copy()
     state, highest = rows.state.copy(), (1.0 + CLOSED_WITHIN) * problem.contact_gap
@@ -360,11 +362,11 @@ def extend_streaks(balance: MixedBalance) -> MixedBalance:
 
 
 def is_firm(balance: MixedBalance) -> bool:
-    """Whether few cells are nearly closed beside those that are flattened.
+    """Return True if few cells are nearly closed, compared with flattened ones.
 
-    Where many are, films of about the contact film close and open from step to step. How they open
-    at one of them tells little of the next, and blocks of cells that are not alike answer badly
-    when they are summed again and again.
+    Many nearly closed cells mean films of about the contact film that open and close from step to
+    step. The opening slopes of one step then say little about the next, and coarse blocks of unlike
+    cells precondition badly.
     """
     gap, film = balance.gap, balance.problem.contact_gap
     nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPENING_RANGE) * film)
@@ -376,22 +378,22 @@ def is_firm(balance: MixedBalance) -> bool:
 def newton_step(
     balance: MixedBalance, settled: Mask | None = None, workspace: Workspace | None = None
 ) -> Pressures:
-    """Changes of all unknowns that meet every linearised equation, and the load, to a tenth.
+    """Return changes of all unknowns that solve the linearised equations and the load to a tenth.
 
-    How the wedge opens is linearised in cells whose gap has `settled`, where bodies touch firmly,
-    and oil is foreseen in flattened streaks; neither without `settled`. Steps of one grid may
-    share GMRES's `workspace`.
+    The opening of the wedge is linearised in `settled` cells if the contact is firm, and oil is
+    extended along flattened streaks; neither without `settled`. Steps on one grid may share a GMRES
+    `workspace`.
     """
     problem = balance.problem
-    stands = (
+    steady = (
         settled is not None
         and not problem.conserve
         and problem.past is None
         and problem.fixed is None
     )
-    if stands:
+    if steady:
         balance = extend_streaks(balance)
-    settled = settled if stands and is_firm(balance) else None
+    settled = settled if steady and is_firm(balance) else None
     linear = MixedLinear(balance, settled=settled)
     real, zero = linear.real, linear.real(0.0)
     known_oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
@@ -409,8 +411,8 @@ def newton_step(
         else 0.0
     )
     if (
-        step.whole == 0.0
-    ):  # every cell is ruptured or capped: only the distance of the bodies can change the load
+        step.load_response == 0.0
+    ):  # all cells ruptured or capped: only the approach can change the load
         return Pressures(
             known_oil,
             known,
@@ -419,7 +421,7 @@ def newton_step(
             / balance.rows.contact_scale,
         )
     rhs = step.joined(np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing))
-    left = (
+    tolerance = (
         MIXED_LINEAR_SOLVER.tolerance_smooth
         if linear.follows_wedge
         else MIXED_LINEAR_SOLVER.tolerance
@@ -429,12 +431,12 @@ def newton_step(
         and linear.lagrangian
         and balance.residual_rms < MIXED_LINEAR_SOLVER.conserving_residual
     ):
-        left = MIXED_LINEAR_SOLVER.tolerance_conserving
+        tolerance = MIXED_LINEAR_SOLVER.tolerance_conserving
     solved = gmres(
         step.product,
         step.precondition,
         rhs,
-        tolerance=left,
+        tolerance=tolerance,
         max_steps=MIXED_LINEAR_SOLVER.max_krylov_steps,
         workspace=workspace,
     )

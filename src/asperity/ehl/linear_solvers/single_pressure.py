@@ -1,7 +1,7 @@
-"""A contact's equations linearised, and a cheap approximate inverse of that, both in single precision.
+"""Linearised single-pressure contact and its preconditioner, both in single precision.
 
-Newton's step is only wanted to a tenth, and what it leaves is measured in double precision: single
-changes neither the answer nor the steps, and halves what has to be moved through memory.
+Newton's step is needed to a tenth only, and its residual is evaluated in double precision: single
+precision changes neither the solution nor the number of steps, and halves the memory traffic.
 """
 
 from functools import lru_cache
@@ -21,17 +21,17 @@ from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 
 class StoredOil(NamedTuple):
-    """What lubricated cells store, as it stands in their scaled equations: by a change of gap and of pressure."""
+    """Storage of oil in the scaled equations of lubricated cells, per change of gap and pressure."""
 
     by_gap: Field
     by_pressure: Field
 
 
 class Linear:
-    """The linearisation of a balance: `product` applies it, a call answers a residual by a change of pressure.
+    """Linearisation of a balance: `product` applies it, a call approximately inverts it.
 
-    The approximate inverse has two parts. Aggregated onto blocks of cells and factored, the
-    five-point stencil of the lubricated cells removes what is slow and smooth (thick, low-pressure
+    The approximate inverse has two parts. The five-point stencil of the lubricated cells,
+    aggregated onto blocks of cells and factored, removes slow, smooth modes (thick, low-pressure
     valleys); zebra line relaxation along x removes the rest.
     """
 
@@ -61,14 +61,14 @@ class Linear:
             )
 
     def product(self, d_pressure: Field, d_approach: float) -> Field:
-        """The linearised equations applied to a change of pressure and approach."""
+        """Apply the linearised equations to a change of pressure and approach."""
         problem = self.balance.problem
         d_gap = problem.deflection(d_pressure)
         d_gap += self.dtype(d_approach)
         return self.of_gap(d_pressure, d_gap)
 
     def of_gap(self, d_pressure: Field, d_gap: Field) -> Field:
-        """The same, of a change of pressure and that of the gap."""
+        """Apply the linearised equations to a change of pressure and gap."""
         problem = self.balance.problem
         if self.film is None or self.faces is None:
             touching = self.rows.state == reynolds.TOUCHING
@@ -90,15 +90,18 @@ class Linear:
         return out
 
     def __call__(self, residual: Field) -> Field:
-        """Approximate change of pressure that answers a residual, both (nx, ny); none in cells that know theirs."""
+        """Return an approximate change of pressure for a residual, both (nx, ny).
+
+        Zero in cells whose pressure is known.
+        """
         change = np.zeros(self.cells, self.dtype) if self.film is None else self.blocks(residual)
         return self.lines(residual, change)
 
     def _storage(self, past: TransientTerm | None, storing: float) -> StoredOil | None:
-        """What the kernels leave to be added; they store for followed oil nothing.
+        """Return the storage that the kernels leave out: all of it for Lagrangian oil.
 
-        What the first two rows then draw in by the wedge is left out: so far from the contact the
-        pressure gradient's flow is all that a change of pressure changes.
+        The wedge's inflow into the first two rows is neglected: so far from the contact only the
+        Poiseuille flow depends on pressure.
         """
         if past is None or self.film is None:
             return None
@@ -109,6 +112,7 @@ class Linear:
         return StoredOil(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
 
     def _stencil(self) -> Stencil:
+        """Return the five-point stencil."""
         stencil = Stencil(*np.empty((5, *self.cells), self.dtype))
         nothing = np.zeros(self.cells, self.dtype)
         film = self.film or Film(*[nothing] * 8)
@@ -130,7 +134,7 @@ class Linear:
 
 
 def fold_at_mirror(stencil: Stencil, mirror: int) -> None:
-    """Couple the last line of cells to what is on its side of the mirror, where there is one, in place."""
+    """Couple the last line of cells to its mirror image, in place, if there is a mirror."""
     if mirror:
         image = stencil.centre if mirror == MIRROR_BETWEEN else stencil.south
         image[:, -1] += stencil.north[:, -1]
@@ -138,9 +142,10 @@ def fold_at_mirror(stencil: Stencil, mirror: int) -> None:
 
 
 class LineRelaxation:
-    """Zebra relaxation of a stencil of five points, or seven with `far` ones: its x lines are solved exactly.
+    """Zebra relaxation of a five-point stencil, or a seven-point one with outer neighbours.
 
-    Even, odd and even ones in turn. Lines of five are not dominated by their centres.
+    Solves even, odd and even x lines exactly, in turn. Seven-point lines are not diagonally
+    dominant.
     """
 
     def __init__(self, stencil: Stencil, far: OuterNeighbours | None = None) -> None:
@@ -164,17 +169,17 @@ class LineRelaxation:
                 self.even = lines
 
     def __call__(self, residual: Field, change: Field) -> Field:
-        """`change`, improved in place so that it better answers the residual, both (nx, ny)."""
+        """Improve `change`, (nx, ny), in place by relaxation, and return it."""
         line_relaxation.relax_zebra(self.stencil, self.far, self.even, self.odd, residual, change)
         return change
 
 
 class SingularFactor(ArithmeticError):
-    """Linearised equations that have no solution, or no single one."""
+    """Linearised equations without a unique solution."""
 
 
 class BlockSolver:
-    """A five-point stencil, its rows times `weight`, summed over blocks of cells and factored by sparse LU."""
+    """Five-point stencil, rows times `weight`, summed over blocks and factored by sparse LU."""
 
     def __init__(self, stencil: Stencil, weight: Field) -> None:
         self.weight, (nx, ny) = weight, weight.shape
@@ -186,7 +191,7 @@ class BlockSolver:
         self.factors = self.pattern.factored(coarse)
 
     def __call__(self, residual: Field) -> Field:
-        """The change, one number a block, that answers a residual; none in cells without weight."""
+        """Return the change, one number per block, for a residual; zero in cells without weight."""
         coarse, change = np.empty(self.cells), np.zeros_like(self.weight)
         line_relaxation.restrict(residual, self.weight, self.block, coarse)
         line_relaxation.prolong(
@@ -196,7 +201,10 @@ class BlockSolver:
 
 
 class MultigridSolver:
-    """The same summed over blocks of two by two again and again, relaxed on each grid, and inverted on the last."""
+    """Five-point stencil, rows times `weight`, summed over nested two-by-two blocks.
+
+    Relaxed on every level and inverted on the last.
+    """
 
     def __init__(self, stencil: Stencil, weight: Field) -> None:
         self.weight = weight
@@ -205,7 +213,7 @@ class MultigridSolver:
             raise SingularFactor("the last of nested grids has no inverse")
 
     def __call__(self, residual: Field) -> Field:
-        """The change, one number a block, that answers a residual; none in cells without weight."""
+        """Return the change, one number per block, for a residual; zero in cells without weight."""
         change = np.zeros_like(self.weight)
         multigrid.apply_hierarchy(
             self.hierarchy, residual, self.weight, PRECONDITIONER.cycles, change
@@ -214,7 +222,7 @@ class MultigridSolver:
 
 
 def _allocate_hierarchy(cells: tuple[int, int], dtype: Any) -> GridHierarchy:
-    """Room for the grids of nested blocks, down to one that is no wider than it has to be."""
+    """Allocate the levels of nested blocks."""
     grids = [(-(-cells[0] // 2), -(-cells[1] // 2))]
     while max(grids[-1]) >= PRECONDITIONER.min_halved_cells:
         nx, ny = (-(-n // 2) if n >= PRECONDITIONER.min_halved_cells else n for n in grids[-1])
@@ -230,13 +238,13 @@ def _allocate_hierarchy(cells: tuple[int, int], dtype: Any) -> GridHierarchy:
 
 
 def _block_size(cells: int) -> int:
-    """How many cells along an axis the factored grid puts into one."""
+    """Return the cells per block along an axis of the factored grid."""
     smallest = 1 if cells < 32 else 2 if cells < 128 else 4
     return max(smallest, -(-cells // PRECONDITIONER.max_coarse_cells))
 
 
 def single_faces(faces: Faces, dtype: Any = np.float32) -> Faces:
-    """In another precision; what would become denormal in it is none."""
+    """Convert faces to another precision, with values that would be denormal set to zero."""
     least = PRECONDITIONER.min_mobility * float(max(faces.east.max(), faces.north.max()))
     *parts, inlet, wedge, behind = faces
     single = np.empty((len(parts), *faces.east.shape), dtype)
@@ -248,7 +256,7 @@ def single_faces(faces: Faces, dtype: Any = np.float32) -> Faces:
 
 
 class _Pattern(NamedTuple):
-    """Where the entries of a five-point matrix on `cells` go, its rows and columns put in an order of little fill."""
+    """Sparsity pattern of a five-point matrix on `cells`, in an order of little fill."""
 
     cells: tuple[int, int]
     order: Any
@@ -257,12 +265,12 @@ class _Pattern(NamedTuple):
     columns: Any
 
     def factored(self, stencil: Stencil) -> Any:
-        """LU factors of the stencil's matrix."""
+        """Return LU factors of the stencil's matrix."""
         count = self.order.size
         entries = np.stack([part.ravel() for part in stencil]).ravel()
         values = np.bincount(self.position, weights=entries, minlength=self.rows.size + 1)[:-1]
         matrix = scipy.sparse.csc_array((values, self.rows, self.columns), shape=(count, count))
-        # small panels: these matrices are too sparse for the dense blocks that SuperLU looks for
+        # small panels: these matrices are too sparse for the dense blocks of SuperLU
         try:
             return scipy.sparse.linalg.splu(
                 matrix,
@@ -276,7 +284,7 @@ class _Pattern(NamedTuple):
             raise SingularFactor(str(error)) from None
 
     def solve(self, factors: Any, rhs: Field) -> Field:
-        """What the factored matrix turns into `rhs`, (cx, cy)."""
+        """Solve the factored matrix for `rhs`, (cx, cy)."""
         solved = np.empty(self.order.size)
         solved[self.order] = factors.solve(rhs.ravel()[self.order])
         return solved.reshape(self.cells)
@@ -284,7 +292,7 @@ class _Pattern(NamedTuple):
 
 @lru_cache(maxsize=16)
 def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
-    """The pattern of a grid, found once."""
+    """Return the pattern of a grid; cached."""
     index = np.arange(cells[0] * cells[1]).reshape(cells)
     nowhere = np.full((1, cells[1]), -1)
     columns = np.stack(
@@ -310,7 +318,7 @@ def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
     place[order] = np.arange(index.size)
     keys = np.where(there, place[columns] * index.size + place[rows], -1).ravel()
     entries, position = np.unique(keys[there.ravel()], return_inverse=True)
-    full = np.full(keys.size, entries.size)  # couplings across the ends go nowhere
+    full = np.full(keys.size, entries.size)  # couplings across the ends are dropped
     full[there.ravel()] = position
     starts = np.searchsorted(entries, np.arange(index.size + 1) * index.size)
     return _Pattern(

@@ -1,10 +1,10 @@
-"""The dry contact of elastic bodies, to any tolerance: which cells touch, and what presses on these.
+"""Dry contact of elastic bodies by active sets of touching cells, to any tolerance.
 
-Pressures of no less than 0, in sum the load, that leave no gap where they are positive and an open
-one where not. Which cells touch is Newton's question (semismooth); what presses on them is found
-by conjugate gradients in single precision, on the lines that touch alone, and what that leaves is
-measured in double. Sources: M. Hintermüller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002) 865; I.
-A. Polonsky, L. M. Keer, Wear 231 (1999) 206.
+Non-negative pressures whose sum is the load, with zero gap where they are positive and a
+non-negative one elsewhere. A semismooth Newton method finds the touching cells; conjugate gradients
+in single precision, on a window of touching lines, find their pressures, with residuals in double
+precision. Sources: M. Hintermüller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002) 865; I. A.
+Polonsky, L. M. Keer, Wear 231 (1999) 206.
 """
 
 from typing import NamedTuple
@@ -18,24 +18,25 @@ from asperity.ehl.models.single_pressure import Problem
 
 
 class _ContactLines(NamedTuple):
-    """Neighbouring lines of a problem, (lines, ny), that hold all that touches."""
+    """Adjacent lines of a problem, (lines, ny), that contain all contact."""
 
     deflection: Deflection
     undeformed: Field
     inside: Mask
     stiffness: float
     load: float  # sum of the pressures
-    cells: int  # of the whole problem
+    cells: int  # number in the whole problem
 
     @classmethod
     def from_problem(cls, problem: Problem) -> "_ContactLines":
+        """Return all lines of a problem."""
         inside = np.broadcast_to(~problem.rim, problem.cells)
         dx, dy = problem.spacing
         load, stiffness = problem.load / (dx * dy), 1.0 / problem.softness
         return cls(problem.deflection, problem.undeformed, inside, stiffness, load, inside.size)
 
     def window(self, touching: Mask) -> tuple["_ContactLines", slice]:
-        """Those that touch, and some more."""
+        """Return the touching lines with a margin."""
         margin, lines = (
             self.undeformed.shape[0] // ELASTIC_DRY.window_margin,
             np.flatnonzero(touching.any(axis=1)),
@@ -48,7 +49,10 @@ class _ContactLines(NamedTuple):
         ), window
 
     def state(self, pressure: Field) -> tuple[Field, float, float]:
-        """The gap, the approach that closes it where there is pressure, and what is left of every equation (rms)."""
+        """Return the gap, the approach, and the residual (rms).
+
+        The approach makes the mean gap zero where there is pressure.
+        """
         gap = self.undeformed + self.deflection(pressure)
         approach = -float(gap[pressure > 0.0].mean())
         gap += approach
@@ -59,9 +63,10 @@ class _ContactLines(NamedTuple):
 def elastic_contact(
     problem: Problem, pressure: Field, tolerance: float
 ) -> tuple[Field, float, bool]:
-    """Pressure (nx, ny) and approach of the elastic, dry contact from a first guess; whether they met the tolerance.
+    """Solve the elastic, dry contact from an initial guess of the pressure.
 
-    The tolerance is of the equations' root mean square, as a share of p_h.
+    Returns pressure (nx, ny), approach, and whether the residual met the tolerance: root mean
+    square as a share of p_h.
     """
     whole = _ContactLines.from_problem(problem)
     pressure = np.where(whole.inside, np.maximum(pressure, 0.0), 0.0)
@@ -82,7 +87,7 @@ def elastic_contact(
 def _solve_window(
     lines: _ContactLines, pressure: Field, tolerance: float, max_steps: int
 ) -> tuple[Field, int]:
-    """Pressures on some lines, none below 0, and the steps they took: met, or out of steps or sets."""
+    """Return non-negative pressures on some lines, and the conjugate-gradient steps taken."""
     steps, before = 0, pressure > 0.0
     for _ in range(ELASTIC_DRY.max_active_sets):
         gap, _, residual = lines.state(pressure)
@@ -112,9 +117,9 @@ def _solve_window(
 def level_gaps(
     deflection: Deflection, touching: Mask, gap: Field, share: float, most: int
 ) -> tuple[Field, float, int]:
-    """A change of touching cells' pressures, in sum nothing, that levels their gaps but for a share.
+    """Solve for a pressure change of touching cells with zero sum that equalises their gaps.
 
-    With it the level, and the steps that were taken.
+    To a relative residual `share`. Returns change, mean gap, and the steps taken.
     """
     count, level = np.float32(np.count_nonzero(touching)), gap[touching].mean()
     residual = np.where(touching, level - gap, 0.0).astype(np.float32)

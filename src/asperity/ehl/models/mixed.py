@@ -1,24 +1,24 @@
-"""The mixed contact with two pressures, on one grid, dimensionless: what each cell asks for.
+"""Two-pressure mixed contact on one grid, dimensionless: the equations of each cell.
 
-The oil has a pressure q of its own, in every cell and so in those that touch too; the asperities
-carry the rest of the total pressure P. With R the cell's net oil outflow in the film max(H, H_c),
-its density and viscosity those of q:
+The oil has a pressure q in every cell, including touching ones; the asperities carry the rest of
+the total pressure P. With R the cell's net oil outflow in the film max(H, H_c), its density and
+viscosity those of q:
 
     oil         max( min( q, R/J ),  q - P_cap ) = 0                  ruptured, lubricated, capped
     asperities  max( min( P - q, (H - H_c)/k ),  P - P_cap ) = 0      free, touching, capped
 
-A closed cell's outflow is scaled by its own derivative, the film held: by that of an open one,
-shut-in oil would count as balanced whatever its pressure. No cell moves its oil less easily than
-ambient oil in the contact film. The wedge is first order, or second order that leans back where
-the film's content jumps, as at the edge of a touching cell.
+A closed cell's outflow is scaled by its derivative at fixed film: with that of an open one, trapped
+oil would count as balanced at any pressure. A cell's mobility is at least that of ambient oil in
+the contact film. The wedge is first order, or second order with a slope limiter that acts where the
+film's content jumps, as at the edge of a touching cell.
 
-A closed cell that takes in more oil than even q = P drives out again is lifted: it gets q = P,
-counts as free, and as long as its gap is still below H_c, what it lacks counts as oil that it
-lacks. So its row asks for an open gap at once. Not so a cell so deep in plastic overlap that
-lifting it would take more than the cap.
+A closed cell that takes in more oil than drains at q = P is opened: it gets q = P and counts as
+free, and while its gap is below H_c the missing gap counts as missing oil, so its equation at once
+demands an open gap. This excludes cells in plastic overlap so deep that opening would take more
+than the cap.
 
-Where oil is conserved, R = 0 in every cell, and one signed unknown tells q, what is missing of the
-film, and how far oil at the cap has pressed the gap open.
+Where oil is conserved, R = 0 in every cell, and one signed unknown represents q, the missing share
+of the film, and the permanent opening of the gap by oil at the cap.
 """
 
 from dataclasses import dataclass, replace
@@ -42,14 +42,14 @@ from asperity.kernels.reynolds import (
 )
 from asperity.lubricant import Lubricant
 
-OPENING_RANGE = 0.5  # contact films of gap beyond the contact film
+OPENING_RANGE = 0.5  # in contact films: gap above the contact film over which the limiter sets in
 
 
 class Pressures(NamedTuple):
-    """The unknowns: the oil's pressure q and the total pressure P, both (nx, ny), and the approach H0.
+    """Unknowns: oil pressure q and total pressure P, both (nx, ny), and approach H0.
 
-    Where oil is conserved, `oil` is signed: below 0 the share of the film that is missing (there q
-    = 0), above the cap what presses the gap open for good (there q = P_cap).
+    Where oil is conserved, `oil` is signed: below 0 the missing share of the film (q = 0), above
+    the cap the permanent opening of the gap (q = P_cap).
     """
 
     oil: Field
@@ -59,15 +59,15 @@ class Pressures(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class MixedBalance:
-    """A problem evaluated at two pressures: gap, what is left of both equations, and what linearisation needs.
+    """A problem evaluated at two pressures: gap, residuals, and terms of the linearisation.
 
-    `rows` are the oil's; `solid` says what decides a cell's total pressure: FREE, TOUCHING or
+    `rows` are those of the oil; `solid` is the state of a cell's total pressure: FREE, TOUCHING or
     CAPPED.
     """
 
     problem: Problem
     unknowns: Pressures
-    # may be negative where the cap lets the bodies overlap: the depth of plastic flattening
+    # negative where the cap lets the bodies overlap: depth of plastic flattening
     gap: Field
     oil_residual: Field
     solid_residual: Field
@@ -77,17 +77,15 @@ class MixedBalance:
     faces: Faces
     limiter: Field
     outflow: Field  # net oil outflow per cell area
-    sealed: Mask  # cells whose film does not change with the gap
-    surplus: Field | None = (
-        None  # content beyond the full film's, where oil is conserved: what is missing, negative
-    )
-    surplus_by_oil: Field | None = (
-        None  # slope of all content; 0 where the film is full and below the cap
-    )
+    sealed: Mask  # cells whose film does not depend on the gap
+    # where oil is conserved: content beyond the full film's, negative in cavities
+    surplus: Field | None = None
+    # its derivative in the signed unknown; 0 where the film is full and below the cap
+    surplus_by_oil: Field | None = None
 
     @property
     def solved(self) -> Mask:
-        """Cells in which Reynolds' equation decides: where oil is conserved, all but the rim's."""
+        """Cells in which Reynolds' equation holds: where oil is conserved, all inside the rim."""
         if self.surplus is None:
             return np.asarray(self.rows.state == LUBRICATED)
         return np.broadcast_to(~self.problem.rim, self.gap.shape)
@@ -99,29 +97,29 @@ class MixedBalance:
 
     @property
     def pressure(self) -> Field:
-        """The total pressure, (nx, ny)."""
+        """Total pressure, (nx, ny)."""
         return self.unknowns.total
 
     @property
     def limiter_correction(self) -> Field:
-        """How far the wedge leans back from first order, in content, (nx, ny)."""
+        """Second-order correction of the wedge, in content, (nx, ny)."""
         return self.limiter * (self.film.content - _upstream(self.problem, self.film.content))
 
     @property
     def film_share(self) -> Field:
-        """Share of the gap that is oil, (nx, ny): below 1 in cavities, where oil is conserved."""
+        """Share of the gap that is oil, (nx, ny): below 1 in conserving cavities."""
         share = np.ones_like(self.gap)
         return share if self.surplus is None else share + np.minimum(self.unknowns.oil, 0.0)
 
     @property
     def growth(self) -> Field:
-        """How far oil at the cap has pressed the gap open for good, where oil is conserved, (nx, ny)."""
+        """Permanent opening of the gap by conserved oil at the cap, (nx, ny)."""
         nothing = np.zeros_like(self.gap)
         return nothing if self.surplus is None else _growth(self.problem, self.unknowns.oil)
 
     @property
     def height(self) -> Field:
-        """Gap between the bodies with what oil at the cap has added, no less than the contact film, (nx, ny)."""
+        """Gap with its permanent opening, at least the contact film, (nx, ny)."""
         return np.maximum(self.gap, self.problem.contact_gap) + self.growth
 
     @property
@@ -135,13 +133,13 @@ class MixedBalance:
 
     @property
     def imbalance(self) -> float:
-        """Oil that cells lose and gain, in sum, over the throughflow: no less than what all lose together."""
+        """Sum of oil lost and gained by cells, over the throughflow; bounds the net loss."""
         dx, dy = self.problem.spacing
         return float(np.abs(self.outflow[self.solved]).sum()) * dx * dy / abs(self.throughflow)
 
     @property
     def load_error(self) -> float:
-        """Relative."""
+        """Relative excess of the pressure over the load."""
         return self.problem.load_error(self.pressure)
 
     @property
@@ -151,12 +149,12 @@ class MixedBalance:
 
     @property
     def oil_pressure(self) -> Field:
-        """What drives the oil, (nx, ny)."""
+        """Oil pressure, (nx, ny)."""
         return np.clip(self.unknowns.oil, 0.0, self.problem.p_cap)
 
     @property
     def parted(self) -> Mask:
-        """Cells in which the bodies' pressure is the oil's."""
+        """Cells without asperity pressure."""
         return np.asarray(self.solid == FREE)
 
     @property
@@ -166,7 +164,7 @@ class MixedBalance:
 
     @property
     def in_contact(self) -> Mask:
-        """Cells where the bodies touch: gap closed to the contact film, or flattened below it."""
+        """Cells in which the bodies touch: gap at the contact film, or flattened below it."""
         closed = self.gap <= (1.0 + CLOSED_WITHIN) * self.problem.contact_gap
         return np.asarray((self.solid == TOUCHING) | closed)
 
@@ -174,9 +172,10 @@ class MixedBalance:
 def evaluate(
     problem: Problem, unknowns: Pressures, *, second_order: bool, freed: Mask | None = None
 ) -> MixedBalance:
-    """What is left of every equation; `freed` cells are taken as free whatever their gap.
+    """Return the residual of every equation.
 
-    So are lifted ones, and the unknowns are changed where that takes it.
+    `freed` cells count as free whatever their gap, and so do opened ones, whose unknowns are
+    changed where necessary.
     """
     gap = problem.undeformed + problem.deflection(unknowns.total)
     gap += unknowns.approach
@@ -192,6 +191,7 @@ def _evaluate(
     *,
     may_open: bool,
 ) -> MixedBalance:
+    """Evaluate at a given gap; again after opening cells, unless `may_open` is False."""
     signed, pressure, approach = unknowns
     assert problem.lubricant is not None
     closed, scale = problem.contact_gap, 1.0 / problem.softness
@@ -237,8 +237,7 @@ def _evaluate(
         load_sharing.fill_oil_rows(cells, bounds, fluid_scale, oil_residual, state)
         load_sharing.fix_film_gap(sealed, film)
     else:
-        # a cell closed to the contact film holds next to no oil: what it lacks counts as what would
-        # lift it
+        # a closed cell holds hardly any oil: its missing oil counts as the gap that would open it
         loose, lacks = (
             surplus_by_oil > 0.0,
             np.maximum(surplus_by_oil, problem.softness) * _outflow_by_content(problem),
@@ -248,7 +247,7 @@ def _evaluate(
         state = np.where(signed < 0.0, RUPTURED, np.where(loose, CAPPED, LUBRICATED)).astype(
             np.int8
         )
-        pressed = signed > problem.p_cap  # opened by the oil, not by the bodies' distance
+        pressed = signed > problem.p_cap  # opened by the oil, not by the approach
         load_sharing.fix_film_gap(sealed & ~pressed, film)
         stiff = pressed & (film.log_mobility_by_gap == 0.0)
         film = film._replace(
@@ -272,7 +271,10 @@ def _evaluate(
 
 
 def _surplus(problem: Problem, film: Film, signed: Field) -> tuple[Field, Field]:
-    """Content beyond the full film's, negative in cavities, and the slope of all content in the signed unknown."""
+    """Return the content beyond the full film's and the derivative of all content.
+
+    The surplus is negative in cavities; the derivative is in the signed unknown.
+    """
     missing = np.minimum(signed, 0.0)
     pressed = signed > problem.p_cap
     density = film.content_by_gap
@@ -282,6 +284,7 @@ def _surplus(problem: Problem, film: Film, signed: Field) -> tuple[Field, Field]
 
 
 def _growth(problem: Problem, signed: Field) -> Field:
+    """Return the permanent opening of the gap by oil at the cap."""
     beyond = (
         np.maximum(signed - problem.p_cap, 0.0)
         if np.isfinite(problem.p_cap)
@@ -293,6 +296,7 @@ def _growth(problem: Problem, signed: Field) -> Field:
 def _flow(
     problem: Problem, oil: Field, gap: Field, lubricant: Lubricant
 ) -> tuple[Film, Faces, Field, Field]:
+    """Return the flow with the wedge and the minimum mobility of this model."""
     wedge = THIRD_ORDER if problem.accurate else FIRST_ORDER
     return problem.flow(
         oil, gap, lubricant, wedge, least_mobility=problem.contact_gap**3 / problem.speed
@@ -300,16 +304,23 @@ def _flow(
 
 
 def uses_limiter(problem: Problem) -> bool:
-    """Whether the wedge leans back from first order: on smooth bodies it has its own, and borders of cavities jump."""
+    """Return True if the wedge is second order with a slope limiter.
+
+    Smooth bodies have a third-order wedge, and at the borders of conserving cavities content jumps.
+    """
     return not problem.accurate and not problem.conserve
 
 
 def _is_lagrangian(problem: Problem) -> bool:
+    """Return True if oil is balanced along its path."""
     return problem.past is not None and problem.past.lagrangian
 
 
 def _upstream(problem: Problem, content: Field) -> Field:
-    """Of each cell, the content that its oil comes from: of followed oil, from a step before, (nx, ny)."""
+    """Return the content upstream of each cell, (nx, ny).
+
+    For Lagrangian oil one time step earlier.
+    """
     upstream = np.concatenate([content[:1], content[:-1]])
     if problem.past is not None and problem.past.upstream is not None:
         upstream[2:] = problem.past.upstream[2:]
@@ -317,10 +328,11 @@ def _upstream(problem: Problem, content: Field) -> Field:
 
 
 def _limiter(problem: Problem, content: Field, gap: Field) -> Field:
-    """Half of 2 m₁ m₂/(m₁² + m₂²) of each cell and what is upstream of it, (nx, ny): 1/2 where the film is even.
+    """Return the slope limiter, (nx, ny).
 
-    Less beside cells that are nearly closed, and nothing beside closed ones: there the film is
-    even, and its content the oil's density.
+    Half of 2 m₁ m₂/(m₁² + m₂²) of each cell and the one upstream: 1/2 where the film is uniform. It
+    falls beside nearly closed cells and is zero beside closed ones: there the film is constant, and
+    its content varies with density only.
     """
     closed, limiter = problem.contact_gap, np.empty_like(content)
     load_sharing.limiter(
@@ -330,9 +342,9 @@ def _limiter(problem: Problem, content: Field, gap: Field) -> Field:
 
 
 def limiter_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
-    """How far the wedge leans for a change of each cell's content, and back for one of that upstream, both (nx, ny).
+    """Return derivatives of the limited correction in the own and, negative, the upstream content.
 
-    How open the cells are is held, see `opening_slopes`.
+    The opening of cells is held constant; see `opening_slopes`. Both (nx, ny).
     """
     content = balance.film.content
     own, by_upstream = np.empty((2, *content.shape), dtype)
@@ -343,10 +355,10 @@ def limiter_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
 
 
 def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Any, Any, Field]:
-    """How the wedge leans more at some eastern faces as some of the `moved` cells open: faces, cells and slopes.
+    """Return derivatives of the limited correction at eastern faces in the gap of opening cells.
 
-    Both as flat indices of cells, a cell once for its own face and once for the next one
-    downstream.
+    Faces, cells and slopes of the `moved` cells; faces and cells as flat indices, a cell once for
+    its own face and once for the next one downstream.
     """
     problem, (_, ny) = balance.problem, balance.problem.cells
     gap, content, closed = balance.gap, balance.film.content.ravel(), problem.contact_gap
@@ -367,7 +379,7 @@ def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Any, Any, Field]
 def _second_order_outflow(
     problem: Problem, content: Field, limiter: Field, *, second_order: bool
 ) -> Field:
-    """What the wedge's second order adds to each cell's outflow, (nx, ny)."""
+    """Return the outflow of each cell due to the second order of the wedge, (nx, ny)."""
     if not _is_lagrangian(problem):
         return limiter_outflow(problem, content, limiter, limiter)
     assert problem.past is not None
@@ -381,10 +393,10 @@ def _second_order_outflow(
 
 
 def limiter_outflow(problem: Problem, content: Field, own: Field, upstream: Field) -> Field:
-    """What second order adds to each cell's outflow for a content on top of the film's own, (nx, ny).
+    """Return the outflow of each cell due to the second order, for an additional content, (nx, ny).
 
-    The wedge leans by `own` of a cell's content less `upstream` of that before it: the lean
-    itself, or its slopes.
+    The correction is `own` times a cell's content less `upstream` times that upstream: the limiter
+    itself, or its derivatives.
     """
     if _is_lagrangian(problem):
         return own * content * content.dtype.type(1.0 / problem.spacing[0])
@@ -394,7 +406,10 @@ def limiter_outflow(problem: Problem, content: Field, own: Field, upstream: Fiel
 
 
 def advected_outflow(problem: Problem, content: Field) -> Field:
-    """What each cell gains and passes on of a content that moves with the oil, upwind to first order, (nx, ny)."""
+    """Return the outflow of each cell of a content that moves with the oil, (nx, ny).
+
+    Upwind, first order.
+    """
     past, dx = problem.past, problem.spacing[0]
     if past is None or not past.lagrangian:
         outflow = content.copy()
@@ -408,14 +423,17 @@ def advected_outflow(problem: Problem, content: Field) -> Field:
 
 
 def upwind_at_outlet(problem: Problem, content: Field, outflow: Field) -> None:
-    """Take the film's last face, which leans, back to first order: where oil is missing, all of it has to be upwind."""
+    """Make the film's last face first order, in place.
+
+    Where oil is missing, all of it must be upwind.
+    """
     if not _is_lagrangian(problem):
         dx = problem.spacing[0]
         outflow[-1] -= (content[-1] - content[-2]) * content.dtype.type(0.5 / dx)
 
 
 def _outflow_by_content(problem: Problem) -> float:
-    """Derivative of a cell's outflow by its own content."""
+    """Return the derivative of a cell's outflow in its own content."""
     past = problem.past
     wedge = 0.0 if past is not None and past.lagrangian else 1.0 / problem.spacing[0]
     return wedge if past is None else wedge + past.rate

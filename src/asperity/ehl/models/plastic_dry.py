@@ -1,11 +1,11 @@
-"""The dry contact of elastic, perfectly plastic bodies: a quadratic programme with bounds.
+"""Dry contact of elastic, perfectly plastic bodies: a quadratic programme with bounds.
 
-Pressures between 0 and the cap, in sum the load, that leave no gap where they lie between, an open
-one at 0 and an overlap at the cap. Nearly all cells that touch are at the cap where bodies yield:
-which do is Newton's question, in single precision, and what presses on the few in between is soon
-found. Where that goes round in circles, by conjugate gradients with bounds. Sources: M.
-Hintermüller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002) 865; I. A. Polonsky, L. M. Keer, Wear
-231 (1999) 206, with the upper bound treated as the lower.
+Pressures between 0 and the cap whose sum is the load, with zero gap between the bounds, an open gap
+at 0 and an overlap at the cap. Where bodies yield, nearly all touching cells are at the cap: a
+semismooth Newton method in single precision finds the active set, and the pressures of the few free
+cells follow quickly. Where the set cycles, projected conjugate gradients take over. Sources: M.
+Hintermüller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002) 865; I. A. Polonsky, L. M. Keer, Wear 231
+(1999) 206, with the upper bound treated like the lower.
 """
 
 import numpy as np
@@ -19,10 +19,9 @@ from asperity.ehl.models.single_pressure import Problem
 def active_set_dry(
     problem: Problem, pressure: Field, approach: float, tolerance: float
 ) -> tuple[Field, float, bool]:
-    """Pressure (nx, ny) and approach of the dry contact from those of a first guess, and whether they are met.
+    """Solve the dry contact by active sets, in single precision, from an initial guess.
 
-    In single precision: to a tolerance, of the equations' root mean square and of the load, that a
-    start asks for.
+    Returns pressure (nx, ny), approach, and whether residual and load error met the tolerance.
     """
     real, deflection, (dx, dy) = np.float32, problem.deflection, problem.spacing
     undeformed, cap, stiffness = (
@@ -59,7 +58,10 @@ def active_set_dry(
 def dry_contact(
     problem: Problem, pressure: Field, *, max_steps: int = PLASTIC_DRY.max_steps
 ) -> tuple[Field, float, bool]:
-    """Pressure (nx, ny) and approach of the dry contact from a first guess, and whether they met the tolerance."""
+    """Solve the dry contact by projected conjugate gradients from an initial guess.
+
+    Returns pressure (nx, ny), approach, and whether the residual met the tolerance.
+    """
     deflection, cap = problem.deflection, problem.p_cap
     inside = np.broadcast_to(~problem.rim, problem.cells)
     stiffness = 1.0 / problem.softness
@@ -95,12 +97,12 @@ def dry_contact(
 
 
 def _scale_to_load(problem: Problem, pressure: Field, inside: Mask) -> Field:
-    """The pressure scaled where no bound holds it, so that it carries the load."""
+    """Scale the pressure between its bounds until it carries the load."""
     (dx, dy), cap = problem.spacing, problem.p_cap
-    wanted = problem.load / (dx * dy)
+    target = problem.load / (dx * dy)
     for _ in range(PLASTIC_DRY.max_load_corrections):
-        load_missing = wanted - float(pressure.sum())
-        if abs(load_missing) <= 1e-12 * wanted:
+        load_missing = target - float(pressure.sum())
+        if abs(load_missing) <= 1e-12 * target:
             break
         free = (pressure > 0.0) & (pressure < cap)
         carried = float(pressure[free].sum())

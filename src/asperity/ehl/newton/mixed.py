@@ -1,4 +1,4 @@
-"""Newton's method on the mixed contact: better and better pressures, for as long as anybody asks."""
+"""Newton's method on the mixed contact."""
 
 from collections.abc import Iterator
 from itertools import count
@@ -20,14 +20,14 @@ from asperity.kernels.reynolds import CAPPED
 
 
 class _StepProposal(NamedTuple):
-    """Where to from a balance: changes of all unknowns, as long as the steps before allow, and which share is taken."""
+    """A balance, limited changes of all unknowns from it, and the damping factor."""
 
     balance: MixedBalance
     step: Pressures
     share: float
 
     def apply(self, damping: float = 1.0) -> tuple[Pressures, Mask]:
-        """The unknowns after a part of it, and which cells are then to be taken as free."""
+        """Return the unknowns after a damped step, and the cells that then count as free."""
         problem, (_, total, approach), share = (
             self.balance.problem,
             self.balance.unknowns,
@@ -38,9 +38,8 @@ class _StepProposal(NamedTuple):
         oil = np.clip(signed, 0.0, problem.p_cap)
         total = np.where(free, oil, np.clip(total + share * self.step.total, 0.0, problem.p_cap))
         overloaded = ~free & (oil > total)
-        freed = overloaded & (
-            self.balance.solid != CAPPED
-        )  # in deep overlap it would be pressed shut and freed in turn
+        # a cell in deep overlap would alternate between closed and free
+        freed = overloaded & (self.balance.solid != CAPPED)
         unknowns = Pressures(
             np.where(overloaded, total, signed), total, approach + share * self.step.approach
         )
@@ -48,14 +47,13 @@ class _StepProposal(NamedTuple):
 
 
 def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iterator[Step]:
-    """Yield the start and then where each Newton step leads.
+    """Yield the initial guess and then the result of each Newton step.
 
-    Once steps have led nowhere for long, oil is no longer foreseen, nor how the wedge opens: these
-    may go round.
+    After a stagnation, streaks of oil and the opening of the wedge are no longer linearised,
+    because they may cause cycles.
 
-    A closed cell whose oil would come to bear more than the total takes the total for its oil's
-    pressure, and is free in the next step: the oil lifts the bodies apart. Not one that the cap
-    decides.
+    A closed cell whose oil pressure would exceed the total takes the total as its oil pressure and
+    is free in the next step: the oil separates the bodies. Cells at the cap are exempt.
     """
     mean_pressure = problem.mean_pressure
     oil_limit, limit = (StepLimit(unknowns.total) for _ in range(2))
@@ -70,7 +68,7 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         yield Step(number, balance, unknowns.approach, change)
         try:
             step = newton_step(balance, None if stagnated else settled_cells, workspace)
-        except SingularFactor:  # strayed so far that no step leads on
+        except SingularFactor:  # diverged
             yield Step(number + 1, balance, unknowns.approach, np.inf)
             return
         change, gap = float(np.mean(np.abs(step.total)) / mean_pressure), balance.gap
@@ -98,7 +96,7 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
 
 
 def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance:
-    """Where a step leads, cut short as long as near a solution it leads away: thin films close and open by turns."""
+    """Halve a step that increases the residual near the solution: thin films may alternate."""
     problem, residual = proposal.balance.problem, proposal.balance.residual_rms
     damping = 1.0
     while True:
@@ -114,7 +112,10 @@ def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance
 
 
 def _updated_oil(balance: MixedBalance, step: Field) -> Field:
-    """The oil's unknown after a step: within its bounds; where oil is conserved, up to the next state."""
+    """Return the oil unknown after a step within its bounds.
+
+    Where oil is conserved, at most up to the next state.
+    """
     before, cap = balance.unknowns.oil, balance.problem.p_cap
     signed = before + step
     if balance.surplus is None:

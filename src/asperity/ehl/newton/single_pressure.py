@@ -1,8 +1,7 @@
-"""Newton's method on a mixed-EHL problem: better and better pressures, for as long as anybody asks.
+"""Newton's method on a single-pressure problem.
 
-Semismooth (each cell is linearised by the equation that decides it), inexact (GMRES to a tenth),
-and limited cell by cell: a cell that turns back takes shorter steps, so that a few undecided ones
-cannot keep all others waiting. The approach of the bodies is limited the same way.
+Semismooth (each cell is linearised in its active equation), inexact (GMRES to a tenth), with step
+limits per cell and for the approach.
 """
 
 from collections.abc import Iterator
@@ -22,15 +21,14 @@ from asperity.ehl.newton.step_limit import ApproachLimit, StepLimit
 
 
 class Damping(NamedTuple):
-    """How steps are taken: which share of them, and over how many cells the oil may travel in one (the inverse)."""
+    """Damping factor of the steps, and the inverse of a pseudo-time step (cells of oil travel)."""
 
     share: float
     storing: float
 
 
-# Steps that go round in circles leave them another way: in time steps (pseudo-transient
-# continuation, Kelley and Keyes, SIAM J. Numer. Anal. 35 (1998)) where waves travel with the oil,
-# shortened where cells flip to and fro.
+# Used in turn when the iteration stagnates: pseudo-transient continuation (Kelley and Keyes, SIAM
+# J. Numer. Anal. 35 (1998)) where waves travel with the oil, damping where cells alternate.
 DAMPINGS = (
     Damping(1.0, 0.0),
     Damping(1.0, 0.5),
@@ -45,7 +43,7 @@ DAMPINGS = (
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Where a Newton step led: its balance, and the mean relative change of pressure it had asked for."""
+    """Result of a Newton step: its balance, and the mean relative change of pressure requested."""
 
     number: int
     balance: Balance | MixedBalance
@@ -56,9 +54,9 @@ class Step:
 def newton(
     problem: Problem, pressure: Field, approach: float, *, fixed: bool = False
 ) -> Iterator[Step]:
-    """Yield the start and then where each Newton step leads.
+    """Yield the initial guess and then the result of each Newton step.
 
-    With the bodies `fixed` at their approach the load is whatever it becomes.
+    At `fixed` approach the load is free.
     """
     mean_pressure = problem.mean_pressure
     limit = StepLimit(pressure, initial=STEP_LIMITS.max_pressure_step, bound_reversals=False)
@@ -88,7 +86,10 @@ def newton(
 def newton_step(
     balance: Balance, *, storing: float = 0.0, fixed: bool = False
 ) -> tuple[Field, float]:
-    """Change of pressure and approach that meets every linearised equation and, unless `fixed`, the load, to a tenth."""
+    """Return the change of pressure and approach that solves the linearised equations to a tenth.
+
+    Includes the load, unless the approach is `fixed`.
+    """
     problem, unknown = balance.problem, balance.unknown
     linear = Linear(balance, storing=storing)
     cells, real = linear.cells, linear.dtype
@@ -103,17 +104,14 @@ def newton_step(
         )
         return known_change + d_pressure.reshape(cells), 0.0
 
-    # unknowns: the pressure changes and, last, the approach; last equation: they make up the
-    # missing load
+    # the last unknown is the approach, the last equation the load
     weight = 1.0 / np.sqrt(unknown.size)
     dx, dy = problem.spacing
     missing = -balance.load_error * problem.load / (dx * dy) - problem.sum_over_cells(known_change)
     response = np.where(unknown, linear.product(np.zeros(cells, real), 1.0), real(0.0))
     answer = linear(response)
     total = float(problem.sum_over_cells(answer))
-    if (
-        total == 0.0
-    ):  # every cell is ruptured or capped: only the distance of the bodies can change the load
+    if total == 0.0:  # all cells ruptured or capped: only the approach can change the load
         return known_change, -STEP_LIMITS.max_pressure_step * float(
             np.sign(missing)
         ) / balance.rows.contact_scale
@@ -135,6 +133,7 @@ def newton_step(
 
 
 def _solved(product: Operator, precondition: Operator, rhs: Field) -> Field:
+    """Solve by GMRES."""
     return gmres(
         product,
         precondition,
