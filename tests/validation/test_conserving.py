@@ -13,7 +13,7 @@ from asperity.ehl.linear_solvers.mixed import MixedLinear, newton_step
 from asperity.ehl.models.mixed import Pressures, evaluate
 from asperity.ehl.models.single_pressure import TransientTerm
 from asperity.ehl.problem_setup import contact_problem
-from asperity.ehl.strategies.mixed_search import pressures_of
+from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.solution import clr_below, contact_state, load_solution, sharing_by_film
 from asperity.surface import MovingSurfaces, Surface, flat_surface, gaussian_surface
 from asperity.transient import moving_contact

@@ -11,7 +11,7 @@ from benchmarks.chosen_grids import samples
 from asperity.case import load_case
 from asperity.contact.grid import Grid
 from asperity.ehl import Options, solve_contact
-from asperity.ehl.controls import INITIAL_GUESS, MIXED_LINEAR_SOLVER, PLASTIC_DRY
+from asperity.ehl.controls import GUESS, MIXED_SOLVER, PLASTIC_DRY
 from asperity.ehl.grid_design import auto_grid
 from asperity.ehl.linear_solvers.mixed import MixedLinear, extend_streaks, is_firm
 from asperity.ehl.load_shares import carried_share
@@ -134,7 +134,7 @@ def test_a_dry_start_by_sets_of_cells_is_newtons(sq, monkeypatch):
     levels = grid_levels(
         contact_problem(contact(hardness=2e9), barus(), rough(grid((96, 96)), sq), MIXED)
     )
-    monkeypatch.setattr(starts, "INITIAL_GUESS", replace(INITIAL_GUESS, dry_tolerance=1e-5))
+    monkeypatch.setattr(starts, "GUESS", replace(GUESS, dry_tolerance=1e-5))
     with monkeypatch.context() as before:
         before.setattr(starts, "active_set_dry", lambda _, *start: (*start[:2], False))
         expected = [dry_start(level) for level in levels]
@@ -424,6 +424,6 @@ def test_blocks_are_nested_where_bodies_touch_firmly_and_not_where_films_are_nea
         rng=np.random.default_rng(sample.seed),
     )
     hard = solve_contact(sample.conditions, sample.oil, surface)
-    assert min(*soft.grid.cells, *grid.cells) >= MIXED_LINEAR_SOLVER.min_multigrid_cells
+    assert min(*soft.grid.cells, *grid.cells) >= MIXED_SOLVER.min_multigrid_cells
     assert is_firm(balance_of(soft))
     assert not is_firm(balance_of(hard))

@@ -180,7 +180,7 @@ class DiscretisationError:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MixedSearchLimits:
+class MixedSearchControls:
     """Strategies of the mixed model."""
 
     max_roller_iterations: int = 60  # third-order, on the finest grid: sharp ends take another way
@@ -224,18 +224,18 @@ class RigidFilm:
 
 
 STEP_LIMITS = StepLimits()
-SINGLE_PRESSURE_NEWTON = SinglePressureNewton()
+NEWTON = SinglePressureNewton()
 MIXED_NEWTON = MixedNewton()
-MIXED_LINEAR_SOLVER = MixedLinearSolver()
+MIXED_SOLVER = MixedLinearSolver()
 PRECONDITIONER = Preconditioner()
 KRYLOV = KrylovMethod()
 OSCILLATION = Oscillation()
 ELASTIC_DRY = ElasticDry()
 PLASTIC_DRY = PlasticDry()
-INITIAL_GUESS = InitialGuess()
-LOCAL_REFINEMENT = LocalRefinement()
-GRID_CONTINUATION = GridContinuation()
-DISCRETISATION_ERROR = DiscretisationError()
-MIXED_SEARCH = MixedSearchLimits()
-TIME_MARCHING = TimeMarching()
+GUESS = InitialGuess()
+REFINEMENT = LocalRefinement()
+CONTINUATION = GridContinuation()
+ERROR_ESTIMATE = DiscretisationError()
+SEARCH = MixedSearchControls()
+MARCHING = TimeMarching()
 RIGID_FILM = RigidFilm()

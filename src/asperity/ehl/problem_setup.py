@@ -6,13 +6,13 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
-from asperity.ehl.controls import GRID_CONTINUATION
+from asperity.ehl.controls import CONTINUATION
 from asperity.ehl.deflection import MIRROR_BETWEEN, MIRROR_THROUGH
 from asperity.ehl.film_formulas import central_film, least_films
 from asperity.ehl.grid_design import MIN_CELLS_SHORT_AXIS, MIN_COARSE_CELLS, inlet_length
-from asperity.ehl.models.single_pressure import BodyShape, Problem
+from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, Options
-from asperity.ehl.roller_profile import RollerProfile
+from asperity.ehl.roller_profile import BodyShape, RollerProfile
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
@@ -121,7 +121,7 @@ def usable_levels(
     most = (
         inlet_length(conditions, lubricant)
         / conditions.hertz.half_widths[0]
-        / GRID_CONTINUATION.min_coarse_inlet_cells
+        / CONTINUATION.min_coarse_inlet_cells
     )
     return [level for number, level in enumerate(levels) if number < 2 or level.spacing[0] <= most]
 

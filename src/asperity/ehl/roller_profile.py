@@ -1,7 +1,7 @@
-"""Profile, load and ends of a roller along its axis, in the solver's units.
+"""Shape of the smooth bodies, and of a roller along its axis, in the solver's units.
 
-The solver holds ambient pressure outside the roller: past its ends, and where its surface has
-dropped so far that oil carries no pressure.
+The solver holds ambient pressure outside a roller: past its ends, and where its surface has dropped
+so far that oil carries no pressure.
 """
 
 from dataclasses import dataclass
@@ -92,3 +92,32 @@ class RollerProfile:
         return np.asarray(
             conditions.roller.drop(y * self.length, conditions.length or 0.0) / self.gap
         )
+
+
+@dataclass(frozen=True, slots=True)
+class BodyShape:
+    """Shape and compliance of the smooth bodies.
+
+    The gap grows as X^2/2 + `flatness` Y^2/2, or across a `roller` by its drop; `compliance` scales
+    the half-space's deflection, V = compliance times the integral of P/distance; `aspect` is the
+    Hertz half-width across over along rolling (infinite for a line); `periodic` refers to y.
+    """
+
+    flatness: float
+    compliance: float
+    aspect: float
+    periodic: bool
+    roller: RollerProfile | None = None
+
+    def gap(self, x: Field, y: Field) -> Field:
+        """Return the gap at H0 = 0, shape (x, y)."""
+        across = self.flatness * (y**2 / 2.0) if self.roller is None else self.roller.drop(y)
+        return np.asarray((x**2 / 2.0)[:, None] + across)
+
+    def hertz(self, x: Field, y: Field) -> Field:
+        """Return the smooth, dry pressure, for a roller by slices, shape (x, y)."""
+        if self.roller is None:
+            across = y / self.aspect
+            return np.asarray(np.sqrt(np.maximum(1.0 - (x**2)[:, None] - across**2, 0.0)))
+        load = np.where(self.roller.outside(y), 0.0, self.roller.load(y))
+        return np.asarray(np.sqrt(np.maximum(load - (x**2)[:, None], 0.0)))

@@ -11,7 +11,7 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl.contact_solution import ContactSolution
-from asperity.ehl.controls import GRID_CONTINUATION
+from asperity.ehl.controls import CONTINUATION
 from asperity.ehl.film_formulas import central_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
@@ -143,12 +143,12 @@ class ElasticSearch(Search):
             tolerance = (
                 options.tolerance
                 if finest
-                else max(GRID_CONTINUATION.coarse_tolerance, options.tolerance)
+                else max(CONTINUATION.coarse_tolerance, options.tolerance)
             )
             if problem.cells != pressure.shape:
                 pressure = problem.interpolate(pressure)
             pressure, dry_approach, converged = elastic_contact(
-                problem, pressure, GRID_CONTINUATION.elastic_tolerance * tolerance
+                problem, pressure, CONTINUATION.elastic_tolerance * tolerance
             )
             if not converged:
                 return super().solve_levels(levels, start, approach, fixed=False)

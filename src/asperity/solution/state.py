@@ -18,7 +18,7 @@ from asperity.ehl.models.mixed import MixedBalance, evaluate
 from asperity.ehl.models.single_pressure import Balance
 from asperity.ehl.outcome import TWO_PRESSURES
 from asperity.ehl.problem_setup import contact_problem, on_one_line
-from asperity.ehl.strategies.mixed_search import pressures_of
+from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.kernels.reynolds import CAPPED, LUBRICATED
 
 

@@ -35,7 +35,8 @@ from asperity.ehl.newton.single_pressure import Step
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, MIXED, TWO_PRESSURES
 from asperity.ehl.problem_setup import contact_problem
 from asperity.ehl.strategies.grid_continuation import Progress, Search
-from asperity.ehl.strategies.mixed_search import MixedSearch, pressures_of
+from asperity.ehl.strategies.mixed_search import MixedSearch
+from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.lubricant import Lubricant
 from asperity.solution.state import state_of
 from asperity.surface import MovingSurfaces, Surface

@@ -49,9 +49,9 @@ def gmres(
     max_steps: int,
     workspace: Workspace | None = None,
 ) -> Vector:
-    """Solve product(x) = rhs to a relative residual `tolerance` or in `max_steps`; return the best x.
+    """Solve product(x) = rhs to a relative residual `tolerance`; return the best x.
 
-    Successive solves may share one `workspace`.
+    At most `max_steps` steps. Successive solves may share one `workspace`.
     """
     exact = np.result_type(rhs.dtype, float)
     norm = _norm(rhs)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.controls import MIXED_LINEAR_SOLVER
+from asperity.ehl.controls import MIXED_SOLVER
 from asperity.ehl.linear_solvers.gmres import Workspace, gmres
 from asperity.ehl.linear_solvers.single_pressure import (
     BlockSolver,
@@ -108,7 +108,7 @@ class MixedLinear:
         weight = np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
         alike = (
             not self.follows_wedge
-            and min(self.cells) >= MIXED_LINEAR_SOLVER.min_multigrid_cells
+            and min(self.cells) >= MIXED_SOLVER.min_multigrid_cells
             and (self.with_limiter or is_firm(self.balance))
         )
         blocks = (MultigridSolver if alike else BlockSolver)(stencil, weight)
@@ -248,11 +248,14 @@ class MixedLinear:
         blocks, lines = self.inverse
         change = blocks(wet)
         if self.follows_wedge:
-            change *= self.real(MIXED_LINEAR_SOLVER.coarse_relaxation)
+            change *= self.real(MIXED_SOLVER.coarse_relaxation)
         return lines(wet, change)
 
     def total(self, d_oil: Field, d_closed: Field) -> Field:
-        """Return the change of total pressure: the oil's in free cells, `d_closed` in touching ones."""
+        """Return the change of total pressure.
+
+        That of the oil in free cells, `d_closed` in touching ones.
+        """
         return np.where(self.free, self.pressure_of(d_oil), d_closed)
 
     def pressure_of(self, d_oil: Field) -> Field:
@@ -370,9 +373,7 @@ def is_firm(balance: MixedBalance) -> bool:
     """
     gap, film = balance.gap, balance.problem.contact_gap
     nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPENING_RANGE) * film)
-    return bool(
-        nearly.sum() < MIXED_LINEAR_SOLVER.max_nearly_closed * flattened_cells(balance).sum()
-    )
+    return bool(nearly.sum() < MIXED_SOLVER.max_nearly_closed * flattened_cells(balance).sum())
 
 
 def newton_step(
@@ -416,28 +417,24 @@ def newton_step(
         return Pressures(
             known_oil,
             known,
-            -MIXED_LINEAR_SOLVER.uncoupled_approach_step
+            -MIXED_SOLVER.uncoupled_approach_step
             * float(np.sign(missing))
             / balance.rows.contact_scale,
         )
     rhs = step.joined(np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing))
-    tolerance = (
-        MIXED_LINEAR_SOLVER.tolerance_smooth
-        if linear.follows_wedge
-        else MIXED_LINEAR_SOLVER.tolerance
-    )
+    tolerance = MIXED_SOLVER.tolerance_smooth if linear.follows_wedge else MIXED_SOLVER.tolerance
     if (
         problem.conserve
         and linear.lagrangian
-        and balance.residual_rms < MIXED_LINEAR_SOLVER.conserving_residual
+        and balance.residual_rms < MIXED_SOLVER.conserving_residual
     ):
-        tolerance = MIXED_LINEAR_SOLVER.tolerance_conserving
+        tolerance = MIXED_SOLVER.tolerance_conserving
     solved = gmres(
         step.product,
         step.precondition,
         rhs,
         tolerance=tolerance,
-        max_steps=MIXED_LINEAR_SOLVER.max_krylov_steps,
+        max_steps=MIXED_SOLVER.max_krylov_steps,
         workspace=workspace,
     )
     d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), zero)

@@ -1,11 +1,11 @@
-"""A solved contact whose bodies oscillate a little: its linearised equations with the oil's squeeze term, answered.
+"""Linear response of a solved contact to small oscillations of the bodies.
 
-With every cell held by what decides it, bodies that come closer by e^(iωt) ask for pressures x
-with (J + iΩ S) x = j + iΩ s: J and j are the linearisation of Newton's step in pressure and
-distance, S and s the oil that lubricated cells gain, Ω = ω a/u. One complex GMRES, preconditioned
-by Newton's own approximate inverse of J; but oil too stiff to flow carries its film along, so that
-its gap is as good as known, and it answers together with what touches. Dimensionless; the
-roughness stands.
+With every cell in its present state, an approach oscillating as e^(iωt) requires pressures x with
+(J + iΩ S) x = j + iΩ s: J and j are the linearisation of Newton's step in pressure and approach, S
+and s the oil that lubricated cells gain, Ω = ω a/u. One complex GMRES, preconditioned by Newton's
+approximate inverse of J; but oil too stiff to flow carries its film along, so that its gap is
+practically known, and such cells are solved together with touching ones. Dimensionless; the
+roughness does not move.
 """
 
 from collections.abc import Callable
@@ -30,10 +30,9 @@ Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 
 
 class OscillationResponse(NamedTuple):
-    """Complex amplitudes of the oil's and the total pressure, (nx, ny), per change of approach, bodies coming closer.
+    """Complex amplitudes of oil and total pressure, (nx, ny), per unit of closing approach.
 
-    `left` is the share of the equations that was left, `steps` those of GMRES, `unknowns` the
-    equations' own.
+    `left` is the relative residual, `steps` those of GMRES, `unknowns` the solution vector.
     """
 
     oil: Waves
@@ -44,26 +43,26 @@ class OscillationResponse(NamedTuple):
 
 
 class _Equations(Protocol):
-    """A model's linearised equations over one vector of unknowns."""
+    """Linearised equations of a model over one vector of unknowns."""
 
     size: int
     real: Any  # the precision of all
 
     def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
-        """Rows of J and of S for a change of the unknowns and of the approach."""
+        """Return the rows of J and of S for a change of the unknowns and of the approach."""
 
     def answer(self, rows: Field) -> Field:
-        """Unknowns that about answer rows of J."""
+        """Apply an approximate inverse of J."""
 
     def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
-        """Oil's and total pressure, (nx, ny)."""
+        """Return the oil and the total pressure, (nx, ny)."""
 
     def load_weights(self) -> Field:
-        """Weight of each unknown in the sum of the total pressure."""
+        """Return the weight of each unknown in the sum of the total pressure."""
 
 
 class _OnePressure:
-    """One pressure for oil and asperities."""
+    """Equations of the single-pressure model."""
 
     def __init__(self, balance: Balance, real: Any) -> None:
         self.real, self.linear = real, Linear(balance, dtype=real)
@@ -100,7 +99,7 @@ class _OnePressure:
 
 
 class _TwoPressures:
-    """The oil's pressure in every cell and, after these, the total one of touching cells."""
+    """Equations of the mixed model: oil pressure of every cell, total pressure of touching ones."""
 
     def __init__(self, balance: MixedBalance, real: Any) -> None:
         self.real, self.linear = real, (linear := MixedLinear(balance, real, with_limiter=True))
@@ -117,7 +116,7 @@ class _TwoPressures:
 
     @cached_property
     def patch(self) -> tuple[slice, Deflection] | None:
-        """Lines whose cells answer together, made when first asked for."""
+        """Lines whose cells are solved together, built on first use."""
         return self._patch()
 
     def _split(self, vector: Any) -> tuple[Any, Any]:
@@ -141,7 +140,10 @@ class _TwoPressures:
         return rows, storage
 
     def answer(self, rows: Field) -> Field:
-        """As in Newton's step, but that cells whose gap is known answer together: here none of them changes sides."""
+        """Apply Newton's approximate inverse, with cells of known gap solved together.
+
+        No cell changes its state here.
+        """
         wet, gap_rows = self._split(rows * self.opening_cells)
         oil, closed = self.linear.answer(wet), gap_rows * self.own
         if self.patch is not None:
@@ -155,9 +157,9 @@ class _TwoPressures:
         return self._joined(oil, closed)
 
     def _stiff(self) -> Mask:
-        """Free cells whose film is carried along, whatever their pressure: neither flow nor compressed oil undoes it.
+        """Return free cells whose film is carried along at any pressure, unaffected by flow.
 
-        Lines alone would take each of them to give way by itself.
+        Line relaxation alone would let each of them deform by itself.
         """
         film, problem = self.linear.balance.film, self.linear.balance.problem
         dx, dy = problem.spacing
@@ -170,7 +172,7 @@ class _TwoPressures:
         )
 
     def _patch(self) -> tuple[slice, Deflection] | None:
-        """The lines with cells whose gap is known, and how these give way; None where there are none."""
+        """Return the lines with cells of known gap and their deflection; None without any."""
         (lines,) = np.nonzero((self.stiff | self.linear.touching).any(axis=1))
         if not lines.size:
             return None
@@ -180,10 +182,10 @@ class _TwoPressures:
         return span, self.deflection.restrict_to(span.stop - span.start)
 
     def _weights(self) -> Field:
-        """Of the rows: a touching cell's oil counts by what flows on from it, as free cells' does, not by its pressure.
+        """Return weights of the rows: a touching cell's oil counts by its onward flow.
 
-        Nothing but the small compressibility and flow of its film tells that pressure, and nobody
-        asks for it.
+        Its pressure follows from the small compressibility and flow of its film only, and is not
+        needed.
         """
         wide = self.linear.balance.problem.spacing[0] * self.linear.rows.contact_scale
         scale = self.linear.balance.rows.fluid_scale
@@ -200,10 +202,10 @@ class _TwoPressures:
 
 
 class Oscillating:
-    """A balance ready to be shaken at any number of frequencies.
+    """A balance prepared for its response at any number of frequencies.
 
-    GMRES goes in single precision, in rounds; what a round leaves is measured in double. A contact
-    on one line of cells is cheap, and stiffer than single precision bears: double throughout.
+    GMRES runs in single precision, in rounds; the residual of a round is evaluated in double. A
+    contact on one line of cells is cheap, and too stiff for single precision: double throughout.
     """
 
     def __init__(self, balance: Balance | MixedBalance) -> None:
@@ -215,9 +217,10 @@ class Oscillating:
     def answer(
         self, frequency: float, *, tolerance: float, start: OscillationResponse | None = None
     ) -> OscillationResponse:
-        """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`.
+        """Return the response to a unit approach at the dimensionless angular frequency Ω.
 
-        `start` is an answer at the same frequency: of another one the oil's lag would stay.
+        To a relative residual `tolerance`. `start` is a response at the same frequency: that at
+        another one has the wrong phase in the oil.
         """
         steps, solver = 0, self.rough
         rows, stored = self.by_approach
@@ -251,7 +254,7 @@ class Oscillating:
         return OscillationResponse(*self.exact.pressures(vector), share, steps, vector)
 
     def sweep(self, frequency: float) -> Shifted:
-        """The answer at Ω = `frequency` on its way, one round of GMRES whose Ω may move."""
+        """Start a solve at Ω = `frequency`: one round of GMRES whose Ω may change."""
         equations = self.rough
         kind = np.result_type(equations.real, np.complex64)
         return Shifted(
@@ -264,7 +267,7 @@ class Oscillating:
         )
 
     def swept(self, sweep: Shifted) -> OscillationResponse:
-        """Where a sweep has come to; what it leaves is measured in double."""
+        """Return the response of a sweep, with its residual in double precision."""
         rows, stored = self.by_approach
         vector = sweep.answer().astype(complex)
         rhs = rows + 1j * sweep.frequency * stored
@@ -279,12 +282,13 @@ class Oscillating:
     def _residual(
         self, rhs: Waves, vector: Waves, frequency: float, size: float
     ) -> tuple[Waves, float]:
-        """What of the equations is left, and its share of all."""
+        """Return the residual and its relative norm."""
         left = rhs - _product(self.exact, vector, frequency)
         return left, float(np.linalg.norm(left)) / size
 
 
 def _equations(balance: Balance | MixedBalance, real: Any) -> _Equations:
+    """Return the equations of a balance in a precision."""
     return (
         _TwoPressures(balance, real)
         if isinstance(balance, MixedBalance)
@@ -295,7 +299,7 @@ def _equations(balance: Balance | MixedBalance, real: Any) -> _Equations:
 def _solved(
     equations: _Equations, rhs: Waves, frequency: float, tolerance: float
 ) -> tuple[Waves, int]:
-    """The unknowns that answer, but for a share `tolerance`, in the equations' own precision; and the steps it took."""
+    """Solve to a relative residual in the precision of the equations; return unknowns and steps."""
     steps = 0
 
     def product(vector: Waves) -> Waves:
@@ -319,12 +323,13 @@ def _solved(
 
 
 def _product(equations: _Equations, vector: Waves, frequency: float) -> Waves:
+    """Apply J + iΩ S."""
     rows, stored = _both(equations, vector)
     return np.asarray(rows + vector.dtype.type(1j * frequency) * stored)
 
 
 def _each_part(operator: Callable[[Field], Any], vector: Waves) -> Any:
-    """A real linear operator on a complex vector."""
+    """Apply a real linear operator to a complex vector."""
     real, imaginary = (
         operator(np.ascontiguousarray(vector.real)),
         operator(np.ascontiguousarray(vector.imag)),
@@ -335,7 +340,7 @@ def _each_part(operator: Callable[[Field], Any], vector: Waves) -> Any:
 
 
 def _both(equations: _Equations, vector: Waves) -> tuple[Waves, Waves]:
-    """Rows of J and of S for complex changes of the unknowns."""
+    """Return the rows of J and of S for complex changes of the unknowns."""
     parts = [
         equations.product(np.ascontiguousarray(part), 0.0) for part in (vector.real, vector.imag)
     ]
@@ -345,7 +350,7 @@ def _both(equations: _Equations, vector: Waves) -> tuple[Waves, Waves]:
 
 
 def at_cap(balance: Balance | MixedBalance) -> bool:
-    """Whether the cap decides any cell, of the oil's or of the bodies' pressure."""
+    """Return True if any cell is at the pressure cap, of the oil or of the bodies."""
     capped = balance.rows.state == CAPPED
     return bool(
         np.any(capped | (balance.solid == CAPPED) if isinstance(balance, MixedBalance) else capped)
@@ -353,10 +358,9 @@ def at_cap(balance: Balance | MixedBalance) -> bool:
 
 
 def elastic(balance: Balance | MixedBalance) -> Balance | MixedBalance:
-    """The balance with its capped cells elastic, as they are once they have yielded and are shaken below that load.
+    """Return the balance with its capped cells elastic, as yielded cells are below their last load.
 
-    Where the bodies overlap they stay together; where oil at the cap parts them it is oil like any
-    other.
+    Overlapping bodies stay in contact; oil at the cap between separated bodies is ordinary oil.
     """
     state = balance.rows.state
     closed: Mask = balance.in_contact

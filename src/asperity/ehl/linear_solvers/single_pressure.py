@@ -21,7 +21,10 @@ from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 
 class StoredOil(NamedTuple):
-    """Storage of oil in the scaled equations of lubricated cells, per change of gap and pressure."""
+    """Storage of oil in the scaled equations of lubricated cells.
+
+    Per change of gap and of pressure.
+    """
 
     by_gap: Field
     by_pressure: Field

@@ -16,7 +16,7 @@ from asperity.core.arrays import Field, Mask
 from asperity.ehl.deflection import MIRROR_THROUGH, Deflection, deflection
 from asperity.ehl.grid_transfer import average, interpolate, mirror_field
 from asperity.ehl.load_shares import within_ellipse
-from asperity.ehl.roller_profile import RollerProfile
+from asperity.ehl.roller_profile import BodyShape
 from asperity.kernels import reynolds
 from asperity.kernels.reynolds import (
     CAPPED,
@@ -35,35 +35,6 @@ SYMMETRY_TOLERANCE = 1e-6  # relative, about Y = 0: far below the solver's toler
 # weights of the next and the upstream cell in the wedge; higher orders do not converge on all rough
 # surfaces
 THIRD_ORDER, SECOND_ORDER, FIRST_ORDER = (0.375, 0.125), (0.0, 0.5), (0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class BodyShape:
-    """Shape and compliance of the smooth bodies.
-
-    The gap grows as X^2/2 + `flatness` Y^2/2, or across a `roller` by its drop; `compliance` scales
-    the half-space's deflection, V = compliance times the integral of P/distance; `aspect` is the
-    Hertz half-width across over along rolling (infinite for a line); `periodic` refers to y.
-    """
-
-    flatness: float
-    compliance: float
-    aspect: float
-    periodic: bool
-    roller: RollerProfile | None = None
-
-    def gap(self, x: Field, y: Field) -> Field:
-        """Return the gap at H0 = 0, shape (x, y)."""
-        across = self.flatness * (y**2 / 2.0) if self.roller is None else self.roller.drop(y)
-        return np.asarray((x**2 / 2.0)[:, None] + across)
-
-    def hertz(self, x: Field, y: Field) -> Field:
-        """Return the smooth, dry pressure, for a roller by slices, shape (x, y)."""
-        if self.roller is None:
-            across = y / self.aspect
-            return np.asarray(np.sqrt(np.maximum(1.0 - (x**2)[:, None] - across**2, 0.0)))
-        load = np.where(self.roller.outside(y), 0.0, self.roller.load(y))
-        return np.asarray(np.sqrt(np.maximum(load - (x**2)[:, None], 0.0)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.ehl.controls import SINGLE_PRESSURE_NEWTON, STEP_LIMITS
+from asperity.ehl.controls import NEWTON, STEP_LIMITS
 from asperity.ehl.linear_solvers.gmres import Operator, gmres
 from asperity.ehl.linear_solvers.single_pressure import Linear
 from asperity.ehl.models.mixed import MixedBalance
@@ -69,14 +69,14 @@ def newton(
         storing = (
             damping.storing
             / problem.spacing[0]
-            * min(1.0, balance.residual_rms / SINGLE_PRESSURE_NEWTON.time_step_residual)
+            * min(1.0, balance.residual_rms / NEWTON.time_step_residual)
         )
         d_pressure, d_approach = newton_step(balance, storing=storing, fixed=fixed)
         change = float(np.mean(np.abs(d_pressure)) / mean_pressure)
         stagnation += 1
         if balance.residual_rms < 0.9 * lowest:
             lowest, stagnation = balance.residual_rms, 0
-        elif stagnation == SINGLE_PRESSURE_NEWTON.stagnation_iterations:
+        elif stagnation == NEWTON.stagnation_iterations:
             lowest, stagnation, attempt = balance.residual_rms, 0, attempt + 1
         limited = limit(d_pressure, pressure)
         pressure = np.clip(pressure + damping.share * limited, 0.0, problem.p_cap)
@@ -138,6 +138,6 @@ def _solved(product: Operator, precondition: Operator, rhs: Field) -> Field:
         product,
         precondition,
         rhs,
-        tolerance=SINGLE_PRESSURE_NEWTON.linear_tolerance,
-        max_steps=SINGLE_PRESSURE_NEWTON.max_krylov_steps,
+        tolerance=NEWTON.linear_tolerance,
+        max_steps=NEWTON.max_krylov_steps,
     )

@@ -1,4 +1,4 @@
-"""The way from a guess on the coarsest grid to the solution on the finest, and the decision when to stop."""
+"""Grid continuation from an initial guess on the coarsest grid, and convergence tests."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -10,7 +10,7 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.contact_solution import ContactSolution
-from asperity.ehl.controls import DISCRETISATION_ERROR, GRID_CONTINUATION
+from asperity.ehl.controls import CONTINUATION, ERROR_ESTIMATE
 from asperity.ehl.load_shares import CENTRE, area_share, carried_share
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
@@ -33,15 +33,14 @@ Progress = Callable[[Iteration], None]
 
 
 class Search:
-    """The way from a guess on the coarsest grid to the solution on the finest, all steps of it on record."""
+    """Grid continuation that records all its steps."""
 
     def __init__(self, options: Options, gap_scale: float, progress: Progress | None) -> None:
         self.options, self.gap_scale, self.progress = options, gap_scale, progress
         self.history: list[Iteration] = []
-        self.figures: list[Figures] = []  # a grid each, since the last climb began
-        self.by_first_order: Figures | None = (
-            None  # on the finest grid, where the search passed a first-order wedge
-        )
+        self.figures: list[Figures] = []  # one per grid of the present continuation
+        # first-order results on the finest grid, if the search obtained them
+        self.by_first_order: Figures | None = None
         self.cell = 0.0  # of the finest grid along x, in half-widths
         self.iteration_error: Figures | None = None
         self.smooth, self.order = (
@@ -49,11 +48,11 @@ class Search:
             1 if options.model == CONSERVING else 2,
         )  # bodies, and wedge
         self.failed = False
-        self.work, self.most_work = 0.0, np.inf  # cells of all steps
+        self.work, self.most_work = 0.0, np.inf  # cells times steps
 
     @property
     def discretisation_error(self) -> GridError | None:
-        """From the last grids; see `grid_error`."""
+        """Discretisation error from the last grids; see `grid_error`."""
         return grid_error(
             self.figures,
             smooth=self.smooth,
@@ -64,18 +63,21 @@ class Search:
 
     @property
     def exhausted(self) -> bool:
-        """Whether all the work that the search may take is done."""
+        """True if the allowed work is used up."""
         return self.work >= self.most_work
 
     def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
-        """Whether the last step met the tolerance in residual, change and, `check_load`, load."""
+        """Return True if the last step met the tolerance in residual, change and load.
+
+        The load counts unless `check_load` is False.
+        """
         last = self.history[-1]
         return max(last.residual, last.load_error if check_load else 0.0, last.change) < tolerance
 
     def solve_levels(
         self, levels: Sequence[Problem], pressure: Field, approach: float, *, fixed: bool
     ) -> Step:
-        """Solve on grid after grid, from the last, coarsest one to the first."""
+        """Solve on successive grids, from the last, coarsest one to the first."""
         options, self.figures, self.smooth = self.options, [], not np.any(levels[0].roughness)
         self.cell = levels[0].spacing[0]
         for problem in reversed(levels):
@@ -83,7 +85,7 @@ class Search:
             tolerance = (
                 options.tolerance
                 if finest
-                else max(GRID_CONTINUATION.coarse_tolerance, options.tolerance)
+                else max(CONTINUATION.coarse_tolerance, options.tolerance)
             )
             if problem.cells != pressure.shape:
                 pressure = problem.interpolate(pressure)
@@ -95,7 +97,7 @@ class Search:
                 most = (
                     options.max_iterations
                     if finest
-                    else min(options.max_iterations, GRID_CONTINUATION.max_coarse_iterations)
+                    else min(options.max_iterations, CONTINUATION.max_coarse_iterations)
                 )
                 steps = newton(problem, pressure, approach)
                 step = self.run(
@@ -103,25 +105,21 @@ class Search:
                     steps,
                     tolerance,
                     most,
-                    divergence=GRID_CONTINUATION.divergence if problem.accurate else np.inf,
+                    divergence=CONTINUATION.divergence if problem.accurate else np.inf,
                 )
                 if (
                     problem.accurate
                     and step.number < most
                     and not (self.converged(tolerance) or self.failed)
-                ):  # astray
+                ):  # diverged
                     pressure, approach = self.robust_start(problem, pressure, approach)
                     step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
-                if (
-                    coarsest
-                    and not finest
-                    and not self.converged(GRID_CONTINUATION.failed_residual)
-                ):
-                    # a capped contact answers its approach too unevenly for Newton
+                if coarsest and not finest and not self.converged(CONTINUATION.failed_residual):
+                    # the load of a capped contact is too nonlinear in the approach for Newton
                     found = self.bracket_approach(
                         problem, pressure, approach, tolerance, from_outside=True
                     )
-                    step = found if self.converged(GRID_CONTINUATION.failed_residual) else step
+                    step = found if self.converged(CONTINUATION.failed_residual) else step
             pressure, approach = step.balance.pressure, step.approach
             if coarser_in_all_axes(problem, levels[0]):
                 self.figures.append(self._figures(step))
@@ -130,17 +128,20 @@ class Search:
     def robust_start(
         self, problem: Problem, pressure: Field, approach: float
     ) -> tuple[Field, float]:
-        """A start for the accurate wedge by a step or two with the sturdy one; as it was, where these lead nowhere."""
+        """Return an initial guess for the third-order wedge from a few second-order steps.
+
+        Unchanged if these do not converge.
+        """
         sturdy = replace(problem, accurate=False)
         step = self.run(
             sturdy,
             newton(sturdy, pressure, approach),
-            GRID_CONTINUATION.failed_residual,
-            GRID_CONTINUATION.max_coarse_iterations,
+            CONTINUATION.failed_residual,
+            CONTINUATION.max_coarse_iterations,
         )
         return (
             (step.balance.pressure, step.approach)
-            if self.converged(GRID_CONTINUATION.failed_residual)
+            if self.converged(CONTINUATION.failed_residual)
             else (pressure, approach)
         )
 
@@ -155,14 +156,14 @@ class Search:
         divergence: float = np.inf,
         after: Step | None = None,
     ) -> Step:
-        """Take steps until they meet the tolerance, `check_load` too, or there have been too many.
+        """Take steps until they meet the tolerance or reach the number `most`.
 
-        Or until what is left is `divergence` times what was left at first: `after` the step that they
-        go on from, if any.
+        Stops also where the residual reaches `divergence` times that of the first step, or of the
+        step `after` which they continue.
         """
         step = next(steps)
         before = after or step
-        astray = divergence * max(before.balance.residual_rms, GRID_CONTINUATION.min_residual)
+        astray = divergence * max(before.balance.residual_rms, CONTINUATION.min_residual)
         while True:
             self._record(problem, step)
             self.failed = step.number > 0 and not np.isfinite(step.change)
@@ -188,20 +189,19 @@ class Search:
         *,
         from_outside: bool,
     ) -> Step:
-        """The contact held at approach after approach until it carries the load: slower, but each is a simple problem.
+        """Solve at fixed approach, and search the approach that carries the load.
 
-        The load falls as the bodies part; the approach is bracketed, then found by false position
-        (Illinois).
+        Slower, but each problem is simpler. The load falls with the approach, which is bracketed
+        and then found by the Illinois variant of false position.
         """
         roughness = float(np.std(problem.roughness))
         stride = max(0.5, 0.5 * roughness) if from_outside else max(0.05, 0.05 * roughness)
         approach += 2.0 * roughness if from_outside else 0.0
-        bracket: dict[
-            bool, tuple[float, float]
-        ] = {}  # by whether too much is carried: approach and load error
+        # approach and load error, by whether the load is too large
+        bracket: dict[bool, tuple[float, float]] = {}
         last_side, left = None, self.options.max_iterations
         while True:
-            most = min(left, GRID_CONTINUATION.max_fixed_iterations)
+            most = min(left, CONTINUATION.max_fixed_iterations)
             step = self.run(
                 problem,
                 newton(problem, pressure, approach, fixed=True),
@@ -219,12 +219,12 @@ class Search:
                 approach += stride if side else -stride
                 stride *= 1.5
                 continue
-            if side == last_side:  # the other end is standing still: give it less weight
+            if side == last_side:  # Illinois: halve the weight of the end that does not move
                 bracket[not side] = bracket[not side][0], 0.5 * bracket[not side][1]
             last_side = side
-            (near, too_much), (apart, too_little) = bracket[True], bracket[False]
+            (closer, too_much), (apart, too_little) = bracket[True], bracket[False]
             share = min(max(too_much / (too_much - too_little), 0.02), 0.98)
-            approach = near + share * (apart - near)
+            approach = closer + share * (apart - closer)
 
     def solution(
         self,
@@ -238,10 +238,10 @@ class Search:
         start: ContactSolution | None = None,
         viscosity_factor: Field | None = None,
     ) -> ContactSolution:
-        """Where the search ended, in SI on the surface's grid, whether it was solved on one line of it or on all.
+        """Return the result of the search in SI units on the surface's grid.
 
-        A warm `start` hands on what its cells' size may have done only where it is of the same
-        contact, but for heat.
+        A warm `start` passes on its discretisation error only if it solves the same contact, except
+        for its temperature.
         """
         discretisation = self.discretisation_error
         if start is not None:
@@ -290,12 +290,14 @@ class Search:
         )
 
     def _figures(self, step: Step) -> Figures:
+        """Return the key results of a step."""
         balance = step.balance
         touching, whole = balance.in_contact & (balance.pressure > 0.0), balance.problem.unfold
         parts = whole(balance.pressure), whole(touching), whole(balance.height)
         return figures(balance.problem.unfolded, *parts, self.gap_scale)
 
     def _record(self, problem: Problem, step: Step) -> None:
+        """Record a step and report progress."""
         balance = step.balance
         left = balance.residual_rms, abs(balance.load_error), step.change
         iteration = Iteration(problem.all_cells, step.number, *left)
@@ -306,7 +308,7 @@ class Search:
 
 
 def on_all_lines(problem: Problem, field: Any, lines: int) -> Any:
-    """A field on the part of a contact that tells all, (nx', ny'), on all of so many lines of cells."""
+    """Expand a field, (nx', ny'), of a reduced problem to so many lines of cells."""
     whole = problem.unfold(field)
     return np.repeat(whole, lines // whole.shape[1], axis=1)
 
@@ -319,31 +321,32 @@ def grid_error(
     by_first_order: Figures | None = None,
     order: int = 2,
 ) -> GridError | None:
-    """90 % intervals from the last grids; None for one grid alone.
+    """Return 90 % intervals of the key results from the last grids; None for a single grid.
 
-    A smooth solution gets Roache's grid convergence index, three times its error: the difference
-    of both where it is of second `order`, three times that where of first. A rough one has no such
-    order. Its figures d apart on the last two grids get 2.5 d the way that they went, 1.5 d the
-    other, and the load share 2.4 of the squared cell (`cell`, in half-widths) either way: what a
-    hundred contacts of the wide sample take to hold four times the cells (`benchmarks.intervals`).
-    A roller's edge pressure and end film get 3 d, and up to ten times that where d does not shrink
-    as grids get finer. d is no less than a quarter of the difference between the grids before,
-    lest two grids agree by chance, and no less than what the second-order wedge did to the first
-    order's figures on the finest grid; where that is known, 0.85 of all this will do. The load
-    share, where three grids are known too, gets 2 d the way that it went, 0.5 d the other and one
-    of the squared cell. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
+    A smooth solution gets Roache's grid convergence index, three times its error: the difference of
+    both grids if it is of second `order`, three times that for first order. A rough one has no such
+    order. If its values on the last two grids differ by d, they get 2.5 d in the direction of the
+    change, 1.5 d against it, and the load share 2.4 of the squared cell (`cell`, in half-widths)
+    either way: what a hundred contacts of the wide sample need to cover four times the cells
+    (`benchmarks.intervals`). A roller's edge pressure and end film get 3 d, and up to ten times
+    that where d does not shrink with refinement. d is at least a quarter of the difference between
+    the grids before, lest two grids agree by chance, and at least the change from the first-order
+    wedge to the second-order one on the finest grid; if that is known, 0.85 of all this suffices.
+    The load share, if three grids are known too, gets 2 d in the direction of the change, 0.5 d
+    against it and one squared cell. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
     """
     if len(on_grids) < 2:
         return None
     *before, coarse, fine = on_grids
     nothing, apart = fine.abs_difference(fine), fine.abs_difference(coarse)
     figures_of_ends = (
-        (name, [getattr(each, name) for each in on_grids]) for name in ("edge_pressure", "end_film")
+        (name, [getattr(parts, name) for parts in on_grids])
+        for name in ("edge_pressure", "end_film")
     )
     ends = {name: ends_error(found) for name, found in figures_of_ends if None not in found}
     if before:
         apart = apart.maximum(
-            coarse.abs_difference(before[-1]).scale(DISCRETISATION_ERROR.min_difference)
+            coarse.abs_difference(before[-1]).scale(ERROR_ESTIMATE.min_difference)
         )
     if smooth:
         return GridError(
@@ -353,30 +356,27 @@ def grid_error(
     if by_first_order is not None:
         apart, share = (
             apart.maximum(fine.abs_difference(by_first_order)),
-            DISCRETISATION_ERROR.two_order_share,
+            ERROR_ESTIMATE.two_order_share,
         )
-    half = apart.scale(
-        0.5 * share * (DISCRETISATION_ERROR.forward + DISCRETISATION_ERROR.backward)
-    ).add(replace(nothing, clr=share * DISCRETISATION_ERROR.load_share_per_cell * cell**2))
-    lean = apart.scale(
-        0.5 * share * (DISCRETISATION_ERROR.forward - DISCRETISATION_ERROR.backward)
-    ).copysign(fine.difference(coarse))
+    half = apart.scale(0.5 * share * (ERROR_ESTIMATE.forward + ERROR_ESTIMATE.backward)).add(
+        replace(nothing, clr=share * ERROR_ESTIMATE.load_share_per_cell * cell**2)
+    )
+    lean = apart.scale(0.5 * share * (ERROR_ESTIMATE.forward - ERROR_ESTIMATE.backward)).copysign(
+        fine.difference(coarse)
+    )
     if by_first_order is not None and before:
         half = replace(
             half,
             clr=0.5
-            * (DISCRETISATION_ERROR.load_share_forward + DISCRETISATION_ERROR.load_share_backward)
+            * (ERROR_ESTIMATE.load_share_forward + ERROR_ESTIMATE.load_share_backward)
             * apart.clr
-            + DISCRETISATION_ERROR.load_share_per_cell_three * cell**2,
+            + ERROR_ESTIMATE.load_share_per_cell_three * cell**2,
         )
         lean = replace(
             lean,
             clr=math.copysign(
                 0.5
-                * (
-                    DISCRETISATION_ERROR.load_share_forward
-                    - DISCRETISATION_ERROR.load_share_backward
-                )
+                * (ERROR_ESTIMATE.load_share_forward - ERROR_ESTIMATE.load_share_backward)
                 * apart.clr,
                 fine.clr - coarse.clr,
             ),
@@ -387,25 +387,28 @@ def grid_error(
 
 
 def ends_error(on_grids: Sequence[float]) -> float:
-    """Half the 90 % interval of a figure of a roller's ends, on finer and finer grids; see `grid_error`."""
+    """Return half the 90 % interval of a value at a roller's ends on successively finer grids.
+
+    See `grid_error`.
+    """
     *before, coarse, fine = on_grids
-    apart, factor = abs(fine - coarse), DISCRETISATION_ERROR.end_factor
+    apart, factor = abs(fine - coarse), ERROR_ESTIMATE.end_factor
     if before:
         earlier = abs(coarse - before[-1])
-        if apart > DISCRETISATION_ERROR.end_scatter * abs(fine):
+        if apart > ERROR_ESTIMATE.end_scatter * abs(fine):
             shrinks = min(apart / earlier, 1.0) if earlier > 0.0 else 1.0
             factor *= min(
                 max(0.5 * shrinks / max(1.0 - shrinks, 1e-9), 1.0),
-                DISCRETISATION_ERROR.max_end_growth,
+                ERROR_ESTIMATE.max_end_growth,
             )
-        apart = max(apart, DISCRETISATION_ERROR.min_difference * earlier)
+        apart = max(apart, ERROR_ESTIMATE.min_difference * earlier)
     return factor * apart
 
 
 def figures(
     problem: Problem, pressure: Field, touching: Mask, gap: Field, gap_scale: float
 ) -> Figures:
-    """The first figures of dimensionless fields; lengths in the unit of `gap_scale`."""
+    """Return the key results of dimensionless fields; lengths in the unit of `gap_scale`."""
     along, ends = problem.form.roller, {}
     if along is not None:
         dome, film = (

@@ -1,10 +1,10 @@
-"""Smooth bodies on a finer grid: the few cells of which the coarser one told least, solved first.
+"""Local refinement of an initial guess for smooth bodies: nonlinear elimination.
 
 A pressure spike is sharper and elsewhere on each grid, and so is the border of the ruptured oil.
-Newton's steps follow both a few cells at a time, while everything else is met long before. So they
-are first taken in boxes around the cells that leave most, with the pressures around them and the
-distance of the bodies held: few cells each. This is nonlinear elimination (P. J. Lanzkron, D. J.
-Rose, J. T. Wilkes, SIAM J. Sci. Comput. 17 (1996) 538): it moves the start and no answer.
+Newton steps follow both by a few cells each, while all other cells have converged. So the cells
+with the largest residuals are first solved in boxes, with the surrounding pressures and the
+approach fixed. Source: P. J. Lanzkron, D. J. Rose, J. T. Wilkes, SIAM J. Sci. Comput. 17 (1996)
+538. This changes the initial guess and no solution.
 """
 
 from dataclasses import replace
@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
-from asperity.ehl.controls import LOCAL_REFINEMENT
+from asperity.ehl.controls import REFINEMENT
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.mixed import newton
@@ -22,7 +22,10 @@ Box = tuple[slice, slice]
 
 
 def refine_locally(problem: Problem, unknowns: Pressures) -> Pressures:
-    """The start of a grid with its worst cells solved for what is around them; or as it is, if they are not few."""
+    """Solve the worst cells of an initial guess for their surroundings.
+
+    Unchanged if these cells are many.
+    """
     balance = evaluate(problem, unknowns, second_order=False)
     oil, total = unknowns.oil.copy(), unknowns.total.copy()
     for box in _worst_boxes(balance):
@@ -32,7 +35,7 @@ def refine_locally(problem: Problem, unknowns: Pressures) -> Pressures:
 
 
 def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
-    """Pressures of the oil and in all that leave least, of the start and of a few of Newton's steps from it."""
+    """Return the oil and total pressures of the smallest residual in a few Newton steps."""
     best = start
     for step in newton(problem, start, second_order=False):
         residual = step.balance.residual_rms
@@ -42,8 +45,8 @@ def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
             assert isinstance(step.balance, MixedBalance)
             least, best = residual, step.balance.unknowns
         if (
-            least < LOCAL_REFINEMENT.target * first
-            or step.number == LOCAL_REFINEMENT.max_steps
+            least < REFINEMENT.target * first
+            or step.number == REFINEMENT.max_steps
             or not np.isfinite(residual)
         ):
             break
@@ -51,40 +54,38 @@ def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
 
 
 def _worst_boxes(balance: MixedBalance) -> list[Box]:
-    """Around the cells that leave most; none where these are many, or leave little."""
+    """Return boxes around the largest residuals; none where these are many, or small."""
     problem, residual = balance.problem, np.abs(balance.oil_residual)
-    worst = residual > LOCAL_REFINEMENT.worst_residual * residual.max()
+    worst = residual > REFINEMENT.worst_residual * residual.max()
     share = float((residual[worst] ** 2).sum() / max((residual**2).sum(), np.finfo(float).tiny))
-    if (
-        balance.residual_rms < LOCAL_REFINEMENT.min_residual
-        or share < LOCAL_REFINEMENT.min_residual_share
-    ):
+    if balance.residual_rms < REFINEMENT.min_residual or share < REFINEMENT.min_residual_share:
         return []
     if problem.form.periodic:
         worst = np.broadcast_to(worst.any(axis=1, keepdims=True), worst.shape)
-    groups, _ = scipy.ndimage.label(
-        scipy.ndimage.maximum_filter(worst, 2 * LOCAL_REFINEMENT.margin + 1)
-    )
+    groups, _ = scipy.ndimage.label(scipy.ndimage.maximum_filter(worst, 2 * REFINEMENT.margin + 1))
     boxes: list[Box] = scipy.ndimage.find_objects(groups)  # type: ignore[assignment]
     size = sum((x.stop - x.start) * (y.stop - y.start) for x, y in boxes)
-    return boxes if size < LOCAL_REFINEMENT.max_box_share * residual.size else []
+    return boxes if size < REFINEMENT.max_box_share * residual.size else []
 
 
 def _subproblem(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
-    """The contact in a box, and its pressures; what the pressures around it displace counts as shape."""
+    """Return the contact in a box, and its pressures.
+
+    The deflection by the surrounding pressures counts as shape.
+    """
     problem, (along, across) = balance.problem, box
     (x, y), (dx, dy) = problem.lower, problem.spacing
     start = Pressures(balance.unknowns.oil[box], balance.unknowns.total[box], 0.0)
     fixed = np.ones(start.total.shape, dtype=bool)
     inner, mirror = (
-        slice(LOCAL_REFINEMENT.fixed_margin, -LOCAL_REFINEMENT.fixed_margin),
+        slice(REFINEMENT.fixed_margin, -REFINEMENT.fixed_margin),
         problem.mirror if across.stop == problem.cells[1] else 0,
     )
     fixed[
         inner,
         slice(None)
         if problem.form.periodic
-        else slice(LOCAL_REFINEMENT.fixed_margin, None)
+        else slice(REFINEMENT.fixed_margin, None)
         if mirror
         else inner,
     ] = False

@@ -1,4 +1,4 @@
-"""The contact with two pressures solved: from the dry contact, or coarse to fine from Hertz's pressure."""
+"""Solution strategies of the two-pressure models: from the dry contact, or coarse to fine."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -10,10 +10,8 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
-from asperity.core.errors import BadInput
-from asperity.ehl.contact_solution import ContactSolution, Oil
-from asperity.ehl.controls import GRID_CONTINUATION, MIXED_SEARCH, TIME_MARCHING
-from asperity.ehl.load_shares import carried_share
+from asperity.ehl.contact_solution import ContactSolution
+from asperity.ehl.controls import CONTINUATION, MARCHING, SEARCH
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, uses_limiter
 from asperity.ehl.models.single_pressure import Problem, TransientTerm
 from asperity.ehl.newton.mixed import newton
@@ -29,7 +27,7 @@ from asperity.ehl.problem_setup import (
     usable_levels,
 )
 from asperity.ehl.scales import Scales
-from asperity.ehl.strategies.grid_continuation import Progress, Search, on_all_lines
+from asperity.ehl.strategies.grid_continuation import Progress, Search
 from asperity.ehl.strategies.initial_guess import (
     DryAndLubricated,
     dry_start,
@@ -37,6 +35,7 @@ from asperity.ehl.strategies.initial_guess import (
     roller_start,
 )
 from asperity.ehl.strategies.local_refinement import refine_locally
+from asperity.ehl.strategies.oil_state import load_share_of, oil_of, pressures_of, unknowns_of
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
@@ -53,17 +52,15 @@ def solve_mixed(
     viscosity_factor: Field | None = None,
     progress: Progress | None = None,
 ) -> ContactSolution:
-    """Solve the contact with a pressure each for oil and asperities; as `solve_contact`, which calls this."""
+    """Solve a two-pressure model; called by `solve_contact`."""
     began = time.perf_counter()
-    assert lubricant is not None  # without oil there is one pressure
+    assert lubricant is not None  # a dry contact has one pressure
     scales = Scales.from_conditions(conditions, lubricant)
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
     finest = reduced_problem(whole)
     search = MixedSearch(options, scales.gap, progress)
     if conditions.geometry == "roller":
-        search.most_work = (
-            MIXED_SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
-        )
+        search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
     if start is not None:
         strategy, step = (
             COARSE_TO_FINE,
@@ -102,28 +99,31 @@ def solve_mixed(
 
 
 def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
-    """What is tried, one after the other, on a film [m] of the bodies if they were smooth."""
+    """Return the strategies in their order, by the film [m] of the smooth bodies."""
     if not np.any(surface.heights):
         return (
             (FROM_DRY, COARSE_TO_FINE, ROBUST) if film < contact_film else (COARSE_TO_FINE, ROBUST)
         )
     return (
         (FROM_DRY, COARSE_TO_FINE)
-        if film < MIXED_SEARCH.dry_film_ratio * surface.sq
+        if film < SEARCH.dry_film_ratio * surface.sq
         else (COARSE_TO_FINE, FROM_DRY)
     )
 
 
 class MixedSearch(Search):
-    """The ways to the solution, all steps of them on record."""
+    """Strategies of the two-pressure models, with all steps on record."""
 
-    imbalance = 0.0  # of the last step, where no oil may be lost
+    imbalance = 0.0  # of the last step, where oil is conserved
 
     def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
-        """Whether the last step met the tolerance, and the one of the whole solve with all oil accounted for."""
+        """Return True if the last step met the tolerance.
+
+        At the tolerance of the whole solve, conserved oil must be balanced too.
+        """
         closely = tolerance <= self.options.tolerance
         return super().converged(tolerance, check_load=check_load) and not (
-            closely and self.imbalance > MIXED_SEARCH.max_imbalance
+            closely and self.imbalance > SEARCH.max_imbalance
         )
 
     def solution(
@@ -134,10 +134,10 @@ class MixedSearch(Search):
         lubricant: Lubricant | None,
         **how: Any,
     ) -> ContactSolution:
-        """Where the search ended, the oil's own pressure with it."""
+        """Return the result of the search with the state of the oil."""
         solution = super().solution(step, surface, conditions, lubricant, **how)
         return replace(
-            solution, oil=_oil(step, surface, Scales.from_conditions(conditions, lubricant))
+            solution, oil=oil_of(step, surface, Scales.from_conditions(conditions, lubricant))
         )
 
     def solve_by(
@@ -146,20 +146,15 @@ class MixedSearch(Search):
         levels: Sequence[Problem],
         guess: Callable[[Problem], tuple[Field, float]],
     ) -> Step:
-        """Solve in one of the manners that are tried, on the first of the levels."""
-        self.cell, self.by_first_order = (
-            levels[0].spacing[0],
-            None,
-        )  # what a way before has left is not this one's
+        """Solve by one of the strategies on the first of the levels."""
+        self.cell, self.by_first_order = levels[0].spacing[0], None  # not an earlier strategy's
         if strategy == FROM_DRY:
             return self.from_dry(levels)
         step = self.coarse_to_fine(levels, guess)
-        ends = (
-            levels[0].form.roller is not None and strategy == COARSE_TO_FINE
-        )  # sharp ones go on the sturdier way
-        single_pressure_suffices = (
-            self.smooth and not ends
-        )  # that bodies without roughness have: oil and asperities never share
+        # sharp ends take the robust strategy
+        ends = levels[0].form.roller is not None and strategy == COARSE_TO_FINE
+        # smooth bodies: oil and asperities never share a cell
+        single_pressure_suffices = self.smooth and not ends
         if single_pressure_suffices and not self.converged(self.options.tolerance):
             step = self.from_single_pressure(levels, guess)
         return step
@@ -167,7 +162,7 @@ class MixedSearch(Search):
     def from_single_pressure(
         self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
     ) -> Step:
-        """From the paper's solution, in which oil and asperities have one pressure."""
+        """Solve from the solution of the single-pressure model."""
         finest = levels[0]
         for fixed in (False, True):
             step = self.solve_levels(levels, *guess(levels[-1]), fixed=fixed)
@@ -181,8 +176,8 @@ class MixedSearch(Search):
         return step
 
     def continue_from(self, problem: Problem, unknowns: Pressures) -> Step:
-        """From a neighbouring solution: second order at once, or if that leads nowhere as from afar."""
-        most = min(self.options.max_iterations, MIXED_SEARCH.max_second_order_iterations)
+        """Solve from a neighbouring solution: second order first, then as from a distant guess."""
+        most = min(self.options.max_iterations, SEARCH.max_second_order_iterations)
         step = self.run(
             problem, newton(problem, unknowns, second_order=True), self.options.tolerance, most
         )
@@ -195,15 +190,14 @@ class MixedSearch(Search):
     def solve_from_coarse(
         self, problem: Problem, unknowns: Pressures, *, coarse: bool = False, last: bool = True
     ) -> Step:
-        """From a coarser grid's solution: second order, or if that gains little as from afar.
+        """Solve from a coarser grid's solution: second order first, then as from a distant guess.
 
-        What the order of the wedge makes of the figures is then told on the way back to first
-        order.
+        The effect of the order on the results then follows from steps back to first order.
         """
-        tolerance, most = self._targets(problem, coarse=coarse, near=True)
+        tolerance, most = self._targets(problem, coarse=coarse, from_coarse=True)
         roughly, soon = (
-            max(MIXED_SEARCH.first_order_tolerance, tolerance),
-            min(MIXED_SEARCH.max_second_order_iterations, most),
+            max(SEARCH.first_order_tolerance, tolerance),
+            min(SEARCH.max_second_order_iterations, most),
         )
         if uses_limiter(problem):
             steps = newton(problem, unknowns, second_order=True)
@@ -211,8 +205,8 @@ class MixedSearch(Search):
                 problem,
                 steps,
                 roughly,
-                min(MIXED_SEARCH.max_restart_iterations, soon),
-                divergence=MIXED_SEARCH.divergence,
+                min(SEARCH.max_restart_iterations, soon),
+                divergence=SEARCH.divergence,
             )
             if self.converged(roughly) and not self.converged(tolerance):
                 step = self.run(
@@ -220,7 +214,7 @@ class MixedSearch(Search):
                     steps,
                     tolerance,
                     step.number + soon,
-                    divergence=MIXED_SEARCH.divergence,
+                    divergence=SEARCH.divergence,
                     after=step,
                 )
             if self.converged(tolerance):
@@ -229,26 +223,31 @@ class MixedSearch(Search):
                 return step
         return self.solve_from_afar(problem, unknowns, coarse=coarse, last=last)
 
-    def _targets(self, problem: Problem, *, coarse: bool, near: bool = False) -> tuple[float, int]:
-        """Tolerance and most steps, of the whole solve or of a grid that is only the way."""
+    def _targets(
+        self, problem: Problem, *, coarse: bool, from_coarse: bool = False
+    ) -> tuple[float, int]:
+        """Return tolerance and largest number of steps, for the finest or a coarser grid."""
         tolerance, most = self.options.tolerance, self.options.max_iterations
         if not coarse:
             return tolerance, most
         roughly = (
-            GRID_CONTINUATION.coarse_tolerance
-            if problem.accurate or near
-            else 0.5 * MIXED_SEARCH.first_order_tolerance
+            CONTINUATION.coarse_tolerance
+            if problem.accurate or from_coarse
+            else 0.5 * SEARCH.first_order_tolerance
         )
-        return max(roughly, tolerance), min(MIXED_SEARCH.max_error_grid_iterations, most)
+        return max(roughly, tolerance), min(SEARCH.max_error_grid_iterations, most)
 
     def refine_third_order(self, problem: Problem, step: Step) -> tuple[str, Step]:
-        """A sturdy solution of smooth bodies led on to the accurate wedge and its way; or as it is, if that fails."""
+        """Refine a robust solution of smooth bodies with the third-order wedge.
+
+        Returns strategy and step; the robust ones if this fails.
+        """
         history, figures, error = list(self.history), list(self.figures), self.iteration_error
         better = self.run(
             problem,
-            newton(problem, _unknowns(step), second_order=False),
+            newton(problem, unknowns_of(step), second_order=False),
             self.options.tolerance,
-            MIXED_SEARCH.max_second_order_iterations,
+            SEARCH.max_second_order_iterations,
         )
         if self.converged(self.options.tolerance):
             self.figures[-1] = self._figures(better)
@@ -265,51 +264,51 @@ class MixedSearch(Search):
         length: float = 1.0,
         last: bool = True,
     ) -> Step:
-        """From afar: in steps of time first, from `length` half-widths on; then what stands still; `coarse` roughly.
+        """Solve from a distant guess: time steps first, then the steady contact.
 
-        The wedge is of first order until that is met roughly, then of second; where oil is
-        conserved of first order throughout. Where time leads nowhere the `last` resort is the
-        contact whose cavities are refilled, if oil is conserved, and then what stands still at
-        once.
+        The first time step is `length` half-widths long. The wedge is first order until a coarse
+        tolerance is met, then second; where oil is conserved, first order throughout. If time steps
+        fail, the `last` resort for conserved oil is the contact with refilled cavities, and then
+        the steady contact directly.
         """
         tolerance, most = self._targets(problem, coarse=coarse)
         if problem.conserve or not problem.accurate:
             step = self.march_in_time(problem, unknowns, length)
-            if not self.converged(TIME_MARCHING.tolerance) and not last:
+            if not self.converged(MARCHING.tolerance) and not last:
                 return step
-            if not self.converged(TIME_MARCHING.tolerance) and problem.conserve:
+            if not self.converged(MARCHING.tolerance) and problem.conserve:
                 step = self.from_refilled_cavities(problem, unknowns, length)
-            unknowns = _unknowns(step) if self.converged(TIME_MARCHING.tolerance) else unknowns
+            unknowns = unknowns_of(step) if self.converged(MARCHING.tolerance) else unknowns
         if problem.accurate and problem.form.roller is not None:
-            most = min(most, MIXED_SEARCH.max_roller_iterations)
+            most = min(most, SEARCH.max_roller_iterations)
         if not uses_limiter(problem):
             return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
-        roughly = max(MIXED_SEARCH.first_order_tolerance, tolerance)
+        roughly = max(SEARCH.first_order_tolerance, tolerance)
         steps = newton(problem, unknowns, second_order=False)
         step = self.run(
             problem,
             steps,
             roughly,
-            min(most, MIXED_SEARCH.max_first_order_iterations),
-            divergence=MIXED_SEARCH.divergence,
+            min(most, SEARCH.max_first_order_iterations),
+            divergence=SEARCH.divergence,
         )
-        if not self.converged(roughly):  # too much was left to the last: closer now
-            unknowns = _unknowns(
+        if not self.converged(roughly):  # the last time step was too inaccurate
+            unknowns = unknowns_of(
                 self.march_in_time(
-                    problem, unknowns, length, met=MIXED_SEARCH.first_order_tolerance
+                    problem, unknowns, length, tolerance=SEARCH.first_order_tolerance
                 )
             )
             step = self.run(
                 problem,
                 newton(problem, unknowns, second_order=False),
                 roughly,
-                min(most, MIXED_SEARCH.max_first_order_iterations),
+                min(most, SEARCH.max_first_order_iterations),
             )
-        if not self.converged(GRID_CONTINUATION.failed_residual):
+        if not self.converged(CONTINUATION.failed_residual):
             return step
         self.by_first_order = self._figures(step)
         return self.run(
-            problem, newton(problem, _unknowns(step), second_order=True), tolerance, most
+            problem, newton(problem, unknowns_of(step), second_order=True), tolerance, most
         )
 
     def march_in_time(
@@ -318,58 +317,61 @@ class MixedSearch(Search):
         unknowns: Pressures,
         first: float,
         *,
-        met: float = TIME_MARCHING.tolerance,
+        tolerance: float = MARCHING.tolerance,
     ) -> Step:
-        """Towards what stands still in steps of time, longer and longer ones, each from where the last led.
+        """Approach the steady contact in growing time steps, each from the last result.
 
-        A step begins with the oil that was there and has little to change: where Newton's steps
-        lead nowhere all the same, it was too long. From a start that tells too little of the oil
-        no step is short enough.
+        A step starts with the oil present and has little to change: if Newton does not converge,
+        the step was too long. From a guess with too little information on the oil no step is short
+        enough.
         """
         length, content = first, evaluate(problem, unknowns, second_order=False).content
-        most = min(TIME_MARCHING.max_newton_steps, self.options.max_iterations)
-        for _ in range(TIME_MARCHING.max_steps):
+        most = min(MARCHING.max_newton_steps, self.options.max_iterations)
+        for _ in range(MARCHING.max_steps):
             stepped = replace(problem, past=_implicit_step(problem, length, content))
             step = self.run(
                 stepped,
                 newton(stepped, unknowns, second_order=False),
-                met,
+                tolerance,
                 most,
-                divergence=MIXED_SEARCH.divergence,
+                divergence=SEARCH.divergence,
             )
-            if self.converged(met):
-                unknowns, content = _unknowns(step), step.balance.content
-                if length >= TIME_MARCHING.final_length:
+            if self.converged(tolerance):
+                unknowns, content = unknowns_of(step), step.balance.content
+                if length >= MARCHING.final_length:
                     break
                 length *= (
-                    (TIME_MARCHING.growth if length >= 1.0 else 3.0)
+                    (MARCHING.growth if length >= 1.0 else 3.0)
                     if step.number <= 2
                     else 2.0
                     if step.number <= 4
                     else 1.2
                 )
-            elif length < TIME_MARCHING.min_length * first:
+            elif length < MARCHING.min_length * first:
                 break
-            else:  # what was left of the steps before may be what goes round: closer from now on
-                length, met = 0.25 * length, min(met, MIXED_SEARCH.first_order_tolerance)
+            else:  # residuals of earlier steps may cause cycles: a closer tolerance
+                length, tolerance = 0.25 * length, min(tolerance, SEARCH.first_order_tolerance)
         return step
 
     def from_refilled_cavities(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
-        """Towards what loses no oil from the contact whose cavities are refilled."""
+        """Solve for conserved oil from the contact with refilled cavities."""
         start = Pressures(
             np.clip(unknowns.oil, 0.0, problem.p_cap), unknowns.total, unknowns.approach
         )
         step = self.march_in_time(replace(problem, conserve=False), start, length)
         return (
-            self.march_in_time(problem, _unknowns(step), length)
-            if self.converged(TIME_MARCHING.tolerance)
+            self.march_in_time(problem, unknowns_of(step), length)
+            if self.converged(MARCHING.tolerance)
             else step
         )
 
     def coarse_to_fine(
         self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
     ) -> Step:
-        """Coarse to fine from Hertz's pressure, all of it the oil's; from there again after a grid that led nowhere."""
+        """Solve coarse to fine from Hertz pressure, carried by the oil.
+
+        Restarts from there after a grid that does not converge.
+        """
         self.figures, self.smooth = [], not np.any(levels[0].roughness)
         unknowns = None
         roller = levels[0].accurate and levels[0].form.roller is not None
@@ -390,36 +392,39 @@ class MixedSearch(Search):
                 )
             else:
                 step = self.solve_coarse(problem, unknowns)
-            if self.smooth and not self.converged(MIXED_SEARCH.smooth_coarse_residual):
+            if self.smooth and not self.converged(SEARCH.smooth_coarse_residual):
                 self.figures, unknowns, coarser = [], None, None
                 continue
-            if problem is not levels[0] and not self.converged(MIXED_SEARCH.first_order_tolerance):
-                self.figures = []  # a start, but no solution to compare with
+            if problem is not levels[0] and not self.converged(SEARCH.first_order_tolerance):
+                self.figures = []  # an initial guess, but no solution to compare with
             elif coarser_in_all_axes(problem, levels[0]):
                 self.figures.append(self._figures(step))
-            unknowns = _unknowns(step)
+            unknowns = unknowns_of(step)
             coarser = DryAndLubricated(dry, unknowns) if roller else None
-        if levels[0].conserve:  # on coarser grids oil was made
+        if levels[0].conserve:  # coarser grids do not conserve oil
             self.figures = self.figures[-1:]
         return step
 
     def solve_coarse(self, problem: Problem, unknowns: Pressures) -> Step:
-        """A start for the next finer grid; of smooth bodies by a few steps, then the worst cells, in turns."""
-        tolerance = max(GRID_CONTINUATION.coarse_tolerance, self.options.tolerance)
+        """Solve roughly, as a guess for the next finer grid.
+
+        Smooth bodies alternate a few steps and local refinement.
+        """
+        tolerance = max(CONTINUATION.coarse_tolerance, self.options.tolerance)
         steps = newton(replace(problem, conserve=False), unknowns, second_order=False)
-        for _ in range(MIXED_SEARCH.max_smooth_turns if problem.accurate else 0):
-            step = self.run(problem, steps, tolerance, MIXED_SEARCH.steps_per_turn)
+        for _ in range(SEARCH.max_smooth_turns if problem.accurate else 0):
+            step = self.run(problem, steps, tolerance, SEARCH.steps_per_turn)
             if self.converged(tolerance):
                 return step
-            if step.balance.residual_rms < MIXED_SEARCH.first_order_tolerance:
+            if step.balance.residual_rms < SEARCH.first_order_tolerance:
                 break
-            steps = newton(problem, refine_locally(problem, _unknowns(step)), second_order=False)
-        return self.run(problem, steps, tolerance, GRID_CONTINUATION.max_coarse_iterations)
+            steps = newton(problem, refine_locally(problem, unknowns_of(step)), second_order=False)
+        return self.run(problem, steps, tolerance, CONTINUATION.max_coarse_iterations)
 
     def from_dry(self, levels: Sequence[Problem]) -> Step:
-        """From bodies that carry all the load themselves, on grid after grid.
+        """Solve from the dry contact, on successive grids.
 
-        What oil changed on a grid is granted to the dry contact of the next finer one.
+        The effect of oil on a grid is transferred to the dry contact of the next finer one.
         """
         self.figures, self.smooth = [], False
         coarser, dry = None, None
@@ -432,23 +437,21 @@ class MixedSearch(Search):
                 step = self.solve_from_afar(problem, start, coarse=not finest)
             else:
                 step = self.solve_from_coarse(problem, start, coarse=not finest, last=False)
-            if coarser is not None and not self.converged(
-                GRID_CONTINUATION.failed_residual
-            ):  # what oil changed on the coarser grid was no start
+            # the effect of oil on the coarser grid was no good guess
+            if coarser is not None and not self.converged(CONTINUATION.failed_residual):
                 step = self.solve_from_afar(
                     problem, dry, coarse=not finest, length=2.0 * problem.spacing[0]
                 )
-            if finest or self.converged(
-                max(MIXED_SEARCH.first_order_tolerance, self.options.tolerance)
-            ):
+            if finest or self.converged(max(SEARCH.first_order_tolerance, self.options.tolerance)):
                 if coarser_in_all_axes(problem, levels[0]):
                     self.figures.append(self._figures(step))
-                coarser = DryAndLubricated(dry, _unknowns(step))
+                coarser = DryAndLubricated(dry, unknowns_of(step))
             else:
                 self.figures, coarser = [], None
         return step
 
     def _record(self, problem: Problem, step: Step) -> None:
+        """Record a step and the imbalance of conserved oil."""
         balance = step.balance
         self.imbalance = (
             balance.imbalance if isinstance(balance, MixedBalance) and problem.conserve else 0.0
@@ -456,12 +459,15 @@ class MixedSearch(Search):
         super()._record(problem, step)
 
     def solve_coarser_grid(self, finest: Problem) -> None:
-        """Solve the next coarser grid from dry, for what the cells' size may have done; nothing if that fails."""
+        """Solve the next coarser grid from dry, to estimate the discretisation error.
+
+        No effect if that fails.
+        """
         levels = grid_levels(finest)
         if len(levels) == 1 or len(self.figures) != 1 or not coarser_in_all_axes(levels[1], finest):
             return
         coarse_search = MixedSearch(
-            replace(self.options, max_iterations=MIXED_SEARCH.max_error_grid_iterations),
+            replace(self.options, max_iterations=SEARCH.max_error_grid_iterations),
             self.gap_scale,
             self.progress,
         )
@@ -471,35 +477,8 @@ class MixedSearch(Search):
             self.figures = [*coarse_search.figures, *self.figures]
 
 
-def pressures_of(solution: ContactSolution, problem: Problem, scales: Scales) -> Pressures:
-    """The unknowns of a solution of any model, on the grid of `problem`."""
-    total = solution.pressure / scales.pressure
-    signed = total if solution.oil is None else _signed(solution.oil, problem, scales)
-    if problem.cells[1] == 1:
-        total, signed = (field[:, :1] for field in (total, signed))
-    if total.shape != problem.all_cells:
-        raise BadInput(
-            f"start has {solution.grid.cells} cells, the surface {problem.all_cells}; solve without start"
-        )
-    signed, total = (np.ascontiguousarray(part[:, : problem.cells[1]]) for part in (signed, total))
-    return Pressures(signed, total, solution.rigid_approach / scales.gap)
-
-
-def _signed(oil: Oil, problem: Problem, scales: Scales) -> Field:
-    """The oil's unknown: below 0 what is missing, above the cap what has pressed the gap open."""
-    if not problem.conserve:
-        return oil.pressure / scales.pressure
-    growth = oil.growth / scales.gap
-    pressed = problem.p_cap + growth / problem.softness
-    return np.where(
-        oil.content < 1.0,
-        oil.content - 1.0,
-        np.where(growth > 0.0, pressed, oil.pressure / scales.pressure),
-    )
-
-
 def _implicit_step(problem: Problem, length: float, content: Field) -> TransientTerm:
-    """The problem's past, or none, and on top the oil that was there when it was `length` farther back."""
+    """Add an implicit time step to the problem, with the oil present at its start."""
     past = (
         TransientTerm(0.0, np.zeros_like(content), lagrangian=False)
         if problem.past is None
@@ -509,39 +488,23 @@ def _implicit_step(problem: Problem, length: float, content: Field) -> Transient
 
 
 def _back_to_first_order(problem: Problem, step: Step) -> Step:
-    """From the second-order wedge's solution to the first-order one, met roughly, or as far as steps move the load."""
+    """Step from the second-order wedge's solution towards the first-order one.
+
+    Until a coarse tolerance is met, or steps no longer change the load share.
+    """
     previous = back = step
     for back in islice(
-        newton(problem, _unknowns(step), second_order=False),
-        MIXED_SEARCH.max_backward_iterations + 1,
+        newton(problem, unknowns_of(step), second_order=False),
+        SEARCH.max_backward_iterations + 1,
     ):
         if back.number > 0:
             moved, all_of_it = (
-                abs(_load_share(back) - _load_share(other)) for other in (previous, step)
+                abs(load_share_of(back) - load_share_of(other)) for other in (previous, step)
             )
             if (
-                back.balance.residual_rms < MIXED_SEARCH.first_order_tolerance
-                or moved < MIXED_SEARCH.backward_tolerance * all_of_it
+                back.balance.residual_rms < SEARCH.first_order_tolerance
+                or moved < SEARCH.backward_tolerance * all_of_it
             ):
                 break
             previous = back
     return back
-
-
-def _load_share(step: Step) -> float:
-    return carried_share(step.balance.pressure, step.balance.in_contact)
-
-
-def _unknowns(step: Step) -> Pressures:
-    assert isinstance(step.balance, MixedBalance)
-    return step.balance.unknowns
-
-
-def _oil(step: Step, surface: Surface, scales: Scales) -> Oil:
-    balance = step.balance
-    assert isinstance(balance, MixedBalance)
-    content, pressure, growth = (
-        on_all_lines(balance.problem, part, surface.grid.cells[1])
-        for part in (balance.film_share, balance.oil_pressure, balance.growth)
-    )
-    return Oil(content=content, pressure=pressure * scales.pressure, growth=growth * scales.gap)
