@@ -169,7 +169,7 @@ def test_the_near_row_is_the_compliance_itself(deflection):
     pressure = np.zeros(CELLS)
     pressure[0, 0] = 1.0
     np.testing.assert_allclose(
-        deflection.near_compliance, deflection(pressure)[[0, 1, 2, 8], 0], rtol=1e-12
+        deflection.local_compliance, deflection(pressure)[[0, 1, 2, 8], 0], rtol=1e-12
     )
 
 

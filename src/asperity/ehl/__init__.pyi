@@ -1,3 +1,4 @@
+from .cavitation import FilmBoundary as FilmBoundary
 from .cavitation import FilmSolution as FilmSolution
 from .cavitation import solve_film as solve_film
 from .contact_solution import ContactSolution as ContactSolution

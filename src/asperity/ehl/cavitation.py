@@ -73,6 +73,25 @@ class FilmSolution:
         return ruptures * dx, (forms + 1.5 - filled) * dx
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmBoundary:
+    """Boundary conditions of an oil film; pressures [Pa] above the cavitation pressure.
+
+    Parameters
+    ----------
+    ends : pressures at inlet and outlet
+    sides : pressures along the two sides of a field; None where it is periodic across
+    inflow_content : share of the gap at the inlet that is filled with oil
+    """
+
+    ends: tuple[float, float] = (0.0, 0.0)
+    sides: tuple[float, float] | None = None
+    inflow_content: float = 1.0
+
+
+FLOODED = FilmBoundary()
+
+
 def solve_film(
     gap: Field,
     *,
@@ -80,9 +99,7 @@ def solve_film(
     entrainment_speed: float,
     viscosity: float | ViscosityLaw,
     density: DensityLaw | None = None,
-    ends: tuple[float, float] = (0.0, 0.0),
-    sides: tuple[float, float] | None = None,
-    inflow_content: float = 1.0,
+    boundary: FilmBoundary = FLOODED,
     tolerance: float = RIGID_FILM.tolerance,
     strict: bool = True,
 ) -> FilmSolution:
@@ -95,9 +112,7 @@ def solve_film(
     entrainment_speed : mean speed of both walls [m/s], towards larger x
     viscosity : a law, or a constant [Pa s]
     density : a law; None for constant density
-    ends : pressures at inlet and outlet [Pa], above the cavitation pressure
-    sides : pressures along the two sides of a field [Pa]; None where it is periodic across
-    inflow_content : share of the gap at the inlet that is filled with oil
+    boundary : pressures at the borders and inflow; by default cavitation pressure and a full inlet
     tolerance : bound on the imbalance of any cell, as a share of the flow
     strict : raise when the tolerance is not met; otherwise return the unconverged film
 
@@ -118,9 +133,7 @@ def solve_film(
         speed=require_positive("entrainment speed", entrainment_speed, "m/s"),
         viscosity=law,
         density=density or Incompressible(1.0),
-        ends=ends,
-        sides=sides,
-        inflow_content=inflow_content,
+        boundary=boundary,
     )
     _check(channel, line=line, field_spacing=not isinstance(spacing, (int, float)))
     signed, flows, residual, steps = _solve_newton(channel, tolerance)
@@ -206,9 +219,7 @@ class RoughChannel:
     speed: float
     viscosity: ViscosityLaw
     density: DensityLaw
-    ends: tuple[float, float]
-    sides: tuple[float, float] | None
-    inflow_content: float
+    boundary: FilmBoundary
 
     @property
     def pressure_scale(self) -> float:
@@ -290,10 +301,10 @@ class RoughChannel:
         by_left = np.where(ruptures, d_to_rupture, by_left)
         by_right = np.where(ruptures, 0.0, by_right)
 
-        inlet, outlet = self.ends
+        inlet, outlet = self.boundary.ends
         entering = (
             u
-            * self.inflow_content
+            * self.boundary.inflow_content
             * self.density(np.array(inlet))
             / self.density.rho0
             * self.gap[0]
@@ -352,10 +363,10 @@ class RoughChannel:
         by_next = (a / (a + b)) ** 2 * np.roll(d_half, -1, 1) * drop - joint * np.roll(
             d_pressure, -1, 1
         )
-        if self.sides is not None:
+        if self.boundary.sides is not None:
             for part in (flow, by_own, by_next):
                 part[:, -1] = 0.0
-            for column, outside in ((0, self.sides[0]), (-1, self.sides[1])):
+            for column, outside in ((0, self.boundary.sides[0]), (-1, self.boundary.sides[1])):
                 outflow[:, column] += half[:, column] * (pressure[:, column] - outside)
                 slope = (
                     d_half[:, column] * (pressure[:, column] - outside)
@@ -401,18 +412,22 @@ def _check(channel: RoughChannel, *, line: bool, field_spacing: bool) -> None:
         )
     for name, size in zip(("dx", "dy"), channel.spacing, strict=True):
         require_positive(f"spacing {name}", size, "m")
-    for name, pressure in (("ends", channel.ends), ("sides", channel.sides or (0.0, 0.0))):
+    for name, pressure in (
+        ("ends", channel.boundary.ends),
+        ("sides", channel.boundary.sides or (0.0, 0.0)),
+    ):
         if not all(0.0 <= value < np.inf for value in pressure):
             raise BadInput(
                 f"{name} must be finite and not below the cavitation pressure 0, got {pressure} Pa"
             )
-    if not 0.0 < channel.inflow_content <= 1.0:
+    if not 0.0 < channel.boundary.inflow_content <= 1.0:
         raise BadInput(
-            f"inflow content must lie between 0 and 1, got {channel.inflow_content:g}; 1 is a full "
+            f"inflow content must lie between 0 and 1, got {channel.boundary.inflow_content:g}; 1 "
+            "is a full "
             "gap"
         )
-    if channel.inflow_content < 1.0 and channel.ends[0] > 0.0:
+    if channel.boundary.inflow_content < 1.0 and channel.boundary.ends[0] > 0.0:
         raise BadInput(
-            f"oil that enters at {channel.ends[0]:g} Pa fills the gap, got inflow content "
-            f"{channel.inflow_content:g}; use 1"
+            f"oil that enters at {channel.boundary.ends[0]:g} Pa fills the gap, got inflow content "
+            f"{channel.boundary.inflow_content:g}; use 1"
         )

@@ -97,7 +97,7 @@ class Deflection:
         )
 
     @property
-    def near_compliance(self) -> Field:
+    def local_compliance(self) -> Field:
         """Compliance of cells 0, 1, 2 along x and of the first far one, for preconditioning."""
         return self.row[[0, 1, 2, min(FAR_CELLS, self.row.size - 1)]].copy()
 

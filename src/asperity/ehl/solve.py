@@ -54,8 +54,8 @@ def solve_contact(
     ------
     BadInput
         for a grid that does not contain the contact or is periodic along the wrong axis, factors
-        that do not fit it, a load beyond the hardness times the area, or a viscosity that overflows at
-        Hertz pressure.
+        that do not fit it, a load beyond the hardness times the area, or a viscosity that
+        overflows at Hertz pressure.
     NotConverged
         when strict and the tolerance was not met; carries the unconverged solution.
     """
@@ -111,7 +111,7 @@ def solve_unified(
         step = search.solve_levels(levels, *guess, fixed=attempt == ATTEMPTS[2])
         if search.converged(options.tolerance):
             break
-    return search.solution(
+    solution = search.solution(
         step,
         surface,
         conditions,
@@ -119,8 +119,8 @@ def solve_unified(
         seconds=time.perf_counter() - began,
         attempt=attempt,
         start=start,
-        viscosity_factor=viscosity_factor,
     )
+    return replace(solution, viscosity_factor=viscosity_factor)
 
 
 class ElasticSearch(Search):

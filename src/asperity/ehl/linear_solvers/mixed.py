@@ -125,7 +125,7 @@ class MixedLinear:
         if self.follows_wedge:
             far, compliance = (
                 OuterNeighbours(*np.empty((2, *self.cells), self.real)),
-                problem.deflection.near_compliance,
+                problem.deflection.local_compliance,
             )
             stencils.wedge_stencil(
                 rows,

@@ -123,7 +123,7 @@ class Linear:
             nothing, nothing, nothing, nothing, nothing, nothing, nothing[0], nothing[0]
         )
         problem = self.balance.problem
-        compliance = problem.deflection.near_compliance
+        compliance = problem.deflection.local_compliance
         stencils.local_stencil(
             self.rows, film, faces, compliance, problem.spacing, self.storing, stencil
         )

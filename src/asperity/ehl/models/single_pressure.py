@@ -204,7 +204,7 @@ class Problem:
     @property
     def softness(self) -> float:
         """Compliance of a cell to its own pressure, less that to a far one."""
-        compliance = self.deflection.near_compliance
+        compliance = self.deflection.local_compliance
         return float(compliance[0] - compliance[3])
 
     @property
@@ -358,7 +358,7 @@ class Problem:
         dx, dy = self.spacing
         outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
         entering = self.entering(gap)
-        compliance = self.deflection.near_compliance
+        compliance = self.deflection.local_compliance
         if self.past is None:
             reynolds.net_outflow(pressure, film.content, faces, entering, dx, dy, outflow)
             reynolds.fluid_diagonal(film, faces, compliance, dx, dy, diagonal)
@@ -389,7 +389,7 @@ class Problem:
         diagonal: Field,
     ) -> None:
         """Fill the net outflow and its diagonal of an unsteady contact."""
-        (dx, dy), compliance, content = self.spacing, self.deflection.near_compliance, film.content
+        (dx, dy), compliance, content = self.spacing, self.deflection.local_compliance, film.content
         if past.lagrangian:
             nothing = np.zeros_like(content)
             reynolds.net_outflow(pressure, nothing, faces, nothing[0], dx, dy, outflow)

@@ -236,7 +236,6 @@ class Search:
         seconds: float,
         attempt: str = ATTEMPTS[0],
         start: ContactSolution | None = None,
-        viscosity_factor: Field | None = None,
     ) -> ContactSolution:
         """Return the result of the search in SI units on the surface's grid.
 
@@ -286,7 +285,6 @@ class Search:
                 iteration_error=self.iteration_error,
                 discretisation_error=discretisation,
             ),
-            viscosity_factor=viscosity_factor,
         )
 
     def _figures(self, step: Step) -> Figures:

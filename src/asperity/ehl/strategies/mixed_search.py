@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
@@ -86,7 +85,7 @@ def solve_mixed(
                 break
             if search.exhausted:
                 break
-    return search.solution(
+    solution = search.solution(
         step,
         surface,
         conditions,
@@ -94,8 +93,8 @@ def solve_mixed(
         seconds=time.perf_counter() - began,
         attempt=strategy,
         start=start,
-        viscosity_factor=viscosity_factor,
     )
+    return replace(solution, viscosity_factor=viscosity_factor)
 
 
 def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
@@ -132,13 +131,17 @@ class MixedSearch(Search):
         surface: Surface,
         conditions: ContactConditions,
         lubricant: Lubricant | None,
-        **how: Any,
+        *,
+        seconds: float,
+        attempt: str = ATTEMPTS[0],
+        start: ContactSolution | None = None,
     ) -> ContactSolution:
         """Return the result of the search with the state of the oil."""
-        solution = super().solution(step, surface, conditions, lubricant, **how)
-        return replace(
-            solution, oil=oil_of(step, surface, Scales.from_conditions(conditions, lubricant))
+        solution = super().solution(
+            step, surface, conditions, lubricant, seconds=seconds, attempt=attempt, start=start
         )
+        scales = Scales.from_conditions(conditions, lubricant)
+        return replace(solution, oil=oil_of(step, surface, scales))
 
     def solve_by(
         self,
