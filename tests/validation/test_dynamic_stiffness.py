@@ -181,9 +181,7 @@ def test_a_sweep_that_cannot_move_begins_anew(monkeypatch):
     expected = ShakenContact(solution).resonance(0.1)
 
     def refused(_, frequency):
-        raise ArithmeticError(
-            f"corrections that are no longer independent at frequency {frequency:g}"
-        )
+        raise ArithmeticError(f"corrections are linearly dependent at frequency {frequency:g}")
 
     monkeypatch.setattr(Shifted, "move", refused)
     found = ShakenContact(solution).resonance(0.1)

@@ -62,9 +62,8 @@ class FilmSolution:
         full = ~self.cavitated
         dx = self.spacing[0]
         ruptures = np.flatnonzero(full[:-1] & ~full[1:]) + 1
-        forms = np.flatnonzero(
-            ~full[:-1] & full[1:]
-        )  # the last cell that is not full contains the front
+        # the last cell that is not full contains the front
+        forms = np.flatnonzero(~full[:-1] & full[1:])
         before = np.maximum(forms - 1, 0)
         streaming = np.minimum(
             self.content[before] * self.gap[before] / self.gap[forms], self.content[forms]
@@ -169,9 +168,7 @@ def _solve_newton(channel: "RoughChannel", tolerance: float) -> tuple[Field, "Fl
         stagnation += 1
         if residual < 0.9 * best:
             best, stagnation, share = residual, 0, min(1.0, 1.5 * share)
-        elif (
-            stagnation == RIGID_FILM.stagnation_iterations
-        ):  # cells that flip to and fro settle in shorter steps
+        elif stagnation == RIGID_FILM.stagnation_iterations:  # damp alternating cells
             best, stagnation, share = residual, 0, max(0.5 * share, RIGID_FILM.min_damping)
         signed = signed + share * channel.limit_step(signed, -_newton_step(flows))
         steps += 1

@@ -325,10 +325,8 @@ def _spacing(
         across = max(CELLS_IN_INLET[kind] * refinement, CELL_MARGIN * MIN_CELLS_IN_INLET)
         dx = min(dx, inlet / across)
         dy = min(dy, inlet / across / SIDE_CELL_RATIO)
-    dx, dy = (
-        dx * a,
-        math.inf if line else dy * b,
-    )  # a line contact varies along y by its roughness only
+    # a line contact varies along y by its roughness only
+    dx, dy = dx * a, math.inf if line else dy * b
     if conditions.geometry == "roller":
         dy = _line_distance(conditions, refinement)
     if texture is not None:

@@ -411,9 +411,8 @@ def newton_step(
         if step.approach_is_free
         else 0.0
     )
-    if (
-        step.load_response == 0.0
-    ):  # all cells ruptured or capped: only the approach can change the load
+    # all cells ruptured or capped: only the approach can change the load
+    if step.load_response == 0.0:
         return Pressures(
             known_oil,
             known,

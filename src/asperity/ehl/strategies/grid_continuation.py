@@ -43,10 +43,8 @@ class Search:
         self.by_first_order: Figures | None = None
         self.cell = 0.0  # of the finest grid along x, in half-widths
         self.iteration_error: Figures | None = None
-        self.smooth, self.order = (
-            False,
-            1 if options.model == CONSERVING else 2,
-        )  # bodies, and wedge
+        self.smooth = False  # bodies without roughness
+        self.order = 1 if options.model == CONSERVING else 2  # of the wedge
         self.failed = False
         self.work, self.most_work = 0.0, np.inf  # cells times steps
 
@@ -163,7 +161,7 @@ class Search:
         """
         step = next(steps)
         before = after or step
-        astray = divergence * max(before.balance.residual_rms, CONTINUATION.min_residual)
+        largest_residual = divergence * max(before.balance.residual_rms, CONTINUATION.min_residual)
         while True:
             self._record(problem, step)
             self.failed = step.number > 0 and not np.isfinite(step.change)
@@ -174,7 +172,7 @@ class Search:
                 or self.exhausted
             ):
                 break
-            if step.balance.residual_rms > astray:
+            if step.balance.residual_rms > largest_residual:
                 break
             before, step = step, next(steps)
         self.iteration_error = self._figures(step).abs_difference(self._figures(before))
