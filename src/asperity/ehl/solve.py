@@ -11,16 +11,23 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl.contact_solution import ContactSolution
-from asperity.ehl.controls import CONTINUATION
+from asperity.ehl.controls import CONTINUATION, SEARCH
 from asperity.ehl.film_formulas import central_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.outcome import ATTEMPTS, PAPER, Options
-from asperity.ehl.problem_setup import contact_problem, first_guess, reduced_problem, usable_levels
+from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, PAPER, Options
+from asperity.ehl.problem_setup import (
+    contact_problem,
+    first_guess,
+    reduced_problem,
+    smooth_film,
+    usable_levels,
+)
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import Progress, Search
-from asperity.ehl.strategies.mixed_search import solve_mixed
+from asperity.ehl.strategies.mixed_search import COARSE_TO_FINE, ROBUST, MixedSearch
+from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.lubricant import Lubricant, require_liquid
 from asperity.surface import Surface
 
@@ -121,6 +128,75 @@ def solve_unified(
         start=start,
     )
     return replace(solution, viscosity_factor=viscosity_factor)
+
+
+def solve_mixed(
+    conditions: ContactConditions,
+    lubricant: Lubricant | None,
+    surface: Surface,
+    *,
+    options: Options,
+    start: ContactSolution | None = None,
+    viscosity_factor: Field | None = None,
+    progress: Progress | None = None,
+) -> ContactSolution:
+    """Solve a two-pressure model; called by `solve_contact`."""
+    began = time.perf_counter()
+    assert lubricant is not None  # a dry contact has one pressure
+    scales = Scales.from_conditions(conditions, lubricant)
+    whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
+    finest = reduced_problem(whole)
+    search = MixedSearch(options, scales.gap, progress)
+    if conditions.geometry == "roller":
+        search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
+    if start is not None:
+        strategy, step = (
+            COARSE_TO_FINE,
+            search.continue_from(finest, pressures_of(start, finest, scales)),
+        )
+    else:
+        for strategy in _strategies(
+            surface, smooth_film(conditions, lubricant), options.contact_film
+        ):
+            problem = finest if strategy == COARSE_TO_FINE else replace(finest, accurate=False)
+            levels = usable_levels(problem, conditions, lubricant)
+            step = search.solve_by(
+                strategy, levels, lambda on: first_guess(on, conditions, lubricant, scales)
+            )
+            if search.converged(options.tolerance):
+                if (
+                    strategy != COARSE_TO_FINE
+                    and finest.accurate
+                    and finest.form.roller is not None
+                ):
+                    strategy, step = search.refine_third_order(finest, step)
+                search.solve_coarser_grid(finest)
+                break
+            if search.exhausted:
+                break
+    solution = search.solution(
+        step,
+        surface,
+        conditions,
+        lubricant,
+        seconds=time.perf_counter() - began,
+        attempt=strategy,
+        start=start,
+    )
+    return replace(solution, viscosity_factor=viscosity_factor)
+
+
+def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
+    """Return the strategies in their order, by the film [m] of the smooth bodies."""
+    if not np.any(surface.heights):
+        return (
+            (FROM_DRY, COARSE_TO_FINE, ROBUST) if film < contact_film else (COARSE_TO_FINE, ROBUST)
+        )
+    return (
+        (FROM_DRY, COARSE_TO_FINE)
+        if film < SEARCH.dry_film_ratio * surface.sq
+        else (COARSE_TO_FINE, FROM_DRY)
+    )
 
 
 class ElasticSearch(Search):

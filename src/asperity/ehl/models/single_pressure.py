@@ -32,8 +32,7 @@ from asperity.lubricant import Lubricant
 
 CLOSED_WITHIN = 0.01  # of the contact film, above which a gap still counts as closed
 SYMMETRY_TOLERANCE = 1e-6  # relative, about Y = 0: far below the solver's tolerance
-# weights of the next and the upstream cell in the wedge; higher orders do not converge on all rough
-# surfaces
+# wedge weights of the next and the upstream cell; high orders fail on some rough surfaces
 THIRD_ORDER, SECOND_ORDER, FIRST_ORDER = (0.375, 0.125), (0.0, 0.5), (0.0, 0.0)
 
 
@@ -269,12 +268,8 @@ class Problem:
         contact_scale = 1.0 / self.softness
         touching = (gap - self.contact_gap) * contact_scale
         if self.lubricant is None:
-            film, faces, outflow, fluid_scale = (
-                None,
-                None,
-                np.zeros_like(pressure),
-                np.ones_like(pressure),
-            )
+            film, faces = None, None
+            outflow, fluid_scale = np.zeros_like(pressure), np.ones_like(pressure)
             residual, state = touching.copy(), np.full(pressure.shape, TOUCHING, dtype=np.int8)
         else:
             film, faces, outflow, fluid_scale = self.flow(
@@ -294,16 +289,8 @@ class Problem:
         residual[:, rim], state[:, rim] = pressure[:, rim], RUPTURED
         if film is not None:  # the film between overlapping bodies does not depend on the approach
             film = film.with_fixed_gap((touching <= 0.0) & (state != LUBRICATED))
-        return Balance(
-            self,
-            pressure,
-            gap,
-            residual,
-            Rows(state, fluid_scale, contact_scale),
-            film,
-            faces,
-            outflow,
-        )
+        rows = Rows(state, fluid_scale, contact_scale)
+        return Balance(self, pressure, gap, residual, rows, film, faces, outflow)
 
     def flow(
         self,
@@ -336,16 +323,8 @@ class Problem:
         film = Film._make([*np.empty((6, *self.cells)), ambient, 3.0 * ambient / height[[0, -1]]])
         least = least_mobility * self.contact_gap**3
         reynolds.fill_film(liquid, height, oil.viscosity.eta0 / self.speed, least, film)
-        east, east_by_own, east_by_next, north, north_by_own, north_by_next = np.empty(
-            (6, *self.cells)
-        )
         faces = Faces(
-            east,
-            east_by_own,
-            east_by_next,
-            north,
-            north_by_own,
-            north_by_next,
+            *np.empty((6, *self.cells)),
             inlet=np.empty(self.cells[1]),
             wedge=np.array(wedge),
             behind=self.cells[1] - self.mirror if self.mirror else 0,

@@ -1,6 +1,5 @@
 """Solution strategies of the two-pressure models: from the dry contact, or coarse to fine."""
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice
@@ -15,18 +14,13 @@ from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, uses_li
 from asperity.ehl.models.single_pressure import Problem, TransientTerm
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step
-from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, Options
+from asperity.ehl.outcome import ATTEMPTS, FROM_DRY
 from asperity.ehl.problem_setup import (
     coarser_in_all_axes,
-    contact_problem,
-    first_guess,
     grid_levels,
-    reduced_problem,
-    smooth_film,
-    usable_levels,
 )
 from asperity.ehl.scales import Scales
-from asperity.ehl.strategies.grid_continuation import Progress, Search
+from asperity.ehl.strategies.grid_continuation import Search
 from asperity.ehl.strategies.initial_guess import (
     DryAndLubricated,
     dry_start,
@@ -34,80 +28,11 @@ from asperity.ehl.strategies.initial_guess import (
     roller_start,
 )
 from asperity.ehl.strategies.local_refinement import refine_locally
-from asperity.ehl.strategies.oil_state import load_share_of, oil_of, pressures_of, unknowns_of
+from asperity.ehl.strategies.oil_state import load_share_of, oil_of, unknowns_of
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
 COARSE_TO_FINE, ROBUST = ATTEMPTS[:2]
-
-
-def solve_mixed(
-    conditions: ContactConditions,
-    lubricant: Lubricant | None,
-    surface: Surface,
-    *,
-    options: Options,
-    start: ContactSolution | None = None,
-    viscosity_factor: Field | None = None,
-    progress: Progress | None = None,
-) -> ContactSolution:
-    """Solve a two-pressure model; called by `solve_contact`."""
-    began = time.perf_counter()
-    assert lubricant is not None  # a dry contact has one pressure
-    scales = Scales.from_conditions(conditions, lubricant)
-    whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = reduced_problem(whole)
-    search = MixedSearch(options, scales.gap, progress)
-    if conditions.geometry == "roller":
-        search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
-    if start is not None:
-        strategy, step = (
-            COARSE_TO_FINE,
-            search.continue_from(finest, pressures_of(start, finest, scales)),
-        )
-    else:
-        for strategy in _strategies(
-            surface, smooth_film(conditions, lubricant), options.contact_film
-        ):
-            problem = finest if strategy == COARSE_TO_FINE else replace(finest, accurate=False)
-            levels = usable_levels(problem, conditions, lubricant)
-            step = search.solve_by(
-                strategy, levels, lambda on: first_guess(on, conditions, lubricant, scales)
-            )
-            if search.converged(options.tolerance):
-                if (
-                    strategy != COARSE_TO_FINE
-                    and finest.accurate
-                    and finest.form.roller is not None
-                ):
-                    strategy, step = search.refine_third_order(finest, step)
-                search.solve_coarser_grid(finest)
-                break
-            if search.exhausted:
-                break
-    solution = search.solution(
-        step,
-        surface,
-        conditions,
-        lubricant,
-        seconds=time.perf_counter() - began,
-        attempt=strategy,
-        start=start,
-    )
-    return replace(solution, viscosity_factor=viscosity_factor)
-
-
-def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
-    """Return the strategies in their order, by the film [m] of the smooth bodies."""
-    if not np.any(surface.heights):
-        return (
-            (FROM_DRY, COARSE_TO_FINE, ROBUST) if film < contact_film else (COARSE_TO_FINE, ROBUST)
-        )
-    return (
-        (FROM_DRY, COARSE_TO_FINE)
-        if film < SEARCH.dry_film_ratio * surface.sq
-        else (COARSE_TO_FINE, FROM_DRY)
-    )
 
 
 class MixedSearch(Search):
