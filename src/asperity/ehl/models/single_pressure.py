@@ -323,12 +323,9 @@ class Problem:
         film = Film._make([*np.empty((6, *self.cells)), ambient, 3.0 * ambient / height[[0, -1]]])
         least = least_mobility * self.contact_gap**3
         reynolds.fill_film(liquid, height, oil.viscosity.eta0 / self.speed, least, film)
-        faces = Faces(
-            *np.empty((6, *self.cells)),
-            inlet=np.empty(self.cells[1]),
-            wedge=np.array(wedge),
-            behind=self.cells[1] - self.mirror if self.mirror else 0,
-        )
+        behind = self.cells[1] - self.mirror if self.mirror else 0
+        parts = [*np.empty((6, *self.cells)), np.empty(self.cells[1]), np.array(wedge), behind]
+        faces = Faces._make(parts)
         mobility = film.mobility
         log_mobility = (
             np.log(np.maximum(mobility, np.finfo(float).tiny)) if self.accurate else mobility
