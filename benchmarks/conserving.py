@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.case import Case
-from asperity.ehl import ContactSolution, solve_contact, solve_film
+from asperity.ehl import ContactSolution, FilmBoundary, solve_contact, solve_film
 from asperity.ehl.outcome import CONSERVING, MIXED, PAPER
 from asperity.solution import LoadSharing, sharing_by_film
 from asperity.solution.state import balance_of
@@ -52,7 +52,7 @@ def rigid_films() -> Iterator[str]:
             spacing=length / cells,
             entrainment_speed=4.57 / 2.0,
             viscosity=0.039,
-            ends=(3364.14, 0.0),
+            boundary=FilmBoundary(ends=(3364.14, 0.0)),
         )
         peak, flow = film.pressure.max() / 3.594269e6 - 1.0, film.flux.mean() / 6.547565e-5 - 1.0
         vary = np.ptp(film.flux) / film.flux.mean()
@@ -64,7 +64,7 @@ def rigid_films() -> Iterator[str]:
             spacing=20e-3 / cells,
             entrainment_speed=0.5,
             viscosity=0.01,
-            ends=(1e5, 1e5),
+            boundary=FilmBoundary(ends=(1e5, 1e5)),
         )
         peak, flow = film.pressure.max() / 350e3 - 1.0, film.flux.mean() / 5.002083e-7 - 1.0
         vary = np.ptp(film.flux) / film.flux.mean()

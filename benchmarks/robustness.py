@@ -119,7 +119,7 @@ def overlap(solution: ContactSolution) -> float:
     The solution's own gap is no less than the contact film by construction, so it could not tell. Cells that the cap
     decides are flattened plastically and do not count.
     """
-    scales = Scales.of(solution.conditions, solution.lubricant)
+    scales = Scales.from_conditions(solution.conditions, solution.lubricant)
     problem = contact_problem(
         solution.conditions, solution.lubricant, solution.surface, solution.options
     )

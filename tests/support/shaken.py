@@ -103,7 +103,7 @@ def _outflow(balance, pressure, gap):
         here, before = content[1:-1], content[:-2]
         lean = here * before / (here**2 + before**2)
         added = np.zeros_like(content)
-        added[1:-1] = balance.lean[1:-1] / lean.real * lean * (here - before)
+        added[1:-1] = balance.limiter[1:-1] / lean.real * lean * (here - before)
         leaning = added.copy()
         leaning[1:] -= added[:-1]
         outflow = outflow + leaning / dx

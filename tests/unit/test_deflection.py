@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import scipy
 
-from asperity.ehl.deflection import Deflection, _k0_beyond, _line_kernel
+from asperity.ehl.deflection import Deflection, _k0_integral, _line_kernel
 from asperity.ehl.deflection import deflection as half_space
 from support.half_space import periodic_compliance
 
@@ -84,7 +84,7 @@ def test_what_is_left_of_k0_beyond_an_argument():
         scipy.integrate.quad(scipy.special.k0, z, z + 40.0, epsabs=1e-15, epsrel=1e-11)[0]
         for z in argument
     ]
-    np.testing.assert_allclose(_k0_beyond(argument), expected, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(_k0_integral(argument), expected, rtol=1e-12, atol=1e-13)
 
 
 def test_a_pressure_that_does_not_vary_in_y_meets_the_logarithm(deflection):
@@ -106,9 +106,9 @@ def test_some_lines_deflect_as_among_all(deflection):
     pressure = np.zeros(CELLS)
     pressure[5:9] = np.random.default_rng(2).random((4, CELLS[1]))
     np.testing.assert_allclose(
-        deflection.among(4)(pressure[5:9]), deflection(pressure)[5:9], rtol=1e-13
+        deflection.restrict_to(4)(pressure[5:9]), deflection(pressure)[5:9], rtol=1e-13
     )
-    single = deflection.among(4)(pressure[5:9].astype(np.float32))
+    single = deflection.restrict_to(4)(pressure[5:9].astype(np.float32))
     assert single.dtype == np.float32
     np.testing.assert_allclose(single, deflection(pressure)[5:9], rtol=1e-5)
 
@@ -168,7 +168,9 @@ def test_every_pressure_costs_work(deflection):
 def test_the_near_row_is_the_compliance_itself(deflection):
     pressure = np.zeros(CELLS)
     pressure[0, 0] = 1.0
-    np.testing.assert_allclose(deflection.near, deflection(pressure)[[0, 1, 2, 8], 0], rtol=1e-12)
+    np.testing.assert_allclose(
+        deflection.local_compliance, deflection(pressure)[[0, 1, 2, 8], 0], rtol=1e-12
+    )
 
 
 def test_a_hertz_pressure_on_a_circle_flattens_the_sphere():

@@ -1,10 +1,13 @@
 """The dry elastic contact by its own solver: beside Newton's steps, which share nothing with it but the equations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from asperity.ehl import Options, solve_contact
 from asperity.ehl import solve as solving
+from asperity.ehl.controls import ELASTIC_DRY
 from asperity.ehl.models import elastic_dry as elastic
 from asperity.ehl.strategies.grid_continuation import Search
 from support.paper import contact, grid, rough
@@ -35,13 +38,13 @@ def test_it_is_newtons_contact_and_one_step_of_newtons_says_so(sq, monkeypatch):
 
 def test_only_lines_that_can_touch_take_part(monkeypatch):
     windows = []
-    around = elastic._Lines.around
+    around = elastic._ContactLines.window
 
     def seen(self, touching):
         windows.append(around(self, touching)[0].undeformed.shape[0] / self.undeformed.shape[0])
         return around(self, touching)
 
-    monkeypatch.setattr(elastic._Lines, "around", seen)
+    monkeypatch.setattr(elastic._ContactLines, "window", seen)
     solve_contact(contact(), None, rough(grid((96, 80)), 0.2e-6), options=TIGHT)
     assert windows
     assert max(windows) < 0.6
@@ -57,7 +60,7 @@ def test_yielding_bodies_and_gradients_out_of_steps_are_left_to_newton(monkeypat
     )
     solve_contact(contact(hardness=2e9), None, surface)
     assert asked == []
-    monkeypatch.setattr(elastic, "MOST_STEPS", 3)
+    monkeypatch.setattr(elastic, "ELASTIC_DRY", replace(ELASTIC_DRY, max_krylov_steps=3))
     found = solve_contact(contact(), None, surface, options=TIGHT)
     assert len(asked) == 1
     np.testing.assert_array_equal(found.pressure, expected.pressure)

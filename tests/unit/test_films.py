@@ -7,7 +7,7 @@ from benchmarks.films import ball
 
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.ehl import film_fits, film_numbers, least_film, lubrication_regime
-from asperity.ehl.film_formulas import AT_THE_PRESSURE_PEAK, _asymptotes, central_film, least_films
+from asperity.ehl.film_formulas import PEAK_TO_MIN_FILM, _asymptotes, central_film, least_films
 from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian
 from support.paper import barus, contact
 
@@ -65,7 +65,7 @@ def test_the_rigid_films_of_a_line_contact_are_those_of_reynolds_equation():
     ) * conditions.radius
     assert films["isoviscous-rigid"].film == pytest.approx(martin, rel=1e-3)
     assert films["piezoviscous-rigid"].film == pytest.approx(blok, rel=1e-3)
-    assert pytest.approx(c, rel=1e-4) == AT_THE_PRESSURE_PEAK
+    assert pytest.approx(c, rel=1e-4) == PEAK_TO_MIN_FILM
     thin, _, _ = line(0.01, 1e-3)
     assert central_film(thin, oil) == pytest.approx(c * martin_of(thin, oil), rel=0.005)
     assert _asymptotes(conditions, numbers).piezoviscous_rigid * unit == pytest.approx(

@@ -133,7 +133,7 @@ def test_the_kernel_agrees_with_its_twin():
     rate, limit, modulus = (10.0 ** rng.uniform(low, low + 1.5, (12, 3)) for low in (4, 6, 7))
     viscosity = 10.0 ** rng.uniform(-2, 4, (12, 3))
     transit, out = 1e-6, np.empty((12, 3))
-    shear_stress.carried_stress(rate, viscosity, limit, modulus, transit, out)
+    shear_stress.march_shear_stress(rate, viscosity, limit, modulus, transit, out)
     for j in range(3):
         stress = limit[0, j] * (1.0 - np.exp(-viscosity[0, j] * rate[0, j] / limit[0, j]))
         for i in range(1, 12):

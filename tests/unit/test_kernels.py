@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from asperity.ehl import Options, Scales
-from asperity.ehl.linear_solvers.single_pressure import Linear, NestedBlocks, five_point_pattern
+from asperity.ehl.linear_solvers.single_pressure import Linear, MultigridSolver, five_point_pattern
 from asperity.ehl.problem_setup import contact_problem, first_guess
 from asperity.kernels import line_relaxation, multigrid, reynolds, stencils
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows
-from asperity.kernels.stencils import Far, Stencil
+from asperity.kernels.stencils import OuterNeighbours, Stencil
 from support import reynolds as twin
 from support.paper import barus, contact, grid, rough
 
@@ -42,7 +42,7 @@ def stencil(rng):
 
 def far_of(cells, rng=None):
     """Couplings of cells two away along x; nothing without a generator."""
-    return Far(*(np.empty((2, 0, 0)) if rng is None else -rng.random((2, *cells))))
+    return OuterNeighbours(*(np.empty((2, 0, 0)) if rng is None else -rng.random((2, *cells))))
 
 
 def dense(stencil, far=None):
@@ -161,9 +161,8 @@ def test_jacobian_product_is_the_complex_step_of_the_twin(rng, film, rows, stori
     pressure, d_pressure, d_gap = (rng.standard_normal(CELLS) for _ in range(3))
     found = np.empty(CELLS)
     faces = faces_of(film, **scheme)
-    reynolds.jacobian_product(
-        rows, film, faces, pressure, d_pressure, d_gap, (DX, DY), storing, found
-    )
+    change = reynolds.PressureChange(d_pressure, d_gap)
+    reynolds.jacobian_product(rows, film, faces, pressure, change, (DX, DY), storing, found)
     step = 1e-30j
     along_step = twin.net_outflow(
         pressure + step * d_pressure,
@@ -266,7 +265,7 @@ def test_wedge_stencil_is_the_complex_step_of_the_twin(rng, film, rows, scheme):
     pressure, faces = rng.random(CELLS), faces_of(film, **scheme)
     stencil, far = (
         Stencil(*(np.empty(CELLS) for _ in range(5))),
-        Far(*(np.empty(CELLS) for _ in range(2))),
+        OuterNeighbours(*(np.empty(CELLS) for _ in range(2))),
     )
     stencils.wedge_stencil(rows, film, faces, pressure, (own, beside), (DX, DY), stencil, far)
     wet, step = rows.state == LUBRICATED, 1e-30j
@@ -299,7 +298,7 @@ def test_wedge_stencil_is_the_complex_step_of_the_twin(rng, film, rows, scheme):
 
 def test_leaning_outflow_is_its_twins(rng):
     content, own, upstream, found = (*rng.random((3, *CELLS)), np.empty(CELLS))
-    reynolds.leaning_outflow(content, own, upstream, DX, found)
+    reynolds.limited_outflow(content, own, upstream, DX, found)
     through = np.zeros(
         (CELLS[0] + 1, CELLS[1])
     )  # x faces; the outer two and the first inner one stay as they are
@@ -310,7 +309,7 @@ def test_leaning_outflow_is_its_twins(rng):
 def test_a_film_that_leans_by_a_half_has_the_second_order_wedge(rng, film):
     pressure, inlet = rng.random(CELLS), rng.random(CELLS[1])
     added, half = np.empty(CELLS), np.full(CELLS, 0.5)
-    reynolds.leaning_outflow(film.content, half, half, DX, added)
+    reynolds.limited_outflow(film.content, half, half, DX, added)
     first = outflow(pressure, film, inlet, wedge=(0.0, 0.0))
     np.testing.assert_allclose(
         first + added, outflow(pressure, film, inlet), rtol=1e-12, atol=1e-12
@@ -336,7 +335,11 @@ def test_relaxed_lines_leave_no_residual(rng, parity, across, reaching):
     stencil = Stencil(5.0 + rng.random(cells), *(-rng.random(cells) for _ in range(4)))
     far = far_of(cells, rng if reaching else None)
     parts = np.empty((7, CELLS[0], (across + 1 - parity) // 2))
-    lines = line_relaxation.Lines(*parts) if reaching else line_relaxation.Lines(*parts[:5], *far)
+    lines = (
+        line_relaxation.LineFactors(*parts)
+        if reaching
+        else line_relaxation.LineFactors(*parts[:5], *far)
+    )
     line_relaxation.factor_lines(stencil, far, parity, 0.02 if reaching else 0.0, lines)
     residual, correction = rng.standard_normal((2, *cells))
     found = np.empty_like(lines.lower)
@@ -357,7 +360,7 @@ def test_a_pivot_that_vanishes_is_replaced(rng):
     """Lines of five are not dominated by their centres; elimination never divides by nothing."""
     stencil, far = Stencil(*(-rng.random(CELLS) for _ in range(5))), far_of(CELLS, rng)
     stencil.centre[0] = 0.0
-    lines = line_relaxation.Lines(*np.empty((7, CELLS[0], CELLS[1] // 2)))
+    lines = line_relaxation.LineFactors(*np.empty((7, CELLS[0], CELLS[1] // 2)))
     line_relaxation.factor_lines(stencil, far, 0, 0.02, lines)
     least = 0.02 * (np.abs(stencil.west) + np.abs(stencil.centre) + np.abs(stencil.east))[:, ::2]
     assert np.all(1.0 / lines.inverse >= 0.999 * least)
@@ -434,7 +437,7 @@ def test_nested_blocks_answer_what_the_factored_sum_does(rng, cells):
     exact = five_point_pattern(wanted.shape).solve(
         five_point_pattern(wanted.shape).factored(sums), wanted
     )
-    found = NestedBlocks(stencil, weight)(residual)
+    found = MultigridSolver(stencil, weight)(residual)
     expected = np.where(
         weight > 0.0, np.repeat(np.repeat(exact, 2, 0), 2, 1)[: cells[0], : cells[1]], 0.0
     )
@@ -462,11 +465,11 @@ def test_sums_over_pairs_and_back(rng, cells):
         coarse = tuple(-(-n // 2) if half else n for n, half in zip(cells, halved, strict=True))
         where = [np.arange(n) // (2 if half else 1) for n, half in zip(cells, halved, strict=True)]
         over, sums, expected = rng.random(coarse), np.empty(coarse), np.zeros(coarse)
-        multigrid.summed(fine, weight, over, sums)
+        multigrid.restrict_scaled(fine, weight, over, sums)
         np.add.at(expected, np.ix_(*where), fine * weight)
         np.testing.assert_allclose(sums, expected * over, rtol=1e-12, atol=1e-12)
         back = fine.copy()
-        multigrid.handed_on(sums, weight, back)
+        multigrid.add_prolonged(sums, weight, back)
         np.testing.assert_allclose(
             back, fine + np.where(weight > 0.0, sums[np.ix_(*where)], 0.0), rtol=1e-12
         )
@@ -479,7 +482,9 @@ def balance():
     problem = contact_problem(
         conditions, oil, rough(on, 0.7e-6, correlation_length=40e-6), Options()
     )
-    pressure, approach = first_guess(problem, conditions, oil, Scales.of(conditions, oil))
+    pressure, approach = first_guess(
+        problem, conditions, oil, Scales.from_conditions(conditions, oil)
+    )
     uneven = 1.0 + 0.3 * np.sin(np.arange(problem.cells[1]) * np.pi / 8.0)
     pressure = np.maximum(pressure * uneven + 0.02 * np.exp(-(problem.x**2) / 9.0)[:, None], 0.0)
     return problem.evaluate(pressure, approach - 0.3)

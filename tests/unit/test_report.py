@@ -372,7 +372,7 @@ def test_several_runs_are_drawn_against_roughness(single, several):
 def test_figures_carry_their_error_where_it_shows():
     run = run_like()
     errors = Figures(car=0.0123, clr=0.0456, h_min=1e-12, h_central=7.1e-9)
-    none = errors.times(0.0)
+    none = errors.scale(0.0)
     cells = GridError(
         car=errors.car, clr=errors.clr, h_min=errors.h_min, h_central=errors.h_central, lean=none
     )

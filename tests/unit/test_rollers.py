@@ -128,12 +128,12 @@ def test_conditions_that_do_not_fit_are_refused():
         (
             {"length": 10e-6},
             1649.0,
-            r"0.01 mm are shorter than its contact is wide, 5.19 mm under 1649 N: .* lower the load",
+            r"0.01 mm is shorter than its contact is wide, 5.19 mm under 1649 N; lower the load",
         ),
         (
             {},
             1.0,
-            r"load of 1 N floats on a film of 30.5 um, .* on 333 um where Hertz's half-width is 2.02 um: .* raise",
+            r"load of 1 N is carried by a film of 30.5 um over 333 um, .* half-width of 2.02 um: .* raise",
         ),
     ],
 )

@@ -63,7 +63,7 @@ def solution():
                 clr=0.2 / 7.0,
                 h_min=2e-9 / 3.0,
                 h_central=2e-9 / 7.0,
-                lean=small.times(-0.5),
+                lean=small.scale(-0.5),
             ),
         ),
         attributes={"case": 'model = "unified"\n# größer\n', "notes": "[]"},

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from asperity.ehl.grid_transfer import averaged, interpolated
+from asperity.ehl.grid_transfer import average, interpolate
 
 
 def centres(n):
@@ -16,18 +16,18 @@ def centres(n):
 def test_averages_keep_the_mean_and_straight_lines(cells):
     fine, coarse = cells
     field = np.random.default_rng(1).standard_normal(fine)
-    assert averaged(field, coarse).shape == coarse
-    assert averaged(field, coarse).mean() == pytest.approx(field.mean(), rel=1e-12)
+    assert average(field, coarse).shape == coarse
+    assert average(field, coarse).mean() == pytest.approx(field.mean(), rel=1e-12)
     line = np.broadcast_to(centres(fine[0])[:, None], fine)
     if fine[0] % coarse[0] == 0:  # cells that straddle an edge are steps, not slopes
         np.testing.assert_allclose(
-            averaged(line, coarse), np.broadcast_to(centres(coarse[0])[:, None], coarse)
+            average(line, coarse), np.broadcast_to(centres(coarse[0])[:, None], coarse)
         )
 
 
 def test_two_by_two_cells_make_one():
     field = np.arange(24.0).reshape(4, 6)
-    np.testing.assert_allclose(averaged(field, (2, 3)), field.reshape(2, 2, 3, 2).mean(axis=(1, 3)))
+    np.testing.assert_allclose(average(field, (2, 3)), field.reshape(2, 2, 3, 2).mean(axis=(1, 3)))
 
 
 @pytest.mark.parametrize("cells", [((8, 6), (16, 12)), ((9, 5), (17, 9)), ((129, 1), (257, 1))])
@@ -35,14 +35,14 @@ def test_cubics_keep_cubics_and_what_goes_round(cells):
     coarse, fine = cells
     x, found = (
         centres(fine[0]),
-        interpolated(centres(coarse[0])[:, None] ** 3 * np.ones(coarse), fine, cubic=True),
+        interpolate(centres(coarse[0])[:, None] ** 3 * np.ones(coarse), fine, cubic=True),
     )
     inside = (x > centres(coarse[0])[1]) & (x < centres(coarse[0])[-2])
     np.testing.assert_allclose(
         found[inside], (x**3)[inside, None] * np.ones(fine)[inside], atol=1e-12
     )
     waves = np.broadcast_to(np.cos(2.0 * np.pi * centres(64)), (4, 64))
-    around = interpolated(waves, (4, 128), cubic=True)
+    around = interpolate(waves, (4, 128), cubic=True)
     np.testing.assert_allclose(
         around, np.broadcast_to(np.cos(2.0 * np.pi * centres(128)), (4, 128)), atol=1e-5
     )
@@ -51,16 +51,16 @@ def test_cubics_keep_cubics_and_what_goes_round(cells):
 @pytest.mark.parametrize("cells", [((4, 3), (8, 6)), ((5, 4), (9, 7)), ((129, 1), (257, 1))])
 def test_interpolation_keeps_straight_lines_and_what_goes_round(cells):
     coarse, fine = cells
-    line = interpolated(np.broadcast_to(centres(coarse[0])[:, None], coarse), fine)
+    line = interpolate(np.broadcast_to(centres(coarse[0])[:, None], coarse), fine)
     inside = (centres(fine[0]) > centres(coarse[0])[0]) & (
         centres(fine[0]) < centres(coarse[0])[-1]
     )
     np.testing.assert_allclose(
         line[inside], np.broadcast_to(centres(fine[0])[inside, None], line[inside].shape)
     )
-    np.testing.assert_allclose(interpolated(np.ones(coarse), fine), 1.0)
+    np.testing.assert_allclose(interpolate(np.ones(coarse), fine), 1.0)
     shifted = np.random.default_rng(2).standard_normal(coarse)
     if fine[1] % coarse[1] == 0:
         step = fine[1] // coarse[1]
-        turned = interpolated(np.roll(shifted, 1, axis=1), fine)
-        np.testing.assert_allclose(turned, np.roll(interpolated(shifted, fine), step, axis=1))
+        turned = interpolate(np.roll(shifted, 1, axis=1), fine)
+        np.testing.assert_allclose(turned, np.roll(interpolate(shifted, fine), step, axis=1))

@@ -185,9 +185,9 @@ def test_the_kernel_is_scipys_dormand_prince():
     """One step of the nonlinear spring against scipy.integrate.RK45's own tableau."""
     from scipy.integrate import RK45
 
-    from asperity.kernels.oscillator import Contact, ride
+    from asperity.kernels.oscillator import ContactSpring, integrate_contact
 
-    contact = Contact(spring=1.1e11, damper=40.0, load=2000.0, hertz=True)
+    contact = ContactSpring(spring=1.1e11, damper=40.0, load=2000.0, hertz=True)
     start, slope, step = np.array([7e-6, 0.03]), 0.04, 4e-5
 
     def slopes(_, state):
@@ -198,7 +198,7 @@ def test_the_kernel_is_scipys_dormand_prince():
     solver = RK45(slopes, 0.0, start, 1.0, first_step=step, rtol=1e9, atol=1e9)
     solver.step()
     compression, velocity = np.array([start[0], 0.0]), np.array([start[1], 0.0])
-    ride(contact, np.array([slope]), step, 1, compression, velocity)
+    integrate_contact(contact, np.array([slope]), step, 1, compression, velocity)
     assert [compression[1], velocity[1]] == pytest.approx(solver.y, rel=1e-12)
 
 

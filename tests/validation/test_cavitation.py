@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from asperity.core.errors import BadInput, NotConverged
-from asperity.ehl import solve_film
+from asperity.ehl import FilmBoundary, solve_film
 from asperity.lubricant import Barus, DowsonHigginson
 
 VISCOSITY, SPEED = 0.039, 4.57 / 2.0
@@ -26,10 +26,15 @@ def wave(x):
     return LEAST * (1.2 + 0.4 * np.cos(6.0 * np.pi * x / LENGTH) + 0.1 * x / LENGTH)
 
 
+def film_between(gap, *, ends=(0.0, 0.0), sides=None, inflow_content=1.0, **more):
+    boundary = FilmBoundary(ends=ends, sides=sides, inflow_content=inflow_content)
+    return solve_film(gap, boundary=boundary, **more)
+
+
 def slider(gap, cells, *, ends=(0.0, 0.0), **more):
     x = (np.arange(cells) + 0.5) * LENGTH / cells
     more = {"viscosity": VISCOSITY, **more}
-    return solve_film(gap(x), spacing=LENGTH / cells, entrainment_speed=SPEED, ends=ends, **more)
+    return film_between(gap(x), spacing=LENGTH / cells, entrainment_speed=SPEED, ends=ends, **more)
 
 
 def rise(gap, flux, start, end):
@@ -68,7 +73,7 @@ def test_slider_with_a_pocket_b3(cells):
     length = 20e-3
     x = (np.arange(cells) + 0.5) * length / cells
     gap = np.where((x > 4e-3) & (x < 10e-3), 2e-6, 1e-6)
-    film = solve_film(
+    film = film_between(
         gap, spacing=length / cells, entrainment_speed=0.5, viscosity=0.01, ends=(1e5, 1e5)
     )
     (rupture,), (formed,) = film.fronts
@@ -106,7 +111,7 @@ def test_long_journal_bearing_with_a_groove_at_the_widest_gap(eccentricity):
     largest = 12.0 * (second(top) - widest(end) * third(top))  # in eta u r/c^2
     eta, u, r, c, cells = 0.02, 3.0, 25e-3, 30e-6, 400
     angle = (np.arange(cells) + 0.5) * 2.0 * np.pi / cells
-    film = solve_film(
+    film = film_between(
         c * (1.0 + e * np.cos(angle)),
         spacing=2.0 * np.pi * r / cells,
         entrainment_speed=u,
@@ -206,7 +211,7 @@ def test_barus_oil_is_a_transformed_plain_one():
 
 def test_a_field_that_does_not_vary_across_is_a_line():
     line, gap = slider(wave, 200, ends=(0.0, 2e6)), wave((np.arange(200) + 0.5) * LENGTH / 200)
-    field = solve_film(
+    field = film_between(
         np.repeat(gap[:, None], 5, axis=1),
         spacing=(LENGTH / 200, 1e-3),
         entrainment_speed=SPEED,
@@ -228,7 +233,7 @@ def test_short_journal_bearing_is_ocvirks():
     angle = (np.arange(cells[0]) + 0.5) * 2.0 * np.pi / cells[0]
     y = (np.arange(cells[1]) + 0.5) * width / cells[1] - width / 2.0
     gap = c * (1.0 + e * np.cos(angle))
-    film = solve_film(
+    film = film_between(
         np.repeat(gap[:, None], cells[1], axis=1),
         spacing=(2.0 * np.pi * r / cells[0], width / cells[1]),
         entrainment_speed=3.0,
@@ -259,7 +264,7 @@ def rough_gap(cells, spread, seed=1):
 )
 def test_no_oil_is_lost_between_rough_walls(oil):
     gap = rough_gap(64, 0.5)
-    film = solve_film(gap, spacing=(15e-6, 15e-6), entrainment_speed=1.0, ends=(1e5, 1e5), **oil)
+    film = film_between(gap, spacing=(15e-6, 15e-6), entrainment_speed=1.0, ends=(1e5, 1e5), **oil)
     through = film.flux.sum(axis=1)
     assert np.ptp(through) < 1e-10 * through.mean()
     assert 0.1 < film.cavitated.mean() < 0.9
@@ -272,9 +277,9 @@ def test_no_oil_is_lost_between_rough_walls(oil):
 def test_a_film_that_is_not_solved_says_so():
     stiff = {"spacing": (40e-6, 40e-6), "entrainment_speed": 1.0, "viscosity": Barus(0.1, 20e-9)}
     with pytest.raises(NotConverged, match="loses") as failed:
-        solve_film(0.5 * rough_gap(24, 0.7), **stiff)
+        film_between(0.5 * rough_gap(24, 0.7), **stiff)
     assert failed.value.solution.pressure.shape == (24, 24)
-    assert not solve_film(0.5 * rough_gap(24, 0.7), strict=False, **stiff).residual < 1e-11
+    assert not film_between(0.5 * rough_gap(24, 0.7), strict=False, **stiff).residual < 1e-11
 
 
 @pytest.mark.parametrize(
@@ -282,11 +287,11 @@ def test_a_film_that_is_not_solved_says_so():
     [
         ({"gap": np.zeros(20)}, "gap must be positive"),
         ({"gap": np.ones((2, 2, 2))}, "gap must have shape"),
-        ({"spacing": (1.0, 1.0)}, "spacing must be one size"),
+        ({"spacing": (1.0, 1.0)}, "spacing must be one cell size"),
         ({"spacing": 0.0}, "spacing dx must be positive"),
         ({"entrainment_speed": -1.0}, "entrainment speed must be positive"),
-        ({"ends": (-1.0, 0.0)}, "ends must be pressures"),
-        ({"sides": (0.0, np.inf)}, "sides must be pressures"),
+        ({"ends": (-1.0, 0.0)}, "ends must be finite"),
+        ({"sides": (0.0, np.inf)}, "sides must be finite"),
         ({"inflow_content": 1.5}, "inflow content must lie"),
         ({"inflow_content": 0.5, "ends": (1e5, 0.0)}, "fills the gap"),
         ({"viscosity": 0.0}, "viscosity eta0 must be positive"),
@@ -295,4 +300,4 @@ def test_a_film_that_is_not_solved_says_so():
 def test_what_cannot_be_is_refused(wrong, says):
     right = {"gap": np.full(20, 1e-6), "spacing": 1e-5, "entrainment_speed": 1.0, "viscosity": 0.1}
     with pytest.raises(BadInput, match=says):
-        solve_film(**{**right, **wrong})
+        film_between(**{**right, **wrong})

@@ -11,9 +11,9 @@ from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl import Options, Scales, SolveStatus, solve_contact
 from asperity.ehl.linear_solvers.mixed import MixedLinear, newton_step
 from asperity.ehl.models.mixed import Pressures, evaluate
-from asperity.ehl.models.single_pressure import Past
+from asperity.ehl.models.single_pressure import TransientTerm
 from asperity.ehl.problem_setup import contact_problem
-from asperity.ehl.strategies.mixed_search import pressures_of
+from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.solution import clr_below, contact_state, load_solution, sharing_by_film
 from asperity.surface import MovingSurfaces, Surface, flat_surface, gaussian_surface
 from asperity.transient import moving_contact
@@ -153,7 +153,7 @@ def posed(solution):
 
 def unknowns_of(solution):
     return pressures_of(
-        solution, posed(solution), Scales.of(solution.conditions, solution.lubricant)
+        solution, posed(solution), Scales.from_conditions(solution.conditions, solution.lubricant)
     )
 
 
@@ -161,8 +161,8 @@ def pasts(problem):
     content, dx = np.ones(problem.cells), problem.spacing[0]
     return (
         None,
-        Past(3.0, -3.0 * content, followed=False),
-        Past(1.0 / dx, -content / dx, followed=True),
+        TransientTerm(3.0, -3.0 * content, lagrangian=False),
+        TransientTerm(1.0 / dx, -content / dx, lagrangian=True),
     )
 
 
@@ -192,7 +192,7 @@ def test_the_linearisation_is_exact_but_at_borders(flattened):
         same = (before.rows.state == after.rows.state) & (before.solid == after.solid)
         opens = (
             here.gap > problem.contact_gap
-        ) == ~here.shut  # not so within 1 % of the contact film, and lifted
+        ) == ~here.sealed  # not so within 1 % of the contact film, and lifted
         same &= (here.solid == after.solid) & (opens | (here.unknowns.oil > problem.p_cap))
         same &= (before.gap > problem.contact_gap) == (after.gap > problem.contact_gap)
         for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):

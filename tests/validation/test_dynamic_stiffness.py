@@ -16,7 +16,7 @@ from asperity.ehl.linear_solvers.gmres import Shifted
 from asperity.ehl.linear_solvers.mixed import MixedLinear
 from asperity.ehl.linear_solvers.oscillating import elastic
 from asperity.ehl.scales import Scales
-from asperity.kernels import relax
+from asperity.kernels import line_relaxation as relax
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
 from asperity.solution import (
     ShakenContact,
@@ -96,7 +96,7 @@ def own_line(nodes):
 @pytest.mark.parametrize("frequency_hz", [0.0, 1e3, 3e3, 10e3, 20e3])
 def test_a_smooth_line_has_the_stiffness_of_a_solver_that_shares_no_code(frequency_hz):
     conditions = contact()
-    a, scales = conditions.hertz.half_widths[0], Scales.of(conditions, barus())
+    a, scales = conditions.hertz.half_widths[0], Scales.from_conditions(conditions, barus())
     solution = solve_contact(
         conditions, barus(), flat_surface(grid((256, 8))), options=Options(tolerance=1e-6)
     )
@@ -181,9 +181,7 @@ def test_a_sweep_that_cannot_move_begins_anew(monkeypatch):
     expected = ShakenContact(solution).resonance(0.1)
 
     def refused(_, frequency):
-        raise ArithmeticError(
-            f"corrections that are no longer independent at frequency {frequency:g}"
-        )
+        raise ArithmeticError(f"corrections are linearly dependent at frequency {frequency:g}")
 
     monkeypatch.setattr(Shifted, "move", refused)
     found = ShakenContact(solution).resonance(0.1)
@@ -201,7 +199,7 @@ def stencil_times(lines, change):
 def test_the_lines_follow_how_the_wedge_leans():
     """Their stencil is the linearisation of a contact in which a cell gives way to its own pressure alone."""
     balance = elastic(balance_of(papers(2.5, "mixed")))
-    linear = MixedLinear(balance, float, closely=True)
+    linear = MixedLinear(balance, float, with_limiter=True)
     _, lines = linear.inverse
     change = np.random.default_rng(2).standard_normal(linear.cells) * linear.lubricated
     compliance = 1.0 / linear.rows.contact_scale

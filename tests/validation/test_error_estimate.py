@@ -10,7 +10,7 @@ from benchmarks.robustness import contacts, prepared
 import asperity.ehl.strategies.grid_continuation as searching
 from asperity.contact.grid import Grid
 from asperity.ehl import Options, solve_contact
-from asperity.ehl.grid_transfer import averaged
+from asperity.ehl.grid_transfer import average
 from asperity.ehl.models.mixed import Pressures
 from asperity.ehl.newton.mixed import newton as mixed_newton
 from asperity.ehl.newton.single_pressure import newton
@@ -18,7 +18,7 @@ from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, Figures
 from asperity.ehl.problem_setup import contact_problem, first_guess, grid_levels
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import grid_error
-from asperity.ehl.strategies.mixed_search import CLIMB, MixedSearch
+from asperity.ehl.strategies.mixed_search import COARSE_TO_FINE, MixedSearch
 from asperity.lubricant import Barus
 from asperity.solution import contact_state
 from asperity.surface import flat_surface
@@ -97,7 +97,7 @@ def test_the_way_back_to_first_order_is_gone_to_its_end(seed):
     """Sharp elastic roughness: one step back told as little as a seventh, and no interval held the truth."""
     fine = rough(grid((384, 32), y=(-1.0, 1.0)), 0.5e-6, seed=seed, correlation_length=30e-6)
     here = replace(
-        fine, grid=grid((96, 32), y=(-1.0, 1.0)), heights=averaged(fine.heights, (96, 32))
+        fine, grid=grid((96, 32), y=(-1.0, 1.0)), heights=average(fine.heights, (96, 32))
     )
     slow = contact(hardness=None, speed=0.15)
     error = contact_state(solve_contact(slow, OIL, here)).error.clr
@@ -175,7 +175,7 @@ def test_two_pressures_ask_the_first_order_wedge_too(monkeypatch):
 @pytest.mark.parametrize("model", ["mixed", "unified"])
 def test_intervals_hold_the_load_share_of_a_finer_grid(model):
     """Of contacts that no factor was chosen on, 96 cells against 192; the whole table is in docs/validation.md."""
-    held, wide = [], []
+    fixed, wide = [], []
     for one in (contacts()[number] for number in (53, 153, 161, 353, 411, 503)):
         here, finer = (
             solve_contact(*posed(one, cells), options=Options(model=model), strict=False)
@@ -183,10 +183,10 @@ def test_intervals_hold_the_load_share_of_a_finer_grid(model):
         )
         error, true = contact_state(here).error.clr, contact_state(finer).clr
         if here.convergence.converged and finer.convergence.converged and error.low is not None:
-            held.append(error.low <= true <= error.high)
+            fixed.append(error.low <= true <= error.high)
             wide.append(0.5 * (error.high - error.low) / abs(true - error.value))
-    assert len(held) >= 5
-    assert sum(held) >= len(held) - 1  # of nine in ten
+    assert len(fixed) >= 5
+    assert sum(fixed) >= len(fixed) - 1  # of nine in ten
     assert np.median(wide) < 5.0
 
 
@@ -208,10 +208,10 @@ def test_what_fails_at_first_is_tried_with_the_bodies_held(monkeypatch):
     usual = solved(surface, options=papers)
     assert usual.convergence.attempt == ATTEMPTS[0]
 
-    def lame(problem, pressure, approach, *, held=False):
-        for step in newton(problem, pressure, approach, held=held):
+    def lame(problem, pressure, approach, *, fixed=False):
+        for step in newton(problem, pressure, approach, fixed=fixed):
             yield step
-            while not held:  # never takes a step
+            while not fixed:  # never takes a step
                 yield step
 
     monkeypatch.setattr(searching, "newton", lame)
@@ -235,24 +235,24 @@ def test_where_the_dry_contact_leads_nowhere_hertzs_pressure_is_the_start(monkey
     monkeypatch.setattr(MixedSearch, "from_dry", lame)
     mended = solved(surface)
     assert usual.convergence.attempt == FROM_DRY
-    assert mended.convergence.attempt == CLIMB
+    assert mended.convergence.attempt == COARSE_TO_FINE
     assert contact_state(mended).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
 
 
-@pytest.mark.parametrize("way", [CLIMB, FROM_DRY])
+@pytest.mark.parametrize("way", [COARSE_TO_FINE, FROM_DRY])
 @pytest.mark.parametrize("model", ["mixed", "conserving"])
 def test_a_way_is_judged_by_its_own_steps(model, way):
     """What a way that failed has left says nothing of the next one's error; how wide cells are always does."""
     options = Options(model=model)
-    scales = Scales.of(CONDITIONS, OIL)
+    scales = Scales.from_conditions(CONDITIONS, OIL)
     problem = contact_problem(
         CONDITIONS, OIL, rough(grid((96, 96)), 1e-6, correlation_length=40e-6), options
     )
     search = MixedSearch(options, scales.gap, None)
     search.by_first_order = Figures(car=50.0, clr=50.0, h_min=50.0, h_central=50.0)
-    search.along(way, grid_levels(problem), lambda on: first_guess(on, CONDITIONS, OIL, scales))
-    assert search.settled(options.tolerance)
-    search.coarser(problem)
+    search.solve_by(way, grid_levels(problem), lambda on: first_guess(on, CONDITIONS, OIL, scales))
+    assert search.converged(options.tolerance)
+    search.solve_coarser_grid(problem)
     assert search.cell == problem.spacing[0]
     assert 0.0 < search.discretisation_error.clr < 1.0
 
@@ -268,8 +268,8 @@ def test_a_heavy_smooth_ball_in_isoviscous_oil_is_solved_at_the_first_attempt(mo
 
 
 def test_a_smooth_contact_falls_back_on_the_sturdy_wedge(monkeypatch):
-    def lame(problem, pressure, approach, *, held=False):
-        for step in newton(problem, pressure, approach, held=held):
+    def lame(problem, pressure, approach, *, fixed=False):
+        for step in newton(problem, pressure, approach, fixed=fixed):
             yield step
             while problem.accurate:  # never takes a step
                 yield step

@@ -230,7 +230,7 @@ def run_in():
 def overlap(one):
     """How deep the bodies overlap [m], from pressure and roughness alone."""
     solution = one.solution
-    scales = Scales.of(solution.conditions, solution.lubricant)
+    scales = Scales.from_conditions(solution.conditions, solution.lubricant)
     posed = contact_problem(
         solution.conditions, solution.lubricant, solution.surface, solution.options
     )

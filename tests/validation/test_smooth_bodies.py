@@ -14,7 +14,7 @@ from asperity.ehl.linear_solvers import mixed as mixed_linear
 from asperity.ehl.models.mixed import Pressures, evaluate
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.problem_setup import contact_problem
-from asperity.ehl.strategies.local_refinement import smoothed
+from asperity.ehl.strategies.local_refinement import refine_locally
 from asperity.surface import flat_surface
 
 OPTIONS = Options(contact_film=NO_FLOOR)
@@ -34,7 +34,7 @@ def solved():
     surface = on_a_grid(conditions, 65)
     problem = contact_problem(conditions, BARUS, surface, OPTIONS)
     solution = solve_contact(conditions, BARUS, surface, options=replace(OPTIONS, tolerance=1e-7))
-    scales = Scales.of(conditions, BARUS)
+    scales = Scales.from_conditions(conditions, BARUS)
     pressure = solution.pressure / scales.pressure
     return problem, Pressures(pressure, pressure, solution.rigid_approach / scales.gap)
 
@@ -51,7 +51,7 @@ def test_worst_cells_are_solved_for_what_is_around_them(solved):
     """Where all else is right the box has the whole contact's solution, and nothing else moves."""
     problem, right = solved
     spike, start = dented(problem, right)
-    found = smoothed(problem, start)
+    found = refine_locally(problem, start)
     assert found.approach == right.approach
     dent = np.abs(start.total - right.total).max()
     assert dent > 0.1
@@ -67,24 +67,24 @@ def test_worst_cells_are_solved_for_what_is_around_them(solved):
 
 def test_nothing_is_done_where_little_or_everything_is_left(solved):
     problem, right = solved
-    np.testing.assert_array_equal(smoothed(problem, right).total, right.total)
+    np.testing.assert_array_equal(refine_locally(problem, right).total, right.total)
     noise = right.total * (1.0 + 0.05 * np.random.default_rng(3).standard_normal(problem.cells))
     np.testing.assert_array_equal(
-        smoothed(problem, Pressures(noise, noise, right.approach)).total, noise
+        refine_locally(problem, Pressures(noise, noise, right.approach)).total, noise
     )
 
 
 def test_held_cells_and_bodies_stay(solved):
     problem, right = solved
     _, start = dented(problem, right)
-    held = np.broadcast_to(np.abs(problem.y) > 0.5, problem.cells)
-    for step in newton(replace(problem, held=held), start, second_order=False):
+    fixed = np.broadcast_to(np.abs(problem.y) > 0.5, problem.cells)
+    for step in newton(replace(problem, fixed=fixed), start, second_order=False):
         if step.number == 3:
             break
     assert step.approach == right.approach
-    np.testing.assert_array_equal(step.balance.unknowns.total[held], start.total[held])
-    assert not np.any(step.balance.oil_residual[held])
-    assert np.abs(step.balance.unknowns.total - start.total)[~held].max() > 0.05
+    np.testing.assert_array_equal(step.balance.unknowns.total[fixed], start.total[fixed])
+    assert not np.any(step.balance.oil_residual[fixed])
+    assert np.abs(step.balance.unknowns.total - start.total)[~fixed].max() > 0.05
 
 
 @pytest.mark.parametrize(

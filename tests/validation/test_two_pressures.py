@@ -11,8 +11,9 @@ from benchmarks.chosen_grids import samples
 from asperity.case import load_case
 from asperity.contact.grid import Grid
 from asperity.ehl import Options, solve_contact
+from asperity.ehl.controls import GUESS, MIXED_SOLVER, PLASTIC_DRY
 from asperity.ehl.grid_design import auto_grid
-from asperity.ehl.linear_solvers.mixed import FEWEST_NESTED, MixedLinear, firm, foreseen
+from asperity.ehl.linear_solvers.mixed import MixedLinear, extend_streaks, is_firm
 from asperity.ehl.load_shares import carried_share
 from asperity.ehl.models import plastic_dry as dry
 from asperity.ehl.models.mixed import Pressures, evaluate
@@ -74,14 +75,17 @@ def test_the_papers_contact_has_the_trials_load_share():
 def test_one_answer_from_two_starts():
     """All load on the asperities, and all of it in the oil."""
     conditions, oil, surface = contact(hardness=2e9), barus(), rough(COARSE, 1e-6, seed=7)
-    problem, scales = contact_problem(conditions, oil, surface, MIXED), Scales.of(conditions, oil)
+    problem, scales = (
+        contact_problem(conditions, oil, surface, MIXED),
+        Scales.from_conditions(conditions, oil),
+    )
 
     dry, hertz = MixedSearch(MIXED, scales.gap, None), MixedSearch(MIXED, scales.gap, None)
     dry.from_dry([problem])
     hertz.climb_from(
         grid_levels(problem), lambda level: first_guess(level, conditions, oil, scales)
     )
-    assert dry.settled(MIXED.tolerance)
+    assert dry.converged(MIXED.tolerance)
     assert hertz.settled(MIXED.tolerance)
     assert dry.figures[-1].clr == pytest.approx(hertz.figures[-1].clr, abs=0.002)
 
@@ -95,13 +99,13 @@ def test_what_oil_changed_on_a_coarse_grid_is_granted_to_the_finer_one():
     )
     levels, scales = (
         grid_levels(contact_problem(conditions, oil, surface, MIXED)),
-        Scales.of(conditions, oil),
+        Scales.from_conditions(conditions, oil),
     )
     searches = {number: MixedSearch(MIXED, scales.gap, None) for number in (1, len(levels))}
     steps = {}
     for number, search in searches.items():
         search.from_dry(levels[:number])
-        assert search.settled(MIXED.tolerance)
+        assert search.converged(MIXED.tolerance)
         steps[number] = sum(step.cells == (192, 192) for step in search.history)
     assert steps[len(levels)] < 0.7 * steps[1]
     at_once, climbed = (search.figures[-1].clr for search in searches.values())
@@ -130,9 +134,9 @@ def test_a_dry_start_by_sets_of_cells_is_newtons(sq, monkeypatch):
     levels = grid_levels(
         contact_problem(contact(hardness=2e9), barus(), rough(grid((96, 96)), sq), MIXED)
     )
-    monkeypatch.setattr(starts, "DRY", 1e-5)
+    monkeypatch.setattr(starts, "GUESS", replace(GUESS, dry_tolerance=1e-5))
     with monkeypatch.context() as before:
-        before.setattr(starts, "roughly_dry", lambda _, *start: (*start[:2], False))
+        before.setattr(starts, "active_set_dry", lambda _, *start: (*start[:2], False))
         expected = [dry_start(level) for level in levels]
     monkeypatch.setattr(starts, "newton", None)
     monkeypatch.setattr(starts, "dry_contact", None)
@@ -148,7 +152,7 @@ def test_a_dry_start_by_sets_of_cells_is_newtons(sq, monkeypatch):
 def test_a_dry_start_that_sets_of_cells_do_not_find_is_found_all_the_same(monkeypatch):
     problem = contact_problem(contact(hardness=2e9), barus(), rough(grid((64, 64)), 1e-6), MIXED)
     expected = dry_start(problem)
-    monkeypatch.setattr(dry, "MOST_SETS", 1)
+    monkeypatch.setattr(dry, "PLASTIC_DRY", replace(PLASTIC_DRY, max_active_sets=1))
     found = dry_start(problem)
     assert found[1] != expected[1]
     assert found[1] == pytest.approx(expected[1], abs=0.01)
@@ -190,8 +194,9 @@ def test_a_step_that_leads_away_from_a_solution_is_cut_short():
         (solved, 0.0625),
         (replace(solved, oil_residual=solved.oil_residual + 1.0), 1.0),
     ):
-        led = mixed_iterate._led(
-            mixed_iterate._Moves(balance, Pressures(still, still, -0.2), 1.0), second_order=True
+        led = mixed_iterate._line_search(
+            mixed_iterate._StepProposal(balance, Pressures(still, still, -0.2), 1.0),
+            second_order=True,
         )
         assert solved.unknowns.approach - led.unknowns.approach == pytest.approx(0.2 * share)
 
@@ -217,7 +222,7 @@ def hard_ball():
         on, sq=0.25e-6, correlation_length=(38e-6, 56e-6), rng=np.random.default_rng(2)
     )
     oil = replace(barus(), viscosity=Roelands(14e-3, 20e-9))
-    problem, scales = contact_problem(hard, oil, surface, MIXED), Scales.of(hard, oil)
+    problem, scales = contact_problem(hard, oil, surface, MIXED), Scales.from_conditions(hard, oil)
     total, approach, _ = dry_contact(
         replace(problem, lubricant=None, contact_gap=0.0), hertz_pressure(problem)
     )
@@ -234,15 +239,15 @@ def test_steps_of_time_lead_where_newtons_steps_alone_do_not():
     """Hard steel: eighty of Newton's steps from the dry contact go round, the film that builds up in time arrives."""
     problem, dry, search = hard_ball()
     search.run(problem, newton(problem, dry, second_order=False), 1e-2, 80)
-    assert not search.settled(1e-2)
+    assert not search.converged(1e-2)
     assert len(search.history) > 80
 
     search.history.clear()
-    arrived = search.march(problem, dry, 1.0, met=1e-2)
+    arrived = search.march_in_time(problem, dry, 1.0, met=1e-2)
     still = search.run(
         problem, newton(problem, arrived.balance.unknowns, second_order=False), 1e-4, 80
     )
-    assert search.settled(1e-4)
+    assert search.converged(1e-4)
     assert len(search.history) < 200
     # the last step of time was long: the oil that it still had from before is hardly to be seen
     shares = [
@@ -259,7 +264,7 @@ def test_newtons_steps_know_how_the_wedge_leans():
     rng, start = np.random.default_rng(3), 0.01 + hertz_pressure(problem)
     at = Pressures(start, start, 2.0)
     balance = evaluate(problem, at, second_order=True)
-    assert balance.lean.max() > 0.4
+    assert balance.limiter.max() > 0.4
     assert balance.parted.all()
     change = rng.standard_normal(start.shape) * balance.solved
     wet, _ = MixedLinear(balance, float).product(change, change, 0.0)
@@ -296,12 +301,12 @@ def test_newtons_steps_know_how_the_wedge_opens_where_the_gap_has_settled():
         for way in (tiny, -tiny)
     ]
     slope = ((outflows[0] - outflows[1]) / (2.0 * tiny) * scale)[balance.solved]
-    held, told = (
+    fixed, told = (
         MixedLinear(balance, float, settled).product(change, change, 0.0)[0][balance.solved]
         for settled in (None, np.ones(start.shape, dtype=bool))
     )
     np.testing.assert_allclose(told, slope, atol=1e-4)
-    assert np.abs(held - slope).max() > 0.05
+    assert np.abs(fixed - slope).max() > 0.05
 
 
 def test_oil_that_fills_a_streak_of_closed_cells_goes_on_in_one_step():
@@ -314,7 +319,7 @@ def test_oil_that_fills_a_streak_of_closed_cells_goes_on_in_one_step():
     )
     oil = np.where(np.random.default_rng(5).random(total.shape) < 0.3, 0.3 * total, 0.0)
     before = evaluate(problem, Pressures(oil, total, approach), second_order=False)
-    after = foreseen(before)
+    after = extend_streaks(before)
     closed = (before.solid == CAPPED) & (before.gap <= 1.01 * problem.contact_gap)
     fills, expected = np.zeros(problem.cells[1], dtype=bool), np.zeros(problem.cells, dtype=bool)
     for i in range(problem.cells[0]):
@@ -419,6 +424,6 @@ def test_blocks_are_nested_where_bodies_touch_firmly_and_not_where_films_are_nea
         rng=np.random.default_rng(sample.seed),
     )
     hard = solve_contact(sample.conditions, sample.oil, surface)
-    assert min(*soft.grid.cells, *grid.cells) >= FEWEST_NESTED
-    assert firm(balance_of(soft))
-    assert not firm(balance_of(hard))
+    assert min(*soft.grid.cells, *grid.cells) >= MIXED_SOLVER.min_multigrid_cells
+    assert is_firm(balance_of(soft))
+    assert not is_firm(balance_of(hard))

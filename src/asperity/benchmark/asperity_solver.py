@@ -11,7 +11,14 @@ from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput
-from asperity.ehl import ContactModel, ContactSolution, Options, solve_contact, solve_film
+from asperity.ehl import (
+    ContactModel,
+    ContactSolution,
+    FilmBoundary,
+    Options,
+    solve_contact,
+    solve_film,
+)
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.solution import contact_state
 from asperity.surface import MovingSurfaces, Surface, flat_surface
@@ -249,7 +256,7 @@ def _slider(given: Mapping[str, Any], cells: int) -> dict[str, float]:
         spacing=length / cells,
         entrainment_speed=given["speed_m_s"],
         viscosity=given["viscosity_pa_s"],
-        ends=tuple(given["pressures_pa"]),
+        boundary=FilmBoundary(ends=tuple(given["pressures_pa"])),
     )
     load = {} if journal else {"load_n_m": float(film.load)}
     return {"p_max_pa": float(film.pressure.max()), "flux_m2_s": float(film.flux.mean()), **load}

@@ -28,7 +28,7 @@ from asperity.case.vibration import parse_vibration
 from asperity.case.wear import WearSection
 from asperity.contact.conditions import Geometry
 from asperity.core.errors import BadInput
-from asperity.ehl import LONGEST_STEP, ContactModel, Options, Start
+from asperity.ehl import MAX_CELLS_PER_TIME_STEP, ContactModel, Options, Start
 from asperity.solution import BOUNDARY_FRICTION
 
 MOST_FREQUENCIES = 200  # at which a contact may be shaken
@@ -127,7 +127,7 @@ class MotionSection(Section):
     """[motion]: how `asperity run` lets the roughness move."""
 
     steps: Count = 200
-    time_step: Annotated[float, Strict(), Field(gt=0.0, le=LONGEST_STEP)] = (
+    time_step: Annotated[float, Strict(), Field(gt=0.0, le=MAX_CELLS_PER_TIME_STEP)] = (
         1.0  # cells that the oil travels in one
     )
     rough: RoughBody = "first"  # which body carries a generated surface; both: a half each

@@ -1,7 +1,8 @@
+from .cavitation import FilmBoundary as FilmBoundary
 from .cavitation import FilmSolution as FilmSolution
 from .cavitation import solve_film as solve_film
 from .contact_solution import ContactSolution as ContactSolution
-from .contact_solution import Contents as Contents
+from .contact_solution import FileContents as FileContents
 from .contact_solution import Oil as Oil
 from .film_formulas import FilmFit as FilmFit
 from .film_formulas import FilmNumbers as FilmNumbers
@@ -18,7 +19,7 @@ from .grid_design import grid_shortfalls as grid_shortfalls
 from .grid_design import inlet_length as inlet_length
 from .grid_design import missing_inlet as missing_inlet
 from .load_shares import hertz_zone as hertz_zone
-from .outcome import LONGEST_STEP as LONGEST_STEP
+from .outcome import MAX_CELLS_PER_TIME_STEP as MAX_CELLS_PER_TIME_STEP
 from .outcome import ContactModel as ContactModel
 from .outcome import ContactState as ContactState
 from .outcome import Convergence as Convergence

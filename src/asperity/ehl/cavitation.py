@@ -1,9 +1,9 @@
-"""Oil between rigid walls that conserves mass where it ruptures: Jakobsson, Floberg and Olsson's cavitation.
+"""Mass-conserving cavitation between rigid walls (Jakobsson, Floberg and Olsson).
 
-One signed unknown a cell: s >= 0 is a pressure in a full film, s < 0 the missing share of a
-ruptured one (film content 1 + s, no pressure), so that one of the two always holds. The gap is
-given: what bends it stands in `conserving`. Source: H. G. Elrod, J. Lubr. Tech. 103 (1981) 350,
-for one universal unknown in both regions.
+One signed unknown per cell: s >= 0 is a pressure in a full film, s < 0 the missing share of a
+ruptured one (film content 1 + s, no pressure), so that the complementarity always holds. The gap is
+given; `asperity.ehl.models.mixed` adds its deformation. Source: H. G. Elrod, J. Lubr. Tech. 103
+(1981) 350, for one universal unknown in both regions.
 """
 
 from dataclasses import dataclass
@@ -15,13 +15,8 @@ import scipy
 
 from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput, NotConverged, require_positive
+from asperity.ehl.controls import RIGID_FILM
 from asperity.lubricant import Barus, DensityLaw, Incompressible, ViscosityLaw
-
-MOST_STEPS = 200
-LONGEST_STEP = 1.0  # change of a viscosity's logarithm in one cell and one Newton step
-PATIENCE = 4  # steps without progress before they are halved ...
-SHORTEST_SHARE = 0.1  # ... down to this
-TOLERANCE = 1e-11  # of the flow: what a cell may lose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,8 +25,7 @@ class FilmSolution:
 
     `pressure` [Pa] above the cavitation pressure, `content` (share of the gap that is oil, 0 to 1)
     and `gap` [m] have shape (nx,) or (nx, ny); `flux` [m^2/s], oil through the faces along x at
-    ambient density and per width, has one more along x; `spacing` [m] and `steps` of Newton's
-    method.
+    ambient density and per width, has one more along x; `spacing` [m]; `steps` of Newton's method.
     """
 
     pressure: Field
@@ -40,7 +34,7 @@ class FilmSolution:
     gap: Field
     spacing: tuple[float, float]
     steps: int
-    residual: float  # most that a cell loses, over the largest mean flow through a section
+    residual: float  # largest imbalance of a cell over the largest mean flow through a section
 
     @property
     def cavitated(self) -> Mask:
@@ -49,34 +43,52 @@ class FilmSolution:
 
     @property
     def load(self) -> float:
-        """What the pressure carries: [N/m] for a line of cells, [N] for a field."""
+        """Load: [N/m] for a line of cells, [N] for a field."""
         area = self.spacing[0] * (self.spacing[1] if self.pressure.ndim == 2 else 1.0)
         return float(self.pressure.sum() * area)
 
     @property
     def fronts(self) -> tuple[Field, Field]:
-        """Where the film of a line of cells ruptures and where it forms again, distances [m] from its start.
+        """Rupture and reformation fronts of a line of cells, distances [m] from its start.
 
-        Where it forms again the last cell that is not full holds more oil than streams through the
-        cavity. None more leaves the next cell without pressure, and all there is room for leaves
-        its own at the onset of one: the front lies between their centres.
+        At reformation the last cell that is not full holds more oil than streams through the
+        cavity. With no surplus the next cell has no pressure, and a full one is at the onset of
+        pressure itself: the front lies between their centres.
         """
         if self.pressure.ndim != 1:
             raise BadInput(
-                "fronts are those of a line of cells, got a field; ask for one of its lines"
+                "fronts exist for a line of cells only, got a field; use one of its lines"
             )
         full = ~self.cavitated
         dx = self.spacing[0]
         ruptures = np.flatnonzero(full[:-1] & ~full[1:]) + 1
-        forms = np.flatnonzero(
-            ~full[:-1] & full[1:]
-        )  # the last cell that is not full holds the front
+        # the last cell that is not full contains the front
+        forms = np.flatnonzero(~full[:-1] & full[1:])
         before = np.maximum(forms - 1, 0)
         streaming = np.minimum(
             self.content[before] * self.gap[before] / self.gap[forms], self.content[forms]
         )
         filled = (self.content[forms] - streaming) / (1.0 - streaming)
         return ruptures * dx, (forms + 1.5 - filled) * dx
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmBoundary:
+    """Boundary conditions of an oil film; pressures [Pa] above the cavitation pressure.
+
+    Parameters
+    ----------
+    ends : pressures at inlet and outlet
+    sides : pressures along the two sides of a field; None where it is periodic across
+    inflow_content : share of the gap at the inlet that is filled with oil
+    """
+
+    ends: tuple[float, float] = (0.0, 0.0)
+    sides: tuple[float, float] | None = None
+    inflow_content: float = 1.0
+
+
+FLOODED = FilmBoundary()
 
 
 def solve_film(
@@ -86,50 +98,44 @@ def solve_film(
     entrainment_speed: float,
     viscosity: float | ViscosityLaw,
     density: DensityLaw | None = None,
-    ends: tuple[float, float] = (0.0, 0.0),
-    sides: tuple[float, float] | None = None,
-    inflow_content: float = 1.0,
-    tolerance: float = TOLERANCE,
+    boundary: FilmBoundary = FLOODED,
+    tolerance: float = RIGID_FILM.tolerance,
     strict: bool = True,
 ) -> FilmSolution:
-    """Pressure and content of the oil in a given gap, no oil lost.
+    """Solve pressure and content of the oil in a given gap with mass-conserving cavitation.
 
     Parameters
     ----------
-    gap : distance of the walls [m] in each cell, shape (nx,) or (nx, ny), x along rolling; a step belongs on a face
-    spacing : size of a cell [m], (dx, dy) for a field
+    gap : wall distance [m], shape (nx,) or (nx, ny), x along rolling; steps lie on faces
+    spacing : cell size [m], (dx, dy) for a field
     entrainment_speed : mean speed of both walls [m/s], towards larger x
-    viscosity : a law, or one number [Pa s]
-    density : a law; None for oil of one density
-    ends : pressures at inlet and outlet [Pa], above the cavitation pressure
-    sides : pressures along the two sides of a field [Pa]; None where it repeats across
-    inflow_content : share of the gap at the inlet that arrives filled with oil
-    tolerance : bound on what any cell loses, as a share of the flow
-    strict : raise when the tolerance is not met; otherwise return the unfinished film
+    viscosity : a law, or a constant [Pa s]
+    density : a law; None for constant density
+    boundary : pressures at the borders and inflow; by default cavitation pressure and a full inlet
+    tolerance : bound on the imbalance of any cell, as a share of the flow
+    strict : raise when the tolerance is not met; otherwise return the unconverged film
 
     Raises
     ------
     BadInput
-        for a gap, pressure, speed or content that cannot be.
+        for an impossible gap, pressure, speed or content.
     NotConverged
-        when strict and the tolerance was not met; carries the unfinished film.
+        when strict and the tolerance was not met; carries the unconverged film.
     """
     gaps = np.asarray(gap, dtype=float)
     line = gaps.ndim == 1
     dx, dy = (spacing, 1.0) if isinstance(spacing, (int, float)) else spacing
     law = Barus(float(viscosity), 1e-30) if isinstance(viscosity, (int, float)) else viscosity
-    channel = Channel(
+    channel = RoughChannel(
         gap=gaps[:, None] if line else gaps,
         spacing=(float(dx), float(dy)),
         speed=require_positive("entrainment speed", entrainment_speed, "m/s"),
         viscosity=law,
         density=density or Incompressible(1.0),
-        ends=ends,
-        sides=sides,
-        inflow_content=inflow_content,
+        boundary=boundary,
     )
     _check(channel, line=line, field_spacing=not isinstance(spacing, (int, float)))
-    signed, flows, residual, steps = _balanced(channel, tolerance)
+    signed, flows, residual, steps = _solve_newton(channel, tolerance)
     pressure, content = channel.split(signed)
     shown = np.s_[:, 0] if line else np.s_[:]
     film = FilmSolution(
@@ -143,26 +149,28 @@ def solve_film(
     )
     if strict and not residual < tolerance:
         raise NotConverged(
-            film, f"film not solved: a cell loses {residual:.1e} of the flow after {steps} steps"
+            film,
+            f"film not solved: a cell's imbalance is {residual:.1e} of the flow after {steps} "
+            "steps",
         )
     return film
 
 
-def _balanced(channel: "Channel", tolerance: float) -> tuple[Field, "Flows", float, int]:
-    """Newton's steps from a film without pressure: the signed unknown, its flows, the residual, and how many steps."""
+def _solve_newton(channel: "RoughChannel", tolerance: float) -> tuple[Field, "Flows", float, int]:
+    """Iterate from a film without pressure; return signed unknown, flows, residual and steps."""
     signed = np.zeros(channel.gap.shape)
-    best, idle, share, steps = np.inf, 0, 1.0, 0
+    best, stagnation, share, steps = np.inf, 0, 1.0, 0
     while True:
         flows = channel.flows(signed)
         residual = float(np.max(np.abs(flows.outflow)) / flows.through)
-        if residual < tolerance or steps == MOST_STEPS or not np.isfinite(residual):
+        if residual < tolerance or steps == RIGID_FILM.max_steps or not np.isfinite(residual):
             return signed, flows, residual, steps
-        idle += 1
+        stagnation += 1
         if residual < 0.9 * best:
-            best, idle, share = residual, 0, min(1.0, 1.5 * share)
-        elif idle == PATIENCE:  # cells that flip to and fro settle in shorter steps
-            best, idle, share = residual, 0, max(0.5 * share, SHORTEST_SHARE)
-        signed = signed + share * channel.limited(signed, -_solved(flows))
+            best, stagnation, share = residual, 0, min(1.0, 1.5 * share)
+        elif stagnation == RIGID_FILM.stagnation_iterations:  # damp alternating cells
+            best, stagnation, share = residual, 0, max(0.5 * share, RIGID_FILM.min_damping)
+        signed = signed + share * channel.limit_step(signed, -_newton_step(flows))
         steps += 1
 
 
@@ -170,7 +178,10 @@ Index: TypeAlias = npt.NDArray[np.intp]
 
 
 class Cells(NamedTuple):
-    """Oil of each cell, and derivatives by the signed unknown: pressure, content, oil of a full gap, conductance."""
+    """State of each cell, with derivatives in the signed unknown.
+
+    Pressure, content, oil of a full gap, and conductance.
+    """
 
     pressure: Field
     d_pressure: Field
@@ -183,7 +194,10 @@ class Cells(NamedTuple):
 
 
 class Flows(NamedTuple):
-    """Flows [m^2/s] through the faces along x, what each cell loses, and its derivatives by the signed unknown."""
+    """Flows [m^2/s] through the faces along x, and the imbalance of each cell.
+
+    With its derivatives in the signed unknown as matrix entries.
+    """
 
     along: Field
     outflow: Field
@@ -194,39 +208,37 @@ class Flows(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Channel:
-    """A rigid gap, its oil and what holds at its borders."""
+class RoughChannel:
+    """A rigid gap, its oil and its boundary conditions."""
 
     gap: Field
     spacing: tuple[float, float]
     speed: float
     viscosity: ViscosityLaw
     density: DensityLaw
-    ends: tuple[float, float]
-    sides: tuple[float, float] | None
-    inflow_content: float
+    boundary: FilmBoundary
 
     @property
     def pressure_scale(self) -> float:
-        """What drives as much oil across a cell as the walls do [Pa]."""
+        """Pressure drop per cell whose flow equals that of the walls [Pa]."""
         typical = float(np.exp(np.mean(np.log(self.gap))))
         return 12.0 * self.viscosity.eta0 * self.speed * self.spacing[0] / typical**2
 
     def split(self, signed: Field) -> tuple[Field, Field]:
-        """Pressure [Pa] and content of a signed unknown."""
+        """Return pressure [Pa] and content of a signed unknown."""
         return np.maximum(signed, 0.0) * self.pressure_scale, 1.0 + np.minimum(signed, 0.0)
 
-    def limited(self, signed: Field, change: Field) -> Field:
-        """A change no longer than the oil's laws are straight."""
+    def limit_step(self, signed: Field, change: Field) -> Field:
+        """Limit a change to the range in which the laws of the oil are nearly linear."""
         steep = (
             self.viscosity.log_slope(np.maximum(signed, 0.0) * self.pressure_scale)
             * self.pressure_scale
         )
-        longest = LONGEST_STEP / np.maximum(steep, 1e-12)
+        longest = RIGID_FILM.max_log_viscosity_step / np.maximum(steep, 1e-12)
         return np.clip(change, -longest - np.abs(signed), longest + 1.0)
 
     def _cells(self, signed: Field) -> Cells:
-        """What the oil of each cell is, with the derivatives by its unknown."""
+        """Return the state of each cell, with derivatives."""
         pressure, content = self.split(signed)
         full = signed >= 0.0
         d_pressure, d_content = np.where(full, self.pressure_scale, 0.0), np.where(full, 0.0, 1.0)
@@ -242,10 +254,10 @@ class Channel:
         )
 
     def flows(self, signed: Field) -> Flows:
-        """All flows and their derivatives.
+        """Return all flows and their derivatives.
 
-        A face joins two half cells of one gap each, which is exact where the gap steps. Its
-        pressure is found from equal flow on both sides, and where that were negative the film
+        A face joins two half cells of constant gap, which is exact where the gap steps. Its
+        pressure follows from equal flow on both sides; where that would be negative the film
         ruptures at the face.
         """
         dx, u = self.spacing[0], self.speed
@@ -286,10 +298,10 @@ class Channel:
         by_left = np.where(ruptures, d_to_rupture, by_left)
         by_right = np.where(ruptures, 0.0, by_right)
 
-        inlet, outlet = self.ends
+        inlet, outlet = self.boundary.ends
         entering = (
             u
-            * self.inflow_content
+            * self.boundary.inflow_content
             * self.density(np.array(inlet))
             / self.density.rho0
             * self.gap[0]
@@ -313,7 +325,9 @@ class Channel:
             (index[:-1], index[1:], by_right),
             (index[1:], index[:-1], -by_left),
         ]
-        outflow += self._across(pressure, conductance, d_conductance, d_pressure, index, entries)
+        outflow += self._flow_across(
+            pressure, conductance, d_conductance, d_pressure, index, entries
+        )
         rows, columns = (
             np.concatenate([entry[place].ravel() for entry in entries]) for place in (0, 1)
         )
@@ -321,7 +335,7 @@ class Channel:
         through = float(np.max(np.abs(along.mean(axis=1))))
         return Flows(along, outflow, through, rows, columns, slopes)
 
-    def _across(
+    def _flow_across(
         self,
         pressure: Field,
         conductance: Field,
@@ -330,7 +344,10 @@ class Channel:
         index: Index,
         entries: list[tuple[Index, Index, Field]],
     ) -> Field:
-        """What each cell loses across, with its derivatives added to `entries`; rows are scaled as those along x."""
+        """Return the outflow of each cell across, and append its derivatives to `entries`.
+
+        Rows are scaled as those along x.
+        """
         dx, dy = self.spacing
         ratio = dx / dy
         half, d_half = 2.0 * ratio * conductance / dy, 2.0 * ratio * d_conductance / dy
@@ -343,10 +360,10 @@ class Channel:
         by_next = (a / (a + b)) ** 2 * np.roll(d_half, -1, 1) * drop - joint * np.roll(
             d_pressure, -1, 1
         )
-        if self.sides is not None:
+        if self.boundary.sides is not None:
             for part in (flow, by_own, by_next):
                 part[:, -1] = 0.0
-            for column, outside in ((0, self.sides[0]), (-1, self.sides[1])):
+            for column, outside in ((0, self.boundary.sides[0]), (-1, self.boundary.sides[1])):
                 outflow[:, column] += half[:, column] * (pressure[:, column] - outside)
                 slope = (
                     d_half[:, column] * (pressure[:, column] - outside)
@@ -363,45 +380,51 @@ class Channel:
         return outflow + flow - np.roll(flow, 1, 1)
 
 
-def _solved(flows: Flows) -> Field:
-    """Change of the signed unknown whose linear answer is the cells' loss."""
+def _newton_step(flows: Flows) -> Field:
+    """Solve the linearised equations; NaN if they are singular."""
     size = flows.outflow.size
     matrix = scipy.sparse.csc_array((flows.slopes, (flows.rows, flows.columns)), shape=(size, size))
     try:
         change = scipy.sparse.linalg.splu(matrix).solve(flows.outflow.ravel())
-    except RuntimeError:  # singular: pressures at which the oil is a solid
+    except RuntimeError:  # singular: the viscosity has overflowed
         return np.full_like(flows.outflow, np.nan)
     return np.asarray(change).reshape(flows.outflow.shape)
 
 
-def _check(channel: Channel, *, line: bool, field_spacing: bool) -> None:
+def _check(channel: RoughChannel, *, line: bool, field_spacing: bool) -> None:
+    """Raise BadInput for an impossible channel."""
     gap = channel.gap
     if gap.ndim != 2 or len(gap) < 2:
         raise BadInput(
             f"gap must have shape (nx,) or (nx, ny) with two cells or more along x, got {gap.shape}"
         )
     if line == field_spacing:
-        wanted = "one size of cell" if line else "(dx, dy)"
+        expected = "one cell size" if line else "(dx, dy)"
         raise BadInput(
-            f"spacing must be {wanted} for a gap of shape {gap.shape[: 1 if line else 2]}"
+            f"spacing must be {expected} for a gap of shape {gap.shape[: 1 if line else 2]}"
         )
     if not np.all((gap > 0.0) & (gap < np.inf)):
         raise BadInput(
-            f"gap must be positive and finite everywhere, got {np.min(gap):g} m; part the walls"
+            f"gap must be positive and finite everywhere, got {np.min(gap):g} m; separate the walls"
         )
     for name, size in zip(("dx", "dy"), channel.spacing, strict=True):
         require_positive(f"spacing {name}", size, "m")
-    for name, pressure in (("ends", channel.ends), ("sides", channel.sides or (0.0, 0.0))):
+    for name, pressure in (
+        ("ends", channel.boundary.ends),
+        ("sides", channel.boundary.sides or (0.0, 0.0)),
+    ):
         if not all(0.0 <= value < np.inf for value in pressure):
             raise BadInput(
-                f"{name} must be pressures above that of cavitation, got {pressure} Pa; count them from it"
+                f"{name} must be finite and not below the cavitation pressure 0, got {pressure} Pa"
             )
-    if not 0.0 < channel.inflow_content <= 1.0:
+    if not 0.0 < channel.boundary.inflow_content <= 1.0:
         raise BadInput(
-            f"inflow content must lie between 0 and 1, got {channel.inflow_content:g}; 1 is a full gap"
+            f"inflow content must lie between 0 and 1, got {channel.boundary.inflow_content:g}; 1 "
+            "is a full "
+            "gap"
         )
-    if channel.inflow_content < 1.0 and channel.ends[0] > 0.0:
+    if channel.boundary.inflow_content < 1.0 and channel.boundary.ends[0] > 0.0:
         raise BadInput(
-            f"oil that enters at {channel.ends[0]:g} Pa fills the gap, got inflow content "
-            f"{channel.inflow_content:g}; use 1"
+            f"oil that enters at {channel.boundary.ends[0]:g} Pa fills the gap, got inflow content "
+            f"{channel.boundary.inflow_content:g}; use 1"
         )

@@ -1,4 +1,4 @@
-"""What a contact solve returns: fields, how it converged, and its way to disk; `asperity.solution.storage` reads it back."""
+"""Result of a contact solve: fields, convergence, and netCDF output."""
 
 import json
 from collections.abc import Mapping
@@ -23,13 +23,9 @@ from asperity.surface import Surface
 if TYPE_CHECKING:
     import xarray
 
-FORMAT = 2  # counts up when a reader of the format before could not read the file
-HEADINGS = (
-    "Conventions",
-    "title",
-    "source",
-    "asperity_format",
-)  # attributes of the file, and those that hold JSON
+FORMAT = 2  # increases when an earlier reader could not read the file
+HEADINGS = ("Conventions", "title", "source", "asperity_format")  # plain attributes of the file
+# attributes that hold JSON
 DESCRIBED = ("conditions", "lubricant", "options", "grid", "convergence", "versions")
 ERRORS = ("iteration_error", "discretisation_error")
 OIL = {
@@ -37,7 +33,7 @@ OIL = {
     "oil_pressure": "pressure",
     "plastic_growth": "growth",
 }  # variable: field of Oil
-STEPS = {  # variable: what it is
+STEPS = {  # variable: long name
     "step_number": "step number on its grid",
     "step_cells_x": "cells of the grid along x",
     "step_cells_y": "cells of the grid along y",
@@ -47,10 +43,11 @@ STEPS = {  # variable: what it is
 }
 
 
-class Contents(NamedTuple):
-    """What a netCDF file holds: variables and coordinates by name, as (dimensions, values, attributes), and attributes.
+class FileContents(NamedTuple):
+    """Contents of a netCDF file: variables and coordinates by name, and attributes.
 
-    Written without xarray, which with pandas takes longer to load than to write.
+    A variable is (dimensions, values, attributes). Written without xarray, whose import takes
+    longer than writing.
     """
 
     variables: dict[str, Any]
@@ -58,29 +55,26 @@ class Contents(NamedTuple):
     attributes: dict[str, Any]
 
     def to_dataset(self) -> "xarray.Dataset":
-        """The same in memory."""
+        """Return the contents as an xarray dataset."""
         import xarray
 
         return xarray.Dataset(*self)
 
     def save(self, path: str | Path) -> Path:
-        """Write a file with its digest, whole or not at all, and return the path.
+        """Write a file with its digest, completely or not at all, and return the path.
 
         Raises
         ------
         BadInput
-            if the folder does not exist or cannot be written to.
+            if the folder does not exist or is not writable.
         AsperityError
-            if writing fails half way, as on a full disk; nothing is left behind then.
+            if writing fails part way, as on a full disk; no partial file remains.
         """
         import h5netcdf
 
-        path, made = (
-            Path(path),
-            BytesIO(),
-        )  # in memory: the HDF5 library does not survive a disk that is full
+        path, buffer = Path(path), BytesIO()  # in memory: HDF5 crashes on a full disk
         packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-        with h5netcdf.File(made, "w") as file:
+        with h5netcdf.File(buffer, "w") as file:
             for name, (dimensions, given, attributes) in {
                 **self.coordinates,
                 **self.variables,
@@ -95,17 +89,17 @@ class Contents(NamedTuple):
                 kind = packed if values.ndim == 2 else {}
                 file.create_variable(name, along, data=values, **kind).attrs.update(attributes)
             file.attrs.update(self.attributes)
-        write_sealed(path, made.getvalue())
+        write_sealed(path, buffer.getvalue())
         return path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Oil:
-    """What the conserving model knows of the oil besides, (nx, ny).
+    """State of the oil in a two-pressure model, (nx, ny).
 
-    `content` is the share of the gap that is oil, `pressure` [Pa] the oil's own (the rest of the
-    solution's is elastic contact), `growth` [m] how far oil at the cap has pressed the gap open
-    for good: part of the solution's gap.
+    `content` is the share of the gap that is oil, `pressure` [Pa] the oil pressure (the remainder
+    of the solution's is contact pressure), `growth` [m] the permanent opening of the gap by oil at
+    the cap: part of the solution's gap.
     """
 
     content: Field
@@ -117,12 +111,11 @@ class Oil:
 class ContactSolution:
     """A solved contact.
 
-    `pressure` [Pa], `gap` [m] between the deformed surfaces and `in_contact` have shape (nx, ny)
-    on `grid`; `rigid_approach` [m] is h0 in h = h0 + x^2/(2R) + deflection - roughness. What was
-    solved travels along: conditions, lubricant (None when dry), surface and options. `oil` is what
-    the conserving model adds; there `in_contact` are the cells whose elastic bodies touch, with
-    oil at the cap perhaps pressed between them since (the solid side), and `gap` is the film's
-    whole height.
+    `pressure` [Pa], `gap` [m] between the deformed surfaces and `in_contact` have shape (nx, ny) on
+    `grid`; `rigid_approach` [m] is h0 in h = h0 + x^2/(2R) + deflection - roughness. The solution
+    includes its conditions, lubricant (None when dry), surface and options. `oil` is the state of
+    the oil in a two-pressure model; there `in_contact` marks cells whose elastic bodies touch,
+    perhaps with oil pressed between them at the cap, and `gap` is the total height of the film.
     """
 
     conditions: ContactConditions
@@ -134,25 +127,24 @@ class ContactSolution:
     in_contact: Mask
     rigid_approach: float
     convergence: Convergence
-    viscosity_factor: Field | None = (
-        None  # what warmth left of the oil's viscosity, (nx, ny); None where it left all
-    )
+    viscosity_factor: Field | None = None  # local over isothermal viscosity, (nx, ny); None: 1
     oil: Oil | None = None
-    attributes: Mapping[str, str] = field(
-        default_factory=dict
-    )  # free text kept with the run, such as its case
-    versions: Mapping[str, str] = field(
-        default_factory=dict
-    )  # of a solution read from a file: what solved it
+    # free text stored with the run, such as its case
+    attributes: Mapping[str, str] = field(default_factory=dict)
+    # software that solved it, for a solution read from a file
+    versions: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def grid(self) -> Grid:
-        """The grid of all fields: the surface's."""
+        """Grid of all fields: that of the surface."""
         return self.surface.grid
 
     @property
     def cavitated(self) -> Mask:
-        """Cells in which the oil has ruptured: no pressure, no contact; in the conserving model any not full of oil."""
+        """Cells with ruptured oil: no pressure and no contact.
+
+        In the conserving model, cells that are not full of oil.
+        """
         if self.lubricant is None:
             return np.zeros(self.pressure.shape, dtype=bool)
         if self.options.model == CONSERVING and self.oil is not None:
@@ -161,30 +153,31 @@ class ContactSolution:
 
     @property
     def p_cap(self) -> float | None:
-        """The pressure no cell exceeds [Pa], None when elastic."""
+        """Upper bound of the pressure [Pa]; None when elastic."""
         return self.conditions.hardness
 
     def to_dataset(self) -> "xarray.Dataset":
-        """The solution as an xarray dataset: its `contents`; raises what they do."""
+        """Return the solution as an xarray dataset; raises like `contents`."""
         return self.contents().to_dataset()
 
-    def contents(self) -> Contents:
-        """The solution with CF attributes; all that `load_solution` needs is in it.
+    def contents(self) -> FileContents:
+        """Return the solution with CF attributes; `load_solution` needs nothing else.
 
-        Fields lie on (x, y), the convergence history on (step). What is not a field travels as
-        JSON in the attributes `conditions`, `lubricant`, `options`, `grid`, `convergence` and
-        `versions`, floats in full; the solution's own attributes, such as its case, stand beside
-        them as they are.
+        Fields lie on (x, y), the convergence history on (step). Everything else is JSON in the
+        attributes `conditions`, `lubricant`, `options`, `grid`, `convergence` and `versions`, with
+        floats in full precision; the solution's own attributes, such as its case, are stored
+        unchanged.
 
         Raises
         ------
         BadInput
-            if one of the solution's attributes bears a name that the format uses itself.
+            if an attribute of the solution has a name that the format uses.
         """
         taken = sorted({*HEADINGS, *DESCRIBED} & set(self.attributes))
         if taken:
             raise BadInput(
-                f"attribute {taken[0]!r} of the solution is a name that the run file uses itself; rename it"
+                f"attribute {taken[0]!r} of the solution has a name that the run file reserves; "
+                "rename it"
             )
         coordinates: dict[str, Any] = {
             "x": ("x", self.grid.x, {**quantity("x_m").attributes, "axis": "X"}),
@@ -199,7 +192,7 @@ class ContactSolution:
             **{name: json.dumps(value) for name, value in described.items()},
             **self.attributes,
         }
-        return Contents({**self._maps(), **self._steps()}, coordinates, attributes)
+        return FileContents({**self._maps(), **self._steps()}, coordinates, attributes)
 
     def _maps(self) -> dict[str, Any]:
         fields = {
@@ -239,9 +232,7 @@ class ContactSolution:
     def _described(self) -> dict[str, Any]:
         convergence, conditions = self.convergence, asdict(self.conditions)
         if conditions["shape"] is None:
-            del conditions[
-                "shape"
-            ]  # which most contacts cannot have, and readers before there were rollers do not know
+            del conditions["shape"]  # rollers only; unknown to readers older than rollers
         return {
             "conditions": conditions,
             "lubricant": None if self.lubricant is None else describe_lubricant(self.lubricant),
@@ -261,5 +252,5 @@ class ContactSolution:
         }
 
     def save(self, path: str | Path) -> Path:
-        """Write the solution as netCDF, whole or not at all, and return the path; raises what `Contents.save` does."""
+        """Write the solution as netCDF and return the path; raises like `FileContents.save`."""
         return self.contents().save(path)

@@ -1,9 +1,9 @@
-"""How an elastic half-space gives way under pressure: an exact cell-to-cell convolution by FFT.
+"""Elastic deflection of a half-space: exact cell-to-cell convolution by FFT.
 
-V = c ∫∫ P/distance, every cell's pressure constant. Aperiodic axes are zero padded. Where y
-repeats, wavenumber 0 in y is the plane-strain logarithm averaged over a cell and every other
+V = c ∫∫ P/distance, the pressure constant over each cell. Aperiodic axes are zero padded. If y is
+periodic, wavenumber 0 in y is the plane-strain logarithm averaged over a cell and every other
 wavenumber q the cell's integral of 2 K₀(q|X|), summed over all aliases that a pressure constant
-over each cell excites; else Love's closed form for a rectangle. Source: K. L. Johnson, Contact
+over each cell excites; otherwise Love's closed form for a rectangle. Source: K. L. Johnson, Contact
 Mechanics (1985), eqs 2.24b and 3.25; the Fourier transform of 1/r along y.
 """
 
@@ -17,27 +17,24 @@ import scipy
 
 from asperity.core.arrays import Field
 
-BETWEEN, THROUGH = (
-    1,
-    2,
-)  # where a mirror across y stands: behind the last line of cells, or in its middle
+MIRROR_BETWEEN, MIRROR_THROUGH = 1, 2  # mirror behind the last line of cells, or in its middle
 COSINES: dict[int, Literal[2, 3]] = {
-    BETWEEN: 2,
-    THROUGH: 3,
-}  # transforms into those counted from the mirror on
-FAR = 8  # cells along x beyond which the compliance counts as a background
-ALL_OF_K0 = 32.0  # to which its integral from 0 is π/2 to 3e-15
-SMALL, DEGREE = 3.0, 14  # argument from which a polynomial gives it, of that degree
-ALIASES = 18  # on either side, for the sum of all
+    MIRROR_BETWEEN: 2,
+    MIRROR_THROUGH: 3,
+}  # type of the cosine transform
+FAR_CELLS = 8  # distance along x from which cells count as far
+K0_CUTOFF = 32.0  # the integral of K₀ from 0 to here is π/2 to 3e-15
+POLYNOMIAL_FROM, DEGREE = 3.0, 14  # argument from which a polynomial is used, and its degree
+ALIASES = 18  # terms on either side
 
 
 @dataclass(frozen=True, slots=True)
 class Deflection:
-    """Compliance of every cell on every other.
+    """Influence of every cell on every other.
 
-    `spectrum` is the transformed kernel, in double and in single precision, `padded` the lengths
-    it was transformed at and `row` the compliance of cells 0, 1, ... along x on one line, shape
-    (nx,). With a `mirror` (0 for none) cells end there, and their image presses too.
+    `spectrum` is the transformed kernel in double and in single precision, `padded` the transform
+    lengths and `row` the compliance of cells 0, 1, ... along x on one line, shape (nx,). With a
+    `mirror` (0 for none) the grid ends there, and its image is loaded too.
     """
 
     cells: tuple[int, int]
@@ -47,21 +44,26 @@ class Deflection:
     mirror: int = 0
 
     def __call__(self, pressure: Field) -> Field:
-        """Surface displacement V of a pressure P, both dimensionless, shape (nx, ny) and of one precision."""
+        """Return the displacement V of a pressure P, both dimensionless, shape (nx, ny).
+
+        Computed in the precision of the pressure.
+        """
         waves = self._waves(pressure)
         waves *= self.spectrum[pressure.dtype == np.float32]
         return self._field(waves)
 
-    def undone(self, displacement: Field) -> Field:
-        """About the pressure that displaces the surface so and leaves all around it where it was, shape (nx, ny)."""
+    def approximate_inverse(self, displacement: Field) -> Field:
+        """Return approximately the pressure of a displacement, zero around it, shape (nx, ny)."""
         waves = self._waves(displacement)
-        waves /= np.abs(
-            self.spectrum[displacement.dtype == np.float32]
-        )  # a line contact's mean has a sign of its own
+        # a line contact's mean value may be negative
+        waves /= np.abs(self.spectrum[displacement.dtype == np.float32])
         return self._field(waves)
 
     def _waves(self, field: Field) -> np.ndarray:
-        """Of a padded field; with a mirror those along x of cosines across, counted from there."""
+        """Return the transform of a padded field.
+
+        With a mirror, across y a cosine transform counted from the mirror.
+        """
         long, wide = self.padded
         if self.mirror:
             cosines = scipy.fft.dct(field[:, ::-1], type=COSINES[self.mirror], n=wide, axis=1)
@@ -71,7 +73,7 @@ class Deflection:
         )
 
     def _field(self, waves: np.ndarray) -> Field:
-        """What has these waves, (nx, ny)."""
+        """Return the field of a transform, (nx, ny)."""
         (nx, ny), (long, wide) = self.cells, self.padded
         if self.mirror:
             cosines = scipy.fft.irfft(waves, n=long, axis=0, overwrite_x=True)[:nx]
@@ -84,20 +86,20 @@ class Deflection:
             ]
         )
 
-    def among(self, lines: int) -> "Deflection":
-        """The same among that many neighbouring lines along x, none longer than the grid is."""
+    def restrict_to(self, lines: int) -> "Deflection":
+        """Return the deflection on that many adjacent lines along x, at most the whole grid."""
         (_, ny), (_, wide) = self.cells, self.padded
         kernel = scipy.fft.ifft(self.spectrum[0], axis=0)[:lines].real
         long = scipy.fft.next_fast_len(2 * lines - 1)
-        spectrum = np.ascontiguousarray(scipy.fft.fft(_mirrored(kernel, long), axis=0).real)
+        spectrum = np.ascontiguousarray(scipy.fft.fft(_even_extension(kernel, long), axis=0).real)
         return Deflection(
             (lines, ny), (long, wide), (spectrum, spectrum.astype(np.float32)), self.row[:lines]
         )
 
     @property
-    def near(self) -> Field:
-        """Compliance of cells 0, 1, 2 along x and of the first far one: what the preconditioner keeps of the kernel."""
-        return self.row[[0, 1, 2, min(FAR, self.row.size - 1)]].copy()
+    def local_compliance(self) -> Field:
+        """Compliance of cells 0, 1, 2 along x and of the first far one, for preconditioning."""
+        return self.row[[0, 1, 2, min(FAR_CELLS, self.row.size - 1)]].copy()
 
 
 @lru_cache(maxsize=16)
@@ -108,9 +110,9 @@ def deflection(
     periodic: bool,
     mirror: int = 0,
 ) -> Deflection:
-    """Compliance of a grid, up to a mirror if there is one; spacing in Hertz half-widths."""
+    """Return the influence of a grid, up to a mirror if any; spacing in Hertz half-widths."""
     nx, ny = cells
-    # zero padded to no less than twice the length: the outlet must not feel the inlet
+    # zero padded to at least twice the length: circular convolution would couple both ends
     padded = (
         scipy.fft.next_fast_len(2 * nx - 1),
         ny if periodic else scipy.fft.next_fast_len(2 * ny - 1, real=True),
@@ -124,31 +126,33 @@ def deflection(
         kernel = compliance * _love_kernel((nx, lines), spacing)
         row = kernel[:, 0].copy()
         spectrum = scipy.fft.rfft(
-            _mirrored(_cosines(kernel, padded[1], mirror), padded[0]), axis=0
+            _even_extension(_cosine_waves(kernel, padded[1], mirror), padded[0]), axis=0
         ).real
     elif periodic:
         kernel = 2.0 * compliance * _line_kernel(cells, spacing)
         row = scipy.fft.irfft(kernel, n=ny, axis=1)[:, 0]
-        spectrum = scipy.fft.fft(_mirrored(kernel, padded[0]), axis=0).real
+        spectrum = scipy.fft.fft(_even_extension(kernel, padded[0]), axis=0).real
     else:
         kernel = compliance * _love_kernel(cells, spacing)
         row = kernel[:, 0].copy()
-        spectrum = scipy.fft.rfft2(_mirrored(_mirrored(kernel, padded[0]).T, padded[1]).T).real
+        spectrum = scipy.fft.rfft2(
+            _even_extension(_even_extension(kernel, padded[0]).T, padded[1]).T
+        ).real
     both = np.ascontiguousarray(spectrum), spectrum.astype(np.float32)
     for array in (*both, row):
         array.flags.writeable = False
     return Deflection(cells, padded, both, row, mirror)
 
 
-def _cosines(kernel: Field, count: int, mirror: int) -> Field:
-    """The waves across y of a kernel of distances 0, 1, ..., made even about 0: whole ones, or halves in between."""
-    if mirror == BETWEEN:
+def _cosine_waves(kernel: Field, count: int, mirror: int) -> Field:
+    """Return the cosine transform across y of a kernel, for a mirror between or on lines."""
+    if mirror == MIRROR_BETWEEN:
         return np.asarray(scipy.fft.dct(kernel, type=1, n=count + 1, axis=1)[:, :count])
     return np.asarray(scipy.fft.dct(kernel, type=3, n=count, axis=1))
 
 
-def _mirrored(kernel: Field, length: int) -> Field:
-    """A kernel of distances 0, 1, ... along the first axis, made even about 0 on a ring of `length`."""
+def _even_extension(kernel: Field, length: int) -> Field:
+    """Extend a kernel of distances 0, 1, ... evenly along the first axis on a ring of `length`."""
     ring = np.zeros((length, kernel.shape[1]))
     ring[: len(kernel)] = kernel
     ring[length - len(kernel) + 1 :] = kernel[:0:-1]
@@ -156,23 +160,25 @@ def _mirrored(kernel: Field, length: int) -> Field:
 
 
 def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
-    """(1/2) ∫∫ 1/distance over each cell of a line contact, transformed along y, shape (nx, ny//2 + 1)."""
+    """Return (1/2) ∫∫ 1/distance over each cell of a line contact, transformed along y.
+
+    Shape (nx, ny//2 + 1).
+    """
     (nx, ny), (dx, dy) = cells, spacing
     kernel = np.empty((nx, ny // 2 + 1))
     edges = (np.arange(nx + 1) - 0.5) * dx
     kernel[:, 0] = -np.diff(edges * np.log(np.abs(edges)) - edges)
-    wave = np.arange(1, ny // 2 + 1) / ny  # waves a cell
-    beyond = np.zeros(
-        (nx + 1, wave.size)
-    )  # the middle of the first cell, then each cell's far edge
+    wave = np.arange(1, ny // 2 + 1) / ny  # waves per cell
+    # integral beyond the centre of the first cell, then beyond each cell's far edge
+    beyond = np.zeros((nx + 1, wave.size))
     for alias, weight in _aliases(wave):
         beyond[0] += (np.pi / 2.0) * weight
         wavenumber = alias * (2.0 * np.pi / dy)
-        reached = 1 + int(ALL_OF_K0 / (wavenumber.min(initial=np.inf) * dx) + 0.5)
+        reached = 1 + int(K0_CUTOFF / (wavenumber.min(initial=np.inf) * dx) + 0.5)
         if reached > 1:
             argument = np.outer(edges[1:reached], wavenumber)
-            row, column = np.nonzero(argument < ALL_OF_K0)
-            beyond[row + 1, column] += weight[column] * _k0_beyond(argument[row, column])
+            row, column = np.nonzero(argument < K0_CUTOFF)
+            beyond[row + 1, column] += weight[column] * _k0_integral(argument[row, column])
     beyond *= np.sin(np.pi * wave) * dy / (2.0 * np.pi**2)
     kernel[:, 1:] = -np.diff(beyond, axis=0)
     kernel[0, 1:] *= 2.0  # its other half
@@ -180,12 +186,12 @@ def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
 
 
 def _aliases(wave: Field) -> Iterator[tuple[Field, Field]]:
-    """Of waves, up to half a one a cell, all that a pressure constant over each cell excites, and each one's weight.
+    """Yield the aliases of waves up to half a wave per cell, and their weights.
 
-    The transform of a cell over the wavenumber is sin(π wave) dy/(2 π²) times 1/(wave + n)² with
-    the sign of (-1)^n (wave + n). Both tails, n to ±∞, alternate, and what they are weights of
-    falls so smoothly that ALIASES terms tell the sum to (3 + √8)^-ALIASES. Source: H. Cohen, F.
-    Rodriguez Villegas, D. Zagier, Exp. Math. 9 (2000) 3.
+    A pressure constant over each cell excites them all. The transform of a cell over the wavenumber
+    is sin(π wave) dy/(2 π²) times 1/(wave + n)² with the sign of (-1)^n (wave + n). Both tails, n
+    to ±∞, alternate, and their terms decay so smoothly that ALIASES terms give the sum to (3 +
+    √8)^-ALIASES. Source: H. Cohen, F. Rodriguez Villegas, D. Zagier, Exp. Math. 9 (2000) 3.
     """
     yield wave, 1.0 / wave**2
     whole = (3.0 + np.sqrt(8.0)) ** ALIASES
@@ -198,29 +204,32 @@ def _aliases(wave: Field) -> Iterator[tuple[Field, Field]]:
         term *= (k + ALIASES) * (k - ALIASES) / ((k + 0.5) * (k + 1.0))
 
 
-def _k0_beyond(argument: Field) -> Field:
-    """∫ K₀ from each argument on, to ALL_OF_K0 at most, of any shape."""
-    centre, reach, series = _large_arguments()
-    inverse = 1.0 / argument.clip(SMALL)
+def _k0_integral(argument: Field) -> Field:
+    """Return ∫ K₀ from each argument to infinity; arguments up to K0_CUTOFF, of any shape."""
+    centre, reach, series = _k0_polynomial()
+    inverse = 1.0 / argument.clip(POLYNOMIAL_FROM)
     place = (inverse - centre) / reach
     integral = np.full(argument.shape, series[-1])
     for coefficient in series[-2::-1]:
         integral *= place
         integral += coefficient
     integral *= np.sqrt(inverse) * np.exp(-argument)
-    small = argument < SMALL
+    small = argument < POLYNOMIAL_FROM
     integral[small] = np.pi / 2.0 - scipy.special.iti0k0(argument[small])[1]
     return integral
 
 
 @lru_cache(maxsize=1)
-def _large_arguments() -> tuple[float, float, Field]:
-    """√z exp(z) ∫ K₀ from z on, as a polynomial: of 1/z less the first number, over the second, the coefficients.
+def _k0_polynomial() -> tuple[float, float, Field]:
+    """Return √z exp(z) ∫ K₀ from z to infinity as a polynomial in (1/z - centre)/reach.
 
-    Interpolated (to 3e-14 of the integral from 0) between ∫ exp(z - z cosh t)/cosh t dt, t from 0
-    on, by trapezoids.
+    Returns centre, reach and coefficients; interpolates (to 3e-14 of the integral from 0) ∫ exp(z -
+    z cosh t)/cosh t dt over t > 0, by the trapezoidal rule.
     """
-    centre, reach = 0.5 * (1.0 / SMALL + 1.0 / ALL_OF_K0), 0.5 * (1.0 / SMALL - 1.0 / ALL_OF_K0)
+    centre, reach = (
+        0.5 * (1.0 / POLYNOMIAL_FROM + 1.0 / K0_CUTOFF),
+        0.5 * (1.0 / POLYNOMIAL_FROM - 1.0 / K0_CUTOFF),
+    )
     cosh = np.cosh(0.125 * np.arange(40))
 
     def scaled(place: Any) -> Any:
@@ -233,7 +242,7 @@ def _large_arguments() -> tuple[float, float, Field]:
 
 
 def _love_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
-    """∫∫ 1/distance over each cell, shape (nx, ny)."""
+    """Return ∫∫ 1/distance over each cell, shape (nx, ny)."""
     x, y = (((np.arange(n + 1) - 0.5) * d) for n, d in zip(cells, spacing, strict=True))
     x, y = x[:, None], y[None, :]
     corners = x * np.arcsinh(y / np.abs(x)) + y * np.arcsinh(x / np.abs(y))

@@ -1,4 +1,4 @@
-"""Films of smooth, flooded, isothermal contacts by published fits, and which regime of lubrication they say it is.
+"""Published film thickness fits for smooth, flooded, isothermal contacts, and their regimes.
 
 Speed U = η₀ u/(E' R), load W = w/(E' R) or F/(E' R²), material G = α E', with u the mean speed and
 R along rolling. Moes' load M = W (2U)^-1/2 (line) or W (2U)^-3/4, oil L = G (2U)^1/4, and film H =
@@ -17,14 +17,15 @@ Regime = Literal[
     "isoviscous-rigid", "isoviscous-elastic", "piezoviscous-rigid", "piezoviscous-elastic"
 ]
 Place = Literal["central", "least"]
-AT_THE_PRESSURE_PEAK = (
-    1.2257  # film of a rigid cylinder under the highest pressure over its least one
-)
+PEAK_TO_MIN_FILM = 1.2257  # rigid cylinder: film under the pressure peak over the minimum
 
 
 @dataclass(frozen=True, slots=True)
 class FilmNumbers:
-    """Dimensionless speed U, load W and material G (Dowson, Higginson, Hamrock), and load M and oil L (Moes)."""
+    """Dimensionless numbers of a film.
+
+    Speed U, load W and material G (Dowson, Higginson, Hamrock), load M and oil L (Moes).
+    """
 
     speed: float
     load: float
@@ -35,10 +36,10 @@ class FilmNumbers:
 
 @dataclass(frozen=True, slots=True)
 class FilmFit:
-    """A published fit: who, which film it gives, and that film [m].
+    """A published fit: source, place, and film thickness [m].
 
-    A central film that the fit gives for an incompressible oil is thinner in a compressible one,
-    by the density there: `incompressible` says so.
+    `incompressible` marks a central film for an incompressible oil; a compressible one is thinner
+    by the density there.
     """
 
     source: str
@@ -48,7 +49,7 @@ class FilmFit:
 
 
 class _Asymptotes(NamedTuple):
-    """Moes' films in the four regimes, each as if there were no other."""
+    """Moes' films in the four regimes."""
 
     isoviscous_rigid: float
     isoviscous_elastic: float
@@ -57,7 +58,7 @@ class _Asymptotes(NamedTuple):
 
 
 def film_numbers(conditions: ContactConditions, lubricant: Lubricant) -> FilmNumbers:
-    """The numbers that fits of the film are made of."""
+    """Return the dimensionless numbers that film thickness fits use."""
     radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
     line = conditions.long
     material = float(lubricant.viscosity.log_slope(np.zeros(1))[0]) * modulus
@@ -77,11 +78,11 @@ def film_numbers(conditions: ContactConditions, lubricant: Lubricant) -> FilmNum
 
 
 def lubrication_regime(conditions: ContactConditions, lubricant: Lubricant) -> Regime:
-    """Which fit of the least film holds: elastic or rigid bodies, oil that thickens under pressure or does not.
+    """Return the regime: elastic or rigid bodies, oil with or without pressure thickening.
 
-    Of an oil that does not thicken the thicker film holds, of one that does the thinner, and of
-    both the thicker: each fit leaves something out, rigid bodies what widens the contact, elastic
-    ones the shape that they still have.
+    For an isoviscous oil the thicker film applies, for a piezoviscous one the thinner, and of both
+    the thicker: each fit omits an effect, rigid bodies the widening of the contact, elastic ones
+    their remaining curvature.
     """
     films = {regime: fit.film for regime, fit in least_films(conditions, lubricant).items()}
     thin = max(films["isoviscous-rigid"], films["isoviscous-elastic"])
@@ -92,11 +93,11 @@ def lubrication_regime(conditions: ContactConditions, lubricant: Lubricant) -> R
 
 
 def central_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
-    """Central film [m] of an incompressible oil by the fit that spans all regimes.
+    """Return the central film [m] of an incompressible oil, by a fit for all regimes.
 
     Line: Moes; others: Nijenbanning, Venner and Moes (1994), for contacts no narrower across
-    rolling than along it. In the rigid regimes it is the film under the highest pressure, 1.2257
-    times the least one of a cylinder.
+    rolling than along it. In the rigid regimes it is the film under the pressure peak, 1.2257 times
+    the minimum film of a cylinder.
     """
     numbers = film_numbers(conditions, lubricant)
     films = _asymptotes(conditions, numbers)
@@ -106,12 +107,12 @@ def central_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
 
 
 def least_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
-    """Least film [m] by the fit of the contact's regime: what a film ratio is made of."""
+    """Return the minimum film [m] by the fit of the contact's regime, the basis of film ratios."""
     return least_films(conditions, lubricant)[lubrication_regime(conditions, lubricant)].film
 
 
 def least_films(conditions: ContactConditions, lubricant: Lubricant) -> dict[Regime, FilmFit]:
-    """The fit of the least film in each regime."""
+    """Return the fit of the minimum film in each regime."""
     numbers, radius = film_numbers(conditions, lubricant), conditions.radius_along_rolling
     u, w, g = numbers.speed, numbers.load, numbers.material
     if conditions.long:
@@ -148,10 +149,9 @@ def least_films(conditions: ContactConditions, lubricant: Lubricant) -> dict[Reg
 
 
 def film_fits(conditions: ContactConditions, lubricant: Lubricant) -> tuple[FilmFit, ...]:
-    """The fits that hold in the contact's regime, thickest film first.
+    """Return the fits valid in the contact's regime, thickest film first.
 
-    None for a contact that is narrower across rolling than along it, where none of these was
-    fitted.
+    Empty for a contact narrower across rolling than along it, which none of these covers.
     """
     if _ratio(conditions) > 1.0:
         return ()
@@ -174,17 +174,18 @@ def film_fits(conditions: ContactConditions, lubricant: Lubricant) -> tuple[Film
 
 
 def _ratio(conditions: ContactConditions) -> float:
-    """Rx/Ry; 0 for a line contact."""
+    """Return Rx/Ry; 0 for a line contact."""
     return conditions.radius_along_rolling / conditions.radius_across_rolling
 
 
 def _axes(conditions: ContactConditions) -> float:
-    """Width of the Hertz contact across rolling over that along it."""
+    """Return the width of the Hertz contact across rolling over that along it."""
     a, b = conditions.hertz.half_widths
     return b / a
 
 
 def _asymptotes(conditions: ContactConditions, numbers: FilmNumbers) -> _Asymptotes:
+    """Return the films of the four regimes."""
     m, l = numbers.moes_load, numbers.moes_oil  # noqa: E741
     if conditions.long:
         return _Asymptotes(
@@ -202,7 +203,7 @@ def _asymptotes(conditions: ContactConditions, numbers: FilmNumbers) -> _Asympto
 
 
 def _moes(films: _Asymptotes, _: float) -> float:
-    """Central film H of a line contact, between the asymptotes."""
+    """Return the central film H of a line contact from its asymptotes."""
     rigid, elastic, stiff_rigid, stiff = films
     s = (7.0 + 8.0 * np.exp(-2.0 * elastic / rigid)) / 5.0
     thin = (rigid ** (7.0 / 3.0) + elastic ** (7.0 / 3.0)) ** (3.0 * s / 7.0)
@@ -211,7 +212,7 @@ def _moes(films: _Asymptotes, _: float) -> float:
 
 
 def _nijenbanning(films: _Asymptotes, ratio: float) -> float:
-    """Central film H of a point or elliptic contact, between the asymptotes."""
+    """Return the central film H of a point or elliptic contact from its asymptotes."""
     rigid, elastic, stiff_rigid, stiff = films
     thin = rigid**1.5 + (elastic**-4.0 + (1.8 / ratio) ** -4.0) ** (-3.0 / 8.0)
     if not stiff:

@@ -1,4 +1,4 @@
-"""How hard a contact is to be solved, and how its solution went."""
+"""Options of a contact solve, and the record of its convergence."""
 
 import math
 from collections.abc import Callable
@@ -10,24 +10,24 @@ from asperity.core.errors import BadInput, require_positive
 from asperity.ehl.uncertainty import ContactError
 
 ContactModel = Literal["unified", "paper", "mixed", "conserving"]
-UNIFIED, PAPER, MIXED, CONSERVING = MODELS = get_args(ContactModel)  # the first two are one
+UNIFIED, PAPER, MIXED, CONSERVING = MODELS = get_args(ContactModel)  # the first two are the same
 TWO_PRESSURES = (MIXED, CONSERVING)
 Start = Literal["steady", "stationary"]
-LONGEST_STEP = 8.0  # cells that the oil may travel in one step of time
+MAX_CELLS_PER_TIME_STEP = 8.0  # cells that oil may travel in one time step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """How hard to solve.
+    """Options of a contact solve.
 
     Parameters
     ----------
-    tolerance : bound on residual, load error and change, each relative
+    tolerance : bound on the relative residual, load error and change
     max_iterations : Newton steps allowed on each grid level and in each attempt
-    contact_film : gap at which asperities count as touching [m]; a few molecules of oil. It moves the load share by
-        some per cent per factor of ten, so it belongs beside every CLR.
-    model : "unified" (or "paper"), one pressure for oil and asperities; "mixed", a pressure each, which without speed
-        is the dry contact; "conserving", in which no oil is lost
+    contact_film : gap at which asperities count as touching [m]; a few molecules of oil. It moves
+        the load share by some per cent per factor of ten, so quote it with every CLR.
+    model : "unified" (or "paper"): one pressure for oil and asperities; "mixed": two pressures, at
+        zero speed the dry contact; "conserving": mixed, with mass-conserving cavitation
     """
 
     tolerance: float = 1e-4
@@ -47,18 +47,18 @@ class Options:
             raise BadInput(f"model must be one of {', '.join(MODELS)}, got {self.model!r}")
 
 
-# what is tried, one after the other, until one converges
+# strategies in their order, until one converges
 ATTEMPTS = (
     "coarse to fine",
-    # smooth bodies only: they have a better one at first
-    "with the second-order wedge of rough bodies",
-    "with the bodies held while their distance was searched",
+    # smooth bodies only, which start with a third-order wedge
+    "with the second-order wedge of rough surfaces",
+    "at fixed approach, found by bracketing",
 )
-FROM_DRY = "from the dry contact"  # of two pressures only
+FROM_DRY = "from the dry contact"  # models with two pressures only
 
 
 class SolveStatus(StrEnum):
-    """How a solve ended."""
+    """Outcome of a solve."""
 
     CONVERGED = "converged"
     OUT_OF_ITERATIONS = "out of iterations"
@@ -67,9 +67,9 @@ class SolveStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Iteration:
-    """Where a Newton step led: grid cells, step number on that grid, and three relative figures that must become small.
+    """One Newton step: grid cells, step number on that grid, and three relative measures.
 
-    Number 0 is the start on that grid, which no step has led to: its change is infinite.
+    Number 0 is the initial guess on that grid; its change is infinite.
     """
 
     cells: tuple[int, int]
@@ -81,10 +81,9 @@ class Iteration:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figures:
-    """What a solution is asked for first: CAR in the Hertz zone, CLR, least and central film [m]; or their errors.
+    """Key results: CAR in the Hertz zone, CLR, minimum and central film [m]; or their errors.
 
-    Of a roller also the largest pressure [Pa] and the least gap [m] at its ends; None of other
-    contacts.
+    For rollers also the largest pressure [Pa] and the smallest gap [m] at the ends; else None.
     """
 
     car: float
@@ -94,31 +93,32 @@ class Figures:
     edge_pressure: float | None = None
     end_film: float | None = None
 
-    def off(self, other: "Figures") -> "Figures":
-        """Absolute differences."""
-        return self._each(other, lambda mine, theirs: abs(mine - theirs))
+    def abs_difference(self, other: "Figures") -> "Figures":
+        """Return the absolute differences."""
+        return self._combine(other, lambda mine, theirs: abs(mine - theirs))
 
-    def minus(self, other: "Figures") -> "Figures":
-        """Differences."""
-        return self._each(other, lambda mine, theirs: mine - theirs)
+    def difference(self, other: "Figures") -> "Figures":
+        """Return the differences."""
+        return self._combine(other, lambda mine, theirs: mine - theirs)
 
-    def signed(self, other: "Figures") -> "Figures":
-        """Each with the other's sign."""
-        return self._each(other, math.copysign)
+    def copysign(self, other: "Figures") -> "Figures":
+        """Return the values with the signs of `other`."""
+        return self._combine(other, math.copysign)
 
-    def plus(self, other: "Figures") -> "Figures":
-        """Sums."""
-        return self._each(other, lambda mine, theirs: mine + theirs)
+    def add(self, other: "Figures") -> "Figures":
+        """Return the sums."""
+        return self._combine(other, lambda mine, theirs: mine + theirs)
 
-    def at_least(self, other: "Figures") -> "Figures":
-        """The larger of each pair."""
-        return self._each(other, max)
+    def maximum(self, other: "Figures") -> "Figures":
+        """Return the larger value of each pair."""
+        return self._combine(other, max)
 
-    def times(self, factor: float) -> "Figures":
-        """All of them times a factor."""
-        return self._each(self, lambda mine, _: factor * mine)
+    def scale(self, factor: float) -> "Figures":
+        """Return the values times a factor."""
+        return self._combine(self, lambda mine, _: factor * mine)
 
-    def _each(self, other: "Figures", merge: Callable[[float, float], float]) -> "Figures":
+    def _combine(self, other: "Figures", merge: Callable[[float, float], float]) -> "Figures":
+        """Apply a function to each pair of values that exist."""
         pairs = ((name, getattr(self, name), getattr(other, name)) for name in FIGURES)
         return Figures(
             **{name: merge(mine, its) for name, mine, its in pairs if None not in (mine, its)}
@@ -130,28 +130,28 @@ FIGURES = tuple(field.name for field in fields(Figures))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GridError(Figures):
-    """What the cells' size may have done to the figures: half-widths of 90 % intervals.
+    """Discretisation error of the key results: half-widths of 90 % intervals.
 
-    `lean` is how far the middle of each interval lies above the figure: a finer grid mostly goes
-    on the way that the figures took from the coarser one.
+    `lean` is the offset of each interval's centre from the value: a finer grid mostly continues in
+    the direction of the last refinement.
     """
 
     lean: Figures
 
     def sides(self, name: str) -> tuple[float, float]:
-        """How far a figure may lie below and above, not less than not at all."""
+        """Return the error below and above a value, each at least 0."""
         half, lean = getattr(self, name), getattr(self.lean, name)
         return max(0.0, half - lean), max(0.0, half + lean)
 
 
 @dataclass(frozen=True, slots=True)
 class Convergence:
-    """How the solve went: status, every step on every grid level, and the time it took [s].
+    """Record of a solve: status, every step on every grid level, and its duration [s].
 
-    `attempt` is the manner that led here: the first, unless what was tried before it failed.
-    `iteration_error` is how far the last step moved the figures, `discretisation_error` what the
-    cells' size may have done to them, from the solutions on coarser grids: None on a grid too
-    small to have a coarser one. A warm start hands on its own.
+    `attempt` is the strategy that led here: the first, unless earlier ones failed.
+    `iteration_error` is the change of the key results in the last step, `discretisation_error`
+    their error from the solutions on coarser grids: None on a grid too small to have a coarser one.
+    A warm start passes on its own.
     """
 
     status: SolveStatus
@@ -164,14 +164,14 @@ class Convergence:
 
     @property
     def error(self) -> Figures | None:
-        """How far off the figures may be: iteration and discretisation error together."""
+        """Sum of iteration and discretisation error."""
         if self.iteration_error is None or self.discretisation_error is None:
             return None
-        return self.iteration_error.plus(self.discretisation_error)
+        return self.iteration_error.add(self.discretisation_error)
 
     @property
     def converged(self) -> bool:
-        """Whether residual, load error and change all met the tolerance on the finest grid."""
+        """True if residual, load error and change met the tolerance on the finest grid."""
         return self.status is SolveStatus.CONVERGED
 
     @property
@@ -180,14 +180,15 @@ class Convergence:
         return sum(step.number > 0 for step in self.history)
 
     def explain(self) -> str:
-        """One sentence on how the solve ended."""
+        """Return one sentence on the outcome of the solve."""
         last = self.history[-1]
-        tried = "" if self.attempt == ATTEMPTS[0] else f", at last {self.attempt},"
-        if self.attempt == FROM_DRY:  # of thin films the first attempt, of thick ones the second
-            tried = f", {FROM_DRY},"
+        tried = "" if self.attempt == ATTEMPTS[0] else f" ({self.attempt})"
+        if self.attempt == FROM_DRY:  # the first attempt for thin films, the second for thick ones
+            tried = f" {FROM_DRY}"
         return (
             f"{self.status}{tried} after {self.iterations} steps in {self.seconds:.2f} s: "
-            f"residual {last.residual:.1e}, load error {last.load_error:.1e}, change {last.change:.1e}; "
+            f"residual {last.residual:.1e}, load error {last.load_error:.1e}, change "
+            f"{last.change:.1e}; "
             f"tolerance {self.tolerance:.0e}"
         )
 
@@ -197,21 +198,23 @@ class ContactState:
     """Scalars of a solved contact, SI.
 
     The Hertz zone is |x| <= a for a line contact, the ellipse of half-widths a, b for others.
-    `car` contact cells in it over all cells there; `car_domain` contact area of the whole domain
-    over the Hertz area; `clr` load on contact cells over the load; `capped_oil_load_ratio` load on
-    cells that stand at the pressure cap without touching, over the load: oil that the model holds
-    at the hardness, which a coarser contact threshold would count as contact; `sq` composite
-    roughness [m]; films [m]: `h_min` smallest gap of the domain (the contact film where bodies
-    touch), `h_central` mean over a tenth of the Hertz zone's half-widths, `h_mean` mean over the
-    zone; `lambda_ratio` the smooth contact's least film, by the fit of its regime, over Sq
-    (`least_film`; None for a smooth surface or a dry contact); `p_max` [Pa]; `reynolds_residual`
-    root mean square of what is left of every cell's equation, as a share of p_h; `load_error`
-    relative; `mass_flux_imbalance` oil that vanishes or appears in the cells of the Hertz zone, of
-    one pressure in those where Reynolds' equation does not hold, in sum, over the oil that the
-    surfaces carry through the zone, u times mean film (0 when dry). The cavity behind the contact
-    is left out: the model refills it, which changes nothing upstream; `contact_slope` mean slope
-    of the undeformed roughness over touching cells (None where none touch); `error` how far load
-    share and resonance may be off, and why (None for a mean over the steps of a history).
+
+    `car`: contact cells in the Hertz zone over all cells there. `car_domain`: contact area of the
+    whole domain over the Hertz area. `clr`: load on contact cells over the load.
+    `capped_oil_load_ratio`: load on cells at the pressure cap without contact, over the load: oil
+    that the model holds at the hardness, which a larger contact film would count as contact. `sq`:
+    composite roughness [m]. Films [m]: `h_min` smallest gap of the domain (the contact film where
+    bodies touch), `h_central` mean over a tenth of the Hertz zone's half-widths, `h_mean` mean over
+    the zone. `lambda_ratio`: the smooth contact's minimum film, by the fit of its regime, over Sq
+    (`least_film`; None for a smooth surface or a dry contact). `p_max` [Pa].
+
+    `reynolds_residual`: root mean square of every cell's residual, as a share of p_h. `load_error`:
+    relative. `mass_flux_imbalance`: sum over the Hertz zone's cells of oil lost or gained, in the
+    single-pressure model in those where Reynolds' equation does not hold, over the oil transported
+    through the zone, u times mean film (0 when dry). The cavity behind the contact is left out: the
+    model refills it, which changes nothing upstream. `contact_slope`: mean slope of the undeformed
+    roughness over touching cells (None where none touch). `error`: uncertainty of load share and
+    resonance (None for a mean over the steps of a history).
     """
 
     car: float

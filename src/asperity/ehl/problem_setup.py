@@ -1,4 +1,4 @@
-"""A contact posed as the dimensionless problem to solve: on which grids, and from which guess."""
+"""Setup of the dimensionless problem: grid levels and initial guess."""
 
 from dataclasses import replace
 
@@ -6,17 +6,16 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
-from asperity.ehl.deflection import BETWEEN, THROUGH
+from asperity.ehl.controls import CONTINUATION
+from asperity.ehl.deflection import MIRROR_BETWEEN, MIRROR_THROUGH
 from asperity.ehl.film_formulas import central_film, least_films
-from asperity.ehl.grid_design import FEWEST_BESIDE, FEWEST_COARSE_CELLS, inlet_length
-from asperity.ehl.models.single_pressure import Form, Problem
+from asperity.ehl.grid_design import MIN_CELLS_SHORT_AXIS, MIN_COARSE_CELLS, inlet_length
+from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, Options
-from asperity.ehl.roller_profile import Along
+from asperity.ehl.roller_profile import BodyShape, RollerProfile
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
-
-FEWEST_IN_COARSE_INLET = 2.0
 
 
 def contact_problem(
@@ -28,19 +27,19 @@ def contact_problem(
     *,
     attempt: str = ATTEMPTS[0],
 ) -> Problem:
-    """The dimensionless problem on the surface's own grid, as the attempt poses it."""
-    scales = Scales.of(conditions, lubricant)
+    """Return the dimensionless problem of an attempt on the surface's grid."""
+    scales = Scales.from_conditions(conditions, lubricant)
     grid, line = surface.grid, conditions.endless
     (dx, dy), (left, front) = grid.spacing, grid.lower
     load = conditions.line_load * grid.extent[1] if line else conditions.load
     radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
     return Problem(
-        form=Form(
+        form=BodyShape(
             flatness=radius / conditions.radius_across_rolling,
             compliance=2.0 * scales.pressure * radius / (np.pi * modulus * scales.length),
             aspect=np.inf if line else conditions.hertz.half_widths[1] / scales.length,
             periodic=line,
-            along=Along(conditions, scales.length, scales.gap)
+            roller=RollerProfile(conditions, scales.length, scales.gap)
             if conditions.geometry == "roller"
             else None,
         ),
@@ -65,56 +64,56 @@ def contact_problem(
 def first_guess(
     problem: Problem, conditions: ContactConditions, lubricant: Lubricant | None, scales: Scales
 ) -> tuple[Field, float]:
-    """Hertz pressure, with the bodies as far apart as the film of a smooth contact holds them."""
+    """Return Hertz pressure and an approach that leaves the film of a smooth contact."""
     pressure = np.minimum(problem.form.hertz(problem.x, problem.y), problem.p_cap)
     film = 0.0
     if lubricant:
         film = smooth_film(conditions, lubricant) / scales.gap
-        if not np.any(
-            problem.roughness
-        ):  # too near, smooth bodies touch where oil has to part them, and stay so
+        # too close, smooth bodies touch where oil should separate them, and remain in contact
+        if not np.any(problem.roughness):
             film = max(
                 film, least_films(conditions, lubricant)["isoviscous-elastic"].film / scales.gap
             )
-            if (
-                not conditions.long
-            ):  # under Hertz's pressure the gap is even: it is that in the middle
+            if not conditions.long:  # the gap is uniform under Hertz pressure: the central film
                 film = max(film, central_film(conditions, lubricant) / scales.gap)
     smooth = problem.form.gap(problem.x, problem.y) + problem.deflection(pressure)
     return pressure, film - float(np.min(smooth))
 
 
 def smooth_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
-    """Least film of the smooth contact [m] by the fits of hard bodies and thickening oils, Dowson's and Hamrock's.
+    """Return the minimum film [m] of a smooth piezoviscous-elastic contact by Dowson or Hamrock.
 
-    A guess to start from, in every regime: `least_film` is the film to report.
+    An initial guess in every regime; report `least_film` instead.
     """
     return least_films(conditions, lubricant)["piezoviscous-elastic"].film
 
 
 def grid_levels(finest: Problem) -> list[Problem]:
-    """The problem on its own grid and on coarser and coarser ones."""
+    """Return the problem on its own grid and on successively coarser ones."""
     levels = [finest]
     while (cells := _halved(levels[-1].all_cells)) != levels[-1].all_cells:
         levels.append(levels[-1].coarsened(cells))
     return levels
 
 
-def coarser_all_along(problem: Problem, finest: Problem) -> bool:
-    """Whether a grid tells what the finest one's cells did: coarser along each axis of more than one, or itself."""
+def coarser_in_all_axes(problem: Problem, finest: Problem) -> bool:
+    """Return True for the finest grid and for grids that refine to it along every axis.
+
+    Axes of one cell do not count. Only such grids estimate the discretisation error.
+    """
     several = [
         (few, many) for few, many in zip(problem.cells, finest.cells, strict=True) if many > 1
     ]
     return problem.cells == finest.cells or all(few < many for few, many in several)
 
 
-def levels_in_reach(
+def usable_levels(
     finest: Problem, conditions: ContactConditions, lubricant: Lubricant | None
 ) -> list[Problem]:
-    """The levels of a climb; those of a smooth line contact down to the coarsest that has 2 cells across the inlet.
+    """Return the levels of a coarse-to-fine solve.
 
-    On coarser ones the bodies touch, which is a worse start than Hertz's pressure. One is kept to
-    tell the error.
+    A smooth line contact needs 2 cells across the inlet: on coarser grids the bodies touch, which
+    is a worse initial guess than Hertz pressure. One coarser level is kept for the error estimate.
     """
     levels = grid_levels(finest)
     if not finest.uniform or lubricant is None:
@@ -122,38 +121,38 @@ def levels_in_reach(
     most = (
         inlet_length(conditions, lubricant)
         / conditions.hertz.half_widths[0]
-        / FEWEST_IN_COARSE_INLET
+        / CONTINUATION.min_coarse_inlet_cells
     )
     return [level for number, level in enumerate(levels) if number < 2 or level.spacing[0] <= most]
 
 
 def _halved(cells: tuple[int, int]) -> tuple[int, int]:
-    fewest = FEWEST_BESIDE if max(cells) // 2 >= FEWEST_COARSE_CELLS else FEWEST_COARSE_CELLS
+    fewest = MIN_CELLS_SHORT_AXIS if max(cells) // 2 >= MIN_COARSE_CELLS else MIN_COARSE_CELLS
     nx, ny = ((n + 1) // 2 if n // 2 >= fewest else n for n in cells)
     return nx, ny
 
 
-def least_part(problem: Problem) -> Problem:
-    """What tells all of a lubricated contact: one line of cells, or those on one side of Y = 0, if that will do."""
+def reduced_problem(problem: Problem) -> Problem:
+    """Return the smallest equivalent problem: one line of cells, half the domain, or all."""
     if problem.uniform:
         return on_one_line(problem)
-    return one_side(problem) if problem.symmetric and problem.lubricant is not None else problem
+    return half_domain(problem) if problem.symmetric and problem.lubricant is not None else problem
 
 
-def one_side(problem: Problem) -> Problem:
-    """What has a mirror at Y = 0, on the cells up to there."""
+def half_domain(problem: Problem) -> Problem:
+    """Return a symmetric problem on the cells up to its mirror plane Y = 0."""
     factor, lines = problem.viscosity_factor, problem.cells[1]
     half = -(-lines // 2)
     return replace(
         problem,
         roughness=problem.roughness[:, :half],
         viscosity_factor=None if factor is None else factor[:, :half],
-        mirror=THROUGH if lines % 2 else BETWEEN,
+        mirror=MIRROR_THROUGH if lines % 2 else MIRROR_BETWEEN,
     )
 
 
 def on_one_line(problem: Problem) -> Problem:
-    """What does not vary along y, on one line of cells that is as wide as all."""
+    """Return a problem uniform along y on one line of cells of the full width."""
     factor, (dx, dy) = problem.viscosity_factor, problem.spacing
     return replace(
         problem,

@@ -1,7 +1,7 @@
-"""A roller along its length, in the solver's units: how its surface falls back, what it may carry, where it ends.
+"""Shape of the smooth bodies, and of a roller along its axis, in the solver's units.
 
-A place is beyond the roller past its ends, and where its surface has fallen back so far that no
-oil between the bodies carries any pressure: there the solver holds ambient pressure.
+The solver holds ambient pressure outside a roller: past its ends, and where its surface has dropped
+so far that oil carries no pressure.
 """
 
 from dataclasses import dataclass
@@ -11,34 +11,39 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field, Mask
 
-# a²/R from where the dry roller still touches: as far as before an inlet of 7.7 half-widths
-FAR_APART = 30.0
-END = 0.05  # share of the length, at either end, that counts as the end
+# a²/R beyond contact; equals the gap before an inlet of 7.7 half-widths
+NO_PRESSURE_GAP = 30.0
+END_SHARE = 0.05  # share of the length at either end
 
 
 @dataclass(frozen=True)
-class Along:
-    """Of a roller under these conditions; Y in half-widths, lengths across the gap in a²/R."""
+class RollerProfile:
+    """Profile of a roller; Y in half-widths, gaps in a²/R."""
 
     conditions: ContactConditions
     length: float  # unit along the surface [m]
     gap: float  # unit across it [m]
 
     def drop(self, y: Field) -> Field:
-        """How far the surface falls back, shape (ny,); beyond the roller there is none, and the gap is wide."""
-        return np.asarray(np.where(self.beyond(y), self._touching + FAR_APART, self._drop(y)))
+        """Return the drop of the surface, shape (ny,); a wide gap outside the roller."""
+        return np.asarray(
+            np.where(self.outside(y), self._contact_drop + NO_PRESSURE_GAP, self._profile_drop(y))
+        )
 
     def load(self, y: Field) -> Field:
-        """Load per length by slices over its mean, shape (ny,)."""
+        """Return the load per length, by slices, over its mean, shape (ny,)."""
         sliced = self.conditions.sliced_load
         return np.asarray(
             np.interp(y * self.length, sliced.y, sliced.line_load / sliced.line_load.mean())
         )
 
     def zone(self, x: Field, y: Field, share: float, spacing: tuple[float, float]) -> Mask:
-        """Cells within `share` of the smooth, dry contact by slices, at least the middle ones, shape (nx, ny)."""
+        """Return the cells within `share` of the smooth dry contact by slices, shape (nx, ny).
+
+        At least the central ones.
+        """
         (dx, dy), (low, high) = spacing, self.conditions.sliced_load.ends
-        half = np.where(self.beyond(y), 0.0, np.sqrt(self.load(y)))
+        half = np.where(self.outside(y), 0.0, np.sqrt(self.load(y)))
         within = np.abs(y - 0.5 * (low + high) / self.length) <= max(
             0.5 * share * (high - low) / self.length, dy
         )
@@ -46,35 +51,73 @@ class Along:
             (np.abs(x)[:, None] <= np.maximum(share * half, dx)) & within & (half > 0.0)
         )
 
-    def beyond(self, y: Field) -> Mask:
-        """Places past the roller, shape (ny,)."""
-        return np.asarray(~self.on(y) | (self._drop(y) > self._touching + FAR_APART))
+    def outside(self, y: Field) -> Mask:
+        """Return the places outside the roller, shape (ny,)."""
+        return np.asarray(
+            ~self.inside(y) | (self._profile_drop(y) > self._contact_drop + NO_PRESSURE_GAP)
+        )
 
     @staticmethod
-    def dome(x: Field, pressure: Field, dx: float) -> Field:
-        """Largest pressure of every line of cells up to its middle, before oil's spike at the outlet, shape (ny,)."""
+    def central_pressure(x: Field, pressure: Field, dx: float) -> Field:
+        """Return the largest pressure of every line up to its centre, shape (ny,).
+
+        Excludes the outlet spike.
+        """
         return np.asarray(pressure[x <= 0.5 * dx].max(axis=0))
 
-    def at_ends(self, y: Field, values: Field) -> Field:
-        """Values of lines on the outer twentieth of the length at either end, and where it begins."""
-        begins, on = (0.5 - END) * self.conditions.line_length / self.length, self.on(y)
-        y, values = y[on], values[on]
+    def end_values(self, y: Field, values: Field) -> Field:
+        """Return values of lines on the outer twentieth at either end, with its inner border."""
+        begins, inside = (
+            (0.5 - END_SHARE) * self.conditions.line_length / self.length,
+            self.inside(y),
+        )
+        y, values = y[inside], values[inside]
         borders = [
             np.interp(place, y, values) for place in (-begins, begins) if y[0] <= place <= y[-1]
         ]
         return np.concatenate([values[np.abs(y) >= begins], borders])
 
-    def on(self, y: Field) -> Mask:
-        """Places between the ends of the roller, shape (ny,)."""
+    def inside(self, y: Field) -> Mask:
+        """Return the places between the ends of the roller, shape (ny,)."""
         return np.asarray(np.abs(y) * self.length < self.conditions.end * (1.0 - 1e-9))
 
     @property
-    def _touching(self) -> float:
-        """Drop down to which the dry roller touches."""
+    def _contact_drop(self) -> float:
+        """Largest drop at which the dry roller touches."""
         return self.conditions.sliced_load.approach / self.gap
 
-    def _drop(self, y: Field) -> Field:
+    def _profile_drop(self, y: Field) -> Field:
+        """Return the drop of the profile."""
         conditions = self.conditions
         return np.asarray(
             conditions.roller.drop(y * self.length, conditions.length or 0.0) / self.gap
         )
+
+
+@dataclass(frozen=True, slots=True)
+class BodyShape:
+    """Shape and compliance of the smooth bodies.
+
+    The gap grows as X^2/2 + `flatness` Y^2/2, or across a `roller` by its drop; `compliance` scales
+    the half-space's deflection, V = compliance times the integral of P/distance; `aspect` is the
+    Hertz half-width across over along rolling (infinite for a line); `periodic` refers to y.
+    """
+
+    flatness: float
+    compliance: float
+    aspect: float
+    periodic: bool
+    roller: RollerProfile | None = None
+
+    def gap(self, x: Field, y: Field) -> Field:
+        """Return the gap at H0 = 0, shape (x, y)."""
+        across = self.flatness * (y**2 / 2.0) if self.roller is None else self.roller.drop(y)
+        return np.asarray((x**2 / 2.0)[:, None] + across)
+
+    def hertz(self, x: Field, y: Field) -> Field:
+        """Return the smooth, dry pressure, for a roller by slices, shape (x, y)."""
+        if self.roller is None:
+            across = y / self.aspect
+            return np.asarray(np.sqrt(np.maximum(1.0 - (x**2)[:, None] - across**2, 0.0)))
+        load = np.where(self.roller.outside(y), 0.0, self.roller.load(y))
+        return np.asarray(np.sqrt(np.maximum(load - (x**2)[:, None], 0.0)))

@@ -1,4 +1,4 @@
-"""The units the solver thinks in: lengths along the surface in Hertz half-widths, pressures in p_h, gaps in a^2/R."""
+"""Units of the solver: Hertz half-widths along the surface, p_h for pressure, a²/R for gaps."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,10 @@ from asperity.lubricant import Lubricant
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """Half-width a [m], pressure p_h [Pa], gap a^2/R [m], and the speed number λ = 12 η₀ u R²/(a³ p_h) (0 when dry)."""
+    """Half-width a [m], pressure p_h [Pa], gap a²/R [m] and speed number.
+
+    The speed number is λ = 12 η₀ u R²/(a³ p_h), 0 for a dry contact.
+    """
 
     length: float
     pressure: float
@@ -16,8 +19,10 @@ class Scales:
     speed: float
 
     @classmethod
-    def of(cls, conditions: ContactConditions, lubricant: Lubricant | None) -> "Scales":
-        """Scales of a contact; a and R are those along rolling."""
+    def from_conditions(
+        cls, conditions: ContactConditions, lubricant: Lubricant | None
+    ) -> "Scales":
+        """Return the scales of a contact; a and R are those along rolling."""
         a, p_h, radius = (
             conditions.hertz.half_widths[0],
             conditions.hertz.p_max,

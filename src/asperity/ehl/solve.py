@@ -1,4 +1,4 @@
-"""From conditions, oil and surface to a solved contact, by the model that the options name."""
+"""Solve a contact from conditions, lubricant and surface, by the model of the options."""
 
 import time
 from collections.abc import Sequence
@@ -11,20 +11,27 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl.contact_solution import ContactSolution
+from asperity.ehl.controls import CONTINUATION, SEARCH
 from asperity.ehl.film_formulas import central_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.outcome import ATTEMPTS, PAPER, Options
-from asperity.ehl.problem_setup import contact_problem, first_guess, least_part, levels_in_reach
+from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, PAPER, Options
+from asperity.ehl.problem_setup import (
+    contact_problem,
+    first_guess,
+    reduced_problem,
+    smooth_film,
+    usable_levels,
+)
 from asperity.ehl.scales import Scales
-from asperity.ehl.strategies.grid_continuation import COARSE_TOLERANCE, Progress, Search
-from asperity.ehl.strategies.mixed_search import solve_mixed
+from asperity.ehl.strategies.grid_continuation import Progress, Search
+from asperity.ehl.strategies.mixed_search import COARSE_TO_FINE, ROBUST, MixedSearch
+from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.lubricant import Lubricant, require_liquid
 from asperity.surface import Surface
 
-RIGID = 30.0  # half-widths on which a film bears, from where rollers are refused
-ELASTIC_TO = 0.1  # of the tolerance that a step of Newton's then has to meet
+RIGID = 30.0  # half-widths of the loaded film above which a roller is rejected as rigid
 
 
 def solve_contact(
@@ -42,21 +49,22 @@ def solve_contact(
 
     Parameters
     ----------
-    conditions, surface : the contact and its composite roughness; the surface's grid is the grid that is solved
-    lubricant : the oil; None for a dry contact
-    options : tolerances; `Options()` unless given
-    start : a neighbouring solution on a grid of the same cells to start from (other load, speed or roughness)
-    viscosity_factor : local over isothermal viscosity, shape (nx, ny), where the film is not at ambient temperature
-    strict : raise when the tolerance is not met; otherwise return the unfinished state
+    conditions, surface : the contact and its composite roughness; the surface's grid is solved
+    lubricant : the lubricant; None for a dry contact
+    options : tolerances and model; `Options()` by default
+    start : a neighbouring solution (other load, speed or roughness) on a grid of the same cells
+    viscosity_factor : local over isothermal viscosity, shape (nx, ny), of a heated film
+    strict : raise when the tolerance is not met; otherwise return the unconverged solution
     progress : called after every Newton step
 
     Raises
     ------
     BadInput
-        for a grid that does not hold the contact or repeats along the wrong axis, factors that do not fit it, a load
-        beyond what the hardness bears on it, or an oil whose viscosity is no number at Hertz's pressure.
+        for a grid that does not contain the contact or is periodic along the wrong axis, factors
+        that do not fit it, a load beyond the hardness times the area, or a viscosity that
+        overflows at Hertz pressure.
     NotConverged
-        when strict and the tolerance was not met; carries the unfinished solution.
+        when strict and the tolerance was not met; carries the unconverged solution.
     """
     options = options or Options()
     _check_grid(conditions, lubricant, surface)
@@ -64,9 +72,7 @@ def solve_contact(
         require_liquid(lubricant.viscosity, conditions.hertz.p_max)
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
-    solve = SOLVERS[
-        options.model if lubricant else PAPER
-    ]  # without oil there is one pressure, and nothing to lose
+    solve = SOLVERS[options.model if lubricant else PAPER]  # one pressure without oil
     solution = solve(
         conditions,
         lubricant,
@@ -91,15 +97,15 @@ def solve_unified(
     viscosity_factor: Field | None = None,
     progress: Progress | None = None,
 ) -> ContactSolution:
-    """Solve the contact with one pressure for oil and asperities, or dry; as `solve_contact`, which calls this."""
+    """Solve the single-pressure model, or a dry contact; called by `solve_contact`."""
     began = time.perf_counter()
-    scales = Scales.of(conditions, lubricant)
+    scales = Scales.from_conditions(conditions, lubricant)
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = least_part(whole)
+    finest = reduced_problem(whole)
     elastic = lubricant is None and conditions.hardness is None
     search = (ElasticSearch if elastic else Search)(options, scales.gap, progress)
     if start is None:
-        levels = levels_in_reach(finest, conditions, lubricant)
+        levels = usable_levels(finest, conditions, lubricant)
         guess = first_guess(levels[-1], conditions, lubricant, scales)
     else:
         levels = [finest]
@@ -109,10 +115,10 @@ def solve_unified(
             if not finest.accurate:
                 continue
             levels = [replace(level, accurate=False) for level in levels]
-        step = search.climb(levels, *guess, held=attempt == ATTEMPTS[2])
-        if search.settled(options.tolerance):
+        step = search.solve_levels(levels, *guess, fixed=attempt == ATTEMPTS[2])
+        if search.converged(options.tolerance):
             break
-    return search.solution(
+    solution = search.solution(
         step,
         surface,
         conditions,
@@ -120,19 +126,88 @@ def solve_unified(
         seconds=time.perf_counter() - began,
         attempt=attempt,
         start=start,
-        viscosity_factor=viscosity_factor,
+    )
+    return replace(solution, viscosity_factor=viscosity_factor)
+
+
+def solve_mixed(
+    conditions: ContactConditions,
+    lubricant: Lubricant | None,
+    surface: Surface,
+    *,
+    options: Options,
+    start: ContactSolution | None = None,
+    viscosity_factor: Field | None = None,
+    progress: Progress | None = None,
+) -> ContactSolution:
+    """Solve a two-pressure model; called by `solve_contact`."""
+    began = time.perf_counter()
+    assert lubricant is not None  # a dry contact has one pressure
+    scales = Scales.from_conditions(conditions, lubricant)
+    whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
+    finest = reduced_problem(whole)
+    search = MixedSearch(options, scales.gap, progress)
+    if conditions.geometry == "roller":
+        search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
+    if start is not None:
+        strategy, step = (
+            COARSE_TO_FINE,
+            search.continue_from(finest, pressures_of(start, finest, scales)),
+        )
+    else:
+        for strategy in _strategies(
+            surface, smooth_film(conditions, lubricant), options.contact_film
+        ):
+            problem = finest if strategy == COARSE_TO_FINE else replace(finest, accurate=False)
+            levels = usable_levels(problem, conditions, lubricant)
+            step = search.solve_by(
+                strategy, levels, lambda on: first_guess(on, conditions, lubricant, scales)
+            )
+            if search.converged(options.tolerance):
+                if (
+                    strategy != COARSE_TO_FINE
+                    and finest.accurate
+                    and finest.form.roller is not None
+                ):
+                    strategy, step = search.refine_third_order(finest, step)
+                search.solve_coarser_grid(finest)
+                break
+            if search.exhausted:
+                break
+    solution = search.solution(
+        step,
+        surface,
+        conditions,
+        lubricant,
+        seconds=time.perf_counter() - began,
+        attempt=strategy,
+        start=start,
+    )
+    return replace(solution, viscosity_factor=viscosity_factor)
+
+
+def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
+    """Return the strategies in their order, by the film [m] of the smooth bodies."""
+    if not np.any(surface.heights):
+        return (
+            (FROM_DRY, COARSE_TO_FINE, ROBUST) if film < contact_film else (COARSE_TO_FINE, ROBUST)
+        )
+    return (
+        (FROM_DRY, COARSE_TO_FINE)
+        if film < SEARCH.dry_film_ratio * surface.sq
+        else (COARSE_TO_FINE, FROM_DRY)
     )
 
 
 class ElasticSearch(Search):
-    """Dry elastic bodies coarse to fine; a step of Newton's on the finest grid says whether it is solved."""
+    """Solve dry elastic bodies coarse to fine, checked by a Newton step on the finest grid."""
 
-    def climb(
-        self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool
+    def solve_levels(
+        self, levels: Sequence[Problem], pressure: Field, approach: float, *, fixed: bool
     ) -> Step:
-        """Solve on grid after grid; by Newton's steps alone where the bodies are `held`."""
-        if held:
-            return super().climb(levels, pressure, approach, held=True)
+        """Solve on successive grids; by Newton steps alone at `fixed` approach."""
+        if fixed:
+            return super().solve_levels(levels, pressure, approach, fixed=True)
         options, start = self.options, pressure
         self.figures, self.smooth, self.cell = (
             [],
@@ -141,15 +216,21 @@ class ElasticSearch(Search):
         )
         for problem in reversed(levels):
             finest = problem is levels[0]
-            tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
+            tolerance = (
+                options.tolerance
+                if finest
+                else max(CONTINUATION.coarse_tolerance, options.tolerance)
+            )
             if problem.cells != pressure.shape:
-                pressure = problem.brought(pressure)
-            pressure, near, met = elastic_contact(problem, pressure, ELASTIC_TO * tolerance)
-            if not met:
-                return super().climb(levels, start, approach, held=False)
+                pressure = problem.interpolate(pressure)
+            pressure, dry_approach, converged = elastic_contact(
+                problem, pressure, CONTINUATION.elastic_tolerance * tolerance
+            )
+            if not converged:
+                return super().solve_levels(levels, start, approach, fixed=False)
             step = self.run(
                 problem,
-                newton(problem, pressure, near),
+                newton(problem, pressure, dry_approach),
                 tolerance,
                 options.max_iterations if finest else 0,
             )
@@ -191,7 +272,8 @@ def _check_grid(
     if grid.periodic != (False, line):
         which = "an elliptic" if conditions.geometry == "elliptic" else f"a {conditions.geometry}"
         raise BadInput(
-            f"{which} contact needs a grid with periodic=(False, {line}), got periodic={grid.periodic}"
+            f"{which} contact needs a grid with periodic=(False, {line}), got "
+            f"periodic={grid.periodic}"
         )
     a, b = conditions.hertz.half_widths
     if conditions.geometry == "roller":
@@ -202,62 +284,73 @@ def _check_grid(
         low, high, spacing = grid.lower[index], grid.upper[index], grid.spacing[index]
         if low > -1.2 * half or high < 1.2 * half:
             raise BadInput(
-                f"grid from {low * 1e6:.4g} to {high * 1e6:.4g} um along {axis} must reach at least "
+                f"grid from {low * 1e6:.4g} to {high * 1e6:.4g} um along {axis} must reach at "
+                "least "
                 f"1.2 Hertz half-widths ({1.2 * half * 1e6:.4g} um) to both sides; widen it"
             )
         if spacing > 0.25 * half:
             raise BadInput(
-                f"cells of {spacing * 1e6:.3g} um along {axis} leave fewer than 8 across the contact of "
+                f"cells of {spacing * 1e6:.3g} um along {axis} leave fewer than 8 across the "
+                "contact of "
                 f"{2.0 * half * 1e6:.3g} um; use more cells"
             )
     _check_cap(conditions, grid)
 
 
 def _check_cap(conditions: ContactConditions, grid: Grid) -> None:
-    """BadInput where the whole grid at the pressure cap bears less than the load."""
+    """Raise BadInput where the whole grid at the pressure cap carries less than the load."""
     if conditions.hardness is None:
         return
     x, y = grid.extent
     most = conditions.hardness * x * (conditions.line_length if conditions.endless else y)
     if most <= conditions.load:
         raise BadInput(
-            f"at a hardness of {conditions.hardness / 1e9:.3g} GPa this grid bears {most:.3g} N at the most, and the "
-            f"load is {conditions.load:.4g} N; lower the load, check the hardness, or widen the grid"
+            f"at a hardness of {conditions.hardness / 1e9:.3g} GPa this grid carries at most "
+            f"{most:.3g} N, "
+            f"less than the load of {conditions.load:.4g} N; lower the load, check the hardness, "
+            "or "
+            "widen the grid"
         )
 
 
 def _check_weight(conditions: ContactConditions, lubricant: Lubricant) -> None:
-    """A roller must be pressed so that it deforms: the solver counts in Hertz's half-widths."""
+    """Raise BadInput for a roller too lightly loaded to deform."""
     film = central_film(conditions, lubricant)
-    wide = float(
-        np.sqrt(film * conditions.radius_along_rolling)
-    )  # where a rigid roller's pressure is
+    # extent of a rigid roller's pressure
+    wide = float(np.sqrt(film * conditions.radius_along_rolling))
     if wide > RIGID * conditions.hertz.half_widths[0]:
         raise BadInput(
-            f"the roller's load of {conditions.load:.3g} N floats on a film of {film * 1e6:.3g} um, which bears it on "
-            f"{wide * 1e6:.3g} um where Hertz's half-width is {conditions.hertz.half_widths[0] * 1e6:.3g} um: the "
-            "bodies stay rigid, and no elastic contact is solved; raise the load, or lower the speed"
+            f"the roller's load of {conditions.load:.3g} N is carried by a film of "
+            f"{film * 1e6:.3g} um over "
+            f"{wide * 1e6:.3g} um, far wider than the Hertz half-width of "
+            f"{conditions.hertz.half_widths[0] * 1e6:.3g} um: the bodies stay rigid, and only "
+            "elastic "
+            "contacts are solved; raise the load or lower the speed"
         )
 
 
 def _check_ends(conditions: ContactConditions, grid: Grid) -> None:
-    """A roller's grid has to hold what is loaded of its length, or all of it and a line of cells beyond."""
+    """Raise BadInput unless the grid holds a roller's loaded length."""
     half, (low, high) = conditions.end, conditions.sliced_load.ends
     if (wide := 2.0 * conditions.hertz.half_widths[0]) > conditions.line_length:
         raise BadInput(
-            f"the roller's {conditions.line_length * 1e3:.3g} mm are shorter than its contact is wide, "
-            f"{wide * 1e3:.3g} mm under {conditions.load:.4g} N: it has no length to share a load along; lower the "
-            'load, or take geometry = "elliptic"'
+            f"the roller of {conditions.line_length * 1e3:.3g} mm is shorter than its contact is "
+            "wide, "
+            f"{wide * 1e3:.3g} mm under {conditions.load:.4g} N; lower the load, or use "
+            'geometry = "elliptic"'
         )
     middle, reach = 0.5 * (low + high), 0.55 * (high - low)
-    wanted = max(middle - reach, -half), min(middle + reach, half)
-    if grid.y[0] > wanted[0] or grid.y[-1] < wanted[1]:
+    loaded = max(middle - reach, -half), min(middle + reach, half)
+    if grid.y[0] > loaded[0] or grid.y[-1] < loaded[1]:
         raise BadInput(
-            f"the outermost cells along y lie at {grid.y[0] * 1e3:.4g} and {grid.y[-1] * 1e3:.4g} mm, and the roller's "
-            f"load reaches from {wanted[0] * 1e3:.4g} to {wanted[1] * 1e3:.4g} mm; widen the grid"
+            f"the grid's outermost cells along y lie at {grid.y[0] * 1e3:.4g} and "
+            f"{grid.y[-1] * 1e3:.4g} mm, but the "
+            f"roller is loaded from {loaded[0] * 1e3:.4g} to {loaded[1] * 1e3:.4g} mm; widen the "
+            "grid"
         )
     if grid.spacing[1] > (high - low) / 16.0:
         raise BadInput(
-            f"cells of {grid.spacing[1] * 1e6:.3g} um along y leave fewer than 16 on the loaded length of "
+            f"cells of {grid.spacing[1] * 1e6:.3g} um along y leave fewer than 16 on the loaded "
+            "length of "
             f"{(high - low) * 1e3:.3g} mm; use more cells"
         )

@@ -1,28 +1,28 @@
-"""How far a number of a contact may be off: 90 % intervals by where the doubt comes from, and all of it together.
+"""Uncertainty of a contact's numbers: 90 % intervals by source, and their combination.
 
-Says what the parts are and how they add up; what each amounts to is worked out where it is known.
+Defines the sources and how they combine; other modules determine their values.
 """
 
 import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
-Sides: TypeAlias = tuple[float, float]  # how far a value may lie below and above
+Sides: TypeAlias = tuple[float, float]  # error below and above a value
 NONE: Sides = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Uncertainty:
-    """A number, and how far it may lie below and above by each source of doubt, each at 90 %.
+    """A number, and its 90 % error below and above it by each source.
 
     Parameters
     ----------
-    value : the best estimate, mean over the surfaces that were solved
-    iteration : from Newton's last step; None where it is not determined
-    grid : from the cells' size; None where it is not determined, as on a grid too small to have a coarser one
-    surfaces : from one surface to another of its kind; None where one was solved, and all is about that one
-    record : from the length of one record; of a number that no record is needed for, none
-    range : what the number cannot leave
+    value : best estimate, mean over the solved surfaces
+    iteration : from Newton's last step; None where undetermined
+    grid : from the cell size; None where undetermined, as on a grid too small to have a coarser one
+    surfaces : from surface to surface of one kind; None where the result is about one surface
+    record : from the length of one record; NONE for a number that needs no record
+    range : bounds of the number
     """
 
     value: float
@@ -34,14 +34,17 @@ class Uncertainty:
 
     @property
     def numerical(self) -> Sides | None:
-        """Iteration and grid together: errors that add up."""
+        """Sum of iteration and grid error."""
         if self.iteration is None or self.grid is None:
             return None
         return self.iteration[0] + self.grid[0], self.iteration[1] + self.grid[1]
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """The whole 90 % interval: independent parts by their squares, within the range; None if one is unknown."""
+        """Total 90 % interval within the range; None if a part is unknown.
+
+        Independent parts add in quadrature.
+        """
         if self.numerical is None or self.record is None:
             return None
         below, above = (
@@ -55,7 +58,7 @@ class Uncertainty:
 
     @property
     def halves(self) -> dict[str, float | None]:
-        """Half-width of each part, mean of both sides; None where it is not known."""
+        """Half-width of each part, mean of both sides; None where unknown."""
         parts = {"numerical": self.numerical, "surfaces": self.surfaces, "record": self.record}
         return {
             name: None if sides is None else 0.5 * (sides[0] + sides[1])
@@ -75,11 +78,11 @@ class Uncertainty:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactError:
-    """How far the figures of a contact may be off.
+    """Uncertainty of a contact's load share and resonance.
 
-    `clr` of the load share, `crf_hz` of the contact resonance (None where none was looked for, or
-    none found); `surfaces` how many were solved. `choices` are in no interval: what was chosen,
-    and would move the numbers if it were chosen otherwise, a few words each.
+    `clr` of the load share, `crf_hz` of the contact resonance (None where not sought or not found);
+    `surfaces` the number of solved surfaces. `choices` names assumptions not covered by the
+    interval.
     """
 
     clr: Uncertainty

@@ -1,12 +1,12 @@
-"""numba's compilation with a cache that can be damaged, emptied or nowhere to be kept: then kernels compile anew.
+"""numba compilation with a verified on-disk cache; kernels recompile if it is damaged or absent.
 
-numba loads what its cache holds as it stands, machine code included, and raises where it holds
-nothing sensible. Here a digest follows everything in it; what does not fit is thrown away. Against
-others who may write there it is no guard.
+numba executes the machine code in its cache unchecked and raises on malformed files. Here a digest
+is appended to every file, and a file that does not match it is deleted. This is no protection
+against an attacker with write access to the folder.
 
-A kernel holds what it calls and constants of modules beside its own: it is stale when any of them
-has changed. numba numbers what it keeps, and two processes may take one number for two signatures:
-so all of it says what it is.
+A kernel inlines the kernels that it calls and the constants of their modules, so it is stale when
+any module of the folder has changed. numba numbers its data files, and two processes may use one
+number for two signatures: every entry therefore stores its source stamp and its key.
 """
 
 import pickle
@@ -21,18 +21,18 @@ import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.runtime.nrt import rtsys
 
-_DIGEST = 32  # bytes behind what is kept; pickle passes over them
+_DIGEST = 32  # bytes appended to each file; pickle ignores trailing bytes
 
 
 class _CheckedFile(IndexDataCacheFile):
-    """The cache of one function on disk."""
+    """Disk cache of one function."""
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep what was compiled, with what it was compiled from and for."""
+        """Store compiled code with its source stamp and its key."""
         super().save(key, (self._source_stamp, key, data))
 
     def load(self, key: Any) -> Any:
-        """What was kept for a key; None where there is nothing, or something else."""
+        """Return the compiled code of a key; None where the entry is missing or another one."""
         stamp, known, data = super().load(key) or (None, None, None)
         return data if (stamp, known) == (self._source_stamp, key) else None
 
@@ -41,10 +41,10 @@ class _CheckedFile(IndexDataCacheFile):
         return body + sha256(body).digest()
 
     def _load_index(self) -> dict[Any, str]:
-        kept: dict[Any, str] = (
+        index: dict[Any, str] = (
             self._checked(Path(self._index_path), super()._load_index, versioned=True) or {}
         )
-        return kept
+        return index
 
     def _load_data(self, name: str) -> Any:
         return self._checked(
@@ -52,7 +52,7 @@ class _CheckedFile(IndexDataCacheFile):
         )
 
     def _checked(self, path: Path, load: Callable[[], Any], *, versioned: bool = False) -> Any:
-        """What a file of the cache gives; None, and no file, where it is not what was written."""
+        """Load a cache file; delete it and return None if its digest does not match."""
         try:
             with path.open("rb") as file:
                 if versioned:
@@ -62,7 +62,7 @@ class _CheckedFile(IndexDataCacheFile):
                 return load()
         except FileNotFoundError:
             return None
-        except Exception:  # noqa: BLE001 - whatever damage makes of a pickle
+        except Exception:  # noqa: BLE001 - a damaged pickle can raise anything
             pass
         with suppress(OSError):
             path.unlink()
@@ -71,41 +71,47 @@ class _CheckedFile(IndexDataCacheFile):
 
 @lru_cache
 def _sources(folder: Path) -> str:
-    """A digest of all modules in a folder."""
-    told = sha256()
+    """Return a digest of all modules in a folder."""
+    digest = sha256()
     for path in sorted(folder.glob("*.py")):
-        told.update(path.name.encode() + b"\0" + sha256(path.read_bytes()).digest())
-    return told.hexdigest()
+        digest.update(path.name.encode() + b"\0" + sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
 
 
 class _Cache(FunctionCache):
-    """The cache of one function; where nothing can be written, nothing is kept."""
+    """Cache of one function; disabled where the folder is not writable."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        kept = self._cache_file
-        stamp = (kept._source_stamp, _sources(Path(function.__code__.co_filename).parent))
-        self._cache_file = _CheckedFile(kept._cache_path, self._impl.filename_base, stamp)
+        default = self._cache_file
+        stamp = (default._source_stamp, _sources(Path(function.__code__.co_filename).parent))
+        self._cache_file = _CheckedFile(default._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was compiled before; numba loads all that compiling needs first, which takes longer than a solve."""
-        rtsys.initialize(target_context)  # kept machine code calls it
+        """Load compiled code without importing the compiler.
+
+        numba loads the whole compiler first, which takes longer than a solve.
+        """
+        rtsys.initialize(target_context)  # cached machine code calls the runtime
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled, if the disk lets us."""
+        """Store compiled code if the disk allows it."""
         with suppress(OSError):
             super().save_overload(sig, data)
 
 
 def njit(*, cache: bool, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """As numba's, with a cache that is checked; without one where no folder for it can be written."""
+    """Compile like `numba.njit`, with a verified cache.
+
+    The kernel is compiled without a cache where no folder for it is writable.
+    """
 
     def compiled(function: Callable[..., Any]) -> Any:
         kernel = numba.njit(**options)(function)
         if cache:
-            with suppress(RuntimeError):  # no folder: every process compiles for itself
+            with suppress(RuntimeError):  # no writable folder: every process compiles anew
                 kernel._cache = _Cache(function)
         return kernel
 

@@ -1,8 +1,8 @@
-"""Cheap approximate inverses of a stencil: line relaxation along x and, of five points, aggregation onto a coarse grid.
+"""Approximate inverses of a stencil: line relaxation along x, and aggregation onto a coarse grid.
 
-Every second x line is kept in arrays of its own and all of them are eliminated side by side, so
-that the innermost loop runs along a contiguous axis. All arrays of a call share one precision,
-which is also that of the arithmetic.
+Every second x line is stored in its own arrays and all of them are eliminated together, so that the
+innermost loop runs along a contiguous axis. Aggregation takes five-point stencils only. All arrays
+of a call share one precision, which is also that of the arithmetic.
 """
 
 from typing import NamedTuple
@@ -11,13 +11,13 @@ import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.kernels.compiled import njit
-from asperity.kernels.stencils import Far, Stencil
+from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 
-class Lines(NamedTuple):
-    """Every second x line of a stencil: its LU factors, and the couplings to the lines on both sides; (nx, lines).
+class LineFactors(NamedTuple):
+    """LU factors of every second x line of a stencil, and its couplings across; (nx, lines).
 
-    `far_lower` and `far_east` are of cells two away, (0, 0) where the stencil does not reach them.
+    `far_lower` and `far_east` belong to cells two away; shape (0, 0) for five-point stencils.
     """
 
     lower: Field
@@ -30,15 +30,17 @@ class Lines(NamedTuple):
 
 
 @njit(cache=True)
-def factor_lines(stencil: Stencil, far: Far, parity: int, least_pivot: float, lines: Lines) -> None:
-    """Eliminate every second x line, starting with `parity`, in place of `lines`.
+def factor_lines(
+    stencil: Stencil, far: OuterNeighbours, parity: int, least_pivot: float, lines: LineFactors
+) -> None:
+    """Factor every second x line, starting with `parity`, into `lines`.
 
-    Where an odd number of lines goes round, the first and the last are not coupled. A pivot below
-    the share `least_pivot` of its row's nearest entries is replaced by that; none for 0.
+    If the number of lines on the ring is odd, the first and the last are not coupled. A pivot below
+    the share `least_pivot` of its row's entries along x is raised to it; 0 disables this.
     """
-    reaching = lines.far_east.size > 0
+    seven_point = lines.far_east.size > 0
     nx, ny = stencil.centre.shape
-    one, least = stencil.centre.dtype.type(1.0), stencil.centre.dtype.type(least_pivot)
+    unity, least = stencil.centre.dtype.type(1.0), stencil.centre.dtype.type(least_pivot)
     count = lines.lower.shape[1]
     for i in range(nx):
         for k in range(count):
@@ -47,10 +49,10 @@ def factor_lines(stencil: Stencil, far: Far, parity: int, least_pivot: float, li
             lines.south[i, k] = stencil.south[i, j]
             lines.east[i, k] = stencil.east[i, j]
             pivot, west = stencil.centre[i, j], stencil.west[i, j]
-            if reaching:
+            if seven_point:
                 lines.far_east[i, k] = far.east[i, j]
                 lines.far_lower[i, k] = 0.0
-            if reaching and i > 1:
+            if seven_point and i > 1:
                 factor = far.west[i, j] * lines.inverse[i - 2, k]
                 west -= factor * lines.east[i - 2, k]
                 pivot -= factor * lines.far_east[i - 2, k]
@@ -58,7 +60,7 @@ def factor_lines(stencil: Stencil, far: Far, parity: int, least_pivot: float, li
             if i > 0:
                 factor = west * lines.inverse[i - 1, k]
                 pivot -= factor * lines.east[i - 1, k]
-                if reaching:
+                if seven_point:
                     lines.east[i, k] -= factor * lines.far_east[i - 1, k]
                 lines.lower[i, k] = factor
             else:
@@ -66,44 +68,46 @@ def factor_lines(stencil: Stencil, far: Far, parity: int, least_pivot: float, li
             if least > 0.0:
                 row = abs(stencil.west[i, j]) + abs(stencil.centre[i, j]) + abs(stencil.east[i, j])
                 pivot = max(pivot, least * row)
-            lines.inverse[i, k] = one / pivot
+            lines.inverse[i, k] = unity / pivot
         if ny % 2 == 1 and parity == 0:
             lines.north[i, count - 1] = 0.0
             lines.south[i, 0] = 0.0
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
-def relax_lines(lines: Lines, parity: int, residual: Field, others: Field, change: Field) -> None:
-    """Solve every second x line for its residual, the lines between held at `others`; in place of `change`."""
+def relax_lines(
+    lines: LineFactors, parity: int, residual: Field, others: Field, change: Field
+) -> None:
+    """Solve every second x line for its residual, the lines between fixed at `others`."""
     nx, count = residual.shape
-    between, reaching = others.shape[1], lines.far_east.size > 0
+    other_lines, seven_point = others.shape[1], lines.far_east.size > 0
     for i in range(nx):
         for k in range(count):
             change[i, k] = residual[i, k]
-        if between > 0:
+        if other_lines > 0:
             if parity == 0:
-                for k in range(min(count, between)):
+                for k in range(min(count, other_lines)):
                     change[i, k] -= lines.north[i, k] * others[i, k]
                 for k in range(1, count):
                     change[i, k] -= lines.south[i, k] * others[i, k - 1]
-                change[i, 0] -= lines.south[i, 0] * others[i, between - 1]
+                change[i, 0] -= lines.south[i, 0] * others[i, other_lines - 1]
             else:
                 for k in range(count):
                     change[i, k] -= lines.south[i, k] * others[i, k]
-                for k in range(min(count, between - 1)):
+                for k in range(min(count, other_lines - 1)):
                     change[i, k] -= lines.north[i, k] * others[i, k + 1]
-                if count == between:
+                if count == other_lines:
                     change[i, count - 1] -= lines.north[i, count - 1] * others[i, 0]
         if i > 0:
             for k in range(count):
                 change[i, k] -= lines.lower[i, k] * change[i - 1, k]
-        if reaching and i > 1:
+        if seven_point and i > 1:
             for k in range(count):
                 change[i, k] -= lines.far_lower[i, k] * change[i - 2, k]
     for k in range(count):
         change[nx - 1, k] *= lines.inverse[nx - 1, k]
     for i in range(nx - 2, -1, -1):
-        if reaching and i < nx - 2:
+        if seven_point and i < nx - 2:
             for k in range(count):
                 change[i, k] -= lines.far_east[i, k] * change[i + 2, k]
         for k in range(count):
@@ -114,12 +118,17 @@ def relax_lines(lines: Lines, parity: int, residual: Field, others: Field, chang
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
 def split_residual(
-    stencil: Stencil, far: Far, residual: Field, correction: Field, even: Field, odd: Field
+    stencil: Stencil,
+    far: OuterNeighbours,
+    residual: Field,
+    correction: Field,
+    even: Field,
+    odd: Field,
 ) -> None:
-    """What the stencil leaves of `residual` after `correction`, even and odd x lines apart."""
+    """Fill `even` and `odd` lines with the residual that remains after `correction`."""
     nx, ny = residual.shape
     left = np.empty(ny, residual.dtype)
-    last, reaching = ny - 1, far.west.size > 0
+    last, seven_point = ny - 1, far.west.size > 0
     for i in range(nx):
         for j in range(ny):
             left[j] = residual[i, j] - stencil.centre[i, j] * correction[i, j]
@@ -135,10 +144,10 @@ def split_residual(
         if i < nx - 1:
             for j in range(ny):
                 left[j] -= stencil.east[i, j] * correction[i + 1, j]
-        if reaching and i > 1:
+        if seven_point and i > 1:
             for j in range(ny):
                 left[j] -= far.west[i, j] * correction[i - 2, j]
-        if reaching and i < nx - 2:
+        if seven_point and i < nx - 2:
             for j in range(ny):
                 left[j] -= far.east[i, j] * correction[i + 2, j]
         for k in range(odd.shape[1]):
@@ -150,13 +159,18 @@ def split_residual(
 
 @njit(cache=True)
 def relax_zebra(
-    stencil: Stencil, far: Far, even: Lines, odd: Lines, residual: Field, change: Field
+    stencil: Stencil,
+    far: OuterNeighbours,
+    even: LineFactors,
+    odd: LineFactors,
+    residual: Field,
+    change: Field,
 ) -> None:
-    """Improve a change in place so that it better answers the residual: even, odd and even lines in turn."""
+    """Improve `change` in place by zebra line relaxation: even, odd and even lines in turn."""
     nx, kind = residual.shape[0], residual.dtype
-    of_even, of_odd = even.lower.shape[1], odd.lower.shape[1]
-    rest_even, rest_odd = np.empty((nx, of_even), kind), np.empty((nx, of_odd), kind)
-    by_even, by_odd = np.empty((nx, of_even), kind), np.empty((nx, of_odd), kind)
+    even_lines, odd_lines = even.lower.shape[1], odd.lower.shape[1]
+    rest_even, rest_odd = np.empty((nx, even_lines), kind), np.empty((nx, odd_lines), kind)
+    by_even, by_odd = np.empty((nx, even_lines), kind), np.empty((nx, odd_lines), kind)
     split_residual(stencil, far, residual, change, rest_even, rest_odd)
     relax_lines(even, 0, rest_even, np.empty((nx, 0), kind), by_even)
     relax_lines(odd, 1, rest_odd, by_even, by_odd)
@@ -180,9 +194,10 @@ def add_lines(even: Field, odd: Field, out: Field) -> None:
 def aggregate_stencil(
     stencil: Stencil, weight: Field, block: tuple[int, int], out: Stencil
 ) -> None:
-    """Sum the rows, times `weight`, over blocks of cells; cells without weight and couplings to them are left out.
+    """Sum the rows, times `weight`, over blocks of cells.
 
-    A block without any gets the row of an identity.
+    Cells without weight and couplings to them are left out; a block without weight gets an identity
+    row.
     """
     nx, ny = weight.shape
     cx, cy = out.centre.shape

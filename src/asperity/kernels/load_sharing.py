@@ -1,6 +1,6 @@
-"""Which of oil and asperities bears a cell, cell by cell; see `asperity.ehl.models.mixed` for the equations.
+"""Load sharing of oil and asperities, cell by cell; see `asperity.ehl.models.mixed`.
 
-All in double precision; knows no oil and no tolerance.
+All in double precision; knows no lubricant and no tolerance.
 """
 
 from typing import NamedTuple
@@ -11,13 +11,16 @@ from asperity.core.arrays import Codes, Field, Mask
 from asperity.kernels.compiled import njit
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film
 
-FREE = LUBRICATED  # code of a cell in which the oil's pressure is the total one
+FREE = LUBRICATED  # code of a cell without asperity pressure
 
 
-class Borne(NamedTuple):
-    """Pressures and gap of each cell, what flows out of it and how that grows with its own pressure, its film held."""
+class CellState(NamedTuple):
+    """Pressures, gap and net outflow of each cell.
 
-    signed: Field  # the oil's unknown
+    `own_outflow` is the derivative of the outflow in the cell's pressure at fixed film.
+    """
+
+    signed: Field  # signed unknown of the oil
     oil: Field
     total: Field
     gap: Field
@@ -25,20 +28,23 @@ class Borne(NamedTuple):
     own_outflow: Field
 
 
-class Bounds(NamedTuple):
-    """What closes a cell and what bears the most: contact film, compliance of a cell, and cap."""
+class ContactBounds(NamedTuple):
+    """Contact film, stiffness of a cell and pressure cap."""
 
     contact_gap: float
     contact_scale: float
-    closed_gap: float  # below which a cell counts as closed
+    closed_gap: float  # a cell with at most this gap counts as closed
     p_cap: float
 
 
 @njit(cache=True, error_model="numpy")
-def own_outflows(
-    film: Film, faces: Faces, carried: float, dx: float, dy: float, out: Field
+def outflow_by_pressure(
+    film: Film, faces: Faces, outflow_by_content: float, dx: float, dy: float, out: Field
 ) -> None:
-    """Derivative of each cell's net outflow by its own pressure, its film held; `carried` is that by its content."""
+    """Fill `out` with the derivative of each cell's net outflow in its pressure at fixed film.
+
+    `outflow_by_content` is the derivative in its content.
+    """
     nx, ny = out.shape
     for i in range(nx):
         for j in range(ny):
@@ -48,154 +54,171 @@ def own_outflows(
             out[i, j] = (
                 (east + west) / (dx * dx)
                 + across / (dy * dy)
-                + film.content_by_pressure[i, j] * carried
+                + film.content_by_pressure[i, j] * outflow_by_content
             )
 
 
 @njit(cache=True, error_model="numpy")
-def lean(
-    content: Field, upstream: Field, gap: Field, closed: float, opens: float, out: Field
+def limiter(
+    content: Field, upstream: Field, gap: Field, closed: float, opening_range: float, out: Field
 ) -> None:
-    """Half of 2 m₁ m₂/(m₁² + m₂²) of each cell's content m₂ and that upstream, m₁.
+    """Fill `out` with the slope limiter m₁ m₂/(m₁² + m₂²) of the wedge, m₁ upstream of m₂.
 
-    Less where a gap is less than `opens` beyond `closed`; 0 in the first cells along x.
+    It falls linearly to zero where a gap is less than `opening_range` above `closed`, and is zero
+    in the first cells along x.
     """
     nx, ny = content.shape
     out[0] = 0.0
     for i in range(1, nx):
         for j in range(ny):
             here, before = content[i, j], upstream[i, j]
-            opened = min(max((gap[i, j] - closed) / opens, 0.0), 1.0)
-            opened *= min(max((gap[i - 1, j] - closed) / opens, 0.0), 1.0)
+            opened = min(max((gap[i, j] - closed) / opening_range, 0.0), 1.0)
+            opened *= min(max((gap[i - 1, j] - closed) / opening_range, 0.0), 1.0)
             out[i, j] = before * here / (before * before + here * here) * opened
 
 
 @njit(cache=True)
-def _pressing(cells: Borne, bounds: Bounds, i: int, j: int) -> tuple[float, float]:
-    """How far a cell is open, as a pressure, and what the asperities bear of its total one."""
+def _contact_excess(cells: CellState, bounds: ContactBounds, i: int, j: int) -> tuple[float, float]:
+    """Return the gap beyond contact as a pressure, and the asperity pressure."""
     touching = (cells.gap[i, j] - bounds.contact_gap) * bounds.contact_scale
     return touching, cells.total[i, j] - cells.oil[i, j]
 
 
 @njit(cache=True)
-def lift(cells: Borne, bounds: Bounds, lifted: Mask) -> bool:
-    """Mark closed cells that take in more oil than drives out again; whether the oil of one bears less than the total.
+def mark_opening(cells: CellState, bounds: ContactBounds, opening: Mask) -> bool:
+    """Mark closed cells that gain more oil than drains at the full pressure.
 
-    Not those so deep in overlap that lifting them alone would take more than the cap.
+    Excludes cells whose overlap is so deep that lifting them would take more than the cap. Returns
+    whether any marked cell still has asperity pressure.
     """
-    nx, ny = lifted.shape
-    found = False
+    nx, ny = opening.shape
+    any_found = False
     for i in range(nx):
         for j in range(ny):
-            total, (touching, borne) = cells.total[i, j], _pressing(cells, bounds, i, j)
-            lifted[i, j] = (
-                borne >= touching
+            total, (touching, asperity_pressure) = (
+                cells.total[i, j],
+                _contact_excess(cells, bounds, i, j),
+            )
+            opening[i, j] = (
+                asperity_pressure >= touching
                 and total - touching <= bounds.p_cap
-                and cells.outflow[i, j] + borne * cells.own_outflow[i, j] < 0.0
+                and cells.outflow[i, j] + asperity_pressure * cells.own_outflow[i, j] < 0.0
                 and cells.signed[i, j] >= 0.0
             )
-            found = found or (lifted[i, j] and borne > 0.0)
-    return found
+            any_found = any_found or (opening[i, j] and asperity_pressure > 0.0)
+    return any_found
 
 
 @njit(cache=True)
-def settle(
-    cells: Borne,
-    bounds: Bounds,
-    lifted: Mask,
+def fill_contact_rows(
+    cells: CellState,
+    bounds: ContactBounds,
+    opening: Mask,
     freed: Mask,
     solid: Codes,
     residual: Field,
     sunk: Mask,
 ) -> bool:
-    """Fill in what decides each cell's total pressure, and what is left of its equation; whether a free cell is sunk.
+    """Fill the state and the residual of each cell's total pressure.
 
-    That is a free cell whose gap is still below the contact film. `freed` ones are free whatever
-    their gap, and those `lifted` where the oil bears it all.
+    `freed` cells are free whatever their gap, and so are `opening` ones without asperity pressure.
+    Marks in `sunk` free cells with a gap below the contact film, and returns whether there are any.
     """
     nx, ny = residual.shape
-    found = False
+    any_found = False
     for i in range(nx):
         for j in range(ny):
-            total, (touching, borne) = cells.total[i, j], _pressing(cells, bounds, i, j)
-            free = borne < touching or freed[i, j] or (lifted[i, j] and borne <= 0.0)
-            left, beyond = borne if free else touching, total - bounds.p_cap
-            capped = beyond > left
-            residual[i, j] = beyond if capped else left
+            total, (touching, asperity_pressure) = (
+                cells.total[i, j],
+                _contact_excess(cells, bounds, i, j),
+            )
+            free = (
+                asperity_pressure < touching
+                or freed[i, j]
+                or (opening[i, j] and asperity_pressure <= 0.0)
+            )
+            excess, cap_excess = asperity_pressure if free else touching, total - bounds.p_cap
+            capped = cap_excess > excess
+            residual[i, j] = cap_excess if capped else excess
             solid[i, j] = CAPPED if capped else (FREE if free else TOUCHING)
             sunk[i, j] = free and not capped and touching < 0.0 and total - touching <= bounds.p_cap
-            found = found or sunk[i, j]
-    return found
+            any_found = any_found or sunk[i, j]
+    return any_found
 
 
 @njit(cache=True, error_model="numpy")
-def shut_in(
-    cells: Borne, bounds: Bounds, solid: Codes, sunk: Mask, scale: Field, shut: Mask
+def mark_sealed(
+    cells: CellState, bounds: ContactBounds, solid: Codes, sunk: Mask, scale: Field, sealed: Mask
 ) -> None:
-    """Mark cells whose film does not change with the gap; closed ones have their rows scaled with their film held."""
+    """Mark cells whose film does not depend on the gap.
+
+    The rows of closed cells are rescaled at fixed film, in place.
+    """
     nx, ny = scale.shape
     for i in range(nx):
         for j in range(ny):
             closed = solid[i, j] != FREE and cells.gap[i, j] <= bounds.closed_gap
-            shut[i, j] = closed or (cells.gap[i, j] <= bounds.contact_gap and not sunk[i, j])
+            sealed[i, j] = closed or (cells.gap[i, j] <= bounds.contact_gap and not sunk[i, j])
             if closed:
                 scale[i, j] = 1.0 / cells.own_outflow[i, j]
 
 
 @njit(cache=True)
-def refilled(cells: Borne, bounds: Bounds, scale: Field, residual: Field, state: Codes) -> None:
-    """Fill in what is left of the oil's equations, and which of them decides, where cavities are refilled."""
+def fill_oil_rows(
+    cells: CellState, bounds: ContactBounds, scale: Field, residual: Field, state: Codes
+) -> None:
+    """Fill residual and state of the oil's equations, with refilled cavities."""
     nx, ny = residual.shape
     for i in range(nx):
         for j in range(ny):
             balanced, oil = cells.outflow[i, j] * scale[i, j], cells.oil[i, j]
-            left, code = (balanced, LUBRICATED) if balanced < oil else (oil, RUPTURED)
-            if oil - bounds.p_cap > left:
-                left, code = oil - bounds.p_cap, CAPPED
-            residual[i, j], state[i, j] = left, code
+            excess, code = (balanced, LUBRICATED) if balanced < oil else (oil, RUPTURED)
+            if oil - bounds.p_cap > excess:
+                excess, code = oil - bounds.p_cap, CAPPED
+            residual[i, j], state[i, j] = excess, code
 
 
 @njit(cache=True)
-def hold_film(held: Mask, film: Film) -> None:
-    """Fix a film's gap in some cells, in place."""
-    nx, ny = held.shape
+def fix_film_gap(fixed: Mask, film: Film) -> None:
+    """Set a film's derivatives in the gap to zero in the cells of `fixed`, in place."""
+    nx, ny = fixed.shape
     for i in range(nx):
         for j in range(ny):
-            if held[i, j]:
+            if fixed[i, j]:
                 film.content_by_gap[i, j] = film.log_mobility_by_gap[i, j] = 0.0
     for j in range(ny):
-        if held[0, j]:
+        if fixed[0, j]:
             film.ambient_by_gap[0, j] = 0.0
-        if held[nx - 1, j]:
+        if fixed[nx - 1, j]:
             film.ambient_by_gap[1, j] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def lean_slopes(
-    lean: Field, content: Field, upstream: Field, own: Field, by_upstream: Field
+def limiter_slopes(
+    limiter: Field, content: Field, upstream: Field, own: Field, by_upstream: Field
 ) -> None:
-    """How far the wedge leans for a change of each cell's content, and back for one of that upstream.
+    """Fill the derivatives of m₁ m₂/(m₁² + m₂²) (m₂ - m₁) in m₂ and, negative, in m₁.
 
-    Of m₁ m₂/(m₁² + m₂²) (m₂ - m₁); in the precision of what is filled in.
+    In the precision of the output arrays.
     """
-    nx, ny = lean.shape
+    nx, ny = limiter.shape
     for i in range(nx):
         for j in range(ny):
             here, before = content[i, j], upstream[i, j]
-            bend = (
+            curvature = (
                 (here - before)
                 * (here - before)
                 * (here + before)
                 / (here * here + before * before)
             )
             own[i, j], by_upstream[i, j] = (
-                lean[i, j] * (1.0 - bend / here),
-                lean[i, j] * (1.0 - bend / before),
+                limiter[i, j] * (1.0 - curvature / here),
+                limiter[i, j] * (1.0 - curvature / before),
             )
 
 
 @njit(cache=True)
-def fill_streaks(
+def extend_lubrication(
     gap: Field,
     closed_gap: float,
     solid: Codes,
@@ -204,17 +227,17 @@ def fill_streaks(
     state: Codes,
     residual: Field,
 ) -> None:
-    """Take closed cells at the cap for lubricated as far down the stream as oil fills those before, in place.
+    """Mark closed cells at the cap as lubricated downstream of filled ones, in place.
 
-    `balanced` is the outflow and its scale, which tell what is left of such a cell's equation.
+    `balanced` is the outflow and its scale, which give the residual of such a cell.
     """
     outflow, scale = balanced
     nx, ny = gap.shape
-    fills = np.zeros(ny, np.bool_)  # those of the cells before that hand oil on
+    fills = np.zeros(ny, np.bool_)  # upstream cells that pass oil on
     for i in range(nx):
         for j in range(ny):
-            shut = solid[i, j] == CAPPED and gap[i, j] <= closed_gap
+            sealed = solid[i, j] == CAPPED and gap[i, j] <= closed_gap
             own = state[i, j] == LUBRICATED and residual[i, j] < 0.0
-            fills[j] = shut and (own or fills[j])
+            fills[j] = sealed and (own or fills[j])
             if fills[j] and state[i, j] == RUPTURED and not rim[j]:
                 state[i, j], residual[i, j] = LUBRICATED, outflow[i, j] * scale[i, j]

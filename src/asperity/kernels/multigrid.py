@@ -1,8 +1,8 @@
-"""A five-point stencil summed over blocks of two by two again and again, and all these grids relaxed in turns.
+"""Algebraic multigrid for a five-point stencil: blocks of two by two, relaxed on every level.
 
-The grids stand one behind the other in flat arrays, so that one call goes through all of them:
-between calls of many small kernels more time passes than in them. Rows are scaled by the sum of
-their entries' sizes, so that single precision holds the coarsest as well as the finest.
+All levels lie one after another in flat arrays, so that one call runs through all of them: calling
+many small kernels takes longer than running them. Rows are scaled by the sum of their entries'
+magnitudes, so that single precision suffices on every level.
 """
 
 from typing import NamedTuple
@@ -11,22 +11,27 @@ import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.kernels.compiled import njit
-from asperity.kernels.line_relaxation import Lines, aggregate_stencil, factor_lines, relax_zebra
-from asperity.kernels.stencils import Far, Stencil
+from asperity.kernels.line_relaxation import (
+    LineFactors,
+    aggregate_stencil,
+    factor_lines,
+    relax_zebra,
+)
+from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 
-class Nest(NamedTuple):
-    """Grids from the first coarser one on, flat; the last one's `inverse` is a matrix.
+class GridHierarchy(NamedTuple):
+    """Levels from the first coarse grid on, stored flat; `inverse` is a matrix on the last one.
 
-    `places` holds for each its cells along x and y, and where it begins in arrays of cells, of
-    even and of odd lines. `over` is one over what its rows are scaled by, `weight` that scale, 0
-    in blocks without any cells; `even` and `odd` are the factors of its lines, (5, cells),
-    `residual` and `change` what goes round.
+    `places` holds for each level its cells along x and y, and its offsets in arrays of cells, of
+    even and of odd lines. `weight` is the scale of its rows, 0 in empty blocks, and `inverse_scale`
+    one over it; `even` and `odd` are the factors of its lines, (5, cells); `residual` and `change`
+    are work arrays.
     """
 
     places: np.ndarray
     stencil: Field
-    over: Field
+    inverse_scale: Field
     weight: Field
     even: Field
     odd: Field
@@ -37,14 +42,15 @@ class Nest(NamedTuple):
 
 @njit(cache=True)
 def _grid(flat: Field, places: np.ndarray, k: int) -> Field:
-    """A flat field on grid `k`."""
+    """Return the view of a flat field on level `k`."""
     nx, ny, start = places[k, 0], places[k, 1], places[k, 2]
     return flat[start : start + nx * ny].reshape((nx, ny))
 
 
 @njit(cache=True)
-def _stencil(nest: Nest, k: int) -> Stencil:
-    parts, places = nest.stencil, nest.places
+def _stencil(hierarchy: GridHierarchy, k: int) -> Stencil:
+    """Return the stencil of level `k`."""
+    parts, places = hierarchy.stencil, hierarchy.places
     return Stencil(
         _grid(parts[0], places, k),
         _grid(parts[1], places, k),
@@ -55,31 +61,32 @@ def _stencil(nest: Nest, k: int) -> Stencil:
 
 
 @njit(cache=True)
-def _lines(flat: Field, nx: int, count: int, start: int, nothing: Field) -> Lines:
-    """Factors of every second line of a grid."""
+def _lines(flat: Field, nx: int, count: int, start: int, empty: Field) -> LineFactors:
+    """Return the factors of every second line of a level."""
     end = start + nx * count
-    return Lines(
+    return LineFactors(
         flat[0, start:end].reshape((nx, count)),
         flat[1, start:end].reshape((nx, count)),
         flat[2, start:end].reshape((nx, count)),
         flat[3, start:end].reshape((nx, count)),
         flat[4, start:end].reshape((nx, count)),
-        nothing,
-        nothing,
+        empty,
+        empty,
     )
 
 
 @njit(cache=True)
-def _both_lines(nest: Nest, k: int, nothing: Field) -> tuple[Lines, Lines]:
-    nx, ny, _, even, odd = nest.places[k]
-    return _lines(nest.even, nx, (ny + 1) // 2, even, nothing), _lines(
-        nest.odd, nx, ny // 2, odd, nothing
+def _both_lines(hierarchy: GridHierarchy, k: int, empty: Field) -> tuple[LineFactors, LineFactors]:
+    """Return the factors of the even and the odd lines of level `k`."""
+    nx, ny, _, even, odd = hierarchy.places[k]
+    return _lines(hierarchy.even, nx, (ny + 1) // 2, even, empty), _lines(
+        hierarchy.odd, nx, ny // 2, odd, empty
     )
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
-def summed(residual: Field, weight: Field, over: Field, out: Field) -> None:
-    """Sum residuals, times `weight`, over blocks of one or two cells along each axis, times `over` of the block."""
+def restrict_scaled(residual: Field, weight: Field, inverse_scale: Field, out: Field) -> None:
+    """Sum residuals, times `weight`, over blocks of one or two cells, times `inverse_scale`."""
     (nx, ny), (cx, cy) = residual.shape, out.shape
     along, across = 2 if cx < nx else 1, 2 if cy < ny else 1
     line = np.empty(ny, residual.dtype)
@@ -92,20 +99,20 @@ def summed(residual: Field, weight: Field, over: Field, out: Field) -> None:
                 line[j] += residual[i + 1, j] * weight[i + 1, j]
         if across == 2:
             for cj in range(ny // 2):
-                out[ci, cj] = (line[2 * cj] + line[2 * cj + 1]) * over[ci, cj]
+                out[ci, cj] = (line[2 * cj] + line[2 * cj + 1]) * inverse_scale[ci, cj]
             if ny % 2 == 1:
-                out[ci, cy - 1] = line[ny - 1] * over[ci, cy - 1]
+                out[ci, cy - 1] = line[ny - 1] * inverse_scale[ci, cy - 1]
         else:
             for cj in range(cy):
-                out[ci, cj] = line[cj] * over[ci, cj]
+                out[ci, cj] = line[cj] * inverse_scale[ci, cj]
 
 
 @njit(cache=True)
-def handed_on(coarse: Field, weight: Field, out: Field) -> None:
+def add_prolonged(coarse: Field, weight: Field, out: Field) -> None:
     """Add to every cell with a weight its block's value."""
     (nx, ny), (cx, cy) = out.shape, coarse.shape
     along, across = 2 if cx < nx else 1, 2 if cy < ny else 1
-    nothing, line = weight.dtype.type(0.0), np.empty(ny, out.dtype)
+    empty, line = weight.dtype.type(0.0), np.empty(ny, out.dtype)
     for ci in range(cx):
         if across == 2:
             for cj in range(ny // 2):
@@ -118,16 +125,21 @@ def handed_on(coarse: Field, weight: Field, out: Field) -> None:
                 line[j] = coarse[ci, j]
         for i in range(along * ci, min(along * (ci + 1), nx)):
             for j in range(ny):
-                out[i, j] += line[j] if weight[i, j] > nothing else nothing
+                out[i, j] += line[j] if weight[i, j] > empty else empty
 
 
 @njit(cache=True)
-def nest_blocks(stencil: Stencil, weight: Field, least_pivot: float, nest: Nest) -> bool:
-    """Fill a nest in from the finest grid's stencil, its rows times `weight`; whether its last grid has an inverse."""
-    nothing = np.empty((0, 0), weight.dtype)
-    last, finer, rows = len(nest.places) - 1, stencil, weight
+def build_hierarchy(
+    stencil: Stencil, weight: Field, least_pivot: float, hierarchy: GridHierarchy
+) -> bool:
+    """Build all levels from the finest stencil; return whether the last one is invertible.
+
+    The rows of the stencil are multiplied by `weight`.
+    """
+    empty = np.empty((0, 0), weight.dtype)
+    last, finer, rows = len(hierarchy.places) - 1, stencil, weight
     for k in range(last + 1):
-        nx, ny = nest.places[k, 0], nest.places[k, 1]
+        nx, ny = hierarchy.places[k, 0], hierarchy.places[k, 1]
         coarse = Stencil(
             np.empty((nx, ny)),
             np.empty((nx, ny)),
@@ -137,25 +149,25 @@ def nest_blocks(stencil: Stencil, weight: Field, least_pivot: float, nest: Nest)
         )
         fx, fy = rows.shape
         aggregate_stencil(finer, rows, (2 if nx < fx else 1, 2 if ny < fy else 1), coarse)
-        scaled, over, kept = (
-            _stencil(nest, k),
-            _grid(nest.over, nest.places, k),
-            _grid(nest.weight, nest.places, k),
+        scaled, inverse_scale, kept = (
+            _stencil(hierarchy, k),
+            _grid(hierarchy.inverse_scale, hierarchy.places, k),
+            _grid(hierarchy.weight, hierarchy.places, k),
         )
-        _scale(coarse, scaled, over, kept)
+        _scale(coarse, scaled, inverse_scale, kept)
         if k < last:
-            even, odd = _both_lines(nest, k, nothing)
-            factor_lines(scaled, Far(nothing, nothing), 0, least_pivot, even)
-            factor_lines(scaled, Far(nothing, nothing), 1, least_pivot, odd)
+            even, odd = _both_lines(hierarchy, k, empty)
+            factor_lines(scaled, OuterNeighbours(empty, empty), 0, least_pivot, even)
+            factor_lines(scaled, OuterNeighbours(empty, empty), 1, least_pivot, odd)
         finer, rows = scaled, kept
-    found: bool = invert(finer, nest.inverse)
-    return found
+    invertible: bool = invert(finer, hierarchy.inverse)
+    return invertible
 
 
 @njit(cache=True)
-def _scale(coarse: Stencil, scaled: Stencil, over: Field, weight: Field) -> None:
-    """Divide rows by the sum of their entries' sizes; a block without any cells has the row of an identity."""
-    nx, ny = over.shape
+def _scale(coarse: Stencil, scaled: Stencil, inverse_scale: Field, weight: Field) -> None:
+    """Divide rows by the sum of their entries' magnitudes; an empty block has an identity row."""
+    nx, ny = inverse_scale.shape
     for i in range(nx):
         for j in range(ny):
             centre, west, east = coarse.centre[i, j], coarse.west[i, j], coarse.east[i, j]
@@ -167,13 +179,13 @@ def _scale(coarse: Stencil, scaled: Stencil, over: Field, weight: Field) -> None
                 east / size,
             )
             scaled.north[i, j], scaled.south[i, j] = north / size, south / size
-            over[i, j] = 1.0 / size
+            inverse_scale[i, j] = 1.0 / size
             weight[i, j] = 0.0 if centre == 1.0 and size == 1.0 else size
 
 
 @njit(cache=True)
 def invert(stencil: Stencil, out: Field) -> bool:
-    """The inverse of a stencil's matrix, by Gauss and Jordan with pivots; whether there is one."""
+    """Invert a stencil's matrix by Gauss-Jordan elimination; return False if it is singular."""
     nx, ny = stencil.centre.shape
     count = nx * ny
     matrix, order = np.zeros((count, count)), np.arange(count)
@@ -208,14 +220,15 @@ def invert(stencil: Stencil, out: Field) -> bool:
                 matrix[row, k] = 0.0
                 for column in range(count):
                     matrix[row, column] -= factor * matrix[k, column]
-    for k in range(count):  # rows were taken in another order: columns of the inverse go back
+    for k in range(count):  # undo the row permutation in the columns of the inverse
         for row in range(count):
             out[row, order[k]] = matrix[row, k]
     return True
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
-def _times(matrix: Field, vector: Field, out: Field) -> None:
+def _multiply(matrix: Field, vector: Field, out: Field) -> None:
+    """Fill `out` with `matrix` times `vector`."""
     for row in range(len(out)):
         total = vector.dtype.type(0.0)
         for column in range(len(vector)):
@@ -224,44 +237,57 @@ def _times(matrix: Field, vector: Field, out: Field) -> None:
 
 
 @njit(cache=True)
-def answer_nested(nest: Nest, residual: Field, weight: Field, turns: int, change: Field) -> None:
-    """Add to `change` about what answers the finest grid's residual, one number a block of its cells.
+def apply_hierarchy(
+    hierarchy: GridHierarchy, residual: Field, weight: Field, cycles: int, change: Field
+) -> None:
+    """Add to `change` the approximate correction for a residual, one value per finest block.
 
-    On every grid but the last the coarser one's answer and its own lines, `turns` of both.
+    Every level but the last alternates the coarser correction and its own line relaxation, `cycles`
+    times.
     """
-    places, last = nest.places, len(nest.places) - 1
-    nothing, taken, k = np.empty((0, 0), weight.dtype), np.zeros(last + 1, np.int64), 0
-    summed(residual, weight, _grid(nest.over, places, 0), _grid(nest.residual, places, 0))
+    places, last = hierarchy.places, len(hierarchy.places) - 1
+    empty, cycles_done, k = np.empty((0, 0), weight.dtype), np.zeros(last + 1, np.int64), 0
+    restrict_scaled(
+        residual,
+        weight,
+        _grid(hierarchy.inverse_scale, places, 0),
+        _grid(hierarchy.residual, places, 0),
+    )
     while k >= 0:
-        here, answer = _grid(nest.residual, places, k), _grid(nest.change, places, k)
+        rhs, answer = _grid(hierarchy.residual, places, k), _grid(hierarchy.change, places, k)
         if k == last:
-            _times(nest.inverse, here.reshape(here.size), answer.reshape(answer.size))
+            _multiply(hierarchy.inverse, rhs.reshape(rhs.size), answer.reshape(answer.size))
             k -= 1
             continue
-        stencil, own = _stencil(nest, k), _grid(nest.weight, places, k)
-        even, odd = _both_lines(nest, k, nothing)
-        if taken[k] > 0:
-            handed_on(_grid(nest.change, places, k + 1), own, answer)
-            relax_zebra(stencil, Far(nothing, nothing), even, odd, here, answer)
+        stencil, own = _stencil(hierarchy, k), _grid(hierarchy.weight, places, k)
+        even, odd = _both_lines(hierarchy, k, empty)
+        if cycles_done[k] > 0:
+            add_prolonged(_grid(hierarchy.change, places, k + 1), own, answer)
+            relax_zebra(stencil, OuterNeighbours(empty, empty), even, odd, rhs, answer)
         else:
             answer[:] = 0.0
-        if taken[k] == turns:
-            taken[k] = 0
+        if cycles_done[k] == cycles:
+            cycles_done[k] = 0
             k -= 1
             continue
-        left = here
-        if taken[k] > 0:
-            left = np.empty_like(here)
-            _leave(stencil, here, answer, left)
-        taken[k] += 1
+        left = rhs
+        if cycles_done[k] > 0:
+            left = np.empty_like(rhs)
+            _remaining_residual(stencil, rhs, answer, left)
+        cycles_done[k] += 1
         k += 1
-        summed(left, own, _grid(nest.over, places, k), _grid(nest.residual, places, k))
-    handed_on(_grid(nest.change, places, 0), weight, change)
+        restrict_scaled(
+            left,
+            own,
+            _grid(hierarchy.inverse_scale, places, k),
+            _grid(hierarchy.residual, places, k),
+        )
+    add_prolonged(_grid(hierarchy.change, places, 0), weight, change)
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
-def _leave(stencil: Stencil, residual: Field, change: Field, left: Field) -> None:
-    """What a stencil leaves of a residual after a change."""
+def _remaining_residual(stencil: Stencil, residual: Field, change: Field, left: Field) -> None:
+    """Fill `left` with the residual that remains after a change."""
     nx, ny = residual.shape
     last = ny - 1
     for i in range(nx):

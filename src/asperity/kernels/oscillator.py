@@ -1,9 +1,9 @@
-"""Dormand and Prince's fifth-order Runge-Kutta with a fixed step: one mass on a contact spring over straight lines.
+"""Fixed-step Dormand-Prince integration of a mass on a contact spring over a rough profile.
 
 State (c, v): compression c = z0 + y_i - y and velocity v = y'. Between samples y_i is a straight
 line of slope s, so c' = s - v and m v' = S c + C c' - F, or S c^1.5 + C c' - F as long as c > 0
-(in the air only -F is left). Source: J. R. Dormand and P. J. Prince, J. Comput. Appl. Math. 6
-(1980) 19, the fifth-order solution.
+(only -F without contact). Source: J. R. Dormand and P. J. Prince, J. Comput. Appl. Math. 6 (1980)
+19, the fifth-order solution.
 """
 
 from typing import NamedTuple
@@ -14,8 +14,11 @@ from asperity.core.arrays import Field
 from asperity.kernels.compiled import njit
 
 
-class Contact(NamedTuple):
-    """Spring, damper and load, each over the mass; `hertz` tells the 3/2-power spring that can lose contact."""
+class ContactSpring(NamedTuple):
+    """Spring, damper and load, each divided by the mass.
+
+    `hertz` selects the 3/2-power spring, which can lose contact.
+    """
 
     spring: float
     damper: float
@@ -24,8 +27,8 @@ class Contact(NamedTuple):
 
 
 @njit(cache=True, inline="always")
-def push(contact: Contact, compression: float, rate: float) -> float:
-    """Acceleration of the mass."""
+def mass_acceleration(contact: ContactSpring, compression: float, rate: float) -> float:
+    """Return the acceleration of the mass."""
     if not contact.hertz:
         return contact.spring * compression + contact.damper * rate - contact.load
     if compression <= 0.0:
@@ -38,23 +41,33 @@ def push(contact: Contact, compression: float, rate: float) -> float:
 
 
 @njit(cache=True, fastmath={"contract", "nsz"}, error_model="numpy")
-def ride(
-    contact: Contact, slopes: Field, step: float, substeps: int, compression: Field, velocity: Field
+def integrate_contact(
+    contact: ContactSpring,
+    slopes: Field,
+    step: float,
+    substeps: int,
+    compression: Field,
+    velocity: Field,
 ) -> None:
-    """Fill compression and velocity at the samples from those at the first; `slopes` one between each two samples."""
+    """Fill compression and velocity at all samples from those at the first.
+
+    `slopes` holds the slope of the profile between each two samples.
+    """
     c, v = compression[0], velocity[0]
     h = step / substeps
     for n in range(slopes.size):
         s = slopes[n]
         for _ in range(substeps):
             c1 = s - v
-            v1 = push(contact, c, c1)
+            v1 = mass_acceleration(contact, c, c1)
             c2 = s - (v + h * (1 / 5) * v1)
-            v2 = push(contact, c + h * (1 / 5) * c1, c2)
+            v2 = mass_acceleration(contact, c + h * (1 / 5) * c1, c2)
             c3 = s - (v + h * ((3 / 40) * v1 + (9 / 40) * v2))
-            v3 = push(contact, c + h * ((3 / 40) * c1 + (9 / 40) * c2), c3)
+            v3 = mass_acceleration(contact, c + h * ((3 / 40) * c1 + (9 / 40) * c2), c3)
             c4 = s - (v + h * ((44 / 45) * v1 - (56 / 15) * v2 + (32 / 9) * v3))
-            v4 = push(contact, c + h * ((44 / 45) * c1 - (56 / 15) * c2 + (32 / 9) * c3), c4)
+            v4 = mass_acceleration(
+                contact, c + h * ((44 / 45) * c1 - (56 / 15) * c2 + (32 / 9) * c3), c4
+            )
             c5 = s - (
                 v
                 + h
@@ -65,7 +78,7 @@ def ride(
                     - (212 / 729) * v4
                 )
             )
-            v5 = push(
+            v5 = mass_acceleration(
                 contact,
                 c
                 + h
@@ -88,7 +101,7 @@ def ride(
                     - (5103 / 18656) * v5
                 )
             )
-            v6 = push(
+            v6 = mass_acceleration(
                 contact,
                 c
                 + h

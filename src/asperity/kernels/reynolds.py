@@ -1,11 +1,11 @@
-"""The finite-volume Reynolds equation on arrays: net outflow of each cell, and its derivative.
+"""Finite-volume Reynolds equation on arrays: net outflow of each cell, and its derivative.
 
 x is the first axis and aperiodic with zero pressure on both end faces; y is the second axis and
-periodic. The wedge leans upstream, face value m + a (m_next - m) + b (m - m_upstream): second
-order with (a, b) = (0, 1/2), third with (3/8, 1/8). Poiseuille faces carry the arithmetic mean of
-two node mobilities or their logarithmic one, which is exact for a viscosity that grows
-exponentially under a given flow; those at the ends carry the mean of their cell's and what that
-would be at zero pressure. Knows no units, no oil and no tolerance.
+periodic. The wedge term is upwind, face value m + a (m_next - m) + b (m - m_upstream): second order
+with (a, b) = (0, 1/2), third with (3/8, 1/8). Poiseuille faces carry the arithmetic mean of two
+node mobilities or their logarithmic mean, which is exact for a viscosity that grows exponentially
+at a given flow; end faces carry the mean of their cell's mobility and its value at zero pressure.
+Knows no units, no lubricant and no tolerance.
 """
 
 from typing import NamedTuple
@@ -15,14 +15,14 @@ import numpy as np
 from asperity.core.arrays import Codes, Field, Mask
 from asperity.kernels.compiled import njit
 
-RUPTURED, TOUCHING, LUBRICATED, CAPPED = 0, 1, 2, 3  # what decides a cell
+RUPTURED, TOUCHING, LUBRICATED, CAPPED = 0, 1, 2, 3  # equation that holds in a cell
 
 
 class Film(NamedTuple):
-    """Oil content m = rho H with its slopes in H and P, Poiseuille mobility eps with those of its logarithm.
+    """Oil content m = rho H and Poiseuille mobility eps, with derivatives in H and P.
 
-    `ambient` is the mobility that the first and the last cells along x would have at ambient
-    pressure, shape (2, ny).
+    The derivatives of eps are those of its logarithm. `ambient` is the mobility of the first and
+    the last cells along x at ambient pressure, shape (2, ny).
     """
 
     content: Field
@@ -34,28 +34,28 @@ class Film(NamedTuple):
     ambient: Field
     ambient_by_gap: Field
 
-    def held_where(self, held: Mask) -> "Film":
-        """The same film, its gap fixed in some cells."""
+    def with_fixed_gap(self, fixed: Mask) -> "Film":
+        """Return the film with its gap fixed in the cells of `fixed`."""
         return self._replace(
-            content_by_gap=np.where(held, 0.0, self.content_by_gap),
-            log_mobility_by_gap=np.where(held, 0.0, self.log_mobility_by_gap),
-            ambient_by_gap=np.where(held[[0, -1]], 0.0, self.ambient_by_gap),
+            content_by_gap=np.where(fixed, 0.0, self.content_by_gap),
+            log_mobility_by_gap=np.where(fixed, 0.0, self.log_mobility_by_gap),
+            ambient_by_gap=np.where(fixed[[0, -1]], 0.0, self.ambient_by_gap),
         )
 
     @property
-    def followed(self) -> "Film":
-        """The same film without a wedge, for oil that is balanced along its way."""
+    def without_wedge(self) -> "Film":
+        """The film without a wedge, for oil balanced along its path (Lagrangian)."""
         nothing = np.zeros_like(self.content)
         return self._replace(content_by_gap=nothing, content_by_pressure=nothing)
 
 
 class Faces(NamedTuple):
-    """Mobility of the faces east and north of each cell, and its slopes in the logarithms of both nodes' mobilities.
+    """Mobility of the east and north face of each cell, with derivatives in both log mobilities.
 
     The last face to the east is the outlet; `inlet` holds the first one to the west, shape (ny,);
-    `wedge` is (a, b). `behind` is the line of cells behind the north faces of the last one: the
-    first, where lines go round, or by a mirror the last or the one before. With a mirror no
-    equation of the first line is the oil's.
+    `wedge` is (a, b). `behind` is the line of cells north of the last one: the first, where y is
+    periodic, or with a mirror the last or the last but one. With a mirror no Reynolds equation
+    holds in the first line.
     """
 
     east: Field
@@ -70,18 +70,25 @@ class Faces(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """How each cell's equation is written: which of the four it is, and the factors that scale it like a pressure."""
+    """Equation of each cell (`state`), and the factors that scale it to a pressure."""
 
     state: Codes
     fluid_scale: Field  # 1/diagonal of the Reynolds rows
     contact_scale: float  # 1/compliance of the contact rows
 
 
-class Liquid(NamedTuple):
-    """Oil by its laws at each cell's pressure: density over the ambient one, viscosity, and what shear leaves of it.
+class PressureChange(NamedTuple):
+    """A change of pressure and the change of gap that it causes."""
 
-    With the slopes of density and of the viscosity's logarithm in P, and of the thinning's
-    logarithm in that of shear.
+    pressure: Field
+    gap: Field
+
+
+class Liquid(NamedTuple):
+    """Lubricant at each cell's pressure: relative density, viscosity and shear-thinning factor.
+
+    With the derivatives of density and of log viscosity in P, and of the log thinning factor in
+    that of the shear rate (`exponent`).
     """
 
     density: Field
@@ -94,15 +101,16 @@ class Liquid(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def fill_film(liquid: Liquid, height: Field, conductance: float, least: float, film: Film) -> None:
-    """Fill the cells of `film` in; `conductance` is the mobility per content and squared height, times the viscosity.
+    """Fill the cells of `film`.
 
-    No cell moves its oil less easily than `least` over its cubed height, as if that were constant:
-    Newton's steps do not converge with its slope in H.
+    `conductance` is the mobility per content and squared height, times the viscosity. The mobility
+    is at least `least` over the cubed height, and its derivatives are zero there: Newton's method
+    does not converge with its derivative in H.
     """
     nx, ny = height.shape
     for i in range(nx):
         for j in range(ny):
-            h, rho, rho_p, bent = (
+            h, rho, rho_p, exponent = (
                 height[i, j],
                 liquid.density[i, j],
                 liquid.density_slope[i, j],
@@ -119,15 +127,15 @@ def fill_film(liquid: Liquid, height: Field, conductance: float, least: float, f
                 rho_p * h,
             )
             film.mobility[i, j] = least / cubed if stiff else mobility
-            film.log_mobility_by_gap[i, j] = 0.0 if stiff else (3.0 + bent) / h
+            film.log_mobility_by_gap[i, j] = 0.0 if stiff else (3.0 + exponent) / h
             film.log_mobility_by_pressure[i, j] = (
-                0.0 if stiff else rho_p / rho - (1.0 + bent) * liquid.log_slope[i, j]
+                0.0 if stiff else rho_p / rho - (1.0 + exponent) * liquid.log_slope[i, j]
             )
 
 
 @njit(cache=True)
 def _log_mean(own: float, following: float, log_ratio: float) -> tuple[float, float, float]:
-    """Logarithmic mean of two positive numbers, and its slopes in their logarithms."""
+    """Return the logarithmic mean of two positive numbers and its slopes in their logarithms."""
     if abs(log_ratio) < 1e-2:
         mean = 0.5 * (own + following) * (1.0 - log_ratio * log_ratio / 12.0)
         return mean, own * (0.5 - log_ratio / 6.0), following * (0.5 + log_ratio / 6.0)
@@ -139,10 +147,10 @@ def _log_mean(own: float, following: float, log_ratio: float) -> tuple[float, fl
 def face_mobilities(
     film: Film, log_mobility: Field, logarithmic: bool, ends: Mask, faces: Faces
 ) -> None:
-    """Fill `faces` in; `log_mobility` is the natural logarithm of the film's mobility.
+    """Fill `faces`; `log_mobility` is the natural logarithm of the film's mobility.
 
-    Arithmetic means unless `logarithmic`; across `ends`, which tell of each line whether its north
-    face is one, always logarithmic ones.
+    Arithmetic means unless `logarithmic`; north faces of the lines marked in `ends` always take the
+    logarithmic mean.
     """
     nx, ny = log_mobility.shape
     eps = film.mobility
@@ -189,7 +197,7 @@ def net_outflow(
     dy: float,
     out: Field,
 ) -> None:
-    """Couette plus Poiseuille outflow minus inflow of each cell, per cell area."""
+    """Fill `out` with the net Couette plus Poiseuille outflow of each cell, per cell area."""
     nx, ny = pressure.shape
     a, b = faces.wedge[0], faces.wedge[1]
     over_dy2 = 1.0 / (dy * dy)
@@ -222,10 +230,10 @@ def net_outflow(
 
 
 @njit(cache=True)
-def leaning_outflow(content: Field, own: Field, upstream: Field, dx: float, out: Field) -> None:
-    """What a wedge of face values m + `own` m - `upstream` m_upstream adds to the outflow of each cell, per cell area.
+def limited_outflow(content: Field, own: Field, upstream: Field, dx: float, out: Field) -> None:
+    """Fill `out` with the outflow per cell area due to face values `own` m - `upstream` m_upstream.
 
-    The first and the last face along x stay as they are.
+    The first and the last face along x contribute nothing.
     """
     nx, ny = content.shape
     over_dx = content.dtype.type(1.0 / dx)
@@ -243,7 +251,7 @@ def leaning_outflow(content: Field, own: Field, upstream: Field, dx: float, out:
 def _through_north(
     faces: Faces, pressure: Field, d_pressure: Field, d_log: Field, i: int, j: int, jn: int
 ) -> float:
-    """Linearised Poiseuille flow from cell (i, j) to (i, jn)."""
+    """Return the linearised Poiseuille flow from cell (i, j) to (i, jn)."""
     d_face = faces.north_by_own[i, j] * d_log[j] + faces.north_by_next[i, j] * d_log[jn]
     d_flow = faces.north[i, j] * (d_pressure[i, j] - d_pressure[i, jn])
     flow: float = d_flow + d_face * (pressure[i, j] - pressure[i, jn])
@@ -256,21 +264,26 @@ def jacobian_product(
     film: Film,
     faces: Faces,
     pressure: Field,
-    d_pressure: Field,
-    d_gap: Field,
+    change: PressureChange,
     spacing: tuple[float, float],
     storing: float,
     out: Field,
 ) -> None:
-    """Every cell's scaled equation, linearised, applied to a change of pressure and the gap change it causes.
+    """Fill `out` with the linearised, scaled equations for a change of pressure and gap.
 
     A lubricated cell also stores `storing` times the oil content it gains: the inverse of a time
-    step. All arrays in one precision, which is also that of the arithmetic.
+    step. All arrays share one precision, which is also that of the arithmetic.
     """
     nx, ny = pressure.shape
     real = pressure.dtype.type
     dx, dy = spacing
-    half, over_dx, over_dy2, kept = real(0.5), real(1.0 / dx), real(1.0 / (dy * dy)), real(storing)
+    d_pressure, d_gap = change.pressure, change.gap
+    half, over_dx, over_dy2, storing_rate = (
+        real(0.5),
+        real(1.0 / dx),
+        real(1.0 / (dy * dy)),
+        real(storing),
+    )
     state, scale, touching = rows.state, rows.fluid_scale, real(rows.contact_scale)
     log_h, log_p = film.log_mobility_by_gap, film.log_mobility_by_pressure
     m_h, m_p = film.content_by_gap, film.content_by_pressure
@@ -304,7 +317,7 @@ def jacobian_product(
                     faces.east[i, j] * (d_pressure[i + 1, j] - d_pressure[i, j])
                     + d_face * (pressure[i + 1, j] - pressure[i, j])
                 )
-                out[i, j] = (flux - upstream[j]) * over_dx + kept * here[j]
+                out[i, j] = (flux - upstream[j]) * over_dx + storing_rate * here[j]
                 upstream[j] = flux
         else:
             for j in range(ny):
@@ -318,8 +331,8 @@ def jacobian_product(
                     * over_dx
                     * (faces.east[i, j] * d_pressure[i, j] + d_face * pressure[i, j])
                 )
-                out[i, j] = (flux - upstream[j]) * over_dx + kept * here[j]
-        # y faces: what leaves a line through its north face enters the next
+                out[i, j] = (flux - upstream[j]) * over_dx + storing_rate * here[j]
+        # y faces: outflow through a north face enters the next line
         last = ny - 1
         for j in range(last):
             north = _through_north(faces, pressure, d_pressure, d_log, i, j, j + 1)
@@ -339,10 +352,13 @@ def jacobian_product(
 
 
 @njit(cache=True, error_model="numpy")
-def fluid_diagonal(film: Film, faces: Faces, near: Field, dx: float, dy: float, out: Field) -> None:
-    """Derivative of each cell's net outflow by its own pressure, kept positive; `near` holds the compliance along x.
+def fluid_diagonal(
+    film: Film, faces: Faces, compliance: Field, dx: float, dy: float, out: Field
+) -> None:
+    """Fill `out` with the positive derivative of each cell's net outflow in its own pressure.
 
-    The wedge is taken as first order: a scale, and the start of a preconditioner, need no more.
+    `compliance` holds the compliance along x. The wedge is taken as first order, which suffices for
+    a scale and as the diagonal of a preconditioner.
     """
     nx, ny = out.shape
     m_h, m_p = film.content_by_gap, film.content_by_pressure
@@ -352,15 +368,15 @@ def fluid_diagonal(film: Film, faces: Faces, near: Field, dx: float, dy: float, 
             east = faces.east[i, j] if i < nx - 1 else 2.0 * faces.east[i, j]
             west = faces.east[i - 1, j] if i > 0 else 2.0 * faces.inlet[j]
             above = m_h[i - 1, j] if i > 0 else m_h[i, j]
-            wedge = m_h[i, j] * near[0] - above * near[1] + m_p[i, j]
-            wedge = max(wedge, near[0] - near[1])
+            wedge = m_h[i, j] * compliance[0] - above * compliance[1] + m_p[i, j]
+            wedge = max(wedge, compliance[0] - compliance[1])
             across = faces.north[i, j] + faces.north[i, js]
             out[i, j] = (east + west) / (dx * dx) + across / (dy * dy) + wedge / dx
 
 
 @njit(cache=True)
-def in_precision_of(out: Field, part: Field, least: float) -> None:
-    """Fill in a field in the precision of `out`; what is no more than `least` is nothing."""
+def convert_precision(out: Field, part: Field, least: float) -> None:
+    """Fill `out` with `part` in the precision of `out`; values up to `least` become zero."""
     nx, ny = part.shape
     for i in range(nx):
         for j in range(ny):

@@ -1,6 +1,6 @@
-"""Shear stress of oil that is elastic, viscous and plastic at once, carried along x: Bair and Winer's equation marched.
+"""Shear stress of a viscoelastic-plastic oil, integrated along x: the Bair-Winer equation.
 
-Knows no oil and no contact; arrays in, array filled.
+Works on plain arrays; knows no lubricant and no contact.
 """
 
 import numpy as np
@@ -8,16 +8,19 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.kernels.compiled import njit
 
-SUBSTEPS = 8
-STIFF = 30.0  # relaxation times a step beyond which one implicit step is as good as many
-MOST_ITERATIONS = 100
+SUBSTEPS = 8  # implicit steps between two cells
+STIFF = 30.0  # relaxation times per step above which one implicit step is accurate enough
+MAX_ITERATIONS = 100  # of the scalar Newton solve
 
 
 @njit(cache=True)
-def yielded(known: float, stiffness: float) -> float:
-    """The s >= 0 with 1 - exp(-s) + stiffness s = known: Newton's method, from where it cannot overshoot."""
+def dimensionless_strain(known: float, stiffness: float) -> float:
+    """Solve 1 - exp(-s) + stiffness s = known for s >= 0 by Newton's method.
+
+    The initial guess lies where the iteration cannot overshoot.
+    """
     s = max(0.0, (known - 1.0) / stiffness)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         left = np.exp(-s)
         change = (known - 1.0 + left - stiffness * s) / (left + stiffness)
         s += change
@@ -27,13 +30,14 @@ def yielded(known: float, stiffness: float) -> float:
 
 
 @njit(cache=True)
-def carried_stress(
+def march_shear_stress(
     rate: Field, viscosity: Field, limit: Field, modulus: Field, transit: float, out: Field
 ) -> None:
-    """Fill the shear stress of oil on its way along x: dτ/dt = G (γ' + (τ_L/η) ln(1 - τ/τ_L)), implicit.
+    """Integrate dτ/dt = G (γ' + (τ_L/η) ln(1 - τ/τ_L)) along x, implicitly.
 
-    `transit` is the time from cell to cell; the first cells are at rest with themselves. Between
-    two cells ln η, τ_L, G and γ' change evenly. All fields (nx, ny), rates not negative.
+    `transit` is the travel time from cell to cell; the first cells are in steady state. ln η, τ_L,
+    G and γ' vary linearly between two cells. All fields have shape (nx, ny); rates are
+    non-negative.
     """
     nx, ny = rate.shape
     for j in range(ny):
@@ -52,6 +56,6 @@ def carried_stress(
                 tau = limit[i - 1, j] + share * (limit[i, j] - limit[i - 1, j])
                 g = modulus[i - 1, j] + share * (modulus[i, j] - modulus[i - 1, j])
                 gamma = rate[i - 1, j] + share * (rate[i, j] - rate[i - 1, j])
-                s = yielded((stress + g * time * gamma) / tau, g * time / eta)
+                s = dimensionless_strain((stress + g * time * gamma) / tau, g * time / eta)
                 stress = -tau * np.expm1(-s)
             out[i, j] = stress

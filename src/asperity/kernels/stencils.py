@@ -1,4 +1,4 @@
-"""The linearised Reynolds equation as stencils of a few cells, for approximate inverses; see `reynolds`.
+"""Linearised Reynolds equation as compact stencils, for approximate inverses; see `reynolds`.
 
 All arrays of a call share one precision, which is also that of the arithmetic.
 """
@@ -13,7 +13,7 @@ from asperity.kernels.reynolds import LUBRICATED, TOUCHING, Faces, Film, Rows
 
 
 class Stencil(NamedTuple):
-    """Five-point approximation of the scaled Jacobian: self, both x neighbours, both y neighbours."""
+    """Five-point approximation of the scaled Jacobian: cell, both x and both y neighbours."""
 
     centre: Field
     west: Field
@@ -22,8 +22,8 @@ class Stencil(NamedTuple):
     south: Field
 
 
-class Far(NamedTuple):
-    """What a stencil has of the cells two away along x; (0, 0) where it does not reach them."""
+class OuterNeighbours(NamedTuple):
+    """Stencil entries of the cells two away along x; shape (0, 0) for five-point stencils."""
 
     west: Field
     east: Field
@@ -34,28 +34,30 @@ def local_stencil(
     rows: Rows,
     film: Film,
     faces: Faces,
-    near: Field,
+    compliance: Field,
     spacing: tuple[float, float],
     storing: float,
     out: Stencil,
 ) -> None:
     """Fill the five-point approximation of the scaled Jacobian, in the precision of `out`.
 
-    `near` holds the compliance of cells 0, 1, 2 along x and, last, that of the cell from which on
-    it counts as far.
+    `compliance` holds the compliance of cells 0, 1, 2 along x and, last, that of the first far
+    cell.
     """
     nx, ny = out.centre.shape
     real = out.centre.dtype.type
-    none, one, two, kept = real(0.0), real(1.0), real(2.0), real(storing)
+    zero, unity, two, storing_rate = real(0.0), real(1.0), real(2.0), real(storing)
     dx, dy = spacing
     over_dx, over_dx2, over_dy2 = real(1.0 / dx), real(1.0 / (dx * dx)), real(1.0 / (dy * dy))
-    near0, near1, near2 = real(near[0]), real(near[1]), real(near[2])
-    touching_own = real((near[0] - near[3]) * rows.contact_scale)
-    touching_next = real((near[1] - near[3]) * rows.contact_scale)
+    compliance0, compliance1, compliance2 = (
+        real(compliance[0]),
+        real(compliance[1]),
+        real(compliance[2]),
+    )
+    touching_own = real((compliance[0] - compliance[3]) * rows.contact_scale)
+    touching_next = real((compliance[1] - compliance[3]) * rows.contact_scale)
     m_h, m_p = film.content_by_gap, film.content_by_pressure
-    across = np.empty(
-        ny + 1, out.centre.dtype
-    )  # of the y faces, each between its southern and northern cell
+    across = np.empty(ny + 1, out.centre.dtype)  # conductances of the y faces, south to north
     for i in range(nx):
         west_of, at_inlet, at_outlet = max(i - 1, 0), i == 0, i == nx - 1
         for j in range(ny):
@@ -64,22 +66,29 @@ def local_stencil(
         for j in range(ny):
             wet, touching = rows.state[i, j] == LUBRICATED, rows.state[i, j] == TOUCHING
             here, above = m_h[i, j], m_h[west_of, j]
-            above_p = none if at_inlet else m_p[west_of, j]
+            above_p = zero if at_inlet else m_p[west_of, j]
             scale = rows.fluid_scale[i, j]
             east = over_dx2 * (two * faces.east[i, j] if at_outlet else faces.east[i, j])
             west = over_dx2 * (two * faces.inlet[j] if at_inlet else faces.east[west_of, j])
-            wedge = here * near0 - above * near1 + m_p[i, j]
-            own_kept, next_kept = kept * (here * near0 + m_p[i, j]), kept * here * near1
-            centre = (east + west + across[j] + across[j + 1] + wedge * over_dx + own_kept) * scale
-            upstream = (
-                -west + (here * near1 - above * near0 - above_p) * over_dx + next_kept
+            wedge = here * compliance0 - above * compliance1 + m_p[i, j]
+            own_stored, next_stored = (
+                storing_rate * (here * compliance0 + m_p[i, j]),
+                storing_rate * here * compliance1,
+            )
+            centre = (
+                east + west + across[j] + across[j + 1] + wedge * over_dx + own_stored
             ) * scale
-            downstream = (-east + (here * near1 - above * near2) * over_dx + next_kept) * scale
-            out.centre[i, j] = centre if wet else (touching_own if touching else one)
-            out.west[i, j] = upstream if wet else (touching_next if touching else none)
-            out.east[i, j] = downstream if wet else (touching_next if touching else none)
-            out.north[i, j] = -across[j + 1] * scale if wet else none
-            out.south[i, j] = -across[j] * scale if wet else none
+            upstream = (
+                -west + (here * compliance1 - above * compliance0 - above_p) * over_dx + next_stored
+            ) * scale
+            downstream = (
+                -east + (here * compliance1 - above * compliance2) * over_dx + next_stored
+            ) * scale
+            out.centre[i, j] = centre if wet else (touching_own if touching else unity)
+            out.west[i, j] = upstream if wet else (touching_next if touching else zero)
+            out.east[i, j] = downstream if wet else (touching_next if touching else zero)
+            out.north[i, j] = -across[j + 1] * scale if wet else zero
+            out.south[i, j] = -across[j] * scale if wet else zero
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
@@ -92,14 +101,15 @@ def own_stencil(
     spacing: tuple[float, float],
     out: Stencil,
 ) -> None:
-    """Fill an approximation of the scaled Jacobian in which a gap gives way to its own cell's pressure alone.
+    """Fill a stencil of the scaled Jacobian whose gaps follow only their own cell's pressure.
 
-    By its `compliance`; the wedge is of first order, and mobilities of the inner faces follow
-    both. Rows that are not the oil's are those of an identity. In the precision of `out`.
+    `compliance` is that of a cell on itself; the wedge is of first order, and mobilities of inner
+    faces follow pressure and gap. Rows other than lubricated ones are identity rows. In the
+    precision of `out`.
     """
     nx, ny = pressure.shape
     real = out.centre.dtype.type
-    zero, one, two = real(0.0), real(1.0), real(2.0)
+    zero, unity, two = real(0.0), real(1.0), real(2.0)
     over_dx, over_dx2, over_dy2 = (
         real(1.0 / spacing[0]),
         real(1.0 / spacing[0] ** 2),
@@ -113,8 +123,7 @@ def own_stencil(
         film.log_mobility_by_pressure,
     )
     slope, slope_next, carried = np.empty((3, ny), out.centre.dtype)
-    # of the flow through each face, east and north and before them west: its slopes in the cells on
-    # both sides
+    # derivatives of the flow through the east, west and north faces in the cells on both sides
     by_here, by_east, by_before, by_west, across, over = np.zeros((6, ny), out.centre.dtype)
     for j in range(ny):
         slope_next[j] = log_p[0, j] + own * log_h[0, j]
@@ -127,25 +136,25 @@ def own_stencil(
             for j in range(ny):
                 slope_next[j] = log_p[i + 1, j] + own * log_h[i + 1, j]
                 through = over_dx2 * faces.east[i, j]
-                falling = over_dx2 * (pressure[i, j] - pressure[i + 1, j])
-                by_here[j] = through + falling * faces.east_by_own[i, j] * slope[j]
-                by_east[j] = falling * faces.east_by_next[i, j] * slope_next[j] - through
+                pressure_gradient = over_dx2 * (pressure[i, j] - pressure[i + 1, j])
+                by_here[j] = through + pressure_gradient * faces.east_by_own[i, j] * slope[j]
+                by_east[j] = pressure_gradient * faces.east_by_next[i, j] * slope_next[j] - through
         else:
             for j in range(ny):
                 by_here[j], by_east[j] = two * over_dx2 * faces.east[i, j], zero
         for j in range(ny):
             jn = j + 1 if j < last else faces.behind
-            through, falling = (
+            through, pressure_gradient = (
                 over_dy2 * faces.north[i, j],
                 over_dy2 * (pressure[i, j] - pressure[i, jn]),
             )
-            across[j] = through + falling * faces.north_by_own[i, j] * slope[j]
-            over[j] = falling * faces.north_by_next[i, j] * slope[jn] - through
+            across[j] = through + pressure_gradient * faces.north_by_own[i, j] * slope[j]
+            over[j] = pressure_gradient * faces.north_by_next[i, j] * slope[jn] - through
         for j in range(ny):
             wet = rows.state[i, j] == LUBRICATED
             scale = rows.fluid_scale[i, j] if wet else zero
             out.centre[i, j] = (
-                scale * (by_here[j] - by_west[j] + across[j] + carried[j]) if wet else one
+                scale * (by_here[j] - by_west[j] + across[j] + carried[j]) if wet else unity
             )
             out.west[i, j] = -scale * by_before[j]
             out.east[i, j] = scale * by_east[j]
@@ -166,7 +175,10 @@ def own_stencil(
 
 @njit(cache=True)
 def _first_line(faces: Faces, i: int, over_dy2: float) -> tuple[float, float]:
-    """Slopes of the flow into the first line where lines do not go round: no equation of that line is the oil's."""
+    """Return derivatives of the flow into the first line where y is not periodic.
+
+    No Reynolds equation holds in that line.
+    """
     through = over_dy2 * faces.north[i, faces.north.shape[1] - 1]
     return -through, through
 
@@ -177,29 +189,29 @@ def wedge_stencil(
     film: Film,
     faces: Faces,
     pressure: Field,
-    near: tuple[float, float],
+    compliance: tuple[float, float],
     spacing: tuple[float, float],
     out: Stencil,
-    far: Far,
+    far: OuterNeighbours,
 ) -> None:
-    """Fill an approximation of the scaled Jacobian that follows wedge and mobilities, in the precision of `out`.
+    """Fill a stencil of the scaled Jacobian that includes wedge and mobility derivatives.
 
-    A gap gives way to the pressure of its own cell and of the next ones along x, by the
-    compliances `near`; across x to its own alone. What the wedge then has of cells three upstream
-    is left out.
+    A gap follows the pressure of its own cell and of its neighbours along x, by the two values of
+    `compliance`; across x its own only. In the precision of `out`; the entry of the wedge three
+    cells upstream is dropped.
     """
     nx, ny = pressure.shape
     real = out.centre.dtype.type
-    zero, one = real(0.0), real(1.0)
+    zero, unity = real(0.0), real(1.0)
     n0, n1, over_dx, over_dy2 = (
-        real(near[0]),
-        real(near[1]),
+        real(compliance[0]),
+        real(compliance[1]),
         real(1.0 / spacing[0]),
         real(1.0 / spacing[1] ** 2),
     )
-    # of the flow through a face: its slopes in gap and pressure of the cells upstream, here and
-    # downstream, and from these in the pressures of the cells -2 ... 2 from here; the face to the
-    # east, and the one to the west
+    # derivatives of the flow through a face in gap and pressure of the cells upstream, here and
+    # downstream (`by_gap`, `by_pressure`), and in the pressures of the cells -2 ... 2 from here:
+    # east face (`flow`) and west face (`before`)
     by_gap, by_pressure = np.zeros((3, ny), out.centre.dtype), np.zeros((3, ny), out.centre.dtype)
     flow, before = np.zeros((5, ny), out.centre.dtype), np.zeros((5, ny), out.centre.dtype)
     for i in range(-1, nx):
@@ -218,7 +230,7 @@ def wedge_stencil(
                 scale = rows.fluid_scale[i, j] if wet else zero
                 far.west[i, j] = second * scale * (flow[0, j] - before[1, j])
                 out.west[i, j] = first * scale * (flow[1, j] - before[2, j])
-                out.centre[i, j] = over_dx * scale * (flow[2, j] - before[3, j]) if wet else one
+                out.centre[i, j] = over_dx * scale * (flow[2, j] - before[3, j]) if wet else unity
                 out.east[i, j] = last * scale * (flow[3, j] - before[4, j])
                 far.east[i, j] = last_but_one * scale * flow[4, j]
                 out.north[i, j], out.south[i, j] = zero, zero
@@ -237,13 +249,13 @@ def _flow_slopes(
     by_gap: Field,
     by_pressure: Field,
 ) -> None:
-    """Slopes of the flow through the faces east of cells `i`, -1 for the inlet's, in what is upstream, here and next.
+    """Fill derivatives of the flow through east faces in the upstream, own and next cell.
 
-    Of the ambient oil's mobility at the ends too.
+    `i` = -1 stands for the inlet faces. Includes the ambient mobility at both ends.
     """
     nx, ny = pressure.shape
     real = pressure.dtype.type
-    half, one, two = real(0.5), real(1.0), real(2.0)
+    half, unity, two = real(0.5), real(1.0), real(2.0)
     m_h, m_p, log_h, log_p = (
         film.content_by_gap,
         film.content_by_pressure,
@@ -252,39 +264,42 @@ def _flow_slopes(
     )
     if i < 0:
         for j in range(ny):
-            gone = over_dx * pressure[0, j]
-            by_gap[2, j] = m_h[0, j] - gone * (
+            end_gradient = over_dx * pressure[0, j]
+            by_gap[2, j] = m_h[0, j] - end_gradient * (
                 film.mobility[0, j] * log_h[0, j] + film.ambient_by_gap[0, j]
             )
             by_pressure[2, j] = (
-                -two * over_dx * faces.inlet[j] - gone * film.mobility[0, j] * log_p[0, j]
+                -two * over_dx * faces.inlet[j] - end_gradient * film.mobility[0, j] * log_p[0, j]
             )
     elif i == nx - 1:
         for j in range(ny):
-            gone = two * over_dx * pressure[i, j]
-            own = gone * faces.east_by_own[i, j]
+            end_gradient = two * over_dx * pressure[i, j]
+            own = end_gradient * faces.east_by_own[i, j]
             by_gap[0, j], by_pressure[0, j] = -half * m_h[i - 1, j], -half * m_p[i - 1, j]
             by_gap[1, j] = (
-                (one + half) * m_h[i, j]
+                (unity + half) * m_h[i, j]
                 + own * log_h[i, j]
-                + gone * half * film.ambient_by_gap[1, j]
+                + end_gradient * half * film.ambient_by_gap[1, j]
             )
             by_pressure[1, j] = (
-                (one + half) * m_p[i, j] + own * log_p[i, j] + two * over_dx * faces.east[i, j]
+                (unity + half) * m_p[i, j] + own * log_p[i, j] + two * over_dx * faces.east[i, j]
             )
             by_gap[2, j], by_pressure[2, j] = real(0.0), real(0.0)
     else:
         inner = real(i > 0)
         ahead, back, upstream = inner * faces.wedge[0], inner * faces.wedge[1], max(i - 1, 0)
         for j in range(ny):
-            falling, through = (
+            pressure_gradient, through = (
                 over_dx * (pressure[i, j] - pressure[i + 1, j]),
                 over_dx * faces.east[i, j],
             )
-            own, following = falling * faces.east_by_own[i, j], falling * faces.east_by_next[i, j]
+            own, following = (
+                pressure_gradient * faces.east_by_own[i, j],
+                pressure_gradient * faces.east_by_next[i, j],
+            )
             by_gap[0, j], by_pressure[0, j] = -back * m_h[upstream, j], -back * m_p[upstream, j]
-            by_gap[1, j] = (one - ahead + back) * m_h[i, j] + own * log_h[i, j]
-            by_pressure[1, j] = (one - ahead + back) * m_p[i, j] + own * log_p[i, j] + through
+            by_gap[1, j] = (unity - ahead + back) * m_h[i, j] + own * log_h[i, j]
+            by_pressure[1, j] = (unity - ahead + back) * m_p[i, j] + own * log_p[i, j] + through
             by_gap[2, j] = ahead * m_h[i + 1, j] + following * log_h[i + 1, j]
             by_pressure[2, j] = ahead * m_p[i + 1, j] + following * log_p[i + 1, j] - through
 
@@ -300,18 +315,21 @@ def _add_across(
     i: int,
     out: Stencil,
 ) -> None:
-    """Add the flows between the x lines, the gap answering to each cell's `own` pressure, to row `i` of a stencil."""
+    """Add the flows between x lines to row `i` of a stencil.
+
+    The gap follows each cell's own pressure, by the compliance `own`.
+    """
     ny = pressure.shape[1]
     for j in range(ny):
         jn = j + 1 if j < ny - 1 else faces.behind
-        through, falling = (
+        through, pressure_gradient = (
             over_dy2 * faces.north[i, j],
             over_dy2 * (pressure[i, j] - pressure[i, jn]),
         )
         slope = film.log_mobility_by_pressure[i, j] + own * film.log_mobility_by_gap[i, j]
         slope_next = film.log_mobility_by_pressure[i, jn] + own * film.log_mobility_by_gap[i, jn]
-        by_own = through + falling * faces.north_by_own[i, j] * slope
-        by_next = -through + falling * faces.north_by_next[i, j] * slope_next
+        by_own = through + pressure_gradient * faces.north_by_own[i, j] * slope
+        by_next = -through + pressure_gradient * faces.north_by_next[i, j] * slope_next
         if rows.state[i, j] == LUBRICATED:
             out.centre[i, j] += rows.fluid_scale[i, j] * by_own
             out.north[i, j] += rows.fluid_scale[i, j] * by_next

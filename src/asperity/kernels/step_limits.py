@@ -1,30 +1,39 @@
-"""Steps cut short, cell by cell."""
+"""Step limiter of the Newton iterations, cell by cell."""
+
+from typing import NamedTuple
 
 from asperity.core.arrays import Field
 from asperity.kernels.compiled import njit
 
 
-@njit(cache=True)
-def shorten(
-    step: Field,
-    size: Field,
-    most: tuple[float, float, float],
-    before: Field,
-    longest: Field,
-    out: Field,
-) -> None:
-    """Fill in the step, as far as `longest` allows, which is brought up to date: half where the step turns back.
+class StepBounds(NamedTuple):
+    """Largest step of a cell: `absolute`, or the share `relative` of its size if that is more.
 
-    `most` is the longest of all steps and the share of a cell's `size` that may be more, and what
-    always may be added; `before` is what the last step asked for.
+    A reversing cell halves its last limit; with `bound_reversals` that limit is bounded first.
+    """
+
+    absolute: float
+    relative: float
+    bound_reversals: bool
+
+
+@njit(cache=True)
+def limit_steps(
+    step: Field, size: Field, bounds: StepBounds, before: Field, longest: Field, out: Field
+) -> None:
+    """Fill `out` with the limited step and update the limits `longest` in place.
+
+    `before` is the last unlimited step. The limit halves where a step exceeds it and reverses
+    the sign of `before`; elsewhere it grows by half, up to the bounds.
     """
     nx, ny = step.shape
-    least, share, upward = most
     for i in range(nx):
         for j in range(ny):
-            asked, limit = step[i, j], longest[i, j]
-            allowed = max(least, share * size[i, j])
-            turned_back = asked * before[i, j] < 0.0 and abs(asked) > limit
-            limit = 0.5 * min(limit, allowed) if turned_back else min(1.5 * limit, allowed)
+            proposed, limit = step[i, j], longest[i, j]
+            allowed = max(bounds.absolute, bounds.relative * size[i, j])
+            if proposed * before[i, j] < 0.0 and abs(proposed) > limit:
+                limit = 0.5 * (min(limit, allowed) if bounds.bound_reversals else limit)
+            else:
+                limit = min(1.5 * limit, allowed)
             longest[i, j] = limit
-            out[i, j] = min(max(asked, -limit), max(limit, upward))
+            out[i, j] = min(max(proposed, -limit), limit)

@@ -112,10 +112,10 @@ class LinearBairWiner(Parametric):
 
 
 def _carried(film: ShearedFilm, limit: Field, modulus: Field) -> Field:
-    from asperity.kernels.shear_stress import carried_stress  # numba, for solved films only
+    from asperity.kernels.shear_stress import march_shear_stress  # numba, for solved films only
 
     stress = np.empty_like(film.pressure)
-    carried_stress(film.rate, film.viscosity, limit, modulus, film.transit, stress)
+    march_shear_stress(film.rate, film.viscosity, limit, modulus, film.transit, stress)
     return stress
 
 

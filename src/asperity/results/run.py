@@ -373,7 +373,7 @@ class Run:
         """The run as an xarray dataset: its `contents`."""
         return self.contents().to_dataset()
 
-    def contents(self) -> ehl.Contents:
+    def contents(self) -> ehl.FileContents:
         """The solution's contents, with every number of the run and maps of traction, temperature and von Mises stress.
 
         A run that is loaded takes nothing from these: they are worked out anew. Maps are in single
@@ -410,7 +410,7 @@ class Run:
         for key, value in self.scalars().items():
             if value is not None and not isinstance(value, bool):
                 variables[key] = ((), value, quantity(key).attributes)
-        return ehl.Contents(variables, coordinates, attributes)
+        return ehl.FileContents(variables, coordinates, attributes)
 
     def save(self, path: str | Path) -> Path:
         """Write the run as one netCDF that restates its case, whole or not at all, and return the path."""

@@ -14,7 +14,12 @@ from asperity.contact.hertz import line_stiffness
 from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.ehl import ContactSolution, Scales
 from asperity.ehl.linear_solvers.gmres import Shifted
-from asperity.ehl.linear_solvers.oscillating import Answer, Oscillating, at_cap, elastic
+from asperity.ehl.linear_solvers.oscillating import (
+    Oscillating,
+    OscillationResponse,
+    at_cap,
+    elastic,
+)
 from asperity.ehl.outcome import CONSERVING
 from asperity.solution.state import balance_of
 from asperity.solution.stiffness import ELASTIC, FLOWING, YIELDED, Yielded, checked_depth
@@ -99,7 +104,10 @@ class ShakenContact:
                 f"a dynamic stiffness needs a contact that stands still, and {balance.residual_rms:.1e} of this one's "
                 "equations is left; solve it without motion, or to its end"
             )
-        self.scales, self.yields = Scales.of(conditions, solution.lubricant), at_cap(balance)
+        self.scales, self.yields = (
+            Scales.from_conditions(conditions, solution.lubricant),
+            at_cap(balance),
+        )
         self.balance = elastic(balance) if yielded == ELASTIC else balance
         self.oscillating = Oscillating(self.balance)
 
@@ -117,7 +125,9 @@ class ShakenContact:
             raise BadInput(f"frequency must be 0 Hz or more, got {frequency_hz:g} Hz")
         return self._at(frequency_hz, tolerance, None)
 
-    def _at(self, frequency_hz: float, tolerance: float, start: Answer | None) -> DynamicStiffness:
+    def _at(
+        self, frequency_hz: float, tolerance: float, start: OscillationResponse | None
+    ) -> DynamicStiffness:
         answer = self.oscillating.answer(
             self.per_crossing(frequency_hz), tolerance=tolerance, start=start
         )
@@ -128,7 +138,7 @@ class ShakenContact:
             )
         return self._read(answer, frequency_hz)
 
-    def _read(self, answer: Answer, frequency_hz: float) -> DynamicStiffness:
+    def _read(self, answer: OscillationResponse, frequency_hz: float) -> DynamicStiffness:
         response, omega = self._response(complex(answer.total.sum())), 2.0 * math.pi * frequency_hz
         return DynamicStiffness(
             frequency_hz=frequency_hz,

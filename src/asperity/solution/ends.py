@@ -12,7 +12,7 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
 from asperity.ehl import ContactSolution, Scales
-from asperity.ehl.roller_profile import Along
+from asperity.ehl.roller_profile import RollerProfile
 
 LOADED = 0.01  # of the mean load per length, from which a place counts as loaded
 # load per length on an end by slices, over the mean, from which it bears, and needs close lines of
@@ -107,10 +107,13 @@ def along_roller(solution: ContactSolution) -> AlongRoller | None:
     conditions, grid = solution.conditions, solution.grid
     if conditions.geometry != "roller":
         return None
-    scales = Scales.of(conditions, solution.lubricant)
-    along, y = Along(conditions, scales.length, scales.gap), grid.y / scales.length
-    dome, gap = along.dome(grid.x, solution.pressure, grid.spacing[0]), solution.gap.min(axis=0)
-    on, pressures, films = along.on(y), along.at_ends(y, dome), along.at_ends(y, gap)
+    scales = Scales.from_conditions(conditions, solution.lubricant)
+    along, y = RollerProfile(conditions, scales.length, scales.gap), grid.y / scales.length
+    dome, gap = (
+        along.central_pressure(grid.x, solution.pressure, grid.spacing[0]),
+        solution.gap.min(axis=0),
+    )
+    on, pressures, films = along.inside(y), along.end_values(y, dome), along.end_values(y, gap)
     found = (
         {"edge_pressure": float(pressures.max()), "end_film": float(films.min())}
         if films.size

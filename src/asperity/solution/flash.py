@@ -283,7 +283,7 @@ def _passed_on(
             tolerance = max(AT_A_TIME, SURELY * SHARING_TOLERANCE * size / rest)
             single = (left / rest).astype(np.float32)
             solved += rest * gmres(
-                unbalanced, np.asarray, single, tolerance=tolerance, most_steps=MOST_STEPS
+                unbalanced, np.asarray, single, tolerance=tolerance, max_steps=MOST_STEPS
             )
             left = wanted.ravel() - unbalanced(solved)
     raise AsperityError(

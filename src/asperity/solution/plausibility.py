@@ -16,7 +16,7 @@ from asperity.ehl import (
     least_film,
     missing_inlet,
 )
-from asperity.ehl.grid_design import CELLS_IN_INLET, WIDEST_BAR
+from asperity.ehl.grid_design import CELLS_IN_INLET, MAX_CLR_ERROR
 from asperity.ehl.load_shares import carried_share
 from asperity.lubricant import Barus, Lubricant, Roelands
 from asperity.solution.ends import BEARING, along_roller
@@ -97,8 +97,10 @@ def undetermined(solution: ContactSolution, clr: Uncertainty) -> str | None:
     if solution.surface.sq > 0.0:
         if clr.numerical is None:
             reasons.append("no coarser grid tells how far it may be off")
-        elif max(clr.numerical) > WIDEST_BAR:
-            bar, most = (quantity("clr").text(value) for value in (max(clr.numerical), WIDEST_BAR))
+        elif max(clr.numerical) > MAX_CLR_ERROR:
+            bar, most = (
+                quantity("clr").text(value) for value in (max(clr.numerical), MAX_CLR_ERROR)
+            )
             reasons.append(f"an error bar of {bar}, where at most {most} tell something")
     return "; ".join(reasons) or None
 

@@ -17,7 +17,7 @@ from asperity.ehl import (
     lubrication_regime,
 )
 from asperity.ehl.film_formulas import Place
-from asperity.ehl.grid_design import FEWEST_IN_INLET
+from asperity.ehl.grid_design import MIN_CELLS_IN_INLET
 from asperity.ehl.load_shares import CENTRE
 
 _NUMBERS = {  # key in the catalogue -> field
@@ -172,7 +172,7 @@ def far_from_fits(solution: ContactSolution) -> str | None:
     flooded, begins = flooded_inlet(conditions, lubricant, missing=0.05), -solution.grid.lower[0]
     reason = (
         f"the grid has {length / cell:.2g} cells across the inlet"
-        if length < FEWEST_IN_INLET * cell
+        if length < MIN_CELLS_IN_INLET * cell
         else "the inlet starves it"
         if begins < flooded
         else "the grid is fine enough and the inlet flooded: the fit may not hold for these bodies and this oil"

@@ -18,7 +18,7 @@ from asperity.ehl.models.mixed import MixedBalance, evaluate
 from asperity.ehl.models.single_pressure import Balance
 from asperity.ehl.outcome import TWO_PRESSURES
 from asperity.ehl.problem_setup import contact_problem, on_one_line
-from asperity.ehl.strategies.mixed_search import pressures_of
+from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.kernels.reynolds import CAPPED, LUBRICATED
 
 
@@ -32,7 +32,7 @@ def balance_of(solution: ContactSolution, *, whole: bool = True) -> Balance | Mi
 
     Unless `whole`, a contact in which nothing varies along y is taken on one line of cells.
     """
-    scales = Scales.of(solution.conditions, solution.lubricant)
+    scales = Scales.from_conditions(solution.conditions, solution.lubricant)
     problem = contact_problem(
         solution.conditions,
         solution.lubricant,
@@ -58,7 +58,7 @@ def plastic_overlap(solution: ContactSolution) -> Field:
     depth = (
         depth
         * (balance.pressure >= balance.problem.p_cap)
-        * Scales.of(solution.conditions, solution.lubricant).gap
+        * Scales.from_conditions(solution.conditions, solution.lubricant).gap
     )
     return np.broadcast_to(depth, solution.grid.cells)
 

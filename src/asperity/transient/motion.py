@@ -20,7 +20,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_positive
 from asperity.ehl import (
-    LONGEST_STEP,
+    MAX_CELLS_PER_TIME_STEP,
     ContactSolution,
     ContactState,
     Oil,
@@ -30,12 +30,13 @@ from asperity.ehl import (
     solve_contact,
 )
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
-from asperity.ehl.models.single_pressure import Balance, Past, Problem
+from asperity.ehl.models.single_pressure import Balance, Problem, TransientTerm
 from asperity.ehl.newton.single_pressure import Step
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, MIXED, TWO_PRESSURES
 from asperity.ehl.problem_setup import contact_problem
 from asperity.ehl.strategies.grid_continuation import Progress, Search
-from asperity.ehl.strategies.mixed_search import MixedSearch, pressures_of
+from asperity.ehl.strategies.mixed_search import MixedSearch
+from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.lubricant import Lubricant
 from asperity.solution.state import state_of
 from asperity.surface import MovingSurfaces, Surface
@@ -115,9 +116,9 @@ def moving_contact(
         if there is no snapshot to start from.
     """
     require_positive("time step", time_step, "cells")
-    if time_step > LONGEST_STEP:
+    if time_step > MAX_CELLS_PER_TIME_STEP:
         raise BadInput(
-            f"time step must be at most {LONGEST_STEP:g} cells, got {time_step:g}; 1 follows the oil"
+            f"time step must be at most {MAX_CELLS_PER_TIME_STEP:g} cells, got {time_step:g}; 1 follows the oil"
         )
     if start not in ("steady", "stationary"):
         raise BadInput(f"start must be steady or stationary, got {start!r}")
@@ -156,7 +157,7 @@ class _Contact:
     ) -> None:
         self.conditions, self.lubricant, self.surfaces = conditions, lubricant, surfaces
         self.options, self.flattening, self.progress = options, flattening, progress
-        self.scales = Scales.of(conditions, lubricant)
+        self.scales = Scales.from_conditions(conditions, lubricant)
         self.seconds = step_seconds(conditions, surfaces, time_step)
         self.length = self.seconds * conditions.entrainment_speed / self.scales.length
         self.one_line = surfaces.uniform and conditions.endless
@@ -244,14 +245,14 @@ class _Contact:
         """The step's way to its solution, and by which attempt."""
         if self.options.model in TWO_PRESSURES:
             mixed = MixedSearch(self.options, self.scales.gap, self.progress)
-            return mixed, mixed.go_on(problem, unknowns), ATTEMPTS[0]
+            return mixed, mixed.continue_from(problem, unknowns), ATTEMPTS[0]
         search = Search(self.options, self.scales.gap, self.progress)
         for held in (
             False,
             True,
         ):  # where Newton's steps lead nowhere, the bodies are held and their distance searched
-            step = search.climb([problem], unknowns.total, unknowns.approach, held=held)
-            if search.settled(self.options.tolerance):
+            step = search.solve_levels([problem], unknowns.total, unknowns.approach, fixed=held)
+            if search.converged(self.options.tolerance):
                 break
         return search, step, HELD if held else ATTEMPTS[0]
 
@@ -260,13 +261,13 @@ class _Contact:
             return evaluate(problem, unknowns, second_order=True)
         return problem.evaluate(unknowns.total, unknowns.approach)
 
-    def _problem(self, surface: Surface, past: Past | None) -> Problem:
+    def _problem(self, surface: Surface, past: TransientTerm | None) -> Problem:
         posed = contact_problem(
             self.conditions, self.lubricant, surface, self.options, attempt=self.attempt
         )
         return replace(posed, past=past)
 
-    def _past(self, memory: Memory) -> Past:
+    def _past(self, memory: Memory) -> TransientTerm:
         content = memory["content"]
         leans = self.options.model == MIXED and self.followed
         first_order = leans or self.options.model == CONSERVING
@@ -276,19 +277,19 @@ class _Contact:
             before, rate, once, twice = content, 1.0, -1.0, 0.0
         source = once * content + twice * before
         if not self.followed:
-            return Past(rate / self.length, source / self.length, self.followed)
+            return TransientTerm(rate / self.length, source / self.length, self.followed)
         if self.options.model == CONSERVING:
             source[0], source[1:] = 0.0, -content[:-1]
-            return Past(rate / self.length, source / self.length, self.followed)
+            return TransientTerm(rate / self.length, source / self.length, self.followed)
         source[2:] = once * content[1:-1] + twice * before[:-2]
-        past = Past(rate / self.length, source / self.length, self.followed)
+        past = TransientTerm(rate / self.length, source / self.length, self.followed)
         if not leans:
             return past
         upstream, leant = (
             np.concatenate([memory[name][:1], memory[name][:-1]]) for name in ("content", "leant")
         )
         leant[:2] = 0.0
-        return replace(past, upstream=upstream, leant=leant)
+        return replace(past, upstream=upstream, limiter_correction=leant)
 
     def _snapshot(
         self,
@@ -308,7 +309,7 @@ class _Contact:
             "content": balance.content,
         }
         if isinstance(balance, MixedBalance):
-            memory["leant"] = balance.leant
+            memory["leant"] = balance.limiter_correction
         flow, elastic = _powers(balance)
         grid, conditions = solution.grid, self.conditions
         area = self.scales.length**2 * (

@@ -234,7 +234,7 @@ def _runge_kutta(
     substeps: int,
 ) -> tuple[Field, Field, Field, Mask]:
     """Compression beyond the static one, velocity, acceleration, and whether the mass touches."""
-    from asperity.kernels.oscillator import Contact, ride
+    from asperity.kernels.oscillator import ContactSpring, integrate_contact
 
     if substeps < 1:
         raise BadInput(
@@ -254,8 +254,13 @@ def _runge_kutta(
     damper = oscillator.damping / mass
     compression, velocity = np.empty(slopes.size + 1), np.empty(slopes.size + 1)
     compression[0], velocity[0] = z0, slopes[0]
-    ride(
-        Contact(spring, damper, load, hertz), slopes, 1.0 / rate_hz, substeps, compression, velocity
+    integrate_contact(
+        ContactSpring(spring, damper, load, hertz),
+        slopes,
+        1.0 / rate_hz,
+        substeps,
+        compression,
+        velocity,
     )
 
     rate = _mean_of_both_sides(slopes) - velocity

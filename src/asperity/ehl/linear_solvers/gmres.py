@@ -1,10 +1,8 @@
-"""GMRES, right-preconditioned, without restart, in the precision of what is wanted; real or complex.
+"""GMRES, right-preconditioned, without restart, in the precision of the right-hand side.
 
-And the same of equations with a frequency in them, which may move between two steps.
-
-SciPy's preconditions from the left, so that it stops on a residual nobody asked for, and
-orthogonalises vector by vector; at 65 000 unknowns and a few dozen steps that costs as much as the
-physics.
+Real or complex; also for equations with a frequency that may change between steps. SciPy's GMRES
+preconditions from the left, so that it stops on the preconditioned residual, and orthogonalises
+vector by vector; at 65 000 unknowns and a few dozen steps that costs as much as the physics.
 """
 
 from collections.abc import Callable
@@ -13,29 +11,22 @@ from typing import Any
 import numpy as np
 import scipy
 
+from asperity.ehl.controls import KRYLOV
+
 Vector = np.ndarray[Any, Any]
 Operator = Callable[[Any], Vector]
 
-FEW = 7  # vectors that there is room for at first
-CANCELLED = (
-    0.5  # share of a vector left by orthogonalising it, below which that is done once more ...
-)
-NEARLY_CANCELLED = (
-    0.1  # ... where all of it stays in this precision, and little is asked of the last digits
-)
-ADJOINT = 2  # what BLAS calls the conjugate transpose
-# what a step leaves of what was left, below which that tells where to go on, and not the step
-FALLING = 0.9
+ADJOINT = 2  # BLAS code of the conjugate transpose
 
 
-class Room:
-    """Memory for the vectors of one GMRES after the other: fresh memory takes as long as what is done with it."""
+class Workspace:
+    """Memory for successive GMRES solves: allocating it anew takes as long as the solve."""
 
     def __init__(self) -> None:
         self.parts: tuple[Vector, Vector] = (np.empty(0), np.empty(0))
 
     def rows(self, count: int, vector: Vector) -> tuple[Vector, Vector]:
-        """Two arrays of at least `count` rows like `vector`; rows of the same length are what they were before."""
+        """Return two arrays of at least `count` rows like `vector`, keeping earlier rows."""
         size = vector.size
         if self.parts[0].dtype != vector.dtype or self.parts[0].size < count * size:
             before = self.parts
@@ -48,115 +39,111 @@ class Room:
         return first, second
 
 
-@np.errstate(
-    over="ignore", invalid="ignore"
-)  # what leaves this precision's range is found out below
+@np.errstate(over="ignore", invalid="ignore")  # overflow is detected below
 def gmres(
     product: Operator,
     precondition: Operator,
-    wanted: Vector,
+    rhs: Vector,
     *,
     tolerance: float,
-    most_steps: int,
-    room: Room | None = None,
+    max_steps: int,
+    workspace: Workspace | None = None,
 ) -> Vector:
-    """Solve product(x) = wanted until the residual has fallen by `tolerance` or steps run out; return the best x.
+    """Solve product(x) = rhs to a relative residual `tolerance`; return the best x.
 
-    Where many are solved one after the other, all of them may have one `room`.
+    At most `max_steps` steps. Successive solves may share one `workspace`.
     """
-    exact = np.result_type(wanted.dtype, float)
-    norm = _length(wanted)
+    exact = np.result_type(rhs.dtype, float)
+    norm = _norm(rhs)
     if norm == 0.0:
-        return np.zeros_like(wanted)
-    room = room or Room()
-    basis, corrections = room.rows(min(FEW, most_steps) + 1, wanted)
-    triangle = np.zeros((most_steps, most_steps), exact)
-    turns = np.zeros(
-        (most_steps, 2), exact
-    )  # cosine and sine of the rotations that make the Hessenberg matrix a triangle
-    target = np.zeros(most_steps + 1, exact)
+        return np.zeros_like(rhs)
+    workspace = workspace or Workspace()
+    basis, corrections = workspace.rows(min(KRYLOV.initial_vectors, max_steps) + 1, rhs)
+    triangle = np.zeros((max_steps, max_steps), exact)
+    rotations = np.zeros((max_steps, 2), exact)  # Givens rotations, cosine and sine
+    target = np.zeros(max_steps + 1, exact)
     target[0] = norm
-    np.divide(wanted, norm, out=basis[0])
-    for step in range(most_steps):
+    np.divide(rhs, norm, out=basis[0])
+    for step in range(max_steps):
         if step + 1 == len(basis):
-            basis, corrections = room.rows(2 * len(basis), wanted)
+            basis, corrections = workspace.rows(2 * len(basis), rhs)
         corrections[step] = precondition(basis[step])
         new = product(corrections[step])
         known = basis[: step + 1]
-        before = _length(new)
+        before = _norm(new)
         overlaps = (known @ new.conj()).conj()
         new -= overlaps @ known
-        column, length = overlaps.astype(exact), _length(new)
-        if not np.isfinite(
-            length
-        ):  # out of this precision's range: what is known already has to do
+        column, length = overlaps.astype(exact), _norm(new)
+        if not np.isfinite(length):  # overflow: use the corrections so far
             step -= 1
             break
-        if length < CANCELLED * before:
+        if length < KRYLOV.reorthogonalise * before:
             overlaps = (known @ new.conj()).conj()
             new -= overlaps @ known
-            column, length = column + overlaps, _length(new)
-        for i, (cosine, sine) in enumerate(turns[:step]):
+            column, length = column + overlaps, _norm(new)
+        for i, (cosine, sine) in enumerate(rotations[:step]):
             column[i : i + 2] = (
                 cosine.conj() * column[i] + sine * column[i + 1],
                 cosine * column[i + 1] - sine * column[i],
             )
         slant = float(np.hypot(abs(column[step]), length))
-        cosine, sine = turns[step] = (column[step] / slant, length / slant) if slant else (1.0, 0.0)
+        cosine, sine = rotations[step] = (
+            (column[step] / slant, length / slant) if slant else (1.0, 0.0)
+        )
         column[step] = slant
         triangle[: step + 1, step] = column
         target[step : step + 2] = np.conj(cosine) * target[step], -sine * target[step]
-        if abs(target[step + 1]) < tolerance * norm or length < np.finfo(wanted.dtype).eps * before:
+        if abs(target[step + 1]) < tolerance * norm or length < np.finfo(rhs.dtype).eps * before:
             break
         np.divide(new, length, out=basis[step + 1])
     count = step + 1
     if count == 0:
-        return np.full_like(wanted, np.nan)
+        return np.full_like(rhs, np.nan)
     weights = np.linalg.lstsq(triangle[:count, :count], target[:count], rcond=None)[0]
-    return np.asarray(weights.astype(wanted.dtype) @ corrections[:count])
+    return np.asarray(weights.astype(rhs.dtype) @ corrections[:count])
 
 
-def _length(vector: Vector) -> float:
+def _norm(vector: Vector) -> float:
+    """Return the Euclidean norm."""
     return float(np.sqrt(np.vdot(vector, vector).real))
 
 
 class Shifted:
-    """(A + iΩ B) x = a + iΩ b: corrections x one by one, their best combination at an Ω that may move on the way.
+    """Solver of (A + iΩ B) x = a + iΩ b whose frequency Ω may change between steps.
 
-    Adaptive simpler GMRES: a step answers what is left, or, where that hardly fell, what the last
-    step made of it. Either alone loses its digits, the one while nothing falls, the other once
-    much has fallen. Source: P. Jiránek and M. Rozložník, Numerical Algorithms 53 (2010) 93-112.
+    Adaptive simpler GMRES: a step preconditions the residual or, if that hardly fell, the last
+    basis vector. Either alone loses digits: the former while nothing falls, the latter once the
+    residual has fallen far. Source: P. Jiránek and M. Rozložník, Numerical Algorithms 53 (2010)
+    93-112.
 
     Parameters
     ----------
-    product, precondition : A v and B v of a complex vector; about what A turns into one
-    wanted : a and b
-    bearing : weights of the unknowns in `sum`, which is known after every step
-    frequency : the Ω to begin with
-    most_steps : room for corrections
+    product, precondition : A v and B v of a complex vector; approximate inverse of A
+    rhs : a and b
+    bearing : weights of the unknowns in `sum`, available after every step
+    frequency : initial Ω
+    max_steps : largest number of corrections
     """
 
     def __init__(
         self,
         product: Callable[[Any], tuple[Vector, Vector]],
         precondition: Operator,
-        wanted: tuple[Vector, Vector],
+        rhs: tuple[Vector, Vector],
         bearing: Vector,
         frequency: float,
-        most_steps: int,
+        max_steps: int,
     ) -> None:
-        self.product, self.precondition, self.wanted, self.frequency = (
+        self.product, self.precondition, self.rhs, self.frequency = (
             product,
             precondition,
-            wanted,
+            rhs,
             frequency,
         )
-        self.kind = wanted[0].dtype
+        self.kind = rhs[0].dtype
         self.bearing, self.count = bearing.astype(self.kind), 0
-        self.basis, self.corrections, self.stored = np.empty(
-            (3, most_steps, wanted[0].size), self.kind
-        )
-        self.triangle = np.zeros((most_steps, most_steps), complex)
+        self.basis, self.corrections, self.stored = np.empty((3, max_steps, rhs[0].size), self.kind)
+        self.triangle = np.zeros((max_steps, max_steps), complex)
         self.times, self.plus = scipy.linalg.get_blas_funcs(("gemv", "axpy"), (self.basis,))
         self.sums: list[complex] = []
         self.falls: bool
@@ -164,8 +151,8 @@ class Shifted:
 
     @property
     def left(self) -> float:
-        """Share of the equations that is left, as far as this precision tells."""
-        return _length(self.rest) / self.size
+        """Relative residual, within this precision."""
+        return _norm(self.rest) / self.size
 
     @property
     def sum(self) -> complex:
@@ -174,61 +161,62 @@ class Shifted:
 
     @property
     def full(self) -> bool:
-        """Whether there is no room for further corrections."""
+        """True if no further correction can be stored."""
         return self.count == len(self.basis)
 
     def answer(self) -> Vector:
-        """The unknowns."""
+        """Return the unknowns."""
         return np.asarray(self._combination().astype(self.kind) @ self.corrections[: self.count])
 
     def step(self) -> bool:
-        """One correction more; False where it told nothing new."""
-        before = _length(self.rest)
+        """Add a correction; return False if it is linearly dependent."""
+        before = _norm(self.rest)
         tried = self.rest / self.kind.type(before) if self.falls else self.basis[self.count - 1]
         correction = self.precondition(tried)
         rows, stored = self.product(correction)
-        if not self._met(self.plus(stored, rows, a=1j * self.frequency)):
+        if not self._append(self.plus(stored, rows, a=1j * self.frequency)):
             return False
         self.corrections[self.count], self.stored[self.count] = correction, stored
         self.sums.append(complex(correction @ self.bearing))
-        self.count, self.falls = self.count + 1, _length(self.rest) < FALLING * before
+        self.count, self.falls = self.count + 1, _norm(self.rest) < KRYLOV.stagnation * before
         return True
 
     def move(self, frequency: float) -> None:
-        """Combine what is known anew, for another Ω."""
+        """Recombine the corrections for another Ω."""
         count, further = self.count, self.kind.type(1j * (frequency - self.frequency))
         rows = self.triangle[:count, :count].T.astype(self.kind) @ self.basis[:count]
         rows += further * self.stored[:count]
         self.frequency, self.count = frequency, 0
         self._begin()
         for row in rows:
-            if not self._met(row):
+            if not self._append(row):
                 raise ArithmeticError(
-                    f"corrections that are no longer independent at frequency {frequency:g}"
+                    f"corrections are linearly dependent at frequency {frequency:g}"
                 )
             self.count += 1
 
     def _begin(self) -> None:
-        a, b = self.wanted
+        """Reset the residual."""
+        a, b = self.rhs
         self.rest = a + self.kind.type(1j * self.frequency) * b
-        self.size = _length(self.rest)
+        self.size = _norm(self.rest)
         self.falls = True
         self.target: list[complex] = []
 
-    def _met(self, new: Vector) -> bool:
-        """What is left without what another correction makes of the equations; False where that is nothing new."""
+    def _append(self, new: Vector) -> bool:
+        """Orthogonalise a vector and update the residual; return False if it is dependent."""
         count = self.count
-        known, before = self.basis[:count].T, _length(new)
+        known, before = self.basis[:count].T, _norm(new)
         column = np.zeros(count, complex)
         for _ in range(2 if count else 0):
             overlaps = self.times(1.0, known, new, trans=ADJOINT)
             new = self.times(-1.0, known, overlaps, beta=1.0, y=new, overwrite_y=True)
             column += overlaps
-            length = _length(new)
-            if length >= NEARLY_CANCELLED * before:
+            length = _norm(new)
+            if length >= KRYLOV.reorthogonalise_shifted * before:
                 break
         else:
-            length = _length(new)
+            length = _norm(new)
         if not length > np.finfo(self.kind).eps * before:
             return False
         self.triangle[:count, count], self.triangle[count, count] = column, length
@@ -239,5 +227,6 @@ class Shifted:
         return True
 
     def _combination(self) -> Vector:
+        """Return the weights of the corrections."""
         triangle = self.triangle[: self.count, : self.count]
         return np.asarray(scipy.linalg.solve_triangular(triangle, np.array(self.target)))

@@ -1,16 +1,14 @@
-"""The mixed contact linearised, and Newton's step of it by GMRES, in single precision.
+"""Linearised mixed contact, and its Newton step by GMRES, in single precision.
 
-Unknown are the changes of the oil's pressure where it is lubricated and of the total one where
-bodies touch; free cells have one pressure, ruptured and capped ones know theirs. The approximate
-inverse answers the oil's rows by blocks and lines, as
-`asperity.ehl.linear_solvers.single_pressure` does, and a touching cell's row by its own
-compliance.
+Unknowns are the changes of oil pressure in lubricated cells and of total pressure in touching ones;
+free cells have one pressure, those of ruptured and capped cells are known. The approximate inverse
+treats the oil's rows by blocks and lines, like `asperity.ehl.linear_solvers.single_pressure`, and a
+touching cell's row by its own compliance.
 
-Two things differ from there, and GMRES needs a fifth of the steps for them where oil is stiff. A
-cell's pressure moves its own gap only: oil carries its film downstream unchanged, which the
-differences of a stencil cut off after three cells let decay. And mobilities answer: beside
-asperities the oil's pressure changes so much from cell to cell that this outweighs the mobilities
-themselves.
+Two differences reduce GMRES steps fivefold where oil is stiff. A cell's pressure changes its own
+gap only: oil carries its film downstream unchanged, while the differences of a stencil truncated
+after three cells make it decay. And mobilities are linearised: beside asperities the oil pressure
+varies so strongly from cell to cell that this outweighs the mobilities themselves.
 """
 
 from dataclasses import replace
@@ -20,51 +18,38 @@ from typing import Any
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.linear_solvers.gmres import Room, gmres
+from asperity.ehl.controls import MIXED_SOLVER
+from asperity.ehl.linear_solvers.gmres import Workspace, gmres
 from asperity.ehl.linear_solvers.single_pressure import (
-    Blocks,
-    Kept,
+    BlockSolver,
     LineRelaxation,
-    NestedBlocks,
+    MultigridSolver,
+    StoredOil,
+    fold_at_mirror,
     single_faces,
-    turn_back,
 )
 from asperity.ehl.models.mixed import (
-    OPEN_FROM,
+    OPENING_RANGE,
     MixedBalance,
     Pressures,
-    added_by_lean,
-    lean_slopes,
+    advected_outflow,
+    limiter_outflow,
+    limiter_slopes,
     opening_slopes,
-    transported,
     upwind_at_outlet,
 )
-from asperity.ehl.models.single_pressure import CLOSED_WITHIN, Past
+from asperity.ehl.models.single_pressure import CLOSED_WITHIN, TransientTerm
 from asperity.kernels import load_sharing, reynolds, stencils
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
-from asperity.kernels.stencils import Far, Stencil
-
-LEFT = 0.1  # share to which the linearised equations are left ...
-LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly straight
-LEFT_NEAR, NEAR = (
-    1e-3,
-    1e-3,
-)  # ... from so little left on, of followed oil that may not be lost: met far closer
-OVER = 2.0  # blocks are too stiff against slow modes, whose slope they have in their borders alone
-MOST_KRYLOV_STEPS = 60
-FEWEST_NESTED = (
-    64  # cells along both axes from which on blocks are nested, where bodies touch firmly
-)
-NEARLY_CLOSED = 0.1  # of the flattened cells: fewer are nearly closed where bodies touch firmly
-LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
+from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 
 class MixedLinear:
-    """The linearisation of a balance: `product` applies it, `answer` approximately inverts it; all (nx, ny).
+    """Linearisation of a balance: `product` applies it, `answer` approximately inverts it.
 
-    `closely` lets the lines follow how the wedge leans, too: where the equations are met far
-    closer than to a tenth.
+    All fields are (nx, ny). `with_limiter` includes the slope limiter of the wedge in the lines,
+    for equations solved far closer than to a tenth.
     """
 
     def __init__(
@@ -73,7 +58,7 @@ class MixedLinear:
         dtype: Any = np.float32,
         settled: Mask | None = None,
         *,
-        closely: bool = False,
+        with_limiter: bool = False,
     ) -> None:
         self.balance, problem = balance, balance.problem
         self.cells, self.real = problem.cells, dtype
@@ -82,9 +67,8 @@ class MixedLinear:
         self.free, self.touching = balance.solid == FREE, balance.solid == TOUCHING
         self.oil = balance.oil_pressure.astype(self.real)
         self.conserves = balance.surplus is not None
-        self.follows_wedge = (
-            problem.accurate and problem.cells[1] > 1
-        )  # on one line own pressures tell more
+        # on one line the stencil of own pressures works better
+        self.follows_wedge = problem.accurate and problem.cells[1] > 1
         if balance.surplus is not None and balance.surplus_by_oil is not None:
             self.surplus_by_oil = balance.surplus_by_oil.astype(self.real)
             missing = np.minimum(balance.unknowns.oil, 0.0)
@@ -94,9 +78,9 @@ class MixedLinear:
             pressed = (balance.unknowns.oil > problem.p_cap) & self.lubricated
             self.growth_by_oil = np.where(pressed, self.real(problem.softness), self.real(0.0))
             self.surplus_by_gap = (missing * balance.film.content_by_gap).astype(self.real)
-        self.leans = bool(np.any(balance.lean))
-        if self.leans:
-            self.lean_own, self.lean_upstream = lean_slopes(balance, dtype)
+        self.has_limiter = bool(np.any(balance.limiter))
+        if self.has_limiter:
+            self.limiter_own, self.limiter_upstream = limiter_slopes(balance, dtype)
         state = np.where(self.lubricated, np.int8(LUBRICATED), balance.rows.state)
         self.rows = Rows(
             state, balance.rows.fluid_scale.astype(self.real), balance.rows.contact_scale
@@ -108,88 +92,89 @@ class MixedLinear:
             self.film.content_by_gap,
             self.film.content_by_pressure,
         )
-        self.kept = self._kept(problem.past)
-        self.follows_oil = problem.past is not None and problem.past.followed
+        self.storage = self._storage(problem.past)
+        self.lagrangian = problem.past is not None and problem.past.lagrangian
         self.opening = None
-        if self.leans and settled is not None and not self.follows_oil:
+        if self.has_limiter and settled is not None and not self.lagrangian:
             self.opening = opening_slopes(balance, settled)
-        if self.follows_oil:
-            self.film = self.film.followed
-        self.closely = closely and self.leans
+        if self.lagrangian:
+            self.film = self.film.without_wedge
+        self.with_limiter = with_limiter and self.has_limiter
 
     @cached_property
-    def inverse(self) -> tuple[Blocks | NestedBlocks, LineRelaxation]:
-        """Blocks and lines, made when they are first asked for."""
+    def inverse(self) -> tuple[BlockSolver | MultigridSolver, LineRelaxation]:
+        """Blocks and lines, built on first use."""
         stencil, far = self._stencil()
         weight = np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
         alike = (
             not self.follows_wedge
-            and min(self.cells) >= FEWEST_NESTED
-            and (self.closely or firm(self.balance))
+            and min(self.cells) >= MIXED_SOLVER.min_multigrid_cells
+            and (self.with_limiter or is_firm(self.balance))
         )
-        blocks = (NestedBlocks if alike else Blocks)(stencil, weight)
-        return blocks, LineRelaxation(*self._leaning(stencil)) if self.closely else LineRelaxation(
-            stencil, far
-        )
+        blocks = (MultigridSolver if alike else BlockSolver)(stencil, weight)
+        return blocks, LineRelaxation(
+            *self._with_limiter(stencil)
+        ) if self.with_limiter else LineRelaxation(stencil, far)
 
-    def _stencil(self) -> tuple[Stencil, Far | None]:
+    def _stencil(self) -> tuple[Stencil, OuterNeighbours | None]:
+        """Return the stencil, with outer neighbours if it includes the wedge."""
         problem, stencil = self.balance.problem, Stencil(*np.empty((5, *self.cells), self.real))
         state = np.where(self.lubricated, np.int8(LUBRICATED), np.int8(RUPTURED))
-        rows, film = self.rows._replace(state=state), self.film.held_where(~self.free)
+        rows, film = self.rows._replace(state=state), self.film.with_fixed_gap(~self.free)
         own, far = 1.0 / self.rows.contact_scale, None
         if self.follows_wedge:
-            far, near = Far(*np.empty((2, *self.cells), self.real)), problem.deflection.near
+            far, compliance = (
+                OuterNeighbours(*np.empty((2, *self.cells), self.real)),
+                problem.deflection.local_compliance,
+            )
             stencils.wedge_stencil(
                 rows,
                 film,
                 self.faces,
                 self.oil,
-                (own, near[1] - near[3]),
+                (own, compliance[1] - compliance[3]),
                 problem.spacing,
                 stencil,
                 far,
             )
         else:
             stencils.own_stencil(rows, film, self.faces, self.oil, own, problem.spacing, stencil)
-        if self.kept is not None:
-            by_gap = np.where(self.free, self.kept.by_gap, self.real(0.0))
+        if self.storage is not None:
+            by_gap = np.where(self.free, self.storage.by_gap, self.real(0.0))
             stencil.centre[:] += np.where(
-                self.lubricated, by_gap * self.real(own) + self.kept.by_pressure, 0.0
+                self.lubricated, by_gap * self.real(own) + self.storage.by_pressure, 0.0
             )
-        turn_back(stencil, problem.mirror)
+        fold_at_mirror(stencil, problem.mirror)
         if self.conserves:
-            self._loosen(stencil)
+            self._advect_surplus(stencil)
         return stencil, far
 
-    def _leaning(self, stencil: Stencil) -> tuple[Stencil, Far]:
-        """The stencil and what it has of cells further upstream, with the wedge leaning.
+    def _with_limiter(self, stencil: Stencil) -> tuple[Stencil, OuterNeighbours]:
+        """Return the stencil and its outer neighbours with the limited correction of the wedge.
 
-        Beside closed cells films thin many times over from one cell to the next. The wedge leans
-        there by so much that a cell's own entry may be a sixth of what first order makes it.
+        Beside closed cells films thin many times over from one cell to the next; the correction
+        there may reduce a cell's own entry to a sixth of its first-order value.
         """
-        film, dx = self.film.held_where(~self.free), self.real(self.balance.problem.spacing[0])
+        film, dx = self.film.with_fixed_gap(~self.free), self.real(self.balance.problem.spacing[0])
         content = (
             film.content_by_gap * self.real(1.0 / self.rows.contact_scale)
             + film.content_by_pressure
         )
-        own, upstream = (
-            np.zeros_like(content),
-            np.zeros_like(content),
-        )  # of what the eastern faces pass on besides
-        own[1:-1] = (self.lean_own * content)[1:-1] / dx
-        upstream[1:-1] = self.lean_upstream[1:-1] * content[:-2] / dx
-        far = Far(*np.zeros((2, *self.cells), self.real))
+        own, upstream = np.zeros_like(content), np.zeros_like(content)  # limited flow, east faces
+        own[1:-1] = (self.limiter_own * content)[1:-1] / dx
+        upstream[1:-1] = self.limiter_upstream[1:-1] * content[:-2] / dx
+        far = OuterNeighbours(*np.zeros((2, *self.cells), self.real))
         stencil.centre[:] += self.scale * own
         stencil.west[1:] -= self.scale[1:] * (upstream[1:] + own[:-1])
         far.west[2:] += self.scale[2:] * upstream[1:-1]
         return stencil, far
 
-    def _loosen(self, stencil: Stencil) -> None:
-        """Cells whose unknown is not a pressure hand what they hold to the next cell downstream, and to no other."""
+    def _advect_surplus(self, stencil: Stencil) -> None:
+        """Couple cells whose unknown is not a pressure to the next one downstream only."""
         past, real, scale = self.balance.problem.past, self.real, self.rows.fluid_scale
         loose = self.lubricated & ~self.full
-        followed = past is not None and past.followed
-        wedge = real(0.0 if followed else 1.0 / self.balance.problem.spacing[0])
+        lagrangian = past is not None and past.lagrangian
+        wedge = real(0.0 if lagrangian else 1.0 / self.balance.problem.spacing[0])
         own = wedge + real(0.0 if past is None else past.rate)
         stencil.centre[loose] = (self.surplus_by_oil * own * scale)[loose]
         stencil.west[1:][loose[:-1]] = (-wedge * self.surplus_by_oil[:-1] * scale[1:])[loose[:-1]]
@@ -198,15 +183,21 @@ class MixedLinear:
         stencil.north[np.roll(loose, -1, axis=1)] = 0.0
         stencil.south[np.roll(loose, 1, axis=1)] = 0.0
 
-    def _kept(self, past: Past | None) -> Kept | None:
-        """What the first rows of followed oil draw in by the wedge is left out, as in `asperity.ehl.linear_solvers.single_pressure`."""
+    def _storage(self, past: TransientTerm | None) -> StoredOil | None:
+        """Return the storage of oil; see `asperity.ehl.linear_solvers.single_pressure`.
+
+        Neglects the wedge in the first rows of Lagrangian oil.
+        """
         if past is None:
             return None
         scaled = self.scale * self.real(past.rate)
-        return Kept(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
+        return StoredOil(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
 
     def product(self, d_oil: Field, d_total: Field, d_approach: float) -> tuple[Field, Field]:
-        """Changes of the oil's equations and of touching cells'; of the unknown itself where it is known."""
+        """Return changes of the oil's equations and of touching cells' equations.
+
+        Known unknowns have identity rows.
+        """
         problem = self.balance.problem
         d_gap = problem.deflection(d_total)
         if d_approach:
@@ -214,7 +205,7 @@ class MixedLinear:
         return self.of_gap(d_oil, d_gap)
 
     def of_gap(self, d_oil: Field, d_gap: Field) -> tuple[Field, Field]:
-        """The same, of a change of the oil's unknown and that of the gap."""
+        """Return the same for a change of the oil's unknown and of the gap."""
         problem = self.balance.problem
         wet = np.empty(self.cells, self.real)
         spacing, d_pressure, d_height = (
@@ -224,23 +215,27 @@ class MixedLinear:
         )
         if self.conserves:
             d_height = (
-                np.where(self.balance.shut, self.real(0.0), d_gap) + self.growth_by_oil * d_oil
+                np.where(self.balance.sealed, self.real(0.0), d_gap) + self.growth_by_oil * d_oil
             )
+        change = reynolds.PressureChange(d_pressure, d_height)
         reynolds.jacobian_product(
-            self.rows, self.film, self.faces, self.oil, d_pressure, d_height, spacing, 0.0, wet
+            self.rows, self.film, self.faces, self.oil, change, spacing, 0.0, wet
         )
-        if self.kept is not None:
-            wet += self.kept.by_gap * d_height + self.kept.by_pressure * d_pressure
+        if self.storage is not None:
+            wet += self.storage.by_gap * d_height + self.storage.by_pressure * d_pressure
         if self.conserves:
-            rest = transported(
+            rest = advected_outflow(
                 problem, self.missing_by_oil * d_oil + self.surplus_by_gap * d_height
             )
             d_content = self.content_by_gap * d_height + self.content_by_pressure * d_pressure
             upwind_at_outlet(problem, d_content, rest)
             wet += rest * self.scale
-        elif self.leans:
+        elif self.has_limiter:
             d_content = self.content_by_gap * d_gap + self.content_by_pressure * d_pressure
-            wet += added_by_lean(problem, d_content, self.lean_own, self.lean_upstream) * self.scale
+            wet += (
+                limiter_outflow(problem, d_content, self.limiter_own, self.limiter_upstream)
+                * self.scale
+            )
         if self.opening is not None:
             faces, cells, slopes = self.opening
             through = (slopes / spacing[0]).astype(self.real) * d_gap.ravel()[cells]
@@ -249,34 +244,37 @@ class MixedLinear:
         return wet, d_gap * self.real(self.rows.contact_scale)
 
     def answer(self, wet: Field) -> Field:
-        """Approximate change of the oil's pressure that answers its rows; touching cells' answer themselves."""
+        """Return an approximate change of the oil's pressure for a residual of its rows."""
         blocks, lines = self.inverse
         change = blocks(wet)
         if self.follows_wedge:
-            change *= self.real(OVER)
+            change *= self.real(MIXED_SOLVER.coarse_relaxation)
         return lines(wet, change)
 
     def total(self, d_oil: Field, d_closed: Field) -> Field:
-        """Change of the total pressure: the oil's in free cells, their own in touching ones."""
+        """Return the change of total pressure.
+
+        That of the oil in free cells, `d_closed` in touching ones.
+        """
         return np.where(self.free, self.pressure_of(d_oil), d_closed)
 
     def pressure_of(self, d_oil: Field) -> Field:
-        """Change of the oil's pressure: none where its unknown is no pressure."""
+        """Return the change of the oil's pressure: zero where its unknown is not a pressure."""
         return np.where(self.full, d_oil, d_oil.dtype.type(0.0)) if self.conserves else d_oil
 
 
 class _Step:
-    """Newton's step as one vector: of the oil, of the total pressure of touching cells, and of the approach.
+    """Newton step as one vector: oil, total pressure of touching cells, approach.
 
-    The last equation is the missing load, or nothing where the bodies are held.
+    The last equation is the load, or an identity at fixed approach.
     """
 
     def __init__(self, linear: MixedLinear) -> None:
         self.linear, self.problem = linear, linear.balance.problem
         self.count, self.touching = linear.balance.gap.size, np.flatnonzero(linear.touching)
-        self.moves = self.problem.held is None
+        self.approach_is_free = self.problem.fixed is None
         self.weight = linear.real(1.0 / np.sqrt(self.count))
-        self.bearing = (linear.free & linear.full if linear.conserves else linear.free).astype(
+        self.load_weights = (linear.free & linear.full if linear.conserves else linear.free).astype(
             linear.real
         )
         by_approach = linear.of_gap(
@@ -285,10 +283,10 @@ class _Step:
         self.response = self._answered(
             self.joined(np.where(linear.lubricated, by_approach[0], 0.0), by_approach[1], 0.0)
         )
-        self.whole = self._borne(self.response)
+        self.load_response = self._load_change(self.response)
 
     def joined(self, oil: Field, solid: Field, last: float) -> Field:
-        """A vector of what is known of the oil, of touching cells (both (nx, ny)) and of the load or the approach."""
+        """Assemble a vector from fields of the oil and of touching cells, and its last entry."""
         vector = np.empty(self.count + self.touching.size + 1, self.linear.real)
         vector[: self.count], vector[self.count : -1], vector[-1] = (
             oil.ravel(),
@@ -298,98 +296,105 @@ class _Step:
         return vector
 
     def oil(self, vector: Field) -> Field:
-        """The part of the oil, (nx, ny)."""
+        """Return the part of the oil, (nx, ny)."""
         return vector[: self.count].reshape(self.linear.cells)
 
     def total(self, vector: Field) -> Field:
-        """Change of the total pressure, (nx, ny): the oil's in free cells, their own in touching ones."""
-        total: Field = self.oil(vector) * self.bearing
+        """Return the change of the total pressure, (nx, ny)."""
+        total: Field = self.oil(vector) * self.load_weights
         total.ravel()[self.touching] = vector[self.count : -1]
         return total
 
     def product(self, vector: Field) -> Field:
-        """The linearised equations applied to it."""
+        """Apply the linearised equations."""
         total, rows = self.total(vector), np.empty_like(vector)
         wet, closed = self.linear.product(self.oil(vector), total, float(vector[-1]))
         rows[: self.count], rows[self.count : -1] = wet.ravel(), closed.ravel()[self.touching]
-        rows[-1] = self.weight * self.problem.summed(total) if self.moves else vector[-1]
+        rows[-1] = (
+            self.weight * self.problem.sum_over_cells(total)
+            if self.approach_is_free
+            else vector[-1]
+        )
         return rows
 
     def precondition(self, rows: Field) -> Field:
-        """About what answers them."""
+        """Apply the approximate inverse."""
         change = self._answered(rows)
-        if self.moves:
+        if self.approach_is_free:
             d_approach = self.linear.real(
-                (self._borne(change) - rows[-1] / self.weight) / self.whole
+                (self._load_change(change) - rows[-1] / self.weight) / self.load_response
             )
             change -= d_approach * self.response
             change[-1] = d_approach
         return change
 
     def _answered(self, rows: Field) -> Field:
+        """Apply the approximate inverse to the oil's rows."""
         change = rows.copy()
         change[: self.count] = self.linear.answer(self.oil(rows)).ravel()
         return change
 
-    def _borne(self, vector: Field) -> float:
-        """By how much more the pressures bear."""
+    def _load_change(self, vector: Field) -> float:
+        """Return the change of the load."""
         if self.problem.mirror:
-            return float(self.problem.summed(self.total(vector)))
-        return float(vector[: self.count] @ self.bearing.ravel() + vector[self.count : -1].sum())
+            return float(self.problem.sum_over_cells(self.total(vector)))
+        return float(
+            vector[: self.count] @ self.load_weights.ravel() + vector[self.count : -1].sum()
+        )
 
 
-def flattened(balance: MixedBalance) -> Mask:
-    """Cells that the cap holds closed: no oil that comes lifts them."""
+def flattened_cells(balance: MixedBalance) -> Mask:
+    """Return the cells that the cap keeps closed and oil cannot open."""
     closed = balance.gap <= (1.0 + CLOSED_WITHIN) * balance.problem.contact_gap
     return np.asarray(closed & (balance.solid == CAPPED))
 
 
-def foreseen(balance: MixedBalance) -> MixedBalance:
-    """The same, but that flattened cells without oil are lubricated as far down the stream as oil fills those before.
+def extend_streaks(balance: MixedBalance) -> MixedBalance:
+    """Return the balance with flattened cells lubricated as far downstream as oil fills them.
 
-    A cell is ruptured until oil has come to it: oil that fills a streak of closed cells would go
-    on by one a step.
+    Otherwise a cell is ruptured until oil has arrived: a streak of closed cells would fill by one
+    cell per step.
     """
     problem, rows, residual = balance.problem, balance.rows, balance.oil_residual.copy()
     state, highest = rows.state.copy(), (1.0 + CLOSED_WITHIN) * problem.contact_gap
     balanced = balance.outflow, rows.fluid_scale
-    load_sharing.fill_streaks(
+    load_sharing.extend_lubrication(
         balance.gap, highest, balance.solid, problem.rim, balanced, state, residual
     )
     return replace(balance, rows=rows._replace(state=state), oil_residual=residual)
 
 
-def firm(balance: MixedBalance) -> bool:
-    """Whether few cells are nearly closed beside those that are flattened.
+def is_firm(balance: MixedBalance) -> bool:
+    """Return True if few cells are nearly closed, compared with flattened ones.
 
-    Where many are, films of about the contact film close and open from step to step. How they open
-    at one of them tells little of the next, and blocks of cells that are not alike answer badly
-    when they are summed again and again.
+    Many nearly closed cells mean films of about the contact film that open and close from step to
+    step. The opening slopes of one step then say little about the next, and coarse blocks of unlike
+    cells precondition badly.
     """
     gap, film = balance.gap, balance.problem.contact_gap
-    nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPEN_FROM) * film)
-    return bool(nearly.sum() < NEARLY_CLOSED * flattened(balance).sum())
+    nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPENING_RANGE) * film)
+    return bool(nearly.sum() < MIXED_SOLVER.max_nearly_closed * flattened_cells(balance).sum())
 
 
 def newton_step(
-    balance: MixedBalance, settled: Mask | None = None, room: Room | None = None
+    balance: MixedBalance, settled: Mask | None = None, workspace: Workspace | None = None
 ) -> Pressures:
-    """Changes of all unknowns that meet every linearised equation, and the load, to a tenth.
+    """Return changes of all unknowns that solve the linearised equations and the load to a tenth.
 
-    How the wedge opens is linearised in cells whose gap has `settled`, where bodies touch firmly,
-    and oil is foreseen in flattened streaks; neither without `settled`. Steps of one grid may
-    share GMRES's `room`.
+    The opening of the wedge is linearised in `settled` cells if the contact is firm, and oil is
+    extended along flattened streaks; neither without `settled`. Steps on one grid may share a GMRES
+    `workspace`.
     """
     problem = balance.problem
-    stands = (
+    steady = (
         settled is not None
         and not problem.conserve
         and problem.past is None
-        and problem.held is None
+        and problem.fixed is None
     )
-    if stands:
-        balance = foreseen(balance)
-    settled = settled if stands and firm(balance) else None
+    if steady:
+        balance = extend_streaks(balance)
+    settled = settled if steady and is_firm(balance) else None
     linear = MixedLinear(balance, settled=settled)
     real, zero = linear.real, linear.real(0.0)
     known_oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
@@ -402,29 +407,34 @@ def newton_step(
     dx, dy = problem.spacing
     step = _Step(linear)
     missing = (
-        -balance.load_error * problem.load / (dx * dy) - problem.summed(known)
-        if step.moves
+        -balance.load_error * problem.load / (dx * dy) - problem.sum_over_cells(known)
+        if step.approach_is_free
         else 0.0
     )
-    if (
-        step.whole == 0.0
-    ):  # every cell is ruptured or capped: only the distance of the bodies can change the load
+    # all cells ruptured or capped: only the approach can change the load
+    if step.load_response == 0.0:
         return Pressures(
-            known_oil, known, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale
+            known_oil,
+            known,
+            -MIXED_SOLVER.uncoupled_approach_step
+            * float(np.sign(missing))
+            / balance.rows.contact_scale,
         )
-    wanted = step.joined(
-        np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing)
-    )
-    left = LEFT_SMOOTH if linear.follows_wedge else LEFT
-    if problem.conserve and linear.follows_oil and balance.residual_rms < NEAR:
-        left = LEFT_NEAR
+    rhs = step.joined(np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing))
+    tolerance = MIXED_SOLVER.tolerance_smooth if linear.follows_wedge else MIXED_SOLVER.tolerance
+    if (
+        problem.conserve
+        and linear.lagrangian
+        and balance.residual_rms < MIXED_SOLVER.conserving_residual
+    ):
+        tolerance = MIXED_SOLVER.tolerance_conserving
     solved = gmres(
         step.product,
         step.precondition,
-        wanted,
-        tolerance=left,
-        most_steps=MOST_KRYLOV_STEPS,
-        room=room,
+        rhs,
+        tolerance=tolerance,
+        max_steps=MIXED_SOLVER.max_krylov_steps,
+        workspace=workspace,
     )
     d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), zero)
     d_total = np.where(linear.free, linear.pressure_of(d_oil) - balance.solid_residual, known)

@@ -1,11 +1,11 @@
-"""A solved contact whose bodies oscillate a little: its linearised equations with the oil's squeeze term, answered.
+"""Linear response of a solved contact to small oscillations of the bodies.
 
-With every cell held by what decides it, bodies that come closer by e^(iωt) ask for pressures x
-with (J + iΩ S) x = j + iΩ s: J and j are the linearisation of Newton's step in pressure and
-distance, S and s the oil that lubricated cells gain, Ω = ω a/u. One complex GMRES, preconditioned
-by Newton's own approximate inverse of J; but oil too stiff to flow carries its film along, so that
-its gap is as good as known, and it answers together with what touches. Dimensionless; the
-roughness stands.
+With every cell in its present state, an approach oscillating as e^(iωt) requires pressures x with
+(J + iΩ S) x = j + iΩ s: J and j are the linearisation of Newton's step in pressure and approach, S
+and s the oil that lubricated cells gain, Ω = ω a/u. One complex GMRES, preconditioned by Newton's
+approximate inverse of J; but oil too stiff to flow carries its film along, so that its gap is
+practically known, and such cells are solved together with touching ones. Dimensionless; the
+roughness does not move.
 """
 
 from collections.abc import Callable
@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
+from asperity.ehl.controls import OSCILLATION
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.linear_solvers.gmres import Shifted, gmres
 from asperity.ehl.linear_solvers.mixed import MixedLinear
@@ -25,27 +26,13 @@ from asperity.ehl.models.single_pressure import Balance
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
 
-MOST_STEPS = 200  # of GMRES at a time ...
-AT_A_TIME = (
-    3e-5  # ... which leave no less of what was left before: about what single precision can tell
-)
-MOST_ROUNDS = 12
-STUCK = (
-    0.3  # share left by a round in single precision, above which the next is taken in double ...
-)
-ASKED = 1.5  # ... times what it was asked to leave, where that is more
-# flow under a cell's own pressure over what the wedge carries on of its film, below which oil is
-# stiff
-STIFF = 1.0
-
 Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 
 
-class Answer(NamedTuple):
-    """Complex amplitudes of the oil's and the total pressure, (nx, ny), per change of approach, bodies coming closer.
+class OscillationResponse(NamedTuple):
+    """Complex amplitudes of oil and total pressure, (nx, ny), per unit of closing approach.
 
-    `left` is the share of the equations that was left, `steps` those of GMRES, `unknowns` the
-    equations' own.
+    `left` is the relative residual, `steps` those of GMRES, `unknowns` the solution vector.
     """
 
     oil: Waves
@@ -56,26 +43,26 @@ class Answer(NamedTuple):
 
 
 class _Equations(Protocol):
-    """A model's linearised equations over one vector of unknowns."""
+    """Linearised equations of a model over one vector of unknowns."""
 
     size: int
     real: Any  # the precision of all
 
     def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
-        """Rows of J and of S for a change of the unknowns and of the approach."""
+        """Return the rows of J and of S for a change of the unknowns and of the approach."""
 
     def answer(self, rows: Field) -> Field:
-        """Unknowns that about answer rows of J."""
+        """Apply an approximate inverse of J."""
 
     def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
-        """Oil's and total pressure, (nx, ny)."""
+        """Return the oil and the total pressure, (nx, ny)."""
 
-    def bearing(self) -> Field:
-        """Weight of each unknown in the sum of the total pressure."""
+    def load_weights(self) -> Field:
+        """Return the weight of each unknown in the sum of the total pressure."""
 
 
 class _OnePressure:
-    """One pressure for oil and asperities."""
+    """Equations of the single-pressure model."""
 
     def __init__(self, balance: Balance, real: Any) -> None:
         self.real, self.linear = real, Linear(balance, dtype=real)
@@ -107,15 +94,15 @@ class _OnePressure:
         pressure = vector.reshape(self.cells)
         return pressure, pressure
 
-    def bearing(self) -> Field:
+    def load_weights(self) -> Field:
         return np.ones(self.size, self.real)
 
 
 class _TwoPressures:
-    """The oil's pressure in every cell and, after these, the total one of touching cells."""
+    """Equations of the mixed model: oil pressure of every cell, total pressure of touching ones."""
 
     def __init__(self, balance: MixedBalance, real: Any) -> None:
-        self.real, self.linear = real, (linear := MixedLinear(balance, real, closely=True))
+        self.real, self.linear = real, (linear := MixedLinear(balance, real, with_limiter=True))
         self.cells, self.count = linear.cells, balance.gap.size
         self.touching = np.flatnonzero(linear.touching)
         self.size = self.count + self.touching.size
@@ -125,11 +112,11 @@ class _TwoPressures:
         self.by_pressure = (scale * balance.film.content_by_pressure).astype(real)
         self.own, self.stiff = real(1.0 / linear.rows.contact_scale), self._stiff()
         self.weights = self._weights()
-        self.lifted = 1.0 / self.weights
+        self.opening_cells = 1.0 / self.weights
 
     @cached_property
     def patch(self) -> tuple[slice, Deflection] | None:
-        """Lines whose cells answer together, made when first asked for."""
+        """Lines whose cells are solved together, built on first use."""
         return self._patch()
 
     def _split(self, vector: Any) -> tuple[Any, Any]:
@@ -148,48 +135,57 @@ class _TwoPressures:
         stored = self.by_gap * d_gap + self.by_pressure * d_oil
         rows = self._joined(np.where(self.linear.lubricated, wet, d_oil), gap_rows)
         rows *= self.weights
-        kept = np.zeros_like(rows)
-        np.multiply(stored.ravel(), self.weights[: self.count], out=kept[: self.count])
-        return rows, kept
+        storage = np.zeros_like(rows)
+        np.multiply(stored.ravel(), self.weights[: self.count], out=storage[: self.count])
+        return rows, storage
 
     def answer(self, rows: Field) -> Field:
-        """As in Newton's step, but that cells whose gap is known answer together: here none of them changes sides."""
-        wet, gap_rows = self._split(rows * self.lifted)
+        """Apply Newton's approximate inverse, with cells of known gap solved together.
+
+        No cell changes its state here.
+        """
+        wet, gap_rows = self._split(rows * self.opening_cells)
         oil, closed = self.linear.answer(wet), gap_rows * self.own
         if self.patch is not None:
             lines, deflection = self.patch
             stiff = self.stiff[lines]
-            together = deflection.undone(np.where(stiff, self.own * oil[lines], closed[lines]))
+            together = deflection.approximate_inverse(
+                np.where(stiff, self.own * oil[lines], closed[lines])
+            )
             oil[lines] = np.where(stiff, together, oil[lines])
             closed[lines] = together
         return self._joined(oil, closed)
 
     def _stiff(self) -> Mask:
-        """Free cells whose film is carried along, whatever their pressure: neither flow nor compressed oil undoes it.
+        """Return free cells whose film is carried along at any pressure, unaffected by flow.
 
-        Lines alone would take each of them to give way by itself.
+        Line relaxation alone would let each of them deform by itself.
         """
         film, problem = self.linear.balance.film, self.linear.balance.problem
         dx, dy = problem.spacing
         flow = film.mobility * (2.0 / dx**2 + 2.0 / dy**2) + film.content_by_pressure / dx
         carried = film.content_by_gap / (dx * self.linear.rows.contact_scale)
-        return np.asarray(self.linear.free & self.linear.lubricated & (flow < STIFF * carried))
+        return np.asarray(
+            self.linear.free
+            & self.linear.lubricated
+            & (flow < OSCILLATION.stiff_flow_ratio * carried)
+        )
 
     def _patch(self) -> tuple[slice, Deflection] | None:
-        """The lines with cells whose gap is known, and how these give way; None where there are none."""
+        """Return the lines with cells of known gap and their deflection; None without any."""
         (lines,) = np.nonzero((self.stiff | self.linear.touching).any(axis=1))
         if not lines.size:
             return None
         if self.deflection.mirror:
             return slice(None), self.deflection
         span = slice(int(lines[0]), int(lines[-1]) + 1)
-        return span, self.deflection.among(span.stop - span.start)
+        return span, self.deflection.restrict_to(span.stop - span.start)
 
     def _weights(self) -> Field:
-        """Of the rows: a touching cell's oil counts by what flows on from it, as free cells' does, not by its pressure.
+        """Return weights of the rows: a touching cell's oil counts by its onward flow.
 
-        Nothing but the small compressibility and flow of its film tells that pressure, and nobody
-        asks for it.
+        Its pressure follows from the small compressibility and flow of its film only, and is not
+        needed.
         """
         wide = self.linear.balance.problem.spacing[0] * self.linear.rows.contact_scale
         scale = self.linear.balance.rows.fluid_scale
@@ -201,15 +197,15 @@ class _TwoPressures:
         oil, closed = self._split(vector)
         return oil, np.where(self.linear.free, oil, closed)
 
-    def bearing(self) -> Field:
+    def load_weights(self) -> Field:
         return self._joined(self.linear.free.astype(self.real), np.ones(self.cells, self.real))
 
 
 class Oscillating:
-    """A balance ready to be shaken at any number of frequencies.
+    """A balance prepared for its response at any number of frequencies.
 
-    GMRES goes in single precision, in rounds; what a round leaves is measured in double. A contact
-    on one line of cells is cheap, and stiffer than single precision bears: double throughout.
+    GMRES runs in single precision, in rounds; the residual of a round is evaluated in double. A
+    contact on one line of cells is cheap, and too stiff for single precision: double throughout.
     """
 
     def __init__(self, balance: Balance | MixedBalance) -> None:
@@ -218,71 +214,81 @@ class Oscillating:
         self.rough = self.exact if one_line else _equations(balance, np.float32)
         self.by_approach = self.exact.product(np.zeros(self.exact.size), 1.0)
 
-    def answer(self, frequency: float, *, tolerance: float, start: Answer | None = None) -> Answer:
-        """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`.
+    def answer(
+        self, frequency: float, *, tolerance: float, start: OscillationResponse | None = None
+    ) -> OscillationResponse:
+        """Return the response to a unit approach at the dimensionless angular frequency Ω.
 
-        `start` is an answer at the same frequency: of another one the oil's lag would stay.
+        To a relative residual `tolerance`. `start` is a response at the same frequency: that at
+        another one has the wrong phase in the oil.
         """
         steps, solver = 0, self.rough
         rows, stored = self.by_approach
-        wanted = rows + 1j * frequency * stored
-        size = float(np.linalg.norm(wanted))
-        vector, left, share = np.zeros(self.exact.size, complex), wanted, 1.0
+        rhs = rows + 1j * frequency * stored
+        size = float(np.linalg.norm(rhs))
+        vector, left, share = np.zeros(self.exact.size, complex), rhs, 1.0
         if start is not None:
             vector = start.unknowns
-            left, share = self._left(wanted, vector, frequency, size)
-        for _ in range(MOST_ROUNDS):
+            left, share = self._residual(rhs, vector, frequency, size)
+        for _ in range(OSCILLATION.max_rounds):
             if share <= tolerance:
                 break
-            leaving = max(tolerance / share, AT_A_TIME)
+            leaving = max(tolerance / share, OSCILLATION.round_tolerance)
             change, taken = _solved(solver, left, frequency, leaving)
-            left, now = self._left(wanted, vector + change, frequency, size)
+            left, now = self._residual(rhs, vector + change, frequency, size)
             steps += taken
-            if now > min(max(STUCK, ASKED * leaving), 1.0) * share:
+            if (
+                now
+                > min(
+                    max(OSCILLATION.stagnation, OSCILLATION.stagnation_of_tolerance * leaving), 1.0
+                )
+                * share
+            ):
                 if solver is self.exact:
                     break
                 solver = self.exact
             if now < share:
                 vector, share = vector + change, now
             else:
-                left, share = self._left(wanted, vector, frequency, size)
-        return Answer(*self.exact.pressures(vector), share, steps, vector)
+                left, share = self._residual(rhs, vector, frequency, size)
+        return OscillationResponse(*self.exact.pressures(vector), share, steps, vector)
 
     def sweep(self, frequency: float) -> Shifted:
-        """The answer at Ω = `frequency` on its way, one round of GMRES whose Ω may move."""
+        """Start a solve at Ω = `frequency`: one round of GMRES whose Ω may change."""
         equations = self.rough
         kind = np.result_type(equations.real, np.complex64)
         return Shifted(
             lambda vector: _both(equations, vector),
             lambda vector: np.asarray(_each_part(equations.answer, vector)),
             (self.by_approach[0].astype(kind), self.by_approach[1].astype(kind)),
-            self.bearing,
+            self.load_weights,
             frequency,
-            MOST_STEPS,
+            OSCILLATION.max_krylov_steps,
         )
 
-    def swept(self, sweep: Shifted) -> Answer:
-        """Where a sweep has come to; what it leaves is measured in double."""
+    def swept(self, sweep: Shifted) -> OscillationResponse:
+        """Return the response of a sweep, with its residual in double precision."""
         rows, stored = self.by_approach
         vector = sweep.answer().astype(complex)
-        wanted = rows + 1j * sweep.frequency * stored
-        _, share = self._left(wanted, vector, sweep.frequency, float(np.linalg.norm(wanted)))
-        return Answer(*self.exact.pressures(vector), share, sweep.count, vector)
+        rhs = rows + 1j * sweep.frequency * stored
+        _, share = self._residual(rhs, vector, sweep.frequency, float(np.linalg.norm(rhs)))
+        return OscillationResponse(*self.exact.pressures(vector), share, sweep.count, vector)
 
     @cached_property
-    def bearing(self) -> Field:
+    def load_weights(self) -> Field:
         """Weights of the unknowns in the sum of the total pressure."""
-        return self.rough.bearing()
+        return self.rough.load_weights()
 
-    def _left(
-        self, wanted: Waves, vector: Waves, frequency: float, size: float
+    def _residual(
+        self, rhs: Waves, vector: Waves, frequency: float, size: float
     ) -> tuple[Waves, float]:
-        """What of the equations is left, and its share of all."""
-        left = wanted - _product(self.exact, vector, frequency)
+        """Return the residual and its relative norm."""
+        left = rhs - _product(self.exact, vector, frequency)
         return left, float(np.linalg.norm(left)) / size
 
 
 def _equations(balance: Balance | MixedBalance, real: Any) -> _Equations:
+    """Return the equations of a balance in a precision."""
     return (
         _TwoPressures(balance, real)
         if isinstance(balance, MixedBalance)
@@ -291,9 +297,9 @@ def _equations(balance: Balance | MixedBalance, real: Any) -> _Equations:
 
 
 def _solved(
-    equations: _Equations, wanted: Waves, frequency: float, tolerance: float
+    equations: _Equations, rhs: Waves, frequency: float, tolerance: float
 ) -> tuple[Waves, int]:
-    """The unknowns that answer, but for a share `tolerance`, in the equations' own precision; and the steps it took."""
+    """Solve to a relative residual in the precision of the equations; return unknowns and steps."""
     steps = 0
 
     def product(vector: Waves) -> Waves:
@@ -305,24 +311,25 @@ def _solved(
         return np.asarray(_each_part(equations.answer, vector))
 
     kind = np.result_type(equations.real, np.complex64)
-    scale = float(np.linalg.norm(wanted))
+    scale = float(np.linalg.norm(rhs))
     found = gmres(
         product,
         precondition,
-        (wanted / scale).astype(kind),
+        (rhs / scale).astype(kind),
         tolerance=tolerance,
-        most_steps=MOST_STEPS,
+        max_steps=OSCILLATION.max_krylov_steps,
     )
     return np.asarray(scale * found, dtype=complex), steps
 
 
 def _product(equations: _Equations, vector: Waves, frequency: float) -> Waves:
+    """Apply J + iΩ S."""
     rows, stored = _both(equations, vector)
     return np.asarray(rows + vector.dtype.type(1j * frequency) * stored)
 
 
 def _each_part(operator: Callable[[Field], Any], vector: Waves) -> Any:
-    """A real linear operator on a complex vector."""
+    """Apply a real linear operator to a complex vector."""
     real, imaginary = (
         operator(np.ascontiguousarray(vector.real)),
         operator(np.ascontiguousarray(vector.imag)),
@@ -333,7 +340,7 @@ def _each_part(operator: Callable[[Field], Any], vector: Waves) -> Any:
 
 
 def _both(equations: _Equations, vector: Waves) -> tuple[Waves, Waves]:
-    """Rows of J and of S for complex changes of the unknowns."""
+    """Return the rows of J and of S for complex changes of the unknowns."""
     parts = [
         equations.product(np.ascontiguousarray(part), 0.0) for part in (vector.real, vector.imag)
     ]
@@ -343,7 +350,7 @@ def _both(equations: _Equations, vector: Waves) -> tuple[Waves, Waves]:
 
 
 def at_cap(balance: Balance | MixedBalance) -> bool:
-    """Whether the cap decides any cell, of the oil's or of the bodies' pressure."""
+    """Return True if any cell is at the pressure cap, of the oil or of the bodies."""
     capped = balance.rows.state == CAPPED
     return bool(
         np.any(capped | (balance.solid == CAPPED) if isinstance(balance, MixedBalance) else capped)
@@ -351,10 +358,9 @@ def at_cap(balance: Balance | MixedBalance) -> bool:
 
 
 def elastic(balance: Balance | MixedBalance) -> Balance | MixedBalance:
-    """The balance with its capped cells elastic, as they are once they have yielded and are shaken below that load.
+    """Return the balance with its capped cells elastic, as yielded cells are below their last load.
 
-    Where the bodies overlap they stay together; where oil at the cap parts them it is oil like any
-    other.
+    Overlapping bodies stay in contact; oil at the cap between separated bodies is ordinary oil.
     """
     state = balance.rows.state
     closed: Mask = balance.in_contact

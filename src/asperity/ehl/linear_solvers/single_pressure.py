@@ -1,7 +1,7 @@
-"""A contact's equations linearised, and a cheap approximate inverse of that, both in single precision.
+"""Linearised single-pressure contact and its preconditioner, both in single precision.
 
-Newton's step is only wanted to a tenth, and what it leaves is measured in double precision: single
-changes neither the answer nor the steps, and halves what has to be moved through memory.
+Newton's step is needed to a tenth only, and its residual is evaluated in double precision: single
+precision changes neither the solution nor the number of steps, and halves the memory traffic.
 """
 
 from functools import lru_cache
@@ -11,32 +11,30 @@ import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
-from asperity.ehl.deflection import BETWEEN
-from asperity.ehl.models.single_pressure import Balance, Past
+from asperity.ehl.controls import PRECONDITIONER
+from asperity.ehl.deflection import MIRROR_BETWEEN
+from asperity.ehl.models.single_pressure import Balance, TransientTerm
 from asperity.kernels import line_relaxation, multigrid, reynolds, stencils
-from asperity.kernels.multigrid import Nest
+from asperity.kernels.multigrid import GridHierarchy
 from asperity.kernels.reynolds import LUBRICATED, Faces, Film
-from asperity.kernels.stencils import Far, Stencil
-
-MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors, where it has one more
-FEWEST_PAIRED = 12  # cells along an axis that nested blocks still halve
-TURNS = 2  # of blocks and lines, on each of them
-LEAST_PIVOT = 0.02  # of a row's nearest entries, where it may vanish
-LEAST = 1e-30  # of the largest mobility: what is smaller is nothing in single precision
+from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 
-class Kept(NamedTuple):
-    """What lubricated cells store, as it stands in their scaled equations: by a change of gap and of pressure."""
+class StoredOil(NamedTuple):
+    """Storage of oil in the scaled equations of lubricated cells.
+
+    Per change of gap and of pressure.
+    """
 
     by_gap: Field
     by_pressure: Field
 
 
 class Linear:
-    """The linearisation of a balance: `product` applies it, a call answers a residual by a change of pressure.
+    """Linearisation of a balance: `product` applies it, a call approximately inverts it.
 
-    The approximate inverse has two parts. Aggregated onto blocks of cells and factored, the
-    five-point stencil of the lubricated cells removes what is slow and smooth (thick, low-pressure
+    The approximate inverse has two parts. The five-point stencil of the lubricated cells,
+    aggregated onto blocks of cells and factored, removes slow, smooth modes (thick, low-pressure
     valleys); zebra line relaxation along x removes the rest.
     """
 
@@ -51,29 +49,29 @@ class Linear:
             None if balance.film is None else Film(*(part.astype(dtype) for part in balance.film))
         )
         self.faces = None if balance.faces is None else single_faces(balance.faces, dtype)
-        self.storing, self.kept = storing, self._kept(balance.problem.past, storing)
+        self.storing, self.storage = storing, self._storage(balance.problem.past, storing)
         if (
             self.film is not None
             and balance.problem.past is not None
-            and balance.problem.past.followed
+            and balance.problem.past.lagrangian
         ):
-            self.film = self.film.followed
+            self.film = self.film.without_wedge
         self.stencil = self._stencil()
         self.lines = LineRelaxation(self.stencil)
         if self.film is not None:
-            self.blocks = Blocks(
+            self.blocks = BlockSolver(
                 self.stencil, np.where(balance.rows.state == LUBRICATED, 1.0 / scale, dtype(0.0))
             )
 
     def product(self, d_pressure: Field, d_approach: float) -> Field:
-        """The linearised equations applied to a change of pressure and approach."""
+        """Apply the linearised equations to a change of pressure and approach."""
         problem = self.balance.problem
         d_gap = problem.deflection(d_pressure)
         d_gap += self.dtype(d_approach)
         return self.of_gap(d_pressure, d_gap)
 
     def of_gap(self, d_pressure: Field, d_gap: Field) -> Field:
-        """The same, of a change of pressure and that of the gap."""
+        """Apply the linearised equations to a change of pressure and gap."""
         problem = self.balance.problem
         if self.film is None or self.faces is None:
             touching = self.rows.state == reynolds.TOUCHING
@@ -84,37 +82,40 @@ class Linear:
             self.film,
             self.faces,
             self.pressure,
-            d_pressure,
-            d_gap,
+            reynolds.PressureChange(d_pressure, d_gap),
             problem.spacing,
             self.storing,
             out,
         )
-        if self.kept is not None:
-            out += self.kept.by_gap * d_gap
-            out += self.kept.by_pressure * d_pressure
+        if self.storage is not None:
+            out += self.storage.by_gap * d_gap
+            out += self.storage.by_pressure * d_pressure
         return out
 
     def __call__(self, residual: Field) -> Field:
-        """Approximate change of pressure that answers a residual, both (nx, ny); none in cells that know theirs."""
+        """Return an approximate change of pressure for a residual, both (nx, ny).
+
+        Zero in cells whose pressure is known.
+        """
         change = np.zeros(self.cells, self.dtype) if self.film is None else self.blocks(residual)
         return self.lines(residual, change)
 
-    def _kept(self, past: Past | None, storing: float) -> Kept | None:
-        """What the kernels leave to be added; they store for followed oil nothing.
+    def _storage(self, past: TransientTerm | None, storing: float) -> StoredOil | None:
+        """Return the storage that the kernels leave out: all of it for Lagrangian oil.
 
-        What the first two rows then draw in by the wedge is left out: so far from the contact the
-        pressure gradient's flow is all that a change of pressure changes.
+        The wedge's inflow into the first two rows is neglected: so far from the contact only the
+        Poiseuille flow depends on pressure.
         """
         if past is None or self.film is None:
             return None
-        rate = self.dtype(past.rate + (storing if past.followed else 0.0))
+        rate = self.dtype(past.rate + (storing if past.lagrangian else 0.0))
         scaled = np.where(
             self.rows.state == LUBRICATED, self.rows.fluid_scale * rate, self.dtype(0.0)
         )
-        return Kept(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
+        return StoredOil(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
 
     def _stencil(self) -> Stencil:
+        """Return the five-point stencil."""
         stencil = Stencil(*np.empty((5, *self.cells), self.dtype))
         nothing = np.zeros(self.cells, self.dtype)
         film = self.film or Film(*[nothing] * 8)
@@ -122,41 +123,48 @@ class Linear:
             nothing, nothing, nothing, nothing, nothing, nothing, nothing[0], nothing[0]
         )
         problem = self.balance.problem
-        near = problem.deflection.near
-        stencils.local_stencil(self.rows, film, faces, near, problem.spacing, self.storing, stencil)
-        if self.kept is not None:
-            own, neighbour = (self.dtype(near[k] - near[3]) for k in (0, 1))
-            stencil.centre[:] += self.kept.by_gap * own + self.kept.by_pressure
-            stencil.west[:] += self.kept.by_gap * neighbour
-            stencil.east[:] += self.kept.by_gap * neighbour
-        turn_back(stencil, problem.mirror)
+        compliance = problem.deflection.local_compliance
+        stencils.local_stencil(
+            self.rows, film, faces, compliance, problem.spacing, self.storing, stencil
+        )
+        if self.storage is not None:
+            own, neighbour = (self.dtype(compliance[k] - compliance[3]) for k in (0, 1))
+            stencil.centre[:] += self.storage.by_gap * own + self.storage.by_pressure
+            stencil.west[:] += self.storage.by_gap * neighbour
+            stencil.east[:] += self.storage.by_gap * neighbour
+        fold_at_mirror(stencil, problem.mirror)
         return stencil
 
 
-def turn_back(stencil: Stencil, mirror: int) -> None:
-    """Couple the last line of cells to what is on its side of the mirror, where there is one, in place."""
+def fold_at_mirror(stencil: Stencil, mirror: int) -> None:
+    """Couple the last line of cells to its mirror image, in place, if there is a mirror."""
     if mirror:
-        image = stencil.centre if mirror == BETWEEN else stencil.south
+        image = stencil.centre if mirror == MIRROR_BETWEEN else stencil.south
         image[:, -1] += stencil.north[:, -1]
         stencil.north[:, -1] = 0.0
 
 
 class LineRelaxation:
-    """Zebra relaxation of a stencil of five points, or seven with `far` ones: its x lines are solved exactly.
+    """Zebra relaxation of a five-point stencil, or a seven-point one with outer neighbours.
 
-    Even, odd and even ones in turn. Lines of five are not dominated by their centres.
+    Solves even, odd and even x lines exactly, in turn. Seven-point lines are not diagonally
+    dominant.
     """
 
-    def __init__(self, stencil: Stencil, far: Far | None = None) -> None:
+    def __init__(self, stencil: Stencil, far: OuterNeighbours | None = None) -> None:
         nx, ny = stencil.centre.shape
         nothing = np.empty((0, 0), stencil.centre.dtype)
-        self.stencil, self.far = stencil, far or Far(nothing, nothing)
+        self.stencil, self.far = stencil, far or OuterNeighbours(nothing, nothing)
         for parity in (0, 1):
-            near = np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)
-            beyond = np.empty((2, *near.shape[1:]), near.dtype) if far else (nothing, nothing)
-            lines = line_relaxation.Lines(*near, *beyond)
+            compliance = np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)
+            beyond = (
+                np.empty((2, *compliance.shape[1:]), compliance.dtype)
+                if far
+                else (nothing, nothing)
+            )
+            lines = line_relaxation.LineFactors(*compliance, *beyond)
             line_relaxation.factor_lines(
-                stencil, self.far, parity, LEAST_PIVOT if far else 0.0, lines
+                stencil, self.far, parity, PRECONDITIONER.min_pivot if far else 0.0, lines
             )
             if parity:
                 self.odd = lines
@@ -164,21 +172,21 @@ class LineRelaxation:
                 self.even = lines
 
     def __call__(self, residual: Field, change: Field) -> Field:
-        """`change`, improved in place so that it better answers the residual, both (nx, ny)."""
+        """Improve `change`, (nx, ny), in place by relaxation, and return it."""
         line_relaxation.relax_zebra(self.stencil, self.far, self.even, self.odd, residual, change)
         return change
 
 
 class SingularFactor(ArithmeticError):
-    """Linearised equations that have no solution, or no single one."""
+    """Linearised equations without a unique solution."""
 
 
-class Blocks:
-    """A five-point stencil, its rows times `weight`, summed over blocks of cells and factored by sparse LU."""
+class BlockSolver:
+    """Five-point stencil, rows times `weight`, summed over blocks and factored by sparse LU."""
 
     def __init__(self, stencil: Stencil, weight: Field) -> None:
         self.weight, (nx, ny) = weight, weight.shape
-        self.block = _block(nx), _block(ny)
+        self.block = _block_size(nx), _block_size(ny)
         self.cells = -(-nx // self.block[0]), -(-ny // self.block[1])
         coarse = Stencil(*np.empty((5, *self.cells)))
         line_relaxation.aggregate_stencil(stencil, weight, self.block, coarse)
@@ -186,7 +194,7 @@ class Blocks:
         self.factors = self.pattern.factored(coarse)
 
     def __call__(self, residual: Field) -> Field:
-        """The change, one number a block, that answers a residual; none in cells without weight."""
+        """Return the change, one number per block, for a residual; zero in cells without weight."""
         coarse, change = np.empty(self.cells), np.zeros_like(self.weight)
         line_relaxation.restrict(residual, self.weight, self.block, coarse)
         line_relaxation.prolong(
@@ -195,27 +203,32 @@ class Blocks:
         return change
 
 
-class NestedBlocks:
-    """The same summed over blocks of two by two again and again, relaxed on each grid, and inverted on the last."""
+class MultigridSolver:
+    """Five-point stencil, rows times `weight`, summed over nested two-by-two blocks.
+
+    Relaxed on every level and inverted on the last.
+    """
 
     def __init__(self, stencil: Stencil, weight: Field) -> None:
         self.weight = weight
-        self.nest = _nest(weight.shape, weight.dtype)
-        if not multigrid.nest_blocks(stencil, weight, LEAST_PIVOT, self.nest):
+        self.hierarchy = _allocate_hierarchy(weight.shape, weight.dtype)
+        if not multigrid.build_hierarchy(stencil, weight, PRECONDITIONER.min_pivot, self.hierarchy):
             raise SingularFactor("the last of nested grids has no inverse")
 
     def __call__(self, residual: Field) -> Field:
-        """The change, one number a block, that answers a residual; none in cells without weight."""
+        """Return the change, one number per block, for a residual; zero in cells without weight."""
         change = np.zeros_like(self.weight)
-        multigrid.answer_nested(self.nest, residual, self.weight, TURNS, change)
+        multigrid.apply_hierarchy(
+            self.hierarchy, residual, self.weight, PRECONDITIONER.cycles, change
+        )
         return change
 
 
-def _nest(cells: tuple[int, int], dtype: Any) -> Nest:
-    """Room for the grids of nested blocks, down to one that is no wider than it has to be."""
+def _allocate_hierarchy(cells: tuple[int, int], dtype: Any) -> GridHierarchy:
+    """Allocate the levels of nested blocks."""
     grids = [(-(-cells[0] // 2), -(-cells[1] // 2))]
-    while max(grids[-1]) >= FEWEST_PAIRED:
-        nx, ny = (-(-n // 2) if n >= FEWEST_PAIRED else n for n in grids[-1])
+    while max(grids[-1]) >= PRECONDITIONER.min_halved_cells:
+        nx, ny = (-(-n // 2) if n >= PRECONDITIONER.min_halved_cells else n for n in grids[-1])
         grids.append((nx, ny))
     starts = np.cumsum(
         [(0, 0, 0), *((nx * ny, nx * ((ny + 1) // 2), nx * (ny // 2)) for nx, ny in grids)], axis=0
@@ -224,29 +237,29 @@ def _nest(cells: tuple[int, int], dtype: Any) -> Nest:
     places = np.concatenate([grids, starts[:-1]], axis=1)
     cells_of, last = (count,), grids[-1][0] * grids[-1][1]
     shapes = [(5, count), cells_of, cells_of, (5, even), (5, odd), cells_of, cells_of, (last, last)]
-    return Nest._make([places, *(np.empty(shape, dtype) for shape in shapes)])
+    return GridHierarchy._make([places, *(np.empty(shape, dtype) for shape in shapes)])
 
 
-def _block(cells: int) -> int:
-    """How many cells along an axis the factored grid puts into one."""
+def _block_size(cells: int) -> int:
+    """Return the cells per block along an axis of the factored grid."""
     smallest = 1 if cells < 32 else 2 if cells < 128 else 4
-    return max(smallest, -(-cells // MOST_COARSE_CELLS))
+    return max(smallest, -(-cells // PRECONDITIONER.max_coarse_cells))
 
 
 def single_faces(faces: Faces, dtype: Any = np.float32) -> Faces:
-    """In another precision; what would become denormal in it is none."""
-    least = LEAST * float(max(faces.east.max(), faces.north.max()))
+    """Convert faces to another precision, with values that would be denormal set to zero."""
+    least = PRECONDITIONER.min_mobility * float(max(faces.east.max(), faces.north.max()))
     *parts, inlet, wedge, behind = faces
     single = np.empty((len(parts), *faces.east.shape), dtype)
     for part, out in zip(parts, single, strict=True):
-        reynolds.in_precision_of(out, part, least)
+        reynolds.convert_precision(out, part, least)
     return Faces._make(
         [*single, np.where(inlet > least, inlet, 0.0).astype(dtype), wedge.astype(dtype), behind]
     )
 
 
 class _Pattern(NamedTuple):
-    """Where the entries of a five-point matrix on `cells` go, its rows and columns put in an order of little fill."""
+    """Sparsity pattern of a five-point matrix on `cells`, in an order of little fill."""
 
     cells: tuple[int, int]
     order: Any
@@ -255,12 +268,12 @@ class _Pattern(NamedTuple):
     columns: Any
 
     def factored(self, stencil: Stencil) -> Any:
-        """LU factors of the stencil's matrix."""
+        """Return LU factors of the stencil's matrix."""
         count = self.order.size
         entries = np.stack([part.ravel() for part in stencil]).ravel()
         values = np.bincount(self.position, weights=entries, minlength=self.rows.size + 1)[:-1]
         matrix = scipy.sparse.csc_array((values, self.rows, self.columns), shape=(count, count))
-        # small panels: these matrices are too sparse for the dense blocks that SuperLU looks for
+        # small panels: these matrices are too sparse for the dense blocks of SuperLU
         try:
             return scipy.sparse.linalg.splu(
                 matrix,
@@ -273,16 +286,16 @@ class _Pattern(NamedTuple):
         except RuntimeError as error:
             raise SingularFactor(str(error)) from None
 
-    def solve(self, factors: Any, wanted: Field) -> Field:
-        """What the factored matrix turns into `wanted`, (cx, cy)."""
+    def solve(self, factors: Any, rhs: Field) -> Field:
+        """Solve the factored matrix for `rhs`, (cx, cy)."""
         solved = np.empty(self.order.size)
-        solved[self.order] = factors.solve(wanted.ravel()[self.order])
+        solved[self.order] = factors.solve(rhs.ravel()[self.order])
         return solved.reshape(self.cells)
 
 
 @lru_cache(maxsize=16)
 def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
-    """The pattern of a grid, found once."""
+    """Return the pattern of a grid; cached."""
     index = np.arange(cells[0] * cells[1]).reshape(cells)
     nowhere = np.full((1, cells[1]), -1)
     columns = np.stack(
@@ -308,7 +321,7 @@ def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
     place[order] = np.arange(index.size)
     keys = np.where(there, place[columns] * index.size + place[rows], -1).ravel()
     entries, position = np.unique(keys[there.ravel()], return_inverse=True)
-    full = np.full(keys.size, entries.size)  # couplings across the ends go nowhere
+    full = np.full(keys.size, entries.size)  # couplings across the ends are dropped
     full[there.ravel()] = position
     starts = np.searchsorted(entries, np.arange(index.size + 1) * index.size)
     return _Pattern(

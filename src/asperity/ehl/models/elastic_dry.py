@@ -1,10 +1,10 @@
-"""The dry contact of elastic bodies, to any tolerance: which cells touch, and what presses on these.
+"""Dry contact of elastic bodies by active sets of touching cells, to any tolerance.
 
-Pressures of no less than 0, in sum the load, that leave no gap where they are positive and an open
-one where not. Which cells touch is Newton's question (semismooth); what presses on them is found
-by conjugate gradients in single precision, on the lines that touch alone, and what that leaves is
-measured in double. Sources: M. Hintermüller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002) 865; I.
-A. Polonsky, L. M. Keer, Wear 231 (1999) 206.
+Non-negative pressures whose sum is the load, with zero gap where they are positive and a
+non-negative one elsewhere. A semismooth Newton method finds the touching cells; conjugate gradients
+in single precision, on a window of touching lines, find their pressures, with residuals in double
+precision. Sources: M. Hintermüller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002) 865; I. A.
+Polonsky, L. M. Keer, Wear 231 (1999) 206.
 """
 
 from typing import NamedTuple
@@ -12,91 +12,86 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
+from asperity.ehl.controls import ELASTIC_DRY
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.models.single_pressure import Problem
 
-MOST_STEPS = 1000  # of conjugate gradients
-MOST_SETS = 30  # of cells that touch, in one window
-MOST_WINDOWS = 8
-MARGIN = 32  # a window has one in so many of all lines more, on either side, than touch
-LOOSE, TIGHT, EXACT = (
-    0.1,
-    1e-3,
-    1e-4,
-)  # left by conjugate gradients: while cells come and go, after, near the end
-MANY, NEAR = (
-    0.002,
-    1e-6,
-)  # share of cells that come and go; what is left, from which the end is near
 
-
-class _Lines(NamedTuple):
-    """Neighbouring lines of a problem, (lines, ny), that hold all that touches."""
+class _ContactLines(NamedTuple):
+    """Adjacent lines of a problem, (lines, ny), that contain all contact."""
 
     deflection: Deflection
     undeformed: Field
     inside: Mask
     stiffness: float
     load: float  # sum of the pressures
-    cells: int  # of the whole problem
+    cells: int  # number in the whole problem
 
     @classmethod
-    def all_of(cls, problem: Problem) -> "_Lines":
+    def from_problem(cls, problem: Problem) -> "_ContactLines":
+        """Return all lines of a problem."""
         inside = np.broadcast_to(~problem.rim, problem.cells)
         dx, dy = problem.spacing
         load, stiffness = problem.load / (dx * dy), 1.0 / problem.softness
         return cls(problem.deflection, problem.undeformed, inside, stiffness, load, inside.size)
 
-    def around(self, touching: Mask) -> tuple["_Lines", slice]:
-        """Those that touch, and some more."""
-        margin, lines = self.undeformed.shape[0] // MARGIN, np.flatnonzero(touching.any(axis=1))
+    def window(self, touching: Mask) -> tuple["_ContactLines", slice]:
+        """Return the touching lines with a margin."""
+        margin, lines = (
+            self.undeformed.shape[0] // ELASTIC_DRY.window_margin,
+            np.flatnonzero(touching.any(axis=1)),
+        )
         window = slice(max(lines[0] - margin, 0), lines[-1] + 1 + margin)
         undeformed = self.undeformed[window]
-        among = self.deflection.among(undeformed.shape[0])
+        restrict_to = self.deflection.restrict_to(undeformed.shape[0])
         return self._replace(
-            deflection=among, undeformed=undeformed, inside=self.inside[window]
+            deflection=restrict_to, undeformed=undeformed, inside=self.inside[window]
         ), window
 
     def state(self, pressure: Field) -> tuple[Field, float, float]:
-        """The gap, the approach that closes it where there is pressure, and what is left of every equation (rms)."""
+        """Return the gap, the approach, and the residual (rms).
+
+        The approach makes the mean gap zero where there is pressure.
+        """
         gap = self.undeformed + self.deflection(pressure)
         approach = -float(gap[pressure > 0.0].mean())
         gap += approach
-        left = np.minimum(pressure, gap * self.stiffness)[self.inside]
-        return gap, approach, float(np.sqrt(np.vdot(left, left) / self.cells))
+        residual = np.minimum(pressure, gap * self.stiffness)[self.inside]
+        return gap, approach, float(np.sqrt(np.vdot(residual, residual) / self.cells))
 
 
 def elastic_contact(
     problem: Problem, pressure: Field, tolerance: float
 ) -> tuple[Field, float, bool]:
-    """Pressure (nx, ny) and approach of the elastic, dry contact from a first guess; whether they met the tolerance.
+    """Solve the elastic, dry contact from an initial guess of the pressure.
 
-    The tolerance is of the equations' root mean square, as a share of p_h.
+    Returns pressure (nx, ny), approach, and whether the residual met the tolerance: root mean
+    square as a share of p_h.
     """
-    whole = _Lines.all_of(problem)
+    whole = _ContactLines.from_problem(problem)
     pressure = np.where(whole.inside, np.maximum(pressure, 0.0), 0.0)
     pressure *= whole.load / pressure.sum()
-    steps = MOST_STEPS
-    for _ in range(MOST_WINDOWS):
-        gap, approach, left = whole.state(pressure)
-        if left < tolerance or steps <= 0:
+    steps = ELASTIC_DRY.max_krylov_steps
+    for _ in range(ELASTIC_DRY.max_windows):
+        gap, approach, residual = whole.state(pressure)
+        if residual < tolerance or steps <= 0:
             break
-        lines, window = whole.around(whole.inside & ((pressure > 0.0) | (gap < 0.0)))
-        found, taken = _pressed(lines, pressure[window], tolerance, steps)
+        lines, window = whole.window(whole.inside & ((pressure > 0.0) | (gap < 0.0)))
+        found, taken = _solve_window(lines, pressure[window], tolerance, steps)
         pressure = np.zeros_like(pressure)
         pressure[window] = found
         steps -= taken
-    return pressure, approach, left < tolerance
+    return pressure, approach, residual < tolerance
 
 
-def _pressed(
-    lines: _Lines, pressure: Field, tolerance: float, most_steps: int
+def _solve_window(
+    lines: _ContactLines, pressure: Field, tolerance: float, max_steps: int
 ) -> tuple[Field, int]:
-    """Pressures on some lines, none below 0, and the steps they took: met, or out of steps or sets."""
+    """Return non-negative pressures on some lines, and the conjugate-gradient steps taken."""
     steps, before = 0, pressure > 0.0
-    for _ in range(MOST_SETS):
-        gap, _, left = lines.state(pressure)
-        if left < tolerance or steps >= most_steps:
+    for _ in range(ELASTIC_DRY.max_active_sets):
+        gap, _, residual = lines.state(pressure)
+        if residual < tolerance or steps >= max_steps:
             break
         touching = lines.inside & (pressure > gap * lines.stiffness)
         count = np.count_nonzero(touching)
@@ -104,26 +99,32 @@ def _pressed(
         if np.any(settled != pressure):
             settled[touching] += (lines.load - settled.sum()) / count
             gap = lines.undeformed + lines.deflection(settled)
-        changing = np.count_nonzero(touching != before) > MANY * count
-        share = LOOSE if changing else TIGHT if left > NEAR else EXACT
-        share = max(share, 0.2 * tolerance / left)
-        change, _, taken = levelled(lines.deflection, touching, gap, share, most_steps - steps)
+        changing = np.count_nonzero(touching != before) > ELASTIC_DRY.changing_share * count
+        share = (
+            ELASTIC_DRY.loose
+            if changing
+            else ELASTIC_DRY.tight
+            if residual > ELASTIC_DRY.final_residual
+            else ELASTIC_DRY.exact
+        )
+        share = max(share, 0.2 * tolerance / residual)
+        change, _, taken = level_gaps(lines.deflection, touching, gap, share, max_steps - steps)
         pressure, before, steps = settled + change, touching, steps + taken
     pressure = np.maximum(pressure, 0.0)
     return pressure * (lines.load / pressure.sum()), steps
 
 
-def levelled(
+def level_gaps(
     deflection: Deflection, touching: Mask, gap: Field, share: float, most: int
 ) -> tuple[Field, float, int]:
-    """A change of touching cells' pressures, in sum nothing, that levels their gaps but for a share.
+    """Solve for a pressure change of touching cells with zero sum that equalises their gaps.
 
-    With it the level, and the steps that were taken.
+    To a relative residual `share`. Returns change, mean gap, and the steps taken.
     """
     count, level = np.float32(np.count_nonzero(touching)), gap[touching].mean()
-    left = np.where(touching, level - gap, 0.0).astype(np.float32)
-    change, direction, step = np.zeros_like(left), left.copy(), 0
-    size = first = float(np.vdot(left, left))
+    residual = np.where(touching, level - gap, 0.0).astype(np.float32)
+    change, direction, step = np.zeros_like(residual), residual.copy(), 0
+    size = first = float(np.vdot(residual, residual))
     while size > share**2 * first and step < most:
         answer = deflection(direction)
         answer[~touching] = 0.0
@@ -132,10 +133,10 @@ def levelled(
         length = np.float32(size / float(np.vdot(answer, direction)))
         change += length * direction
         level += length * mean
-        left -= length * answer
-        before, size = size, float(np.vdot(left, left))
+        residual -= length * answer
+        before, size = size, float(np.vdot(residual, residual))
         direction *= np.float32(size / before)
-        direction += left
+        direction += residual
         step += 1
     exact = change.astype(float)
     exact[touching] -= exact[touching].mean()

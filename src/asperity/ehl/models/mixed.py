@@ -1,24 +1,24 @@
-"""The mixed contact with two pressures, on one grid, dimensionless: what each cell asks for.
+"""Two-pressure mixed contact on one grid, dimensionless: the equations of each cell.
 
-The oil has a pressure q of its own, in every cell and so in those that touch too; the asperities
-carry the rest of the total pressure P. With R the cell's net oil outflow in the film max(H, H_c),
-its density and viscosity those of q:
+The oil has a pressure q in every cell, including touching ones; the asperities carry the rest of
+the total pressure P. With R the cell's net oil outflow in the film max(H, H_c), its density and
+viscosity those of q:
 
     oil         max( min( q, R/J ),  q - P_cap ) = 0                  ruptured, lubricated, capped
     asperities  max( min( P - q, (H - H_c)/k ),  P - P_cap ) = 0      free, touching, capped
 
-A closed cell's outflow is scaled by its own derivative, the film held: by that of an open one,
-shut-in oil would count as balanced whatever its pressure. No cell moves its oil less easily than
-ambient oil in the contact film. The wedge is first order, or second order that leans back where
-the film's content jumps, as at the edge of a touching cell.
+A closed cell's outflow is scaled by its derivative at fixed film: with that of an open one, trapped
+oil would count as balanced at any pressure. A cell's mobility is at least that of ambient oil in
+the contact film. The wedge is first order, or second order with a slope limiter that acts where the
+film's content jumps, as at the edge of a touching cell.
 
-A closed cell that takes in more oil than even q = P drives out again is lifted: it gets q = P,
-counts as free, and as long as its gap is still below H_c, what it lacks counts as oil that it
-lacks. So its row asks for an open gap at once. Not so a cell so deep in plastic overlap that
-lifting it would take more than the cap.
+A closed cell that takes in more oil than drains at q = P is opened: it gets q = P and counts as
+free, and while its gap is below H_c the missing gap counts as missing oil, so its equation at once
+demands an open gap. This excludes cells in plastic overlap so deep that opening would take more
+than the cap.
 
-Where oil is conserved, R = 0 in every cell, and one signed unknown tells q, what is missing of the
-film, and how far oil at the cap has pressed the gap open.
+Where oil is conserved, R = 0 in every cell, and one signed unknown represents q, the missing share
+of the film, and the permanent opening of the gap by oil at the cap.
 """
 
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ import numpy as np
 from asperity.core.arrays import Codes, Field, Mask
 from asperity.ehl.models.single_pressure import CLOSED_WITHIN, FIRST_ORDER, THIRD_ORDER, Problem
 from asperity.kernels import load_sharing
-from asperity.kernels.load_sharing import FREE, Borne, Bounds
+from asperity.kernels.load_sharing import FREE, CellState, ContactBounds
 from asperity.kernels.reynolds import (
     CAPPED,
     LUBRICATED,
@@ -38,18 +38,18 @@ from asperity.kernels.reynolds import (
     Faces,
     Film,
     Rows,
-    leaning_outflow,
+    limited_outflow,
 )
 from asperity.lubricant import Lubricant
 
-OPEN_FROM = 0.5  # contact films of gap beyond the contact film
+OPENING_RANGE = 0.5  # in contact films: gap above the contact film over which the limiter sets in
 
 
 class Pressures(NamedTuple):
-    """The unknowns: the oil's pressure q and the total pressure P, both (nx, ny), and the approach H0.
+    """Unknowns: oil pressure q and total pressure P, both (nx, ny), and approach H0.
 
-    Where oil is conserved, `oil` is signed: below 0 the share of the film that is missing (there q
-    = 0), above the cap what presses the gap open for good (there q = P_cap).
+    Where oil is conserved, `oil` is signed: below 0 the missing share of the film (q = 0), above
+    the cap the permanent opening of the gap (q = P_cap).
     """
 
     oil: Field
@@ -59,15 +59,15 @@ class Pressures(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class MixedBalance:
-    """A problem evaluated at two pressures: gap, what is left of both equations, and what linearisation needs.
+    """A problem evaluated at two pressures: gap, residuals, and terms of the linearisation.
 
-    `rows` are the oil's; `solid` says what decides a cell's total pressure: FREE, TOUCHING or
+    `rows` are those of the oil; `solid` is the state of a cell's total pressure: FREE, TOUCHING or
     CAPPED.
     """
 
     problem: Problem
     unknowns: Pressures
-    # may be negative where the cap lets the bodies overlap: the depth of plastic flattening
+    # negative where the cap lets the bodies overlap: depth of plastic flattening
     gap: Field
     oil_residual: Field
     solid_residual: Field
@@ -75,19 +75,17 @@ class MixedBalance:
     solid: Codes
     film: Film
     faces: Faces
-    lean: Field
+    limiter: Field
     outflow: Field  # net oil outflow per cell area
-    shut: Mask  # cells whose film does not change with the gap
-    surplus: Field | None = (
-        None  # content beyond the full film's, where oil is conserved: what is missing, negative
-    )
-    surplus_by_oil: Field | None = (
-        None  # slope of all content; 0 where the film is full and below the cap
-    )
+    sealed: Mask  # cells whose film does not depend on the gap
+    # where oil is conserved: content beyond the full film's, negative in cavities
+    surplus: Field | None = None
+    # its derivative in the signed unknown; 0 where the film is full and below the cap
+    surplus_by_oil: Field | None = None
 
     @property
     def solved(self) -> Mask:
-        """Cells in which Reynolds' equation decides: where oil is conserved, all but the rim's."""
+        """Cells in which Reynolds' equation holds: where oil is conserved, all inside the rim."""
         if self.surplus is None:
             return np.asarray(self.rows.state == LUBRICATED)
         return np.broadcast_to(~self.problem.rim, self.gap.shape)
@@ -99,29 +97,29 @@ class MixedBalance:
 
     @property
     def pressure(self) -> Field:
-        """The total pressure, (nx, ny)."""
+        """Total pressure, (nx, ny)."""
         return self.unknowns.total
 
     @property
-    def leant(self) -> Field:
-        """How far the wedge leans back from first order, in content, (nx, ny)."""
-        return self.lean * (self.film.content - _upstream(self.problem, self.film.content))
+    def limiter_correction(self) -> Field:
+        """Second-order correction of the wedge, in content, (nx, ny)."""
+        return self.limiter * (self.film.content - _upstream(self.problem, self.film.content))
 
     @property
     def film_share(self) -> Field:
-        """Share of the gap that is oil, (nx, ny): below 1 in cavities, where oil is conserved."""
+        """Share of the gap that is oil, (nx, ny): below 1 in conserving cavities."""
         share = np.ones_like(self.gap)
         return share if self.surplus is None else share + np.minimum(self.unknowns.oil, 0.0)
 
     @property
     def growth(self) -> Field:
-        """How far oil at the cap has pressed the gap open for good, where oil is conserved, (nx, ny)."""
+        """Permanent opening of the gap by conserved oil at the cap, (nx, ny)."""
         nothing = np.zeros_like(self.gap)
         return nothing if self.surplus is None else _growth(self.problem, self.unknowns.oil)
 
     @property
     def height(self) -> Field:
-        """Gap between the bodies with what oil at the cap has added, no less than the contact film, (nx, ny)."""
+        """Gap with its permanent opening, at least the contact film, (nx, ny)."""
         return np.maximum(self.gap, self.problem.contact_gap) + self.growth
 
     @property
@@ -135,13 +133,13 @@ class MixedBalance:
 
     @property
     def imbalance(self) -> float:
-        """Oil that cells lose and gain, in sum, over the throughflow: no less than what all lose together."""
+        """Sum of oil lost and gained by cells, over the throughflow; bounds the net loss."""
         dx, dy = self.problem.spacing
         return float(np.abs(self.outflow[self.solved]).sum()) * dx * dy / abs(self.throughflow)
 
     @property
     def load_error(self) -> float:
-        """Relative."""
+        """Relative excess of the pressure over the load."""
         return self.problem.load_error(self.pressure)
 
     @property
@@ -151,12 +149,12 @@ class MixedBalance:
 
     @property
     def oil_pressure(self) -> Field:
-        """What drives the oil, (nx, ny)."""
+        """Oil pressure, (nx, ny)."""
         return np.clip(self.unknowns.oil, 0.0, self.problem.p_cap)
 
     @property
     def parted(self) -> Mask:
-        """Cells in which the bodies' pressure is the oil's."""
+        """Cells without asperity pressure."""
         return np.asarray(self.solid == FREE)
 
     @property
@@ -166,7 +164,7 @@ class MixedBalance:
 
     @property
     def in_contact(self) -> Mask:
-        """Cells where the bodies touch: gap closed to the contact film, or flattened below it."""
+        """Cells in which the bodies touch: gap at the contact film, or flattened below it."""
         closed = self.gap <= (1.0 + CLOSED_WITHIN) * self.problem.contact_gap
         return np.asarray((self.solid == TOUCHING) | closed)
 
@@ -174,13 +172,14 @@ class MixedBalance:
 def evaluate(
     problem: Problem, unknowns: Pressures, *, second_order: bool, freed: Mask | None = None
 ) -> MixedBalance:
-    """What is left of every equation; `freed` cells are taken as free whatever their gap.
+    """Return the residual of every equation.
 
-    So are lifted ones, and the unknowns are changed where that takes it.
+    `freed` cells count as free whatever their gap, and so do opened ones, whose unknowns are
+    changed where necessary.
     """
     gap = problem.undeformed + problem.deflection(unknowns.total)
     gap += unknowns.approach
-    return _evaluate(problem, unknowns, gap, second_order, freed, may_lift=True)
+    return _evaluate(problem, unknowns, gap, second_order, freed, may_open=True)
 
 
 def _evaluate(
@@ -190,58 +189,66 @@ def _evaluate(
     second_order: bool,
     freed: Mask | None,
     *,
-    may_lift: bool,
+    may_open: bool,
 ) -> MixedBalance:
+    """Evaluate at a given gap; again after opening cells, unless `may_open` is False."""
     signed, pressure, approach = unknowns
     assert problem.lubricant is not None
     closed, scale = problem.contact_gap, 1.0 / problem.softness
-    bounds = Bounds(closed, scale, (1.0 + CLOSED_WITHIN) * closed, problem.p_cap)
+    bounds = ContactBounds(closed, scale, (1.0 + CLOSED_WITHIN) * closed, problem.p_cap)
     oil = np.clip(signed, 0.0, problem.p_cap)
     height = np.maximum(gap, closed) + _growth(problem, signed) if problem.conserve else gap
     film, faces, outflow, fluid_scale = _flow(problem, oil, height, problem.lubricant)
-    lean = (
-        _lean(problem, film.content, gap)
-        if second_order and may_lean(problem)
+    limiter = (
+        _limiter(problem, film.content, gap)
+        if second_order and uses_limiter(problem)
         else np.zeros_like(gap)
     )
     surplus, surplus_by_oil = _surplus(problem, film, signed) if problem.conserve else (None, None)
-    outflow += _beyond_first_order(problem, film.content, lean, second_order=second_order)
+    outflow += _second_order_outflow(problem, film.content, limiter, second_order=second_order)
     if surplus is not None:
-        outflow += transported(problem, surplus)
+        outflow += advected_outflow(problem, surplus)
         upwind_at_outlet(problem, film.content, outflow)
 
-    cells = Borne(signed, oil, pressure, gap, outflow, np.empty_like(gap))
-    load_sharing.own_outflows(film, faces, _carried(problem), *problem.spacing, cells.own_outflow)
+    cells = CellState(signed, oil, pressure, gap, outflow, np.empty_like(gap))
+    load_sharing.outflow_by_pressure(
+        film, faces, _outflow_by_content(problem), *problem.spacing, cells.own_outflow
+    )
     freed = np.zeros(gap.shape, dtype=bool) if freed is None else freed
-    lifted, sunk, shut = np.empty((3, *gap.shape), dtype=bool)
-    if load_sharing.lift(cells, bounds, lifted) and may_lift:
+    opening_cells, sunk, sealed = np.empty((3, *gap.shape), dtype=bool)
+    if load_sharing.mark_opening(cells, bounds, opening_cells) and may_open:
         unknowns = Pressures(
-            np.where(lifted & (pressure > oil), pressure, signed), pressure, approach
+            np.where(opening_cells & (pressure > oil), pressure, signed), pressure, approach
         )
-        return _evaluate(problem, unknowns, gap, second_order, freed | lifted, may_lift=False)
+        return _evaluate(
+            problem, unknowns, gap, second_order, freed | opening_cells, may_open=False
+        )
     solid, solid_residual = np.empty(gap.shape, dtype=np.int8), np.empty_like(gap)
-    if load_sharing.settle(cells, bounds, lifted, freed, solid, solid_residual, sunk):
+    if load_sharing.fill_contact_rows(
+        cells, bounds, opening_cells, freed, solid, solid_residual, sunk
+    ):
         lacking = np.where(sunk, film.content_by_gap * (gap - closed), 0.0)
-        outflow += transported(problem, lacking) + added_by_lean(problem, lacking, lean, lean)
-    load_sharing.shut_in(cells, bounds, solid, sunk, fluid_scale, shut)
+        outflow += advected_outflow(problem, lacking) + limiter_outflow(
+            problem, lacking, limiter, limiter
+        )
+    load_sharing.mark_sealed(cells, bounds, solid, sunk, fluid_scale, sealed)
     oil_residual, state = np.empty_like(gap), np.empty(gap.shape, dtype=np.int8)
     if surplus_by_oil is None:
-        load_sharing.refilled(cells, bounds, fluid_scale, oil_residual, state)
-        load_sharing.hold_film(shut, film)
+        load_sharing.fill_oil_rows(cells, bounds, fluid_scale, oil_residual, state)
+        load_sharing.fix_film_gap(sealed, film)
     else:
-        # a cell closed to the contact film holds next to no oil: what it lacks counts as what would
-        # lift it
+        # a closed cell holds hardly any oil: its missing oil counts as the gap that would open it
         loose, lacks = (
             surplus_by_oil > 0.0,
-            np.maximum(surplus_by_oil, problem.softness) * _carried(problem),
+            np.maximum(surplus_by_oil, problem.softness) * _outflow_by_content(problem),
         )
         fluid_scale = np.where(loose, 1.0 / lacks, fluid_scale)
         oil_residual = outflow * fluid_scale
         state = np.where(signed < 0.0, RUPTURED, np.where(loose, CAPPED, LUBRICATED)).astype(
             np.int8
         )
-        pressed = signed > problem.p_cap  # opened by the oil, not by the bodies' distance
-        load_sharing.hold_film(shut & ~pressed, film)
+        pressed = signed > problem.p_cap  # opened by the oil, not by the approach
+        load_sharing.fix_film_gap(sealed & ~pressed, film)
         stiff = pressed & (film.log_mobility_by_gap == 0.0)
         film = film._replace(
             log_mobility_by_gap=np.where(stiff, -3.0 / height, film.log_mobility_by_gap)
@@ -249,12 +256,12 @@ def _evaluate(
     if np.any(rim := problem.rim):
         state[:, rim], oil_residual[:, rim] = RUPTURED, signed[:, rim]
         solid[:, rim], solid_residual[:, rim] = FREE, (pressure - oil)[:, rim]
-    if problem.held is not None:
-        state[problem.held], solid[problem.held] = RUPTURED, FREE
-        oil_residual[problem.held] = solid_residual[problem.held] = 0.0
+    if problem.fixed is not None:
+        state[problem.fixed], solid[problem.fixed] = RUPTURED, FREE
+        oil_residual[problem.fixed] = solid_residual[problem.fixed] = 0.0
     rows, left = Rows(state, fluid_scale, scale), (oil_residual, solid_residual)
     balance = MixedBalance(
-        problem, unknowns, gap, *left, rows, solid, film, faces, lean, outflow, shut
+        problem, unknowns, gap, *left, rows, solid, film, faces, limiter, outflow, sealed
     )
     return (
         replace(balance, surplus=surplus, surplus_by_oil=surplus_by_oil)
@@ -264,7 +271,10 @@ def _evaluate(
 
 
 def _surplus(problem: Problem, film: Film, signed: Field) -> tuple[Field, Field]:
-    """Content beyond the full film's, negative in cavities, and the slope of all content in the signed unknown."""
+    """Return the content beyond the full film's and the derivative of all content.
+
+    The surplus is negative in cavities; the derivative is in the signed unknown.
+    """
     missing = np.minimum(signed, 0.0)
     pressed = signed > problem.p_cap
     density = film.content_by_gap
@@ -274,6 +284,7 @@ def _surplus(problem: Problem, film: Film, signed: Field) -> tuple[Field, Field]
 
 
 def _growth(problem: Problem, signed: Field) -> Field:
+    """Return the permanent opening of the gap by oil at the cap."""
     beyond = (
         np.maximum(signed - problem.p_cap, 0.0)
         if np.isfinite(problem.p_cap)
@@ -285,104 +296,122 @@ def _growth(problem: Problem, signed: Field) -> Field:
 def _flow(
     problem: Problem, oil: Field, gap: Field, lubricant: Lubricant
 ) -> tuple[Film, Faces, Field, Field]:
+    """Return the flow with the wedge and the minimum mobility of this model."""
     wedge = THIRD_ORDER if problem.accurate else FIRST_ORDER
     return problem.flow(
         oil, gap, lubricant, wedge, least_mobility=problem.contact_gap**3 / problem.speed
     )
 
 
-def may_lean(problem: Problem) -> bool:
-    """Whether the wedge leans back from first order: on smooth bodies it has its own, and borders of cavities jump."""
+def uses_limiter(problem: Problem) -> bool:
+    """Return True if the wedge is second order with a slope limiter.
+
+    Smooth bodies have a third-order wedge, and at the borders of conserving cavities content jumps.
+    """
     return not problem.accurate and not problem.conserve
 
 
-def _followed(problem: Problem) -> bool:
-    return problem.past is not None and problem.past.followed
+def _is_lagrangian(problem: Problem) -> bool:
+    """Return True if oil is balanced along its path."""
+    return problem.past is not None and problem.past.lagrangian
 
 
 def _upstream(problem: Problem, content: Field) -> Field:
-    """Of each cell, the content that its oil comes from: of followed oil, from a step before, (nx, ny)."""
+    """Return the content upstream of each cell, (nx, ny).
+
+    For Lagrangian oil one time step earlier.
+    """
     upstream = np.concatenate([content[:1], content[:-1]])
     if problem.past is not None and problem.past.upstream is not None:
         upstream[2:] = problem.past.upstream[2:]
     return upstream
 
 
-def _lean(problem: Problem, content: Field, gap: Field) -> Field:
-    """Half of 2 m₁ m₂/(m₁² + m₂²) of each cell and what is upstream of it, (nx, ny): 1/2 where the film is even.
+def _limiter(problem: Problem, content: Field, gap: Field) -> Field:
+    """Return the slope limiter, (nx, ny).
 
-    Less beside cells that are nearly closed, and nothing beside closed ones: there the film is
-    even, and its content the oil's density.
+    Half of 2 m₁ m₂/(m₁² + m₂²) of each cell and the one upstream: 1/2 where the film is uniform. It
+    falls beside nearly closed cells and is zero beside closed ones: there the film is constant, and
+    its content varies with density only.
     """
-    closed, lean = problem.contact_gap, np.empty_like(content)
-    load_sharing.lean(content, _upstream(problem, content), gap, closed, OPEN_FROM * closed, lean)
-    return lean
+    closed, limiter = problem.contact_gap, np.empty_like(content)
+    load_sharing.limiter(
+        content, _upstream(problem, content), gap, closed, OPENING_RANGE * closed, limiter
+    )
+    return limiter
 
 
-def lean_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
-    """How far the wedge leans for a change of each cell's content, and back for one of that upstream, both (nx, ny).
+def limiter_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
+    """Return derivatives of the limited correction in the own and, negative, the upstream content.
 
-    How open the cells are is held, see `opening_slopes`.
+    The opening of cells is held constant; see `opening_slopes`. Both (nx, ny).
     """
     content = balance.film.content
     own, by_upstream = np.empty((2, *content.shape), dtype)
-    load_sharing.lean_slopes(
-        balance.lean, content, _upstream(balance.problem, content), own, by_upstream
+    load_sharing.limiter_slopes(
+        balance.limiter, content, _upstream(balance.problem, content), own, by_upstream
     )
     return own, by_upstream
 
 
 def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Any, Any, Field]:
-    """How the wedge leans more at some eastern faces as some of the `moved` cells open: faces, cells and slopes.
+    """Return derivatives of the limited correction at eastern faces in the gap of opening cells.
 
-    Both as flat indices of cells, a cell once for its own face and once for the next one
-    downstream.
+    Faces, cells and slopes of the `moved` cells; faces and cells as flat indices, a cell once for
+    its own face and once for the next one downstream.
     """
     problem, (_, ny) = balance.problem, balance.problem.cells
     gap, content, closed = balance.gap, balance.film.content.ravel(), problem.contact_gap
-    cells = np.flatnonzero(moved & (gap > closed) & (gap < (1.0 + OPEN_FROM) * closed))
+    cells = np.flatnonzero(moved & (gap > closed) & (gap < (1.0 + OPENING_RANGE) * closed))
     faces = np.concatenate([cells, cells + ny])
     inner = (faces >= ny) & (faces < content.size - ny)
     faces, cells = faces[inner], np.tile(cells, 2)[inner]
     here, upstream = content[faces], content[faces - ny]
     other = np.clip(
-        (gap.ravel()[np.where(faces == cells, faces - ny, faces)] / closed - 1.0) / OPEN_FROM,
+        (gap.ravel()[np.where(faces == cells, faces - ny, faces)] / closed - 1.0) / OPENING_RANGE,
         0.0,
         1.0,
     )
     leaning = upstream * here / (upstream**2 + here**2) * (here - upstream)
-    return faces, cells, leaning * other / (OPEN_FROM * closed)
+    return faces, cells, leaning * other / (OPENING_RANGE * closed)
 
 
-def _beyond_first_order(
-    problem: Problem, content: Field, lean: Field, *, second_order: bool
+def _second_order_outflow(
+    problem: Problem, content: Field, limiter: Field, *, second_order: bool
 ) -> Field:
-    """What the wedge's second order adds to each cell's outflow, (nx, ny)."""
-    if not _followed(problem):
-        return added_by_lean(problem, content, lean, lean)
+    """Return the outflow of each cell due to the second order of the wedge, (nx, ny)."""
+    if not _is_lagrangian(problem):
+        return limiter_outflow(problem, content, limiter, limiter)
     assert problem.past is not None
-    added = lean * (content - _upstream(problem, content)) / problem.spacing[0]
-    leant = problem.past.leant
-    return added - leant / problem.spacing[0] if second_order and leant is not None else added
+    added = limiter * (content - _upstream(problem, content)) / problem.spacing[0]
+    limiter_correction = problem.past.limiter_correction
+    return (
+        added - limiter_correction / problem.spacing[0]
+        if second_order and limiter_correction is not None
+        else added
+    )
 
 
-def added_by_lean(problem: Problem, content: Field, own: Field, upstream: Field) -> Field:
-    """What second order adds to each cell's outflow for a content on top of the film's own, (nx, ny).
+def limiter_outflow(problem: Problem, content: Field, own: Field, upstream: Field) -> Field:
+    """Return the outflow of each cell due to the second order, for an additional content, (nx, ny).
 
-    The wedge leans by `own` of a cell's content less `upstream` of that before it: the lean
-    itself, or its slopes.
+    The correction is `own` times a cell's content less `upstream` times that upstream: the limiter
+    itself, or its derivatives.
     """
-    if _followed(problem):
+    if _is_lagrangian(problem):
         return own * content * content.dtype.type(1.0 / problem.spacing[0])
     added = np.empty_like(content)
-    leaning_outflow(content, own, upstream, problem.spacing[0], added)
+    limited_outflow(content, own, upstream, problem.spacing[0], added)
     return added
 
 
-def transported(problem: Problem, content: Field) -> Field:
-    """What each cell gains and passes on of a content that moves with the oil, upwind to first order, (nx, ny)."""
+def advected_outflow(problem: Problem, content: Field) -> Field:
+    """Return the outflow of each cell of a content that moves with the oil, (nx, ny).
+
+    Upwind, first order.
+    """
     past, dx = problem.past, problem.spacing[0]
-    if past is None or not past.followed:
+    if past is None or not past.lagrangian:
         outflow = content.copy()
         outflow[1:] -= content[:-1]
         outflow /= dx
@@ -394,14 +423,17 @@ def transported(problem: Problem, content: Field) -> Field:
 
 
 def upwind_at_outlet(problem: Problem, content: Field, outflow: Field) -> None:
-    """Take the film's last face, which leans, back to first order: where oil is missing, all of it has to be upwind."""
-    if not _followed(problem):
+    """Make the film's last face first order, in place.
+
+    Where oil is missing, all of it must be upwind.
+    """
+    if not _is_lagrangian(problem):
         dx = problem.spacing[0]
         outflow[-1] -= (content[-1] - content[-2]) * content.dtype.type(0.5 / dx)
 
 
-def _carried(problem: Problem) -> float:
-    """Derivative of a cell's outflow by its own content."""
+def _outflow_by_content(problem: Problem) -> float:
+    """Return the derivative of a cell's outflow in its own content."""
     past = problem.past
-    wedge = 0.0 if past is not None and past.followed else 1.0 / problem.spacing[0]
+    wedge = 0.0 if past is not None and past.lagrangian else 1.0 / problem.spacing[0]
     return wedge if past is None else wedge + past.rate

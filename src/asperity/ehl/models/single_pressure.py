@@ -1,9 +1,9 @@
-"""The mixed-EHL problem on one grid, dimensionless: what each cell asks for, and its semismooth linearisation.
+"""Single-pressure mixed-EHL problem on one grid, dimensionless, and its semismooth linearisation.
 
 Every cell obeys one of four equations, each written so that it grows with the cell's own pressure
-P: ruptured P, touching (H - H_c)/k, lubricated R/J, capped P - P_cap; phi = max(min(P, (H -
-H_c)/k, R/J), P - P_cap) = 0. R is the cell's net oil outflow, J its derivative, k the compliance
-of near cells, H_c the gap that counts as contact.
+P: ruptured P, touching (H - H_c)/k, lubricated R/J, capped P - P_cap; phi = max(min(P, (H - H_c)/k,
+R/J), P - P_cap) = 0. R is the cell's net oil outflow, J its derivative, k the compliance of near
+cells, H_c the contact film.
 """
 
 from dataclasses import dataclass, replace
@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.deflection import THROUGH, Deflection, deflection
-from asperity.ehl.grid_transfer import averaged, interpolated, mirrored
+from asperity.ehl.deflection import MIRROR_THROUGH, Deflection, deflection
+from asperity.ehl.grid_transfer import average, interpolate, mirror_field
 from asperity.ehl.load_shares import within_ellipse
-from asperity.ehl.roller_profile import Along
+from asperity.ehl.roller_profile import BodyShape
 from asperity.kernels import reynolds
 from asperity.kernels.reynolds import (
     CAPPED,
@@ -30,89 +30,57 @@ from asperity.kernels.reynolds import (
 )
 from asperity.lubricant import Lubricant
 
-CLOSED_WITHIN = 0.01  # of the contact film
-AS_GOOD_AS = 1e-6  # relative, of both sides of Y = 0: nothing beside what is left unsolved
-# weights of the next and the upstream cell in the wedge; the more accurate ones do not converge on
-# all rough surfaces
+CLOSED_WITHIN = 0.01  # of the contact film, above which a gap still counts as closed
+SYMMETRY_TOLERANCE = 1e-6  # relative, about Y = 0: far below the solver's tolerance
+# wedge weights of the next and the upstream cell; high orders fail on some rough surfaces
 THIRD_ORDER, SECOND_ORDER, FIRST_ORDER = (0.375, 0.125), (0.0, 0.5), (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
-    """Shape and compliance of the smooth bodies.
+class TransientTerm:
+    """Time derivative in the oil's balance: `rate` times its content, plus `source`, (nx, ny).
 
-    The gap grows as X^2/2 + `flatness` Y^2/2, or on a roller by its drop `along` it; `compliance`
-    scales the half-space's deflection, V = compliance times the integral of P/distance; `aspect`
-    is the Hertz contact's half-width across over along rolling (infinite for a line); `periodic`
-    tells whether the contact repeats in y.
-    """
-
-    flatness: float
-    compliance: float
-    aspect: float
-    periodic: bool
-    along: Along | None = None
-
-    def gap(self, x: Field, y: Field) -> Field:
-        """Gap at H0 = 0, shape (x, y)."""
-        across = self.flatness * (y**2 / 2.0) if self.along is None else self.along.drop(y)
-        return np.asarray((x**2 / 2.0)[:, None] + across)
-
-    def hertz(self, x: Field, y: Field) -> Field:
-        """Pressure of the smooth, dry contact, that of a roller by slices, shape (x, y)."""
-        if self.along is None:
-            across = y / self.aspect
-            return np.asarray(np.sqrt(np.maximum(1.0 - (x**2)[:, None] - across**2, 0.0)))
-        load = np.where(self.along.beyond(y), 0.0, self.along.load(y))
-        return np.asarray(np.sqrt(np.maximum(load - (x**2)[:, None], 0.0)))
-
-
-@dataclass(frozen=True, slots=True)
-class Past:
-    """What a step in time adds to the oil's balance: `rate` times its content now, and `source` from before, (nx, ny).
-
-    `followed` oil is balanced along its way, so that `source` holds the wedge too (unless oil is
-    conserved, not in the first two rows of cells, which it has no way to). `leant` is then by how
-    much the wedge, second order, leant back a cell and a step before, and `upstream` the content
-    there; None where the source is of second order already.
+    With `lagrangian`, oil is balanced along its path, so that `source` includes the wedge (unless
+    oil is conserved, not in the first two rows of cells, which have no upstream path). Then
+    `limiter_correction` is the second-order correction of the wedge one cell upstream and one step
+    before, and `upstream` the content there; None where the source is of second order already.
     """
 
     rate: float
     source: Field
-    followed: bool
+    lagrangian: bool
     upstream: Field | None = None
-    leant: Field | None = None
+    limiter_correction: Field | None = None
 
     @property
-    def on_one_line(self) -> "Past":
-        """The same where nothing varies along y, on the first line of cells."""
+    def on_one_line(self) -> "TransientTerm":
+        """The same on the first line of cells, for a problem uniform along y."""
         parts = (
             None if part is None else part[:, :1]
-            for part in (self.source, self.upstream, self.leant)
+            for part in (self.source, self.upstream, self.limiter_correction)
         )
-        source, upstream, leant = parts
+        source, upstream, limiter_correction = parts
         assert source is not None
-        return Past(self.rate, source, self.followed, upstream, leant)
+        return TransientTerm(self.rate, source, self.lagrangian, upstream, limiter_correction)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
     """A contact on one grid, in the solver's units.
 
-    `form` is the bodies' own shape and `roughness` what stands out of it, shape (nx, ny); `load`
-    the wanted sum of P dX dY; `p_cap` and `contact_gap` bound P above and H below; `speed` is the
-    speed number. For the oil's laws `p_scale` [Pa] turns P into pascals and `sliding`/H is the
-    shear rate [1/s]; `viscosity_factor` is what warmth leaves of the viscosity, shape (nx, ny),
-    None for all of it. A contact that does not repeat in y is bounded by lines of cells at ambient
-    pressure, a roller by all beyond its ends. `accurate` takes the third-order wedge and
-    logarithmic mean mobilities. `conserve` lets no oil appear or vanish. `past` is None where
-    nothing moves but the oil. `held` tells of the cells, (nx, ny), whose pressures are given, and
-    the distance of the bodies with them. Where `mirror` is not 0, cells are those up to the plane
-    Y = 0, BETWEEN two lines of cells or THROUGH the last one, and what lies behind it is their
-    image.
+    `form` is the bodies' smooth shape and `roughness` their heights above it, shape (nx, ny);
+    `load` is the sum of P dX dY; `p_cap` and `contact_gap` bound P above and H below; `speed` is
+    the speed number. For the laws of the oil `p_scale` [Pa] converts P to pascals and `sliding`/H
+    is the shear rate [1/s]; `viscosity_factor` is the local over the isothermal viscosity, shape
+    (nx, ny), None for 1. An aperiodic contact is bounded by lines of cells at ambient pressure, a
+    roller by everything outside it. `accurate` selects the third-order wedge and logarithmic mean
+    mobilities, `conserve` mass-conserving cavitation. `past` is the time derivative, None for a
+    steady contact. `fixed` marks cells, (nx, ny), whose pressures are given; the approach is then
+    fixed too. If `mirror` is not 0, cells end at the plane Y = 0, MIRROR_BETWEEN two lines of cells
+    or MIRROR_THROUGH the last one, and the rest is their image.
     """
 
-    form: Form
+    form: BodyShape
     roughness: Field
     lower: tuple[float, float]
     spacing: tuple[float, float]
@@ -126,56 +94,56 @@ class Problem:
     viscosity_factor: Field | None = None
     accurate: bool = False
     conserve: bool = False
-    past: Past | None = None
-    held: Mask | None = None
+    past: TransientTerm | None = None
+    fixed: Mask | None = None
     mirror: int = 0
 
     @property
     def cells(self) -> tuple[int, int]:
-        """(nx, ny)."""
+        """Number of cells (nx, ny)."""
         nx, ny = self.roughness.shape
         return nx, ny
 
     @property
     def all_cells(self) -> tuple[int, int]:
-        """The same with those behind a mirror."""
+        """Number of cells including those behind a mirror."""
         nx, ny = self.cells
         return nx, 2 * ny + 1 - self.mirror if self.mirror else ny
 
-    def whole(self, field: Any) -> Any:
-        """A field, (nx', ny'), with its image behind the mirror, of this grid or a coarser one."""
-        return mirrored(field, 2 * field.shape[1] + 1 - self.mirror) if self.mirror else field
+    def unfold(self, field: Any) -> Any:
+        """Return a field, (nx', ny'), with its mirror image, of this grid or a coarser one."""
+        return mirror_field(field, 2 * field.shape[1] + 1 - self.mirror) if self.mirror else field
 
-    def brought(self, field: Field, *, cubic: bool = False) -> Field:
-        """A coarser grid's field on this one, (nx, ny), by lines or cubics."""
-        finer = interpolated(self.whole(field), self.all_cells, cubic=cubic)
+    def interpolate(self, field: Field, *, cubic: bool = False) -> Field:
+        """Interpolate a coarser grid's field onto this grid, (nx, ny), linearly or `cubic`."""
+        finer = interpolate(self.unfold(field), self.all_cells, cubic=cubic)
         return np.ascontiguousarray(finer[:, : self.cells[1]])
 
-    def summed(self, field: Field) -> Any:
-        """Of a field, (nx, ny), over all cells of the contact, those behind a mirror too."""
+    def sum_over_cells(self, field: Field) -> Any:
+        """Sum a field, (nx, ny), over all cells, including those behind a mirror."""
         total = field.sum()
         return (
             total
             if not self.mirror
-            else 2.0 * total - (field[:, -1].sum() if self.mirror == THROUGH else 0.0)
+            else 2.0 * total - (field[:, -1].sum() if self.mirror == MIRROR_THROUGH else 0.0)
         )
 
     @property
     def mean_pressure(self) -> float:
-        """Over the whole grid."""
+        """Mean over the whole grid."""
         (nx, ny), (dx, dy) = self.all_cells, self.spacing
         return self.load / (nx * ny * dx * dy)
 
     @property
-    def unmirrored(self) -> "Problem":
+    def unfolded(self) -> "Problem":
         """The same contact on all its cells."""
         if not self.mirror:
             return self
         factor = self.viscosity_factor
         return replace(
             self,
-            roughness=self.whole(self.roughness),
-            viscosity_factor=None if factor is None else self.whole(factor),
+            roughness=self.unfold(self.roughness),
+            viscosity_factor=None if factor is None else self.unfold(factor),
             mirror=0,
         )
 
@@ -191,53 +159,56 @@ class Problem:
 
     @cached_property
     def undeformed(self) -> Field:
-        """Gap of the rough bodies before they deform, at H0 = 0, shape (nx, ny)."""
+        """Gap of the rough, undeformed bodies at H0 = 0, shape (nx, ny)."""
         return np.asarray(self.form.gap(self.x, self.y) - self.roughness)
 
     @cached_property
     def rim(self) -> Mask:
-        """Lines of cells along x that are held at ambient pressure, shape (ny,)."""
-        held = np.zeros(self.cells[1], dtype=bool)
+        """Lines of cells along x at ambient pressure, shape (ny,)."""
+        fixed = np.zeros(self.cells[1], dtype=bool)
         if not self.form.periodic:
-            held[[0] if self.mirror else [0, -1]] = True
-        if self.form.along is not None:
-            held |= self.form.along.beyond(self.y)
-        return held
+            fixed[[0] if self.mirror else [0, -1]] = True
+        if self.form.roller is not None:
+            fixed |= self.form.roller.outside(self.y)
+        return fixed
 
     @cached_property
     def _nearest(self) -> np.ndarray | None:
-        """Of each line of cells the nearest one on the roller; None where there are no ends."""
-        if self.form.along is None:
+        """Nearest line on the roller for each line of cells; None without ends."""
+        if self.form.roller is None:
             return None
         inside = np.flatnonzero(~self.rim)
         return np.asarray(inside[np.abs(np.arange(self.cells[1])[:, None] - inside).argmin(axis=1)])
 
     @cached_property
     def _ends(self) -> Mask:
-        """Lines of cells behind which, towards larger y, a roller ends or begins, shape (ny,)."""
+        """Lines of cells with an end of the roller on their side of larger y, shape (ny,)."""
         changes = self.rim != np.roll(self.rim, -1)
-        return np.asarray(changes & (self.form.along is not None))
+        return np.asarray(changes & (self.form.roller is not None))
 
     def filmed(self, gap: Field) -> Field:
-        """A gap, or its change, as the oil has it: beyond a roller's ends that at the ends, where it flows out."""
+        """Return a gap, or its change, with the values of a roller's ends beyond them.
+
+        Oil flows out through the gap at the end.
+        """
         return gap if self._nearest is None else gap[:, self._nearest]
 
     @property
     def deflection(self) -> Deflection:
-        """The elastic half-space on this grid."""
+        """Elastic half-space on this grid."""
         return deflection(
             self.cells, self.spacing, self.form.compliance, self.form.periodic, self.mirror
         )
 
     @property
     def softness(self) -> float:
-        """Compliance of a cell to its own pressure, less that of one far off."""
-        near = self.deflection.near
-        return float(near[0] - near[3])
+        """Compliance of a cell to its own pressure, less that to a far one."""
+        compliance = self.deflection.local_compliance
+        return float(compliance[0] - compliance[3])
 
     @property
     def uniform(self) -> bool:
-        """Whether nothing varies along y, so that one line of cells tells all."""
+        """True if nothing varies along y, so that one line of cells suffices."""
         fields = (
             [self.roughness]
             if self.viscosity_factor is None
@@ -247,60 +218,58 @@ class Problem:
 
     @property
     def symmetric(self) -> bool:
-        """Whether the half of smooth bodies' contact up to Y = 0 tells all."""
-        if self.form.periodic or self.form.along is not None or np.any(self.roughness):
+        """True if smooth bodies are symmetric, so that the half up to Y = 0 suffices."""
+        if self.form.periodic or self.form.roller is not None or np.any(self.roughness):
             return False
         (_, ny), dy, factor = self.cells, self.spacing[1], self.viscosity_factor
         even = factor is None or bool(
-            np.allclose(factor, factor[:, ::-1], rtol=AS_GOOD_AS, atol=0.0)
+            np.allclose(factor, factor[:, ::-1], rtol=SYMMETRY_TOLERANCE, atol=0.0)
         )
-        return even and abs(2.0 * self.lower[1] + ny * dy) < AS_GOOD_AS * dy
+        return even and abs(2.0 * self.lower[1] + ny * dy) < SYMMETRY_TOLERANCE * dy
 
     def coarsened(self, cells: tuple[int, int]) -> "Problem":
-        """The same contact on a grid of fewer cells; fields are averaged over each cell.
+        """Return the contact on a grid of fewer cells, with fields averaged over each cell.
 
-        A mirror stays in the middle of a line or between two, for which a line may be one more or
-        fewer.
+        A mirror stays in the middle of a line or between two, which may change the lines by one.
         """
         (nx, ny), (dx, dy) = self.all_cells, self.spacing
         half = -(-cells[1] // 2)
         cells, kept = (
             (cells, cells[1]) if not self.mirror else ((cells[0], 2 * half + 1 - self.mirror), half)
         )
-        roughness, factor = self.whole(self.roughness), self.viscosity_factor
+        roughness, factor = self.unfold(self.roughness), self.viscosity_factor
         return replace(
             self,
-            roughness=averaged(roughness, cells)[:, :kept],
+            roughness=average(roughness, cells)[:, :kept],
             viscosity_factor=None
             if factor is None
-            else averaged(self.whole(factor), cells)[:, :kept],
+            else average(self.unfold(factor), cells)[:, :kept],
             spacing=(dx * (nx / cells[0]), dy * (ny / cells[1])),
         )
 
     def zone(self, share: float = 1.0) -> Mask:
-        """Cells within `share` of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
-        if self.form.along is not None:
-            return self.form.along.zone(self.x, self.y, share, self.spacing)
+        """Return the cells within `share` of the Hertz half-widths, shape (nx, ny).
+
+        At least the central ones.
+        """
+        if self.form.roller is not None:
+            return self.form.roller.zone(self.x, self.y, share, self.spacing)
         return within_ellipse(self.x, self.y, (share, share * self.form.aspect), self.spacing)
 
     def load_error(self, pressure: Field) -> float:
-        """By how much a pressure carries more than the load, relative."""
+        """Return the excess of a pressure over the load, relative."""
         dx, dy = self.spacing
-        return float(self.summed(pressure) * dx * dy / self.load - 1.0)
+        return float(self.sum_over_cells(pressure) * dx * dy / self.load - 1.0)
 
     def evaluate(self, pressure: Field, approach: float) -> "Balance":
-        """What is left of every equation at a pressure and a rigid approach H0."""
+        """Return the residual of every equation at a pressure and a rigid approach H0."""
         gap = self.undeformed + self.deflection(pressure)
         gap += approach
         contact_scale = 1.0 / self.softness
         touching = (gap - self.contact_gap) * contact_scale
         if self.lubricant is None:
-            film, faces, outflow, fluid_scale = (
-                None,
-                None,
-                np.zeros_like(pressure),
-                np.ones_like(pressure),
-            )
+            film, faces = None, None
+            outflow, fluid_scale = np.zeros_like(pressure), np.ones_like(pressure)
             residual, state = touching.copy(), np.full(pressure.shape, TOUCHING, dtype=np.int8)
         else:
             film, faces, outflow, fluid_scale = self.flow(
@@ -318,18 +287,10 @@ class Problem:
         state[capped] = CAPPED
         rim = self.rim
         residual[:, rim], state[:, rim] = pressure[:, rim], RUPTURED
-        if film is not None:  # pressing overlapping bodies together moves no film
-            film = film.held_where((touching <= 0.0) & (state != LUBRICATED))
-        return Balance(
-            self,
-            pressure,
-            gap,
-            residual,
-            Rows(state, fluid_scale, contact_scale),
-            film,
-            faces,
-            outflow,
-        )
+        if film is not None:  # the film between overlapping bodies does not depend on the approach
+            film = film.with_fixed_gap((touching <= 0.0) & (state != LUBRICATED))
+        rows = Rows(state, fluid_scale, contact_scale)
+        return Balance(self, pressure, gap, residual, rows, film, faces, outflow)
 
     def flow(
         self,
@@ -339,7 +300,10 @@ class Problem:
         wedge: tuple[float, float],
         least_mobility: float = 0.0,
     ) -> tuple[Film, Faces, Field, Field]:
-        """Film, faces, net outflow of each cell and the inverse of its derivative, of an oil pressure and a gap."""
+        """Return the flow of an oil pressure and a gap.
+
+        Film, faces, net outflow of each cell, and the inverse of its derivative.
+        """
         pascals = pressure * self.p_scale
         gap = self.filmed(gap)
         height = np.maximum(gap, self.contact_gap)
@@ -359,20 +323,9 @@ class Problem:
         film = Film._make([*np.empty((6, *self.cells)), ambient, 3.0 * ambient / height[[0, -1]]])
         least = least_mobility * self.contact_gap**3
         reynolds.fill_film(liquid, height, oil.viscosity.eta0 / self.speed, least, film)
-        east, east_by_own, east_by_next, north, north_by_own, north_by_next = np.empty(
-            (6, *self.cells)
-        )
-        faces = Faces(
-            east,
-            east_by_own,
-            east_by_next,
-            north,
-            north_by_own,
-            north_by_next,
-            inlet=np.empty(self.cells[1]),
-            wedge=np.array(wedge),
-            behind=self.cells[1] - self.mirror if self.mirror else 0,
-        )
+        behind = self.cells[1] - self.mirror if self.mirror else 0
+        parts = [*np.empty((6, *self.cells)), np.empty(self.cells[1]), np.array(wedge), behind]
+        faces = Faces._make(parts)
         mobility = film.mobility
         log_mobility = (
             np.log(np.maximum(mobility, np.finfo(float).tiny)) if self.accurate else mobility
@@ -381,27 +334,29 @@ class Problem:
         dx, dy = self.spacing
         outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
         entering = self.entering(gap)
-        near = self.deflection.near
+        compliance = self.deflection.local_compliance
         if self.past is None:
             reynolds.net_outflow(pressure, film.content, faces, entering, dx, dy, outflow)
-            reynolds.fluid_diagonal(film, faces, near, dx, dy, diagonal)
+            reynolds.fluid_diagonal(film, faces, compliance, dx, dy, diagonal)
         else:
             self._move(self.past, pressure, film, faces, entering, outflow, diagonal)
         return film, faces, outflow, 1.0 / diagonal
 
     def entering(self, gap: Field) -> Field:
-        """Content that the surfaces carry in, shape (ny,): the inlet is at ambient pressure, where density is 1."""
+        """Return the content that the surfaces carry in, shape (ny,).
+
+        The inlet is at ambient pressure, where the relative density is 1.
+        """
         x, dx = self.x[0], self.spacing[0]
-        ahead = np.maximum(
-            gap[0] + ((x - dx) ** 2 - x**2) / 2.0, self.contact_gap
-        )  # one cell before the inlet
+        # one cell before the inlet
+        ahead = np.maximum(gap[0] + ((x - dx) ** 2 - x**2) / 2.0, self.contact_gap)
         if self.conserve:  # upwind
             return np.asarray(ahead)
         return np.asarray(0.5 * (ahead + np.maximum(gap[0], self.contact_gap)))
 
     def _move(
         self,
-        past: Past,
+        past: TransientTerm,
         pressure: Field,
         film: Film,
         faces: Faces,
@@ -409,34 +364,31 @@ class Problem:
         outflow: Field,
         diagonal: Field,
     ) -> None:
-        """Fill in the net outflow and its diagonal of a contact in which more moves than the oil."""
-        (dx, dy), near, content = self.spacing, self.deflection.near, film.content
-        if past.followed:
+        """Fill the net outflow and its diagonal of an unsteady contact."""
+        (dx, dy), compliance, content = self.spacing, self.deflection.local_compliance, film.content
+        if past.lagrangian:
             nothing = np.zeros_like(content)
             reynolds.net_outflow(pressure, nothing, faces, nothing[0], dx, dy, outflow)
-            reynolds.fluid_diagonal(film.followed, faces, near, dx, dy, diagonal)
+            reynolds.fluid_diagonal(film.without_wedge, faces, compliance, dx, dy, diagonal)
             outflow[0] -= entering / dx
-            if (
-                not self.conserve
-            ):  # else all oil is followed, the first cell's from before the inlet
+            if not self.conserve:  # conserved oil is Lagrangian from before the inlet on
                 outflow[0] += content[0] / dx
                 outflow[1] += (1.0 + faces.wedge[1]) * (content[1] - content[0]) / dx
         else:
             reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
-            reynolds.fluid_diagonal(film, faces, near, dx, dy, diagonal)
+            reynolds.fluid_diagonal(film, faces, compliance, dx, dy, diagonal)
         outflow += past.rate * content + past.source
-        # less what far cells would answer too, as in a cell that touches: stored oil is as stiff as
-        # that
+        # compliance less that of far cells, as in a touching cell: stored oil is as stiff
         diagonal += past.rate * (film.content_by_gap * self.softness + film.content_by_pressure)
 
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """A problem evaluated at one pressure: gap, residual phi, and what linearisation needs."""
+    """A problem evaluated at one pressure: gap, residual phi, and terms of its linearisation."""
 
     problem: Problem
     pressure: Field
-    # may be negative where a cap lets the bodies overlap: the depth of plastic flattening
+    # negative where the cap lets the bodies overlap: depth of plastic flattening
     gap: Field
     residual: Field
     rows: Rows
@@ -446,17 +398,17 @@ class Balance:
 
     @property
     def load_error(self) -> float:
-        """Relative."""
+        """Relative excess of the pressure over the load."""
         return self.problem.load_error(self.pressure)
 
     @property
     def height(self) -> Field:
-        """Gap between the bodies, no less than the contact film, (nx, ny)."""
+        """Gap between the bodies, at least the contact film, (nx, ny)."""
         return np.maximum(self.gap, self.problem.contact_gap)
 
     @property
     def content(self) -> Field:
-        """Oil over each cell, (nx, ny); the contact has to have some."""
+        """Oil over each cell, (nx, ny), of a lubricated contact."""
         assert self.film is not None
         return self.film.content
 
@@ -467,12 +419,12 @@ class Balance:
 
     @property
     def oil_pressure(self) -> Field:
-        """What drives the oil, (nx, ny): in this model the one pressure there is."""
+        """Oil pressure, (nx, ny): the only pressure of this model."""
         return self.pressure
 
     @property
     def parted(self) -> Mask:
-        """Cells in which a film parts the bodies, or a cavity."""
+        """Cells in which a film or a cavity separates the bodies."""
         return np.asarray((self.rows.state == LUBRICATED) | (self.rows.state == RUPTURED))
 
     @property
@@ -482,7 +434,7 @@ class Balance:
 
     @property
     def in_contact(self) -> Mask:
-        """Cells where the bodies touch: gap closed to the contact film, or flattened below it.
+        """Cells in which the bodies touch: gap at the contact film, or flattened below it.
 
         Within 1 %, because oil leaves a contact at just that film and may keep it for many cells.
         """
@@ -491,5 +443,5 @@ class Balance:
 
     @property
     def unknown(self) -> Mask:
-        """Cells whose pressure the linear system decides; ruptured and capped cells know theirs."""
+        """Lubricated and touching cells, the unknowns of the linear system."""
         return np.asarray((self.rows.state == LUBRICATED) | (self.rows.state == TOUCHING))

@@ -1,4 +1,4 @@
-"""Newton's method on the mixed contact: better and better pressures, for as long as anybody asks."""
+"""Newton's method on the mixed contact."""
 
 from collections.abc import Iterator
 from itertools import count
@@ -7,77 +7,59 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.linear_solvers.gmres import Room
+from asperity.ehl.controls import MIXED_NEWTON
+from asperity.ehl.linear_solvers.gmres import Workspace
 from asperity.ehl.linear_solvers.mixed import newton_step
 from asperity.ehl.linear_solvers.single_pressure import SingularFactor
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step
-from asperity.ehl.newton.step_limit import StepLimit
+from asperity.ehl.newton.step_limit import ApproachLimit, StepLimit
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED
 
-PATIENCE, PROGRESS = (
-    8,
-    0.9,
-)  # steps without progress, after which halves are taken, or whole ones again
-LEAST_CONTENT = 0.2  # share of its content that a ruptured cell keeps in one step
-BESIDE = 1e-9  # how far beyond a border a cell is put to belong to the other side
-FURTHEST_APPROACH = 0.3  # of a^2/R, or of the roughness where that is more
-CLOSE, AWAY = (
-    0.03,
-    1.5,
-)  # from less left than this (rms, of p_h), a step that leaves so many times as much is halved
-SETTLED = (
-    0.1  # contact films by which a step has moved a gap at most whose opening the next one follows
-)
-SHORTEST_CUT = 0.1  # until it is shorter than this share
 
-
-class _Moves(NamedTuple):
-    """Where to from a balance: changes of all unknowns, as long as the steps before allow, and which share is taken."""
+class _StepProposal(NamedTuple):
+    """A balance, limited changes of all unknowns from it, and the damping factor."""
 
     balance: MixedBalance
-    by: Pressures
+    step: Pressures
     share: float
 
-    def taken(self, cut: float = 1.0) -> tuple[Pressures, Mask]:
-        """The unknowns after a part of it, and which cells are then to be taken as free."""
+    def apply(self, damping: float = 1.0) -> tuple[Pressures, Mask]:
+        """Return the unknowns after a damped step, and the cells that then count as free."""
         problem, (_, total, approach), share = (
             self.balance.problem,
             self.balance.unknowns,
-            cut * self.share,
+            damping * self.share,
         )
         free = self.balance.solid == FREE
-        signed = _moved(self.balance, share * self.by.oil)
+        signed = _updated_oil(self.balance, share * self.step.oil)
         oil = np.clip(signed, 0.0, problem.p_cap)
-        total = np.where(free, oil, np.clip(total + share * self.by.total, 0.0, problem.p_cap))
-        overborne = ~free & (oil > total)
-        freed = overborne & (
-            self.balance.solid != CAPPED
-        )  # in deep overlap it would be pressed shut and freed in turn
+        total = np.where(free, oil, np.clip(total + share * self.step.total, 0.0, problem.p_cap))
+        overloaded = ~free & (oil > total)
+        # a cell in deep overlap would alternate between closed and free
+        freed = overloaded & (self.balance.solid != CAPPED)
         unknowns = Pressures(
-            np.where(overborne, total, signed), total, approach + share * self.by.approach
+            np.where(overloaded, total, signed), total, approach + share * self.step.approach
         )
         return unknowns, freed
 
 
 def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iterator[Step]:
-    """Yield the start and then where each Newton step leads.
+    """Yield the initial guess and then the result of each Newton step.
 
-    Once steps have led nowhere for long, oil is no longer foreseen, nor how the wedge opens: these
-    may go round.
+    After a stagnation, streaks of oil and the opening of the wedge are no longer linearised,
+    because they may cause cycles.
 
-    A closed cell whose oil would come to bear more than the total takes the total for its oil's
-    pressure, and is free in the next step: the oil lifts the bodies apart. Not one that the cap
-    decides.
+    A closed cell whose oil pressure would exceed the total takes the total as its oil pressure and
+    is free in the next step: the oil separates the bodies. Cells at the cap are exempt.
     """
-    wanted_mean = problem.mean_pressure
-    oil_limit, limit = (StepLimit(np.zeros_like(unknowns.total)) for _ in range(2))
-    furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
-    approach_before, change = 0.0, np.inf
-    lowest, idle, share, astray, room = np.inf, 0, 1.0, False, Room()
-    balance, settled = (
+    mean_pressure = problem.mean_pressure
+    oil_limit, limit = (StepLimit(unknowns.total) for _ in range(2))
+    approach_limit, change = ApproachLimit(problem.roughness), np.inf
+    lowest, stagnation, share, stagnated, workspace = np.inf, 0, 1.0, False, Workspace()
+    balance, settled_cells = (
         evaluate(problem, unknowns, second_order=second_order),
         np.zeros(problem.cells, dtype=bool),
     )
@@ -85,16 +67,16 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         unknowns = balance.unknowns
         yield Step(number, balance, unknowns.approach, change)
         try:
-            step = newton_step(balance, None if astray else settled, room)
-        except SingularFactor:  # strayed so far that no step leads on
+            step = newton_step(balance, None if stagnated else settled_cells, workspace)
+        except SingularFactor:  # diverged
             yield Step(number + 1, balance, unknowns.approach, np.inf)
             return
-        change, gap = float(np.mean(np.abs(step.total)) / wanted_mean), balance.gap
-        idle += 1
-        if balance.residual_rms < PROGRESS * lowest:
-            lowest, idle = balance.residual_rms, 0
-        elif idle == PATIENCE:
-            lowest, idle, share, astray = balance.residual_rms, 0, 1.5 - share, True
+        change, gap = float(np.mean(np.abs(step.total)) / mean_pressure), balance.gap
+        stagnation += 1
+        if balance.residual_rms < MIXED_NEWTON.required_decrease * lowest:
+            lowest, stagnation = balance.residual_rms, 0
+        elif stagnation == MIXED_NEWTON.stagnation_iterations:
+            lowest, stagnation, share, stagnated = balance.residual_rms, 0, 1.5 - share, True
         closed = (
             (balance.solid != FREE)
             & (balance.gap <= problem.contact_gap)
@@ -103,39 +85,47 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         d_oil = np.where(
             closed | (unknowns.oil < 0.0),
             step.oil,
-            oil_limit.limited(step.oil, np.abs(unknowns.oil), 0.0),
+            oil_limit(step.oil, np.abs(unknowns.oil)),
         )
-        d_total = limit.limited(step.total, unknowns.total, 0.0)
-        turned_back = step.approach * approach_before < 0.0 and abs(step.approach) > 0.5 * furthest
-        furthest = 0.5 * furthest if turned_back else min(1.2 * furthest, most)
-        approach_before = step.approach
-        by = Pressures(d_oil, d_total, float(np.clip(step.approach, -furthest, furthest)))
-        balance = _led(_Moves(balance, by, share), second_order=second_order)
-        settled = np.abs(balance.gap - gap) < SETTLED * problem.contact_gap
+        d_total = limit(step.total, unknowns.total)
+        step = Pressures(d_oil, d_total, approach_limit(step.approach))
+        balance = _line_search(_StepProposal(balance, step, share), second_order=second_order)
+        settled_cells = (
+            np.abs(balance.gap - gap) < MIXED_NEWTON.settled_gap_change * problem.contact_gap
+        )
 
 
-def _led(moves: _Moves, *, second_order: bool) -> MixedBalance:
-    """Where a step leads, cut short as long as near a solution it leads away: thin films close and open by turns."""
-    problem, left = moves.balance.problem, moves.balance.residual_rms
-    cut = 1.0
+def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance:
+    """Halve a step that increases the residual near the solution: thin films may alternate."""
+    problem, residual = proposal.balance.problem, proposal.balance.residual_rms
+    damping = 1.0
     while True:
-        unknowns, freed = moves.taken(cut)
+        unknowns, freed = proposal.apply(damping)
         balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
-        if left >= CLOSE or balance.residual_rms <= AWAY * left or cut <= SHORTEST_CUT:
+        if (
+            residual >= MIXED_NEWTON.line_search_residual
+            or balance.residual_rms <= MIXED_NEWTON.max_residual_growth * residual
+            or damping <= MIXED_NEWTON.min_damping
+        ):
             return balance
-        cut *= 0.5
+        damping *= 0.5
 
 
-def _moved(balance: MixedBalance, step: Field) -> Field:
-    """The oil's unknown after a step: within its bounds; where oil is conserved, up to the next state."""
+def _updated_oil(balance: MixedBalance, step: Field) -> Field:
+    """Return the oil unknown after a step within its bounds.
+
+    Where oil is conserved, at most up to the next state.
+    """
     before, cap = balance.unknowns.oil, balance.problem.p_cap
     signed = before + step
     if balance.surplus is None:
         return np.clip(signed, 0.0, cap)
     ruptured, pressed = before < 0.0, before > cap
     full = ~ruptured & ~pressed
-    signed = np.where(ruptured, np.maximum(signed, LEAST_CONTENT * (1.0 + before) - 1.0), signed)
+    signed = np.where(
+        ruptured, np.maximum(signed, MIXED_NEWTON.min_content_share * (1.0 + before) - 1.0), signed
+    )
     signed = np.where(ruptured & (signed >= 0.0), 0.0, signed)
-    signed = np.where(full & (signed < 0.0), -BESIDE, signed)
-    signed = np.where(full & (signed > cap), cap * (1.0 + BESIDE), signed)
-    return np.where(pressed & (signed <= cap), cap * (1.0 - BESIDE), signed)
+    signed = np.where(full & (signed < 0.0), -MIXED_NEWTON.state_offset, signed)
+    signed = np.where(full & (signed > cap), cap * (1.0 + MIXED_NEWTON.state_offset), signed)
+    return np.where(pressed & (signed <= cap), cap * (1.0 - MIXED_NEWTON.state_offset), signed)

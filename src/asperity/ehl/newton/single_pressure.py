@@ -1,8 +1,7 @@
-"""Newton's method on a mixed-EHL problem: better and better pressures, for as long as anybody asks.
+"""Newton's method on a single-pressure problem.
 
-Semismooth (each cell is linearised by the equation that decides it), inexact (GMRES to a tenth),
-and limited cell by cell: a cell that turns back takes shorter steps, so that a few undecided ones
-cannot keep all others waiting. The approach of the bodies is limited the same way.
+Semismooth (each cell is linearised in its active equation), inexact (GMRES to a tenth), with step
+limits per cell and for the approach.
 """
 
 from collections.abc import Iterator
@@ -13,48 +12,38 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.ehl.controls import NEWTON, STEP_LIMITS
 from asperity.ehl.linear_solvers.gmres import Operator, gmres
 from asperity.ehl.linear_solvers.single_pressure import Linear
 from asperity.ehl.models.mixed import MixedBalance
 from asperity.ehl.models.single_pressure import Balance, Problem
-
-LONGEST_STEP = 0.5  # of p_h, in one cell and one Newton step ...
-LONGEST_SHARE = (
-    0.5  # ... or this share of the cell's own pressure: sharp elastic asperities reach 100 p_h
-)
-# of a^2/R, or of the roughness where that is more: what a capped contact answers is not linear
-FURTHEST_APPROACH = 0.3
-PATIENCE = 8  # steps without progress before another manner is tried
-EASY = 0.05  # residual below which the time steps grow
-FORCING = 0.1
-MOST_KRYLOV_STEPS = 60
+from asperity.ehl.newton.step_limit import ApproachLimit, StepLimit
 
 
-class Manner(NamedTuple):
-    """How steps are taken: which share of them, and over how many cells the oil may travel in one (the inverse)."""
+class Damping(NamedTuple):
+    """Damping factor of the steps, and the inverse of a pseudo-time step (cells of oil travel)."""
 
     share: float
     storing: float
 
 
-# Steps that go round in circles leave them another way: in time steps (pseudo-transient
-# continuation, Kelley and Keyes, SIAM J. Numer. Anal. 35 (1998)) where waves travel with the oil,
-# shortened where cells flip to and fro.
-MANNERS = (
-    Manner(1.0, 0.0),
-    Manner(1.0, 0.5),
-    Manner(0.5, 0.0),
-    Manner(1.0, 2.0),
-    Manner(0.5, 0.5),
-    Manner(1.0, 8.0),
-    Manner(0.25, 0.0),
-    Manner(0.5, 2.0),
+# Used in turn when the iteration stagnates: pseudo-transient continuation (Kelley and Keyes, SIAM
+# J. Numer. Anal. 35 (1998)) where waves travel with the oil, damping where cells alternate.
+DAMPINGS = (
+    Damping(1.0, 0.0),
+    Damping(1.0, 0.5),
+    Damping(0.5, 0.0),
+    Damping(1.0, 2.0),
+    Damping(0.5, 0.5),
+    Damping(1.0, 8.0),
+    Damping(0.25, 0.0),
+    Damping(0.5, 2.0),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Where a Newton step led: its balance, and the mean relative change of pressure it had asked for."""
+    """Result of a Newton step: its balance, and the mean relative change of pressure requested."""
 
     number: int
     balance: Balance | MixedBalance
@@ -63,89 +52,92 @@ class Step:
 
 
 def newton(
-    problem: Problem, pressure: Field, approach: float, *, held: bool = False
+    problem: Problem, pressure: Field, approach: float, *, fixed: bool = False
 ) -> Iterator[Step]:
-    """Yield the start and then where each Newton step leads.
+    """Yield the initial guess and then the result of each Newton step.
 
-    With the bodies `held` at their approach the load is whatever it becomes.
+    At `fixed` approach the load is free.
     """
-    wanted_mean = problem.mean_pressure
-    longest: Field = np.full_like(pressure, LONGEST_STEP)
-    before: Field = np.zeros_like(pressure)
-    furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
-    approach_before = 0.0
-    lowest, idle, tried, change = np.inf, 0, 0, np.inf
+    mean_pressure = problem.mean_pressure
+    limit = StepLimit(pressure, initial=STEP_LIMITS.max_pressure_step, bound_reversals=False)
+    approach_limit = ApproachLimit(problem.roughness)
+    lowest, stagnation, attempt, change = np.inf, 0, 0, np.inf
     for number in count():
         balance = problem.evaluate(pressure, approach)
         yield Step(number, balance, approach, change)
-        manner = MANNERS[tried % len(MANNERS)]
-        storing = manner.storing / problem.spacing[0] * min(1.0, balance.residual_rms / EASY)
-        d_pressure, d_approach = newton_step(balance, storing=storing, held=held)
-        change = float(np.mean(np.abs(d_pressure)) / wanted_mean)
-        idle += 1
-        if balance.residual_rms < 0.9 * lowest:
-            lowest, idle = balance.residual_rms, 0
-        elif idle == PATIENCE:
-            lowest, idle, tried = balance.residual_rms, 0, tried + 1
-        turned_back = (d_pressure * before < 0.0) & (np.abs(d_pressure) > longest)
-        most_now = np.maximum(LONGEST_STEP, LONGEST_SHARE * pressure)
-        longest = np.where(turned_back, 0.5 * longest, np.minimum(1.5 * longest, most_now))
-        before = d_pressure
-        pressure = np.clip(
-            pressure + manner.share * np.clip(d_pressure, -longest, longest), 0.0, problem.p_cap
+        damping = DAMPINGS[attempt % len(DAMPINGS)]
+        storing = (
+            damping.storing
+            / problem.spacing[0]
+            * min(1.0, balance.residual_rms / NEWTON.time_step_residual)
         )
-        turned_back_bodies = d_approach * approach_before < 0.0 and abs(d_approach) > 0.5 * furthest
-        furthest = 0.5 * furthest if turned_back_bodies else min(1.2 * furthest, most)
-        approach_before = d_approach
-        approach += manner.share * float(np.clip(d_approach, -furthest, furthest))
+        d_pressure, d_approach = newton_step(balance, storing=storing, fixed=fixed)
+        change = float(np.mean(np.abs(d_pressure)) / mean_pressure)
+        stagnation += 1
+        if balance.residual_rms < 0.9 * lowest:
+            lowest, stagnation = balance.residual_rms, 0
+        elif stagnation == NEWTON.stagnation_iterations:
+            lowest, stagnation, attempt = balance.residual_rms, 0, attempt + 1
+        limited = limit(d_pressure, pressure)
+        pressure = np.clip(pressure + damping.share * limited, 0.0, problem.p_cap)
+        approach += damping.share * approach_limit(d_approach)
 
 
 def newton_step(
-    balance: Balance, *, storing: float = 0.0, held: bool = False
+    balance: Balance, *, storing: float = 0.0, fixed: bool = False
 ) -> tuple[Field, float]:
-    """Change of pressure and approach that meets every linearised equation and, unless `held`, the load, to a tenth."""
+    """Return the change of pressure and approach that solves the linearised equations to a tenth.
+
+    Includes the load, unless the approach is `fixed`.
+    """
     problem, unknown = balance.problem, balance.unknown
     linear = Linear(balance, storing=storing)
     cells, real = linear.cells, linear.dtype
     known_change = np.where(unknown, 0.0, -balance.residual)
     rows = -balance.residual - linear.product(known_change.astype(real), 0.0)
-    wanted = np.where(unknown, rows, 0.0).astype(real).ravel()
-    if held:
+    rhs = np.where(unknown, rows, 0.0).astype(real).ravel()
+    if fixed:
         d_pressure = _solved(
             lambda vector: linear.product(vector.reshape(cells), 0.0).ravel(),
             lambda vector: linear(vector.reshape(cells)).ravel(),
-            wanted,
+            rhs,
         )
         return known_change + d_pressure.reshape(cells), 0.0
 
-    # unknowns: the pressure changes and, last, the approach; last equation: they make up the
-    # missing load
+    # the last unknown is the approach, the last equation the load
     weight = 1.0 / np.sqrt(unknown.size)
     dx, dy = problem.spacing
-    missing = -balance.load_error * problem.load / (dx * dy) - problem.summed(known_change)
+    missing = -balance.load_error * problem.load / (dx * dy) - problem.sum_over_cells(known_change)
     response = np.where(unknown, linear.product(np.zeros(cells, real), 1.0), real(0.0))
     answer = linear(response)
-    total = float(problem.summed(answer))
-    if (
-        total == 0.0
-    ):  # every cell is ruptured or capped: only the distance of the bodies can change the load
-        return known_change, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale
+    total = float(problem.sum_over_cells(answer))
+    if total == 0.0:  # all cells ruptured or capped: only the approach can change the load
+        return known_change, -STEP_LIMITS.max_pressure_step * float(
+            np.sign(missing)
+        ) / balance.rows.contact_scale
 
     def product(vector: Field) -> Field:
         d_pressure, d_approach = vector[:-1].reshape(cells), float(vector[-1])
         left = linear.product(d_pressure, 0.0)
         if d_approach:
             left += real(d_approach) * response
-        return np.append(left.ravel(), real(weight * problem.summed(d_pressure)))
+        return np.append(left.ravel(), real(weight * problem.sum_over_cells(d_pressure)))
 
     def precondition(vector: Field) -> Field:
         d_pressure = linear(vector[:-1].reshape(cells))
-        d_approach = real((problem.summed(d_pressure) - vector[-1] / weight) / total)
+        d_approach = real((problem.sum_over_cells(d_pressure) - vector[-1] / weight) / total)
         return np.append((d_pressure - d_approach * answer).ravel(), d_approach)
 
-    solved = _solved(product, precondition, np.append(wanted, real(weight * missing)))
+    solved = _solved(product, precondition, np.append(rhs, real(weight * missing)))
     return known_change + solved[:-1].reshape(cells), float(solved[-1])
 
 
-def _solved(product: Operator, precondition: Operator, wanted: Field) -> Field:
-    return gmres(product, precondition, wanted, tolerance=FORCING, most_steps=MOST_KRYLOV_STEPS)
+def _solved(product: Operator, precondition: Operator, rhs: Field) -> Field:
+    """Solve by GMRES."""
+    return gmres(
+        product,
+        precondition,
+        rhs,
+        tolerance=NEWTON.linear_tolerance,
+        max_steps=NEWTON.max_krylov_steps,
+    )

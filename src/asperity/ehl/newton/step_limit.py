@@ -1,25 +1,54 @@
-"""How far a Newton step may go in one cell: so that a few undecided cells cannot keep all others waiting."""
+"""Step limits of Newton's method, shared by all models.
+
+A cell whose step reverses takes shorter steps, so that a few undecided cells do not stall the
+others; the approach of the bodies is limited in the same way.
+"""
 
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.kernels.step_limits import shorten
-
-LONGEST_STEP = 0.5  # of p_h, in one cell and one Newton step ...
-LONGEST_SHARE = 0.5  # ... or this share of the cell's own pressure
+from asperity.ehl.controls import STEP_LIMITS
+from asperity.kernels.step_limits import StepBounds, limit_steps
 
 
 class StepLimit:
-    """The longest step of every cell, which shrinks where it turns back."""
+    """Largest pressure step of every cell.
 
-    def __init__(self, before: Field) -> None:
-        self.before, self.longest = before, np.full_like(before, np.inf)
+    Limits start at `initial`. With `bound_reversals` a reversing cell's last limit is bounded by
+    the size of its pressure before it is halved.
+    """
 
-    def limited(self, step: Field, size: Field, upward: float) -> Field:
-        """The step, no longer than what its cell's `size` and its past allow, but for `upward` if that is more."""
-        limited = np.empty_like(step)
-        shorten(
-            step, size, (LONGEST_STEP, LONGEST_SHARE, upward), self.before, self.longest, limited
+    def __init__(
+        self, pressure: Field, *, initial: float = np.inf, bound_reversals: bool = True
+    ) -> None:
+        self.before, self.longest = np.zeros_like(pressure), np.full_like(pressure, initial)
+        self.bounds = StepBounds(
+            STEP_LIMITS.max_pressure_step, STEP_LIMITS.max_relative_step, bound_reversals
         )
+
+    def __call__(self, step: Field, size: Field) -> Field:
+        """Return the limited step; `size` is the magnitude of each cell's pressure."""
+        limited = np.empty_like(step)
+        limit_steps(step, size, self.bounds, self.before, self.longest, limited)
         self.before = step
         return limited
+
+
+class ApproachLimit:
+    """Largest change of the approach; grows without reversals, halves with them."""
+
+    def __init__(self, roughness: Field) -> None:
+        self.largest = self.current = largest_approach_step(roughness)
+        self.before = 0.0
+
+    def __call__(self, step: float) -> float:
+        """Return the limited step."""
+        reverses = step * self.before < 0.0 and abs(step) > 0.5 * self.current
+        grown = min(STEP_LIMITS.approach_growth * self.current, self.largest)
+        self.current, self.before = 0.5 * self.current if reverses else grown, step
+        return float(np.clip(step, -self.current, self.current))
+
+
+def largest_approach_step(roughness: Field) -> float:
+    """Return the largest step of the approach on a roughness, both in a²/R."""
+    return STEP_LIMITS.max_approach_step * max(1.0, float(np.std(roughness)))

@@ -1,4 +1,4 @@
-"""The way from a guess on the coarsest grid to the solution on the finest, and the decision when to stop."""
+"""Grid continuation from an initial guess on the coarsest grid, and convergence tests."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -10,6 +10,7 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.contact_solution import ContactSolution
+from asperity.ehl.controls import CONTINUATION, ERROR_ESTIMATE
 from asperity.ehl.load_shares import CENTRE, area_share, carried_share
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
@@ -23,65 +24,33 @@ from asperity.ehl.outcome import (
     Options,
     SolveStatus,
 )
-from asperity.ehl.problem_setup import coarser_all_along
+from asperity.ehl.problem_setup import coarser_in_all_axes
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
 Progress = Callable[[Iteration], None]
 
-COARSE_TOLERANCE = 1e-3  # a coarse solution only has to be a good start
-MOST_COARSE_ITERATIONS = 40
-MOST_HELD_ITERATIONS = 40  # at one distance of the bodies
-ONWARDS, BACK = (
-    2.5,
-    1.5,
-)  # of the difference to the coarser grid: how far a rough contact's figures may yet go
-AGREEMENT = 0.25  # of the difference between the grids before: the least that counts
-UNRESOLVED = (
-    2.4  # of the squared cell, in half-widths: what of the load share no coarser grid foretells
-)
-BY_TWO_ORDERS = 0.85  # share of all this where both orders of the wedge are known, and tell more
-KEPT_ON, KEPT_BACK, KEPT_UNRESOLVED = (
-    2.0,
-    0.5,
-    1.0,
-)  # the same of the load share, where three grids are known too
-# of the same, of what is read off a roller's ends: their error falls with the cell, not its square
-OF_ENDS = 3.0
-NO_LIMIT = 10.0  # times that, of what grows as fast from grid to grid as before
-SCATTER = 0.03  # of a figure of the ends, below which differences say nothing of where they go
-NEXT_TO_NOTHING = (
-    1e-2  # what is left of a start, below which steps have not strayed yet by many times that
-)
-ASTRAY = (
-    10.0  # times what a start leaves: steps of the accurate wedge that leave more began too far off
-)
-FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
-
 
 class Search:
-    """The way from a guess on the coarsest grid to the solution on the finest, all steps of it on record."""
+    """Grid continuation that records all its steps."""
 
     def __init__(self, options: Options, gap_scale: float, progress: Progress | None) -> None:
         self.options, self.gap_scale, self.progress = options, gap_scale, progress
         self.history: list[Iteration] = []
-        self.figures: list[Figures] = []  # a grid each, since the last climb began
-        self.by_first_order: Figures | None = (
-            None  # on the finest grid, where the search passed a first-order wedge
-        )
+        self.figures: list[Figures] = []  # one per grid of the present continuation
+        # first-order results on the finest grid, if the search obtained them
+        self.by_first_order: Figures | None = None
         self.cell = 0.0  # of the finest grid along x, in half-widths
         self.iteration_error: Figures | None = None
-        self.smooth, self.order = (
-            False,
-            1 if options.model == CONSERVING else 2,
-        )  # bodies, and wedge
-        self.lost = False
-        self.work, self.most_work = 0.0, np.inf  # cells of all steps
+        self.smooth = False  # bodies without roughness
+        self.order = 1 if options.model == CONSERVING else 2  # of the wedge
+        self.failed = False
+        self.work, self.most_work = 0.0, np.inf  # cells times steps
 
     @property
     def discretisation_error(self) -> GridError | None:
-        """From the last grids; see `grid_error`."""
+        """Discretisation error from the last grids; see `grid_error`."""
         return grid_error(
             self.figures,
             smooth=self.smooth,
@@ -91,61 +60,86 @@ class Search:
         )
 
     @property
-    def given_up(self) -> bool:
-        """Whether all the work that the search may take is done."""
+    def exhausted(self) -> bool:
+        """True if the allowed work is used up."""
         return self.work >= self.most_work
 
-    def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
-        """Whether the last step met the tolerance in residual, change and, `of_load`, load."""
-        last = self.history[-1]
-        return max(last.residual, last.load_error if of_load else 0.0, last.change) < tolerance
+    def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
+        """Return True if the last step met the tolerance in residual, change and load.
 
-    def climb(
-        self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool
+        The load counts unless `check_load` is False.
+        """
+        last = self.history[-1]
+        return max(last.residual, last.load_error if check_load else 0.0, last.change) < tolerance
+
+    def solve_levels(
+        self, levels: Sequence[Problem], pressure: Field, approach: float, *, fixed: bool
     ) -> Step:
-        """Solve on grid after grid, from the last, coarsest one to the first."""
+        """Solve on successive grids, from the last, coarsest one to the first."""
         options, self.figures, self.smooth = self.options, [], not np.any(levels[0].roughness)
         self.cell = levels[0].spacing[0]
         for problem in reversed(levels):
             coarsest, finest = problem is levels[-1], problem is levels[0]
-            tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
+            tolerance = (
+                options.tolerance
+                if finest
+                else max(CONTINUATION.coarse_tolerance, options.tolerance)
+            )
             if problem.cells != pressure.shape:
-                pressure = problem.brought(pressure)
-            if held:
-                step = self.position(problem, pressure, approach, tolerance, from_outside=coarsest)
+                pressure = problem.interpolate(pressure)
+            if fixed:
+                step = self.bracket_approach(
+                    problem, pressure, approach, tolerance, from_outside=coarsest
+                )
             else:
                 most = (
                     options.max_iterations
                     if finest
-                    else min(options.max_iterations, MOST_COARSE_ITERATIONS)
+                    else min(options.max_iterations, CONTINUATION.max_coarse_iterations)
                 )
                 steps = newton(problem, pressure, approach)
                 step = self.run(
-                    problem, steps, tolerance, most, stray=ASTRAY if problem.accurate else np.inf
+                    problem,
+                    steps,
+                    tolerance,
+                    most,
+                    divergence=CONTINUATION.divergence if problem.accurate else np.inf,
                 )
                 if (
                     problem.accurate
                     and step.number < most
-                    and not (self.settled(tolerance) or self.lost)
-                ):  # astray
-                    pressure, approach = self.nearer(problem, pressure, approach)
+                    and not (self.converged(tolerance) or self.failed)
+                ):  # diverged
+                    pressure, approach = self.robust_start(problem, pressure, approach)
                     step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
-                if coarsest and not finest and not self.settled(FAR_OFF):
-                    # a capped contact answers its approach too unevenly for Newton
-                    found = self.position(problem, pressure, approach, tolerance, from_outside=True)
-                    step = found if self.settled(FAR_OFF) else step
+                if coarsest and not finest and not self.converged(CONTINUATION.failed_residual):
+                    # the load of a capped contact is too nonlinear in the approach for Newton
+                    found = self.bracket_approach(
+                        problem, pressure, approach, tolerance, from_outside=True
+                    )
+                    step = found if self.converged(CONTINUATION.failed_residual) else step
             pressure, approach = step.balance.pressure, step.approach
-            if coarser_all_along(problem, levels[0]):
+            if coarser_in_all_axes(problem, levels[0]):
                 self.figures.append(self._figures(step))
         return step
 
-    def nearer(self, problem: Problem, pressure: Field, approach: float) -> tuple[Field, float]:
-        """A start for the accurate wedge by a step or two with the sturdy one; as it was, where these lead nowhere."""
+    def robust_start(
+        self, problem: Problem, pressure: Field, approach: float
+    ) -> tuple[Field, float]:
+        """Return an initial guess for the third-order wedge from a few second-order steps.
+
+        Unchanged if these do not converge.
+        """
         sturdy = replace(problem, accurate=False)
-        step = self.run(sturdy, newton(sturdy, pressure, approach), FAR_OFF, MOST_COARSE_ITERATIONS)
+        step = self.run(
+            sturdy,
+            newton(sturdy, pressure, approach),
+            CONTINUATION.failed_residual,
+            CONTINUATION.max_coarse_iterations,
+        )
         return (
             (step.balance.pressure, step.approach)
-            if self.settled(FAR_OFF)
+            if self.converged(CONTINUATION.failed_residual)
             else (pressure, approach)
         )
 
@@ -156,35 +150,35 @@ class Search:
         tolerance: float,
         most: int,
         *,
-        of_load: bool = True,
-        stray: float = np.inf,
+        check_load: bool = True,
+        divergence: float = np.inf,
         after: Step | None = None,
     ) -> Step:
-        """Take steps until they meet the tolerance, `of_load` too, or there have been too many.
+        """Take steps until they meet the tolerance or reach the number `most`.
 
-        Or until what is left is `stray` times what was left at first: `after` the step that they
-        go on from, if any.
+        Stops also where the residual reaches `divergence` times that of the first step, or of the
+        step `after` which they continue.
         """
         step = next(steps)
         before = after or step
-        astray = stray * max(before.balance.residual_rms, NEXT_TO_NOTHING)
+        largest_residual = divergence * max(before.balance.residual_rms, CONTINUATION.min_residual)
         while True:
             self._record(problem, step)
-            self.lost = step.number > 0 and not np.isfinite(step.change)
+            self.failed = step.number > 0 and not np.isfinite(step.change)
             if (
-                self.settled(tolerance, of_load=of_load)
+                self.converged(tolerance, check_load=check_load)
                 or step.number >= most
-                or self.lost
-                or self.given_up
+                or self.failed
+                or self.exhausted
             ):
                 break
-            if step.balance.residual_rms > astray:
+            if step.balance.residual_rms > largest_residual:
                 break
             before, step = step, next(steps)
-        self.iteration_error = self._figures(step).off(self._figures(before))
+        self.iteration_error = self._figures(step).abs_difference(self._figures(before))
         return step
 
-    def position(
+    def bracket_approach(
         self,
         problem: Problem,
         pressure: Field,
@@ -193,30 +187,29 @@ class Search:
         *,
         from_outside: bool,
     ) -> Step:
-        """The contact held at approach after approach until it carries the load: slower, but each is a simple problem.
+        """Solve at fixed approach, and search the approach that carries the load.
 
-        The load falls as the bodies part; the approach is bracketed, then found by false position
-        (Illinois).
+        Slower, but each problem is simpler. The load falls with the approach, which is bracketed
+        and then found by the Illinois variant of false position.
         """
         roughness = float(np.std(problem.roughness))
         stride = max(0.5, 0.5 * roughness) if from_outside else max(0.05, 0.05 * roughness)
         approach += 2.0 * roughness if from_outside else 0.0
-        bracket: dict[
-            bool, tuple[float, float]
-        ] = {}  # by whether too much is carried: approach and load error
+        # approach and load error, by whether the load is too large
+        bracket: dict[bool, tuple[float, float]] = {}
         last_side, left = None, self.options.max_iterations
         while True:
-            most = min(left, MOST_HELD_ITERATIONS)
+            most = min(left, CONTINUATION.max_fixed_iterations)
             step = self.run(
                 problem,
-                newton(problem, pressure, approach, held=True),
+                newton(problem, pressure, approach, fixed=True),
                 tolerance,
                 most,
-                of_load=False,
+                check_load=False,
             )
             left -= max(step.number, 1)
             pressure, error = step.balance.pressure, step.balance.load_error
-            if left <= 0 or self.lost or self.settled(tolerance):
+            if left <= 0 or self.failed or self.converged(tolerance):
                 return step
             side = error > 0.0
             bracket[side] = approach, error
@@ -224,12 +217,12 @@ class Search:
                 approach += stride if side else -stride
                 stride *= 1.5
                 continue
-            if side == last_side:  # the other end is standing still: give it less weight
+            if side == last_side:  # Illinois: halve the weight of the end that does not move
                 bracket[not side] = bracket[not side][0], 0.5 * bracket[not side][1]
             last_side = side
-            (near, too_much), (apart, too_little) = bracket[True], bracket[False]
+            (closer, too_much), (apart, too_little) = bracket[True], bracket[False]
             share = min(max(too_much / (too_much - too_little), 0.02), 0.98)
-            approach = near + share * (apart - near)
+            approach = closer + share * (apart - closer)
 
     def solution(
         self,
@@ -241,12 +234,11 @@ class Search:
         seconds: float,
         attempt: str = ATTEMPTS[0],
         start: ContactSolution | None = None,
-        viscosity_factor: Field | None = None,
     ) -> ContactSolution:
-        """Where the search ended, in SI on the surface's grid, whether it was solved on one line of it or on all.
+        """Return the result of the search in SI units on the surface's grid.
 
-        A warm `start` hands on what its cells' size may have done only where it is of the same
-        contact, but for heat.
+        A warm `start` passes on its discretisation error only if it solves the same contact, except
+        for its temperature.
         """
         discretisation = self.discretisation_error
         if start is not None:
@@ -263,11 +255,11 @@ class Search:
             )
             discretisation = start.convergence.discretisation_error if same else None
         scales, balance, lines = (
-            Scales.of(conditions, lubricant),
+            Scales.from_conditions(conditions, lubricant),
             step.balance,
             surface.grid.cells[1],
         )
-        stopped = SolveStatus.STALLED if self.lost else SolveStatus.OUT_OF_ITERATIONS
+        stopped = SolveStatus.STALLED if self.failed else SolveStatus.OUT_OF_ITERATIONS
         touching = balance.in_contact & (balance.pressure > 0.0)
         pressure, height, in_contact = (
             on_all_lines(balance.problem, part, lines)
@@ -283,7 +275,7 @@ class Search:
             in_contact=in_contact,
             rigid_approach=step.approach * scales.gap,
             convergence=Convergence(
-                status=SolveStatus.CONVERGED if self.settled(self.options.tolerance) else stopped,
+                status=SolveStatus.CONVERGED if self.converged(self.options.tolerance) else stopped,
                 history=tuple(self.history),
                 tolerance=self.options.tolerance,
                 seconds=seconds,
@@ -291,16 +283,17 @@ class Search:
                 iteration_error=self.iteration_error,
                 discretisation_error=discretisation,
             ),
-            viscosity_factor=viscosity_factor,
         )
 
     def _figures(self, step: Step) -> Figures:
+        """Return the key results of a step."""
         balance = step.balance
-        touching, whole = balance.in_contact & (balance.pressure > 0.0), balance.problem.whole
+        touching, whole = balance.in_contact & (balance.pressure > 0.0), balance.problem.unfold
         parts = whole(balance.pressure), whole(touching), whole(balance.height)
-        return figures(balance.problem.unmirrored, *parts, self.gap_scale)
+        return figures(balance.problem.unfolded, *parts, self.gap_scale)
 
     def _record(self, problem: Problem, step: Step) -> None:
+        """Record a step and report progress."""
         balance = step.balance
         left = balance.residual_rms, abs(balance.load_error), step.change
         iteration = Iteration(problem.all_cells, step.number, *left)
@@ -311,8 +304,8 @@ class Search:
 
 
 def on_all_lines(problem: Problem, field: Any, lines: int) -> Any:
-    """A field on the part of a contact that tells all, (nx', ny'), on all of so many lines of cells."""
-    whole = problem.whole(field)
+    """Expand a field, (nx', ny'), of a reduced problem to so many lines of cells."""
+    whole = problem.unfold(field)
     return np.repeat(whole, lines // whole.shape[1], axis=1)
 
 
@@ -324,47 +317,65 @@ def grid_error(
     by_first_order: Figures | None = None,
     order: int = 2,
 ) -> GridError | None:
-    """90 % intervals from the last grids; None for one grid alone.
+    """Return 90 % intervals of the key results from the last grids; None for a single grid.
 
-    A smooth solution gets Roache's grid convergence index, three times its error: the difference
-    of both where it is of second `order`, three times that where of first. A rough one has no such
-    order. Its figures d apart on the last two grids get 2.5 d the way that they went, 1.5 d the
-    other, and the load share 2.4 of the squared cell (`cell`, in half-widths) either way: what a
-    hundred contacts of the wide sample take to hold four times the cells (`benchmarks.intervals`).
-    A roller's edge pressure and end film get 3 d, and up to ten times that where d does not shrink
-    as grids get finer. d is no less than a quarter of the difference between the grids before,
-    lest two grids agree by chance, and no less than what the second-order wedge did to the first
-    order's figures on the finest grid; where that is known, 0.85 of all this will do. The load
-    share, where three grids are known too, gets 2 d the way that it went, 0.5 d the other and one
-    of the squared cell. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
+    A smooth solution gets Roache's grid convergence index, three times its error: the difference of
+    both grids if it is of second `order`, three times that for first order. A rough one has no such
+    order. If its values on the last two grids differ by d, they get 2.5 d in the direction of the
+    change, 1.5 d against it, and the load share 2.4 of the squared cell (`cell`, in half-widths)
+    either way: what a hundred contacts of the wide sample need to cover four times the cells
+    (`benchmarks.intervals`). A roller's edge pressure and end film get 3 d, and up to ten times
+    that where d does not shrink with refinement. d is at least a quarter of the difference between
+    the grids before, lest two grids agree by chance, and at least the change from the first-order
+    wedge to the second-order one on the finest grid; if that is known, 0.85 of all this suffices.
+    The load share, if three grids are known too, gets 2 d in the direction of the change, 0.5 d
+    against it and one squared cell. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
     """
     if len(on_grids) < 2:
         return None
     *before, coarse, fine = on_grids
-    nothing, apart = fine.off(fine), fine.off(coarse)
+    nothing, apart = fine.abs_difference(fine), fine.abs_difference(coarse)
     figures_of_ends = (
-        (name, [getattr(each, name) for each in on_grids]) for name in ("edge_pressure", "end_film")
+        (name, [getattr(parts, name) for parts in on_grids])
+        for name in ("edge_pressure", "end_film")
     )
     ends = {name: ends_error(found) for name, found in figures_of_ends if None not in found}
     if before:
-        apart = apart.at_least(coarse.off(before[-1]).times(AGREEMENT))
+        apart = apart.maximum(
+            coarse.abs_difference(before[-1]).scale(ERROR_ESTIMATE.min_difference)
+        )
     if smooth:
         return GridError(
-            **asdict(replace(apart if order > 1 else apart.times(3.0), **ends)), lean=nothing
+            **asdict(replace(apart if order > 1 else apart.scale(3.0), **ends)), lean=nothing
         )
     share = 1.0
     if by_first_order is not None:
-        apart, share = apart.at_least(fine.off(by_first_order)), BY_TWO_ORDERS
-    half = apart.times(0.5 * share * (ONWARDS + BACK)).plus(
-        replace(nothing, clr=share * UNRESOLVED * cell**2)
+        apart, share = (
+            apart.maximum(fine.abs_difference(by_first_order)),
+            ERROR_ESTIMATE.two_order_share,
+        )
+    half = apart.scale(0.5 * share * (ERROR_ESTIMATE.forward + ERROR_ESTIMATE.backward)).add(
+        replace(nothing, clr=share * ERROR_ESTIMATE.load_share_per_cell * cell**2)
     )
-    lean = apart.times(0.5 * share * (ONWARDS - BACK)).signed(fine.minus(coarse))
+    lean = apart.scale(0.5 * share * (ERROR_ESTIMATE.forward - ERROR_ESTIMATE.backward)).copysign(
+        fine.difference(coarse)
+    )
     if by_first_order is not None and before:
         half = replace(
-            half, clr=0.5 * (KEPT_ON + KEPT_BACK) * apart.clr + KEPT_UNRESOLVED * cell**2
+            half,
+            clr=0.5
+            * (ERROR_ESTIMATE.load_share_forward + ERROR_ESTIMATE.load_share_backward)
+            * apart.clr
+            + ERROR_ESTIMATE.load_share_per_cell_three * cell**2,
         )
         lean = replace(
-            lean, clr=math.copysign(0.5 * (KEPT_ON - KEPT_BACK) * apart.clr, fine.clr - coarse.clr)
+            lean,
+            clr=math.copysign(
+                0.5
+                * (ERROR_ESTIMATE.load_share_forward - ERROR_ESTIMATE.load_share_backward)
+                * apart.clr,
+                fine.clr - coarse.clr,
+            ),
         )
     return GridError(
         **asdict(replace(half, **ends)), lean=replace(lean, **dict.fromkeys(ends, 0.0))
@@ -372,27 +383,36 @@ def grid_error(
 
 
 def ends_error(on_grids: Sequence[float]) -> float:
-    """Half the 90 % interval of a figure of a roller's ends, on finer and finer grids; see `grid_error`."""
+    """Return half the 90 % interval of a value at a roller's ends on successively finer grids.
+
+    See `grid_error`.
+    """
     *before, coarse, fine = on_grids
-    apart, factor = abs(fine - coarse), OF_ENDS
+    apart, factor = abs(fine - coarse), ERROR_ESTIMATE.end_factor
     if before:
         earlier = abs(coarse - before[-1])
-        if apart > SCATTER * abs(fine):
+        if apart > ERROR_ESTIMATE.end_scatter * abs(fine):
             shrinks = min(apart / earlier, 1.0) if earlier > 0.0 else 1.0
-            factor *= min(max(0.5 * shrinks / max(1.0 - shrinks, 1e-9), 1.0), NO_LIMIT)
-        apart = max(apart, AGREEMENT * earlier)
+            factor *= min(
+                max(0.5 * shrinks / max(1.0 - shrinks, 1e-9), 1.0),
+                ERROR_ESTIMATE.max_end_growth,
+            )
+        apart = max(apart, ERROR_ESTIMATE.min_difference * earlier)
     return factor * apart
 
 
 def figures(
     problem: Problem, pressure: Field, touching: Mask, gap: Field, gap_scale: float
 ) -> Figures:
-    """The first figures of dimensionless fields; lengths in the unit of `gap_scale`."""
-    along, ends = problem.form.along, {}
+    """Return the key results of dimensionless fields; lengths in the unit of `gap_scale`."""
+    along, ends = problem.form.roller, {}
     if along is not None:
         dome, film = (
-            along.at_ends(problem.y, of)
-            for of in (along.dome(problem.x, pressure, problem.spacing[0]), gap.min(axis=0))
+            along.end_values(problem.y, of)
+            for of in (
+                along.central_pressure(problem.x, pressure, problem.spacing[0]),
+                gap.min(axis=0),
+            )
         )
         if dome.size:
             ends = {

@@ -1,4 +1,4 @@
-"""Where Newton's steps on a grid begin: with the dry contact, or with what a coarser grid has told."""
+"""Initial guesses on a grid: the dry contact, or the solution on a coarser grid."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -6,111 +6,108 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.ehl.controls import CONTINUATION, GUESS
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.mixed import Pressures
-from asperity.ehl.models.plastic_dry import dry_contact, roughly_dry
+from asperity.ehl.models.plastic_dry import active_set_dry, dry_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.strategies.grid_continuation import COARSE_TOLERANCE
-from asperity.ehl.strategies.local_refinement import smoothed
-
-DRY = 1e-2  # what the dry contact of bodies that yield is met to: oil moves it far more
-HIGH = 2.0  # asperities, over the root mean square of the roughness
-MOST_GRADIENTS, MOST_DRY = (
-    60,
-    20,
-)  # steps by conjugate gradients, and then Newton's, for the dry contact
+from asperity.ehl.strategies.local_refinement import refine_locally
 
 
-class Lubricated(NamedTuple):
+class DryAndLubricated(NamedTuple):
     """A contact on one grid without oil and with it."""
 
     dry: Pressures
     wet: Pressures
 
-    def granted(self, problem: Problem, dry: Pressures) -> Pressures:
-        """About what oil makes of the dry contact on another grid."""
-        changed = problem.brought(self.wet.total - self.dry.total)
+    def transfer_to(self, problem: Problem, dry: Pressures) -> Pressures:
+        """Estimate the lubricated contact on another grid from its dry contact."""
+        changed = problem.interpolate(self.wet.total - self.dry.total)
         total = np.clip(dry.total + changed, 0.0, problem.p_cap)
-        oil = np.minimum(problem.brought(np.maximum(self.wet.oil, 0.0)), total)
+        oil = np.minimum(problem.interpolate(np.maximum(self.wet.oil, 0.0)), total)
         return Pressures(oil, total, dry.approach + self.wet.approach - self.dry.approach)
 
 
 def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field, float]:
-    """Pressure and approach without oil, from those on a `coarser` grid or from Hertz's pressure.
+    """Return pressure and approach without oil, from a `coarser` grid or from Hertz pressure.
 
-    As elastic bodies, if these stay below the cap. Otherwise by sets of cells that yield. Where
-    these go round in circles by Newton's steps from the coarser grid, where that leads nowhere by
-    conjugate gradients, and by Newton's steps where the cap is too busy for these.
+    First as elastic bodies, valid if these stay below the cap; then by active sets; if these cycle,
+    by Newton steps from the coarser grid; if those fail, by projected conjugate gradients, and by
+    Newton steps where these do not converge.
     """
     if problem.mirror:
-        whole = None if coarser is None else coarser._replace(total=problem.whole(coarser.total))
-        pressure, approach = dry_start(problem.unmirrored, whole)
+        whole = None if coarser is None else coarser._replace(total=problem.unfold(coarser.total))
+        pressure, approach = dry_start(problem.unfolded, whole)
         return np.ascontiguousarray(pressure[:, : problem.cells[1]]), approach
     dry, guess = (
         replace(problem, lubricant=None, contact_gap=0.0),
         problem.form.hertz(problem.x, problem.y),
     )
     if coarser is not None:
-        guess = problem.brought(coarser.total)
+        guess = problem.interpolate(coarser.total)
     if np.all(guess < problem.p_cap):
-        pressure, approach, met = elastic_contact(dry, guess, COARSE_TOLERANCE)
-        if met and np.all(pressure < problem.p_cap):
+        pressure, approach, converged = elastic_contact(dry, guess, CONTINUATION.coarse_tolerance)
+        if converged and np.all(pressure < problem.p_cap):
             return pressure, approach
-    near = _just_touching(dry, guess) if coarser is None else coarser.approach - problem.contact_gap
-    pressure, approach, met = roughly_dry(dry, guess, near, DRY)
-    if met:
+    approach_guess = (
+        _first_contact(dry, guess) if coarser is None else coarser.approach - problem.contact_gap
+    )
+    pressure, approach, converged = active_set_dry(dry, guess, approach_guess, GUESS.dry_tolerance)
+    if converged:
         return pressure, approach
     if coarser is not None:
-        step, met = _settled(dry, guess, near)
-        if met:
+        step, converged = _by_newton(dry, guess, approach_guess)
+        if converged:
             return step.balance.pressure, step.approach
         guess = problem.form.hertz(problem.x, problem.y)
-    pressure, approach, met = dry_contact(dry, guess, most_steps=MOST_GRADIENTS)
-    if not met:
-        step, _ = _settled(dry, pressure, approach)
+    pressure, approach, converged = dry_contact(dry, guess, max_steps=GUESS.max_gradient_steps)
+    if not converged:
+        step, _ = _by_newton(dry, pressure, approach)
         pressure, approach = step.balance.pressure, step.approach
     return pressure, approach
 
 
-def _just_touching(dry: Problem, pressure: Field) -> float:
-    """The approach at which only high asperities touch, under the smooth bodies' pressure."""
+def _first_contact(dry: Problem, pressure: Field) -> float:
+    """Return the approach at which only high asperities touch, at the smooth bodies' pressure."""
     smooth = dry.form.gap(dry.x, dry.y) + dry.deflection(pressure)
-    return HIGH * float(np.std(dry.roughness)) - float(smooth.min())
+    return GUESS.first_asperities * float(np.std(dry.roughness)) - float(smooth.min())
 
 
-def _settled(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bool]:
-    """Where Newton's steps lead, and whether that is near enough for a start."""
+def _by_newton(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bool]:
+    """Return the result of Newton steps, and whether it suffices as an initial guess."""
     for step in newton(dry, pressure, approach):
-        left = max(step.balance.residual_rms, abs(step.balance.load_error))
-        if left < DRY or step.number == MOST_DRY:
+        residual = max(step.balance.residual_rms, abs(step.balance.load_error))
+        if residual < GUESS.dry_tolerance or step.number == GUESS.max_newton_steps:
             break
-    return step, left < DRY
+    return step, residual < GUESS.dry_tolerance
 
 
-def handed_up(problem: Problem, unknowns: Pressures) -> Pressures:
-    """A coarser grid's pressures on this one; those of smooth bodies nearer to what this one has, where they jump."""
+def interpolate_unknowns(problem: Problem, unknowns: Pressures) -> Pressures:
+    """Interpolate a coarser grid's pressures; those of smooth bodies are refined locally."""
     total, oil = (
-        np.clip(problem.brought(np.maximum(part, 0.0), cubic=problem.accurate), 0.0, problem.p_cap)
+        np.clip(
+            problem.interpolate(np.maximum(part, 0.0), cubic=problem.accurate), 0.0, problem.p_cap
+        )
         for part in (unknowns.total, unknowns.oil)
     )
     handed = Pressures(np.minimum(oil, total), total, unknowns.approach)
-    return smoothed(problem, handed) if problem.accurate else handed
+    return refine_locally(problem, handed) if problem.accurate else handed
 
 
-def on_a_roller(
-    problem: Problem, before: Lubricated | None, pressure: Field, approach: float
+def roller_start(
+    problem: Problem, before: DryAndLubricated | None, pressure: Field, approach: float
 ) -> tuple[Pressures, Pressures]:
-    """The dry contact of a smooth roller that ends, and where to start: there, with what oil changed on a coarser grid.
+    """Return the dry contact of a smooth roller with ends, and an initial guess.
 
-    Or, with none before, with the film of a guessed `pressure` and `approach`. How high the
-    pressure at a sharp end is hangs on the cells: a coarser grid's is too low by half, which
-    Newton's steps answer by bodies that overlap.
+    The guess adds the effect of the oil on a coarser grid or, without one, the film of a guessed
+    `pressure` and `approach`. The pressure at a sharp end depends on the cell size: that of a
+    coarser grid is half as high, and Newton steps from it make the bodies overlap.
     """
     total, distance = dry_start(problem)
     dry = Pressures(total, total, distance)
     if before is None:
         film = approach + float((problem.undeformed + problem.deflection(pressure)).min())
         return dry, Pressures(total, total, distance + film)
-    start = before.granted(problem, dry)
-    return dry, smoothed(problem, Pressures(start.total, start.total, start.approach))
+    start = before.transfer_to(problem, dry)
+    return dry, refine_locally(problem, Pressures(start.total, start.total, start.approach))

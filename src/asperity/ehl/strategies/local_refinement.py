@@ -1,10 +1,10 @@
-"""Smooth bodies on a finer grid: the few cells of which the coarser one told least, solved first.
+"""Local refinement of an initial guess for smooth bodies: nonlinear elimination.
 
 A pressure spike is sharper and elsewhere on each grid, and so is the border of the ruptured oil.
-Newton's steps follow both a few cells at a time, while everything else is met long before. So they
-are first taken in boxes around the cells that leave most, with the pressures around them and the
-distance of the bodies held: few cells each. This is nonlinear elimination (P. J. Lanzkron, D. J.
-Rose, J. T. Wilkes, SIAM J. Sci. Comput. 17 (1996) 538): it moves the start and no answer.
+Newton steps follow both by a few cells each, while all other cells have converged. So the cells
+with the largest residuals are first solved in boxes, with the surrounding pressures and the
+approach fixed. Source: P. J. Lanzkron, D. J. Rose, J. T. Wilkes, SIAM J. Sci. Comput. 17 (1996)
+538. This changes the initial guess and no solution.
 """
 
 from dataclasses import replace
@@ -13,72 +13,81 @@ import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
+from asperity.ehl.controls import REFINEMENT
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.mixed import newton
 
 Box = tuple[slice, slice]
 
-LEAVING = 0.05  # of the largest residual: cells that belong into the box ...
-MOST_OF_IT = 0.5  # ... if they leave this share of all, in squares
-LARGEST = 0.25  # share of the grid's cells that is still worth while
-NOTHING_LEFT = 1e-3  # a start that leaves less needs none
-AROUND, HELD = (
-    6,
-    2,
-)  # cells around the ones that leave most, and of these the outer ones that are held
-MET, MOST_STEPS = 0.03, 8  # share of what the box has left at first, and steps to get there
 
+def refine_locally(problem: Problem, unknowns: Pressures) -> Pressures:
+    """Solve the worst cells of an initial guess for their surroundings.
 
-def smoothed(problem: Problem, unknowns: Pressures) -> Pressures:
-    """The start of a grid with its worst cells solved for what is around them; or as it is, if they are not few."""
+    Unchanged if these cells are many.
+    """
     balance = evaluate(problem, unknowns, second_order=False)
     oil, total = unknowns.oil.copy(), unknowns.total.copy()
-    for box in _boxes(balance):
-        part, start = _within(balance, box)
+    for box in _worst_boxes(balance):
+        part, start = _subproblem(balance, box)
         oil[box], total[box] = _solved(part, start)
     return Pressures(oil, total, unknowns.approach)
 
 
 def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
-    """Pressures of the oil and in all that leave least, of the start and of a few of Newton's steps from it."""
+    """Return the oil and total pressures of the smallest residual in a few Newton steps."""
     best = start
     for step in newton(problem, start, second_order=False):
-        left = step.balance.residual_rms
+        residual = step.balance.residual_rms
         if step.number == 0:
-            first = least = left
-        elif left < least:
+            first = least = residual
+        elif residual < least:
             assert isinstance(step.balance, MixedBalance)
-            least, best = left, step.balance.unknowns
-        if least < MET * first or step.number == MOST_STEPS or not np.isfinite(left):
+            least, best = residual, step.balance.unknowns
+        if (
+            least < REFINEMENT.target * first
+            or step.number == REFINEMENT.max_steps
+            or not np.isfinite(residual)
+        ):
             break
     return best.oil, best.total
 
 
-def _boxes(balance: MixedBalance) -> list[Box]:
-    """Around the cells that leave most; none where these are many, or leave little."""
-    problem, left = balance.problem, np.abs(balance.oil_residual)
-    worst = left > LEAVING * left.max()
-    share = float((left[worst] ** 2).sum() / max((left**2).sum(), np.finfo(float).tiny))
-    if balance.residual_rms < NOTHING_LEFT or share < MOST_OF_IT:
+def _worst_boxes(balance: MixedBalance) -> list[Box]:
+    """Return boxes around the largest residuals; none where these are many, or small."""
+    problem, residual = balance.problem, np.abs(balance.oil_residual)
+    worst = residual > REFINEMENT.worst_residual * residual.max()
+    share = float((residual[worst] ** 2).sum() / max((residual**2).sum(), np.finfo(float).tiny))
+    if balance.residual_rms < REFINEMENT.min_residual or share < REFINEMENT.min_residual_share:
         return []
     if problem.form.periodic:
         worst = np.broadcast_to(worst.any(axis=1, keepdims=True), worst.shape)
-    groups, _ = scipy.ndimage.label(scipy.ndimage.maximum_filter(worst, 2 * AROUND + 1))
+    groups, _ = scipy.ndimage.label(scipy.ndimage.maximum_filter(worst, 2 * REFINEMENT.margin + 1))
     boxes: list[Box] = scipy.ndimage.find_objects(groups)  # type: ignore[assignment]
     size = sum((x.stop - x.start) * (y.stop - y.start) for x, y in boxes)
-    return boxes if size < LARGEST * left.size else []
+    return boxes if size < REFINEMENT.max_box_share * residual.size else []
 
 
-def _within(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
-    """The contact in a box, and its pressures; what the pressures around it displace counts as shape."""
+def _subproblem(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
+    """Return the contact in a box, and its pressures.
+
+    The deflection by the surrounding pressures counts as shape.
+    """
     problem, (along, across) = balance.problem, box
     (x, y), (dx, dy) = problem.lower, problem.spacing
     start = Pressures(balance.unknowns.oil[box], balance.unknowns.total[box], 0.0)
-    held = np.ones(start.total.shape, dtype=bool)
-    inner, mirror = slice(HELD, -HELD), problem.mirror if across.stop == problem.cells[1] else 0
-    held[
-        inner, slice(None) if problem.form.periodic else slice(HELD, None) if mirror else inner
+    fixed = np.ones(start.total.shape, dtype=bool)
+    inner, mirror = (
+        slice(REFINEMENT.fixed_margin, -REFINEMENT.fixed_margin),
+        problem.mirror if across.stop == problem.cells[1] else 0,
+    )
+    fixed[
+        inner,
+        slice(None)
+        if problem.form.periodic
+        else slice(REFINEMENT.fixed_margin, None)
+        if mirror
+        else inner,
     ] = False
     factor = problem.viscosity_factor
     part = replace(
@@ -86,7 +95,7 @@ def _within(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
         lower=(x + along.start * dx, y + across.start * dy),
         roughness=problem.roughness[box],
         viscosity_factor=None if factor is None else factor[box],
-        held=held,
+        fixed=fixed,
         mirror=mirror,
     )
     shape = balance.gap[box] - part.deflection(start.total)

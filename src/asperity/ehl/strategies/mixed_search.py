@@ -1,136 +1,53 @@
-"""The contact with two pressures solved: from the dry contact, or coarse to fine from Hertz's pressure."""
+"""Solution strategies of the two-pressure models: from the dry contact, or coarse to fine."""
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
-from asperity.core.errors import BadInput
-from asperity.ehl.contact_solution import ContactSolution, Oil
-from asperity.ehl.load_shares import carried_share
-from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, may_lean
-from asperity.ehl.models.single_pressure import Past, Problem
+from asperity.ehl.contact_solution import ContactSolution
+from asperity.ehl.controls import CONTINUATION, MARCHING, SEARCH
+from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, uses_limiter
+from asperity.ehl.models.single_pressure import Problem, TransientTerm
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step
-from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, Options
+from asperity.ehl.outcome import ATTEMPTS, FROM_DRY
 from asperity.ehl.problem_setup import (
-    coarser_all_along,
-    contact_problem,
-    first_guess,
+    coarser_in_all_axes,
     grid_levels,
-    least_part,
-    levels_in_reach,
-    smooth_film,
 )
 from asperity.ehl.scales import Scales
-from asperity.ehl.strategies.grid_continuation import (
-    COARSE_TOLERANCE,
-    FAR_OFF,
-    MOST_COARSE_ITERATIONS,
-    Progress,
-    Search,
-    on_all_lines,
+from asperity.ehl.strategies.grid_continuation import Search
+from asperity.ehl.strategies.initial_guess import (
+    DryAndLubricated,
+    dry_start,
+    interpolate_unknowns,
+    roller_start,
 )
-from asperity.ehl.strategies.initial_guess import Lubricated, dry_start, handed_up, on_a_roller
-from asperity.ehl.strategies.local_refinement import smoothed
+from asperity.ehl.strategies.local_refinement import refine_locally
+from asperity.ehl.strategies.oil_state import load_share_of, oil_of, unknowns_of
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
-CLIMB, STURDY = ATTEMPTS[:2]
-MOST_BETWEEN_ENDS = 60  # accurate steps on a roller's finest grid: sharp ends take the sturdier way
-# of as many steps as are allowed on a roller's finest grid: all steps, on all grids, of all ways
-MOST_WORK = 1.25
-MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
-ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order one
-MOST_ROUGHLY = 80
-MOST_AT_ONCE = 40
-MOST_BACK = 20  # steps from the second-order wedge's solution to the first-order one
-TOLD = 0.2  # of what these have made of the load share: a step that moves it by less is the last
-# steps of the second-order wedge that lead from a coarser grid's solution to what is met roughly
-MOST_NEAR = 12
-BALANCED = (
-    1e-6  # oil that cells may lose and gain, in sum, over the throughflow, where none may be lost
-)
-LAST_LENGTH = 3.0  # half-widths that oil moves at least in the last step of time
-SHORTEST = 0.05  # step of time, over the first one that was tried
-LEAP = 10.0  # from a long step of time that was easy to the next one
-MOST_TURNS, STEPS_A_TURN = 4, 2  # of a smooth contact on a coarse grid
-IN_TIME = 5e-2  # what a step of time is met to ...
-MOST_A_STEP, MOST_IN_TIME = 10, 60  # ... in so many of Newton's, and how many there are
-STRAY = 10.0  # times what was left at first: from there steps seldom come back
-LED_NOWHERE = 1e-2  # a smooth contact's coarse solution that misses by more
-THIN = 1.0  # film ratio below which the dry contact is the nearer start
-
-
-def solve_mixed(
-    conditions: ContactConditions,
-    lubricant: Lubricant | None,
-    surface: Surface,
-    *,
-    options: Options,
-    start: ContactSolution | None = None,
-    viscosity_factor: Field | None = None,
-    progress: Progress | None = None,
-) -> ContactSolution:
-    """Solve the contact with a pressure each for oil and asperities; as `solve_contact`, which calls this."""
-    began = time.perf_counter()
-    assert lubricant is not None  # without oil there is one pressure
-    scales = Scales.of(conditions, lubricant)
-    whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = least_part(whole)
-    search = MixedSearch(options, scales.gap, progress)
-    if conditions.geometry == "roller":
-        search.most_work = MOST_WORK * options.max_iterations * finest.roughness.size
-    if start is not None:
-        way, step = CLIMB, search.go_on(finest, pressures_of(start, finest, scales))
-    else:
-        for way in _ways(surface, smooth_film(conditions, lubricant), options.contact_film):
-            posed = finest if way == CLIMB else replace(finest, accurate=False)
-            levels = levels_in_reach(posed, conditions, lubricant)
-            step = search.along(
-                way, levels, lambda on: first_guess(on, conditions, lubricant, scales)
-            )
-            if search.settled(options.tolerance):
-                if way != CLIMB and finest.accurate and finest.form.along is not None:
-                    way, step = search.refined(finest, step)
-                search.coarser(finest)
-                break
-            if search.given_up:
-                break
-    return search.solution(
-        step,
-        surface,
-        conditions,
-        lubricant,
-        seconds=time.perf_counter() - began,
-        attempt=way,
-        start=start,
-        viscosity_factor=viscosity_factor,
-    )
-
-
-def _ways(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
-    """What is tried, one after the other, on a film [m] of the bodies if they were smooth."""
-    if not np.any(surface.heights):
-        return (FROM_DRY, CLIMB, STURDY) if film < contact_film else (CLIMB, STURDY)
-    return (FROM_DRY, CLIMB) if film < THIN * surface.sq else (CLIMB, FROM_DRY)
+COARSE_TO_FINE, ROBUST = ATTEMPTS[:2]
 
 
 class MixedSearch(Search):
-    """The ways to the solution, all steps of them on record."""
+    """Strategies of the two-pressure models, with all steps on record."""
 
-    imbalance = 0.0  # of the last step, where no oil may be lost
+    imbalance = 0.0  # of the last step, where oil is conserved
 
-    def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
-        """Whether the last step met the tolerance, and the one of the whole solve with all oil accounted for."""
+    def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
+        """Return True if the last step met the tolerance.
+
+        At the tolerance of the whole solve, conserved oil must be balanced too.
+        """
         closely = tolerance <= self.options.tolerance
-        return super().settled(tolerance, of_load=of_load) and not (
-            closely and self.imbalance > BALANCED
+        return super().converged(tolerance, check_load=check_load) and not (
+            closely and self.imbalance > SEARCH.max_imbalance
         )
 
     def solution(
@@ -139,350 +56,383 @@ class MixedSearch(Search):
         surface: Surface,
         conditions: ContactConditions,
         lubricant: Lubricant | None,
-        **how: Any,
+        *,
+        seconds: float,
+        attempt: str = ATTEMPTS[0],
+        start: ContactSolution | None = None,
     ) -> ContactSolution:
-        """Where the search ended, the oil's own pressure with it."""
-        solution = super().solution(step, surface, conditions, lubricant, **how)
-        return replace(solution, oil=_oil(step, surface, Scales.of(conditions, lubricant)))
+        """Return the result of the search with the state of the oil."""
+        solution = super().solution(
+            step, surface, conditions, lubricant, seconds=seconds, attempt=attempt, start=start
+        )
+        scales = Scales.from_conditions(conditions, lubricant)
+        return replace(solution, oil=oil_of(step, surface, scales))
 
-    def along(
-        self, way: str, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
+    def solve_by(
+        self,
+        strategy: str,
+        levels: Sequence[Problem],
+        guess: Callable[[Problem], tuple[Field, float]],
     ) -> Step:
-        """Solve in one of the manners that are tried, on the first of the levels."""
-        self.cell, self.by_first_order = (
-            levels[0].spacing[0],
-            None,
-        )  # what a way before has left is not this one's
-        if way == FROM_DRY:
+        """Solve by one of the strategies on the first of the levels."""
+        self.cell, self.by_first_order = levels[0].spacing[0], None  # not an earlier strategy's
+        if strategy == FROM_DRY:
             return self.from_dry(levels)
-        step = self.climb_from(levels, guess)
-        ends = (
-            levels[0].form.along is not None and way == CLIMB
-        )  # sharp ones go on the sturdier way
-        one_is_all = (
-            self.smooth and not ends
-        )  # that bodies without roughness have: oil and asperities never share
-        if one_is_all and not self.settled(self.options.tolerance):
-            step = self.from_one(levels, guess)
+        step = self.coarse_to_fine(levels, guess)
+        # sharp ends take the robust strategy
+        ends = levels[0].form.roller is not None and strategy == COARSE_TO_FINE
+        # smooth bodies: oil and asperities never share a cell
+        single_pressure_suffices = self.smooth and not ends
+        if single_pressure_suffices and not self.converged(self.options.tolerance):
+            step = self.from_single_pressure(levels, guess)
         return step
 
-    def from_one(
+    def from_single_pressure(
         self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
     ) -> Step:
-        """From the paper's solution, in which oil and asperities have one pressure."""
+        """Solve from the solution of the single-pressure model."""
         finest = levels[0]
-        for held in (False, True):
-            step = self.climb(levels, *guess(levels[-1]), held=held)
-            if self.settled(self.options.tolerance):
+        for fixed in (False, True):
+            step = self.solve_levels(levels, *guess(levels[-1]), fixed=fixed)
+            if self.converged(self.options.tolerance):
                 break
         self.figures = self.figures[:-1]
-        step = self.go_on(
+        step = self.continue_from(
             finest, Pressures(step.balance.pressure, step.balance.pressure, step.approach)
         )
         self.figures.append(self._figures(step))
         return step
 
-    def go_on(self, problem: Problem, unknowns: Pressures) -> Step:
-        """From a neighbouring solution: second order at once, or if that leads nowhere as from afar."""
-        most = min(self.options.max_iterations, MOST_AT_ONCE)
+    def continue_from(self, problem: Problem, unknowns: Pressures) -> Step:
+        """Solve from a neighbouring solution: second order first, then as from a distant guess."""
+        most = min(self.options.max_iterations, SEARCH.max_second_order_iterations)
         step = self.run(
             problem, newton(problem, unknowns, second_order=True), self.options.tolerance, most
         )
-        return step if self.settled(self.options.tolerance) else self.finish(problem, unknowns)
+        return (
+            step
+            if self.converged(self.options.tolerance)
+            else self.solve_from_afar(problem, unknowns)
+        )
 
-    def at_once(
-        self, problem: Problem, unknowns: Pressures, *, coarsely: bool = False, last: bool = True
+    def solve_from_coarse(
+        self, problem: Problem, unknowns: Pressures, *, coarse: bool = False, last: bool = True
     ) -> Step:
-        """From a coarser grid's solution: second order, or if that gains little as from afar.
+        """Solve from a coarser grid's solution: second order first, then as from a distant guess.
 
-        What the order of the wedge makes of the figures is then told on the way back to first
-        order.
+        The effect of the order on the results then follows from steps back to first order.
         """
-        tolerance, most = self._wanted(problem, coarsely=coarsely, near=True)
-        roughly, soon = max(ROUGHLY, tolerance), min(MOST_AT_ONCE, most)
-        if may_lean(problem):
+        tolerance, most = self._targets(problem, coarse=coarse, from_coarse=True)
+        roughly, soon = (
+            max(SEARCH.first_order_tolerance, tolerance),
+            min(SEARCH.max_second_order_iterations, most),
+        )
+        if uses_limiter(problem):
             steps = newton(problem, unknowns, second_order=True)
-            step = self.run(problem, steps, roughly, min(MOST_NEAR, soon), stray=STRAY)
-            if self.settled(roughly) and not self.settled(tolerance):
+            step = self.run(
+                problem,
+                steps,
+                roughly,
+                min(SEARCH.max_restart_iterations, soon),
+                divergence=SEARCH.divergence,
+            )
+            if self.converged(roughly) and not self.converged(tolerance):
                 step = self.run(
-                    problem, steps, tolerance, step.number + soon, stray=STRAY, after=step
+                    problem,
+                    steps,
+                    tolerance,
+                    step.number + soon,
+                    divergence=SEARCH.divergence,
+                    after=step,
                 )
-            if self.settled(tolerance):
-                if not coarsely:
+            if self.converged(tolerance):
+                if not coarse:
                     self.by_first_order = self._figures(_back_to_first_order(problem, step))
                 return step
-        return self.finish(problem, unknowns, coarsely=coarsely, last=last)
+        return self.solve_from_afar(problem, unknowns, coarse=coarse, last=last)
 
-    def _wanted(self, problem: Problem, *, coarsely: bool, near: bool = False) -> tuple[float, int]:
-        """Tolerance and most steps, of the whole solve or of a grid that is only the way."""
+    def _targets(
+        self, problem: Problem, *, coarse: bool, from_coarse: bool = False
+    ) -> tuple[float, int]:
+        """Return tolerance and largest number of steps, for the finest or a coarser grid."""
         tolerance, most = self.options.tolerance, self.options.max_iterations
-        if not coarsely:
+        if not coarse:
             return tolerance, most
-        roughly = COARSE_TOLERANCE if problem.accurate or near else 0.5 * ROUGHLY
-        return max(roughly, tolerance), min(MOST_BESIDE, most)
+        roughly = (
+            CONTINUATION.coarse_tolerance
+            if problem.accurate or from_coarse
+            else 0.5 * SEARCH.first_order_tolerance
+        )
+        return max(roughly, tolerance), min(SEARCH.max_error_grid_iterations, most)
 
-    def refined(self, problem: Problem, step: Step) -> tuple[str, Step]:
-        """A sturdy solution of smooth bodies led on to the accurate wedge and its way; or as it is, if that fails."""
+    def refine_third_order(self, problem: Problem, step: Step) -> tuple[str, Step]:
+        """Refine a robust solution of smooth bodies with the third-order wedge.
+
+        Returns strategy and step; the robust ones if this fails.
+        """
         history, figures, error = list(self.history), list(self.figures), self.iteration_error
         better = self.run(
             problem,
-            newton(problem, _reached(step), second_order=False),
+            newton(problem, unknowns_of(step), second_order=False),
             self.options.tolerance,
-            MOST_AT_ONCE,
+            SEARCH.max_second_order_iterations,
         )
-        if self.settled(self.options.tolerance):
+        if self.converged(self.options.tolerance):
             self.figures[-1] = self._figures(better)
-            return CLIMB, better
+            return COARSE_TO_FINE, better
         self.history, self.figures, self.iteration_error = history, figures, error
-        return STURDY, step
+        return ROBUST, step
 
-    def finish(
+    def solve_from_afar(
         self,
         problem: Problem,
         unknowns: Pressures,
         *,
-        coarsely: bool = False,
+        coarse: bool = False,
         length: float = 1.0,
         last: bool = True,
     ) -> Step:
-        """From afar: in steps of time first, from `length` half-widths on; then what stands still; `coarsely` roughly.
+        """Solve from a distant guess: time steps first, then the steady contact.
 
-        The wedge is of first order until that is met roughly, then of second; where oil is
-        conserved of first order throughout. Where time leads nowhere the `last` resort is the
-        contact whose cavities are refilled, if oil is conserved, and then what stands still at
-        once.
+        The first time step is `length` half-widths long. The wedge is first order until a coarse
+        tolerance is met, then second; where oil is conserved, first order throughout. If time steps
+        fail, the `last` resort for conserved oil is the contact with refilled cavities, and then
+        the steady contact directly.
         """
-        tolerance, most = self._wanted(problem, coarsely=coarsely)
+        tolerance, most = self._targets(problem, coarse=coarse)
         if problem.conserve or not problem.accurate:
-            step = self.march(problem, unknowns, length)
-            if not self.settled(IN_TIME) and not last:
+            step = self.march_in_time(problem, unknowns, length)
+            if not self.converged(MARCHING.tolerance) and not last:
                 return step
-            if not self.settled(IN_TIME) and problem.conserve:
-                step = self.refilled(problem, unknowns, length)
-            unknowns = _reached(step) if self.settled(IN_TIME) else unknowns
-        if problem.accurate and problem.form.along is not None:
-            most = min(most, MOST_BETWEEN_ENDS)
-        if not may_lean(problem):
+            if not self.converged(MARCHING.tolerance) and problem.conserve:
+                step = self.from_refilled_cavities(problem, unknowns, length)
+            unknowns = unknowns_of(step) if self.converged(MARCHING.tolerance) else unknowns
+        if problem.accurate and problem.form.roller is not None:
+            most = min(most, SEARCH.max_roller_iterations)
+        if not uses_limiter(problem):
             return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
-        roughly = max(ROUGHLY, tolerance)
+        roughly = max(SEARCH.first_order_tolerance, tolerance)
         steps = newton(problem, unknowns, second_order=False)
-        step = self.run(problem, steps, roughly, min(most, MOST_ROUGHLY), stray=STRAY)
-        if not self.settled(roughly):  # too much was left to the last: closer now
-            unknowns = _reached(self.march(problem, unknowns, length, met=ROUGHLY))
+        step = self.run(
+            problem,
+            steps,
+            roughly,
+            min(most, SEARCH.max_first_order_iterations),
+            divergence=SEARCH.divergence,
+        )
+        if not self.converged(roughly):  # the last time step was too inaccurate
+            unknowns = unknowns_of(
+                self.march_in_time(
+                    problem, unknowns, length, tolerance=SEARCH.first_order_tolerance
+                )
+            )
             step = self.run(
                 problem,
                 newton(problem, unknowns, second_order=False),
                 roughly,
-                min(most, MOST_ROUGHLY),
+                min(most, SEARCH.max_first_order_iterations),
             )
-        if not self.settled(FAR_OFF):
+        if not self.converged(CONTINUATION.failed_residual):
             return step
         self.by_first_order = self._figures(step)
         return self.run(
-            problem, newton(problem, _reached(step), second_order=True), tolerance, most
+            problem, newton(problem, unknowns_of(step), second_order=True), tolerance, most
         )
 
-    def march(
-        self, problem: Problem, unknowns: Pressures, first: float, *, met: float = IN_TIME
+    def march_in_time(
+        self,
+        problem: Problem,
+        unknowns: Pressures,
+        first: float,
+        *,
+        tolerance: float = MARCHING.tolerance,
     ) -> Step:
-        """Towards what stands still in steps of time, longer and longer ones, each from where the last led.
+        """Approach the steady contact in growing time steps, each from the last result.
 
-        A step begins with the oil that was there and has little to change: where Newton's steps
-        lead nowhere all the same, it was too long. From a start that tells too little of the oil
-        no step is short enough.
+        A step starts with the oil present and has little to change: if Newton does not converge,
+        the step was too long. From a guess with too little information on the oil no step is short
+        enough.
         """
         length, content = first, evaluate(problem, unknowns, second_order=False).content
-        most = min(MOST_A_STEP, self.options.max_iterations)
-        for _ in range(MOST_IN_TIME):
-            led = replace(problem, past=_kept_for(problem, length, content))
-            step = self.run(led, newton(led, unknowns, second_order=False), met, most, stray=STRAY)
-            if self.settled(met):
-                unknowns, content = _reached(step), step.balance.content
-                if length >= LAST_LENGTH:
+        most = min(MARCHING.max_newton_steps, self.options.max_iterations)
+        for _ in range(MARCHING.max_steps):
+            stepped = replace(problem, past=_implicit_step(problem, length, content))
+            step = self.run(
+                stepped,
+                newton(stepped, unknowns, second_order=False),
+                tolerance,
+                most,
+                divergence=SEARCH.divergence,
+            )
+            if self.converged(tolerance):
+                unknowns, content = unknowns_of(step), step.balance.content
+                if length >= MARCHING.final_length:
                     break
                 length *= (
-                    (LEAP if length >= 1.0 else 3.0)
+                    (MARCHING.growth if length >= 1.0 else 3.0)
                     if step.number <= 2
                     else 2.0
                     if step.number <= 4
                     else 1.2
                 )
-            elif length < SHORTEST * first:
+            elif length < MARCHING.min_length * first:
                 break
-            else:  # what was left of the steps before may be what goes round: closer from now on
-                length, met = 0.25 * length, min(met, ROUGHLY)
+            else:  # residuals of earlier steps may cause cycles: a closer tolerance
+                length, tolerance = 0.25 * length, min(tolerance, SEARCH.first_order_tolerance)
         return step
 
-    def refilled(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
-        """Towards what loses no oil from the contact whose cavities are refilled."""
+    def from_refilled_cavities(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
+        """Solve for conserved oil from the contact with refilled cavities."""
         start = Pressures(
             np.clip(unknowns.oil, 0.0, problem.p_cap), unknowns.total, unknowns.approach
         )
-        step = self.march(replace(problem, conserve=False), start, length)
-        return self.march(problem, _reached(step), length) if self.settled(IN_TIME) else step
+        step = self.march_in_time(replace(problem, conserve=False), start, length)
+        return (
+            self.march_in_time(problem, unknowns_of(step), length)
+            if self.converged(MARCHING.tolerance)
+            else step
+        )
 
-    def climb_from(
+    def coarse_to_fine(
         self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
     ) -> Step:
-        """Coarse to fine from Hertz's pressure, all of it the oil's; from there again after a grid that led nowhere."""
+        """Solve coarse to fine from Hertz pressure, carried by the oil.
+
+        Restarts from there after a grid that does not converge.
+        """
         self.figures, self.smooth = [], not np.any(levels[0].roughness)
         unknowns = None
-        roller = levels[0].accurate and levels[0].form.along is not None
-        before: Lubricated | None = None
+        roller = levels[0].accurate and levels[0].form.roller is not None
+        coarser: DryAndLubricated | None = None
         for problem in reversed(levels):
             if roller:
-                dry, unknowns = on_a_roller(problem, before, *guess(problem))
+                dry, unknowns = roller_start(problem, coarser, *guess(problem))
             elif unknowns is None:
                 pressure, approach = guess(problem)
                 unknowns = Pressures(pressure, pressure, approach)
             elif problem.cells != unknowns.total.shape:
-                unknowns = handed_up(problem, unknowns)
+                unknowns = interpolate_unknowns(problem, unknowns)
             if problem is levels[0]:
                 step = (
-                    self.at_once(problem, unknowns)
+                    self.solve_from_coarse(problem, unknowns)
                     if self.figures
-                    else self.finish(problem, unknowns)
+                    else self.solve_from_afar(problem, unknowns)
                 )
             else:
-                step = self.coarsely(problem, unknowns)
-            if self.smooth and not self.settled(LED_NOWHERE):
-                self.figures, unknowns, before = [], None, None
+                step = self.solve_coarse(problem, unknowns)
+            if self.smooth and not self.converged(SEARCH.smooth_coarse_residual):
+                self.figures, unknowns, coarser = [], None, None
                 continue
-            if problem is not levels[0] and not self.settled(ROUGHLY):
-                self.figures = []  # a start, but no solution to compare with
-            elif coarser_all_along(problem, levels[0]):
+            if problem is not levels[0] and not self.converged(SEARCH.first_order_tolerance):
+                self.figures = []  # an initial guess, but no solution to compare with
+            elif coarser_in_all_axes(problem, levels[0]):
                 self.figures.append(self._figures(step))
-            unknowns = _reached(step)
-            before = Lubricated(dry, unknowns) if roller else None
-        if levels[0].conserve:  # on coarser grids oil was made
+            unknowns = unknowns_of(step)
+            coarser = DryAndLubricated(dry, unknowns) if roller else None
+        if levels[0].conserve:  # coarser grids do not conserve oil
             self.figures = self.figures[-1:]
         return step
 
-    def coarsely(self, problem: Problem, unknowns: Pressures) -> Step:
-        """A start for the next finer grid; of smooth bodies by a few steps, then the worst cells, in turns."""
-        tolerance = max(COARSE_TOLERANCE, self.options.tolerance)
+    def solve_coarse(self, problem: Problem, unknowns: Pressures) -> Step:
+        """Solve roughly, as a guess for the next finer grid.
+
+        Smooth bodies alternate a few steps and local refinement.
+        """
+        tolerance = max(CONTINUATION.coarse_tolerance, self.options.tolerance)
         steps = newton(replace(problem, conserve=False), unknowns, second_order=False)
-        for _ in range(MOST_TURNS if problem.accurate else 0):
-            step = self.run(problem, steps, tolerance, STEPS_A_TURN)
-            if self.settled(tolerance):
+        for _ in range(SEARCH.max_smooth_turns if problem.accurate else 0):
+            step = self.run(problem, steps, tolerance, SEARCH.steps_per_turn)
+            if self.converged(tolerance):
                 return step
-            if step.balance.residual_rms < ROUGHLY:
+            if step.balance.residual_rms < SEARCH.first_order_tolerance:
                 break
-            steps = newton(problem, smoothed(problem, _reached(step)), second_order=False)
-        return self.run(problem, steps, tolerance, MOST_COARSE_ITERATIONS)
+            steps = newton(problem, refine_locally(problem, unknowns_of(step)), second_order=False)
+        return self.run(problem, steps, tolerance, CONTINUATION.max_coarse_iterations)
 
     def from_dry(self, levels: Sequence[Problem]) -> Step:
-        """From bodies that carry all the load themselves, on grid after grid.
+        """Solve from the dry contact, on successive grids.
 
-        What oil changed on a grid is granted to the dry contact of the next finer one.
+        The effect of oil on a grid is transferred to the dry contact of the next finer one.
         """
         self.figures, self.smooth = [], False
-        before, dry = None, None
+        coarser, dry = None, None
         for problem in reversed(levels):
             total, approach = dry_start(problem, dry)
             dry = Pressures(np.zeros_like(total), total, approach + problem.contact_gap)
             finest = problem is levels[0]
-            start = dry if before is None else before.granted(problem, dry)
-            if before is None:
-                step = self.finish(problem, start, coarsely=not finest)
+            start = dry if coarser is None else coarser.transfer_to(problem, dry)
+            if coarser is None:
+                step = self.solve_from_afar(problem, start, coarse=not finest)
             else:
-                step = self.at_once(problem, start, coarsely=not finest, last=False)
-            if before is not None and not self.settled(
-                FAR_OFF
-            ):  # what oil changed on the coarser grid was no start
-                step = self.finish(
-                    problem, dry, coarsely=not finest, length=2.0 * problem.spacing[0]
+                step = self.solve_from_coarse(problem, start, coarse=not finest, last=False)
+            # the effect of oil on the coarser grid was no good guess
+            if coarser is not None and not self.converged(CONTINUATION.failed_residual):
+                step = self.solve_from_afar(
+                    problem, dry, coarse=not finest, length=2.0 * problem.spacing[0]
                 )
-            if finest or self.settled(max(ROUGHLY, self.options.tolerance)):
-                if coarser_all_along(problem, levels[0]):
+            if finest or self.converged(max(SEARCH.first_order_tolerance, self.options.tolerance)):
+                if coarser_in_all_axes(problem, levels[0]):
                     self.figures.append(self._figures(step))
-                before = Lubricated(dry, _reached(step))
+                coarser = DryAndLubricated(dry, unknowns_of(step))
             else:
-                self.figures, before = [], None
+                self.figures, coarser = [], None
         return step
 
     def _record(self, problem: Problem, step: Step) -> None:
+        """Record a step and the imbalance of conserved oil."""
         balance = step.balance
         self.imbalance = (
             balance.imbalance if isinstance(balance, MixedBalance) and problem.conserve else 0.0
         )
         super()._record(problem, step)
 
-    def coarser(self, finest: Problem) -> None:
-        """Solve the next coarser grid from dry, for what the cells' size may have done; nothing if that fails."""
+    def solve_coarser_grid(self, finest: Problem) -> None:
+        """Solve the next coarser grid from dry, to estimate the discretisation error.
+
+        No effect if that fails.
+        """
         levels = grid_levels(finest)
-        if len(levels) == 1 or len(self.figures) != 1 or not coarser_all_along(levels[1], finest):
+        if len(levels) == 1 or len(self.figures) != 1 or not coarser_in_all_axes(levels[1], finest):
             return
-        beside = MixedSearch(
-            replace(self.options, max_iterations=MOST_BESIDE), self.gap_scale, self.progress
+        coarse_search = MixedSearch(
+            replace(self.options, max_iterations=SEARCH.max_error_grid_iterations),
+            self.gap_scale,
+            self.progress,
         )
-        beside.from_dry(levels[1:2])
-        self.history = [*beside.history, *self.history]
-        if beside.settled(self.options.tolerance):
-            self.figures = [*beside.figures, *self.figures]
+        coarse_search.from_dry(levels[1:2])
+        self.history = [*coarse_search.history, *self.history]
+        if coarse_search.converged(self.options.tolerance):
+            self.figures = [*coarse_search.figures, *self.figures]
 
 
-def pressures_of(solution: ContactSolution, problem: Problem, scales: Scales) -> Pressures:
-    """The unknowns of a solution of any model, on the grid of `problem`."""
-    total = solution.pressure / scales.pressure
-    signed = total if solution.oil is None else _signed(solution.oil, problem, scales)
-    if problem.cells[1] == 1:
-        total, signed = (field[:, :1] for field in (total, signed))
-    if total.shape != problem.all_cells:
-        raise BadInput(
-            f"start has {solution.grid.cells} cells, the surface {problem.all_cells}; solve without start"
-        )
-    signed, total = (np.ascontiguousarray(part[:, : problem.cells[1]]) for part in (signed, total))
-    return Pressures(signed, total, solution.rigid_approach / scales.gap)
-
-
-def _signed(oil: Oil, problem: Problem, scales: Scales) -> Field:
-    """The oil's unknown: below 0 what is missing, above the cap what has pressed the gap open."""
-    if not problem.conserve:
-        return oil.pressure / scales.pressure
-    growth = oil.growth / scales.gap
-    pressed = problem.p_cap + growth / problem.softness
-    return np.where(
-        oil.content < 1.0,
-        oil.content - 1.0,
-        np.where(growth > 0.0, pressed, oil.pressure / scales.pressure),
-    )
-
-
-def _kept_for(problem: Problem, length: float, content: Field) -> Past:
-    """The problem's past, or none, and on top the oil that was there when it was `length` farther back."""
+def _implicit_step(problem: Problem, length: float, content: Field) -> TransientTerm:
+    """Add an implicit time step to the problem, with the oil present at its start."""
     past = (
-        Past(0.0, np.zeros_like(content), followed=False) if problem.past is None else problem.past
+        TransientTerm(0.0, np.zeros_like(content), lagrangian=False)
+        if problem.past is None
+        else problem.past
     )
     return replace(past, rate=past.rate + 1.0 / length, source=past.source - content / length)
 
 
 def _back_to_first_order(problem: Problem, step: Step) -> Step:
-    """From the second-order wedge's solution to the first-order one, met roughly, or as far as steps move the load."""
-    told = back = step
-    for back in islice(newton(problem, _reached(step), second_order=False), MOST_BACK + 1):
+    """Step from the second-order wedge's solution towards the first-order one.
+
+    Until a coarse tolerance is met, or steps no longer change the load share.
+    """
+    previous = back = step
+    for back in islice(
+        newton(problem, unknowns_of(step), second_order=False),
+        SEARCH.max_backward_iterations + 1,
+    ):
         if back.number > 0:
-            moved, all_of_it = (abs(_clr(back) - _clr(other)) for other in (told, step))
-            if back.balance.residual_rms < ROUGHLY or moved < TOLD * all_of_it:
+            moved, all_of_it = (
+                abs(load_share_of(back) - load_share_of(other)) for other in (previous, step)
+            )
+            if (
+                back.balance.residual_rms < SEARCH.first_order_tolerance
+                or moved < SEARCH.backward_tolerance * all_of_it
+            ):
                 break
-            told = back
+            previous = back
     return back
-
-
-def _clr(step: Step) -> float:
-    return carried_share(step.balance.pressure, step.balance.in_contact)
-
-
-def _reached(step: Step) -> Pressures:
-    assert isinstance(step.balance, MixedBalance)
-    return step.balance.unknowns
-
-
-def _oil(step: Step, surface: Surface, scales: Scales) -> Oil:
-    balance = step.balance
-    assert isinstance(balance, MixedBalance)
-    content, pressure, growth = (
-        on_all_lines(balance.problem, part, surface.grid.cells[1])
-        for part in (balance.film_share, balance.oil_pressure, balance.growth)
-    )
-    return Oil(content=content, pressure=pressure * scales.pressure, growth=growth * scales.gap)

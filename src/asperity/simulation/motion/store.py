@@ -38,7 +38,7 @@ from asperity.core.storage import (
     write_sealed,
     write_table,
 )
-from asperity.ehl import Contents
+from asperity.ehl import FileContents
 from asperity.simulation.motion.history import History, MotionFrame
 from asperity.simulation.motion.rows import Row
 from asperity.surface import MovingSurfaces
@@ -143,7 +143,7 @@ class Keeper:
             "time_s": snapshot.time,
         }
         about |= {"case": self.identity}
-        contents = Contents(
+        contents = FileContents(
             {
                 name: (("x", "y"), values, quantity(name).attributes)
                 for name, values in maps.items()

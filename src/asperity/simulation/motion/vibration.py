@@ -244,7 +244,7 @@ def _passage(history: History, period: float) -> tuple[Signal | None, float | No
     )
     if (
         profile is not None
-        and np.std(profile.values) < SILENT * Scales.of(case.conditions, case.lubricant).gap
+        and np.std(profile.values) < SILENT * Scales.from_conditions(case.conditions, case.lubricant).gap
     ):
         return (
             None,

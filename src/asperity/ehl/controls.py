@@ -1,0 +1,241 @@
+"""Constants that control the search for a solution, each with its unit and its reason.
+
+They decide whether and how fast the solver converges, not what it converges to, unless a comment
+says otherwise. Residuals are root mean squares as a share of p_h.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepLimits:
+    """Largest changes of one Newton step; shared by all models."""
+
+    max_pressure_step: float = 0.5  # of a cell, in p_h ...
+    max_relative_step: float = 0.5  # ... or in its own pressure: elastic asperities reach 100 p_h
+    # in a²/R or rms roughness, whichever is more: a contact at the cap responds nonlinearly
+    max_approach_step: float = 0.3
+    approach_growth: float = 1.2  # of the approach limit from step to step without reversal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SinglePressureNewton:
+    """Newton iteration of the single-pressure model."""
+
+    stagnation_iterations: int = 8  # without a decrease, until the damping changes
+    required_decrease: float = 0.9  # of the lowest residual, to count as a decrease
+    time_step_residual: float = 0.05  # below it pseudo-time steps grow
+    linear_tolerance: float = 0.1  # relative residual of GMRES: an inexact Newton method
+    max_krylov_steps: int = 60
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MixedNewton:
+    """Newton iteration of the mixed model."""
+
+    stagnation_iterations: int = 8  # without a decrease, until the damping changes
+    required_decrease: float = 0.9  # of the lowest residual, to count as a decrease
+    min_content_share: float = 0.2  # of its content that a ruptured cell keeps in one step
+    state_offset: float = 1e-9  # beyond a state's bound, puts a cell into the next state
+    line_search_residual: float = 0.03  # below it a step that increases the residual is halved
+    max_residual_growth: float = 1.5  # of a step that is not halved
+    min_damping: float = 0.1  # the line search stops there
+    # in contact films: change of gap below which the next step linearises the opening of the wedge
+    settled_gap_change: float = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MixedLinearSolver:
+    """Linear solver of the mixed model's Newton steps."""
+
+    tolerance: float = 0.1  # relative residual of GMRES ...
+    tolerance_smooth: float = 0.05  # ... for smooth bodies, whose steps are few and nearly linear
+    tolerance_conserving: float = 1e-3  # ... for oil conserved along its path ...
+    conserving_residual: float = 1e-3  # ... from this residual on: the mass balance is met closer
+    max_krylov_steps: int = 60
+    coarse_relaxation: float = 2.0  # the coarse correction is too stiff against slow modes
+    min_multigrid_cells: int = 64  # along both axes, from which multigrid replaces sparse LU
+    # share of the flattened cells: fewer nearly closed ones make the contact firm
+    max_nearly_closed: float = 0.1
+    uncoupled_approach_step: float = 0.5  # in p_h, if only the approach can change the load
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Preconditioner:
+    """Approximate inverse of the linearised equations."""
+
+    max_coarse_cells: int = 64  # along each axis of the grid that is factored
+    min_halved_cells: int = 12  # along an axis that multigrid still halves
+    cycles: int = 2  # of coarse correction and line relaxation on each level
+    min_pivot: float = 0.02  # in its row's entries along x; keeps elimination stable
+    min_mobility: float = 1e-30  # in the largest: smaller ones are zero in single precision
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KrylovMethod:
+    """GMRES and its variant with a frequency."""
+
+    initial_vectors: int = 7  # allocated at first
+    reorthogonalise: float = 0.5  # share of a vector left, below which it is orthogonalised again
+    reorthogonalise_shifted: float = 0.1  # the same, where all vectors stay in single precision
+    stagnation: float = 0.9  # residual ratio of a step above which the basis vector continues
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Oscillation:
+    """Linear response of an oscillating contact."""
+
+    max_krylov_steps: int = 200  # of one round of GMRES
+    round_tolerance: float = 3e-5  # relative residual of a round: the limit of single precision
+    max_rounds: int = 12
+    # residual ratio of a round above which the next one is taken in double precision ...
+    stagnation: float = 0.3
+    stagnation_of_tolerance: float = 1.5  # ... or this multiple of its tolerance, if that is more
+    # flow under a cell's own pressure over Couette transport of its film, below which oil is stiff
+    stiff_flow_ratio: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ElasticDry:
+    """Active-set method for dry elastic bodies."""
+
+    max_krylov_steps: int = 1000  # of conjugate gradients, in all
+    max_active_sets: int = 30  # in one window
+    max_windows: int = 8
+    window_margin: int = 32  # a window adds one in so many of all lines on either side
+    loose: float = 0.1  # relative residual of conjugate gradients while the active set changes
+    tight: float = 1e-3  # ... once it is stable
+    exact: float = 1e-4  # ... close to the solution
+    changing_share: float = 0.002  # of touching cells: the active set changes
+    final_residual: float = 1e-6  # below it the solution is close
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlasticDry:
+    """Active-set method and projected conjugate gradients for dry elastic-plastic bodies."""
+
+    tolerance: float = 1e-4  # residual of projected conjugate gradients
+    max_steps: int = 300  # of projected conjugate gradients
+    max_load_corrections: int = 40  # rounds that redistribute load cut off by the bounds
+    max_active_sets: int = 16
+    linear_tolerance: float = 0.3  # relative residual of conjugate gradients in an active set
+    max_krylov_steps: int = 60  # of conjugate gradients in an active set
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InitialGuess:
+    """Dry contact as an initial guess."""
+
+    dry_tolerance: float = 1e-2  # residual of plastic bodies: oil changes them far more
+    first_asperities: float = 2.0  # height of the first touching asperities, in rms roughness
+    max_gradient_steps: int = 60  # of projected conjugate gradients ...
+    max_newton_steps: int = 20  # ... and then of Newton's method
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LocalRefinement:
+    """Nonlinear elimination of the worst cells of an initial guess."""
+
+    worst_residual: float = 0.05  # in the largest residual: cells that belong to a box ...
+    min_residual_share: float = 0.5  # ... if they hold this share of the sum of squares
+    max_box_share: float = 0.25  # of the grid's cells: larger boxes do not pay
+    min_residual: float = 1e-3  # of an initial guess that needs refinement
+    margin: int = 6  # cells around the worst ones in a box ...
+    fixed_margin: int = 2  # ... of which the outer ones are fixed
+    target: float = 0.03  # ratio of the box's residual to its initial one
+    max_steps: int = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GridContinuation:
+    """Search from the coarsest grid to the finest."""
+
+    coarse_tolerance: float = 1e-3  # a coarse solution only has to be a good initial guess
+    max_coarse_iterations: int = 40
+    max_fixed_iterations: int = 40  # at one approach, while the approach is bracketed
+    min_residual: float = 1e-2  # reference of the divergence tests for smaller initial residuals
+    # ratio to the initial residual: the third-order wedge started too far away
+    divergence: float = 10.0
+    failed_residual: float = 0.1  # a coarse solution with more is no initial guess
+    elastic_tolerance: float = 0.1  # of dry elastic bodies, in that of the Newton step after it
+    min_coarse_inlet_cells: float = 2.0  # across the inlet of a smooth line contact: else it closes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiscretisationError:
+    """90 % intervals from the last grids; they decide error bars (benchmark row: intervals)."""
+
+    forward: float = 2.5  # in the difference d of the last two grids, in its direction ...
+    backward: float = 1.5  # ... and against it
+    min_difference: float = 0.25  # in the difference between the two grids before
+    load_share_per_cell: float = 2.4  # in the squared cell [half-widths²]: unresolved load share
+    two_order_share: float = 0.85  # of all this, if both orders of the wedge are known
+    load_share_forward: float = 2.0  # the same of the load share, if three grids are known too
+    load_share_backward: float = 0.5
+    load_share_per_cell_three: float = 1.0
+    # of edge pressure and end film, in d: their error falls with the cell, not with its square
+    end_factor: float = 3.0
+    max_end_growth: float = 10.0  # times that, of a figure that does not converge with the grid
+    end_scatter: float = 0.03  # share of a figure below which differences have no trend
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MixedSearchControls:
+    """Strategies of the mixed model."""
+
+    max_roller_iterations: int = 60  # third-order, on the finest grid: sharp ends take another way
+    max_roller_work: float = 1.25  # all steps on all grids, in the allowed work on the finest one
+    max_error_grid_iterations: int = 60  # on a coarser grid that only estimates the error
+    first_order_tolerance: float = 1e-2  # of the first-order wedge before the second-order one
+    max_first_order_iterations: int = 80
+    max_second_order_iterations: int = 40
+    max_backward_iterations: int = 20  # from second order back to first, for the error estimate ...
+    backward_tolerance: float = 0.2  # ... until a step moves the load share by less of its change
+    max_restart_iterations: int = 12  # second order from a coarser grid to `first_order_tolerance`
+    max_imbalance: float = 1e-6  # sum of gains and losses over the throughflow, if conserving
+    max_smooth_turns: int = 4  # of Newton and local refinement for smooth bodies on a coarse grid
+    steps_per_turn: int = 2
+    divergence: float = 10.0  # ratio to the initial residual from which steps seldom recover
+    smooth_coarse_residual: float = 1e-2  # a coarse smooth solution with more is no initial guess
+    dry_film_ratio: float = 1.0  # below it the dry contact is the better initial guess
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeMarching:
+    """Implicit time steps towards a steady state; lengths are the oil's path in one step."""
+
+    tolerance: float = 5e-2  # of one step
+    max_newton_steps: int = 10  # in one step
+    max_steps: int = 60
+    final_length: float = 3.0  # half-widths; the last step is at least as long
+    min_length: float = 0.05  # in the first step: shorter ones do not help
+    growth: float = 10.0  # after a long step that converged at once
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RigidFilm:
+    """Mass-conserving film between rigid walls."""
+
+    max_steps: int = 200
+    max_log_viscosity_step: float = 1.0  # change of log viscosity in one cell and step
+    stagnation_iterations: int = 4  # without a decrease, until steps are halved ...
+    min_damping: float = 0.1  # ... down to this share
+    tolerance: float = 1e-11  # largest imbalance of a cell, in the flow
+
+
+STEP_LIMITS = StepLimits()
+NEWTON = SinglePressureNewton()
+MIXED_NEWTON = MixedNewton()
+MIXED_SOLVER = MixedLinearSolver()
+PRECONDITIONER = Preconditioner()
+KRYLOV = KrylovMethod()
+OSCILLATION = Oscillation()
+ELASTIC_DRY = ElasticDry()
+PLASTIC_DRY = PlasticDry()
+GUESS = InitialGuess()
+REFINEMENT = LocalRefinement()
+CONTINUATION = GridContinuation()
+ERROR_ESTIMATE = DiscretisationError()
+SEARCH = MixedSearchControls()
+MARCHING = TimeMarching()
+RIGID_FILM = RigidFilm()
