@@ -112,7 +112,7 @@ def speed_lines() -> Iterator[str]:
     )
 
     def surface_to_spectrum() -> object:
-        profile = SurfaceTrack.of(surface, 0.42).profile(6_000_000, 20e3, 1)
+        profile = SurfaceTrack.from_surface(surface, 0.42).profile(6_000_000, 20e3, 1)
         return power_spectrum(acceleration(SPRING, profile), segment=20_000)
 
     yield f"- 300 s at 20 kHz, filtered noise to spectrum: {median_seconds(noise_to_spectrum, 3):.2f} s"

@@ -12,7 +12,7 @@ import x3pio
 import asperity.ehl
 from asperity import NotConverged, load_case, load_run, solve_case
 from asperity.core.errors import BadInput
-from asperity.solution import OwnResonance, ShakenContact
+from asperity.solution import OscillatingContact, OwnResonance
 from asperity.surface import flat_surface
 
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
@@ -86,7 +86,7 @@ def test_what_is_not_shown_is_not_worked_out(asp, monkeypatch):
         line for line in expected[1].splitlines() if " s" not in line
     ]
     monkeypatch.setattr(
-        ShakenContact, "resonance", lambda *_: pytest.fail("shaken without being asked to")
+        OscillatingContact, "resonance", lambda *_: pytest.fail("shaken without being asked to")
     )
     assert asp("solve", "case.toml", "--quiet")[:2] == (0, f"{expected[1].splitlines()[0]}\n")
 
@@ -96,7 +96,7 @@ def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
     assert code == 0
     scalars = json.loads(asp("solve", "case.toml", "--json")[1])
     coarse = "Grid too coarse, CLR not determined (3.3 cells along the correlation length in x, where 4 are needed; "
-    unknown = "no coarser grid tells how far it may be off): "
+    unknown = "no coarser grid is available to estimate its error): "
     assert out.splitlines()[0].startswith(f"{coarse}{unknown}on this grid asperities carry ")
     assert (scalars["determined"], scalars["cells"]) == (False, [64, 64])
     assert f"{100 * scalars['clr']:.1f} % of the load (± not determined" in out.splitlines()[0]
@@ -116,7 +116,7 @@ def test_an_accuracy_chooses_the_cells_and_keeps_the_domain(asp):
     assert card["regime"] == "piezoviscous-elastic"
     assert card["half_width_m"] == pytest.approx(55.93e-6, rel=1e-3)
     assert [fit["source"] for fit in card["fits"]] == ["Moes", "Dowson (1968)"]
-    assert any("starves the film" in note for note in finer["notes"])
+    assert any("is starved" in note for note in finer["notes"])
     assert asp("solve", "case.toml", "--accuracy", "3")[:2] == (2, "")
 
 

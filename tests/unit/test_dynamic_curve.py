@@ -102,7 +102,7 @@ def test_without_a_mass_the_curve_lies_about_the_oils_crossing(run):
 
 
 def test_frequencies_that_cannot_be_solved_are_left_out_and_said(run, monkeypatch):
-    class Stuck(dynamic.ShakenContact):
+    class Stuck(dynamic.OscillatingContact):
         def at(self, frequency_hz):
             if frequency_hz > 20e3:
                 raise AsperityError(f"not found at {frequency_hz:.0f} Hz")
@@ -121,7 +121,7 @@ def test_what_cannot_be_shaken_says_why(run):
     conserving = solve_case(run.case.with_overrides({"model": "conserving", "surface": "flat"}))
     assert conserving.dynamic_curve is None
     assert any(
-        "No stiffness over frequency: a dynamic stiffness needs the model" in note
+        "No stiffness over frequency: dynamic stiffness needs the model" in note
         for note in conserving.remarks
     )
 

@@ -5,7 +5,12 @@ import pytest
 
 from asperity.core.errors import BadInput
 from asperity.monitoring.auxiliary_channels import bands, lines
-from asperity.vibration import Turning, steadied, turning_by_pulses, turning_by_speed
+from asperity.vibration import (
+    Turning,
+    resample_to_constant_speed,
+    turning_by_pulses,
+    turning_by_speed,
+)
 
 RATE, SECONDS = 20e3, 4.0
 TIME = np.arange(round(RATE * SECONDS)) / RATE
@@ -61,7 +66,7 @@ def test_the_angle_by_a_speed_channel_is_its_integral():
 @pytest.mark.parametrize("order", [3.58, 80.0, 200.0])  # up to 7200 Hz, a third of the rate
 def test_an_order_is_one_line_again(order):
     values = np.sin(2.0 * np.pi * order * ANGLE)
-    even, rate = steadied(values, turning_by_speed(SPEED, RATE), RATE)
+    even, rate = resample_to_constant_speed(values, turning_by_speed(SPEED, RATE), RATE)
     found = lines(*spectrum(even, rate), {"it": order * MEAN})["it"]
     assert found == pytest.approx(np.sqrt(0.5), rel=0.01)
     frequency, density = spectrum(even, rate)
@@ -74,7 +79,9 @@ def test_an_order_is_one_line_again(order):
 def test_a_shaft_that_turns_evenly_leaves_a_vibration_as_it_is():
     values = np.random.default_rng(2).standard_normal(4000)
     smooth = np.convolve(values, np.ones(8) / 8.0, mode="same")
-    even, rate = steadied(smooth, turning_by_speed(np.full(4000, 25.0), RATE), RATE)
+    even, rate = resample_to_constant_speed(
+        smooth, turning_by_speed(np.full(4000, 25.0), RATE), RATE
+    )
     assert rate == pytest.approx(RATE)
     assert even[100:3900] == pytest.approx(smooth[100:3900], abs=0.02)
 
@@ -85,7 +92,9 @@ def test_what_turns_no_shaft_is_refused():
     with pytest.raises(BadInput, match="stands still or turns back"):
         turning_by_speed(np.linspace(-1.0, 30.0, 1000), RATE)
     with pytest.raises(BadInput, match=r"less than 0\.25 of its mean speed"):
-        steadied(np.zeros(1000), turning_by_speed(np.geomspace(0.1, 30.0, 1000), RATE), RATE)
+        resample_to_constant_speed(
+            np.zeros(1000), turning_by_speed(np.geomspace(0.1, 30.0, 1000), RATE), RATE
+        )
     with pytest.raises(BadInput, match="pulses per turn"):
         turning_by_pulses(np.zeros(10), RATE, 0.0)
     assert isinstance(turning_by_speed(np.ones(10), RATE), Turning)

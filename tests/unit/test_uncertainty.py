@@ -11,7 +11,7 @@ from asperity import BadInput, load_case, load_run, solve_case
 from asperity.case import Case
 from asperity.cli.contact import run_table
 from asperity.ehl import Uncertainty
-from asperity.results import one_surface
+from asperity.results import prediction_interval
 
 PAPER = files("asperity.paper").joinpath("paper.toml").read_text("utf-8")
 ALONE = {"grid.cells": [48, 48], "vibration.duration": "0.2 s"}  # too few cells for a coarser grid
@@ -67,7 +67,7 @@ def test_nine_in_ten_further_surfaces_lie_within_the_interval_of_a_few(count):
     rng = np.random.default_rng(1)
     held = 0
     for *few, further in rng.normal(3500.0, 100.0, (20_000, count + 1)):
-        mean, (below, above) = one_surface(few, share=False)
+        mean, (below, above) = prediction_interval(few, share=False)
         held += mean - below <= further <= mean + above
     assert held / 20_000 == pytest.approx(0.9, abs=0.008)
 
@@ -78,7 +78,7 @@ def test_so_do_shares_and_none_is_below_nothing_or_above_all(centre, scatter):
     rng = np.random.default_rng(2)
     held = 0
     for *few, further in 1.0 / (1.0 + np.exp(-rng.normal(centre, scatter, (10_000, 6)))):
-        mean, (below, above) = one_surface(few, share=True)
+        mean, (below, above) = prediction_interval(few, share=True)
         assert 0.0 <= mean - below <= mean + above <= 1.0
         held += mean - below <= further <= mean + above
     assert (
@@ -88,7 +88,10 @@ def test_so_do_shares_and_none_is_below_nothing_or_above_all(centre, scatter):
 
 @pytest.mark.parametrize("share", [0.0, 1.0, 0.3])
 def test_surfaces_that_agree_do_not_scatter(share):
-    assert one_surface([share] * 4, share=True) == (share, pytest.approx((0.0, 0.0), abs=1e-12))
+    assert prediction_interval([share] * 4, share=True) == (
+        share,
+        pytest.approx((0.0, 0.0), abs=1e-12),
+    )
 
 
 def test_a_resonance_is_off_by_what_its_load_share_is(run):
@@ -132,7 +135,7 @@ def test_numbers_of_several_surfaces_are_means_over_them(three, alone):
     assert (
         numbers["iterations"] == alone.scalars()["iterations"]
     )  # how it went is the first surface's
-    mean, sides = one_surface([one.state.clr for one in apart], share=True)
+    mean, sides = prediction_interval([one.state.clr for one in apart], share=True)
     assert three.error.clr.value == mean
     assert three.error.clr.surfaces == sides
     assert three.state.clr == apart[0].state.clr

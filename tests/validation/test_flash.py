@@ -93,7 +93,7 @@ def test_few_panels_are_as_good_as_many(speed, monkeypatch):
     """The kernel in panels of half a cell throughout, with nodes enough."""
     place = (96, 16), (2e-6, 1e-6), speed, STEEL
     found = moving_source(*place, length=0.01).spectrum[0]
-    monkeypatch.setattr("asperity.solution.flash.SPREAD", 0.0)
+    monkeypatch.setattr("asperity.solution.flash.MAX_DRIFT", 0.0)
     monkeypatch.setattr("asperity.solution.flash.NODES", 16)
     expected = moving_source.__wrapped__(*place, length=0.01).spectrum[0]
     assert np.abs(found - expected).max() < 5e-5 * np.abs(expected).max()

@@ -1,11 +1,11 @@
 from .dynamic import DynamicStiffness as DynamicStiffness
+from .dynamic import OscillatingContact as OscillatingContact
 from .dynamic import OwnResonance as OwnResonance
-from .dynamic import ShakenContact as ShakenContact
 from .dynamic import dynamic_stiffness as dynamic_stiffness
 from .dynamic import own_resonance as own_resonance
-from .ends import AlongRoller as AlongRoller
-from .ends import AtEnd as AtEnd
-from .ends import along_roller as along_roller
+from .ends import AxialDistribution as AxialDistribution
+from .ends import EndValue as EndValue
+from .ends import axial_distribution as axial_distribution
 from .flash import FlashTemperature as FlashTemperature
 from .flash import flash_temperature as flash_temperature
 from .load_sharing import FILMS as FILMS
