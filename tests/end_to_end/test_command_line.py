@@ -222,7 +222,7 @@ def test_python_and_command_line_agree(asp):
 def test_a_case_without_vibration_has_no_resonance(asp):
     code, out, _ = asp("solve", "case.toml", "--set", "vibration=none", "--out", "run.nc")
     assert code == 0
-    assert "vibration not asked for" in out
+    assert "vibration not requested" in out
     assert load_run("run.nc").scalars()["crf_hz"] is None
     assert asp("report", "run.nc")[0] == 0
 
@@ -291,7 +291,7 @@ def test_a_surface_on_another_grid_is_refused():
 def test_demo_goes_from_case_to_report(asp):
     code, out, _ = asp("demo", "--out", "shown")
     assert code == 0
-    assert out.startswith("From Sq 0.5 um to 3 um the asperities' share of the load goes from ")
+    assert out.startswith("From Sq 0.5 um to 3 um the asperity load share changes from ")
     assert str(Path("shown", "report.html")) in out
     names = {"paper.toml", "report.html", "run-sq-0.5um.nc", "run-sq-1.5um.nc", "run-sq-3um.nc"}
     assert {entry.name for entry in Path("shown").iterdir()} == names

@@ -42,7 +42,7 @@ def test_stribeck_falls_from_boundary_friction_to_the_oils(asp):
         for point in points
     )
     assert told["verdict"].startswith(
-        f"Friction goes from {friction[0]:.4f} at 0.0191 m/s to {friction[-1]:.4f}"
+        f"The friction coefficient changes from {friction[0]:.4f} at 0.0191 m/s to {friction[-1]:.4f}"
     )
 
 
@@ -62,7 +62,7 @@ def test_traction_rises_from_nothing_and_meets_its_limit(asp):
     )
     assert code == 0
     first, second = out.splitlines()[:2]
-    assert first.startswith("Friction is at most 0.0")
+    assert first.startswith("The largest friction coefficient is 0.0")
     assert "(Sq 1 um, boundary friction 0.15)" in second
     assert out.count("1.91") == 8
     assert "thermal.feedback=true" in out  # it is hot at 300 % of sliding
@@ -113,14 +113,14 @@ def test_points_that_do_not_converge_are_marked_and_fail_the_command(asp):
     [
         (
             ("stribeck", "case.toml", "--set", "contact.slip=0.0"),
-            "contact.slip is 0 and nothing slides",
+            "contact.slip is 0, so that nothing slides",
         ),
         (("stribeck", "case.toml", "--speed", "-1"), "entrainment speed must be positive"),
         (("stribeck", "case.toml", "--out", "curve.pdf"), "must be a file that ends in .png"),
         (("stribeck", "case.toml", "--sq", "1 kg"), "surface.sq must be a length"),
         (
             ("traction", "case.toml", "--slip", "-0.1"),
-            "slide-to-roll ratio must lie between 0 and 1000, got -0.1",
+            "slide-to-roll ratio must be between 0 and 1000, got -0.1",
         ),
     ],
 )

@@ -233,7 +233,7 @@ def test_bad_input_is_named():
         noise(filter_order=9)
     with pytest.raises(BadInput, match="continuous, bilinear"):
         noise(filter="elliptic")
-    with pytest.raises(BadInput, match=r"must lie between 1/duration \(30.* got 20"):
+    with pytest.raises(BadInput, match=r"must be between 1/duration \(30.* got 20"):
         noise(cutoff_hz=20.0).profile(300, 9e3, seed=1)
     with pytest.raises(BadInput, match="rate"):
         noise(cutoff_hz=600.0).profile(3000, 5e3, seed=1)

@@ -213,7 +213,7 @@ def test_an_edge_pressure_that_is_determined_is_said_with_its_bar():
             {"grid": {"cells": [48, 128]}}
         )
     )
-    assert "times an even load's, loaded length " in run.verdict()
+    assert "times that of a uniform load, loaded length " in run.verdict()
     numbers = run.summary()
     assert (
         0.0
@@ -268,7 +268,7 @@ def test_sharp_ends_and_an_uneven_load_are_noted():
     def notes(shape: RollerShape) -> str:
         return " ".join(plausibility_notes(roller(shape), None))
 
-    assert "has no limit there. Take more crown" in notes(RollerShape())
+    assert "is singular there. Use more crown" in notes(RollerShape())
     assert "free end surface of a real roller, which is softer, is not modelled" in notes(
         RollerShape()
     )

@@ -120,7 +120,7 @@ def test_a_grid_without_a_coarser_one_is_said_to_tell_no_error(alone):
     assert alone.verdict().count("± not determined") == 2
     table = "\n".join(run_table(alone))
     assert "CLR, 90 % interval" in table
-    assert "CLR, size of the cells                               not determined" in table
+    assert "CLR, cell size                                       not determined" in table
 
 
 def test_numbers_of_several_surfaces_are_means_over_them(three, alone):
@@ -200,7 +200,9 @@ def test_a_surface_that_fails_is_left_out_and_said_to_be(monkeypatch):
     found = solve_case(case(), surfaces=3)
     assert found.scalars()["surfaces"] == 2
     (note,) = [note for note in found.notes if "left out" in note]
-    assert note.startswith("Surface 2 of 3 was left out of means and intervals: contact not solved")
+    assert note.startswith(
+        "Surface 2 of 3 is excluded from means and intervals: contact not solved"
+    )
     assert "mean of 2 surfaces" in found.verdict()
 
 

@@ -1,4 +1,4 @@
-"""Adapters of other people's solvers, installed apart: `pip install tamaas`, `pip install ContactMechanics`."""
+"""Adapters of external solvers: `pip install tamaas`, `pip install ContactMechanics`."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -14,14 +14,14 @@ from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError
 
 
-class Pressed(ABC):
-    """What presses heights flat, in units of a side and the reduced modulus: dry balls, ellipses and periodic waves."""
+class DryContactSolver(ABC):
+    """Dry contact of rough balls, ellipses and periodic waves, in units of a side and E*."""
 
     name: str
     kinds = ("dry", "wave")
 
     def solve(self, given: Mapping[str, Any], cells: int) -> dict[str, float]:
-        """Quantities by key; nothing of line contacts, which end on a periodic or a bounded side."""
+        """Return quantities by key; none for line contacts (mixed periodicity)."""
         modulus = ElasticPair(
             tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"])
         ).reduced_modulus
@@ -64,11 +64,11 @@ class Pressed(ABC):
     def pressed(
         self, heights: Field, sides: tuple[float, float], mean: float, *, images: bool = False
     ) -> tuple[Field, Field]:
-        """Pressure and gap under a mean pressure; with `images` both sides repeat."""
+        """Return pressure and gap under a mean pressure; with `images` periodic."""
 
 
-class Tamaas(Pressed):
-    """tamaas: Polonsky and Keer's conjugate gradients."""
+class Tamaas(DryContactSolver):
+    """Adapter of tamaas: conjugate gradients by Polonsky and Keer."""
 
     name = "tamaas"
 
@@ -81,7 +81,7 @@ class Tamaas(Pressed):
     def pressed(
         self, heights: Field, sides: tuple[float, float], mean: float, *, images: bool = False
     ) -> tuple[Field, Field]:
-        """By PolonskyKeerRey, with the kernel dcfft where nothing repeats."""
+        """Solve by PolonskyKeerRey, with the kernel dcfft if not periodic."""
         model = self.tamaas.ModelFactory.createModel(
             self.tamaas.model_type.basic_2d, list(sides), list(heights.shape)
         )
@@ -95,8 +95,8 @@ class Tamaas(Pressed):
         return np.asarray(model.traction), gap - gap.min()
 
 
-class ContactMechanics(Pressed):
-    """ContactMechanics, by its constrained conjugate gradients."""
+class ContactMechanics(DryContactSolver):
+    """Adapter of ContactMechanics: constrained conjugate gradients."""
 
     name = "contactmechanics"
 
@@ -109,7 +109,7 @@ class ContactMechanics(Pressed):
     def pressed(
         self, heights: Field, sides: tuple[float, float], mean: float, *, images: bool = False
     ) -> tuple[Field, Field]:
-        """By a hard wall on its half-space, free or periodic."""
+        """Solve with a hard wall on a free or periodic half-space."""
         from SurfaceTopography import Topography
 
         nx, ny = heights.shape
@@ -122,9 +122,9 @@ class ContactMechanics(Pressed):
         topography = Topography(heights, sides, periodic=images)
         system = self.make_system(interaction="hardwall", substrate=substrate, surface=topography)
         area = sides[0] * sides[1]
-        found = system.minimize_proxy(external_force=mean * area, pentol=1e-9, maxiter=5000)
-        if not found.success:
-            raise AsperityError(f"ContactMechanics: {found.message}")
+        result = system.minimize_proxy(external_force=mean * area, pentol=1e-9, maxiter=5000)
+        if not result.success:
+            raise AsperityError(f"ContactMechanics: {result.message}")
         pressure = np.abs(np.asarray(substrate.force)[:nx, :ny]) * (nx * ny / area)
-        gap = np.asarray(found.x)[:nx, :ny] - heights
+        gap = np.asarray(result.x)[:nx, :ny] - heights
         return pressure, gap - gap.min()

@@ -343,12 +343,12 @@ class Run:
         if self.vibration is None:
             return "vibration not requested"
         rows = (self.summary_row, *self.others)
-        values = sum(row["crf_hz"] is not None for row in rows)
+        count = sum(row["crf_hz"] is not None for row in rows)
         error = self.error.crf_hz
-        if not values or error is None:
+        if not count or error is None:
             return f"no contact resonance ({self.vibration.resonance.reason.rstrip('.')})"
-        surfaces_text = "" if values == len(rows) else f", on {values} of {len(rows)} surfaces"
-        return f"contact resonance at {error.value:.0f} Hz {interval_text('crf_hz', error)}{surfaces_text}"
+        subset = "" if count == len(rows) else f", on {count} of {len(rows)} surfaces"
+        return f"contact resonance at {error.value:.0f} Hz {interval_text('crf_hz', error)}{subset}"
 
     def to_dataset(self) -> "xarray.Dataset":
         """Return the run's `contents` as an xarray dataset."""
