@@ -103,12 +103,12 @@ def test_without_a_mass_the_curve_lies_about_the_oils_crossing(run):
 
 def test_frequencies_that_cannot_be_solved_are_left_out_and_said(run, monkeypatch):
     class Stuck(dynamic.OscillatingContact):
-        def at(self, frequency_hz):
+        def evaluate(self, frequency_hz):
             if frequency_hz > 20e3:
                 raise AsperityError(f"not found at {frequency_hz:.0f} Hz")
-            return super().at(frequency_hz)
+            return super().evaluate(frequency_hz)
 
-    monkeypatch.setattr(dynamic, "ShakenContact", Stuck)
+    monkeypatch.setattr(dynamic, "OscillatingContact", Stuck)
     stuck = replace(run)
     curve = stuck.dynamic_curve
     assert np.isnan(curve.elastic.stiffness[-1])

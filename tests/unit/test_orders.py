@@ -87,7 +87,7 @@ def test_a_shaft_that_turns_evenly_leaves_a_vibration_as_it_is():
 
 
 def test_what_turns_no_shaft_is_refused():
-    with pytest.raises(BadInput, match="shows 0 pulses, and 4 are needed"):
+    with pytest.raises(BadInput, match="has 0 pulses, but 4 are required"):
         turning_by_pulses(np.zeros(1000), RATE)
     with pytest.raises(BadInput, match="stops or reverses"):
         turning_by_speed(np.linspace(-1.0, 30.0, 1000), RATE)

@@ -174,7 +174,7 @@ def test_a_kept_run_has_the_same_numbers(three, tmp_path):
 
 
 def test_processes_change_nothing(three, monkeypatch):
-    monkeypatch.setattr(solving, "WORTH_PROCESSES_S", 0.0)
+    monkeypatch.setattr(solving, "MIN_PARALLEL_S", 0.0)
     monkeypatch.setattr(solving, "cores", lambda: 2)
     done = []
     spread = solve_case(
@@ -199,7 +199,7 @@ def test_a_surface_that_fails_is_left_out_and_said_to_be(monkeypatch):
     monkeypatch.setattr(solving, "_first", lame)
     found = solve_case(case(), surfaces=3)
     assert found.scalars()["surfaces"] == 2
-    (note,) = [note for note in found.notes if "left out" in note]
+    (note,) = [note for note in found.notes if "excluded" in note]
     assert note.startswith(
         "Surface 2 of 3 is excluded from means and intervals: contact not solved"
     )
