@@ -1,12 +1,11 @@
 """Adapter of asperity: contacts, waves and sliders of the benchmark, solved by `asperity.ehl`."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
+from asperity.benchmark.cases import CaseTable
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
@@ -27,12 +26,12 @@ class AsperitySolver:
     name = "asperity"
     kinds = ("dry", "wave", "ehl", "mixed", "conserving", "moving", "slider")
 
-    def solve(self, given: Mapping[str, Any], cells: int) -> dict[str, float]:
+    def solve(self, given: CaseTable, cells: int) -> dict[str, float]:
         """Return quantities by key."""
         return _SOLVES[given["kind"]](given, cells)
 
 
-def _conditions(given: Mapping[str, Any], speed: float = 1.0) -> ContactConditions:
+def _conditions(given: CaseTable, speed: float = 1.0) -> ContactConditions:
     line = given["geometry"] == "line"
     radius = given["radius_m"]
     return ContactConditions(
@@ -45,7 +44,7 @@ def _conditions(given: Mapping[str, Any], speed: float = 1.0) -> ContactConditio
     )
 
 
-def waves_on(grid: Grid, given: Mapping[str, Any]) -> Field:
+def waves_on(grid: Grid, given: CaseTable) -> Field:
     """Return the heights of the case's waves [m].
 
     Each wave is (amplitude [m], waves along x and y over the side, phase [rad]).
@@ -63,7 +62,7 @@ def waves_on(grid: Grid, given: Mapping[str, Any]) -> Field:
     )
 
 
-def dry_roughness(grid: Grid, given: Mapping[str, Any]) -> Field:
+def dry_roughness(grid: Grid, given: CaseTable) -> Field:
     """Return the heights [m] of a dry ball's or ellipse's roughness: waves, rings, or none."""
     if "waves" in given:
         return waves_on(grid, given)
@@ -87,7 +86,7 @@ def pressures(pressure: Field, cell_area: float) -> dict[str, float]:
     }
 
 
-def _dry(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+def _dry(given: CaseTable, cells: int) -> dict[str, float]:
     conditions = _conditions(given)
     a, b = conditions.hertz.half_widths
     if given["geometry"] == "line":
@@ -113,7 +112,7 @@ def _half_width(x: Field, pressure: Field) -> float:
     return float(np.sqrt(-level / slope))
 
 
-def _wave(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+def _wave(given: CaseTable, cells: int) -> dict[str, float]:
     """Solve waves across a wide line contact, whose middle approximates an infinite contact."""
     pair = ElasticPair(tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"]))
     length, amplitude = given["wavelength_m"], given["amplitude_m"]
@@ -136,7 +135,7 @@ def _wave(given: Mapping[str, Any], cells: int) -> dict[str, float]:
     }
 
 
-def _oil(given: Mapping[str, Any]) -> Lubricant:
+def _oil(given: CaseTable) -> Lubricant:
     oil = given["oil"]
     stated = (oil["density"], oil["density_c1_1_pa"], oil["density_c2_1_pa"])
     if stated != ("dowson-higginson", 0.6e-9, 1.7e-9):
@@ -154,7 +153,7 @@ def _oil(given: Mapping[str, Any]) -> Lubricant:
     )
 
 
-def _ehl_grid(given: Mapping[str, Any], a: float, cells: int) -> Grid:
+def _ehl_grid(given: CaseTable, a: float, cells: int) -> Grid:
     low, high = given["inlet_half_widths"] * a, given["outlet_half_widths"] * a
     if given["geometry"] == "point":
         side = given["side_half_widths"] * a
@@ -164,7 +163,7 @@ def _ehl_grid(given: Mapping[str, Any], a: float, cells: int) -> Grid:
     return Grid((cells, 8), (low, 0.0), (high, 8 * (high - low) / cells))
 
 
-def _oiled_waves(given: Mapping[str, Any], grid: Grid) -> Surface:
+def _oiled_waves(given: CaseTable, grid: Grid) -> Surface:
     """Return the surface of waves in a lubricated contact.
 
     Each wave is (amplitude [m], waves per metre along x, waves over the width along y, phase
@@ -178,7 +177,7 @@ def _oiled_waves(given: Mapping[str, Any], grid: Grid) -> Surface:
     return Surface(np.broadcast_to(np.sum(heights, axis=0), grid.cells).copy(), grid)
 
 
-def _ehl(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+def _ehl(given: CaseTable, cells: int) -> dict[str, float]:
     """Solve a contact that is smooth, has stationary waves, or conserves oil."""
     conditions = _conditions(given, float(np.mean(given["surface_speeds_m_s"])))
     grid = _ehl_grid(given, conditions.hertz.half_widths[0], cells)
@@ -190,7 +189,7 @@ def _ehl(given: Mapping[str, Any], cells: int) -> dict[str, float]:
     return _films(given, solve_contact(conditions, _oil(given), surface, options=options))
 
 
-def _films(given: Mapping[str, Any], solution: ContactSolution) -> dict[str, float]:
+def _films(given: CaseTable, solution: ContactSolution) -> dict[str, float]:
     grid, gap, pressure = solution.grid, solution.gap, solution.pressure
     if given["geometry"] == "point":
         state = contact_state(solution)
@@ -213,7 +212,7 @@ def _films(given: Mapping[str, Any], solution: ContactSolution) -> dict[str, flo
     return values
 
 
-def _moving(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+def _moving(given: CaseTable, cells: int) -> dict[str, float]:
     """Solve waves of the first surface that pass through: film at x = 0 over their last period."""
     speeds = tuple(given["surface_speeds_m_s"])
     conditions = replace(_conditions(given), surface_speeds=speeds)
@@ -252,7 +251,7 @@ def _min_film(gap: Field) -> float:
     return float(centre - (right - left) ** 2 / (8.0 * bend)) if bend > 0.0 else float(centre)
 
 
-def _slider(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+def _slider(given: CaseTable, cells: int) -> dict[str, float]:
     journal = given["shape"] == "journal"
     length = 2.0 * np.pi * given["radius_m"] if journal else given["length_m"]
     share = (np.arange(cells) + 0.5) / cells

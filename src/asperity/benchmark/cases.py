@@ -5,9 +5,11 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from asperity.core.errors import BadInput
+
+CaseTable: TypeAlias = Mapping[str, Any]  # plain SI numbers of a case by key
 
 KINDS = ("dry", "wave", "ehl", "mixed", "conserving", "moving", "slider")
 _IN_PACKAGE = Path(__file__).with_name("cases")  # in a wheel
@@ -31,7 +33,7 @@ class BenchmarkCase:
 
     name: str
     kind: str
-    given: Mapping[str, Any]
+    given: CaseTable
     certified: tuple[Certified, ...]
 
 

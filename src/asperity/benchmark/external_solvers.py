@@ -1,12 +1,11 @@
 """Adapters of external solvers: `pip install tamaas`, `pip install ContactMechanics`."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from asperity.benchmark.asperity_solver import dry_roughness, pressures
+from asperity.benchmark.cases import CaseTable
 from asperity.contact.conditions import ElasticPair
 from asperity.contact.grid import Grid
 from asperity.contact.hertz import elliptic_contact, point_contact
@@ -20,7 +19,7 @@ class DryContactSolver(ABC):
     name: str
     kinds = ("dry", "wave")
 
-    def solve(self, given: Mapping[str, Any], cells: int) -> dict[str, float]:
+    def solve(self, given: CaseTable, cells: int) -> dict[str, float]:
         """Return quantities by key; none for line contacts (mixed periodicity)."""
         modulus = ElasticPair(
             tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"])
@@ -29,7 +28,7 @@ class DryContactSolver(ABC):
             return self._wave(given, cells, modulus)
         return {} if given["geometry"] == "line" else self._bounded(given, cells, modulus)
 
-    def _bounded(self, given: Mapping[str, Any], cells: int, modulus: float) -> dict[str, float]:
+    def _bounded(self, given: CaseTable, cells: int, modulus: float) -> dict[str, float]:
         load, radius = given["load_n"], given["radius_m"]
         radii = tuple(radius) if isinstance(radius, list) else (radius, radius)
         hertz = (
@@ -50,7 +49,7 @@ class DryContactSolver(ABC):
         )
         return pressures(pressure * modulus, grid.spacing[0] * grid.spacing[1])
 
-    def _wave(self, given: Mapping[str, Any], cells: int, modulus: float) -> dict[str, float]:
+    def _wave(self, given: CaseTable, cells: int, modulus: float) -> dict[str, float]:
         length, amplitude = given["wavelength_m"], given["amplitude_m"]
         mean = given["pressure_over_full"] * np.pi * amplitude / length
         wave = amplitude / length * np.cos(2.0 * np.pi * (np.arange(cells) + 0.5) / cells)

@@ -10,8 +10,9 @@ import importlib
 import sys
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
+from asperity.benchmark.cases import CaseTable
 from asperity.core.errors import BadInput
 
 KNOWN = {
@@ -28,7 +29,7 @@ class Solver(Protocol):
     name: str
     kinds: Collection[str]
 
-    def solve(self, given: Mapping[str, Any], cells: int) -> Mapping[str, float]:
+    def solve(self, given: CaseTable, cells: int) -> Mapping[str, float]:
         """Return quantities by key, in SI, of a case solved with this many cells along x."""
         ...
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -161,41 +162,56 @@ def contact_vibration(
     if spring is None:
         resonance = no_resonance(objection or "", band_hz, model.method)
         return Vibration(resonance=resonance, band_hz=band_hz, full_load_crf_hz=full_load_crf_hz)
-    base_excitation = excitation(state, conditions, model, solution=solution)
-    profile = base_excitation.profile(
-        round(model.duration_s * model.rate_hz), model.rate_hz, model.seed
-    )
-    if model.linear:
-        response, contact_loss = (
-            acceleration(spring, profile, method=model.response, substeps=model.substeps),
-            0.0,
-        )
-    else:
-        motion = mass_motion(spring, profile, method=model.response, substeps=model.substeps)
-        response, contact_loss = (
-            Signal(motion.acceleration, profile.rate_hz, "m/s^2"),
-            motion.contact_loss,
-        )
-    spectrum = power_spectrum(response, window="boxcar")
+    record = _simulate(spring, excitation(state, conditions, model, solution=solution), model)
     f0 = np.array(spring.natural_frequency_hz)
-    line_model = None
-    if model.method == "likelihood" and model.linear and isinstance(base_excitation, FilteredNoise):
-        line_model = SampledLine(base_excitation, model.rate_hz)
     return Vibration(
         resonance=contact_resonance(
-            spectrum, band_hz=band_hz, method=model.method, seen=line_model
+            record.spectrum, band_hz=band_hz, method=model.method, seen=record.line_model
         ),
         band_hz=band_hz,
         full_load_crf_hz=full_load_crf_hz,
         oscillator=spring,
-        profile=profile,
-        response=response,
-        spectrum=spectrum,
-        excitation=base_excitation,
-        expected_crfa=float(spring.gain(f0) * base_excitation.density(f0, model.rate_hz)),
-        dynamic_load=float(model.mass * np.std(response.values) / (spring.load or conditions.load)),
-        contact_loss=contact_loss,
+        profile=record.profile,
+        response=record.response,
+        spectrum=record.spectrum,
+        excitation=record.excitation,
+        expected_crfa=float(spring.gain(f0) * record.excitation.density(f0, model.rate_hz)),
+        dynamic_load=float(
+            model.mass * np.std(record.response.values) / (spring.load or conditions.load)
+        ),
+        contact_loss=record.contact_loss,
     )
+
+
+class _Record(NamedTuple):
+    """Simulated record of a mass, and the sampled line over its noise, if that applies."""
+
+    excitation: Excitation
+    profile: Signal
+    response: Signal
+    spectrum: Spectrum
+    contact_loss: float
+    line_model: SampledLine | None
+
+
+def _simulate(
+    spring: ContactOscillator, base_excitation: Excitation, model: VibrationModel
+) -> _Record:
+    """Simulate the record of a mass on `spring` under an excitation."""
+    samples = round(model.duration_s * model.rate_hz)
+    profile = base_excitation.profile(samples, model.rate_hz, model.seed)
+    contact_loss = 0.0
+    if model.linear:
+        response = acceleration(spring, profile, method=model.response, substeps=model.substeps)
+    else:
+        motion = mass_motion(spring, profile, method=model.response, substeps=model.substeps)
+        response = Signal(motion.acceleration, profile.rate_hz, "m/s^2")
+        contact_loss = motion.contact_loss
+    line_model = None
+    if model.method == "likelihood" and model.linear and isinstance(base_excitation, FilteredNoise):
+        line_model = SampledLine(base_excitation, model.rate_hz)
+    spectrum = power_spectrum(response, window="boxcar")
+    return _Record(base_excitation, profile, response, spectrum, contact_loss, line_model)
 
 
 def _objection(state: ContactState, model: VibrationModel) -> str | None:

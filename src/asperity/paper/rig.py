@@ -161,8 +161,7 @@ def simulate_rig(
     Parameters
     ----------
     settings : size and trend of the test; default `RigSettings()`
-    disturbance : signals besides the contact, default an SNR of 10 dB; modes, levels and tones are
-        drawn anew for each seed
+    disturbance : signals besides the contact, drawn anew for each seed; default `Disturbance()`
     case : its contact, solved at each Sq, gives load and area shares instead of the trend; its
         load, radius, mass, damping (for the damping law "contact" that of the solved contact) and
         excitation define the line
@@ -190,24 +189,24 @@ def simulate_rig(
     background = draw_background(
         frequency, band_hz, disturbance, np.random.default_rng(background_seed)
     )
-    recordings = []
+    recordings: list[RigRecording] = []
     for index, draw in enumerate(draws):
         rng = np.random.default_rng(draw)
         measured_sq, measured_std = float(sq[index]), float(sq_std[index])
-        true_sq = max(float(sq[index] + sq_std[index] * rng.standard_normal()), 0.1 * measured_sq)
-        state, sample_model = _on_trend(trend, true_sq, conditions, full_load_crf_hz), model
-        if case is not None:
-            state, sample_model = (
-                _touching(moments[index], model) if moments else _solved(case, true_sq, model)
-            )
+        true_sq = max(measured_sq + measured_std * float(rng.standard_normal()), 0.1 * measured_sq)
+        if case is None:
+            sample = _on_trend(trend, true_sq, conditions, full_load_crf_hz), model
+        elif moments:
+            sample = _touching(moments[index], model)
+        else:
+            sample = _solved(case, true_sq, model)
         for repeat in range(1, settings.repeats + 1):
             test = RigTest(
                 index + 1, repeat, measured_sq, measured_std, rate_hz, settings.duration_s
             )
             shift = settings.repeat_std_hz * rng.standard_normal() / full_load_crf_hz
-            line = contact_line(
-                _shifted(state, shift), conditions, sample_model, frequency, rate_hz
-            )
+            state, sample_model = _shifted(sample[0], shift), sample[1]
+            line = contact_line(state, conditions, sample_model, frequency, rate_hz)
             recordings.append(background.recording(test, line, disturbance, rng))
     return Rig(
         recordings=tuple(recordings),

@@ -77,8 +77,6 @@ def solve_case(
     if count == 1 or not run.solution.convergence.converged:
         return run
     further_cases = [case.on_surface(number) for number in range(1, count)]
-    rows: dict[int, Row] = {}
-    failures: dict[int, str] = {}
     seconds = run.solution.convergence.seconds
     parallel = workers > 1 and seconds * len(further_cases) > MIN_PARALLEL_S
     outcomes = (
@@ -86,18 +84,7 @@ def solve_case(
         if parallel
         else _in_this_process(further_cases, groups, progress)
     )
-    for finished, outcome in enumerate(outcomes, 1):
-        if outcome.row.value is None:
-            failures[outcome.number] = outcome.row.reason.rstrip(".")
-        else:
-            rows[outcome.number] = outcome.row.value
-        if surface_progress is not None:
-            surface_progress(finished + 1, count)
-    others = [rows[number] for number in sorted(rows)]
-    exclusions = [
-        f"Surface {number + 1} of {count} is excluded from means and intervals: {failures[number]}."
-        for number in sorted(failures)
-    ]
+    others, exclusions = _collect(outcomes, count, surface_progress)
     notes = [*json.loads(run.solution.attributes["notes"]), *exclusions]
     attributes = {
         **run.solution.attributes,
@@ -107,6 +94,26 @@ def solve_case(
     return run_of(
         case, replace(run.solution, attributes=attributes), notes, others, run.vibration, groups
     )
+
+
+def _collect(
+    outcomes: Iterator["_Outcome"], count: int, surface_progress: SurfaceProgress | None
+) -> tuple[list[Row], list[str]]:
+    """Return the rows of further surfaces in order, and notes on those that failed."""
+    rows: dict[int, Row] = {}
+    failures: dict[int, str] = {}
+    for finished, outcome in enumerate(outcomes, 1):
+        if outcome.row.value is None:
+            failures[outcome.number] = outcome.row.reason.rstrip(".")
+        else:
+            rows[outcome.number] = outcome.row.value
+        if surface_progress is not None:
+            surface_progress(finished + 1, count)
+    exclusions = [
+        f"Surface {number + 1} of {count} is excluded from means and intervals: {failures[number]}."
+        for number in sorted(failures)
+    ]
+    return [rows[number] for number in sorted(rows)], exclusions
 
 
 def _first(

@@ -141,49 +141,59 @@ def solve_thermal_contact(
     isothermal = lubricant is None or not thermal.feedback or conditions.sliding_speed == 0.0
     if isothermal or not solution.convergence.converged:
         return solution
-    history, seconds = solution.convergence.history, solution.convergence.seconds
     options = settings.get("options") or Options()
-    strict, progress = settings.get("strict", True), settings.get("progress")
+    solution, settled = _iterate_with_heat(
+        solution,
+        options,
+        boundary_friction=boundary_friction,
+        thermal=thermal,
+        progress=settings.get("progress"),
+    )
+    status = SolveStatus.CONVERGED if settled else SolveStatus.OUT_OF_ITERATIONS
+    solution = replace(solution, convergence=replace(solution.convergence, status=status))
+    if settings.get("strict", True) and not solution.convergence.converged:
+        raise NotConverged(solution, f"contact and heat did not converge in {MAX_SOLVES} solves")
+    return solution
+
+
+def _iterate_with_heat(
+    solution: ContactSolution,
+    options: Options,
+    *,
+    boundary_friction: float,
+    thermal: Thermal,
+    progress: Progress | None,
+) -> tuple[ContactSolution, bool]:
+    """Solve contact and heat in turn from an isothermal solution; return convergence, too."""
+    history, seconds = solution.convergence.history, solution.convergence.seconds
     warm_options = replace(options, max_iterations=min(options.max_iterations, MAX_WARM_ITERATIONS))
     # film temperature rise at which the solution's viscosity was evaluated
-    temperature_rise: Field = np.zeros(surface.grid.cells)
+    temperature_rise: Field = np.zeros(solution.grid.cells)
     damping, temperature_converged = 1.0, False
     for _ in range(MAX_SOLVES):
-        film = friction_and_heat(solution, boundary_friction=boundary_friction, thermal=thermal)[
-            1
-        ].film
-        residual = float(np.sqrt(np.mean((film - temperature_rise) ** 2)))
-        temperature_converged = residual < TEMPERATURE_TOLERANCE * max(
-            float(np.max(film)), MIN_SCALE
-        )
+        _, heat = friction_and_heat(solution, boundary_friction=boundary_friction, thermal=thermal)
+        residual = float(np.sqrt(np.mean((heat.film - temperature_rise) ** 2)))
+        scale = max(float(np.max(heat.film)), MIN_SCALE)
+        temperature_converged = residual < TEMPERATURE_TOLERANCE * scale
         if temperature_converged:
             break
-        target = temperature_rise + damping * (film - temperature_rise)
+        target = temperature_rise + damping * (heat.film - temperature_rise)
         candidate = solve_contact(
-            conditions,
-            lubricant,
-            surface,
+            solution.conditions,
+            solution.lubricant,
+            solution.surface,
             options=warm_options,
             start=solution,
             viscosity_factor=warm_factor(solution, thermal, thermal.ambient + target),
             strict=False,
             progress=progress,
         )
-        history, seconds = (
-            history + candidate.convergence.history,
-            seconds + candidate.convergence.seconds,
-        )
+        history += candidate.convergence.history
+        seconds += candidate.convergence.seconds
         if candidate.convergence.converged:
-            solution, temperature_rise, damping = (
-                replace(candidate, options=options),
-                target,
-                min(1.0, 2.0 * damping),
-            )
+            solution, temperature_rise = replace(candidate, options=options), target
+            damping = min(1.0, 2.0 * damping)
         else:  # temperature step too large
             damping *= 0.5
-    status = SolveStatus.CONVERGED if temperature_converged else SolveStatus.OUT_OF_ITERATIONS
-    convergence = replace(solution.convergence, status=status, history=history, seconds=seconds)
-    solution = replace(solution, convergence=convergence)
-    if strict and not convergence.converged:
-        raise NotConverged(solution, f"contact and heat did not converge in {MAX_SOLVES} solves")
-    return solution
+    convergence = replace(solution.convergence, history=history, seconds=seconds)
+    return replace(solution, convergence=convergence), temperature_converged
