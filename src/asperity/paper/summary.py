@@ -31,7 +31,7 @@ def rig_scalars(rig: Rig) -> dict[str, Any]:
 
 def table1_verdict(rows: Sequence[Table1Row], preset: str) -> str:
     """Return one sentence: deviation from the printed CRFs, and printed CRFAs within our range."""
-    inside, largest = sum(row.within for row in rows), max(abs(row.crf_off) for row in rows)
+    inside, largest = sum(row.within for row in rows), max(abs(row.crf_deviation) for row in rows)
     return (
         f"Table 1, preset {preset}: CRF within {100 * largest:.2f} % of the printed values, "
         f"{inside} of {len(rows)} printed CRFAs inside our 5 to 95 % range."

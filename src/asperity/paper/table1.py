@@ -44,7 +44,7 @@ class Table1Row:
     paper_crfa: float
 
     @property
-    def crf_off(self) -> float:
+    def crf_deviation(self) -> float:
         """Relative deviation of our median CRF from the printed one."""
         return self.crf_hz / self.paper_crf_hz - 1.0
 
