@@ -27,6 +27,7 @@ _NUMBERS = {  # key in the catalogue -> field
     "moes_load": "moes_load",
     "moes_oil": "moes_oil",
 }
+_PLACES = {"central": "central film thickness", "least": "minimum film thickness"}
 MAX_DEVIATION = 0.25  # of the film from all fits; their authors claim 5 to 15 %
 FULL_FILM = 3.0  # film ratio from which roughness does not affect the mean film
 
@@ -112,7 +113,7 @@ class RegimeCard:
         film, deviation = quantity("film_thickness_m"), quantity("film_deviation")
         rows += [
             (
-                f"fitted {fit.place} film, {fit.source}",
+                f"fitted {_PLACES[fit.place]}, {fit.source}",
                 f"{film.text(fit.film)}; solved {film.text(fit.solved)}, "
                 f"{deviation.text(fit.deviation)}",
             )
