@@ -75,7 +75,7 @@ def test_json_holds_the_contract_and_nothing_else_is_on_stdout(asp):
     assert json.loads(out)["sq_m"] == pytest.approx(1e-6)
 
 
-def test_what_is_not_shown_is_not_worked_out(asp, monkeypatch):
+def test_quantities_not_shown_are_not_computed(asp, monkeypatch):
     """The virgin contact's stiffness stands in no short table, and costs as much as the other limit."""
     expected = asp("solve", "case.toml")
     monkeypatch.setattr(
@@ -266,7 +266,7 @@ def test_report_makes_a_page_of_one_run_or_several(asp):
     assert all(Path(name).read_text("utf-8").startswith("<!") for name in ("run.html", "two.html"))
 
 
-def test_surface_says_what_it_read(asp):
+def test_surface_prints_its_parameters(asp):
     heights = np.random.default_rng(5).standard_normal((32, 48)) * 1e-6
     heights[:2] = np.nan
     x3pio.write("ring.x3p", heights.T, x_scale=2e-6, y_scale=3e-6)

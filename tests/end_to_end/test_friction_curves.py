@@ -46,7 +46,7 @@ def test_stribeck_falls_from_boundary_friction_to_the_oils(asp):
     )
 
 
-def test_traction_rises_from_nothing_and_meets_its_limit(asp):
+def test_traction_rises_from_zero_to_its_limit(asp):
     wanted = [argument for slip in ("0", "0.3", "0.001", "3") for argument in ("--slip", slip)]
     code, out, _ = asp(
         "traction",
@@ -88,7 +88,7 @@ def test_a_traction_curve_in_python(case):
     )  # Newtonian in the film: sliding moves nothing else
 
 
-def test_feedback_is_heard_by_the_curve(case):
+def test_thermal_feedback_changes_the_curve(case):
     speeds = [10.0]
     cold = stribeck_curve(case, speeds=speeds)
     warm = stribeck_curve(case.with_overrides({"thermal.feedback": "true"}), speeds=speeds)

@@ -51,7 +51,7 @@ def test_height_of_the_record_is_exact_and_of_the_process_scatters():
     assert np.sqrt(np.mean(np.square(process))) == pytest.approx(2e-6, rel=0.05)
 
 
-def test_noise_of_a_height_before_the_filter_loses_what_the_filter_stops():
+def test_noise_with_its_height_before_the_filter_loses_the_filtered_power():
     """Of white noise up to rate/2, a filter of noise bandwidth B = fc (π/4)/sin(π/4) passes B/(rate/2)."""
     profile = noise(height_of="noise", filter="bilinear").profile(800_000, 10e3, seed=1).values
     assert np.std(profile) == pytest.approx(2e-6 * np.sqrt(30.0 * 1.1107 / 5e3), rel=0.02)

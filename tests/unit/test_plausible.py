@@ -51,7 +51,7 @@ def test_the_papers_contact_is_plausible():
         (contact(), roelands(0.001, 22e-9), "Roelands' exponent z is 1.56"),
     ],
 )
-def test_what_cannot_well_be_meant_is_noted(conditions, oil, note_text):
+def test_implausible_input_is_noted(conditions, oil, note_text):
     assert any(note_text in note for note in plausibility_notes(conditions, oil))
 
 
@@ -62,7 +62,7 @@ def test_what_cannot_well_be_meant_is_noted(conditions, oil, note_text):
         (contact(**HARD), roelands(0.04, 22e-9)),  # gears
     ],
 )
-def test_what_can_be_meant_is_not_noted(conditions, oil):
+def test_plausible_input_is_not_noted(conditions, oil):
     assert plausibility_notes(conditions, oil) == ()
 
 
@@ -95,7 +95,7 @@ def test_contact_at_a_grid_edge_is_noted():
     )
 
 
-def test_pressures_that_no_body_stands_and_heights_that_a_grid_does_not_show_are_told():
+def test_excessive_pressures_and_unresolved_heights_are_noted():
     small = grid((64, 32), (-2.0, 1.3))
     steep = gaussian_surface(small, sq=3e-6, correlation_length=20e-6, rng=np.random.default_rng(1))
     assert any(
@@ -120,7 +120,7 @@ def test_a_film_far_from_its_fits_is_noted_with_the_reason():
     assert solution_notes(solve_contact(contact(), oil, flooded)) == ()
 
 
-def test_asperities_that_bear_nothing_at_a_small_film_ratio_are_told():
+def test_unloaded_asperities_at_a_small_film_ratio_are_noted():
     """The paper's contact at Sq 2.5 um has a film ratio of 0.25, and asperities bear nine tenths: no note."""
     solved = solve_contact(contact(hardness=2e9), barus(), rough(grid((48, 32)), 2.5e-6))
     assert not any("film ratio" in note for note in solution_notes(solved))

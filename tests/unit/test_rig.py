@@ -50,7 +50,7 @@ def test_the_rig_is_the_papers():
         assert one.clr == pytest.approx((one.crf_hz / rig.full_load_crf_hz) ** 6, rel=1e-9)
 
 
-def test_measured_roughness_errs_by_what_it_says():
+def test_measured_roughness_has_the_stated_error():
     off = [
         (one.true_sq_m - one.sq_m) / one.sq_std_m
         for seed in range(20)
@@ -60,7 +60,7 @@ def test_measured_roughness_errs_by_what_it_says():
 
 
 @pytest.mark.parametrize("snr_db", [20.0, 0.0])
-def test_the_signal_to_noise_ratio_is_the_one_asked_for(snr_db):
+def test_the_signal_to_noise_ratio_is_as_requested(snr_db):
     rig = simulate_rig(RigSettings(duration_s=1.0), disturbance=Disturbance(snr_db=snr_db))
     found = []
     for one in rig.recordings:
@@ -203,7 +203,7 @@ def test_a_case_gives_its_contacts_own_damping_and_a_track_finds_it_again():
 
 
 @pytest.mark.parametrize("file_format", ["h5", "wav"])
-def test_what_is_written_can_be_read(tmp_path, file_format):
+def test_written_recordings_can_be_read(tmp_path, file_format):
     rig = simulate_rig(RigSettings(samples=2, repeats=2, duration_s=0.5))
     told = []
     paths = write_rig(

@@ -84,7 +84,7 @@ def test_the_deviation_of_damping_is_of_one_further_surface(run):
     )
 
 
-def test_only_what_is_asked_for_is_worked_out(run, tmp_path, monkeypatch):
+def test_only_requested_quantities_are_computed(run, tmp_path, monkeypatch):
     """And what was not, on every surface, has no mean once a run is read back."""
     case = run.case.with_overrides({"vibration": MASS})
     whole = solve_case(case, surfaces=2)
@@ -112,7 +112,7 @@ def test_only_what_is_asked_for_is_worked_out(run, tmp_path, monkeypatch):
     )
 
 
-def test_where_the_virgin_contact_is_not_known_the_other_limit_stands(run, monkeypatch):
+def test_the_elastic_limit_remains_if_the_virgin_one_fails(run, monkeypatch):
     def lost(_):
         raise AsperityError("dynamic stiffness did not converge at 3000 Hz")
 
@@ -142,7 +142,7 @@ def test_each_surface_vibrates_once(run, monkeypatch):
     )
 
 
-def test_what_cannot_be_shaken_is_said_on_the_page(run, tmp_path):
+def test_a_failed_dynamic_stiffness_is_stated_on_the_page(run, tmp_path):
     shaken = solve_case(
         run.case.with_overrides({"vibration": MASS, "model": "conserving", "surface": "flat"})
     )
@@ -193,7 +193,7 @@ def test_a_kept_run_shows_its_maps_and_does_not_need_them(run, tmp_path):
     assert load_run(full).scalars() == load_run(bare).scalars() == run.scalars()
 
 
-def test_what_cannot_settle_leaves_friction_out_and_keeps_the_rest(run, monkeypatch):
+def test_a_failure_of_friction_keeps_all_other_results(run, monkeypatch):
     def refuse(*_, **__):
         raise AsperityError("friction and temperature did not converge")
 

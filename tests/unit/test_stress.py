@@ -96,7 +96,7 @@ def test_deep_kernels_hold_only_the_waves_that_reach_so_far():
 
 
 @pytest.mark.parametrize("repeats", [True, False])
-def test_the_surface_carries_what_was_put_on_it(repeats):
+def test_surface_stresses_equal_the_applied_tractions(repeats):
     generator = np.random.default_rng(5)
     grid = Grid((24, 20), (0.0, 0.0), (1.2, 1.0), (False, repeats))
     pressure, shear = generator.random(grid.cells), generator.normal(size=grid.cells)
@@ -166,7 +166,7 @@ def test_the_peak_between_depths_hardly_depends_on_the_depths():
 
 
 @pytest.mark.parametrize("core", [0.25, 1.0])
-def test_the_core_is_what_lies_below_a_depth(core):
+def test_the_core_is_the_largest_stress_below_a_depth(core):
     grid = Grid((64, 8), (-2.0, -1.0), (2.0, 1.0))
     pressure = np.repeat(np.sqrt(np.maximum(1.0 - grid.x**2, 0.0))[:, None], 8, axis=1)
     depths = np.concatenate([[0.0], np.geomspace(0.02, 3.0, 12)])
@@ -245,7 +245,7 @@ def test_default_depths_go_from_the_surface_to_below_the_contact():
         (None, [np.nan], "finite lengths of 0 m"),
     ],
 )
-def test_what_cannot_be_used_is_refused(shear, depths, told):
+def test_invalid_stress_input_is_refused(shear, depths, told):
     grid = Grid((8, 8), (0.0, 0.0), (1.0, 1.0))
     with pytest.raises(BadInput, match=told):
         stress_below(np.ones((8, 8)), shear, grid, np.array(depths), poisson_ratio=0.3)

@@ -48,7 +48,7 @@ def test_independent_parts_add_by_their_squares_and_numerical_ones_as_they_are()
 @pytest.mark.parametrize(
     ("value", "low", "high"), [(0.06, 0.0, 0.74), (0.95, 0.27, 1.0), (0.5, 0.0, 1.0)]
 )
-def test_no_share_of_the_load_is_off_beyond_nothing_and_all(value, low, high):
+def test_the_interval_of_a_share_stays_within_0_and_1(value, low, high):
     """A CLR of 6 % once was said to be off by 113 %."""
     error = Uncertainty(value=value, iteration=(0.0, 0.0), grid=(0.68, 0.68), range=(0.0, 1.0))
     assert error.interval == pytest.approx((low, high))
@@ -73,7 +73,7 @@ def test_nine_in_ten_further_surfaces_lie_within_the_interval_of_a_few(count):
 
 
 @pytest.mark.parametrize(("centre", "scatter"), [(0.0, 0.4), (2.5, 0.8), (-4.0, 1.0), (5.0, 2.0)])
-def test_so_do_shares_and_none_is_below_nothing_or_above_all(centre, scatter):
+def test_intervals_of_shares_cover_and_stay_within_0_and_1(centre, scatter):
     """Of shares whose logarithm of odds scatters normally, from a twentieth to nearly all of the load."""
     rng = np.random.default_rng(2)
     held = 0
@@ -94,7 +94,7 @@ def test_surfaces_that_agree_do_not_scatter(share):
     )
 
 
-def test_a_resonance_is_off_by_what_its_load_share_is(run):
+def test_the_error_of_a_resonance_follows_from_its_load_share(run):
     """CRF goes with CLR^(1/6): of 2466.0 Hz, 1.4 were said to be in doubt where CLR 7 ± 2.4 % alone is worth 136."""
     clr, crf = run.error.clr, run.error.crf_hz
     assert clr.surfaces is crf.surfaces is None
@@ -111,7 +111,7 @@ def test_a_resonance_is_off_by_what_its_load_share_is(run):
     assert (numbers["clr_low"], numbers["clr_high"]) == clr.interval
 
 
-def test_a_grid_without_a_coarser_one_is_said_to_tell_no_error(alone):
+def test_without_a_coarser_grid_the_error_is_not_determined(alone):
     """No ± was given there, without a word."""
     numbers = alone.scalars()
     for key in ("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "clr_error", "crf_error_hz"):
@@ -154,7 +154,7 @@ def test_the_scatter_of_the_load_share_is_handed_on_to_the_resonance(three):
     assert crf.surfaces == pytest.approx((f0 * (1.0 - below), f0 * (above - 1.0)))
 
 
-def test_a_law_that_needs_the_solved_contact_says_that_its_numerical_error_is_unknown():
+def test_a_law_that_needs_the_solved_contact_has_no_numerical_error():
     tangent = {
         "vibration.stiffness_law": "tangent",
         "vibration.rate": "200 kHz",
@@ -173,7 +173,7 @@ def test_a_kept_run_has_the_same_numbers(three, tmp_path):
     assert kept.verdict() == three.verdict()
 
 
-def test_processes_change_nothing(three, monkeypatch):
+def test_worker_processes_do_not_change_results(three, monkeypatch):
     monkeypatch.setattr(solving, "MIN_PARALLEL_S", 0.0)
     monkeypatch.setattr(solving, "cores", lambda: 2)
     done = []
@@ -188,7 +188,7 @@ def timeless(row):
     return {key: value for key, value in row.items() if key != "seconds"}
 
 
-def test_a_surface_that_fails_is_left_out_and_said_to_be(monkeypatch):
+def test_a_surface_that_fails_is_excluded_with_a_note(monkeypatch):
     solved = solving._first
 
     def lame(chosen, *rest, **more):
@@ -222,7 +222,7 @@ def test_how_many_surfaces_are_solved(overrides, count):
 
 
 @pytest.mark.parametrize("count", [1001, 0x7FFF])
-def test_more_surfaces_than_tell_anything_are_refused(count):
+def test_too_many_surfaces_are_refused(count):
     with pytest.raises(BadInput, match=f"surfaces must be 1 to 1000, got {count}"):
         case(**{"solver.surfaces": count}).surface_count()
 

@@ -161,7 +161,7 @@ def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
 
 
 @pytest.mark.parametrize("hardness", [None, "2 GPa"])
-def test_where_nothing_yields_both_limits_are_one(hardness):
+def test_without_yielding_both_limits_coincide(hardness):
     """Solved for themselves they agree; where cells are at the cap they do not."""
     case = load_case(PAPER).with_overrides(
         {"grid.cells": [48, 24], "surface.sq": "1 um", "contact.load": "500 N"}
@@ -222,7 +222,7 @@ def test_the_lines_follow_how_the_wedge_leans():
     assert np.abs(stencil_times(upright, change) - expected)[inner].max() > 0.1
 
 
-def test_a_shaken_contact_whose_bodies_touch_takes_few_steps():
+def test_an_oscillating_contact_with_asperities_takes_few_steps():
     """With stiff oil apart from what touches it takes 30."""
     ready = OscillatingContact(papers(0.5, "mixed", cells=(128, 128)))
     answer = ready.oscillating.answer(ready.dimensionless_frequency(9e3), tolerance=3e-5)
@@ -289,7 +289,7 @@ def test_oil_that_has_no_time_is_shut_in():
 
 
 @pytest.mark.parametrize("frequency_hz", [100.0, 1e4])
-def test_what_damps_is_what_the_squeezed_oil_turns_to_heat(frequency_hz):
+def test_damping_equals_the_dissipation_of_the_squeezed_oil(frequency_hz):
     """Bodies that hardly bend, oil of one viscosity: with h³p'/12η = C - x the flow of oil squeezed out at 1 m/s,
 
     dissipation is 12 η ∫ (x - C)²/h³ dx, least for the C that leaves no pressure at both ends: c by quadrature.

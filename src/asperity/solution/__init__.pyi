@@ -34,6 +34,7 @@ from .stress import stress_below as stress_below
 from .stress import subsurface_stress as subsurface_stress
 from .stress_influence import Tractions as Tractions
 from .thermal import HOT as HOT
+from .thermal import SolveSettings as SolveSettings
 from .thermal import friction_and_heat as friction_and_heat
 from .thermal import solve_thermal_contact as solve_thermal_contact
 from .traction import BOUNDARY_FRICTION as BOUNDARY_FRICTION
