@@ -16,7 +16,7 @@ from asperity.ehl.linear_solvers.gmres import Shifted
 from asperity.ehl.linear_solvers.mixed import MixedLinear
 from asperity.ehl.linear_solvers.oscillating import elastic
 from asperity.ehl.scales import Scales
-from asperity.kernels import relax
+from asperity.kernels import line_relaxation as relax
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
 from asperity.solution import (
     OscillatingContact,
