@@ -26,7 +26,7 @@ from asperity.paper.rig_recording import (
     draw_background,
 )
 from asperity.resonance import contact_resonance, remove_lines, series_resonances
-from asperity.solution import ShakenContact, contact_state
+from asperity.solution import OscillatingContact, contact_state
 from asperity.vibration import ContactOscillator, FilteredNoise
 from benchmarks.roughness_levels import paper_case
 
@@ -93,7 +93,7 @@ def solved(sq_um: float, seed: int) -> Point:
     solution = solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
     found = []
     for yielded in ("elastic", "flowing"):
-        ready = ShakenContact(solution, yielded=yielded)
+        ready = OscillatingContact(solution, yielded=yielded)
         heavy, light = ready.resonance(HEAVY), ready.resonance(LIGHT)
         found += [heavy.stiffness, light.damping_ratio, heavy.damping_ratio]
     return Point(sq_um, seed, contact_state(solution).clr, *found)

@@ -12,7 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.signals import Spectrum
-from asperity.paper import SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS, Disturbance, Rig, simulate_rig
+from asperity.paper import (
+    SAMPLES_SQ_UM,
+    SAMPLES_STD_UM,
+    TRENDS,
+    Disturbance,
+    Rig,
+    RigSettings,
+    simulate_rig,
+)
 from asperity.resonance import (
     CleanSpectrum,
     Resonance,
@@ -75,7 +83,7 @@ def drawn(snr_db: float, seed: int, *, duration_s: float = DURATION, **choices: 
         modes=int(np.random.default_rng(seed).integers(2, 7)),
         **choices,  # type: ignore[arg-type]
     )
-    return simulate_rig(duration_s=duration_s, disturbance=disturbance, seed=seed)
+    return simulate_rig(RigSettings(duration_s=duration_s, seed=seed), disturbance=disturbance)
 
 
 def transferred(rig: Rig, size: float, seed: int) -> Rig:

@@ -19,7 +19,7 @@ from asperity.case import load_case
 from asperity.core.errors import BadInput
 from asperity.monitoring import search_target, track_recordings
 from asperity.monitoring.reading import FINEST_HZ, read_spectrum
-from asperity.paper import simulate_rig, write_rig
+from asperity.paper import RigSettings, simulate_rig, write_rig
 from asperity.recording import ReadOptions, check_recording, open_channels, read_recording
 from asperity.resonance import contact_resonance, remove_lines
 
@@ -34,7 +34,7 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield f"## Recordings: 60 of {duration:g} s at 20 kHz, from disk to report\n"
     with tempfile.TemporaryDirectory() as folder:
         where = Path(folder, "rig")
-        write_rig(simulate_rig(duration_s=duration, seed=7), where)
+        write_rig(simulate_rig(RigSettings(duration_s=duration, seed=7)), where)
         table = ["--table", str(where / "table.csv"), "--case", str(where / "rig.toml")]
         page = [
             "--report",

@@ -12,7 +12,7 @@ from asperity.contact.grid import Grid
 from asperity.contact.rollers import RollerShape
 from asperity.ehl import solve_contact
 from asperity.lubricant import DowsonHigginson, Lubricant, Newtonian, Roelands
-from asperity.solution import along_roller, contact_state
+from asperity.solution import axial_distribution, contact_state
 from asperity.surface import flat_surface
 
 STEEL = ElasticPair((206e9, 206e9), (0.3, 0.3))
@@ -89,7 +89,7 @@ def _timed(name: str, contact: ContactConditions, cells: tuple[int, int]) -> str
     began = time.process_time()
     solution = solve_contact(contact, OIL, surface)
     seconds = time.process_time() - began
-    along, state = along_roller(solution), contact_state(solution)
+    along, state = axial_distribution(solution), contact_state(solution)
     assert along is not None
     edge, end = (
         f"{factor * found.on_grid:.3f}"

@@ -57,7 +57,7 @@ def table_lines() -> Iterator[str]:
     for row in reproduce_table1():
         yield (
             f"| {row.cutoff_hz:.0f} | {1e6 * row.height_m:.0f} | {row.load_n:.0f} | {row.crf_hz:.2f} | "
-            f"{row.paper_crf_hz:.2f} | {100 * row.crf_off:+.2f} % | {row.crfa:.3f} | "
+            f"{row.paper_crf_hz:.2f} | {100 * row.crf_deviation:+.2f} % | {row.crfa:.3f} | "
             f"{row.crfa_low:.3f} to {row.crfa_high:.3f} | {row.paper_crfa:.2f} | {'yes' if row.within else 'NO'} |"
         )
 
@@ -112,7 +112,7 @@ def speed_lines() -> Iterator[str]:
     )
 
     def surface_to_spectrum() -> object:
-        profile = SurfaceTrack.of(surface, 0.42).profile(6_000_000, 20e3, 1)
+        profile = SurfaceTrack.from_surface(surface, 0.42).profile(6_000_000, 20e3, 1)
         return power_spectrum(acceleration(SPRING, profile), segment=20_000)
 
     yield f"- 300 s at 20 kHz, filtered noise to spectrum: {median_seconds(noise_to_spectrum, 3):.2f} s"

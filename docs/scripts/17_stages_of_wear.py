@@ -11,7 +11,9 @@ import matplotlib.pyplot as plt
 import asperity as asp
 from asperity import paper, resonance
 
-rig = paper.simulate_rig(repeats=2, duration_s=5.0, disturbance=paper.Disturbance(snr_db=6.0))
+rig = paper.simulate_rig(
+    paper.RigSettings(repeats=2, duration_s=5.0), disturbance=paper.Disturbance(snr_db=6.0)
+)
 clean = [
     resonance.remove_lines(one.spectrum(20_000), shaft_hz=rig.shaft_hz) for one in rig.recordings
 ]

@@ -12,7 +12,7 @@ import x3pio
 import asperity.ehl
 from asperity import NotConverged, load_case, load_run, solve_case
 from asperity.core.errors import BadInput
-from asperity.solution import OwnResonance, ShakenContact
+from asperity.solution import OscillatingContact, OwnResonance
 from asperity.surface import flat_surface
 
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
@@ -75,7 +75,7 @@ def test_json_holds_the_contract_and_nothing_else_is_on_stdout(asp):
     assert json.loads(out)["sq_m"] == pytest.approx(1e-6)
 
 
-def test_what_is_not_shown_is_not_worked_out(asp, monkeypatch):
+def test_quantities_not_shown_are_not_computed(asp, monkeypatch):
     """The virgin contact's stiffness stands in no short table, and costs as much as the other limit."""
     expected = asp("solve", "case.toml")
     monkeypatch.setattr(
@@ -86,7 +86,7 @@ def test_what_is_not_shown_is_not_worked_out(asp, monkeypatch):
         line for line in expected[1].splitlines() if " s" not in line
     ]
     monkeypatch.setattr(
-        ShakenContact, "resonance", lambda *_: pytest.fail("shaken without being asked to")
+        OscillatingContact, "resonance", lambda *_: pytest.fail("shaken without being asked to")
     )
     assert asp("solve", "case.toml", "--quiet")[:2] == (0, f"{expected[1].splitlines()[0]}\n")
 
@@ -96,7 +96,7 @@ def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
     assert code == 0
     scalars = json.loads(asp("solve", "case.toml", "--json")[1])
     coarse = "Grid too coarse, CLR not determined (3.3 cells along the correlation length in x, where 4 are needed; "
-    unknown = "no coarser grid tells how far it may be off): "
+    unknown = "no coarser grid is available to estimate its error): "
     assert out.splitlines()[0].startswith(f"{coarse}{unknown}on this grid asperities carry ")
     assert (scalars["determined"], scalars["cells"]) == (False, [64, 64])
     assert f"{100 * scalars['clr']:.1f} % of the load (± not determined" in out.splitlines()[0]
@@ -116,7 +116,7 @@ def test_an_accuracy_chooses_the_cells_and_keeps_the_domain(asp):
     assert card["regime"] == "piezoviscous-elastic"
     assert card["half_width_m"] == pytest.approx(55.93e-6, rel=1e-3)
     assert [fit["source"] for fit in card["fits"]] == ["Moes", "Dowson (1968)"]
-    assert any("starves the film" in note for note in finer["notes"])
+    assert any("is starved" in note for note in finer["notes"])
     assert asp("solve", "case.toml", "--accuracy", "3")[:2] == (2, "")
 
 
@@ -222,7 +222,7 @@ def test_python_and_command_line_agree(asp):
 def test_a_case_without_vibration_has_no_resonance(asp):
     code, out, _ = asp("solve", "case.toml", "--set", "vibration=none", "--out", "run.nc")
     assert code == 0
-    assert "vibration not asked for" in out
+    assert "vibration not requested" in out
     assert load_run("run.nc").scalars()["crf_hz"] is None
     assert asp("report", "run.nc")[0] == 0
 
@@ -266,7 +266,7 @@ def test_report_makes_a_page_of_one_run_or_several(asp):
     assert all(Path(name).read_text("utf-8").startswith("<!") for name in ("run.html", "two.html"))
 
 
-def test_surface_says_what_it_read(asp):
+def test_surface_prints_its_parameters(asp):
     heights = np.random.default_rng(5).standard_normal((32, 48)) * 1e-6
     heights[:2] = np.nan
     x3pio.write("ring.x3p", heights.T, x_scale=2e-6, y_scale=3e-6)
@@ -291,7 +291,7 @@ def test_a_surface_on_another_grid_is_refused():
 def test_demo_goes_from_case_to_report(asp):
     code, out, _ = asp("demo", "--out", "shown")
     assert code == 0
-    assert out.startswith("From Sq 0.5 um to 3 um the asperities' share of the load goes from ")
+    assert out.startswith("From Sq 0.5 um to 3 um the asperity load share changes from ")
     assert str(Path("shown", "report.html")) in out
     names = {"paper.toml", "report.html", "run-sq-0.5um.nc", "run-sq-1.5um.nc", "run-sq-3um.nc"}
     assert {entry.name for entry in Path("shown").iterdir()} == names

@@ -10,7 +10,7 @@ import pytest
 import x3pio
 
 from asperity.case import load_case
-from asperity.paper import Disturbance, simulate_rig
+from asperity.paper import Disturbance, RigSettings, simulate_rig
 from support.emulated import CASE, SMALL
 
 LIMIT = ("--forecast", "clr=0.75")
@@ -23,7 +23,8 @@ def rig(tmp_path_factory):
     folder = tmp_path_factory.mktemp("rig") / "rising"
     folder.mkdir()
     found = simulate_rig(
-        samples=12, repeats=1, trend="smooth", duration_s=3.0, disturbance=QUIET, seed=4
+        RigSettings(samples=12, repeats=1, trend="smooth", duration_s=3.0, seed=4),
+        disturbance=QUIET,
     )
     rows = ["file,hours,load_n,entrainment_m_s"]
     for number, one in enumerate(found.recordings[:7]):

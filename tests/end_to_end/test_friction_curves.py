@@ -42,11 +42,11 @@ def test_stribeck_falls_from_boundary_friction_to_the_oils(asp):
         for point in points
     )
     assert told["verdict"].startswith(
-        f"Friction goes from {friction[0]:.4f} at 0.0191 m/s to {friction[-1]:.4f}"
+        f"The friction coefficient changes from {friction[0]:.4f} at 0.0191 m/s to {friction[-1]:.4f}"
     )
 
 
-def test_traction_rises_from_nothing_and_meets_its_limit(asp):
+def test_traction_rises_from_zero_to_its_limit(asp):
     wanted = [argument for slip in ("0", "0.3", "0.001", "3") for argument in ("--slip", slip)]
     code, out, _ = asp(
         "traction",
@@ -62,7 +62,7 @@ def test_traction_rises_from_nothing_and_meets_its_limit(asp):
     )
     assert code == 0
     first, second = out.splitlines()[:2]
-    assert first.startswith("Friction is at most 0.0")
+    assert first.startswith("The largest friction coefficient is 0.0")
     assert "(Sq 1 um, boundary friction 0.15)" in second
     assert out.count("1.91") == 8
     assert "thermal.feedback=true" in out  # it is hot at 300 % of sliding
@@ -88,7 +88,7 @@ def test_a_traction_curve_in_python(case):
     )  # Newtonian in the film: sliding moves nothing else
 
 
-def test_feedback_is_heard_by_the_curve(case):
+def test_thermal_feedback_changes_the_curve(case):
     speeds = [10.0]
     cold = stribeck_curve(case, speeds=speeds)
     warm = stribeck_curve(case.with_overrides({"thermal.feedback": "true"}), speeds=speeds)
@@ -113,14 +113,14 @@ def test_points_that_do_not_converge_are_marked_and_fail_the_command(asp):
     [
         (
             ("stribeck", "case.toml", "--set", "contact.slip=0.0"),
-            "contact.slip is 0 and nothing slides",
+            "contact.slip is 0, so that nothing slides",
         ),
         (("stribeck", "case.toml", "--speed", "-1"), "entrainment speed must be positive"),
         (("stribeck", "case.toml", "--out", "curve.pdf"), "must be a file that ends in .png"),
         (("stribeck", "case.toml", "--sq", "1 kg"), "surface.sq must be a length"),
         (
             ("traction", "case.toml", "--slip", "-0.1"),
-            "slide-to-roll ratio must lie between 0 and 1000, got -0.1",
+            "slide-to-roll ratio must be between 0 and 1000, got -0.1",
         ),
     ],
 )

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from asperity.paper import Disturbance, simulate_rig
+from asperity.paper import Disturbance, RigSettings, simulate_rig
 
 KEYS = {"file", "x", "crf_hz", "crf_std_hz", "crfa", "found", "reason"}  # the contract
 
@@ -17,7 +17,8 @@ KEYS = {"file", "x", "crf_hz", "crf_std_hz", "crfa", "found", "reason"}  # the c
 def write_rig(folder, trend, **shape):
     """Recordings of the rig as HDF5, and the table of their roughness; the truth by file."""
     rig = simulate_rig(
-        trend=trend, duration_s=3.0, disturbance=Disturbance(snr_db=15.0), seed=4, **shape
+        RigSettings(trend=trend, duration_s=3.0, seed=4, **shape),
+        disturbance=Disturbance(snr_db=15.0),
     )
     folder.mkdir()
     rows, truth = ["file,sq_um,sq_um_std,load_n"], {}

@@ -42,7 +42,7 @@ def test_table_1_needs_no_case_and_draws_itself(asp):
     assert {path.name for path in Path("drawn").iterdir()} == {"table1.png", "load-trend.png"}
 
 
-def test_a_case_is_heard_dry_with_all_load_on_asperities(asp):
+def test_a_case_vibrates_dry_with_all_load_on_asperities(asp):
     code, out, err = asp("vibrate", "case.toml", "--json")
     assert (code, err) == (0, "")
     heard = json.loads(out)
@@ -92,7 +92,7 @@ def test_a_contact_that_cannot_be_solved_is_kept_without_its_tangent_stiffness(a
     assert Path("run.nc").exists()
 
 
-def test_too_strong_a_shaking_for_a_linear_spring_is_said(asp):
+def test_a_dynamic_load_beyond_a_linear_spring_is_stated(asp):
     loud = ("--set", "vibration.cutoff_reference=5 kHz")
     assert "too much for a linear spring" in asp("vibrate", "case.toml", *loud)[1].splitlines()[0]
     code, out, _ = asp(
@@ -129,7 +129,7 @@ def test_what_cannot_be_used_is_named(asp, arguments, names):
     assert all(name in err for name in names)
 
 
-def test_a_preset_in_the_file_lets_single_choices_stand_above_it():
+def test_single_choices_override_a_preset_in_the_file():
     text = PAPER.replace("[vibration]", '[vibration]\npreset = "paper"\nrate = "20 kHz"')
     case = load_case(text)
     assert case.vibration.rate_hz == 20e3

@@ -15,7 +15,7 @@ import pytest
 from asperity import read_surface, run_wear
 from asperity.core.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.core.storage import read_sealed, write_sealed
-from asperity.paper import simulate_rig, write_rig
+from asperity.paper import RigSettings, simulate_rig, write_rig
 from asperity.simulation import WearHistory, WearProgress, load_wear, of_body
 from asperity.simulation.wear import frames, store
 from asperity.simulation.wear.frames import is_kept
@@ -256,7 +256,9 @@ def test_a_contact_that_outgrows_its_grid_is_stopped():
 
 def test_a_rig_records_a_contact_as_it_wears(unbroken, tmp_path):
     rig = simulate_rig(
-        case=unbroken.case, moments=unbroken.moments([0.0, HOURS]), repeats=2, repeat_std_hz=0.0
+        RigSettings(repeats=2, repeat_std_hz=0.0),
+        case=unbroken.case,
+        moments=unbroken.moments([0.0, HOURS]),
     )
     assert [recording.sample for recording in rig.recordings] == [1, 1, 2, 2]
     for recording, hours in zip(rig.recordings[::2], (0.0, HOURS), strict=True):

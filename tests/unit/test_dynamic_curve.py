@@ -42,7 +42,7 @@ def test_the_curve_passes_through_the_reported_resonance(run):
     assert curve.frequency_hz[-1] > 3.0 * own.frequency_hz
 
 
-def test_every_point_is_the_contact_shaken_at_that_frequency_alone(run):
+def test_every_point_equals_the_dynamic_stiffness_at_its_frequency(run):
     curve = run.dynamic_curve
     for place in (0, COUNT - 1):
         for yielded, branch in (("elastic", curve.elastic), ("flowing", curve.virgin)):
@@ -58,7 +58,7 @@ def test_every_point_is_the_contact_shaken_at_that_frequency_alone(run):
     )
 
 
-def test_it_stands_in_json_and_file_and_nothing_where_it_was_not_asked_for(run, tmp_path):
+def test_the_curve_is_in_json_and_file_only_if_requested(run, tmp_path):
     said = json.loads(json.dumps(run.summary()))["dynamic_curve"]
     assert said["frequency_hz"] == run.dynamic_curve.frequency_hz.tolist()
     assert said["stiffness_n_m"] == run.dynamic_curve.elastic.stiffness.tolist()
@@ -101,14 +101,14 @@ def test_without_a_mass_the_curve_lies_about_the_oils_crossing(run):
     assert np.min(np.abs(free.dynamic_curve.frequency_hz / crossing - 1.0)) < 1e-12
 
 
-def test_frequencies_that_cannot_be_solved_are_left_out_and_said(run, monkeypatch):
-    class Stuck(dynamic.ShakenContact):
-        def at(self, frequency_hz):
+def test_frequencies_that_fail_are_nan_and_noted(run, monkeypatch):
+    class Stuck(dynamic.OscillatingContact):
+        def evaluate(self, frequency_hz):
             if frequency_hz > 20e3:
                 raise AsperityError(f"not found at {frequency_hz:.0f} Hz")
-            return super().at(frequency_hz)
+            return super().evaluate(frequency_hz)
 
-    monkeypatch.setattr(dynamic, "ShakenContact", Stuck)
+    monkeypatch.setattr(dynamic, "OscillatingContact", Stuck)
     stuck = replace(run)
     curve = stuck.dynamic_curve
     assert np.isnan(curve.elastic.stiffness[-1])
@@ -117,11 +117,11 @@ def test_frequencies_that_cannot_be_solved_are_left_out_and_said(run, monkeypatc
     assert any("Not found at" in note for note in stuck.remarks)
 
 
-def test_what_cannot_be_shaken_says_why(run):
+def test_a_contact_without_dynamic_stiffness_has_a_note(run):
     conserving = solve_case(run.case.with_overrides({"model": "conserving", "surface": "flat"}))
     assert conserving.dynamic_curve is None
     assert any(
-        "No stiffness over frequency: a dynamic stiffness needs the model" in note
+        "No stiffness over frequency: dynamic stiffness needs the model" in note
         for note in conserving.remarks
     )
 

@@ -6,7 +6,7 @@ from asperity.core.errors import BadInput
 from asperity.core.signals import Signal, power_spectrum
 from asperity.surface import Surface, flat_surface, gaussian_surface
 from asperity.vibration import FilteredNoise, PatchAverage, SurfaceTrack
-from asperity.vibration.excitation import synthesised
+from asperity.vibration.excitation import synthesise
 
 
 def noise(**choices) -> FilteredNoise:
@@ -51,7 +51,7 @@ def test_height_of_the_record_is_exact_and_of_the_process_scatters():
     assert np.sqrt(np.mean(np.square(process))) == pytest.approx(2e-6, rel=0.05)
 
 
-def test_noise_of_a_height_before_the_filter_loses_what_the_filter_stops():
+def test_noise_with_its_height_before_the_filter_loses_the_filtered_power():
     """Of white noise up to rate/2, a filter of noise bandwidth B = fc (π/4)/sin(π/4) passes B/(rate/2)."""
     profile = noise(height_of="noise", filter="bilinear").profile(800_000, 10e3, seed=1).values
     assert np.std(profile) == pytest.approx(2e-6 * np.sqrt(30.0 * 1.1107 / 5e3), rel=0.02)
@@ -112,7 +112,7 @@ def test_both_ways_of_making_a_record_agree():
     a = np.sqrt(2.0) * np.pi * 30.0
     for heights in (
         source.profile(samples, rate, seed=1).values,
-        synthesised(source, samples, rate, seed=1),
+        synthesise(source, samples, rate, seed=1),
     ):
         assert np.std(heights) == pytest.approx(2e-6, rel=0.03)
         for lag in (1, 20, 60):
@@ -140,7 +140,7 @@ GRID = Grid((512, 64), (-4e-4, -1e-4), (4e-4, 1e-4))
 
 def test_a_sine_runs_over_as_a_line_at_speed_over_wavelength():
     heights = np.repeat(1e-6 * np.sin(2 * np.pi * GRID.x / 1e-4)[:, None], 64, axis=1)
-    track = SurfaceTrack.of(Surface(heights, GRID), speed=0.5)
+    track = SurfaceTrack.from_surface(Surface(heights, GRID), speed=0.5)
     frequency = np.linspace(0.0, 20e3, 20_001)
     density = track.density(frequency, 100e3)
     assert frequency[np.argmax(density)] == pytest.approx(0.5 / 1e-4)
@@ -153,7 +153,7 @@ def test_a_generated_surface_has_its_own_spectrum():
     frequency = np.linspace(1500.0, 12e3, 50)
     seen = np.mean(
         [
-            SurfaceTrack.of(
+            SurfaceTrack.from_surface(
                 gaussian_surface(
                     GRID, sq=1e-6, correlation_length=length, rng=np.random.default_rng(seed)
                 ),
@@ -173,7 +173,7 @@ def test_a_tracks_record_has_the_tracks_spectrum_and_nothing_finer_than_two_pixe
     surface = gaussian_surface(
         GRID, sq=1e-6, correlation_length=20e-6, rng=np.random.default_rng(1)
     )
-    track = SurfaceTrack.of(surface, 0.42)
+    track = SurfaceTrack.from_surface(surface, 0.42)
     spectrum = power_spectrum(track.profile(1_000_000, 100e3, seed=2), segment=4000)
     band = (spectrum.frequency_hz > 500) & (spectrum.frequency_hz < 10e3)
     ratio = spectrum.density[band] / track.density(spectrum.frequency_hz[band], 100e3)
@@ -233,14 +233,14 @@ def test_bad_input_is_named():
         noise(filter_order=9)
     with pytest.raises(BadInput, match="continuous, bilinear"):
         noise(filter="elliptic")
-    with pytest.raises(BadInput, match=r"must lie between 1/duration \(30.* got 20"):
+    with pytest.raises(BadInput, match=r"must be between 1/duration \(30.* got 20"):
         noise(cutoff_hz=20.0).profile(300, 9e3, seed=1)
     with pytest.raises(BadInput, match="rate"):
         noise(cutoff_hz=600.0).profile(3000, 5e3, seed=1)
     with pytest.raises(BadInput, match="rate/2"):
         noise(cutoff_hz=600.0, filter="bilinear").density(np.zeros(1), 1000.0)
     with pytest.raises(BadInput, match="flat"):
-        SurfaceTrack.of(flat_surface(GRID), 0.4)
+        SurfaceTrack.from_surface(flat_surface(GRID), 0.4)
     with pytest.raises(BadInput, match="line, point"):
         PatchAverage(source=noise(), shape="square", half_width=1e-4, speed=0.4)
     assert isinstance(noise().profile(3000, 1e4, seed=1), Signal)

@@ -211,7 +211,7 @@ def test_where_the_model_cannot_be_shaken_the_damping_is_not_determined():
     vibration = history_vibration(conserving, moments=1)
     assert np.isfinite(vibration.stiffness).all()
     assert np.isnan(vibration.damping).all()
-    assert "damping is not determined (a dynamic stiffness needs the model" in vibration.verdict()
+    assert "damping is not determined (dynamic stiffness needs the model" in vibration.verdict()
     assert vibration.scalars()["history_damping_ratio"] is None
 
 

@@ -11,7 +11,7 @@ from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import write_csv
 from asperity.core.limits import memory_limit, require_affordable, require_unpacked
 from asperity.coupling import VibrationModel
-from asperity.paper import papers_case, simulate_rig
+from asperity.paper import RigSettings, papers_case, simulate_rig
 from asperity.recording import read_recording
 from asperity.simulation import run_history
 
@@ -74,7 +74,7 @@ ASKED = {
         {"vibration.rate": "1e15 Hz"}
     ),
     "a history of": lambda: run_history(papers_case(), passes=1e300),
-    "a wear test of": lambda: simulate_rig(duration_s=1e6),
+    "a wear test of": lambda: simulate_rig(RigSettings(duration_s=1e6)),
 }
 
 

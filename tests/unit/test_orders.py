@@ -5,7 +5,12 @@ import pytest
 
 from asperity.core.errors import BadInput
 from asperity.monitoring.auxiliary_channels import bands, lines
-from asperity.vibration import Turning, steadied, turning_by_pulses, turning_by_speed
+from asperity.vibration import (
+    Turning,
+    resample_to_constant_speed,
+    turning_by_pulses,
+    turning_by_speed,
+)
 
 RATE, SECONDS = 20e3, 4.0
 TIME = np.arange(round(RATE * SECONDS)) / RATE
@@ -48,7 +53,7 @@ def test_pulses_of_two_samples_a_turn_are_pulses():
 
 
 def test_edges_that_come_as_no_shaft_turns_are_refused():
-    with pytest.raises(BadInput, match="as no shaft turns; name another channel"):
+    with pytest.raises(BadInput, match="which no shaft produces; use another channel"):
         turning_by_pulses(np.random.default_rng(0).standard_normal(5_000), 25_600.0)
 
 
@@ -61,7 +66,7 @@ def test_the_angle_by_a_speed_channel_is_its_integral():
 @pytest.mark.parametrize("order", [3.58, 80.0, 200.0])  # up to 7200 Hz, a third of the rate
 def test_an_order_is_one_line_again(order):
     values = np.sin(2.0 * np.pi * order * ANGLE)
-    even, rate = steadied(values, turning_by_speed(SPEED, RATE), RATE)
+    even, rate = resample_to_constant_speed(values, turning_by_speed(SPEED, RATE), RATE)
     found = lines(*spectrum(even, rate), {"it": order * MEAN})["it"]
     assert found == pytest.approx(np.sqrt(0.5), rel=0.01)
     frequency, density = spectrum(even, rate)
@@ -74,18 +79,22 @@ def test_an_order_is_one_line_again(order):
 def test_a_shaft_that_turns_evenly_leaves_a_vibration_as_it_is():
     values = np.random.default_rng(2).standard_normal(4000)
     smooth = np.convolve(values, np.ones(8) / 8.0, mode="same")
-    even, rate = steadied(smooth, turning_by_speed(np.full(4000, 25.0), RATE), RATE)
+    even, rate = resample_to_constant_speed(
+        smooth, turning_by_speed(np.full(4000, 25.0), RATE), RATE
+    )
     assert rate == pytest.approx(RATE)
     assert even[100:3900] == pytest.approx(smooth[100:3900], abs=0.02)
 
 
 def test_what_turns_no_shaft_is_refused():
-    with pytest.raises(BadInput, match="shows 0 pulses, and 4 are needed"):
+    with pytest.raises(BadInput, match="has 0 pulses, but 4 are required"):
         turning_by_pulses(np.zeros(1000), RATE)
-    with pytest.raises(BadInput, match="stands still or turns back"):
+    with pytest.raises(BadInput, match="stops or reverses"):
         turning_by_speed(np.linspace(-1.0, 30.0, 1000), RATE)
     with pytest.raises(BadInput, match=r"less than 0\.25 of its mean speed"):
-        steadied(np.zeros(1000), turning_by_speed(np.geomspace(0.1, 30.0, 1000), RATE), RATE)
+        resample_to_constant_speed(
+            np.zeros(1000), turning_by_speed(np.geomspace(0.1, 30.0, 1000), RATE), RATE
+        )
     with pytest.raises(BadInput, match="pulses per turn"):
         turning_by_pulses(np.zeros(10), RATE, 0.0)
     assert isinstance(turning_by_speed(np.ones(10), RATE), Turning)

@@ -28,10 +28,10 @@ def test_the_papers_contact_is_plausible():
 
 
 @pytest.mark.parametrize(
-    ("conditions", "oil", "said"),
+    ("conditions", "oil", "note_text"),
     [
-        (contact(), barus(4e-9), "4 1/GPa lies outside 5 to 40"),
-        (contact(), barus(18.2e-6), "1.82e+04 1/GPa lies outside 5 to 40"),
+        (contact(), barus(4e-9), "4 1/GPa is outside the usual range of oils, 5 to 40"),
+        (contact(), barus(18.2e-6), "1.82e+04 1/GPa is outside the usual range of oils, 5 to 40"),
         (
             contact(pair=ElasticPair((210e6, 200e9), (0.3, 0.3))),
             barus(),
@@ -45,14 +45,14 @@ def test_the_papers_contact_is_plausible():
         (
             contact(hardness=0.5e9),
             barus(),
-            "hardness of 0.5 GPa lies below Hertz's largest pressure of 0.569 GPa",
+            "hardness of 0.5 GPa is below the maximum Hertz pressure of 0.569 GPa",
         ),
-        (contact(**HARD), barus(), "thickens the oil by exp(65.5)"),
+        (contact(**HARD), barus(), "raises the viscosity by exp(65.5)"),
         (contact(), roelands(0.001, 22e-9), "Roelands' exponent z is 1.56"),
     ],
 )
-def test_what_cannot_well_be_meant_is_noted(conditions, oil, said):
-    assert any(said in note for note in plausibility_notes(conditions, oil))
+def test_implausible_input_is_noted(conditions, oil, note_text):
+    assert any(note_text in note for note in plausibility_notes(conditions, oil))
 
 
 @pytest.mark.parametrize(
@@ -62,38 +62,40 @@ def test_what_cannot_well_be_meant_is_noted(conditions, oil, said):
         (contact(**HARD), roelands(0.04, 22e-9)),  # gears
     ],
 )
-def test_what_can_be_meant_is_not_noted(conditions, oil):
+def test_plausible_input_is_not_noted(conditions, oil):
     assert plausibility_notes(conditions, oil) == ()
 
 
-def test_a_light_contact_is_told_that_it_starves_and_a_heavy_one_that_it_need_not_reach_so_far():
+def test_short_inlets_are_noted_as_starved_and_long_inlets_as_longer_than_necessary():
     a = contact().hertz.half_widths[0]
     assert (
-        "starves the film by about 5"
+        "is starved: the film is about 5"
         in inlet_notes(contact(), barus(), grid((256, 8), (-4.5, 1.9)))[0]
     )
     assert inlet_notes(contact(), barus(), grid((256, 8), (-12.0, 3.0))) == ()
     heavy = contact(load=50000.0, speed=0.5)
     wide = heavy.hertz.half_widths[0]
     long, ample = (Grid((256, 8), (inlet * wide, -a), (1.9 * wide, a)) for inlet in (-4.5, -1.6))
-    (said,) = inlet_notes(heavy, roelands(0.04, 22e-9), long)
-    assert "is longer than the film needs (m* = 1.1): grid.x from -1.6" in said
+    (note_text,) = inlet_notes(heavy, roelands(0.04, 22e-9), long)
+    assert "is longer than necessary (m* = 1.1): starting grid.x at -1.6" in note_text
     assert inlet_notes(heavy, roelands(0.04, 22e-9), ample) == ()
 
 
-def test_contact_that_runs_into_an_edge_is_told_and_one_inside_is_not():
+def test_contact_at_a_grid_edge_is_noted():
     rough = {"sq": 1e-6, "correlation_length": 20e-6, "rng": np.random.default_rng(1)}
     soft = contact(hardness=0.36e9)  # cannot carry the load within 1.24 half-widths
     small = gaussian_surface(grid((64, 32), (-4.0, 1.3)), **rough)
     assert any(
-        "runs into the outlet edge of" in note
+        "reaches the outlet edge of" in note
         for note in solution_notes(solve_contact(soft, None, small))
     )
     wide = gaussian_surface(grid((128, 32), (-5.0, 5.0)), **rough)
-    assert not any("runs into" in note for note in solution_notes(solve_contact(soft, None, wide)))
+    assert not any(
+        "reaches the" in note for note in solution_notes(solve_contact(soft, None, wide))
+    )
 
 
-def test_pressures_that_no_body_stands_and_heights_that_a_grid_does_not_show_are_told():
+def test_excessive_pressures_and_unresolved_heights_are_noted():
     small = grid((64, 32), (-2.0, 1.3))
     steep = gaussian_surface(small, sq=3e-6, correlation_length=20e-6, rng=np.random.default_rng(1))
     assert any(
@@ -101,25 +103,24 @@ def test_pressures_that_no_body_stands_and_heights_that_a_grid_does_not_show_are
         for n in solution_notes(solve_contact(contact(), None, steep))
     )
     noise = Surface(1e-9 * np.random.default_rng(1).standard_normal(small.cells), small)
-    (said,) = solution_notes(solve_contact(contact(), None, noise))
-    assert "cells along the correlation length in x, where 4 are needed" in said
+    (note_text,) = solution_notes(solve_contact(contact(), None, noise))
+    assert "cells along the correlation length in x, where 4 are needed" in note_text
 
 
-def test_a_film_far_from_its_fits_is_told_with_the_reason():
+def test_a_film_far_from_its_fits_is_noted_with_the_reason():
     smooth = Surface(np.zeros((64, 8)), grid((64, 8), (-1.3, 1.9)))
     oil = Lubricant(
         viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian()
     )
     starved = solve_contact(contact(), oil, smooth, options=Options())
     assert any(
-        "nearest fit's" in note and "the inlet starves it" in note
-        for note in solution_notes(starved)
+        "nearest fit" in note and "the inlet is starved" in note for note in solution_notes(starved)
     )
     flooded = replace(smooth, grid=grid((256, 8), (-12.0, 2.0)), heights=np.zeros((256, 8)))
     assert solution_notes(solve_contact(contact(), oil, flooded)) == ()
 
 
-def test_asperities_that_bear_nothing_at_a_small_film_ratio_are_told():
+def test_unloaded_asperities_at_a_small_film_ratio_are_noted():
     """The paper's contact at Sq 2.5 um has a film ratio of 0.25, and asperities bear nine tenths: no note."""
     solved = solve_contact(contact(hardness=2e9), barus(), rough(grid((48, 32)), 2.5e-6))
     assert not any("film ratio" in note for note in solution_notes(solved))
@@ -131,7 +132,7 @@ def test_asperities_that_bear_nothing_at_a_small_film_ratio_are_told():
     assert not any("film ratio" in note for note in solution_notes(smooth))
 
 
-def test_ridges_without_a_radius_are_told():
+def test_sharp_ridges_are_noted():
     """Grooves that cut one another leave edges; a Gaussian surface's crests have a radius on any grid."""
     conditions, on = contact(speed=0.1), grid((96, 64))
     ground = ground_surface(
@@ -148,11 +149,11 @@ def test_ridges_without_a_radius_are_told():
     of_ground, of_gaussian = (
         solve_contact(conditions, barus(), surface) for surface in (ground, gaussian)
     )
-    (said,) = (note for note in solution_notes(of_ground) if "are edges" in note)
-    assert "on cells twice as wide" in said
-    assert not any("are edges" in note for note in solution_notes(of_gaussian))
+    (note_text,) = (note for note in solution_notes(of_ground) if "are sharp edges" in note)
+    assert "on cells twice as wide" in note_text
+    assert not any("are sharp edges" in note for note in solution_notes(of_gaussian))
     dry = solve_contact(conditions, None, ground)
-    assert not any("are edges" in note for note in solution_notes(dry))
+    assert not any("are sharp edges" in note for note in solution_notes(dry))
 
 
 @pytest.mark.parametrize(

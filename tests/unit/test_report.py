@@ -30,7 +30,7 @@ from asperity.report import base, surface_map, write_report
 from asperity.report.run import contact, friction_maps, page, vibration
 from asperity.report.run import several_runs as against_roughness
 from asperity.report.style import CONTACT_COLOUR, svg
-from asperity.results import Run, whole_error
+from asperity.results import Run, total_error
 from asperity.surface import (
     MeasuredSurface,
     Surface,
@@ -139,8 +139,8 @@ def doubted(run, half=None, others=()):
         clr=Uncertainty(value=run.state.clr, iteration=sides, grid=sides, range=(0.0, 1.0))
     )
     state = replace(run.state, error=known)
-    rows = (run.crucial, *others)
-    error = whole_error(state, rows, run.case.conditions, run.case.vibration, run.vibration)
+    rows = (run.summary_row, *others)
+    error = total_error(state, rows, run.case.conditions, run.case.vibration, run.vibration)
     return replace(run, state=replace(state, error=error), others=tuple(others))
 
 
@@ -595,7 +595,7 @@ def test_every_axis_over_roughness_and_frequency_has_a_label_with_its_unit():
         "CRF [Hz]",
     ]
     assert labels_of(against_roughness.friction_against_roughness(points)) == [ROUGH, "µ"]
-    density = labels_of(vibration.spectrum(run.vibration, run.resonance_in_words()))
+    density = labels_of(vibration.spectrum(run.vibration, run.resonance_text()))
     assert density == ["frequency [Hz]", "acceleration density [(m/s²)²/Hz]"]
 
 
@@ -660,7 +660,7 @@ def test_a_run_in_pure_rolling_and_one_without_friction_say_so(monkeypatch):
     assert len(rolling.images()) == len(Page(page.render_page([run_like()])).images()) - 3
 
     def refuse(*_, **__):
-        raise AsperityError("friction and temperature did not settle")
+        raise AsperityError("friction and temperature did not converge")
 
     monkeypatch.setattr("asperity.results.run.friction_and_heat", refuse)
     unsettled = Page(page.render_page([run_like()]))
@@ -729,7 +729,7 @@ def test_hertz_is_dashed_beside_the_solved_pressure():
 
 def test_resonance_is_marked_where_it_was_found():
     run = run_like()
-    (axes,) = vibration.spectrum(run.vibration, run.resonance_in_words()).figure().axes
+    (axes,) = vibration.spectrum(run.vibration, run.resonance_text()).figure().axes
     marks = {
         line.get_label(): line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2
     }
@@ -742,7 +742,7 @@ def test_resonance_is_marked_where_it_was_found():
 
 def test_highest_point_has_neither_curve_nor_interval():
     run = run_like(CASE + 'method = "peak"\n')
-    (axes,) = vibration.spectrum(run.vibration, run.resonance_in_words()).figure().axes
+    (axes,) = vibration.spectrum(run.vibration, run.resonance_text()).figure().axes
     labels = {line.get_label() for line in axes.lines}
     assert "CRF" in labels
     assert "fitted resonance" not in labels

@@ -10,7 +10,15 @@ from asperity.core.errors import BadInput
 from asperity.core.signals import power_spectrum
 from asperity.coupling import VibrationModel
 from asperity.ehl import solve_contact
-from asperity.paper import SAMPLES_SQ_UM, Disturbance, RigRecording, Tones, simulate_rig, write_rig
+from asperity.paper import (
+    SAMPLES_SQ_UM,
+    Disturbance,
+    RigRecording,
+    RigSettings,
+    Tones,
+    simulate_rig,
+    write_rig,
+)
 from asperity.resonance import contact_resonance, remove_lines
 from asperity.solution import dynamic_stiffness
 from asperity.vibration import FilteredNoise, acceleration
@@ -31,7 +39,7 @@ def powers(recording: RigRecording, band):
 
 
 def test_the_rig_is_the_papers():
-    rig = simulate_rig(repeat_std_hz=0.0, duration_s=1.0)
+    rig = simulate_rig(RigSettings(repeat_std_hz=0.0, duration_s=1.0))
     assert len(rig.recordings) == 60
     assert [one.sq_m * 1e6 for one in rig.recordings[::5]] == pytest.approx(SAMPLES_SQ_UM)
     assert rig.full_load_crf_hz == pytest.approx(3879.0, abs=1.0)
@@ -42,18 +50,18 @@ def test_the_rig_is_the_papers():
         assert one.clr == pytest.approx((one.crf_hz / rig.full_load_crf_hz) ** 6, rel=1e-9)
 
 
-def test_measured_roughness_errs_by_what_it_says():
+def test_measured_roughness_has_the_stated_error():
     off = [
         (one.true_sq_m - one.sq_m) / one.sq_std_m
         for seed in range(20)
-        for one in simulate_rig(repeats=1, duration_s=0.1, seed=seed).recordings
+        for one in simulate_rig(RigSettings(repeats=1, duration_s=0.1, seed=seed)).recordings
     ]
     assert np.std(off) == pytest.approx(1.0, abs=0.12)
 
 
 @pytest.mark.parametrize("snr_db", [20.0, 0.0])
-def test_the_signal_to_noise_ratio_is_the_one_asked_for(snr_db):
-    rig = simulate_rig(duration_s=1.0, disturbance=Disturbance(snr_db=snr_db))
+def test_the_signal_to_noise_ratio_is_as_requested(snr_db):
+    rig = simulate_rig(RigSettings(duration_s=1.0), disturbance=Disturbance(snr_db=snr_db))
     found = []
     for one in rig.recordings:
         contact, other = powers(one, rig.band_hz)
@@ -65,7 +73,7 @@ def test_the_signal_to_noise_ratio_is_the_one_asked_for(snr_db):
 
 def test_the_contact_line_is_the_oscillators_own_response():
     """Against a record by another way: the profile, finely sampled, through the exact response in time."""
-    one = simulate_rig(**SMALL).recordings[0]
+    one = simulate_rig(RigSettings(**SMALL)).recordings[0]
     model = VibrationModel(mass=0.1, damping_ratio=0.02)
     spring = replace(_spring(one.crf_hz), damping_ratio=one.damping_ratio)
     ridden = FilteredNoise(
@@ -89,7 +97,7 @@ def _spring(f0):
 
 def test_a_drawn_spectrum_scatters_as_those_of_records():
     one = simulate_rig(
-        samples=1, repeats=1, duration_s=40.0, disturbance=Disturbance(modes=0)
+        RigSettings(samples=1, repeats=1, duration_s=40.0), disturbance=Disturbance(modes=0)
     ).recordings[0]
     one = replace(one, tones=Tones(np.array([2718.3]), np.array([0.02 * np.sqrt(one.crfa)])))
     expected = np.interp(
@@ -128,7 +136,7 @@ def test_a_drawn_spectrum_scatters_as_those_of_records():
 
 
 def test_a_quiet_recording_gives_its_truth_back():
-    rig = simulate_rig(**SMALL, disturbance=Disturbance(snr_db=40.0))
+    rig = simulate_rig(RigSettings(**SMALL), disturbance=Disturbance(snr_db=40.0))
     for one in rig.recordings:
         clean = remove_lines(power_spectrum(one.signal(), segment=40_000), shaft_hz=rig.shaft_hz)
         found = contact_resonance(clean.spectrum, band_hz=rig.band_hz)
@@ -137,7 +145,7 @@ def test_a_quiet_recording_gives_its_truth_back():
 
 
 def test_a_seed_is_a_rig_and_another_seed_another():
-    first, again, other = (simulate_rig(**SMALL, seed=seed) for seed in (3, 3, 4))
+    first, again, other = (simulate_rig(RigSettings(**SMALL, seed=seed)) for seed in (3, 3, 4))
     assert np.array_equal(first.recordings[1].signal().values, again.recordings[1].signal().values)
     assert not np.array_equal(first.recordings[1].other_density, other.recordings[1].other_density)
 
@@ -146,7 +154,7 @@ def test_a_seed_is_a_rig_and_another_seed_another():
     ("trend", "knee"), [("knee", 1.8e-6), ("smooth", None), ("constant", None)]
 )
 def test_trends(trend, knee):
-    rig = simulate_rig(repeat_std_hz=0.0, duration_s=0.1, trend=trend)
+    rig = simulate_rig(RigSettings(repeat_std_hz=0.0, duration_s=0.1, trend=trend))
     assert rig.split_sq_m == knee
     crf = [one.crf_hz for one in rig.recordings]
     assert np.ptp(crf) < 1e-6 if trend == "constant" else np.ptp(crf) > 500.0
@@ -158,7 +166,9 @@ def test_a_case_gives_its_own_load_shares():
         .read_text("utf-8")
         .replace("[256, 256]", "[64, 64]")
     )
-    rig = simulate_rig(samples=2, repeats=1, duration_s=1.0, case=case, repeat_std_hz=0.0)
+    rig = simulate_rig(
+        RigSettings(samples=2, repeats=1, duration_s=1.0, repeat_std_hz=0.0), case=case
+    )
     smooth, rough = rig.recordings
     assert smooth.clr < rough.clr
     assert rough.crf_hz == pytest.approx(rig.full_load_crf_hz * rough.clr ** (1 / 6), rel=1e-6)
@@ -173,7 +183,9 @@ def test_a_case_gives_its_contacts_own_damping_and_a_track_finds_it_again():
     )
     quiet = Disturbance(snr_db=40.0, modes=0)
     rig = simulate_rig(
-        samples=3, repeats=1, duration_s=10.0, case=case, repeat_std_hz=0.0, disturbance=quiet
+        RigSettings(samples=3, repeats=1, duration_s=10.0, repeat_std_hz=0.0),
+        case=case,
+        disturbance=quiet,
     )
     damped = [one.damping_ratio for one in rig.recordings]
     assert damped == sorted(damped, reverse=True)  # less oil, less damping
@@ -191,8 +203,8 @@ def test_a_case_gives_its_contacts_own_damping_and_a_track_finds_it_again():
 
 
 @pytest.mark.parametrize("file_format", ["h5", "wav"])
-def test_what_is_written_can_be_read(tmp_path, file_format):
-    rig = simulate_rig(samples=2, repeats=2, duration_s=0.5)
+def test_written_recordings_can_be_read(tmp_path, file_format):
+    rig = simulate_rig(RigSettings(samples=2, repeats=2, duration_s=0.5))
     told = []
     paths = write_rig(
         rig, tmp_path / "rig", file_format=file_format, progress=lambda *step: told.append(step)
@@ -235,7 +247,7 @@ def test_what_is_written_can_be_read(tmp_path, file_format):
 )
 def test_a_rig_that_cannot_be_is_refused(arguments, named):
     with pytest.raises(BadInput, match=named):
-        simulate_rig(**{**SMALL, **arguments})
+        simulate_rig(RigSettings(**{**SMALL, **arguments}))
 
 
 @pytest.mark.parametrize("arguments", [{"snr_db": 99.0}, {"modes": -1}, {"gain_db": -1.0}])

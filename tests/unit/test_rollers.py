@@ -12,7 +12,7 @@ from asperity.case import load_case
 from asperity.contact.hertz import line_contact
 from asperity.contact.rollers import RollerShape, sliced_load
 from asperity.ehl import auto_grid, hertz_zone
-from asperity.solution import along_roller, plausibility_notes, solution_notes
+from asperity.solution import axial_distribution, plausibility_notes, solution_notes
 
 STEEL = asp.ElasticPair((206e9, 206e9), (0.3, 0.3))
 RADIUS, LENGTH, LOAD = 3.629e-3, 10e-3, 2000.0
@@ -202,7 +202,7 @@ def test_a_case_states_a_roller_and_a_run_keeps_it(tmp_path):
     )  # too few lines for its ends
     assert said["edge_pressure_pa"] is said["edge_pressure_error_pa"] is None
     assert any(
-        note.startswith("The edge pressure is not determined: its lines of cells")
+        note.startswith("The edge pressure is not determined: the lines of cells")
         for note in said["notes"]
     )
 
@@ -213,7 +213,7 @@ def test_an_edge_pressure_that_is_determined_is_said_with_its_bar():
             {"grid": {"cells": [48, 128]}}
         )
     )
-    assert "times an even load's, loaded length " in run.verdict()
+    assert "times that of a uniform load, loaded length " in run.verdict()
     numbers = run.summary()
     assert (
         0.0
@@ -268,11 +268,13 @@ def test_sharp_ends_and_an_uneven_load_are_noted():
     def notes(shape: RollerShape) -> str:
         return " ".join(plausibility_notes(roller(shape), None))
 
-    assert "has no limit there. Take more crown" in notes(RollerShape())
-    assert "free surface, which is softer, is not modelled" in notes(RollerShape())
+    assert "is singular there. Use more crown" in notes(RollerShape())
+    assert "free end surface of a real roller, which is softer, is not modelled" in notes(
+        RollerShape()
+    )
     assert "free surface" not in notes(ISO)
-    assert "falls back too little" not in notes(ISO)
-    assert "By slices the load lies on" in notes(ISO.tilted(1e-3))
+    assert "relieves the ends too little" not in notes(ISO)
+    assert "By slices, " in notes(ISO.tilted(1e-3))
     assert "By slices" not in notes(ISO)
 
 
@@ -283,7 +285,7 @@ def test_readings_are_those_of_a_known_pressure():
     solution = asp.solve_contact(conditions, None, asp.flat_surface(grid))
     on = np.abs(grid.y) < 4.5e-3
     made = np.where(on, 1.0 + grid.y / 9e-3, 0.0) * np.ones((32, 1)) * 1e9
-    along = along_roller(replace(solution, pressure=made))
+    along = axial_distribution(replace(solution, pressure=made))
     assert along.y.size == 90
     assert along.load_centre == pytest.approx(9e-3 / 12.0, rel=1e-3)
     assert along.moment == pytest.approx(1e9 * 4e-4 * (9e-3) ** 2 / 12.0, rel=1e-3)
@@ -291,16 +293,18 @@ def test_readings_are_those_of_a_known_pressure():
     assert along.edge_pressure.on_grid == pytest.approx(1.5e9, rel=0.01)
     assert along.middle_pressure == pytest.approx(1e9)
     assert along.loaded_share == pytest.approx(1.0)
-    short = along_roller(
+    short = axial_distribution(
         replace(solution, pressure=np.where(np.abs(grid.y) < 0.44 * 9e-3, made, 0.0))
     )
     assert (short.edge_pressure.on_grid, short.loaded_share) == (0.0, pytest.approx(0.88, abs=0.01))
-    longer = along_roller(
+    longer = axial_distribution(
         replace(solution, pressure=np.where(np.abs(grid.y) < 0.47 * 9e-3, made, 0.0))
     )
     assert longer.edge_pressure.on_grid > 1.4e9
     assert (
-        along_roller(replace(solution, conditions=replace(conditions, geometry="line", shape=None)))
+        axial_distribution(
+            replace(solution, conditions=replace(conditions, geometry="line", shape=None))
+        )
         is None
     )
     assert not any("sides" in note for note in solution_notes(solution))

@@ -84,7 +84,7 @@ def test_the_deviation_of_damping_is_of_one_further_surface(run):
     )
 
 
-def test_only_what_is_asked_for_is_worked_out(run, tmp_path, monkeypatch):
+def test_only_requested_quantities_are_computed(run, tmp_path, monkeypatch):
     """And what was not, on every surface, has no mean once a run is read back."""
     case = run.case.with_overrides({"vibration": MASS})
     whole = solve_case(case, surfaces=2)
@@ -112,16 +112,16 @@ def test_only_what_is_asked_for_is_worked_out(run, tmp_path, monkeypatch):
     )
 
 
-def test_where_the_virgin_contact_is_not_known_the_other_limit_stands(run, monkeypatch):
+def test_the_elastic_limit_remains_if_the_virgin_one_fails(run, monkeypatch):
     def lost(_):
-        raise AsperityError("dynamic stiffness not found at 3000 Hz")
+        raise AsperityError("dynamic stiffness did not converge at 3000 Hz")
 
     monkeypatch.setattr(OwnResonance, "virgin", property(lost))
     found = solve_case(run.case.with_overrides({"vibration": MASS})).summary()
     assert found["contact_damping_ratio_virgin"] is None
     assert found["contact_damping_ratio"] > 0.0
     assert (
-        "no stiffness of virgin roughness: dynamic stiffness not found at 3000 Hz."
+        "no stiffness of virgin roughness: dynamic stiffness did not converge at 3000 Hz."
         in found["notes"][-1]
     )
 
@@ -142,7 +142,7 @@ def test_each_surface_vibrates_once(run, monkeypatch):
     )
 
 
-def test_what_cannot_be_shaken_is_said_on_the_page(run, tmp_path):
+def test_a_failed_dynamic_stiffness_is_stated_on_the_page(run, tmp_path):
     shaken = solve_case(
         run.case.with_overrides({"vibration": MASS, "model": "conserving", "surface": "flat"})
     )
@@ -162,7 +162,7 @@ def test_a_film_too_hot_for_its_viscosity_is_remarked_on(run, monkeypatch):
 
 
 def test_the_traction_of_friction_is_part_of_the_stress(run):
-    surface = run.stress.at(0.0)
+    surface = run.stress.tensor_at(0.0)
     np.testing.assert_allclose(surface.xz, -run.friction.shear, atol=1e-3 * run.state.p_max)
     assert np.abs(run.friction.shear).max() > 0.1 * run.state.p_max
 
@@ -193,9 +193,9 @@ def test_a_kept_run_shows_its_maps_and_does_not_need_them(run, tmp_path):
     assert load_run(full).scalars() == load_run(bare).scalars() == run.scalars()
 
 
-def test_what_cannot_settle_leaves_friction_out_and_keeps_the_rest(run, monkeypatch):
+def test_a_failure_of_friction_keeps_all_other_results(run, monkeypatch):
     def refuse(*_, **__):
-        raise AsperityError("friction and temperature did not settle")
+        raise AsperityError("friction and temperature did not converge")
 
     monkeypatch.setattr(results, "friction_and_heat", refuse)
     apart = Run(case=run.case, solution=run.solution, state=run.state, vibration=None)
@@ -204,7 +204,7 @@ def test_what_cannot_settle_leaves_friction_out_and_keeps_the_rest(run, monkeypa
     assert found["von_mises_max_pa"] > 0.0
     assert found["clr"] == run.scalars()["clr"]
     lines = list(run_table(apart))
-    assert lines[-1] == "  note: no friction: friction and temperature did not settle"
+    assert lines[-1] == "  note: no friction: friction and temperature did not converge"
     title = quantity("friction_coefficient").title
     assert (
         next(line for line in lines if line.startswith(f"  {title}  ")).split("  ")[-1] == NO_VALUE

@@ -152,7 +152,7 @@ def test_a_flipped_bit_anywhere_is_noticed(solution, tmp_path):
             load_solution(path)
 
 
-def test_what_is_no_run_is_refused(tmp_path):
+def test_files_without_a_run_are_refused(tmp_path):
     (tmp_path / "text.nc").write_text("pressure 1 GPa")
     xarray.Dataset({"pressure": ("x", [1.0])}).to_netcdf(tmp_path / "foreign.nc", engine="h5netcdf")
     for name, attributes in {
@@ -183,7 +183,7 @@ def test_what_is_no_run_is_refused(tmp_path):
         (OSError(errno.ENOSPC, "No space left on device"), AsperityError),
     ],
 )
-def test_an_interrupted_save_leaves_what_was_there(
+def test_an_interrupted_save_keeps_the_old_file(
     solution, tmp_path, monkeypatch, failure, raised
 ):
     path = solution.save(tmp_path / "run.nc")

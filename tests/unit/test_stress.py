@@ -77,7 +77,9 @@ def test_waves_and_strips_meet_closed_forms_of_rectangles_and_their_images(cells
     pressure, shear = np.zeros(cells), np.zeros(cells)
     pressure[loaded[0]] = shear[loaded[1]] = 1.0
     grid = Grid(cells, (0.0, 0.0), size)
-    found = Tractions.of(grid, pressure, shear).stresses(depth * spacing[0], 0.3, keep=False)
+    found = Tractions.from_fields(grid, pressure, shear).stresses(
+        depth * spacing[0], 0.3, cache=False
+    )
     expected = images_summed(cells, spacing, depth * spacing[0], loaded)
     np.testing.assert_allclose(
         found, expected, atol=2e-4
@@ -94,11 +96,13 @@ def test_deep_kernels_hold_only_the_waves_that_reach_so_far():
 
 
 @pytest.mark.parametrize("repeats", [True, False])
-def test_the_surface_carries_what_was_put_on_it(repeats):
+def test_surface_stresses_equal_the_applied_tractions(repeats):
     generator = np.random.default_rng(5)
     grid = Grid((24, 20), (0.0, 0.0), (1.2, 1.0), (False, repeats))
     pressure, shear = generator.random(grid.cells), generator.normal(size=grid.cells)
-    surface = stress_below(pressure, shear, grid, np.array([0.0, 0.1]), poisson_ratio=0.25).at(0.0)
+    surface = stress_below(
+        pressure, shear, grid, np.array([0.0, 0.1]), poisson_ratio=0.25
+    ).tensor_at(0.0)
     np.testing.assert_allclose(surface.zz, -pressure, atol=5e-5)
     np.testing.assert_allclose(surface.xz, -shear, atol=5e-5)
     np.testing.assert_allclose(surface.yz, 0.0, atol=2e-4)
@@ -111,7 +115,7 @@ def test_every_plane_below_carries_the_load(repeats):
     grid = Grid((96, 96), (-1.5, -1.5), (1.5, 1.5), (False, repeats))
     loaded = (np.abs(grid.x) < 0.2)[:, None] & (np.abs(grid.y) < 0.2)
     pressure, shear = np.where(loaded, generator.random((2, 96, 96)), 0.0)
-    plane = stress_below(pressure, shear, grid, np.array([0.05]), poisson_ratio=0.3).at(0.05)
+    plane = stress_below(pressure, shear, grid, np.array([0.05]), poisson_ratio=0.3).tensor_at(0.05)
     assert -plane.zz.sum() == pytest.approx(pressure.sum(), rel=2e-3)
     assert -plane.xz.sum() == pytest.approx(shear.sum(), rel=5e-2)  # shear spreads further
 
@@ -128,7 +132,7 @@ def test_material_is_in_equilibrium():
         poisson_ratio=0.3,
     )
     (dx, dy), dz = grid.spacing, 0.01
-    above, here, below = (stress.at(0.4 + shift) for shift in (-dz, 0.0, dz))
+    above, here, below = (stress.tensor_at(0.4 + shift) for shift in (-dz, 0.0, dz))
 
     def divergence(name_x, name_y, name_z):
         along = np.gradient(getattr(here, name_x), dx, axis=0)
@@ -162,7 +166,7 @@ def test_the_peak_between_depths_hardly_depends_on_the_depths():
 
 
 @pytest.mark.parametrize("core", [0.25, 1.0])
-def test_the_core_is_what_lies_below_a_depth(core):
+def test_the_core_is_the_largest_stress_below_a_depth(core):
     grid = Grid((64, 8), (-2.0, -1.0), (2.0, 1.0))
     pressure = np.repeat(np.sqrt(np.maximum(1.0 - grid.x**2, 0.0))[:, None], 8, axis=1)
     depths = np.concatenate([[0.0], np.geomspace(0.02, 3.0, 12)])
@@ -170,7 +174,7 @@ def test_the_core_is_what_lies_below_a_depth(core):
         pressure, 0.4 * pressure, grid, depths, poisson_ratio=0.3, core_depth=core
     )
     assert stress.peak.depth == 0.0
-    fine = [stress.at(depth).von_mises.max() for depth in np.linspace(core, 3.0, 60)]
+    fine = [stress.tensor_at(depth).von_mises.max() for depth in np.linspace(core, 3.0, 60)]
     assert stress.core.value == pytest.approx(max(fine), rel=1e-3)
     assert stress.core.depth >= core == stress.core_depth
 
@@ -235,13 +239,13 @@ def test_default_depths_go_from_the_surface_to_below_the_contact():
     ("shear", "depths", "told"),
     [
         (np.zeros((4, 4)), [0.1], "shear must have the grid's shape"),
-        (None, [0.2, 0.1], "depths must grow"),
-        (None, [-0.1, 0.1], "from 0 m"),
-        (None, [], "from 0 m"),
-        (None, [np.nan], "from 0 m"),
+        (None, [0.2, 0.1], "depths must increase"),
+        (None, [-0.1, 0.1], "finite lengths of 0 m"),
+        (None, [], "finite lengths of 0 m"),
+        (None, [np.nan], "finite lengths of 0 m"),
     ],
 )
-def test_what_cannot_be_used_is_refused(shear, depths, told):
+def test_invalid_stress_input_is_refused(shear, depths, told):
     grid = Grid((8, 8), (0.0, 0.0), (1.0, 1.0))
     with pytest.raises(BadInput, match=told):
         stress_below(np.ones((8, 8)), shear, grid, np.array(depths), poisson_ratio=0.3)
@@ -258,10 +262,12 @@ def test_the_second_body_feels_the_opposite_traction_and_has_its_own_poisson_rat
     shear = 0.1 * solution.pressure
     first, second = (subsurface_stress(solution, shear=shear, body=body) for body in (1, 2))
     np.testing.assert_allclose(
-        second.at(0.3 * a).xz, first.at(0.3 * a).xz[::-1] * -1.0, atol=1e-4 * bodies.hertz.p_max
+        second.tensor_at(0.3 * a).xz,
+        first.tensor_at(0.3 * a).xz[::-1] * -1.0,
+        atol=1e-4 * bodies.hertz.p_max,
     )
     assert second.peak.x < 0.0 < first.peak.x
-    sideways = second.at(0.5 * a)
+    sideways = second.tensor_at(0.5 * a)
     np.testing.assert_allclose(
         sideways.yy, 0.2 * (sideways.xx + sideways.zz), atol=1e-5 * bodies.hertz.p_max
     )

@@ -103,9 +103,9 @@ def test_what_a_rate_is_in_doubt_by_crf_is_too():
     from asperity.monitoring.reading import Reading
     from asperity.monitoring.target import search_target
     from asperity.monitoring.track import judge
-    from asperity.paper import simulate_rig
+    from asperity.paper import RigSettings, simulate_rig
 
-    rig = simulate_rig(samples=6, repeats=1, duration_s=10.0)
+    rig = simulate_rig(RigSettings(samples=6, repeats=1, duration_s=10.0))
     sure = [
         Reading(file=f"{k}", spectrum=one.spectrum(20_000), rate_hz=20e3, unit="m/s^2")
         for k, one in enumerate(rig.recordings)

@@ -75,8 +75,8 @@ def test_a_crf_that_conditions_explain_is_drawn_without_them(failing):
         )
         for number, one in enumerate(failing.recordings)
     ]
-    steadied = [replace(one, crf_reference_hz=3e3) for one in moved]
-    track = replace(failing, recordings=tuple(steadied))
+    resample_to_constant_speed = [replace(one, crf_reference_hz=3e3) for one in moved]
+    track = replace(failing, recordings=tuple(resample_to_constant_speed))
     (shown,) = (
         line
         for line in trend(track).draw(ON_PAGE).axes[0].get_lines()

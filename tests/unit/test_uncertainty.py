@@ -11,7 +11,7 @@ from asperity import BadInput, load_case, load_run, solve_case
 from asperity.case import Case
 from asperity.cli.contact import run_table
 from asperity.ehl import Uncertainty
-from asperity.results import one_surface
+from asperity.results import prediction_interval
 
 PAPER = files("asperity.paper").joinpath("paper.toml").read_text("utf-8")
 ALONE = {"grid.cells": [48, 48], "vibration.duration": "0.2 s"}  # too few cells for a coarser grid
@@ -48,7 +48,7 @@ def test_independent_parts_add_by_their_squares_and_numerical_ones_as_they_are()
 @pytest.mark.parametrize(
     ("value", "low", "high"), [(0.06, 0.0, 0.74), (0.95, 0.27, 1.0), (0.5, 0.0, 1.0)]
 )
-def test_no_share_of_the_load_is_off_beyond_nothing_and_all(value, low, high):
+def test_the_interval_of_a_share_stays_within_0_and_1(value, low, high):
     """A CLR of 6 % once was said to be off by 113 %."""
     error = Uncertainty(value=value, iteration=(0.0, 0.0), grid=(0.68, 0.68), range=(0.0, 1.0))
     assert error.interval == pytest.approx((low, high))
@@ -67,18 +67,18 @@ def test_nine_in_ten_further_surfaces_lie_within_the_interval_of_a_few(count):
     rng = np.random.default_rng(1)
     held = 0
     for *few, further in rng.normal(3500.0, 100.0, (20_000, count + 1)):
-        mean, (below, above) = one_surface(few, share=False)
+        mean, (below, above) = prediction_interval(few, share=False)
         held += mean - below <= further <= mean + above
     assert held / 20_000 == pytest.approx(0.9, abs=0.008)
 
 
 @pytest.mark.parametrize(("centre", "scatter"), [(0.0, 0.4), (2.5, 0.8), (-4.0, 1.0), (5.0, 2.0)])
-def test_so_do_shares_and_none_is_below_nothing_or_above_all(centre, scatter):
+def test_intervals_of_shares_cover_and_stay_within_0_and_1(centre, scatter):
     """Of shares whose logarithm of odds scatters normally, from a twentieth to nearly all of the load."""
     rng = np.random.default_rng(2)
     held = 0
     for *few, further in 1.0 / (1.0 + np.exp(-rng.normal(centre, scatter, (10_000, 6)))):
-        mean, (below, above) = one_surface(few, share=True)
+        mean, (below, above) = prediction_interval(few, share=True)
         assert 0.0 <= mean - below <= mean + above <= 1.0
         held += mean - below <= further <= mean + above
     assert (
@@ -88,10 +88,13 @@ def test_so_do_shares_and_none_is_below_nothing_or_above_all(centre, scatter):
 
 @pytest.mark.parametrize("share", [0.0, 1.0, 0.3])
 def test_surfaces_that_agree_do_not_scatter(share):
-    assert one_surface([share] * 4, share=True) == (share, pytest.approx((0.0, 0.0), abs=1e-12))
+    assert prediction_interval([share] * 4, share=True) == (
+        share,
+        pytest.approx((0.0, 0.0), abs=1e-12),
+    )
 
 
-def test_a_resonance_is_off_by_what_its_load_share_is(run):
+def test_the_error_of_a_resonance_follows_from_its_load_share(run):
     """CRF goes with CLR^(1/6): of 2466.0 Hz, 1.4 were said to be in doubt where CLR 7 ± 2.4 % alone is worth 136."""
     clr, crf = run.error.clr, run.error.crf_hz
     assert clr.surfaces is crf.surfaces is None
@@ -108,7 +111,7 @@ def test_a_resonance_is_off_by_what_its_load_share_is(run):
     assert (numbers["clr_low"], numbers["clr_high"]) == clr.interval
 
 
-def test_a_grid_without_a_coarser_one_is_said_to_tell_no_error(alone):
+def test_without_a_coarser_grid_the_error_is_not_determined(alone):
     """No ± was given there, without a word."""
     numbers = alone.scalars()
     for key in ("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "clr_error", "crf_error_hz"):
@@ -117,7 +120,7 @@ def test_a_grid_without_a_coarser_one_is_said_to_tell_no_error(alone):
     assert alone.verdict().count("± not determined") == 2
     table = "\n".join(run_table(alone))
     assert "CLR, 90 % interval" in table
-    assert "CLR, size of the cells                               not determined" in table
+    assert "CLR, cell size                                       not determined" in table
 
 
 def test_numbers_of_several_surfaces_are_means_over_them(three, alone):
@@ -132,7 +135,7 @@ def test_numbers_of_several_surfaces_are_means_over_them(three, alone):
     assert (
         numbers["iterations"] == alone.scalars()["iterations"]
     )  # how it went is the first surface's
-    mean, sides = one_surface([one.state.clr for one in apart], share=True)
+    mean, sides = prediction_interval([one.state.clr for one in apart], share=True)
     assert three.error.clr.value == mean
     assert three.error.clr.surfaces == sides
     assert three.state.clr == apart[0].state.clr
@@ -151,7 +154,7 @@ def test_the_scatter_of_the_load_share_is_handed_on_to_the_resonance(three):
     assert crf.surfaces == pytest.approx((f0 * (1.0 - below), f0 * (above - 1.0)))
 
 
-def test_a_law_that_needs_the_solved_contact_says_that_its_numerical_error_is_unknown():
+def test_a_law_that_needs_the_solved_contact_has_no_numerical_error():
     tangent = {
         "vibration.stiffness_law": "tangent",
         "vibration.rate": "200 kHz",
@@ -170,8 +173,8 @@ def test_a_kept_run_has_the_same_numbers(three, tmp_path):
     assert kept.verdict() == three.verdict()
 
 
-def test_processes_change_nothing(three, monkeypatch):
-    monkeypatch.setattr(solving, "WORTH_PROCESSES_S", 0.0)
+def test_worker_processes_do_not_change_results(three, monkeypatch):
+    monkeypatch.setattr(solving, "MIN_PARALLEL_S", 0.0)
     monkeypatch.setattr(solving, "cores", lambda: 2)
     done = []
     spread = solve_case(
@@ -185,7 +188,7 @@ def timeless(row):
     return {key: value for key, value in row.items() if key != "seconds"}
 
 
-def test_a_surface_that_fails_is_left_out_and_said_to_be(monkeypatch):
+def test_a_surface_that_fails_is_excluded_with_a_note(monkeypatch):
     solved = solving._first
 
     def lame(chosen, *rest, **more):
@@ -196,8 +199,10 @@ def test_a_surface_that_fails_is_left_out_and_said_to_be(monkeypatch):
     monkeypatch.setattr(solving, "_first", lame)
     found = solve_case(case(), surfaces=3)
     assert found.scalars()["surfaces"] == 2
-    (note,) = [note for note in found.notes if "left out" in note]
-    assert note.startswith("Surface 2 of 3 was left out of means and intervals: contact not solved")
+    (note,) = [note for note in found.notes if "excluded" in note]
+    assert note.startswith(
+        "Surface 2 of 3 is excluded from means and intervals: contact not solved"
+    )
     assert "mean of 2 surfaces" in found.verdict()
 
 
@@ -217,7 +222,7 @@ def test_how_many_surfaces_are_solved(overrides, count):
 
 
 @pytest.mark.parametrize("count", [1001, 0x7FFF])
-def test_more_surfaces_than_tell_anything_are_refused(count):
+def test_too_many_surfaces_are_refused(count):
     with pytest.raises(BadInput, match=f"surfaces must be 1 to 1000, got {count}"):
         case(**{"solver.surfaces": count}).surface_count()
 

@@ -51,7 +51,7 @@ def test_response_to_kinks_is_the_closed_form(damping_ratio, rate):
     assert np.max(np.abs(response.values - expected)) < 1e-9 * np.max(np.abs(expected))
 
 
-def test_a_steady_slope_shakes_nothing():
+def test_a_constant_slope_excites_no_vibration():
     response = acceleration(STEEL, Signal(1e-3 * np.arange(500), 50e3, "m")).values
     assert np.max(np.abs(response)) < 1e-9 * 1e-3 * 50e3 * STEEL.angular_frequency
 

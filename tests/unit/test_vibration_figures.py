@@ -79,7 +79,7 @@ def test_table_1_is_drawn_with_its_printed_values(tmp_path):
     assert path.read_bytes().startswith(b"\x89PNG")
 
 
-def test_nothing_touching_is_nothing_to_draw():
+def test_no_contact_gives_no_figure():
     flat = contact_vibration(dry_full_load(CONTACT, 0.0), CONTACT, PAPER)
     for draw in (excitation_figure, response_figure):
         with pytest.raises(BadInput, match="flat"):

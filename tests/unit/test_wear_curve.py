@@ -59,11 +59,11 @@ def test_means_deviations_and_intervals_are_students():
 def test_between_levels_the_curve_is_straight_and_their_surfaces_independent():
     curve = made([1.0, 2.0], 3, car=lambda sq, seed: sq + (seed - 1.0))
     reach = 2.91998558 / np.sqrt(3.0)
-    middle, low, high = curve.at(1.25e-6, "car")
+    middle, low, high = curve.interpolate(1.25e-6, "car")
     off = reach * np.hypot(0.75, 0.25)
     assert (middle, low, high) == pytest.approx((1.25, 1.25 - off, 1.25 + off))
-    assert curve.at(2e-6, "car") == pytest.approx((2.0, 2.0 - reach, 2.0 + reach))
-    assert np.isnan(curve.at(2.1e-6, "car")).all()
+    assert curve.interpolate(2e-6, "car") == pytest.approx((2.0, 2.0 - reach, 2.0 + reach))
+    assert np.isnan(curve.interpolate(2.1e-6, "car")).all()
 
 
 def test_what_failed_or_was_not_heard_is_in_no_mean():

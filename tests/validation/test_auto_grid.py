@@ -195,7 +195,7 @@ def test_a_chosen_grid_of_few_cells_still_has_a_coarser_one_that_tells_its_error
     coarse = solve_case(case.with_overrides({"grid": {"cells": [64, 64], "accuracy": None}}))
     assert coarse.error.clr.numerical is None
     assert coarse.determined is False
-    assert "no coarser grid tells how far it may be off" in coarse.verdict()
+    assert "no coarser grid is available to estimate its error" in coarse.verdict()
 
 
 def test_films_that_carry_nothing_need_no_inlet():

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.bounded import OIL, ellipses, rollers
 
 from asperity.ehl import solve_contact
-from asperity.solution import along_roller, contact_state
+from asperity.solution import axial_distribution, contact_state
 
 CONTACTS = {
     f"{c.geometry} {number}": (c, s)
@@ -25,6 +25,6 @@ def test_a_bounded_rough_contact_is_solved(name):
     assert abs(state.load_error) < 1e-4
     assert solution.pressure[:, [0, -1]].max() == 0.0
     assert solution.p_cap is None or state.p_max <= solution.p_cap * (1.0 + 1e-9)
-    along = along_roller(solution)
+    along = axial_distribution(solution)
     if along is not None and conditions.roller.tilt != 0.0:
         assert along.load_centre * conditions.roller.tilt < 0.0

@@ -19,7 +19,7 @@ from asperity.ehl.scales import Scales
 from asperity.kernels import line_relaxation as relax
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
 from asperity.solution import (
-    ShakenContact,
+    OscillatingContact,
     contact_state,
     dynamic_stiffness,
     own_resonance,
@@ -67,14 +67,16 @@ def test_another_programs_table_comes_out(sq_um, yielded):
     clr, *stiffness, at_1, at_3, at_5 = TABLE[sq_um, yielded]
     solution = papers(sq_um)
     assert contact_state(solution).clr == pytest.approx(clr, abs=0.006)
-    shaken_contact = ShakenContact(solution, yielded=yielded)
+    shaken_contact = OscillatingContact(solution, yielded=yielded)
     for frequency, expected in zip((0.0, 3e3, 10e3), stiffness, strict=True):
         if expected is not None:
-            assert shaken_contact.at(frequency).stiffness / MICRO == pytest.approx(
+            assert shaken_contact.evaluate(frequency).stiffness / MICRO == pytest.approx(
                 expected, rel=0.01
             )
     for frequency, expected in zip((1e3, 3e3, 5e3), (at_1, at_3, at_5), strict=True):
-        assert shaken_contact.at(frequency).damping_ratio == pytest.approx(expected, abs=0.001)
+        assert shaken_contact.evaluate(frequency).damping_ratio == pytest.approx(
+            expected, abs=0.001
+        )
 
 
 @cache
@@ -144,7 +146,7 @@ def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
         conditions, surface = case.conditions, case.surface()
         solution = solve_contact(conditions, case.lubricant, surface, options=Options(model=model))
     assert 0.02 < contact_state(solution).clr < 0.98
-    ready = ShakenContact(solution, yielded=yielded)
+    ready = OscillatingContact(solution, yielded=yielded)
     balance = balance_of(solution)
     balance = elastic(balance) if yielded == "elastic" else balance
     hertz = (0.0, 4e3, 100e3)
@@ -159,7 +161,7 @@ def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
 
 
 @pytest.mark.parametrize("hardness", [None, "2 GPa"])
-def test_where_nothing_yields_both_limits_are_one(hardness):
+def test_without_yielding_both_limits_coincide(hardness):
     """Solved for themselves they agree; where cells are at the cap they do not."""
     case = load_case(PAPER).with_overrides(
         {"grid.cells": [48, 24], "surface.sq": "1 um", "contact.load": "500 N"}
@@ -169,7 +171,9 @@ def test_where_nothing_yields_both_limits_are_one(hardness):
         solve_contact(conditions, case.lubricant, case.surface(), options=case.options), 0.1
     )
     assert own.virgin.yielded == "flowing"
-    alone = ShakenContact(own.solution, yielded="flowing").settled(own.elastic.frequency_hz)
+    alone = OscillatingContact(own.solution, yielded="flowing").converged_at(
+        own.elastic.frequency_hz
+    )
     assert own.virgin.stiffness == pytest.approx(alone.stiffness, rel=2e-3)
     assert own.virgin.damping_ratio == pytest.approx(alone.damping_ratio, rel=0.02)
     assert (own.virgin.stiffness < 0.95 * own.elastic.stiffness) == (hardness is not None)
@@ -178,13 +182,13 @@ def test_where_nothing_yields_both_limits_are_one(hardness):
 def test_a_sweep_that_cannot_move_begins_anew(monkeypatch):
     """Where corrections of one frequency tell nothing new at the next, the resonance is the same."""
     solution = papers(1.0, "mixed")
-    expected = ShakenContact(solution).resonance(0.1)
+    expected = OscillatingContact(solution).resonance(0.1)
 
     def refused(_, frequency):
         raise ArithmeticError(f"corrections are linearly dependent at frequency {frequency:g}")
 
     monkeypatch.setattr(Shifted, "move", refused)
-    found = ShakenContact(solution).resonance(0.1)
+    found = OscillatingContact(solution).resonance(0.1)
     assert found.frequency_hz == pytest.approx(expected.frequency_hz, rel=1e-3)
     assert found.damping_ratio == pytest.approx(expected.damping_ratio, rel=2e-2)
 
@@ -216,10 +220,10 @@ def test_the_lines_follow_how_the_wedge_leans():
     assert np.abs(stencil_times(upright, change) - expected)[inner].max() > 0.1
 
 
-def test_a_shaken_contact_whose_bodies_touch_takes_few_steps():
+def test_an_oscillating_contact_with_asperities_takes_few_steps():
     """With stiff oil apart from what touches it takes 30."""
-    ready = ShakenContact(papers(0.5, "mixed", cells=(128, 128)))
-    answer = ready.oscillating.answer(ready.per_crossing(9e3), tolerance=3e-5)
+    ready = OscillatingContact(papers(0.5, "mixed", cells=(128, 128)))
+    answer = ready.oscillating.answer(ready.dimensionless_frequency(9e3), tolerance=3e-5)
     assert answer.left <= 3e-5
     assert answer.steps <= 24
 
@@ -233,8 +237,8 @@ def test_the_resonance_is_that_of_equations_met_to_the_end(model, sq_um):
     solution, mass = papers(sq_um, model), 0.1
     own = own_resonance(solution, mass)
     for found in (own.elastic, own.virgin):
-        ready = ShakenContact(solution, yielded=found.yielded)
-        to_the_end = ready.at(found.frequency_hz, tolerance=1e-8)
+        ready = OscillatingContact(solution, yielded=found.yielded)
+        to_the_end = ready.evaluate(found.frequency_hz, tolerance=1e-8)
         assert found.stiffness == pytest.approx(to_the_end.stiffness, rel=2e-3)
         assert found.damping_ratio == pytest.approx(to_the_end.damping_ratio, rel=0.01)
     resonates = np.sqrt(own.elastic.stiffness / mass) / (2.0 * np.pi)
@@ -268,7 +272,7 @@ def test_a_contact_that_bore_its_load_before_is_level_in_roughness(sq_um, printe
 def test_oil_that_has_no_time_is_shut_in():
     """As the frequency grows no cell gains or loses oil: ρ V(p) + ρ' h p = ρ δ, solved densely."""
     solution = papers(0.0, cells=(96, 48))
-    ready = ShakenContact(solution)
+    ready = OscillatingContact(solution)
     balance = ready.balance
     wet = (balance.rows.state == 2).ravel()
     bend = np.stack(
@@ -283,7 +287,7 @@ def test_oil_that_has_no_time_is_shut_in():
 
 
 @pytest.mark.parametrize("frequency_hz", [100.0, 1e4])
-def test_what_damps_is_what_the_squeezed_oil_turns_to_heat(frequency_hz):
+def test_damping_equals_the_dissipation_of_the_squeezed_oil(frequency_hz):
     """Bodies that hardly bend, oil of one viscosity: with h³p'/12η = C - x the flow of oil squeezed out at 1 m/s,
 
     dissipation is 12 η ∫ (x - C)²/h³ dx, least for the C that leaves no pressure at both ends: c by quadrature.
@@ -307,10 +311,10 @@ def test_what_damps_is_what_the_squeezed_oil_turns_to_heat(frequency_hz):
 
 
 def test_a_mass_resonates_where_its_own_stiffness_is():
-    ready = ShakenContact(papers(1.0))
+    ready = OscillatingContact(papers(1.0))
     for mass in (0.1, 1.0):
         found = ready.resonance(mass)
-        exact = ready.at(found.frequency_hz, tolerance=1e-8)
+        exact = ready.evaluate(found.frequency_hz, tolerance=1e-8)
         assert found.stiffness == pytest.approx(exact.stiffness, rel=1e-3)
         assert found.damping_ratio == pytest.approx(exact.damping_ratio, abs=1e-4)
         assert found.stiffness == pytest.approx(
@@ -339,7 +343,7 @@ def test_bad_input_is_named():
     with pytest.raises(BadInput, match="half-width"):
         dynamic_stiffness(solution, 1e3, reference_depth=1e-6)
     with pytest.raises(BadInput, match="mass"):
-        ShakenContact(solution).resonance(0.0)
+        OscillatingContact(solution).resonance(0.0)
     conserving = solve_contact(
         contact(),
         barus(),
@@ -352,5 +356,5 @@ def test_bad_input_is_named():
     unfinished = solve_contact(
         contact(), barus(), flat_surface(grid((48, 8))), options=few, strict=False
     )
-    with pytest.raises(BadInput, match="stands still"):
+    with pytest.raises(BadInput, match="steady, converged contact"):
         dynamic_stiffness(unfinished, 1e3)

@@ -93,7 +93,7 @@ def test_few_panels_are_as_good_as_many(speed, monkeypatch):
     """The kernel in panels of half a cell throughout, with nodes enough."""
     place = (96, 16), (2e-6, 1e-6), speed, STEEL
     found = moving_source(*place, length=0.01).spectrum[0]
-    monkeypatch.setattr("asperity.solution.flash.SPREAD", 0.0)
+    monkeypatch.setattr("asperity.solution.flash.MAX_DRIFT", 0.0)
     monkeypatch.setattr("asperity.solution.flash.NODES", 16)
     expected = moving_source.__wrapped__(*place, length=0.01).spectrum[0]
     assert np.abs(found - expected).max() < 5e-5 * np.abs(expected).max()
@@ -106,7 +106,7 @@ def test_a_line_at_rest_is_as_long_as_it_is():
     assert body(np.ones((33, 8)))[16, 2] == pytest.approx(rectangle_at_rest(B, 0.005, K), rel=1e-4)
 
 
-def test_what_repeats_in_y_is_many_copies():
+def test_periodicity_in_y_equals_many_copies():
     rng, n, dx = np.random.default_rng(2), 8, 5e-6
     heat = rng.random((16, n))
     repeating = moving_source((16, n), (dx, dx), 1.0, STEEL, length=ENDLESS)(heat)
@@ -131,7 +131,7 @@ SPEEDS = [(2.101, 1.719), (1.719, 2.101), (3.8, 0.02), (5.0, -1.2), (4.0, 0.0)]
 
 
 @pytest.mark.parametrize("speeds", SPEEDS)
-def test_the_bodies_carry_away_what_friction_makes(speeds):
+def test_the_bodies_take_up_all_frictional_heat(speeds):
     """Heat that flows through planes far from the contact in both bodies, from their own temperatures in depth."""
     solution = warm_contact(speeds)
     rubbing = friction(solution)

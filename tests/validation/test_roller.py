@@ -14,7 +14,7 @@ import asperity as asp
 from asperity.contact.rollers import RollerShape
 from asperity.ehl import auto_grid
 from asperity.ehl.problem_setup import contact_problem
-from asperity.solution import along_roller, dynamic_stiffness, tangent_stiffness
+from asperity.solution import axial_distribution, dynamic_stiffness, tangent_stiffness
 from asperity.surface import gaussian_surface
 
 STEEL = asp.ElasticPair((206e9, 206e9), (0.3, 0.3))
@@ -75,20 +75,20 @@ def test_a_dry_roller_has_the_reference_pressure(shape, load, largest, at, middl
     assert (abs(place) if at >= 0.0 else place) == pytest.approx(at, abs=2e-3)
     assert np.interp(0.0, y, pressure.max(axis=0)) == pytest.approx(middle, rel=1e-3)
     if line_load is not None:
-        along = along_roller(solution)
+        along = axial_distribution(solution)
         assert along.largest_line_load * LENGTH / load == pytest.approx(line_load, rel=5e-4)
 
 
 def test_lundbergs_shape_is_even_but_for_the_ends_and_loaded_throughout():
     solution = solved(roller(lundberg(LOAD)), cells=(48, 1024))
-    along = along_roller(solution)
+    along = axial_distribution(solution)
     at = np.interp(0.45 * LENGTH, along.y, along.pressure) / solution.conditions.hertz.p_max
     assert at == pytest.approx(1.0029, abs=1e-3)
     assert along.loaded_share == pytest.approx(1.0)
     assert along.edge_pressure.on_grid == pytest.approx(
         1.131 * solution.conditions.hertz.p_max, rel=5e-4
     )
-    iso = along_roller(solved(roller(ISO), cells=(48, 1024)))
+    iso = axial_distribution(solved(roller(ISO), cells=(48, 1024)))
     assert iso.loaded_share == pytest.approx(0.918, abs=0.004)
 
 
@@ -104,7 +104,7 @@ def test_what_lies_past_the_ends_changes_nothing(oil):
     assert wide.pressure[:, 4:-4] == pytest.approx(
         narrow.pressure[:, 1:-1], abs=2e-3 * narrow.pressure.max()
     )
-    films = [along_roller(each).end_film.on_grid for each in (wide, narrow)]
+    films = [axial_distribution(each).end_film.on_grid for each in (wide, narrow)]
     assert films[0] == pytest.approx(films[1], rel=2e-3, abs=1e-12)
 
 
@@ -112,7 +112,7 @@ def test_an_untilted_roller_is_symmetric_to_rounding():
     solution = solved(roller(ISO), cells=(48, 128), tolerance=1e-8)
     pressure = solution.pressure
     assert np.abs(pressure - pressure[:, ::-1]).max() < 1e-9 * pressure.max()
-    assert abs(along_roller(solution).load_centre) < 1e-9 * LENGTH
+    assert abs(axial_distribution(solution).load_centre) < 1e-9 * LENGTH
     here, there = (
         solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-8) for tilt in (3e-4, -3e-4)
     )
@@ -137,7 +137,7 @@ def test_the_moment_is_what_the_energy_asks_for():
         return float(work.sum()) * dx * dy
 
     tilt, step = 0.5e-3, 2e-5
-    along = along_roller(solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-7))
+    along = axial_distribution(solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-7))
     assert along.moment == pytest.approx(
         (energy(tilt + step) - energy(tilt - step)) / (2.0 * step), rel=1e-3
     )
@@ -182,17 +182,17 @@ def test_the_middle_of_a_long_roller_is_a_line_contact(oil):
 
 def test_a_straight_rollers_middle_is_the_line_contact_of_its_own_load():
     solution = solved(roller(), cells=(64, 256))
-    along = along_roller(solution)
+    along = axial_distribution(solution)
     middle = along.y.size // 2
     line = replace(roller(), geometry="line", load=along.line_load[middle] * LENGTH)
     assert along.pressure[middle] == pytest.approx(line.hertz.p_max, rel=5e-3)
-    finer = along_roller(solved(roller(), cells=(64, 512)))
+    finer = axial_distribution(solved(roller(), cells=(64, 512)))
     assert finer.edge_pressure.on_grid > 1.2 * along.edge_pressure.on_grid  # singular
     assert along.middle_pressure == pytest.approx(along.pressure[middle], rel=1e-6)
     for each in (along, finer):
         assert each.edge_pressure.value is each.edge_pressure.bar is None
         assert each.undetermined[0].startswith(
-            "The edge pressure is not determined: the roller's shape falls back too"
+            "The edge pressure is not determined: the profile relieves the ends too"
         )
 
 
@@ -200,7 +200,7 @@ def edges(shape, oil, *grids):
     """What is said of the edge pressure on each grid, over Hertz's, and how far it may be off."""
     conditions = roller(shape)
     found = [
-        along_roller(solved(conditions, oil, cells=(nx, ny - 8), past=4)).edge_pressure
+        axial_distribution(solved(conditions, oil, cells=(nx, ny - 8), past=4)).edge_pressure
         for nx, ny in grids
     ]
     return [
@@ -238,30 +238,32 @@ def test_a_pressure_that_still_grows_is_no_edge_pressure():
     circle = RollerShape(crown_radius=LENGTH**2 / 8.0 / 5e-6)
     for oil in (None, OIL):
         assert edges(circle, oil, (48 if oil is None else 96, 256)) == [(None, None)]
-    along = along_roller(solved(roller(circle), cells=(48, 120), past=4))
+    along = axial_distribution(solved(roller(circle), cells=(48, 120), past=4))
     assert (
-        "lie 0.92 half-widths apart, where loaded ends need 0.5; take 237 cells"
+        "are 0.92 half-widths apart, but loaded ends require 0.5; use 237 cells"
         in along.undetermined[0]
     )
 
 
 def test_an_end_at_the_pressure_cap_has_that_edge_pressure():
-    along = along_roller(solved(roller(hardness=2e9), cells=(48, 248), past=4))
+    along = axial_distribution(solved(roller(hardness=2e9), cells=(48, 248), past=4))
     assert along.edge_pressure.value == pytest.approx(2e9)
     assert (
-        along_roller(solved(roller(hardness=20e9), cells=(48, 248), past=4)).edge_pressure.value
+        axial_distribution(
+            solved(roller(hardness=20e9), cells=(48, 248), past=4)
+        ).edge_pressure.value
         is None
     )
 
 
 def test_the_film_at_loaded_ends_asks_for_close_lines():
     few, many, finest = (
-        along_roller(solved(roller(lundberg(1.5 * LOAD)), OIL, cells=(128, ny - 8), past=4))
+        axial_distribution(solved(roller(lundberg(1.5 * LOAD)), OIL, cells=(128, ny - 8), past=4))
         for ny in (256, 1024, 1536)
     )
     assert few.end_film.value is None
     assert any(
-        "film at the ends is not determined: its lines of cells lie 0.45" in said
+        "film at the ends is not determined: the lines of cells are 0.45" in said
         for said in few.undetermined
     )
     assert (
@@ -289,7 +291,7 @@ def test_a_roller_with_a_strong_crown_is_a_point_contact(oil):
 
 def test_oil_leaves_at_the_ends_and_the_film_there_is_thin():
     solution = solved(roller(lundberg(1.5 * LOAD)), OIL, cells=(96, 128))
-    state, along = asp.contact_state(solution), along_roller(solution)
+    state, along = asp.contact_state(solution), axial_distribution(solution)
     assert solution.pressure[:, [0, -1]].max() == 0.0
     assert along.end_film.on_grid == state.h_min
     assert 0.3 * state.h_central < along.end_film.on_grid < 0.9 * state.h_central
@@ -303,7 +305,7 @@ def test_a_film_ends_alike_between_smooth_bodies_and_all_but_smooth_ones():
     rough = asp.solve_contact(
         smooth.conditions, OIL, asp.Surface(heights - heights.mean(), smooth.grid)
     )
-    ends = [along_roller(solution).end_film.on_grid for solution in (smooth, rough)]
+    ends = [axial_distribution(solution).end_film.on_grid for solution in (smooth, rough)]
     assert ends[1] == pytest.approx(ends[0], rel=0.1)
 
 
@@ -371,7 +373,7 @@ def test_a_straight_roller_is_led_on_from_the_dry_one():
     solution = solved(roller(), OIL, cells=(128, 120), past=4)
     assert solution.convergence.attempt == "coarse to fine"  # on by the accurate wedge
     assert solution.convergence.iterations < 200
-    along = along_roller(solution)
+    along = axial_distribution(solution)
     middle = along.y.size // 2
     line = replace(roller(), geometry="line", load=float(along.line_load[middle]) * LENGTH)
     lower, upper = (solution.grid.lower[0], -1e-4), (solution.grid.upper[0], 1e-4)

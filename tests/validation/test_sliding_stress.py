@@ -80,7 +80,7 @@ def test_the_peak_below_a_sliding_line_contact_is_smith_and_lius(friction):
 def test_the_whole_tensor_below_a_sliding_line_contact(friction):
     stress = below_line(friction)
     for depth in (0.06, 0.3, 0.786, 2.0):
-        found = stress.at(depth)
+        found = stress.tensor_at(depth)
         xx, yy, zz, xz = sliding.line(stress.grid.x, depth, friction, NU)
         tolerance = (
             0.005 if depth < 0.1 else 0.0012
@@ -99,7 +99,7 @@ def test_the_whole_tensor_below_a_sliding_ball(friction):
     i, j = np.arange(5, 128, 9), np.arange(3, 128, 10)
     x, y = np.meshgrid(stress.grid.x[i], stress.grid.y[j], indexing="ij")
     for depth in (0.12, 0.48, 1.5):
-        found = stress.at(depth)
+        found = stress.tensor_at(depth)
         expected = sliding.point(x, y, np.full(x.shape, depth), friction, NU)
         for name, values in zip(("xx", "yy", "zz", "xy", "yz", "xz"), expected, strict=True):
             np.testing.assert_allclose(
@@ -132,9 +132,9 @@ def test_traction_alone_stretches_the_surface_of_a_ball_as_hamilton_and_goodman_
     grid = Grid((256, 256), (-1.2, -1.2), (1.2, 1.2), (False, False))
     radius = np.hypot(grid.x[:, None], grid.y)
     traction = np.sqrt(np.maximum(1.0 - radius**2, 0.0))
-    surface = stress_below(0.0 * traction, traction, grid, np.array([0.0]), poisson_ratio=NU).at(
-        0.0
-    )
+    surface = stress_below(
+        0.0 * traction, traction, grid, np.array([0.0]), poisson_ratio=NU
+    ).tensor_at(0.0)
     inside, x = radius < 0.7, np.broadcast_to(grid.x[:, None], grid.cells)
     for name, slope in (("xx", (4.0 + NU) * np.pi / 8.0), ("yy", 3.0 * NU * np.pi / 8.0)):
         expected = -slope * x[inside]

@@ -9,7 +9,7 @@ import pytest
 from asperity.core.errors import BadInput
 from asperity.coupling import VibrationModel
 from asperity.paper import TABLE1_PRINTED, continuous_crfa, expected_crfa, reproduce_table1
-from asperity.paper.table1 import highest_point, riding
+from asperity.paper.table1 import highest_point, oscillator_on_noise
 
 TABLE = Path(__file__).parents[1] / "reference" / "table1.csv"
 ROWS = list(csv.DictReader(TABLE.read_text().splitlines()))
@@ -44,7 +44,7 @@ def test_printed_crfas_lie_in_the_5_to_95_percent_range(ours):
 @pytest.mark.parametrize("preset", ["paper", "sound"])
 def test_crf_grows_as_load_to_the_sixth(preset):
     model = VibrationModel.preset(preset, mass=0.1, damping_ratio=0.02)
-    crf = [riding(model, 30.0, 2e-6, load)[0].natural_frequency_hz for load in LOADS]
+    crf = [oscillator_on_noise(model, 30.0, 2e-6, load)[0].natural_frequency_hz for load in LOADS]
     assert exponent(LOADS, crf) == pytest.approx(1 / 6, abs=1e-9)
 
 
@@ -97,7 +97,7 @@ def test_the_closed_form_is_what_many_records_average_to():
     from asperity.core.signals import power_spectrum
     from asperity.vibration import acceleration
 
-    spring, noise = riding(PAPER, 30.0, 2e-6, 200.0)
+    spring, noise = oscillator_on_noise(PAPER, 30.0, 2e-6, 200.0)
     density = []
     for seed in range(300):
         record = acceleration(spring, noise.profile(16_384, 10e3, seed))

@@ -90,8 +90,8 @@ def test_a_runaway_law_is_tamed(monkeypatch):
     assert fed_back[0].coefficient < 0.5 * isothermal[0].coefficient
     touchy = replace(WARM, warmth=ExponentialWarmth(50.0))
     assert 0.0 < friction_and_heat(unlimited, thermal=touchy)[1].film_max_k < fed_back[1].film_max_k
-    monkeypatch.setattr("asperity.solution.thermal.MOST_ROUNDS", 2)
-    with pytest.raises(AsperityError, match="did not settle"):
+    monkeypatch.setattr("asperity.solution.thermal.MAX_ROUNDS", 2)
+    with pytest.raises(AsperityError, match="did not converge"):
         friction_and_heat(unlimited, thermal=WARM)
 
 

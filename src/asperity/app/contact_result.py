@@ -14,7 +14,7 @@ from asperity.contact.hertz import ellipse_pressure
 from asperity.core.arrays import Field, Mask
 from asperity.core.quantities import NO_VALUE, Quantity, lines, quantity, read
 from asperity.ehl import ContactSolution, ContactState, hertz_zone
-from asperity.results import DOUBT, Run
+from asperity.results import UNCERTAINTY, Run
 from asperity.solution import contact_state
 
 TILES = (
@@ -150,7 +150,7 @@ def numbers_of(run: Run) -> dict[str, Any]:
     """The page's numbers of a run, with what is known of their doubt; nothing that takes longer than the contact."""
     shown = [quantity(key) for key in TILES]
     deviations = [quantity(entry.deviation) for entry in shown if entry.deviation]
-    return read(run, [*shown, *deviations, quantity("sq_m"), *lines(DOUBT)])
+    return read(run, [*shown, *deviations, quantity("sq_m"), *lines(UNCERTAINTY)])
 
 
 def answer_of(run: Run, seconds: float) -> Answer:

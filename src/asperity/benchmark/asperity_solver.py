@@ -1,12 +1,11 @@
-"""asperity's own adapter: contacts, waves and sliders of the benchmark by the solvers of `asperity.ehl`."""
+"""Adapter of asperity: contacts, waves and sliders of the benchmark, solved by `asperity.ehl`."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
+from asperity.benchmark.cases import CaseTable
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
@@ -24,22 +23,22 @@ from asperity.solution import contact_state
 from asperity.surface import MovingSurfaces, Surface, flat_surface
 from asperity.transient import moving_contact
 
-LENGTH = 0.01  # of a line contact, which no certified value hangs on [m]
+LENGTH = 0.01  # of a line contact [m]; no certified value depends on it
 TIGHT = Options(tolerance=1e-6)
 
 
-class Ours:
-    """asperity, at a tight tolerance."""
+class AsperitySolver:
+    """Adapter of asperity with a tight tolerance."""
 
     name = "asperity"
     kinds = ("dry", "wave", "ehl", "mixed", "conserving", "moving", "slider")
 
-    def solve(self, given: Mapping[str, Any], cells: int) -> dict[str, float]:
-        """Quantities by key."""
+    def solve(self, given: CaseTable, cells: int) -> dict[str, float]:
+        """Return quantities by key."""
         return _SOLVES[given["kind"]](given, cells)
 
 
-def _conditions(given: Mapping[str, Any], speed: float = 1.0) -> ContactConditions:
+def _conditions(given: CaseTable, speed: float = 1.0) -> ContactConditions:
     line = given["geometry"] == "line"
     radius = given["radius_m"]
     return ContactConditions(
@@ -52,20 +51,26 @@ def _conditions(given: Mapping[str, Any], speed: float = 1.0) -> ContactConditio
     )
 
 
-def waves_on(grid: Grid, given: Mapping[str, Any]) -> Field:
-    """Heights of the case's waves [m], each of (amplitude [m], waves along x and y over the side, phase [rad])."""
+def waves_on(grid: Grid, given: CaseTable) -> Field:
+    """Return the heights of the case's waves [m].
+
+    Each wave is (amplitude [m], waves along x and y over the side, phase [rad]).
+    """
     x, y = grid.x[:, None], grid.y[None, :]
-    turn = 2.0 * np.pi / given["side_m"]
+    angular_wavenumber = 2.0 * np.pi / given["side_m"]
     return np.asarray(
         np.sum(
-            [a * np.cos(turn * (kx * x + ky * y) + phase) for a, kx, ky, phase in given["waves"]],
+            [
+                a * np.cos(angular_wavenumber * (kx * x + ky * y) + phase)
+                for a, kx, ky, phase in given["waves"]
+            ],
             axis=0,
         )
     )
 
 
-def dry_roughness(grid: Grid, given: Mapping[str, Any]) -> Field:
-    """Heights [m] of a dry ball's or ellipse's roughness: waves, rings, or none."""
+def dry_roughness(grid: Grid, given: CaseTable) -> Field:
+    """Return the heights [m] of a dry ball's or ellipse's roughness: waves, rings, or none."""
     if "waves" in given:
         return waves_on(grid, given)
     if "rings" in given:
@@ -77,7 +82,10 @@ def dry_roughness(grid: Grid, given: Mapping[str, Any]) -> Field:
 
 
 def pressures(pressure: Field, cell_area: float) -> dict[str, float]:
-    """Largest pressure, and the mean of the pressure weighted by itself, which hangs less on single cells."""
+    """Return largest pressure, pressure-weighted mean pressure, and contact area.
+
+    The weighted mean depends less on single cells.
+    """
     return {
         "p_max_pa": float(pressure.max()),
         "p_weighted_pa": float((pressure**2).sum() / pressure.sum()),
@@ -85,7 +93,7 @@ def pressures(pressure: Field, cell_area: float) -> dict[str, float]:
     }
 
 
-def _dry(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+def _dry(given: CaseTable, cells: int) -> dict[str, float]:
     conditions = _conditions(given)
     a, b = conditions.hertz.half_widths
     if given["geometry"] == "line":
@@ -98,21 +106,21 @@ def _dry(given: Mapping[str, Any], cells: int) -> dict[str, float]:
     else:
         surface = Surface(dry_roughness(grid, given), grid)
     solution = solve_contact(conditions, None, surface, options=TIGHT)
-    found = pressures(solution.pressure, grid.spacing[0] * grid.spacing[1])
+    values = pressures(solution.pressure, grid.spacing[0] * grid.spacing[1])
     if given["geometry"] == "line" and "waves" not in given:
-        found["half_width_m"] = _half_width(grid.x, solution.pressure[:, 0])
-    return found
+        values["half_width_m"] = _half_width(grid.x, solution.pressure[:, 0])
+    return values
 
 
 def _half_width(x: Field, pressure: Field) -> float:
-    """Where the square of the pressure, which is straight at the edge, goes through zero."""
-    inside = np.flatnonzero(pressure)[-3:-1]  # the last cell is cut by the edge
+    """Return the zero of the squared pressure, which is linear at the edge."""
+    inside = np.flatnonzero(pressure)[-3:-1]  # without the last cell, which the edge cuts
     slope, level = np.polyfit(x[inside] ** 2, pressure[inside] ** 2, 1)
     return float(np.sqrt(-level / slope))
 
 
-def _wave(given: Mapping[str, Any], cells: int) -> dict[str, float]:
-    """Waves across a line contact that is so wide that its middle is as good as endless."""
+def _wave(given: CaseTable, cells: int) -> dict[str, float]:
+    """Solve waves across a wide line contact, whose middle approximates an infinite contact."""
     pair = ElasticPair(tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"]))
     length, amplitude = given["wavelength_m"], given["amplitude_m"]
     p_mean = given["pressure_over_full"] * np.pi * pair.reduced_modulus * amplitude / length
@@ -134,24 +142,25 @@ def _wave(given: Mapping[str, Any], cells: int) -> dict[str, float]:
     }
 
 
-def _oil(given: Mapping[str, Any]) -> Lubricant:
+def _oil(given: CaseTable) -> Lubricant:
     oil = given["oil"]
     stated = (oil["density"], oil["density_c1_1_pa"], oil["density_c2_1_pa"])
     if stated != ("dowson-higginson", 0.6e-9, 1.7e-9):
         raise BadInput(
-            f"the oil's density must be Dowson and Higginson's with 0.6e-9 and 1.7e-9 1/Pa, got {stated}"
+            "the oil's density law must be Dowson and Higginson's with 0.6e-9 and 1.7e-9 1/Pa, "
+            f"got {stated}"
         )
-    thick: Barus | Roelands
+    viscosity: Barus | Roelands
     if oil["viscosity"] == "barus":
-        thick = Barus(oil["eta0_pa_s"], oil["alpha_1_pa"])
+        viscosity = Barus(oil["eta0_pa_s"], oil["alpha_1_pa"])
     else:
-        thick = Roelands(oil["eta0_pa_s"], oil["alpha_1_pa"], oil["roelands_p0_pa"])
+        viscosity = Roelands(oil["eta0_pa_s"], oil["alpha_1_pa"], oil["roelands_p0_pa"])
     return Lubricant(
-        viscosity=thick, density=DowsonHigginson(oil["rho0_kg_m3"]), rheology=Newtonian()
+        viscosity=viscosity, density=DowsonHigginson(oil["rho0_kg_m3"]), rheology=Newtonian()
     )
 
 
-def _ehl_grid(given: Mapping[str, Any], a: float, cells: int) -> Grid:
+def _ehl_grid(given: CaseTable, a: float, cells: int) -> Grid:
     low, high = given["inlet_half_widths"] * a, given["outlet_half_widths"] * a
     if given["geometry"] == "point":
         side = given["side_half_widths"] * a
@@ -161,18 +170,22 @@ def _ehl_grid(given: Mapping[str, Any], a: float, cells: int) -> Grid:
     return Grid((cells, 8), (low, 0.0), (high, 8 * (high - low) / cells))
 
 
-def _oiled_waves(given: Mapping[str, Any], grid: Grid) -> Surface:
-    """Waves of (amplitude [m], waves a metre along x, waves over the width along y, phase [rad])."""
+def _oiled_waves(given: CaseTable, grid: Grid) -> Surface:
+    """Return the surface of waves in a lubricated contact.
+
+    Each wave is (amplitude [m], waves per metre along x, waves over the width along y, phase
+    [rad]).
+    """
     x, y = grid.x[:, None], grid.y[None, :] / given.get("width_m", 1.0)
     heights = [
-        a * np.cos(2.0 * np.pi * (along * x + across * y) + phase)
-        for a, along, across, phase in given["waves"]
+        a * np.cos(2.0 * np.pi * (wavenumber * x + across * y) + phase)
+        for a, wavenumber, across, phase in given["waves"]
     ]
     return Surface(np.broadcast_to(np.sum(heights, axis=0), grid.cells).copy(), grid)
 
 
-def _ehl(given: Mapping[str, Any], cells: int) -> dict[str, float]:
-    """Smooth, with standing waves (which may touch), and with no oil lost."""
+def _ehl(given: CaseTable, cells: int) -> dict[str, float]:
+    """Solve a contact that is smooth, has stationary waves, or conserves oil."""
     conditions = _conditions(given, float(np.mean(given["surface_speeds_m_s"])))
     grid = _ehl_grid(given, conditions.hertz.half_widths[0], cells)
     surface = _oiled_waves(given, grid) if "waves" in given else flat_surface(grid)
@@ -183,7 +196,7 @@ def _ehl(given: Mapping[str, Any], cells: int) -> dict[str, float]:
     return _films(given, solve_contact(conditions, _oil(given), surface, options=options))
 
 
-def _films(given: Mapping[str, Any], solution: ContactSolution) -> dict[str, float]:
+def _films(given: CaseTable, solution: ContactSolution) -> dict[str, float]:
     grid, gap, pressure = solution.grid, solution.gap, solution.pressure
     if given["geometry"] == "point":
         state = contact_state(solution)
@@ -192,31 +205,30 @@ def _films(given: Mapping[str, Any], solution: ContactSolution) -> dict[str, flo
         gap[:, 0] if grid.y[0] == 0.0 or "width_m" not in given else 0.5 * (gap[:, 0] + gap[:, -1])
     )
     inside = np.linspace(-1.0, 1.0, 4001) * solution.conditions.hertz.half_widths[0]
-    found = {
+    values = {
         "h_central_m": float(np.interp(0.0, grid.x, middle)),
-        "h_min_m": _least(gap[:, 0]),
+        "h_min_m": _min_film(gap[:, 0]),
         "h_mean_m": float(np.interp(inside, grid.x, gap.mean(axis=1)).mean()),
         "p_weighted_pa": float((pressure**2).sum() / pressure.sum()),
         "load_share": float((pressure * solution.in_contact).sum() / pressure.sum()),
     }
     if solution.oil is not None and given["kind"] == "conserving":
         speed = float(np.mean(given["surface_speeds_m_s"]))
-        found["flux_m2_s"] = speed * float(
-            (solution.oil.content * gap)[-1].mean()
-        )  # nothing drives it there but u
-    return found
+        # at the outlet only entrainment drives the oil
+        values["flux_m2_s"] = speed * float((solution.oil.content * gap)[-1].mean())
+    return values
 
 
-def _moving(given: Mapping[str, Any], cells: int) -> dict[str, float]:
-    """Waves of the first surface that run through: the film at x = 0 over their last period."""
+def _moving(given: CaseTable, cells: int) -> dict[str, float]:
+    """Solve waves of the first surface that pass through: film at x = 0 over their last period."""
     speeds = tuple(given["surface_speeds_m_s"])
     conditions = replace(_conditions(given), surface_speeds=speeds)
     a = conditions.hertz.half_widths[0]
     grid = _ehl_grid(given, a, cells)
     surfaces = MovingSurfaces.one_rough(_oiled_waves(given, grid), speeds)
-    ((amplitude, along, _, _),) = given["waves"]
+    ((amplitude, wavenumber, _, _),) = given["waves"]
     step, rough = grid.spacing[0], speeds[0] / float(np.mean(speeds))
-    period = round(1.0 / (along * rough * step))
+    period = round(1.0 / (wavenumber * rough * step))
     last = round(given["settles_half_widths"] * a / step) + period
     films = []
     for snapshot in islice(
@@ -224,26 +236,29 @@ def _moving(given: Mapping[str, Any], cells: int) -> dict[str, float]:
     ):
         if not snapshot.solution.convergence.converged:
             raise AsperityError(
-                f"step {snapshot.number} of {last} did not converge; take other cells"
+                f"step {snapshot.number} of {last} did not converge; use another number of cells"
             )
         films.append(float(np.interp(0.0, grid.x, snapshot.solution.gap[:, 0])))
-    heard = np.array(films[-period:])
-    turns = np.exp(2j * np.pi * np.arange(period) / period)
+    period_films = np.array(films[-period:])
+    phases = np.exp(2j * np.pi * np.arange(period) / period)
     return {
-        "amplitude_ratio": float(2.0 * abs(turns @ heard) / period / amplitude),
-        "h_mean_m": float(heard.mean()),
+        "amplitude_ratio": float(2.0 * abs(phases @ period_films) / period / amplitude),
+        "h_mean_m": float(period_films.mean()),
     }
 
 
-def _least(gap: Field) -> float:
-    """Vertex of the parabola through the three lowest cells, which a finer grid does not move from cell to cell."""
+def _min_film(gap: Field) -> float:
+    """Return the vertex of the parabola through the lowest cell and its neighbours.
+
+    Unlike the lowest cell it varies smoothly with the grid.
+    """
     i = int(np.clip(gap.argmin(), 1, gap.size - 2))
-    before, here, behind = gap[i - 1 : i + 2]
-    bend = before - 2.0 * here + behind
-    return float(here - (behind - before) ** 2 / (8.0 * bend)) if bend > 0.0 else float(here)
+    left, centre, right = gap[i - 1 : i + 2]
+    bend = left - 2.0 * centre + right
+    return float(centre - (right - left) ** 2 / (8.0 * bend)) if bend > 0.0 else float(centre)
 
 
-def _slider(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+def _slider(given: CaseTable, cells: int) -> dict[str, float]:
     journal = given["shape"] == "journal"
     length = 2.0 * np.pi * given["radius_m"] if journal else given["length_m"]
     share = (np.arange(cells) + 0.5) / cells

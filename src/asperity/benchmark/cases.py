@@ -1,22 +1,24 @@
-"""Cases of the benchmark, read from their files."""
+"""Benchmark cases, read from their files."""
 
 import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from asperity.core.errors import BadInput
 
+CaseTable: TypeAlias = Mapping[str, Any]  # plain SI numbers of a case by key
+
 KINDS = ("dry", "wave", "ehl", "mixed", "conserving", "moving", "slider")
-_BESIDE = Path(__file__).with_name("cases")  # in a wheel
+_IN_PACKAGE = Path(__file__).with_name("cases")  # in a wheel
 _IN_REPOSITORY = Path(__file__).parents[3] / "benchmark" / "cases"
 
 
 @dataclass(frozen=True)
 class Certified:
-    """A quantity with its value and uncertainty, in `unit`, and the ways that it was found by."""
+    """Certified quantity with its value and uncertainty in `unit`, and the two methods used."""
 
     quantity: str
     unit: str
@@ -27,28 +29,26 @@ class Certified:
 
 @dataclass(frozen=True)
 class BenchmarkCase:
-    """A case: `given` in plain SI numbers, and what is certified of it."""
+    """Benchmark case: `given` in plain SI numbers, and its certified quantities."""
 
     name: str
     kind: str
-    given: Mapping[str, Any]
+    given: CaseTable
     certified: tuple[Certified, ...]
 
 
 def load_benchmark(folder: Path | None = None) -> tuple[BenchmarkCase, ...]:
-    """The cases of a folder; without one, those that come with asperity.
+    """Load the cases of a folder, by default those packaged with asperity.
 
     Raises
     ------
     BadInput
-        for a folder without cases, and for a file that is no case.
+        for a folder without cases, or an invalid case file.
     """
-    place = folder or (_BESIDE if _BESIDE.is_dir() else _IN_REPOSITORY)
-    files = sorted(place.glob("*.toml"))
+    source = folder or (_IN_PACKAGE if _IN_PACKAGE.is_dir() else _IN_REPOSITORY)
+    files = sorted(source.glob("*.toml"))
     if not files:
-        raise BadInput(
-            f"{place} holds no cases of the benchmark (*.toml); name the folder that does"
-        )
+        raise BadInput(f"{source} contains no benchmark cases (*.toml); choose another folder")
     return tuple(_read(path) for path in files)
 
 
@@ -75,7 +75,7 @@ def _read(path: Path) -> BenchmarkCase:
         ValueError,
     ) as error:
         raise BadInput(
-            f"{path} is no case of the benchmark: {error!r}; benchmark/certify.py writes them"
+            f"{path} is not a benchmark case: {error!r}; benchmark/certify.py writes such files"
         ) from None
     if kind not in KINDS:
         raise BadInput(f"{path}: kind must be one of {', '.join(KINDS)}, got {kind}")

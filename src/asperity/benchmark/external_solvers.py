@@ -1,12 +1,11 @@
-"""Adapters of other people's solvers, installed apart: `pip install tamaas`, `pip install ContactMechanics`."""
+"""Adapters of external solvers: `pip install tamaas`, `pip install ContactMechanics`."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from asperity.benchmark.asperity_solver import dry_roughness, pressures
+from asperity.benchmark.cases import CaseTable
 from asperity.contact.conditions import ElasticPair
 from asperity.contact.grid import Grid
 from asperity.contact.hertz import elliptic_contact, point_contact
@@ -14,14 +13,14 @@ from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError
 
 
-class Pressed(ABC):
-    """What presses heights flat, in units of a side and the reduced modulus: dry balls, ellipses and periodic waves."""
+class DryContactSolver(ABC):
+    """Dry contact of rough balls, ellipses and periodic waves, in units of a side and E*."""
 
     name: str
     kinds = ("dry", "wave")
 
-    def solve(self, given: Mapping[str, Any], cells: int) -> dict[str, float]:
-        """Quantities by key; nothing of line contacts, which end on a periodic or a bounded side."""
+    def solve(self, given: CaseTable, cells: int) -> dict[str, float]:
+        """Return quantities by key; none for line contacts (mixed periodicity)."""
         modulus = ElasticPair(
             tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"])
         ).reduced_modulus
@@ -29,7 +28,7 @@ class Pressed(ABC):
             return self._wave(given, cells, modulus)
         return {} if given["geometry"] == "line" else self._bounded(given, cells, modulus)
 
-    def _bounded(self, given: Mapping[str, Any], cells: int, modulus: float) -> dict[str, float]:
+    def _bounded(self, given: CaseTable, cells: int, modulus: float) -> dict[str, float]:
         load, radius = given["load_n"], given["radius_m"]
         radii = tuple(radius) if isinstance(radius, list) else (radius, radius)
         hertz = (
@@ -50,7 +49,7 @@ class Pressed(ABC):
         )
         return pressures(pressure * modulus, grid.spacing[0] * grid.spacing[1])
 
-    def _wave(self, given: Mapping[str, Any], cells: int, modulus: float) -> dict[str, float]:
+    def _wave(self, given: CaseTable, cells: int, modulus: float) -> dict[str, float]:
         length, amplitude = given["wavelength_m"], given["amplitude_m"]
         mean = given["pressure_over_full"] * np.pi * amplitude / length
         wave = amplitude / length * np.cos(2.0 * np.pi * (np.arange(cells) + 0.5) / cells)
@@ -64,11 +63,11 @@ class Pressed(ABC):
     def pressed(
         self, heights: Field, sides: tuple[float, float], mean: float, *, images: bool = False
     ) -> tuple[Field, Field]:
-        """Pressure and gap under a mean pressure; with `images` both sides repeat."""
+        """Return pressure and gap under a mean pressure; with `images` periodic."""
 
 
-class Tamaas(Pressed):
-    """tamaas: Polonsky and Keer's conjugate gradients."""
+class Tamaas(DryContactSolver):
+    """Adapter of tamaas: conjugate gradients by Polonsky and Keer."""
 
     name = "tamaas"
 
@@ -81,7 +80,7 @@ class Tamaas(Pressed):
     def pressed(
         self, heights: Field, sides: tuple[float, float], mean: float, *, images: bool = False
     ) -> tuple[Field, Field]:
-        """By PolonskyKeerRey, with the kernel dcfft where nothing repeats."""
+        """Solve by PolonskyKeerRey, with the kernel dcfft if not periodic."""
         model = self.tamaas.ModelFactory.createModel(
             self.tamaas.model_type.basic_2d, list(sides), list(heights.shape)
         )
@@ -95,8 +94,8 @@ class Tamaas(Pressed):
         return np.asarray(model.traction), gap - gap.min()
 
 
-class ContactMechanics(Pressed):
-    """ContactMechanics, by its constrained conjugate gradients."""
+class ContactMechanics(DryContactSolver):
+    """Adapter of ContactMechanics: constrained conjugate gradients."""
 
     name = "contactmechanics"
 
@@ -109,7 +108,7 @@ class ContactMechanics(Pressed):
     def pressed(
         self, heights: Field, sides: tuple[float, float], mean: float, *, images: bool = False
     ) -> tuple[Field, Field]:
-        """By a hard wall on its half-space, free or periodic."""
+        """Solve with a hard wall on a free or periodic half-space."""
         from SurfaceTopography import Topography
 
         nx, ny = heights.shape
@@ -122,9 +121,9 @@ class ContactMechanics(Pressed):
         topography = Topography(heights, sides, periodic=images)
         system = self.make_system(interaction="hardwall", substrate=substrate, surface=topography)
         area = sides[0] * sides[1]
-        found = system.minimize_proxy(external_force=mean * area, pentol=1e-9, maxiter=5000)
-        if not found.success:
-            raise AsperityError(f"ContactMechanics: {found.message}")
+        result = system.minimize_proxy(external_force=mean * area, pentol=1e-9, maxiter=5000)
+        if not result.success:
+            raise AsperityError(f"ContactMechanics: {result.message}")
         pressure = np.abs(np.asarray(substrate.force)[:nx, :ny]) * (nx * ny / area)
-        gap = np.asarray(found.x)[:nx, :ny] - heights
+        gap = np.asarray(result.x)[:nx, :ny] - heights
         return pressure, gap - gap.min()

@@ -73,13 +73,15 @@ def rig(
     history = _wear(worn, hours, case_file)
     with progress("rig", "simulating ...", quiet=quiet) as display:
         made = paper.simulate_rig(
-            samples=samples,
-            repeats=repeats,
-            duration_s=case.read_amount("--duration", "s", duration),
-            rate_hz=case.read_amount("--rate", "Hz", rate),
+            paper.RigSettings(
+                samples=samples,
+                repeats=repeats,
+                duration_s=case.read_amount("--duration", "s", duration),
+                rate_hz=case.read_amount("--rate", "Hz", rate),
+                trend=trend,  # type: ignore[arg-type]
+                seed=seed,
+            ),
             disturbance=paper.Disturbance(snr_db=snr, modes=modes),
-            trend=trend,  # type: ignore[arg-type]
-            seed=seed,
             case=case_at(case_file) if history is None else history.case,
             moments=None if history is None else history.moments(hours, samples),
         )

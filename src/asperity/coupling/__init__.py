@@ -1,4 +1,4 @@
-"""From a solved contact to its vibration: the only room that knows both."""
+"""Vibration of a solved contact: stiffness, damping and excitation laws, and simulated records."""
 
 import lazy_loader
 

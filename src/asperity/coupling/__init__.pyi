@@ -32,7 +32,7 @@ from .model import Choice as Choice
 from .model import VibrationModel as VibrationModel
 from .model import preset_choices as preset_choices
 from .model import vibration_choices as vibration_choices
-from .record import LINEAR_UP_TO as LINEAR_UP_TO
+from .record import MAX_LINEAR_LOAD as MAX_LINEAR_LOAD
 from .record import SampledLine as SampledLine
 from .record import Vibration as Vibration
 from .record import contact_vibration as contact_vibration

@@ -1,7 +1,7 @@
-"""What the contact's roughness does to a mass on it: which excitation passes below, averaged over which contact patch.
+"""Excitation of the mass by the contact's roughness, and averaging over the contact patch.
 
-A law makes an `asperity.vibration.Excitation` of the contact under its load, and says what keeps
-it from doing so.
+A law turns the contact under its load into an `asperity.vibration.Excitation`, or states why it
+cannot.
 """
 
 from abc import ABC, abstractmethod
@@ -20,33 +20,33 @@ Coefficient: TypeAlias = Literal["readjusted", "kept"]
 
 
 class ExcitationLaw(ABC):
-    """What passes under the mass. `needs_solution`: only the solved contact can tell."""
+    """Excitation of the mass. `needs_solution`: the law needs the solved contact."""
 
     name: ClassVar[str]
-    label: ClassVar[str]  # of a profile in a figure
+    label: ClassVar[str]  # label of a profile in a figure
     needs_solution: ClassVar[bool] = False
 
     @abstractmethod
     def __call__(self, contact: LoadedContact) -> Excitation:
-        """The excitation of this contact; raises BadInput where it has none."""
+        """Return the excitation of this contact; raise BadInput if there is none."""
 
     def objection(self, state: ContactState) -> str | None:  # noqa: ARG002 - none in any contact
-        """Why nothing excites the mass on this contact; None where something does."""
+        """Return the reason why this contact has no excitation; None if it has one."""
         return None
 
     @property
     @abstractmethod
     def summary(self) -> str:
-        """The excitation in a line; a noise's defaults are left out."""
+        """Description in one line; default values are omitted."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CutoffLaw(Parametric):
-    """Cut-off of the profile: fc = fc_ref (CAR/CAR_ref)^q.
+    """Cut-off frequency of the profile: fc = fc_ref (CAR/CAR_ref)^q.
 
-    The paper names no law. 30 Hz is the base case of its dry section 2, in which everything
-    touches, hence CAR_ref = 1; q = 0.18 is where its "the two effects offset" holds (in
-    proportion, q = 1, CRFA would grow 60 000-fold).
+    The paper states no law. 30 Hz is the base case of its dry section 2, in which everything
+    touches, hence CAR_ref = 1; at q = 0.18 its "the two effects offset" holds (in proportion, q =
+    1, CRFA would grow 60 000-fold).
     """
 
     cutoff_reference_hz: Annotated[
@@ -59,11 +59,12 @@ class CutoffLaw(Parametric):
         super().__post_init__()
         if not 0.0 <= self.cutoff_exponent <= 2.0:
             raise BadInput(
-                f"cut-off exponent must lie between 0 and 2, got {self.cutoff_exponent:g}; 0.18 is the default"
+                f"cut-off exponent must be between 0 and 2, got {self.cutoff_exponent:g}; the "
+                "default is 0.18"
             )
 
     def cutoff_hz(self, car: float) -> float:
-        """Cut-off [Hz] of an area share CAR, counted in the Hertz zone as the paper does."""
+        """Return the cut-off [Hz] at an area share CAR in the Hertz zone."""
         return float(self.cutoff_reference_hz * (car / self.car_reference) ** self.cutoff_exponent)
 
 
@@ -71,10 +72,10 @@ class CutoffLaw(Parametric):
 class NoiseExcitation(NoiseFilter, CutoffLaw, ExcitationLaw):
     """Filtered Gaussian noise of height Sq.
 
-    By default Sq is the height of the process, not of the one record: scaling each record to Sq
-    would hand the chance of a few hundred slow waves on to CRFA (about 9 % at 30 Hz and 4 s). The
-    noise's `coefficient` is "readjusted" to the height at every cut-off, or "kept" from the
-    reference cut-off.
+    By default Sq is the height of the process, not of a single record: scaling each record to Sq
+    would transfer the scatter of a few hundred slow waves to CRFA (about 9 % at 30 Hz and 4 s). The
+    noise `coefficient` is "readjusted" to the height at every cut-off, or "kept" from the reference
+    cut-off.
     """
 
     coefficient: Coefficient = "readjusted"
@@ -88,7 +89,7 @@ class NoiseExcitation(NoiseFilter, CutoffLaw, ExcitationLaw):
         require_choice("noise coefficient", self.coefficient, get_args(Coefficient))
 
     def __call__(self, contact: LoadedContact) -> Excitation:
-        """The noise behind the cut-off of this CAR; raises BadInput for a flat surface or where nothing touches."""
+        """Return the noise at this CAR's cut-off; raise BadInput if flat or without contact."""
         car = require_positive("area share of the asperities (CAR)", contact.state.car)
         return FilteredNoise(
             height=require_positive("roughness Sq", contact.state.sq, "m"),
@@ -98,59 +99,64 @@ class NoiseExcitation(NoiseFilter, CutoffLaw, ExcitationLaw):
         )
 
     def objection(self, state: ContactState) -> str | None:
-        """The noise's cut-off is counted inside the Hertz zone."""
+        """Return the reason if no asperity touches in the Hertz zone, on which CAR depends."""
         if state.car == 0.0:
-            return "asperities touch outside the Hertz zone only, and the excitation is counted inside it"
+            return (
+                "asperities touch outside the Hertz zone only, but the excitation is defined "
+                "inside it"
+            )
         return None
 
     @property
     def summary(self) -> str:
         """Height, filter and cut-off."""
         height = {"rms": "RMS", "ra": "Ra"}[self.height_as]
-        of = "" if self.height_of == "process" else f" of the {self.height_of}"
+        scope = "" if self.height_of == "process" else f" of the {self.height_of}"
         kind = "" if self.filter == "continuous" else f"{self.filter} "
         order = "" if self.filter_order == 2 else f" of order {self.filter_order}"
         kept = ", coefficient kept" if self.coefficient == "kept" else ""
         return (
-            f"white noise of {height} height Sq{of} behind a {kind}low pass{order} at {self.cutoff_reference_hz:.4g} Hz"
-            f" × (CAR/{self.car_reference:.3g})^{self.cutoff_exponent:.3g}{kept}"
+            f"white noise of {height} height Sq{scope} behind a {kind}low pass{order} at "
+            f"{self.cutoff_reference_hz:.4g} Hz × "
+            f"(CAR/{self.car_reference:.3g})^{self.cutoff_exponent:.3g}{kept}"
         )
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Passing(Parametric):
-    """Roughness passes the contact at this speed; None: the sliding speed."""
+    """Speed at which roughness passes the contact; default the sliding speed."""
 
     passing_speed: Annotated[float | None, Parameter("m/s", "v", "passing speed")] = None
 
     def speed(self, conditions: ContactConditions) -> float:
-        """Speed [m/s]; raises BadInput where nothing passes."""
+        """Return the speed [m/s]; raise BadInput if it is zero."""
         speed = conditions.sliding_speed if self.passing_speed is None else self.passing_speed
         if speed == 0.0:
             raise BadInput(
-                "roughness passes the contact at the sliding speed, which is 0; give passing_speed, or slip"
+                "roughness passes the contact at the sliding speed, which is 0; give "
+                "passing_speed or slip"
             )
         return speed
 
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceExcitation(_Passing, ExcitationLaw):
-    """The solved contact's surface, its own spectrum run over."""
+    """Spectrum of the solved contact's surface, traversed at the passing speed."""
 
     name = "surface"
-    label = "the surface run over"
+    label = "surface profile"
     needs_solution = True
 
     def __call__(self, contact: LoadedContact) -> Excitation:
-        """The surface's track; raises BadInput without a solution, for a flat surface, or where nothing passes."""
+        """Return the surface's track; raise BadInput without solution, roughness or speed."""
         speed = self.speed(contact.conditions)
         if contact.solution is None:
             raise BadInput(
-                "excitation surface needs the solved contact's surface; solve the case, or take noise"
+                "excitation surface needs the solved contact's surface; solve the case or use noise"
             )
-        return SurfaceTrack.of(contact.solution.surface, speed)
+        return SurfaceTrack.from_surface(contact.solution.surface, speed)
 
-    summary = "the surface's own spectrum run over"
+    summary = "spectrum of the contact's surface"
 
 
 EXCITATIONS: dict[str, type[ExcitationLaw]] = {
@@ -159,28 +165,28 @@ EXCITATIONS: dict[str, type[ExcitationLaw]] = {
 
 
 class PatchLaw(ABC):
-    """Over which contact patch an excitation is averaged."""
+    """Averaging of an excitation over a contact patch."""
 
     name: ClassVar[str]
 
     @abstractmethod
     def __call__(self, source: Excitation, contact: LoadedContact) -> Excitation:
-        """The averaged excitation."""
+        """Return the averaged excitation."""
 
     @property
     def summary(self) -> str:
-        """The patch, to stand behind its excitation."""
+        """Description of the patch, appended to that of the excitation."""
         return f", averaged over a {self.name} patch"
 
 
 @dataclass(frozen=True, kw_only=True)
 class NoPatch(PatchLaw):
-    """The profile as it is."""
+    """No averaging."""
 
     name = "none"
 
     def __call__(self, source: Excitation, contact: LoadedContact) -> Excitation:  # noqa: ARG002
-        """The excitation itself."""
+        """Return the excitation unchanged."""
         return source
 
     summary = ""
@@ -188,24 +194,24 @@ class NoPatch(PatchLaw):
 
 @dataclass(frozen=True, kw_only=True)
 class LinePatch(_Passing, PatchLaw):
-    """Half-width of the smooth line contact under the whole load."""
+    """Patch with the half-width of the smooth line contact under the whole load."""
 
     name = "line"
 
     def __call__(self, source: Excitation, contact: LoadedContact) -> Excitation:
-        """Averaged over the line; raises BadInput where nothing passes."""
+        """Return the average over the line; raise BadInput if the speed is zero."""
         half_width, speed = contact.conditions.hertz.half_widths[0], self.speed(contact.conditions)
         return PatchAverage(source=source, shape="line", half_width=half_width, speed=speed)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PointPatch(_Passing, PatchLaw):
-    """Radius of the sphere's contact under the asperities' load."""
+    """Patch with the radius of the sphere's contact under the asperity load."""
 
     name = "point"
 
     def __call__(self, source: Excitation, contact: LoadedContact) -> Excitation:
-        """Averaged over the circle; raises BadInput where nothing passes or asperities carry nothing."""
+        """Return the average over the circle; raise BadInput without speed or asperity load."""
         conditions, speed = contact.conditions, self.speed(contact.conditions)
         load = require_positive("load share of the asperities (CLR)", contact.clr) * conditions.load
         point = point_contact(

@@ -1,6 +1,6 @@
-"""Laws of the contact's spring and damper, each a small frozen value that is called with the contact under its load.
+"""Stiffness and damping laws: small frozen values, called with the contact under its load.
 
-A law answers for itself: whether it is the asperities' spring alone, whether it needs the solved
+Each law states whether it describes the asperities' spring alone and whether it needs the solved
 contact. A new law is a new class here and one line in its table; its parameters are keywords of
 `VibrationModel` and keys of the case file.
 """
@@ -24,7 +24,7 @@ ROUGHNESS_FACTOR = 0.48
 
 
 class LoadedContact(NamedTuple):
-    """What a law may look at; `clr` in place of the state's own. Without a solution only scalars are known."""
+    """Contact as seen by a law; `clr` replaces that of `state`; `solution` may be missing."""
 
     clr: float
     state: ContactState
@@ -40,10 +40,10 @@ class LoadedContact(NamedTuple):
 class StiffnessLaw(ABC):
     """Stiffness of the contact [N/m].
 
-    `asperities_alone`: no spring without touching asperities, and it carries and grows with their
-    load; other laws need the solved contact. `by_load_share`: what it takes of the contact is its
-    load share and means over it, so that it can be asked at another share. `point_spring`: a
-    sphere's, force ~ compression^1.5, which a nonlinear response supposes.
+    `asperities_alone`: the spring exists only with touching asperities, carries their load and
+    grows with it; other laws need the solved contact. `by_load_share`: the law depends on the load
+    share and on mean values only, so that it can be evaluated at another share. `point_spring`: a
+    sphere's spring, force ~ compression^1.5, which a nonlinear response assumes.
     """
 
     name: ClassVar[str]
@@ -53,23 +53,23 @@ class StiffnessLaw(ABC):
 
     @abstractmethod
     def __call__(self, contact: LoadedContact) -> float:
-        """dF/dz [N/m]."""
+        """Return dF/dz [N/m]."""
 
     def at_full_load(self, conditions: ContactConditions) -> "StiffnessLaw":  # noqa: ARG002 - the same in any contact
-        """The law that says how stiff the contact is with all load on asperities."""
+        """Return the law for the stiffness with all load on asperities."""
         return self
 
 
 @dataclass(frozen=True, slots=True)
 class HertzPoint(StiffnessLaw):
-    """Stiffness of a sphere on a plane under the asperities' load, Rx and E* of the contact: the paper's Eqs 2-3."""
+    """Stiffness of a sphere on a plane under the asperity load, with Rx and E* (Eqs 2-3)."""
 
     name = "hertz-point"
     asperities_alone = by_load_share = True
     point_spring = True
 
     def __call__(self, contact: LoadedContact) -> float:
-        """1.5 F/z0 [N/m]."""
+        """Return 1.5 F/z0 [N/m]."""
         conditions = contact.conditions
         return point_stiffness(
             contact.asperity_load, conditions.radius_along_rolling, conditions.pair.reduced_modulus
@@ -78,7 +78,7 @@ class HertzPoint(StiffnessLaw):
 
 @dataclass(frozen=True, slots=True)
 class _LineApproach(Parametric):
-    """A line contact's approach depends on the depth that it is measured from."""
+    """Reference depth of a line contact, on which its approach depends."""
 
     # None: 2R/e, a roller held at its centre
     reference_depth: Annotated[float | None, Parameter("m", "d", "reference depth")] = None
@@ -86,17 +86,18 @@ class _LineApproach(Parametric):
 
 @dataclass(frozen=True, slots=True)
 class HertzLine(_LineApproach, StiffnessLaw):
-    """Stiffness of a smooth line contact under the asperities' load: π E* L / (2 ln(2d/a))."""
+    """Stiffness of a smooth line contact under the asperity load: π E* L / (2 ln(2d/a))."""
 
     name = "hertz-line"
     asperities_alone = by_load_share = True
 
     def __call__(self, contact: LoadedContact) -> float:
-        """S [N/m]; raises BadInput for a contact that is no line."""
+        """Return S [N/m]; raise BadInput for a contact that is not a line contact."""
         conditions = contact.conditions
         if not conditions.long:
             raise BadInput(
-                f"stiffness law hertz-line needs a line contact, got {articled(conditions.geometry)} contact"
+                "stiffness law hertz-line needs a line contact, got "
+                f"{articled(conditions.geometry)} contact"
             )
         return line_stiffness(
             contact.asperity_load,
@@ -109,18 +110,18 @@ class HertzLine(_LineApproach, StiffnessLaw):
 
 @dataclass(frozen=True, slots=True)
 class ParallelFilm(StiffnessLaw):
-    """Asperity layer and oil film side by side, both on the elastic bodies: 1/S = 1/S_bodies + 1/(k_a + k_f).
+    """Asperity layer and film in parallel, in series with the bodies.
 
-    S_bodies is Hertz's point spring under the whole load, k_a = CLR F / (γ Sq) the stiffness of a
-    randomly rough layer, k_f = (1 - CLR) F / (0.13 h) that of a film with h ~ load^-0.13, h its
-    mean over the Hertz zone.
+    1/S = 1/S_bodies + 1/(k_a + k_f). S_bodies is Hertz's point spring under the whole load, k_a =
+    CLR F / (γ Sq) the stiffness of a randomly rough layer, k_f = (1 - CLR) F / (0.13 h) that of a
+    film with h ~ load^-0.13, h its mean over the Hertz zone.
     """
 
     name = "parallel-film"
     by_load_share = True
 
     def __call__(self, contact: LoadedContact) -> float:
-        """S [N/m]."""
+        """Return S [N/m]."""
         state = contact.state
         layers = contact.asperity_load / (ROUGHNESS_FACTOR * state.sq) if state.sq > 0.0 else 0.0
         if state.h_mean > 0.0:
@@ -131,26 +132,30 @@ class ParallelFilm(StiffnessLaw):
 
 @dataclass(frozen=True, slots=True)
 class Tangent(_LineApproach, StiffnessLaw):
-    """Tangent stiffness of the solved contact itself, asperities and film: `asperity.solution.tangent_stiffness`."""
+    """Tangent stiffness of the solved contact, asperities and film."""
 
     name = "tangent"
 
     def __call__(self, contact: LoadedContact) -> float:
-        """dF/dδ [N/m]; raises BadInput without a solution, NotConverged where a neighbouring load has none."""
+        """Return dF/dδ [N/m].
+
+        Raises
+        ------
+        BadInput
+            without a solution.
+        NotConverged
+            if a neighbouring load cannot be solved.
+        """
         if contact.solution is None:
             raise BadInput(
-                "stiffness law tangent needs the solved contact; solve the case, or take another law"
+                "stiffness law tangent needs the solved contact; solve the case or use another law"
             )
-        return self.of(contact.solution)
-
-    def of(self, solution: ContactSolution) -> float:
-        """dF/dδ of a solved contact [N/m]."""
         return postprocessing.tangent_stiffness(
-            solution, reference_depth=self.reference_depth
+            contact.solution, reference_depth=self.reference_depth
         ).total
 
     def at_full_load(self, conditions: ContactConditions) -> StiffnessLaw:
-        """That of the smooth, dry contact: a tangent belongs to its own load share."""
+        """Return the law of the smooth, dry contact: a tangent holds at its own load share only."""
         return HertzLine(self.reference_depth) if conditions.long else HertzPoint()
 
 
@@ -160,9 +165,9 @@ STIFFNESS_LAWS: dict[str, type[StiffnessLaw]] = {
 
 
 class DampingLaw(ABC):
-    """Damping ratio ζ of the oscillator; `damping_ratio` is the one that the model states.
+    """Damping ratio ζ of the oscillator; `damping_ratio` is the one stated in the model.
 
-    `needs_solution`: only the solved contact can tell.
+    `needs_solution`: the law needs the solved contact.
     """
 
     name: ClassVar[str]
@@ -177,16 +182,16 @@ class DampingLaw(ABC):
         damping_ratio: float,
         solution: ContactSolution | None = None,
     ) -> float:
-        """ζ, of a mass [kg] on a spring [N/m]."""
+        """Return ζ for a mass [kg] on a spring [N/m]."""
 
     def summary(self, damping_ratio: float) -> str:
-        """The law and its number in a few words."""
+        """Return the law and its value in a few words."""
         return f"damping ratio {damping_ratio:.3g} by the law {self.name}"
 
 
 @dataclass(frozen=True, slots=True)
 class RatioDamping(DampingLaw):
-    """C = 2 ζ ω m: the paper's Eq 5."""
+    """Constant damping ratio, C = 2 ζ ω m: the paper's Eq 5."""
 
     name = "ratio"
 
@@ -198,17 +203,17 @@ class RatioDamping(DampingLaw):
         damping_ratio: float,
         solution: ContactSolution | None = None,  # noqa: ARG002
     ) -> float:
-        """ζ as stated."""
+        """Return ζ as stated."""
         return damping_ratio
 
     def summary(self, damping_ratio: float) -> str:
-        """The ratio."""
+        """Return the damping ratio as text."""
         return f"damping ratio {damping_ratio:.3g}"
 
 
 @dataclass(frozen=True, slots=True)
 class ConstantDamping(Parametric, DampingLaw):
-    """C is the same at any load: ζ = C / (2 sqrt(S m))."""
+    """Constant damping coefficient C at any load: ζ = C / (2 sqrt(S m))."""
 
     damping: Annotated[float, Parameter("N s/m", "C", "damping")]
 
@@ -222,17 +227,17 @@ class ConstantDamping(Parametric, DampingLaw):
         damping_ratio: float,  # noqa: ARG002
         solution: ContactSolution | None = None,  # noqa: ARG002
     ) -> float:
-        """ζ of this C."""
+        """Return the ζ of this C."""
         return self.damping / (2.0 * float(np.sqrt(stiffness * mass)))
 
     def summary(self, damping_ratio: float) -> str:  # noqa: ARG002
-        """C."""
+        """Return C as text."""
         return f"damping {self.damping:.3g} N s/m"
 
 
 @dataclass(frozen=True, slots=True)
 class HertzForRadian(DampingLaw):
-    """The paper's Eq 5 with Eq 4's hertz in it: a damping ratio of ζ/2π."""
+    """The paper's Eq 5 with the frequency of Eq 4 in Hz, not rad/s: a damping ratio of ζ/2π."""
 
     name = "hertz-for-radian"
 
@@ -244,15 +249,15 @@ class HertzForRadian(DampingLaw):
         damping_ratio: float,
         solution: ContactSolution | None = None,  # noqa: ARG002
     ) -> float:
-        """ζ/2π."""
+        """Return ζ/2π."""
         return damping_ratio / (2.0 * float(np.pi))
 
 
 @dataclass(frozen=True, slots=True)
 class ContactDamping(DampingLaw):
-    """The solved contact's own ω c/2k at the oscillator's frequency, on top of ζ of all the rest, which is stated.
+    """Damping of the solved contact, ω c/2k at the oscillator's frequency, plus the stated ζ.
 
-    Of asperities that have borne this load before; `asperity.solution.dynamic_stiffness`.
+    Asperities have carried this load before; see `asperity.solution.dynamic_stiffness`.
     """
 
     name = "contact"
@@ -266,23 +271,30 @@ class ContactDamping(DampingLaw):
         damping_ratio: float,
         solution: ContactSolution | None = None,
     ) -> float:
-        """ζ of both; raises BadInput without a solution, or where the contact feeds more than the rest damps."""
+        """Return the total ζ.
+
+        Raises
+        ------
+        BadInput
+            without a solution, or if the total is not positive (self-excited vibration).
+        """
         if solution is None:
             raise BadInput(
-                "damping law contact needs the solved contact; solve the case, or take another law"
+                "damping law contact needs the solved contact; solve the case or use another law"
             )
         frequency_hz = float(np.sqrt(stiffness / mass) / (2.0 * np.pi))
-        own = postprocessing.dynamic_stiffness(solution, frequency_hz).damping_ratio
-        if own + damping_ratio <= 0.0:
+        contact_ratio = postprocessing.dynamic_stiffness(solution, frequency_hz).damping_ratio
+        if contact_ratio + damping_ratio <= 0.0:
             raise BadInput(
-                f"the contact's oil feeds a vibration of {frequency_hz:.0f} Hz (damping ratio {own:.2g}) more than the "
-                f"stated {damping_ratio:g} damps: no steady vibration; state more damping, or another mass"
+                f"the oil excites vibration at {frequency_hz:.0f} Hz (damping ratio "
+                f"{contact_ratio:.2g}) more than the stated {damping_ratio:g} damps it, so that "
+                "no steady vibration exists; state more damping or another mass"
             )
-        return own + damping_ratio
+        return contact_ratio + damping_ratio
 
     def summary(self, damping_ratio: float) -> str:
-        """What is added to what."""
-        return f"damping ratio {damping_ratio:.3g} and the solved contact's own"
+        """Return both contributions as text."""
+        return f"damping ratio {damping_ratio:.3g} plus that of the solved contact"
 
 
 DAMPING_LAWS: dict[str, type[DampingLaw]] = {

@@ -1,7 +1,7 @@
-"""How a contact becomes a vibration: mass, laws and record as one value, and the two presets.
+"""Vibration model of a contact: mass, laws and record settings as one value, and two presets.
 
-A law can be chosen by its name, with its parameters beside it as the case file has them; what is
-stated for laws that are not in use is kept, so that another law can be tried.
+A law can be chosen by its name, with its parameters as further keywords, as in the case file.
+Parameters of laws that are not in use are retained, so that another law can be selected later.
 """
 
 from collections.abc import Mapping
@@ -31,17 +31,15 @@ from asperity.coupling.laws import (
 from asperity.resonance import INDICATOR_METHODS, IndicatorMethod
 from asperity.vibration import RESPONSE_METHODS, SUBSTEPS, ResponseMethod, require_damping_ratio
 
-SAMPLE_BYTES, SAMPLE_S = 150.0, 1e-6  # what a sample of a record takes of memory and time
-SAMPLES_PER_PERIOD = (
-    15.0  # below it the straight lines between samples cost the resonance over 3 % of its power
-)
+SAMPLE_BYTES, SAMPLE_S = 150.0, 1e-6  # memory [B] and time [s] per sample of a record
+SAMPLES_PER_PERIOD = 15.0  # with fewer, linear interpolation costs over 3 % of the resonance power
 LAWS: dict[str, Mapping[str, type[Any]]] = {
     "damping_law": DAMPING_LAWS,
     "stiffness_law": STIFFNESS_LAWS,
     "excitation": EXCITATIONS,
     "patch": CONTACT_PATCHES,
 }
-_NAMES = {"patch": "contact patch"}  # where the keyword is not what people call it
+_NAMES = {"patch": "contact patch"}  # usual names that differ from the keyword
 
 PRESETS: dict[str, dict[str, Any]] = {
     "paper": {
@@ -67,26 +65,32 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True, kw_only=True, init=False)
 class VibrationModel(Parametric):
-    """How a contact state becomes a vibration record. The defaults are the preset `sound`; `preset` makes the other.
+    """Vibration model of a contact. The defaults are the preset `sound`; see also `preset`.
 
     Parameters
     ----------
-    mass : mass that rides on the contact [kg]
-    damping_ratio : of the contact oscillator; 0.01 dry to 0.1 in boundary lubrication (the paper's section 2.1)
-    damping_law, stiffness_law, excitation, patch : a law, or its name in DAMPING_LAWS, STIFFNESS_LAWS, EXCITATIONS and
-        CONTACT_PATCHES with its parameters as further keywords: `stiffness_law="hertz-line", reference_depth=0.01`.
-        "hertz-point" is the paper's spring, a line contact's own stiffness is far higher
+    mass : mass on the contact spring [kg]
+    damping_ratio : of the contact oscillator; 0.01 dry to 0.1 in boundary lubrication (the paper's
+        section 2.1)
+    damping_law, stiffness_law, excitation, patch : a law, or its name in DAMPING_LAWS,
+        STIFFNESS_LAWS, EXCITATIONS and CONTACT_PATCHES with its parameters as further keywords:
+        `stiffness_law="hertz-line", reference_depth=0.01`. "hertz-point" is the paper's spring; the
+        stiffness of a line contact is far higher
     response, substeps : see `asperity.vibration.acceleration`
-    rate_hz : samples a second; at least `samples_per_period` times the full-load resonance
-    samples_per_period : 15 keeps the loss to the straight lines between samples below 3 % of CRFA (at 100 kHz and
-        3.5 kHz it is 0.8 %)
-    duration_s : length of the record [s]; sd(CRF) = sqrt(ζ f0 / (2π duration)), 1.7 Hz for the paper's case and 4 s
-    seed : of the profile; one seed, one record
-    method : how the resonance is estimated, name in INDICATOR_METHODS. The likeliest line supposes a base that is white
-        in acceleration, as noise behind a filter of order 2 is; over a surface's own spectrum, or averaged by a patch,
-        take "peak", or `Vibration.expected`
+    rate_hz : sampling rate; at least `samples_per_period` times the full-load resonance
+    samples_per_period : 15 keeps the loss by linear interpolation between samples below 3 % of CRFA
+        (at 100 kHz and 3.5 kHz it is 0.8 %)
+    duration_s : length of the record [s]; sd(CRF) = sqrt(ζ f0 / (2π duration)), 1.7 Hz for the
+        paper's case and 4 s
+    seed : random seed of the profile
+    method : resonance estimator, name in INDICATOR_METHODS. Maximum likelihood assumes a base that
+        is white in acceleration, such as noise behind a filter of order 2; for a surface's own
+        spectrum, or a patch average, use "peak", or `Vibration.expected`
 
-    Raises BadInput for a quantity out of range or a name that is not in its table.
+    Raises
+    ------
+    BadInput
+        for a quantity out of range or an unknown name.
     """
 
     mass: Annotated[float, Parameter("kg", "m", "oscillator mass")]
@@ -102,9 +106,8 @@ class VibrationModel(Parametric):
     duration_s: Annotated[float, Parameter("s", positive="vibration duration")] = 4.0
     seed: int = 1
     method: IndicatorMethod = "likelihood"
-    stated: Mapping[str, Any] = field(
-        init=False, repr=False, compare=False
-    )  # every keyword by name, used or not
+    # every keyword by name, used or not
+    stated: Mapping[str, Any] = field(init=False, repr=False, compare=False)
 
     def __init__(self, *, mass: float, damping_ratio: float, **choices: Any) -> None:
         choices = _by_name({"mass": mass, "damping_ratio": damping_ratio, **choices})
@@ -130,7 +133,7 @@ class VibrationModel(Parametric):
         if not self.samples_per_period >= 2.0:
             raise BadInput(
                 f"samples per period must be at least 2, got {self.samples_per_period:g}; "
-                f"{SAMPLES_PER_PERIOD:g} is the default"
+                f"the default is {SAMPLES_PER_PERIOD:g}"
             )
         samples = self.duration_s * self.rate_hz
         require_affordable(
@@ -142,43 +145,48 @@ class VibrationModel(Parametric):
             raise BadInput(f"vibration seed must be 0 or more, got {self.seed}")
         if self.substeps < 1:
             raise BadInput(
-                f"sub-steps must be 1 or more, got {self.substeps}; {SUBSTEPS} is the default"
+                f"sub-steps must be 1 or more, got {self.substeps}; the default is {SUBSTEPS}"
             )
         require_choice("response", self.response, RESPONSE_METHODS)
         require_choice("indicator method", self.method, INDICATOR_METHODS)
         if not (self.linear or self.stiffness_law.point_spring):
             raise BadInput(
-                "a nonlinear response is that of Hertz's point spring, got the stiffness law "
-                f"{self.stiffness_law.name!r}; take hertz-point, or the exact response"
+                "a nonlinear response needs Hertz's point spring, got the stiffness law "
+                f"{self.stiffness_law.name!r}; use hertz-point or the exact response"
             )
 
     @property
     def linear(self) -> bool:
-        """Whether the spring is taken as linear."""
+        """True if the spring is linear."""
         return self.response != "nonlinear"
 
     @property
     def needs_solution(self) -> bool:
-        """Whether more is asked for than the dry, fully loaded contact of the paper's section 2 can tell."""
+        """True if the model needs more than the dry, fully loaded contact of the paper."""
         laws = (self.excitation, self.damping_law)
         return not self.stiffness_law.asperities_alone or any(law.needs_solution for law in laws)
 
     def with_choices(self, **choices: Any) -> "VibrationModel":
-        """The model with other keywords; parameters stated for laws that were not in use count if they now are."""
+        """Return the model with other keywords; retained parameters of a law now in use apply."""
         return VibrationModel(**{**self.stated, **_by_name(choices)})
 
     @classmethod
     def preset(cls, name: str, **choices: Any) -> "VibrationModel":
-        """The preset `name` with `choices` (mass and damping_ratio at least) on top; BadInput for an unknown name."""
+        """Return the preset `name` with `choices` (at least mass and damping_ratio) applied.
+
+        Raises
+        ------
+        BadInput
+            for an unknown name.
+        """
         return cls(**{**preset_choices(name), **choices})
 
 
 def preset_choices(name: str) -> Mapping[str, Any]:
-    """Every choice that tells the presets apart, as `name` has it.
+    """Return the settings of the preset `name` that differ between presets.
 
-    "paper": everything as the paper's section 2 did it, as far as it can be recovered
-    (docs/theory/vibration.md); "sound", the default: fine sampling, the true damping, the
-    likeliest line.
+    "paper": as in the paper's section 2, as far as it can be recovered (docs/theory/vibration.md);
+    "sound", the default: fine sampling, the true damping, maximum likelihood.
     """
     if name == "sound":
         return {
@@ -192,10 +200,9 @@ def preset_choices(name: str) -> Mapping[str, Any]:
 
 
 class Choice(NamedTuple):
-    """A keyword of `VibrationModel`: its type (laws and methods by name), default and SI unit.
+    """Keyword of `VibrationModel`: its type (laws and methods by name), default and SI unit.
 
-    The default is MISSING (of dataclasses) where the keyword is required, None where it may be
-    left out.
+    The default is MISSING (of dataclasses) if the keyword is required, None if it is optional.
     """
 
     kind: Any
@@ -204,7 +211,10 @@ class Choice(NamedTuple):
 
 
 def vibration_choices() -> Mapping[str, Choice]:
-    """Every keyword that a model can be stated with by names and numbers, laws' parameters behind their law."""
+    """Return every keyword of a model that is stated by a name or a number.
+
+    Parameters of laws follow their law.
+    """
     choices: dict[str, Choice] = {}
     for name, choice in _choices(VibrationModel):
         choices[name] = (
@@ -212,7 +222,7 @@ def vibration_choices() -> Mapping[str, Choice]:
         )
         for law in LAWS.get(name, {}).values():
             for parameter, own in _choices(law):  # type: ignore[arg-type]  # classes are hashable
-                choices.pop(parameter, None)  # one that two laws share stands behind the latter
+                choices.pop(parameter, None)  # a shared parameter follows the last of its laws
                 choices[parameter] = own._replace(default=None) if own.default is MISSING else own
     return choices
 
@@ -235,7 +245,7 @@ def _choices(law: type) -> tuple[tuple[str, Choice], ...]:
 
 
 def _by_name(choices: Mapping[str, Any]) -> dict[str, Any]:
-    """Keywords with every law as its name and its parameters."""
+    """Return the keywords with every law replaced by its name and parameters."""
     stated = dict(choices)
     for slot in LAWS:
         law = choices.get(slot)
@@ -246,15 +256,15 @@ def _by_name(choices: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _law(slot: str, stated: Mapping[str, Any]) -> Any:
-    """The law stated for a slot; parameters stated for its neighbours are checked too."""
-    default, thing, laws = (
+    """Return the law of a slot; parameters of its alternatives are checked too."""
+    default, label, laws = (
         getattr(VibrationModel, slot).name,
         _NAMES.get(slot, slot.replace("_", " ")),
         LAWS[slot],
     )
     chosen = stated.get(slot, default)
-    require_choice(thing, chosen, laws)
-    made = {}
+    require_choice(label, chosen, laws)
+    instances = {}
     for name, law in laws.items():
         missing = [
             entry.name
@@ -262,12 +272,12 @@ def _law(slot: str, stated: Mapping[str, Any]) -> Any:
             if entry.default is MISSING and entry.name not in stated
         ]
         if not missing:
-            made[name] = law(
+            instances[name] = law(
                 **{entry.name: stated[entry.name] for entry in fields(law) if entry.name in stated}
             )
         elif name == chosen:
             unit = parameters(law)[missing[0]].unit
             raise BadInput(
-                f"{thing} {name} needs {missing[0]}, in {unit}; add it, or take the law {default}"
+                f"{label} {name} needs {missing[0]}, in {unit}; add it, or use the law {default}"
             )
-    return made[chosen]
+    return instances[chosen]

@@ -1,4 +1,4 @@
-"""The mass on the contact's spring, by a model's laws."""
+"""Oscillator of a contact: the mass on the contact's spring, by a model's laws."""
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.errors import require_positive
@@ -15,10 +15,13 @@ def oscillator(
     *,
     solution: ContactSolution | None = None,
 ) -> ContactOscillator:
-    """The mass on the contact spring, by the model's stiffness and damping laws.
+    """Return the mass on the contact spring, by the model's stiffness and damping laws.
 
-    Raises BadInput when the law's spring is that of the asperities and they carry nothing, or when
-    it needs the solved contact and there is none.
+    Raises
+    ------
+    BadInput
+        if the law needs asperity load and there is none, or needs a solved contact and there is
+        none.
     """
     if model.stiffness_law.asperities_alone:
         require_positive("load share of the asperities (CLR)", state.clr)
@@ -30,9 +33,10 @@ def oscillator(
 def resonance_at(
     clr: float, state: ContactState, conditions: ContactConditions, model: VibrationModel
 ) -> float | None:
-    """Natural frequency [Hz] at another load share of the same contact; None by a law that would need it solved.
+    """Return the natural frequency [Hz] at another load share of the same contact.
 
-    Without any load on asperities, a spring that is theirs alone leaves nothing to resonate: 0.
+    None for a law that would need that contact solved; 0 without asperity load, if the spring is
+    that of the asperities alone.
     """
     law = model.stiffness_law
     if not law.by_load_share:
@@ -45,13 +49,13 @@ def resonance_at(
 def loaded_oscillator(
     law: StiffnessLaw, contact: LoadedContact, model: VibrationModel
 ) -> ContactOscillator:
-    """The model's mass and damping on the spring that `law` makes of a contact."""
+    """Return the model's mass and damping on the spring of `law` for a contact."""
     load = contact.asperity_load if law.asperities_alone else contact.conditions.load
     return damped_oscillator(law(contact), load, model, solution=contact.solution)
 
 
 def natural_frequency_hz(law: StiffnessLaw, contact: LoadedContact, model: VibrationModel) -> float:
-    """Of the model's mass on the spring that `law` makes of a contact [Hz], which may not be solved."""
+    """Return the natural frequency [Hz] on the spring of `law`; the contact need not be solved."""
     known = model.with_choices(damping_law="ratio") if model.damping_law.needs_solution else model
     return loaded_oscillator(law, contact, known).natural_frequency_hz
 
@@ -59,9 +63,12 @@ def natural_frequency_hz(law: StiffnessLaw, contact: LoadedContact, model: Vibra
 def damped_oscillator(
     stiffness: float, load: float, model: VibrationModel, *, solution: ContactSolution | None = None
 ) -> ContactOscillator:
-    """The model's mass and damping on a spring of `stiffness` [N/m] that carries `load` [N].
+    """Return the model's mass and damping on a spring of `stiffness` [N/m] carrying `load` [N].
 
-    Raises BadInput where the damping law needs the solved contact and there is none.
+    Raises
+    ------
+    BadInput
+        if the damping law needs a solved contact and there is none.
     """
     ratio = model.damping_law(
         mass=model.mass, stiffness=stiffness, damping_ratio=model.damping_ratio, solution=solution

@@ -408,7 +408,7 @@ def _over_depth(stress: SubsurfaceStress, slope: float) -> Field:
     """The largest measure of all lines along rolling at each depth."""
     found = []
     for depth in stress.depths:
-        levels = stress.tractions.stresses(float(depth), stress.poisson_ratio, keep=False)
+        levels = stress.tractions.stresses(float(depth), stress.poisson_ratio, cache=False)
         passing = np.concatenate(
             [np.swapaxes(levels, 1, 2), np.zeros((6, levels.shape[2], 1))], axis=2
         )

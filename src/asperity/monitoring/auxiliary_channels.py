@@ -17,7 +17,13 @@ from asperity.core.signals import averaged_spectrum
 from asperity.monitoring.files import Place
 from asperity.monitoring.target import Target
 from asperity.recording import OPERATING, OpenRecording, other_channel
-from asperity.vibration import Envelope, Turning, steadied, turning_by_pulses, turning_by_speed
+from asperity.vibration import (
+    Envelope,
+    Turning,
+    resample_to_constant_speed,
+    turning_by_pulses,
+    turning_by_speed,
+)
 
 MOST = 1 << 21  # samples of which orders are followed: they are in memory at once
 HARMONICS = 3
@@ -129,7 +135,7 @@ def steady(opened: OpenRecording, told: Beside) -> tuple[Field, float] | None:
     values = np.concatenate(held)[: told.turning.turns.size]
     if not np.isfinite(values).all():
         raise BadInput("samples are missing, so that the shaft's orders are not followed")
-    return steadied(values, told.turning, opened.rate_hz)
+    return resample_to_constant_speed(values, told.turning, opened.rate_hz)
 
 
 def heard_at(

@@ -1,4 +1,4 @@
-"""What is the paper's: its case, every number it prints, its table, its rig."""
+"""The paper of Xu et al. (2025): its case, printed numbers, Table 1 and simulated rig."""
 
 import lazy_loader
 

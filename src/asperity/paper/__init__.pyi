@@ -22,11 +22,12 @@ from .numbers import TABLE1_PRINTED as TABLE1_PRINTED
 from .numbers import Citation as Citation
 from .rig import TRENDS as TRENDS
 from .rig import Moment as Moment
-from .rig import RecordingFormat as RecordingFormat
 from .rig import Rig as Rig
+from .rig import RigSettings as RigSettings
 from .rig import RigTrend as RigTrend
 from .rig import simulate_rig as simulate_rig
-from .rig import write_rig as write_rig
+from .rig_files import RecordingFormat as RecordingFormat
+from .rig_files import write_rig as write_rig
 from .rig_recording import Disturbance as Disturbance
 from .rig_recording import RigRecording as RigRecording
 from .rig_recording import Tones as Tones

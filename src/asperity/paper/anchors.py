@@ -1,4 +1,4 @@
-"""What is known from elsewhere about a wear curve, the paper's printed numbers above all, and how a curve meets it."""
+"""Anchors of a wear curve: known values, chiefly the paper's, and the comparison with a curve."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -36,30 +36,30 @@ SPLIT_ANCHOR = "split"  # the quantity of an anchor that is a break between stag
 
 
 class CurveOverSq(Protocol):
-    """What anchors are compared with: a study's wear curve."""
+    """Wear curve of a study, as compared with anchors."""
 
     @property
     def stages(self) -> Mapping[str, Stages]:
-        """Along Sq in micrometres, by vibration preset."""
+        """Stages along Sq [um], by vibration preset."""
 
-    def at(self, sq: float, quantity: str) -> tuple[float, float, float]:
-        """Mean at a roughness [m] and its interval; nan where the curve does not reach."""
+    def interpolate(self, sq: float, quantity: str) -> tuple[float, float, float]:
+        """Return the mean at a roughness [m] and its interval; nan outside the curve."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Anchor:
-    """A number that a wear curve should meet.
+    """Known value that a wear curve should match.
 
     Parameters
     ----------
-    name : what a table calls it
+    name : name in tables
     quantity : a column of the study, or "split", the break between stages [um of Sq]
-    value, tolerance : in the column's unit; `tolerance` is what a deviation is measured by
-    sq : roughness it holds at [m]; None for "split"
-    since : where given, the anchor is the change of the quantity from there to `sq` [m]
-    sense : whether the curve should be about `value`, at least or at most that
-    source : where it is printed
-    fitted : whether a calibration aims at it
+    value, tolerance : in the column's unit
+    sq : roughness [m] at which it applies; None for "split"
+    since : if given, the anchor is the change of the quantity from there to `sq` [m]
+    sense : the curve should be about `value`, at least or at most `value`
+    source : publication
+    fitted : True if a calibration should match it
     """
 
     name: str
@@ -72,8 +72,8 @@ class Anchor:
     source: str = ""
     fitted: bool = True
 
-    def of(self, curve: CurveOverSq) -> tuple[float, float, float]:
-        """What the curve has in its place, and the interval over seeds; nan where the curve does not reach."""
+    def evaluate(self, curve: CurveOverSq) -> tuple[float, float, float]:
+        """Return the curve's value for this anchor and its interval over seeds; nan outside."""
         if self.quantity == SPLIT_ANCHOR:
             stages = curve.stages.get("sound")
             return (
@@ -82,65 +82,76 @@ class Anchor:
                 else (stages.split, *stages.interval)
             )
         assert self.sq is not None
-        here = curve.at(self.sq, self.quantity)
+        value = curve.interpolate(self.sq, self.quantity)
         if self.since is None:
-            return here
-        there = curve.at(self.since, self.quantity)
-        off = float(np.hypot(here[2] - here[0], there[2] - there[0]))
-        change = here[0] - there[0]
-        return change, change - off, change + off
+            return value
+        reference = curve.interpolate(self.since, self.quantity)
+        deviation = float(np.hypot(value[2] - value[0], reference[2] - reference[0]))
+        change = value[0] - reference[0]
+        return change, change - deviation, change + deviation
 
-    def miss(self, ours: float) -> float:
-        """How far off `ours` is, in the quantity's unit; 0 where the anchor only bounds it and is kept."""
-        off = ours - self.value
+    def miss(self, our_value: float) -> float:
+        """Return the deviation in the quantity's unit; 0 for a bound that is satisfied."""
+        deviation = our_value - self.value
         if self.sense == "at least":
-            return min(off, 0.0)
-        return max(off, 0.0) if self.sense == "at most" else off
+            return min(deviation, 0.0)
+        return max(deviation, 0.0) if self.sense == "at most" else deviation
 
 
 def compare_with_anchors(
     curve: CurveOverSq, anchors: Sequence[Anchor] | None = None
 ) -> pandas.DataFrame:
-    """A row an anchor, the paper's unless given: what is printed, ours with its 90 % interval, the miss, whether met.
+    """Return a table with a row per anchor: printed value, ours with 90 % interval, deviation.
 
-    `met` is True where the miss is within the tolerance, and `possible` where some value of the
-    interval would be. Both are False where the curve has no value (a Sq that was not computed,
-    stages that are not there).
+    `met` is True if the deviation is within the tolerance, and `possible` if it would be for some
+    value of the interval. Both are False if the curve has no value (Sq not computed, no stages).
     """
     rows = []
     for anchor in PAPER_ANCHORS if anchors is None else anchors:
-        ours, low, high = anchor.of(curve)
+        our_value, low, high = anchor.evaluate(curve)
         ends = [abs(anchor.miss(end)) for end in (low, high) if np.isfinite(end)]
         crossed = bool(np.isfinite(low) and low <= anchor.value <= high)
-        miss = anchor.miss(ours) if np.isfinite(ours) else np.nan
-        met = bool(np.isfinite(miss) and abs(miss) <= anchor.tolerance)
+        miss = anchor.miss(our_value) if np.isfinite(our_value) else np.nan
+        fulfilled = bool(np.isfinite(miss) and abs(miss) <= anchor.tolerance)
         sq_um = np.nan if anchor.sq is None else 1e6 * anchor.sq
-        possible = met or crossed or any(end <= anchor.tolerance for end in ends)
-        about = (anchor.name, anchor.quantity, sq_um, anchor.sense, anchor.value, anchor.tolerance)
-        rows.append((*about, ours, low, high, miss, met, possible, anchor.source))
+        possible = fulfilled or crossed or any(end <= anchor.tolerance for end in ends)
+        described = (
+            anchor.name,
+            anchor.quantity,
+            sq_um,
+            anchor.sense,
+            anchor.value,
+            anchor.tolerance,
+        )
+        rows.append((*described, our_value, low, high, miss, fulfilled, possible, anchor.source))
     return pandas.DataFrame(rows, columns=list(COMPARED))
 
 
 def rig_prediction(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> pandas.DataFrame:
-    """Our CRF at the rig's twelve Sq values with the spread over seeds, beside what is printed: the two ends."""
+    """Return our CRF at the rig's twelve Sq with its spread over seeds, and the printed values."""
     table = pandas.DataFrame({"sq_um": SAMPLES_SQ_UM, "sq_std_um": SAMPLES_STD_UM})
-    table[["crf_hz", "low", "high"]] = [curve.at(1e-6 * sq, quantity) for sq in SAMPLES_SQ_UM]
+    table[["crf_hz", "low", "high"]] = [
+        curve.interpolate(1e-6 * sq, quantity) for sq in SAMPLES_SQ_UM
+    ]
     table["printed_hz"] = [CRF_ENDS_HZ[0], *[np.nan] * (len(table) - 2), CRF_ENDS_HZ[1]]
     return table
 
 
 def rig_deviation(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> dict[str, float]:
-    """Root mean square of our CRF less the rig's [Hz]; nan where the curve does not reach over all of its Sq.
+    """Return the root mean square deviation of our CRF from the rig's [Hz]; nan outside the curve.
 
-    "ends": over the two values that are printed. "knee", "smooth": over all twelve Sq, between
-    those ends along a bent or a saturating line; its Fig 13 has no numbers, so that the shape
-    between the ends is ours.
+    "ends": over the two printed values. "knee", "smooth": over all twelve Sq, with a bent or a
+    saturating line between those ends; the paper's Fig 13 has no numbers, so that the shape is
+    ours.
     """
     predicted = rig_prediction(curve, quantity)
-    ours, sq = predicted["crf_hz"].to_numpy(dtype=float), 1e-6 * np.array(SAMPLES_SQ_UM)
-    ends = ours[[0, -1]] - np.array(CRF_ENDS_HZ)
-    shapes = {name: ours - TRENDS[name](sq) for name in ("knee", "smooth")}
-    return {name: float(np.sqrt(np.mean(off**2))) for name, off in {"ends": ends, **shapes}.items()}
+    our_value, sq = predicted["crf_hz"].to_numpy(dtype=float), 1e-6 * np.array(SAMPLES_SQ_UM)
+    ends = our_value[[0, -1]] - np.array(CRF_ENDS_HZ)
+    shapes = {name: our_value - TRENDS[name](sq) for name in ("knee", "smooth")}
+    return {
+        name: float(np.sqrt(np.mean(deviation**2)))
+        for name, deviation in {"ends": ends, **shapes}.items()
+    }
 
 
 class _AnchorSection(Section):
@@ -160,14 +171,16 @@ class _AnchorFile(Section):
 
 
 def load_anchors(path: str | Path) -> tuple[Anchor, ...]:
-    """Read anchors of one's own: a TOML file of [[anchor]] tables with the fields of `Anchor`, Sq with its unit.
+    """Load user-defined anchors: a TOML file of [[anchor]] tables with the fields of `Anchor`.
+
+    `sq` and `since` are stated with their unit.
 
     Raises
     ------
     UnreadableFile
-        if the file is missing or no TOML.
+        if the file is missing or not TOML.
     BadInput
-        for a table that lacks something or has what an anchor has not.
+        for a table with missing or unknown entries.
     """
     path = Path(path)
     try:
@@ -178,7 +191,7 @@ def load_anchors(path: str | Path) -> tuple[Anchor, ...]:
     for section in sections:
         if (section.sq is None) != (section.quantity == SPLIT_ANCHOR):
             raise BadInput(
-                f"{path}: anchor {section.name!r} needs sq, a length; only a split has none"
+                f"{path}: anchor {section.name!r} needs sq, a length (only a split has none)"
             )
     return tuple(Anchor(**dict(section)) for section in sections)
 

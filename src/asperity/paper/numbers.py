@@ -1,11 +1,11 @@
-"""What Xu et al. print, and where; what is ours beside it says so. Anchors of the wear curve lie in anchors.toml."""
+"""Numbers printed by Xu et al., with their place; ours are marked. Wear anchors: anchors.toml."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Citation:
-    """A paper as a list of references has it."""
+    """Reference of a paper."""
 
     authors: str
     year: int
@@ -46,8 +46,5 @@ RIG_LOAD = 500.0  # [N]
 SHAFT_HZ = (3375.0 / 60.0, 300.0 / 60.0)  # roller, ring
 SAMPLES_SQ_UM = (0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49)
 SAMPLES_STD_UM = (0.10, 0.08, 0.05, 0.05, 0.10, 0.06, 0.10, 0.08, 0.05, 0.05, 0.10, 0.06)
-CRF_ENDS_HZ = (
-    2921.93,
-    3811.88,
-)  # smoothest and roughest sample; the others are drawn without numbers
-RIG_SPLIT_UM = (1.68, 1.92)  # between these samples wear turns severe
+CRF_ENDS_HZ = (2921.93, 3811.88)  # smoothest and roughest sample; the others have no numbers
+RIG_SPLIT_UM = (1.68, 1.92)  # onset of severe wear lies between these samples

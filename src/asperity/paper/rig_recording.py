@@ -1,4 +1,4 @@
-"""A recording of the simulated rig: the contact's line, all that an accelerometer picks up besides, records of both."""
+"""Recording of the simulated rig: line of the contact, disturbances, and records of both."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -18,23 +18,21 @@ from asperity.paper.numbers import SHAFT_HZ
 MAINS_HZ = 50.0
 RING_HARMONICS, MAINS_HARMONICS = 40, 20
 LOWPASS = 0.45  # corner of the anti-aliasing filter over the sampling rate
-MOUNTED_HZ, MOUNTED_DAMPING = (
-    46e3,
-    0.02,
-)  # resonance of the accelerometer on its stud: + 5 % at 10 kHz, as printed
-FLAT_BELOW_HZ = 100.0  # machine noise, which falls with frequency above
-GRID_HZ = 0.25  # on which densities are worked out; the sharpest mode is ten times as wide
+# resonance of the mounted accelerometer: + 5 % at 10 kHz, as printed
+MOUNTED_HZ, MOUNTED_DAMPING = 46e3, 0.02
+FLAT_BELOW_HZ = 100.0  # machine noise decreases with frequency above
+GRID_HZ = 0.25  # frequency grid of densities; the sharpest mode is ten times as wide
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbance:
-    """What the accelerometer picks up besides the contact.
+    """Disturbances of the accelerometer signal.
 
     `snr_db`: power of the contact's line over that of everything else, both within the contact's
-    search band, in the mean over recordings. `modes` structural modes share most of that band with
-    it. `gain_db` is the standard deviation of the level of everything else from recording to
-    recording, `mode_gain_db` that of each mode beside it, `mode_drift` that of the modes'
-    frequencies (all together, relative), `speed_drift` that of the shafts' speeds.
+    search band, on average over recordings. `modes` structural modes contribute most of the
+    disturbance in the band. `gain_db` is the standard deviation of the disturbance level between
+    recordings, `mode_gain_db` that of each mode in addition, `mode_drift` that of the modes'
+    frequencies (common, relative), `speed_drift` that of the shaft speeds.
     """
 
     snr_db: float = 10.0
@@ -47,10 +45,10 @@ class Disturbance:
     def __post_init__(self) -> None:
         if not -60.0 <= self.snr_db <= 60.0:
             raise BadInput(
-                f"SNR must lie between -60 and 60 dB, got {self.snr_db:g} dB; 10 dB is the default"
+                f"SNR must be between -60 and 60 dB, got {self.snr_db:g} dB; the default is 10 dB"
             )
         if not 0 <= self.modes <= 20:
-            raise BadInput(f"structural modes must be 0 to 20, got {self.modes}; 4 is the default")
+            raise BadInput(f"structural modes must be 0 to 20, got {self.modes}; the default is 4")
         for name in ("gain_db", "mode_gain_db", "mode_drift", "speed_drift"):
             if not getattr(self, name) >= 0.0:
                 raise BadInput(
@@ -59,7 +57,7 @@ class Disturbance:
 
 
 class Tones(NamedTuple):
-    """Lines of shafts and mains: frequencies [Hz] and amplitudes [m/s^2], shape (tones,)."""
+    """Tones of shafts and mains: frequencies [Hz] and amplitudes [m/s^2], shape (tones,)."""
 
     frequency_hz: Field
     amplitude: Field
@@ -67,11 +65,11 @@ class Tones(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class RigRecording:
-    """One test of one ring: the truth, and records and spectra of it.
+    """Test of a ring: true values, records and spectra.
 
-    `sq_m` with `sq_std_m` is what a profilometer says, `true_sq_m` what the ring has; `crf_hz`,
-    `crfa` and `damping_ratio` are the contact line's true ones, the accelerometer's response
-    included in `crfa`. `contact_density` and `other_density` are one-sided [(m/s^2)^2/Hz] on
+    `sq_m` with `sq_std_m` is the profilometer's reading, `true_sq_m` the true value; `crf_hz`,
+    `crfa` and `damping_ratio` are the true ones of the contact line, with the accelerometer's
+    response in `crfa`. `contact_density` and `other_density` are one-sided [(m/s^2)^2/Hz] on
     `frequency_hz`.
     """
 
@@ -95,15 +93,14 @@ class RigRecording:
 
     @property
     def name(self) -> str:
-        """Such as "sample-07-test-3"."""
+        """File name without suffix, such as "sample-07-test-3"."""
         return f"sample-{self.sample:02d}-test-{self.repeat}"
 
     def signal(self) -> Signal:
-        """The record [m/s^2]: Gaussian, with exactly these densities, and the tones; one seed, one record."""
+        """Return the record [m/s^2]: Gaussian with exactly these densities, plus the tones."""
         samples = round(self.duration_s * self.rate_hz)
-        length = scipy.fft.next_fast_len(
-            samples + samples // 64, real=True
-        )  # cut off: no end meets the beginning
+        # longer than the record, which is then not periodic
+        length = scipy.fft.next_fast_len(samples + samples // 64, real=True)
         frequency = np.arange(length // 2 + 1) * (self.rate_hz / length)
         scale = self.rate_hz * length / 4.0
         rng = np.random.default_rng(self.seed)
@@ -112,17 +109,22 @@ class RigRecording:
             scale
             * np.interp(frequency, self.frequency_hz, self.contact_density + self.other_density)
         )
-        turns = np.exp(2j * np.pi * rng.random(self.tones.amplitude.size))
+        phases = np.exp(2j * np.pi * rng.random(self.tones.amplitude.size))
         at = np.rint(self.tones.frequency_hz * (length / self.rate_hz)).astype(int)
-        np.add.at(waves, at, 0.5 * length * self.tones.amplitude * turns)
+        np.add.at(waves, at, 0.5 * length * self.tones.amplitude * phases)
         waves[0] = 0.0
         values = scipy.fft.irfft(waves, length, overwrite_x=True)[:samples]
         return Signal(np.ascontiguousarray(values), self.rate_hz, "m/s^2")
 
     def spectrum(self, segment: int) -> Spectrum:
-        """A Hann-tapered averaged spectrum, drawn without a record: mean and covariance of lines as records have them.
+        """Return a Hann-tapered averaged spectrum, drawn directly without a record.
 
-        Raises BadInput for a segment longer than the record or shorter than 8 samples.
+        Mean and covariance of its lines are those of spectra of records.
+
+        Raises
+        ------
+        BadInput
+            for a segment longer than the record or shorter than 8 samples.
         """
         samples = round(self.duration_s * self.rate_hz)
         if not 8 <= segment <= samples:
@@ -135,8 +137,8 @@ class RigRecording:
         smooth = np.interp(frequency, self.frequency_hz, self.contact_density + self.other_density)
         averages = _averages_of(segment, samples)
         rng = np.random.default_rng(self.seed)
-        # weights (1/6, 2/3, 1/6) over independent gammas: neighbours correlate by 4/9, as those
-        # behind a Hann taper do
+        # weights (1/6, 2/3, 1/6) over independent gammas: neighbours correlate by 4/9, as with a
+        # Hann taper
         drawn = rng.gamma(averages, 1.0 / averages, frequency.size + 2)
         scatter = (drawn[:-2] + 4.0 * drawn[1:-1] + drawn[2:]) / 6.0
         mean_square = 2.0 / (self.rate_hz * float(np.sum(weights**2)))
@@ -145,8 +147,10 @@ class RigRecording:
         for shift in range(-3, 4):
             at = nearest + shift
             inside = (at >= 0) & (at < frequency.size)
-            away = (at - self.tones.frequency_hz / spacing)[inside]
-            amplitude = 0.5 * self.tones.amplitude[inside] * segment * np.abs(_hann_transform(away))
+            offset = (at - self.tones.frequency_hz / spacing)[inside]
+            amplitude = (
+                0.5 * self.tones.amplitude[inside] * segment * np.abs(_hann_transform(offset))
+            )
             np.add.at(tonal, at[inside], mean_square * amplitude**2)
         mixed = 2.0 * np.sqrt(np.maximum(tonal * smooth, 0.0)) * rng.standard_normal(frequency.size)
         density = np.abs(smooth * scatter + tonal + mixed / np.sqrt(2.0 * averages))
@@ -163,19 +167,24 @@ class RigRecording:
         )
 
 
-def _hann_transform(away: Field) -> Field:
-    """Of a Hann window of length 1 at `away` cycles from its centre, relative to a boxcar's peak."""
-    return np.asarray(0.5 * np.sinc(away) + 0.25 * (np.sinc(away - 1.0) + np.sinc(away + 1.0)))
+def _hann_transform(offset: Field) -> Field:
+    """Return the transform of a Hann window of length 1, `offset` cycles from its centre.
+
+    Relative to the peak of a boxcar.
+    """
+    return np.asarray(
+        0.5 * np.sinc(offset) + 0.25 * (np.sinc(offset - 1.0) + np.sinc(offset + 1.0))
+    )
 
 
 @cache
 def _averages_of(segment: int, samples: int) -> float:
-    """Independent ordinates a line is worth, `signals.power_spectrum`'s own count."""
+    """Return the number of independent averages, as counted by `signals.power_spectrum`."""
     return power_spectrum(Signal(np.zeros(samples), 1.0, "m/s^2"), segment=segment).averages
 
 
 class RigTest(NamedTuple):
-    """Which test of which ring, and how it is recorded."""
+    """Test of a ring and its recording settings."""
 
     sample: int
     repeat: int
@@ -186,7 +195,7 @@ class RigTest(NamedTuple):
 
 
 class ContactLine(NamedTuple):
-    """The contact's line: truth, and density on the grid as the accelerometer shows it."""
+    """Line of the contact: true values, and density on the grid as measured."""
 
     true_sq_m: float
     clr: float
@@ -203,14 +212,14 @@ def contact_line(
     frequency: Field,
     rate_hz: float,
 ) -> ContactLine:
-    """|H|^2 of the oscillator times the spectrum of what it rides over."""
+    """Return the contact's line: |H|^2 of the oscillator times the excitation's spectrum."""
     spring = oscillator(state, conditions, model)
-    ridden_over = excitation(state, conditions, model)
+    base_excitation = excitation(state, conditions, model)
     f0 = spring.natural_frequency_hz
 
     def density(at: Field) -> Field:
         return np.asarray(
-            spring.gain(at) * ridden_over.density(at, rate_hz) * _accelerometer(at, rate_hz)
+            spring.gain(at) * base_excitation.density(at, rate_hz) * _accelerometer(at, rate_hz)
         )
 
     measured = np.zeros(frequency.size)
@@ -221,14 +230,14 @@ def contact_line(
 
 
 def _accelerometer(frequency: Field, rate_hz: float) -> Field:
-    """Power response: flat, towards its mounted resonance rising, cut by the anti-aliasing filter."""
+    """Return the power response: flat, rising to the mounted resonance, low-pass filtered."""
     x = frequency / MOUNTED_HZ
     mounted = 1.0 / ((1.0 - x**2) ** 2 + (2.0 * MOUNTED_DAMPING * x) ** 2)
     return np.asarray(mounted / (1.0 + (frequency / (LOWPASS * rate_hz)) ** 16))
 
 
 class Background(NamedTuple):
-    """What is common to all recordings of a rig; powers within the band, 1 in all."""
+    """Disturbances common to all recordings of a rig; total power 1 within the band."""
 
     band_hz: tuple[float, float]
     frequency: Field
@@ -240,28 +249,32 @@ class Background(NamedTuple):
     source: Field  # 0 roller, 1 ring, 2 mains,
     power: Field  # and mean squares
 
-    def recorded(
+    def recording(
         self,
         test: RigTest,
         contact: ContactLine,
         disturbance: Disturbance,
         rng: np.random.Generator,
     ) -> RigRecording:
-        """The contact before all this, as loud as the SNR says give or take a little, its modes moved each time."""
+        """Return a recording of the contact with these disturbances.
+
+        Their level follows from the SNR, with random scatter; the modes are shifted in each
+        recording.
+        """
         inside = self._in_band(self.frequency)
         power = float(np.sum(contact.contact_density[inside])) * GRID_HZ
-        wanted = power / 10.0 ** (disturbance.snr_db / 10.0)
-        level = wanted * 10.0 ** (disturbance.gain_db * rng.standard_normal() / 10.0)
+        target = power / 10.0 ** (disturbance.snr_db / 10.0)
+        level = target * 10.0 ** (disturbance.gain_db * rng.standard_normal() / 10.0)
         gains = 10.0 ** (disturbance.mode_gain_db * rng.standard_normal(self.mode_hz.size) / 10.0)
         mode_hz = self.mode_hz * (1.0 + disturbance.mode_drift * rng.standard_normal())
         other = self.floor.copy()
-        for f0, damping, loud in zip(
+        for f0, damping, mode_power in zip(
             mode_hz, self.mode_damping, self.mode_power * gains, strict=True
         ):
             # inertance of a mode under a white force; ∫ = π f0/(4ζ) near the peak
             x2 = (self.frequency / f0) ** 2
             other += (
-                loud
+                mode_power
                 * 4.0
                 * damping
                 / (np.pi * f0)
@@ -296,7 +309,7 @@ def draw_background(
     disturbance: Disturbance,
     rng: np.random.Generator,
 ) -> Background:
-    """Modes, noise and tones, drawn: their shares of the power in the band 0.6, 0.3 and 0.1, give or take."""
+    """Draw modes, noise and tones, with mean power shares in the band of 0.6, 0.3 and 0.1."""
     low, high = band_hz
     # as many modes below and above the band as within it
     spans = (
@@ -308,9 +321,7 @@ def draw_background(
     damping = np.exp(rng.uniform(np.log(0.004), np.log(0.03), mode_hz.size))
     shares = rng.gamma([6.0 if disturbance.modes else 1e-9, 3.0, 1.0])
     shares /= np.sum(shares)
-    heights = 10.0 ** rng.uniform(
-        -1.2, 0.0, mode_hz.size
-    )  # of the peaks, 12 dB between the lowest and the highest
+    heights = 10.0 ** rng.uniform(-1.2, 0.0, mode_hz.size)  # of the peaks, within 12 dB
     power = heights * damping * mode_hz
     power *= shares[0] / max(float(np.sum(power[: disturbance.modes])), np.finfo(float).tiny)
     inside = (frequency >= low) & (frequency <= high)

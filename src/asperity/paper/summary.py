@@ -1,4 +1,4 @@
-"""What a simulated rig and the paper's Table 1 come to, in a sentence and as numbers."""
+"""Summaries of a simulated rig and of the reproduction of the paper's Table 1."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,7 +8,7 @@ from asperity.paper.table1 import Table1Row
 
 
 def rig_verdict(rig: Rig) -> str:
-    """How many recordings, and from where to where the true CRF goes."""
+    """Return one sentence: number of recordings and range of the true CRF."""
     first, last = rig.recordings[0], rig.recordings[-1]
     knee = "" if rig.split_sq_m is None else f", with a knee at Sq {rig.split_sq_m * 1e6:g} um"
     ends = " to ".join(
@@ -19,7 +19,7 @@ def rig_verdict(rig: Rig) -> str:
 
 
 def rig_scalars(rig: Rig) -> dict[str, Any]:
-    """What `asperity rig --json` prints of a rig."""
+    """Return the content of `asperity rig --json`."""
     return {
         "verdict": rig_verdict(rig),
         "band_hz": list(rig.band_hz),
@@ -30,9 +30,9 @@ def rig_scalars(rig: Rig) -> dict[str, Any]:
 
 
 def table1_verdict(rows: Sequence[Table1Row], preset: str) -> str:
-    """How near our CRFs are to the printed ones, and how many printed CRFAs a record of ours could have shown."""
-    inside, farthest = sum(row.within for row in rows), max(abs(row.crf_off) for row in rows)
+    """Return one sentence: deviation from the printed CRFs, and printed CRFAs within our range."""
+    inside, largest = sum(row.within for row in rows), max(abs(row.crf_deviation) for row in rows)
     return (
-        f"Table 1, preset {preset}: CRF within {100 * farthest:.2f} % of the printed ones, {inside} of {len(rows)} "
-        "printed CRFAs inside our 5 to 95 % range."
+        f"Table 1, preset {preset}: CRF within {100 * largest:.2f} % of the printed values, "
+        f"{inside} of {len(rows)} printed CRFAs inside our 5 to 95 % range."
     )

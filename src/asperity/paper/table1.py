@@ -1,6 +1,6 @@
-"""The paper's Table 1 beside ours: CRF and CRFA of the dry, fully loaded contact over load, height and cut-off.
+"""Reproduction of the paper's Table 1: CRF and CRFA of the dry, fully loaded contact.
 
-Where a single record decides, as in the paper, an ensemble says what that record could have shown.
+The paper uses single records; an ensemble shows the scatter of such records.
 """
 
 from dataclasses import dataclass
@@ -25,13 +25,13 @@ from asperity.paper.numbers import DAMPING_RATIO, MASS, TABLE1_PRINTED
 from asperity.resonance import contact_resonance
 from asperity.vibration import ContactOscillator, Excitation, acceleration
 
-SHORTEST_TRANSFORM = 16384  # the paper's, it seems: 1.6 s at 10 kHz and the next power of two
-FEWEST_RECORDS = 20
+MIN_TRANSFORM = 16384  # probably the paper's: 1.6 s at 10 kHz and the next power of two
+MIN_RECORDS = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table1Row:
-    """One row: what the paper printed, and the median with the 5 to 95 % range of our records; SI."""
+    """Row of Table 1: printed values, and median and 5 to 95 % range of our records; SI."""
 
     cutoff_hz: float
     height_m: float
@@ -44,24 +44,24 @@ class Table1Row:
     paper_crfa: float
 
     @property
-    def crf_off(self) -> float:
-        """How far our median CRF lies from the printed one, relatively."""
+    def crf_deviation(self) -> float:
+        """Relative deviation of our median CRF from the printed one."""
         return self.crf_hz / self.paper_crf_hz - 1.0
 
     @property
     def within(self) -> bool:
-        """Whether the printed CRFA lies in the range."""
+        """True if the printed CRFA lies in the range."""
         return self.crfa_low <= self.paper_crfa <= self.crfa_high
 
 
 def reproduce_table1(
     *, preset: str = "paper", records: int | None = None, seed: int = 1
 ) -> list[Table1Row]:
-    """All twelve rows, each from `records` records of the preset's own kind, seeds `seed` and on, the same in each row.
+    """Reproduce all twelve rows, each from `records` records with seeds from `seed` on.
 
-    A record is read as the paper reads it, by the highest point of its raw periodogram, where the
-    preset's method is "peak" (200 records by default), and else by the preset's method (20, it
-    scatters less).
+    If the preset's method is "peak" (200 records by default), a record is evaluated as in the
+    paper, by the highest point of its raw periodogram; otherwise by the preset's method (20
+    records, since it scatters less).
 
     Raises
     ------
@@ -69,14 +69,13 @@ def reproduce_table1(
         for an unknown preset or fewer than 20 records, which have no 5 % quantile.
     """
     model = VibrationModel.preset(preset, mass=MASS, damping_ratio=DAMPING_RATIO)
-    records = (200 if model.method == "peak" else FEWEST_RECORDS) if records is None else records
-    if records < FEWEST_RECORDS:
+    records = (200 if model.method == "peak" else MIN_RECORDS) if records is None else records
+    if records < MIN_RECORDS:
         raise BadInput(
-            f"records must be at least {FEWEST_RECORDS} for a 5 % quantile, got {records}; 200 are usual"
+            f"records must be at least {MIN_RECORDS} for a 5 % quantile, got {records}; 200 are "
+            "usual"
         )
-    read = cache(
-        partial(_records, model, records, seed)
-    )  # the table has one case in three of its rows
+    read = cache(partial(_records, model, records, seed))  # three rows of the table are identical
     rows = []
     for cutoff, height_um, load, paper_crf, paper_crfa in TABLE1_PRINTED:
         crf, crfa = read(cutoff, height_um * 1e-6, load)
@@ -97,10 +96,10 @@ def reproduce_table1(
     return rows
 
 
-def riding(
+def oscillator_on_noise(
     model: VibrationModel, cutoff_hz: float, height: float, load: float
 ) -> tuple[ContactOscillator, Excitation]:
-    """The oscillator under `load` [N], and noise of `height` [m] behind `cutoff_hz` that it rides over."""
+    """Return the oscillator under `load` [N] and its noise excitation of `height` [m]."""
     conditions = papers_contact(load)
     state = dry_full_load(conditions, height)
     noise = model.excitation
@@ -113,28 +112,32 @@ def riding(
 
 
 def expected_crfa(model: VibrationModel, cutoff_hz: float, height: float, load: float) -> float:
-    """Spectrum of the sampled response at f0 in closed form, without any record or scatter [(m/s^2)^2/Hz]."""
-    spring, ridden_over = riding(model, cutoff_hz, height, load)
+    """Return the expected spectrum of the sampled response at f0 [(m/s^2)^2/Hz], in closed form."""
+    spring, base_excitation = oscillator_on_noise(model, cutoff_hz, height, load)
     f0 = np.array(spring.natural_frequency_hz)
-    return float(spring.sampled_gain(f0, model.rate_hz) * ridden_over.density(f0, model.rate_hz))
+    return float(
+        spring.sampled_gain(f0, model.rate_hz) * base_excitation.density(f0, model.rate_hz)
+    )
 
 
 def continuous_crfa(model: VibrationModel, cutoff_hz: float, height: float, load: float) -> float:
-    """The same without sampling: what an accelerometer on the contact itself would find [(m/s^2)^2/Hz]."""
-    spring, ridden_over = riding(model.with_choices(filter="continuous"), cutoff_hz, height, load)
+    """Return the expected spectrum of the continuous motion at f0 [(m/s^2)^2/Hz]."""
+    spring, base_excitation = oscillator_on_noise(
+        model.with_choices(filter="continuous"), cutoff_hz, height, load
+    )
     f0 = np.array(spring.natural_frequency_hz)
-    return float(spring.gain(f0) * ridden_over.density(f0, model.rate_hz))
+    return float(spring.gain(f0) * base_excitation.density(f0, model.rate_hz))
 
 
 def _records(
     model: VibrationModel, records: int, seed: int, cutoff: float, height: float, load: float
 ) -> Field:
-    """CRF [Hz] and CRFA of each record, shape (2, records)."""
-    spring, ridden_over = riding(model, cutoff, height, load)
+    """Return CRF [Hz] and CRFA of each record, shape (2, records)."""
+    spring, base_excitation = oscillator_on_noise(model, cutoff, height, load)
     samples = round(model.duration_s * model.rate_hz)
     readings = np.empty((2, records))
     for number in range(records):
-        profile = ridden_over.profile(samples, model.rate_hz, seed + number)
+        profile = base_excitation.profile(samples, model.rate_hz, seed + number)
         response = acceleration(spring, profile, method=model.response, substeps=model.substeps)
         if model.method == "peak":
             readings[:, number] = highest_point(response.values, model.rate_hz)
@@ -148,12 +151,12 @@ def _records(
 
 
 def highest_point(values: Field, rate_hz: float) -> tuple[float, float]:
-    """Frequency [Hz] and height of the highest line of a raw periodogram, zero-padded to a power of two.
+    """Return frequency [Hz] and height of the highest line of a raw, zero-padded periodogram.
 
-    The axis is linspace(0, rate/2, n/2), one line too long, as the printed frequencies suggest:
-    0.4 Hz at 3.3 kHz.
+    The axis is linspace(0, rate/2, n/2), one line too long, as the printed frequencies suggest: 0.4
+    Hz at 3.3 kHz.
     """
-    length = max(SHORTEST_TRANSFORM, 1 << (values.size - 1).bit_length())
+    length = max(MIN_TRANSFORM, 1 << (values.size - 1).bit_length())
     density = (
         2.0 * np.abs(scipy.fft.rfft(values, length)[: length // 2]) ** 2 / (rate_hz * values.size)
     )

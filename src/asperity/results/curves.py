@@ -1,6 +1,6 @@
 """Friction curves of a case: over speed (Stribeck) and over the slide-to-roll ratio (traction).
 
-Each point is a contact of its own, started from its neighbour's solution; prints and draws nothing.
+Each point is a solved contact, warm-started from its neighbour; nothing is printed or drawn here.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,20 +17,20 @@ from asperity.solution import HOT, contact_state, friction_and_heat, solve_therm
 SolverProgress = Callable[[Iteration], None]
 FrictionCurveKind = Literal["stribeck", "traction"]
 
-SPEED_RANGE = (0.01, 10.0)  # of the case's entrainment speed
+SPEED_RANGE = (0.01, 10.0)  # over the case's entrainment speed
 SPEEDS = 13
 SLIP_RANGE = (1e-3, 0.5)
 SLIPS = 14
-MOST_SLIP = 1000.0
+MAX_SLIP = 1000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionPoint:
-    """One contact of a curve, SI.
+    """Point of a friction curve, SI.
 
     `friction_coefficient` = `asperity_part` + `oil_part`; `lambda_ratio` is None for a smooth or
-    dry contact; temperatures are rises [K], the first of the hotter surface; a point that did not
-    converge must not be used.
+    dry contact; temperatures are rises [K], `flash_temperature_max_k` that of the hotter surface.
+    Points that did not converge must not be used.
     """
 
     entrainment_speed_m_s: float
@@ -49,16 +49,16 @@ class FrictionPoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionCurve:
-    """Friction over speed ("stribeck") or over the slide-to-roll ratio ("traction"), by rising abscissa."""
+    """Friction over speed ("stribeck") or slide-to-roll ratio ("traction"), in ascending order."""
 
     kind: FrictionCurveKind
     points: tuple[FrictionPoint, ...]
     boundary_friction: float
     sq: float  # composite roughness [m]
-    feedback: bool  # whether the film's heat acted back on it
+    feedback: bool  # True if the viscosity is that at the film temperature
 
     def scalars(self) -> dict[str, Any]:
-        """The curve as `--json` prints it."""
+        """Return the curve for `--json`."""
         return {
             "kind": self.kind,
             "sq_m": self.sq,
@@ -68,56 +68,57 @@ class FrictionCurve:
         }
 
     def verdict(self) -> str:
-        """One sentence: from where to where friction goes."""
+        """Return one sentence on the range of friction."""
         first, last = self.points[0], self.points[-1]
         if self.kind == "stribeck":
             sentence = (
-                f"Friction goes from {first.friction_coefficient:.4f} at {first.entrainment_speed_m_s:.3g} m/s to "
-                f"{last.friction_coefficient:.4f} at {last.entrainment_speed_m_s:.3g} m/s"
+                f"The friction coefficient changes from {first.friction_coefficient:.4f} at "
+                f"{first.entrainment_speed_m_s:.3g} m/s to {last.friction_coefficient:.4f} at "
+                f"{last.entrainment_speed_m_s:.3g} m/s"
             )
         else:
             highest = max(self.points, key=lambda point: point.friction_coefficient)
             sentence = (
-                f"Friction is at most {highest.friction_coefficient:.4f}, at a slide-to-roll ratio of "
-                f"{100 * highest.slide_to_roll:.3g} %"
+                f"The largest friction coefficient is {highest.friction_coefficient:.4f}, at a "
+                f"slide-to-roll ratio of {100 * highest.slide_to_roll:.3g} %"
             )
         sentence += f" (Sq {1e6 * self.sq:.3g} um, boundary friction {self.boundary_friction:g})."
-        unfinished = sum(not point.converged for point in self.points)
+        not_converged = sum(not point.converged for point in self.points)
         return (
-            f"NOT CONVERGED at {unfinished} of {len(self.points)} points: {sentence}"
-            if unfinished
+            f"NOT CONVERGED at {not_converged} of {len(self.points)} points: {sentence}"
+            if not_converged
             else sentence
         )
 
     def hint(self) -> str | None:
-        """What a reader has to know about the figures, None if nothing."""
+        """Return a warning if the film is hot without thermal feedback; None otherwise."""
         hottest = max(point.film_temperature_max_k for point in self.points)
         if self.feedback or hottest < HOT:
             return None
         return (
-            f"the film warms up by up to {hottest:.0f} K, and its oil is taken as viscous as when cold; "
-            "set thermal.feedback=true to let it thin"
+            f"the film warms by up to {hottest:.0f} K, but the viscosity is that of the cold oil; "
+            "set thermal.feedback=true"
         )
 
 
 def stribeck_curve(
     case: Case, *, speeds: Sequence[float] | None = None, progress: SolverProgress | None = None
 ) -> FrictionCurve:
-    """Friction over entrainment speed at the case's slide-to-roll ratio.
+    """Compute friction over entrainment speed at the case's slide-to-roll ratio.
 
     Parameters
     ----------
-    speeds : entrainment speeds [m/s]; by default 13 from a hundredth of the case's to ten times it
-    progress : called after every step of the solver
+    speeds : entrainment speeds [m/s]; default 13 from a hundredth of the case's to ten times it
+    progress : called after every solver iteration
 
     Raises
     ------
     BadInput
-        for a case in which nothing slides, or a speed that is not positive.
+        for a case without sliding, or a speed that is not positive.
     """
     if case.conditions.sliding_speed == 0.0:
         raise BadInput(
-            f"{case.source}: contact.slip is 0 and nothing slides; set it, to 0.1 for instance"
+            f"{case.source}: contact.slip is 0, so that nothing slides; set it, for instance to 0.1"
         )
     if speeds is None:
         low, high = (share * case.conditions.entrainment_speed for share in SPEED_RANGE)
@@ -128,33 +129,31 @@ def stribeck_curve(
         speed / case.conditions.entrainment_speed for speed in case.conditions.surface_speeds
     )
     pairs = [(first * speed, second * speed) for speed in sorted(speeds, reverse=True)]
-    return _curve(
-        case, "stribeck", pairs, progress
-    )  # from full film down: each starts the next well
+    return _curve(case, "stribeck", pairs, progress)  # descending from full film: best warm starts
 
 
 def traction_curve(
     case: Case, *, slips: Sequence[float] | None = None, progress: SolverProgress | None = None
 ) -> FrictionCurve:
-    """Friction over the slide-to-roll ratio (u1 - u2)/u at the case's entrainment speed; above 2 the surfaces oppose.
+    """Compute friction over the slide-to-roll ratio (u1 - u2)/u at the case's entrainment speed.
+
+    Above a ratio of 2 the surfaces move in opposite directions.
 
     Parameters
     ----------
-    slips : slide-to-roll ratios, not negative; by default 0 and 14 from 0.001 to 0.5
-    progress : called after every step of the solver
+    slips : slide-to-roll ratios, not negative; default 0 and 14 from 0.001 to 0.5
+    progress : called after every solver iteration
 
     Raises
     ------
     BadInput
-        for a ratio that is negative or beyond 1000.
+        for a ratio that is negative or above 1000.
     """
     if slips is None:
         slips = [0.0, *(float(slip) for slip in np.geomspace(*SLIP_RANGE, SLIPS))]
     for slip in slips:
-        if not 0.0 <= slip <= MOST_SLIP:
-            raise BadInput(
-                f"slide-to-roll ratio must lie between 0 and {MOST_SLIP:g}, got {slip:g}"
-            )
+        if not 0.0 <= slip <= MAX_SLIP:
+            raise BadInput(f"slide-to-roll ratio must be between 0 and {MAX_SLIP:g}, got {slip:g}")
     speed = case.conditions.entrainment_speed
     pairs = [(speed * (1.0 + slip / 2.0), speed * (1.0 - slip / 2.0)) for slip in sorted(slips)]
     return _curve(case, "traction", pairs, progress)
@@ -166,13 +165,13 @@ def _curve(
     speeds: Sequence[tuple[float, float]],
     progress: SolverProgress | None,
 ) -> FrictionCurve:
-    """Contacts at these surface speeds, each started from the one before."""
+    """Solve the contacts at these surface speeds, each warm-started from the last."""
     if not speeds:
         raise BadInput("a curve needs at least one point, got none")
     surface, points = case.surface(), []
     start: ContactSolution | None = None
     for pair in speeds:
-        for first in (start, None):  # from nothing where the neighbour leads nowhere
+        for first in (start, None):  # retry with a cold start if the warm start fails
             solution = solve_thermal_contact(
                 replace(case.conditions, surface_speeds=pair),
                 case.lubricant,
@@ -198,21 +197,21 @@ def _curve(
 
 
 def _point(case: Case, solution: ContactSolution) -> FrictionPoint:
-    rubbing, heat = friction_and_heat(
+    friction, heat = friction_and_heat(
         solution, boundary_friction=case.boundary_friction, thermal=case.thermal
     )
     state, conditions = contact_state(solution), solution.conditions
     return FrictionPoint(
         entrainment_speed_m_s=conditions.entrainment_speed,
         slide_to_roll=conditions.slide_to_roll,
-        friction_coefficient=rubbing.coefficient,
-        asperity_part=rubbing.asperity_part,
-        oil_part=rubbing.oil_part,
+        friction_coefficient=friction.coefficient,
+        asperity_part=friction.asperity_part,
+        oil_part=friction.oil_part,
         clr=state.clr,
         h_mean_m=state.h_mean,
         lambda_ratio=state.lambda_ratio,
         flash_temperature_max_k=heat.max_k,
         film_temperature_max_k=heat.film_max_k,
-        friction_power_w=rubbing.power,
+        friction_power_w=friction.power,
         converged=solution.convergence.converged,
     )

@@ -1,7 +1,7 @@
-"""Stiffness and damping of a solved contact over frequency: its dynamic stiffness, asked for as often as wanted.
+"""Dynamic stiffness and damping of a solved contact over frequency.
 
-Each frequency costs a third of the solve at 128 x 128 cells and as much as the solve at 256 x 256,
-so a case says how many (`solver.dynamic`); none by default.
+Each frequency takes a third of the solution time at 128 x 128 cells and as long as the solution at
+256 x 256. The case states how many (`solver.dynamic`); the default is none.
 """
 
 import math
@@ -13,17 +13,17 @@ import numpy as np
 from asperity.core.arrays import Field, finite_or_none
 from asperity.core.errors import AsperityError
 from asperity.ehl import ContactSolution
-from asperity.solution import ShakenContact, Yielded
+from asperity.solution import OscillatingContact, Yielded
 
-FREQUENCIES = 13  # unless the case says
-SPAN = (0.1, 4.0)  # of the resonance, from and to
+FREQUENCIES = 13  # default number
+SPAN = (0.1, 4.0)  # frequency range over the resonance frequency
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DynamicBranch:
-    """k [N/m] and c [N s/m] at each frequency, shape (frequencies,), nan where there is no answer.
+    """Stiffness k [N/m] and damping c [N s/m] at each frequency, nan if not determined.
 
-    `slow` is the stiffness against a change so slow that the film follows.
+    `slow` is the stiffness at 0 Hz, where the film follows fully.
     """
 
     stiffness: Field
@@ -33,9 +33,9 @@ class DynamicBranch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DynamicCurve:
-    """k(ω) and c(ω) of a solved contact: yielded cells elastic, as on tracks that come round again, and `virgin`.
+    """k(ω) and c(ω) of a solved contact, with cells at the cap `elastic` or flowing (`virgin`).
 
-    `failures` are the frequencies without an answer, a sentence each.
+    `failures` lists the frequencies without a result, one sentence each.
     """
 
     frequency_hz: Field
@@ -44,7 +44,7 @@ class DynamicCurve:
     failures: tuple[str, ...] = ()
 
     def scalars(self) -> dict[str, Any]:
-        """What `solve --json` prints of it; None where there is no answer."""
+        """Return the curve for `solve --json`; None where it is not determined."""
         return {
             "frequency_hz": self.frequency_hz.tolist(),
             "stiffness_n_m": _listed(self.elastic.stiffness),
@@ -63,17 +63,18 @@ def _listed(values: Field) -> list[float | None]:
 def dynamic_curve(
     solution: ContactSolution, count: int, resonance_hz: float | None
 ) -> DynamicCurve:
-    """Shake a solved contact at so many frequencies.
+    """Compute the dynamic stiffness of a solved contact at `count` frequencies.
 
     Parameters
     ----------
-    count : of the frequencies, evenly on a logarithmic scale over `SPAN`
-    resonance_hz : one of them; without it, where the oil crosses a half-width in a radian of the oscillation
+    count : number of frequencies, logarithmically spaced over `SPAN`
+    resonance_hz : one of the frequencies; default that at which oil crosses a half-width in one
+        radian
 
     Raises
     ------
     BadInput
-        for a solution of the conserving model, or of bodies that do not move and have no resonance given.
+        for a solution of the conserving model, or of bodies at rest without a resonance.
     """
     middle = resonance_hz
     if middle is None:
@@ -97,14 +98,14 @@ def dynamic_curve(
 def _branch(
     solution: ContactSolution, frequency: Field, yielded: Yielded, failures: list[str]
 ) -> DynamicBranch:
-    shaken = ShakenContact(solution, yielded=yielded)
-    found = []
-    for one in (0.0, *frequency):
+    oscillating = OscillatingContact(solution, yielded=yielded)
+    results = []
+    for frequency_hz in (0.0, *frequency):
         try:
-            answer = shaken.at(float(one))
-            found.append((answer.stiffness, answer.damping))
-        except AsperityError as refusal:
-            failures.append(str(refusal))
-            found.append((math.nan, math.nan))
-    stiffness, damping = np.array(found).T
+            dynamic = oscillating.evaluate(float(frequency_hz))
+            results.append((dynamic.stiffness, dynamic.damping))
+        except AsperityError as error:
+            failures.append(str(error))
+            results.append((math.nan, math.nan))
+    stiffness, damping = np.array(results).T
     return DynamicBranch(stiffness=stiffness[1:], damping=damping[1:], slow=float(stiffness[0]))

@@ -1,4 +1,4 @@
-"""Runs of one case that differ in their roughness, in one sentence."""
+"""Comparison of runs of one case at several roughness levels."""
 
 from collections.abc import Mapping
 
@@ -6,14 +6,14 @@ from asperity.results.run import Run
 
 
 def levels_verdict(runs: Mapping[str, Run]) -> str:
-    """From where to where load sharing and resonance go, for runs by their roughness, as written and rising."""
+    """Return one sentence on load share and resonance over increasing roughness levels."""
     levels, solved = list(runs), list(runs.values())
     first, last = solved[0], solved[-1]
-    less, more = (f"{100 * run.state.clr:.0f} %" for run in (first, last))
-    at_last = last.resonance_in_words().removeprefix("contact resonance ")
+    first_clr, last_clr = (f"{100 * run.state.clr:.0f} %" for run in (first, last))
+    at_last = last.resonance_text().removeprefix("contact resonance ")
     verdict = (
-        f"From Sq {levels[0]} to {levels[-1]} the asperities' share of the load goes from {less} to {more}: "
-        f"{first.resonance_in_words()} at first, {at_last} at last."
+        f"From Sq {levels[0]} to {levels[-1]} the asperity load share changes from {first_clr} to "
+        f"{last_clr}; {first.resonance_text()} at the first level, {at_last} at the last."
     )
     unfinished = not_converged(runs)
     return (
@@ -24,5 +24,5 @@ def levels_verdict(runs: Mapping[str, Run]) -> str:
 
 
 def not_converged(runs: Mapping[str, Run]) -> list[str]:
-    """The roughnesses whose contacts did not converge."""
+    """Return the roughness levels whose contacts did not converge."""
     return [level for level, run in runs.items() if not run.solution.convergence.converged]

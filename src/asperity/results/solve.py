@@ -1,4 +1,4 @@
-"""The main job: a case solved, on one surface or several of its kind, and read back from its file."""
+"""Solving of cases, on one or several surfaces, and loading of stored runs."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -16,12 +16,13 @@ from asperity.core.errors import AsperityError, BadInput, NotConverged, Unreadab
 from asperity.core.processes import cores, set_up_worker
 from asperity.core.storage import version_notes
 from asperity.coupling import require_sampling
+from asperity.results.determined import Determined
 from asperity.results.run import RUN_GROUPS, Run, run_of
 from asperity.results.surface_spread import Row
 from asperity.solution import load_solution, solve_thermal_contact
 from asperity.surface import Surface
 
-WORTH_PROCESSES_S = 8.0  # of work, below which starting processes takes longer than they save
+MIN_PARALLEL_S = 8.0  # work below which starting processes takes longer than it saves
 
 SurfaceProgress = Callable[[int, int], None]
 
@@ -37,64 +38,82 @@ def solve_case(
     strict: bool = True,
     groups: tuple[str, ...] = RUN_GROUPS,
 ) -> Run:
-    """Solve a case, and work out its vibration.
+    """Solve a case and compute its vibration.
 
     Parameters
     ----------
-    case : what to solve
-    surface : composite roughness on the case's grid, in place of the case's own
-    surfaces : how many surfaces of the case's kind to solve, with later seeds or at other places of a measured map;
-        None: as many as the case's [solver] says or, if it does not, as `Case.surface_count` finds worth the wait. One
-        where a `surface` is given, or the case has only one
-    workers : processes for the surfaces after the first, where they are worth starting; 1 starts none
-    progress : called after every step of the solver, of those that work in this process
-    surface_progress : called with the surfaces that are done, and all of them
-    strict : raise when the solver stops before its tolerance on the first surface; else the run says so. Others that
-        fail are left out, and the run's notes say so
-    groups : of the catalogue of quantities, whose numbers are worked out on every surface
+    case : case to solve
+    surface : composite roughness on the case's grid, instead of the case's own
+    surfaces : number of surfaces of the case's kind to solve, with consecutive seeds or at other
+        places of a measured map; None: as the case's [solver] states, or else `Case.surface_count`.
+        One if a `surface` is given or the case has only one
+    workers : processes for the surfaces after the first, started if worthwhile; 1 starts none
+    progress : called after every solver iteration in this process
+    surface_progress : called with the number of surfaces done and in total
+    strict : raise if the first surface does not converge; otherwise the run states it. Other
+        surfaces that fail are omitted, with a note
+    groups : groups of the catalogue that are evaluated on every surface
 
     Raises
     ------
     BadInput
-        for a surface that does not fit the case's grid, or cannot be made or read; more surfaces than a map holds.
+        for a surface that does not fit the case's grid, or cannot be generated or read; or more
+        surfaces than a map contains.
     NotConverged
-        if `strict`; its `solution` is the unfinished contact.
+        if `strict`; its `solution` is the last iterate.
     AsperityError
         if worker processes cannot start.
     """
     if surface is not None:
         if surface.grid != case.grid:
-            grids = f"got {surface.grid} where the case has {case.grid}"
-            raise BadInput(f"surface must lie on the case's grid, {grids}; make it on case.grid")
+            raise BadInput(
+                f"surface must be on the case's grid {case.grid}, got {surface.grid}; generate it "
+                "on case.grid"
+            )
         case = replace(case, stored=surface)
         surfaces = 1
     count = case.surface_count(surfaces)
     run = _first(case, progress, strict, groups)
     if count == 1 or not run.solution.convergence.converged:
         return run
-    kind = [case.on_surface(number) for number in range(1, count)]
+    further_cases = [case.on_surface(number) for number in range(1, count)]
+    seconds = run.solution.convergence.seconds
+    parallel = workers > 1 and seconds * len(further_cases) > MIN_PARALLEL_S
+    outcomes = (
+        _in_processes(further_cases, groups, workers)
+        if parallel
+        else _in_this_process(further_cases, groups, progress)
+    )
+    others, exclusions = _collect(outcomes, count, surface_progress)
+    notes = [*json.loads(run.solution.attributes["notes"]), *exclusions]
+    attributes = {
+        **run.solution.attributes,
+        "notes": json.dumps(notes),
+        "surfaces": json.dumps(others),
+    }
+    return run_of(
+        case, replace(run.solution, attributes=attributes), notes, others, run.vibration, groups
+    )
+
+
+def _collect(
+    outcomes: Iterator["_Outcome"], count: int, surface_progress: SurfaceProgress | None
+) -> tuple[list[Row], list[str]]:
+    """Return the rows of further surfaces in order, and notes on those that failed."""
     rows: dict[int, Row] = {}
     failures: dict[int, str] = {}
-    seconds = run.solution.convergence.seconds
-    spread_out = workers > 1 and seconds * len(kind) > WORTH_PROCESSES_S
-    outcomes = _in_processes(kind, groups, workers) if spread_out else _here(kind, groups, progress)
-    for done, outcome in enumerate(outcomes, 1):
-        if outcome.row is None:
-            failures[outcome.number] = outcome.reason
+    for finished, outcome in enumerate(outcomes, 1):
+        if outcome.row.value is None:
+            failures[outcome.number] = outcome.row.reason.rstrip(".")
         else:
-            rows[outcome.number] = outcome.row
+            rows[outcome.number] = outcome.row.value
         if surface_progress is not None:
-            surface_progress(done + 1, count)
-    others = [rows[number] for number in sorted(rows)]
-    left_out = [
-        f"Surface {number + 1} of {count} was left out of means and intervals: {failures[number]}."
+            surface_progress(finished + 1, count)
+    exclusions = [
+        f"Surface {number + 1} of {count} is excluded from means and intervals: {failures[number]}."
         for number in sorted(failures)
     ]
-    notes = [*json.loads(run.solution.attributes["notes"]), *left_out]
-    kept = {**run.solution.attributes, "notes": json.dumps(notes), "surfaces": json.dumps(others)}
-    return run_of(
-        case, replace(run.solution, attributes=kept), notes, others, run.vibration, groups
-    )
+    return [rows[number] for number in sorted(rows)], exclusions
 
 
 def _first(
@@ -103,15 +122,14 @@ def _first(
     strict: bool,
     groups: tuple[str, ...],
 ) -> Run:
-    """A case on its own surface."""
+    """Solve a case on its own surface."""
     roughness = case.surface()
     if case.vibration is not None:
         with case.naming("vibration"):
-            require_sampling(
-                case.conditions, case.vibration, roughness.sq
-            )  # before the time a solution takes
+            # check before the solution, which takes longer
+            require_sampling(case.conditions, case.vibration, roughness.sq)
     notes = (*case.surface_notes, *case.notes)
-    kept = {"case": case.text, "notes": json.dumps(notes)}
+    attributes = {"case": case.text, "notes": json.dumps(notes)}
     try:
         solution = solve_thermal_contact(
             case.conditions,
@@ -123,17 +141,16 @@ def _first(
             progress=progress,
             strict=strict,
         )
-    except NotConverged as unfinished:
-        raise NotConverged(replace(unfinished.solution, attributes=kept), str(unfinished)) from None
-    return run_of(case, replace(solution, attributes=kept), notes, groups=groups)
+    except NotConverged as failure:
+        raise NotConverged(replace(failure.solution, attributes=attributes), str(failure)) from None
+    return run_of(case, replace(solution, attributes=attributes), notes, groups=groups)
 
 
 class _Outcome(NamedTuple):
-    """What became of a further surface: its numbers, or why there are none."""
+    """Numbers of a further surface, if determined."""
 
     number: int
-    row: Row | None
-    reason: str = ""
+    row: Determined[Row]
 
 
 def _outcome(
@@ -142,50 +159,60 @@ def _outcome(
     groups: tuple[str, ...],
     progress: Callable[[ehl.Iteration], None] | None = None,
 ) -> _Outcome:
-    """One thread does the algebra: two would sum in another order, and processes are to change nothing."""
-    try:
-        with threadpool_limits(1):
-            run = _first(case, progress, strict=True, groups=groups)
-            return _Outcome(number, {**run.own_scalars, **run.crucial})
-    except AsperityError as refusal:
-        return _Outcome(number, None, str(refusal).rstrip("."))
+    """Solve a further surface, with one thread for the algebra.
+
+    Several threads would sum in another order, but processes must not change results.
+    """
+
+    def row() -> Row:
+        run = _first(case, progress, strict=True, groups=groups)
+        return {**run.own_scalars, **run.summary_row}
+
+    with threadpool_limits(1):
+        return _Outcome(number, Determined.attempt(row))
 
 
-def _here(
-    kind: list[Case], groups: tuple[str, ...], progress: Callable[[ehl.Iteration], None] | None
+def _in_this_process(
+    further_cases: list[Case],
+    groups: tuple[str, ...],
+    progress: Callable[[ehl.Iteration], None] | None,
 ) -> Iterator[_Outcome]:
-    for number, case in enumerate(kind, 1):
+    for number, case in enumerate(further_cases, 1):
         yield _outcome(number, case, groups, progress)
 
 
-def _in_processes(kind: list[Case], groups: tuple[str, ...], workers: int) -> Iterator[_Outcome]:
+def _in_processes(
+    further_cases: list[Case], groups: tuple[str, ...], workers: int
+) -> Iterator[_Outcome]:
     pool = ProcessPoolExecutor(
-        min(workers, cores(), len(kind)), get_context("spawn"), set_up_worker
+        min(workers, cores(), len(further_cases)), get_context("spawn"), set_up_worker
     )
     try:
         submitted = [
-            pool.submit(_outcome, number, case, groups) for number, case in enumerate(kind, 1)
+            pool.submit(_outcome, number, case, groups)
+            for number, case in enumerate(further_cases, 1)
         ]
         for future in as_completed(submitted):
             yield future.result()
     except BrokenExecutor:
         raise AsperityError(
-            "a worker process could not start or died, for want of memory perhaps; solve with fewer surfaces, or with "
-            'workers=1 where the calling script is not a file with its calls under if __name__ == "__main__":'
+            "a worker process could not start or died, possibly for lack of memory; solve fewer "
+            "surfaces, or use "
+            'workers=1 if the calling script does not guard its calls by if __name__ == "__main__":'
         ) from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
 def load_run(path: str | Path) -> Run:
-    """Read a run back: its fields as they were solved, everything else worked out from them anew.
+    """Load a run: stored fields, with all derived quantities recomputed.
 
-    The numbers of further surfaces than the first are kept as they were.
+    The numbers of surfaces after the first are those stored.
 
     Raises
     ------
     UnreadableFile
-        if the file is missing, damaged, or holds no case.
+        if the file is missing, damaged, or contains no case.
     """
     path = Path(path)
     solution = load_solution(path)
@@ -193,14 +220,16 @@ def load_run(path: str | Path) -> Run:
         text, notes = solution.attributes["case"], tuple(json.loads(solution.attributes["notes"]))
         others = json.loads(solution.attributes.get("surfaces", "[]"))
     except (KeyError, ValueError):
-        alone = f"{path} holds a solution without its case"
-        raise UnreadableFile(f"{alone}; save the run (Run.save), not its solution alone") from None
+        raise UnreadableFile(
+            f"{path} contains a solution without its case; save the run (Run.save), not the "
+            "solution"
+        ) from None
     case = load_case(text, folder=path.parent, name=str(path), stored=solution.surface)
     if (case.conditions, case.grid) != (solution.conditions, solution.grid) or (
         case.lubricant != solution.lubricant or case.options != solution.options
     ):
         raise UnreadableFile(
-            f"{path} holds a case that is not the one solved in it; solve its case again"
+            f"{path} contains a case that differs from its solution; solve the case again"
         )
     case = replace(case, stored_notes=tuple(note for note in notes if note not in case.notes))
     return run_of(case, solution, (*version_notes(solution.versions), *notes), others)

@@ -1,7 +1,7 @@
-"""What several surfaces of one kind make of a contact's numbers: means, and how far one such surface may be off them.
+"""Means over several surfaces of one kind, and 90 % intervals for a single such surface.
 
-The interval is one surface's, not the mean's: of surfaces made alike, nine in ten have their load
-share within it. Does not solve anything.
+The interval is that of one surface, not of the mean: 90 % of nominally identical surfaces have
+their load share within it. Nothing is solved here.
 """
 
 import math
@@ -20,10 +20,9 @@ from asperity.ehl import ContactError, ContactState, Sides, Uncertainty
 Scalar = float | int | bool | None
 Row = Mapping[str, Scalar]
 
-LEVEL = 0.95  # of the t distribution on either side: 90 % between them
-NORMAL = 1.6448536269514722  # standard deviations on either side of 90 % of a normal distribution
-# load share below which the film is full: the logarithm of the odds tells no smaller ones apart
-FLOOR = 0.01
+LEVEL = 0.95  # one-sided quantile of the t distribution, for a 90 % interval
+NORMAL = 1.6448536269514722  # the same for a normal distribution [standard deviations]
+FLOOR = 0.01  # load share of a full film; log odds do not distinguish smaller shares
 # groups of the catalogue
 AVERAGED = (
     "load",
@@ -40,9 +39,9 @@ AVERAGED = (
 
 
 def mean_row(rows: Sequence[Row]) -> dict[str, Any]:
-    """The mean over surfaces of every number that one surface has; over those that have it, as not all resonate.
+    """Return means over surfaces of every number, over those surfaces that have it.
 
-    None for what was not worked out on every surface.
+    None for numbers that were not computed on every surface.
     """
     first, *others = rows
     means: dict[str, Any] = dict(first)
@@ -57,14 +56,14 @@ def mean_row(rows: Sequence[Row]) -> dict[str, Any]:
     return means
 
 
-def one_surface(values: Sequence[float], *, share: bool) -> tuple[float, Sides]:
-    """The mean, and how far below and above it a further surface lies with 90 %: Student's prediction interval.
+def prediction_interval(values: Sequence[float], *, share: bool) -> tuple[float, Sides]:
+    """Return the mean and Student's 90 % prediction interval for a further surface (below, above).
 
-    A share is taken by the logarithm of its odds, so that what comes out is one too.
+    A `share` is transformed to log odds, so that the interval stays within 0 to 1.
     """
     mean, count = float(np.mean(values)), len(values)
     if count < 2:
-        raise ValueError("one value does not scatter")
+        raise ValueError("a prediction interval needs at least two values")
     scale = np.array([_odds(value) for value in values]) if share else np.array(values)
     reach = float(stdtrit(count - 1, LEVEL) * math.sqrt(1.0 + 1.0 / count) * np.std(scale, ddof=1))
     ends = float(np.mean(scale)) - reach, float(np.mean(scale)) + reach
@@ -73,13 +72,13 @@ def one_surface(values: Sequence[float], *, share: bool) -> tuple[float, Sides]:
 
 
 def half_interval(values: Sequence[float]) -> float:
-    """Half of the 90 % interval of one further surface's number, which may be any."""
-    below, above = one_surface(values, share=False)[1]
+    """Return half of the 90 % prediction interval of an unbounded number on a further surface."""
+    below, above = prediction_interval(values, share=False)[1]
     return 0.5 * (below + above)
 
 
 def _odds(share: float) -> float:
-    """Logarithm of the odds of a share, 0 and 1 moved in by `FLOOR`."""
+    """Return the log odds of a share, with 0 and 1 moved inwards by `FLOOR`."""
     return float(logit((share + FLOOR) / (1.0 + 2.0 * FLOOR)))
 
 
@@ -87,19 +86,19 @@ def _share(odds: float) -> float:
     return float(np.clip((1.0 + 2.0 * FLOOR) * expit(odds) - FLOOR, 0.0, 1.0))
 
 
-def whole_error(
+def total_error(
     state: ContactState,
     rows: Sequence[Row],
     conditions: ContactConditions,
     model: VibrationModel | None,
     vibration: Vibration | None,
 ) -> ContactError | None:
-    """All that is known of how far load share and resonance are off, from the numbers of every surface.
+    """Return the uncertainty of load share and resonance from the numbers of all surfaces.
 
     Parameters
     ----------
     state, vibration : of the first surface
-    rows : numbers of every surface by their keys in the catalogue, the first one's at the beginning
+    rows : numbers of every surface by catalogue key, first surface first
     """
     if state.error is None:
         return None
@@ -114,26 +113,25 @@ def whole_error(
     return replace(state.error, clr=clr, crf_hz=crf, surfaces=len(rows))
 
 
-def _clr_error(own: Uncertainty, rows: Sequence[Row]) -> Uncertainty:
+def _clr_error(first: Uncertainty, rows: Sequence[Row]) -> Uncertainty:
     if len(rows) == 1:
-        return own
-    mean, surfaces = one_surface([float(row["clr"] or 0.0) for row in rows], share=True)
+        return first
+    mean, surfaces = prediction_interval([float(row["clr"] or 0.0) for row in rows], share=True)
     numerical = [row["clr_error"] for row in rows]
-    grid = own.grid
-    if own.iteration is not None and grid is not None and None not in numerical:
+    grid = first.grid
+    if first.iteration is not None and grid is not None and None not in numerical:
         half = max(
             0.0,
-            float(np.mean([error for error in numerical if error is not None])) - own.iteration[0],
+            float(np.mean([error for error in numerical if error is not None]))
+            - first.iteration[0],
         )
-        mean_half = 0.5 * (
-            grid[0] + grid[1]
-        )  # of the first surface, whose leaning the others share
+        mean_half = 0.5 * (grid[0] + grid[1])  # of the first surface; others share its asymmetry
         grid = (
             (grid[0] * half / mean_half, grid[1] * half / mean_half)
             if mean_half > 0.0
             else (half, half)
         )
-    return replace(own, value=mean, grid=grid, surfaces=surfaces)
+    return replace(first, value=mean, grid=grid, surfaces=surfaces)
 
 
 def _crf_error(
@@ -144,12 +142,15 @@ def _crf_error(
     model: VibrationModel,
     vibration: Vibration,
 ) -> Uncertainty:
-    """Of the load share by the coupling's law, of the surfaces by it or by their own resonances; and of the record."""
-    found = [float(row["crf_hz"] or 0.0) for row in rows if row["crf_hz"] is not None]
-    deviations = [float(row["crf_std_hz"]) for row in rows if row["crf_std_hz"] is not None]
-    record = NORMAL * float(np.mean(deviations)) if len(deviations) == len(found) else None
+    """Propagate the errors of CLR to CRF by the coupling's law, and add that of the record.
 
-    def carried_over(sides: Sides | None) -> Sides | None:
+    The scatter between surfaces comes from the law, or else from the surfaces' own resonances.
+    """
+    crf_hz = [float(row["crf_hz"] or 0.0) for row in rows if row["crf_hz"] is not None]
+    deviations = [float(row["crf_std_hz"]) for row in rows if row["crf_std_hz"] is not None]
+    record = NORMAL * float(np.mean(deviations)) if len(deviations) == len(crf_hz) else None
+
+    def propagated(sides: Sides | None) -> Sides | None:
         if sides is None:
             return None
         ends = (max(0.0, clr.value - sides[0]), clr.value, min(1.0, clr.value + sides[1]))
@@ -158,13 +159,13 @@ def _crf_error(
             return None
         return abs(middle - low), abs(high - middle)
 
-    surfaces = carried_over(clr.surfaces)
-    if clr.surfaces is not None and surfaces is None and len(found) > 1:
-        surfaces = one_surface(found, share=False)[1]
+    surfaces = propagated(clr.surfaces)
+    if clr.surfaces is not None and surfaces is None and len(crf_hz) > 1:
+        surfaces = prediction_interval(crf_hz, share=False)[1]
     return Uncertainty(
-        value=float(np.mean(found)),
-        iteration=carried_over(clr.iteration),
-        grid=carried_over(clr.grid),
+        value=float(np.mean(crf_hz)),
+        iteration=propagated(clr.iteration),
+        grid=propagated(clr.grid),
         surfaces=surfaces,
         record=None if record is None else (record, record),
         range=vibration.band_hz,

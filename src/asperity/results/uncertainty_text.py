@@ -1,24 +1,24 @@
-"""How far the numbers of a contact may be off, in words: in a sentence, and part by part for tables."""
+"""Uncertainty of a contact's numbers as text: in a sentence, and by part for tables."""
 
 from asperity.core.quantities import NO_VALUE, Quantity, quantity
 from asperity.ehl import ContactError, Sides, Uncertainty
 
-PARTS = {  # part of an uncertainty: what tables call it
+PARTS = {  # part of an uncertainty: name in tables
     "iteration": "iteration",
-    "grid": "size of the cells",
+    "grid": "cell size",
     "surfaces": "surface to surface",
-    "record": "length of the record",
+    "record": "record length",
 }
 UNDETERMINED = "not determined"
-REASONS = {  # why a part is not determined
-    "iteration": "nothing to compare with",
-    "grid": "nothing to compare with",
-    "record": "the method states none",
+REASONS = {  # reason why a part is not determined
+    "iteration": "no solution to compare with",
+    "grid": "no coarser grid to compare with",
+    "record": "not given by the method",
 }
 
 
-def in_words(key: str, error: Uncertainty) -> str:
-    """The interval of a quantity in brackets, or what of it is not known."""
+def interval_text(key: str, error: Uncertainty) -> str:
+    """Return the interval of a quantity in brackets, or the parts that are not determined."""
     if error.low is None or error.high is None:
         missing = [PARTS[part] for part in REASONS if getattr(error, part) is None]
         return f"(± {UNDETERMINED}: {' and '.join(missing)})"
@@ -26,29 +26,32 @@ def in_words(key: str, error: Uncertainty) -> str:
 
 
 def basis(error: ContactError) -> str:
-    """What the intervals are about."""
+    """Return the reference of the intervals as text."""
     if error.surfaces == 1:
-        return "90 % intervals, of this one surface"
-    return f"mean of {error.surfaces} surfaces, 90 % intervals for one of their kind"
+        return "90 % intervals for this surface"
+    return (
+        f"mean of {error.surfaces} surfaces, 90 % prediction intervals for another surface of "
+        "this kind"
+    )
 
 
-def doubt_rows(error: ContactError) -> list[tuple[str, str]]:
-    """Names and texts: the intervals of CLR and CRF, what each is made of, and what is in neither."""
+def uncertainty_rows(error: ContactError) -> list[tuple[str, str]]:
+    """Return table rows: intervals of CLR and CRF, their parts, and assumptions not covered."""
     rows = []
     for key, part in (("clr", error.clr), ("crf_hz", error.crf_hz)):
         if part is not None:
             rows += _rows(quantity(key), part, error.surfaces)
-    return [*rows, ("chosen, in no interval", ", ".join(error.choices))]
+    return [*rows, ("assumptions not covered by the intervals", ", ".join(error.choices))]
 
 
 def _rows(entry: Quantity, error: Uncertainty, surfaces: int) -> list[tuple[str, str]]:
     unknown = error.low is None or error.high is None
-    whole = UNDETERMINED if unknown else entry.interval(error.low or 0.0, error.high or 0.0)
-    rows = [(f"{entry.short}, 90 % interval", whole)]
+    interval = UNDETERMINED if unknown else entry.interval(error.low or 0.0, error.high or 0.0)
+    rows = [(f"{entry.short}, 90 % interval", interval)]
     for part, name in PARTS.items():
         sides: Sides | None = getattr(error, part)
         if part == "surfaces" and sides is None:
-            text = "not known: one was solved" if surfaces == 1 else UNDETERMINED
+            text = "unknown (one surface solved)" if surfaces == 1 else UNDETERMINED
         elif sides is None:
             text = f"{UNDETERMINED} ({REASONS[part]})"
         elif sides == (0.0, 0.0) and part == "record":

@@ -1,4 +1,4 @@
-"""The vibration model of a case alone: what an accelerometer would measure, without a solution where none is needed."""
+"""Vibration model of a case; the contact is solved only if the model needs it."""
 
 import math
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from typing import Any
 from asperity.case import Case
 from asperity.core.errors import BadInput
 from asperity.core.quantities import lines, quantity, read
-from asperity.coupling import LINEAR_UP_TO, Vibration, contact_vibration, dry_full_load
+from asperity.coupling import MAX_LINEAR_LOAD, Vibration, contact_vibration, dry_full_load
 from asperity.ehl import ContactState, Iteration
 from asperity.resonance import Resonance
 from asperity.results.solve import solve_case
@@ -18,7 +18,7 @@ KEYS = ("crf_hz", "crfa", "crf_std_hz", "crfa_std", "clr", "car", "sq_m")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VibratedCase:
-    """A case's vibration, and the contact that it is of."""
+    """Vibration of a case, and the state of its contact."""
 
     case: Case
     state: ContactState
@@ -26,22 +26,22 @@ class VibratedCase:
 
     @property
     def resonance(self) -> Resonance:
-        """What was looked for in the record, found or not."""
+        """Contact resonance of the record, found or not."""
         return self.vibration.resonance
 
     def scalars(self) -> dict[str, Any]:
-        """Every number of `asperity vibrate --json` by its key, SI; None where there is none."""
+        """Return the numbers of `asperity vibrate --json` by key, SI; None if not available."""
         numbers = read(self, (*map(quantity, KEYS), *lines("vibration")))
-        found = {"found": self.resonance.found, "reason": self.resonance.reason}
+        result = {"found": self.resonance.found, "reason": self.resonance.reason}
         return {
             "verdict": self.verdict(),
             **numbers,
-            **found,
+            **result,
             "band_hz": list(self.vibration.band_hz),
         }
 
     def verdict(self) -> str:
-        """One sentence: the resonance, of which contact, and whether its spring may be taken as linear."""
+        """Return one sentence: resonance, contact, and a warning if the spring is nonlinear."""
         resonance, model, force = self.resonance, self.case.vibration, self.vibration.dynamic_load
         load = f"{self.case.conditions.load:g} N on asperities"
         solved = model is not None and model.needs_solution
@@ -56,32 +56,32 @@ class VibratedCase:
         sentence = f"Contact resonance at {resonance.crf_hz:.1f}{deviation} Hz"
         sentence += f", CRFA {resonance.crfa:.3g} (m/s^2)^2/Hz: {contact}"
         linear = model is not None and model.linear
-        if linear and force is not None and force > LINEAR_UP_TO:
-            sentence += f"; but the dynamic force is {100 * force:.0f} % of the load, too much for a linear spring: "
-            sentence += "take vibration.response = nonlinear"
+        if linear and force is not None and force > MAX_LINEAR_LOAD:
+            sentence += (
+                f"; the dynamic force is {100 * force:.0f} % of the load, too much for a linear "
+                "spring: use vibration.response = nonlinear"
+            )
         return f"{sentence}."
 
 
 def vibrate_case(
     case: Case, *, progress: Callable[[Iteration], None] | None = None
 ) -> VibratedCase:
-    """The vibration model of a case, and the contact it is of.
+    """Simulate the vibration of a case.
 
-    That is the paper's section 2, dry and with all load on asperities of the case's Sq; or the
-    solved contact, where the case's stiffness law or excitation needs one.
+    The contact is that of the paper's section 2, dry with all load on asperities of the case's Sq;
+    or the solved contact if the case's stiffness law, damping law or excitation needs one.
 
     Raises
     ------
     BadInput
-        for a case without [vibration], or one that `contact_vibration` refuses.
+        for a case without [vibration], or as `contact_vibration`.
     NotConverged
-        if the contact is needed and cannot be solved.
+        if the contact is required and does not converge.
     """
     model = case.vibration
     if model is None:
-        raise BadInput(
-            f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio"
-        )
+        raise BadInput(f"{case.source}: [vibration] is missing; add it with mass and damping_ratio")
     if model.needs_solution:
         run = solve_case(case, progress=progress)
         assert run.vibration is not None  # the case has a model

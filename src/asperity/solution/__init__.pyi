@@ -1,11 +1,11 @@
 from .dynamic import DynamicStiffness as DynamicStiffness
+from .dynamic import OscillatingContact as OscillatingContact
 from .dynamic import OwnResonance as OwnResonance
-from .dynamic import ShakenContact as ShakenContact
 from .dynamic import dynamic_stiffness as dynamic_stiffness
 from .dynamic import own_resonance as own_resonance
-from .ends import AlongRoller as AlongRoller
-from .ends import AtEnd as AtEnd
-from .ends import along_roller as along_roller
+from .ends import AxialDistribution as AxialDistribution
+from .ends import EndValue as EndValue
+from .ends import axial_distribution as axial_distribution
 from .flash import FlashTemperature as FlashTemperature
 from .flash import flash_temperature as flash_temperature
 from .load_sharing import FILMS as FILMS
@@ -34,6 +34,7 @@ from .stress import stress_below as stress_below
 from .stress import subsurface_stress as subsurface_stress
 from .stress_influence import Tractions as Tractions
 from .thermal import HOT as HOT
+from .thermal import SolveSettings as SolveSettings
 from .thermal import friction_and_heat as friction_and_heat
 from .thermal import solve_thermal_contact as solve_thermal_contact
 from .traction import BOUNDARY_FRICTION as BOUNDARY_FRICTION

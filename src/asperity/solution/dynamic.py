@@ -1,9 +1,9 @@
-"""The dynamic stiffness k(ω) + iω c(ω) of a solved contact: what a small oscillation of the bodies' distance meets.
+"""Dynamic stiffness k(ω) + iω c(ω) of a solved contact under small oscillations of the approach.
 
-Reynolds' equation with its squeeze term, the deflection and the touching cells, linearised where
-they were solved. The oil needs time to follow, so the force runs before or behind the distance:
-that is the contact's own damping, which may be negative where the film is carried through just
-late enough (the entraining motion pays for it).
+Reynolds' equation with its squeeze term, the deflection and the touching cells are linearised about
+the solution. The oil needs time to follow, so the force leads or lags the approach: this is the
+contact's own damping. It may be negative where the film is carried through with a suitable delay;
+the entraining motion supplies the energy.
 """
 
 import math
@@ -24,33 +24,28 @@ from asperity.ehl.outcome import CONSERVING
 from asperity.solution.state import balance_of
 from asperity.solution.stiffness import ELASTIC, FLOWING, YIELDED, Yielded, checked_depth
 
-TOLERANCE = 1e-5  # of the linear equations: stiffness to 1e-4, a damping ratio of 0.001 to 1 %
-# of those where a mass resonates, if they are solved by rounds: a damping ratio of 0.003 to 1 %
-AT_RESONANCE = 3e-5
-ROUGHLY = 1e-2  # of those of a trial frequency: stiffness to 1 %
-STANDS_FROM, CLOSEST = (
-    3e-4,
-    1e-6,
-)  # between which stiffness and damping are watched whether they stand ...
-FEWEST_WATCHED, WATCHED = (
-    4,
-    0.2,
-)  # ... over the last steps, a share of all, as slow ones tell little one by one ...
-STILL, LEAST_LOSS = 0.005, 2e-6  # ... to this share; a loss factor of less is none
-SHORT = 2.0  # times what single precision says to be left, and a sweep has come short of it
-SAME_FREQUENCY = 0.005  # a resonance is found when its own stiffness moves it by less
-STANDING = 10.0  # tolerances that a solution may miss by
-MOST_TRIALS = 20
+# Relative residuals of the linear equations:
+TOLERANCE = 1e-5  # stiffness to 1e-4, a damping ratio of 0.001 to 1 %
+RESONANCE_TOLERANCE = 3e-5  # at a resonance, if solved by rounds: a damping ratio of 0.003 to 1 %
+TRIAL_TOLERANCE = 1e-2  # at a trial frequency: stiffness to 1 %
+MONITOR_FROM, MIN_RESIDUAL = 3e-4, 1e-6  # between which stagnation of k and c ends a sweep
+# Stagnation: k and c change by at most this share over the last steps (a share of all steps).
+MIN_MONITORED_STEPS, MONITORED_SHARE = 4, 0.2
+STAGNATION, MIN_LOSS_FACTOR = 0.005, 2e-6
+RESIDUAL_MISMATCH = 2.0  # true residual over that in single precision, above which it is refined
+FREQUENCY_TOLERANCE = 0.005  # relative change of the frequency at which a resonance is accepted
+STEADY_FACTOR = 10.0  # largest residual of a steady solution, in its tolerances
+MAX_TRIALS = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DynamicStiffness:
-    """Force over approach of a contact that is shaken at `frequency_hz`: `stiffness` k [N/m] + iω `damping` c [N s/m].
+    """Force over approach of a contact oscillating at `frequency_hz`: k [N/m] + iω c [N s/m].
 
-    The approach of a line contact is that of points `reference_depth` [m] away (None for others:
-    from far away). `yielded` tells what cells at the pressure cap do: "flowing" at a constant
-    pressure, as virgin roughness does, or "elastic", as where this load has been borne before. At
-    0 Hz `damping` is nan. `left` is the share of the linear equations that was not met.
+    `stiffness` is k, `damping` is c (nan at 0 Hz). The approach of a line contact is that of points
+    `reference_depth` [m] away (None for others: from infinity). `yielded` is the behaviour of cells
+    at the pressure cap: "flowing" at constant pressure, as virgin roughness, or "elastic", as where
+    this load has been carried before. `residual` is the relative residual of the linear equations.
     """
 
     frequency_hz: float
@@ -58,28 +53,28 @@ class DynamicStiffness:
     damping: float
     yielded: Yielded
     reference_depth: float | None
-    left: float
+    residual: float
 
     @property
     def damping_ratio(self) -> float:
-        """ζ = ω c/2k of a mass that resonates on this contact at this frequency, and of nothing else."""
+        """Damping ratio ζ = ω c/2k of a mass that resonates on this contact alone."""
         return math.pi * self.frequency_hz * self.damping / self.stiffness
 
 
-class ShakenContact:
-    """A solved contact made ready to be shaken at any number of frequencies.
+class OscillatingContact:
+    """Solved contact, linearised for oscillations at any number of frequencies.
 
     Parameters
     ----------
-    solution : of the model unified (or paper) or mixed, dry ones too
-    yielded : what cells at the pressure cap do, see `DynamicStiffness`
-    reference_depth : of a line contact [m]; None takes `roller_depth` of the conditions
+    solution : of the model unified (or paper) or mixed; dry contacts too
+    yielded : behaviour of cells at the pressure cap, see `DynamicStiffness`
+    reference_depth : of a line contact [m]; default `roller_depth` of the conditions
 
     Raises
     ------
     BadInput
-        for a solution of the conserving model, one that does not stand still (unsolved, or a moment of a motion), or a
-        reference no deeper than the contact is wide.
+        for the conserving model, an unsteady solution (not converged, or a snapshot of a motion),
+        or a reference depth less than the half-width.
     """
 
     def __init__(
@@ -96,13 +91,14 @@ class ShakenContact:
         self.depth = checked_depth(conditions, reference_depth) if conditions.endless else None
         if solution.options.model == CONSERVING:
             raise BadInput(
-                "a dynamic stiffness needs the model unified or mixed, got conserving; solve by one of them"
+                "dynamic stiffness needs the model unified or mixed, got conserving; solve with "
+                "one of them"
             )
         balance = balance_of(solution, whole=False)
-        if balance.residual_rms > STANDING * solution.options.tolerance:
+        if balance.residual_rms > STEADY_FACTOR * solution.options.tolerance:
             raise BadInput(
-                f"a dynamic stiffness needs a contact that stands still, and {balance.residual_rms:.1e} of this one's "
-                "equations is left; solve it without motion, or to its end"
+                f"dynamic stiffness needs a steady, converged contact, but the residual is "
+                f"{balance.residual_rms:.1e}; solve it without motion, to convergence"
             )
         self.scales, self.yields = (
             Scales.from_conditions(conditions, solution.lubricant),
@@ -111,34 +107,34 @@ class ShakenContact:
         self.balance = elastic(balance) if yielded == ELASTIC else balance
         self.oscillating = Oscillating(self.balance)
 
-    def at(self, frequency_hz: float, *, tolerance: float = TOLERANCE) -> DynamicStiffness:
-        """Stiffness and damping at a frequency [Hz]; 0 for a change so slow that the film follows.
+    def evaluate(self, frequency_hz: float, *, tolerance: float = TOLERANCE) -> DynamicStiffness:
+        """Return stiffness and damping at a frequency [Hz]; at 0 Hz the film follows fully.
 
-        `tolerance` is the share of the linear equations that may be left.
+        `tolerance` is the largest relative residual of the linear equations.
 
         Raises
         ------
         AsperityError
-            where the linear equations cannot be solved.
+            if the linear equations do not converge.
         """
         if not 0.0 <= frequency_hz < math.inf:
             raise BadInput(f"frequency must be 0 Hz or more, got {frequency_hz:g} Hz")
-        return self._at(frequency_hz, tolerance, None)
+        return self._solve(frequency_hz, tolerance, None)
 
-    def _at(
+    def _solve(
         self, frequency_hz: float, tolerance: float, start: OscillationResponse | None
     ) -> DynamicStiffness:
         answer = self.oscillating.answer(
-            self.per_crossing(frequency_hz), tolerance=tolerance, start=start
+            self.dimensionless_frequency(frequency_hz), tolerance=tolerance, start=start
         )
         if not answer.left < 2.0 * tolerance:
             raise AsperityError(
-                f"dynamic stiffness not found at {frequency_hz:g} Hz: {answer.steps} steps left "
-                f"{answer.left:.1e} of the linear equations, wanted {tolerance:.0e}"
+                f"dynamic stiffness did not converge at {frequency_hz:g} Hz: residual "
+                f"{answer.left:.1e} after {answer.steps} steps, required {tolerance:.0e}"
             )
-        return self._read(answer, frequency_hz)
+        return self._to_stiffness(answer, frequency_hz)
 
-    def _read(self, answer: OscillationResponse, frequency_hz: float) -> DynamicStiffness:
+    def _to_stiffness(self, answer: OscillationResponse, frequency_hz: float) -> DynamicStiffness:
         response, omega = self._response(complex(answer.total.sum())), 2.0 * math.pi * frequency_hz
         return DynamicStiffness(
             frequency_hz=frequency_hz,
@@ -146,73 +142,80 @@ class ShakenContact:
             damping=response.imag / omega if omega > 0.0 else math.nan,
             yielded=self.yielded,
             reference_depth=self.depth,
-            left=answer.left,
+            residual=answer.left,
         )
 
-    def _response(self, pressed: complex) -> complex:
-        """Complex k + iωc [N/m] of the sum of the dimensionless pressures per approach."""
-        return self._from_reference(pressed * self._newtons_per_metre())
+    def _response(self, pressure_sum: complex) -> complex:
+        """Return k + iωc [N/m] from the sum of the dimensionless pressures per approach."""
+        return self._at_reference(pressure_sum * self._stiffness_scale())
 
-    def per_crossing(self, frequency_hz: float) -> float:
-        """Angular frequency times the time that oil takes across a half-width."""
+    def dimensionless_frequency(self, frequency_hz: float) -> float:
+        """Return the angular frequency times the oil's transit time over a half-width."""
         speed = self.conditions.entrainment_speed
         return 2.0 * math.pi * frequency_hz * self.scales.length / speed if speed > 0.0 else 0.0
 
     def resonance(self, mass: float) -> DynamicStiffness:
-        """Where a mass [kg] resonates on this contact, k = m ω², to 0.5 % of its frequency; or AsperityError."""
+        """Return the dynamic stiffness at the resonance of a mass [kg], k = m ω² (to 0.5 %).
+
+        Raises
+        ------
+        AsperityError
+            if there is no resonance or the linear equations do not converge.
+        """
         require_positive("mass", mass, "kg")
-        hertz = _resonance_hz(self._bodies(), mass)
-        sweep = self.oscillating.sweep(self.per_crossing(hertz))
-        for trial in range(MOST_TRIALS):
-            stiffness = self._followed(sweep, roughly=trial == 0).real
+        frequency_hz = _resonance_hz(self._smooth_stiffness(), mass)
+        sweep = self.oscillating.sweep(self.dimensionless_frequency(frequency_hz))
+        for trial in range(MAX_TRIALS):
+            stiffness = self._iterate(sweep, roughly=trial == 0).real
             if stiffness <= 0.0:
                 break
-            moved = _resonance_hz(stiffness, mass)
-            if trial and abs(moved - hertz) <= SAME_FREQUENCY * moved:
-                return self._found(sweep, hertz)
-            hertz = moved
+            updated_hz = _resonance_hz(stiffness, mass)
+            if trial and abs(updated_hz - frequency_hz) <= FREQUENCY_TOLERANCE * updated_hz:
+                return self._finish(sweep, frequency_hz)
+            frequency_hz = updated_hz
             try:
-                sweep.move(self.per_crossing(hertz))
-            except (
-                ArithmeticError
-            ):  # what was gathered at the other frequency is not enough for this one
-                sweep = self.oscillating.sweep(self.per_crossing(hertz))
+                sweep.move(self.dimensionless_frequency(frequency_hz))
+            except ArithmeticError:  # the subspace of the other frequency does not suffice here
+                sweep = self.oscillating.sweep(self.dimensionless_frequency(frequency_hz))
         raise AsperityError(
-            f"a mass of {mass:g} kg has no resonance on this contact: k = m ω² is met nowhere"
+            f"a mass of {mass:g} kg has no resonance on this contact: k = m ω² has no solution"
         )
 
-    def settled(self, frequency_hz: float) -> DynamicStiffness:
-        """Stiffness and damping at a frequency [Hz], so close that the damping ratio stands to 1 % (or 1e-6)."""
-        sweep = self.oscillating.sweep(self.per_crossing(frequency_hz))
-        self._followed(sweep, roughly=False)
-        return self._found(sweep, frequency_hz)
+    def converged_at(self, frequency_hz: float) -> DynamicStiffness:
+        """Return stiffness and damping at a frequency [Hz], damping ratio to 1 % (or 1e-6)."""
+        sweep = self.oscillating.sweep(self.dimensionless_frequency(frequency_hz))
+        self._iterate(sweep, roughly=False)
+        return self._finish(sweep, frequency_hz)
 
-    def _followed(self, sweep: Shifted, *, roughly: bool) -> complex:
-        """Complex k + iωc [N/m] once it does not move any more, or `roughly` once the equations are met to `ROUGHLY`.
+    def _iterate(self, sweep: Shifted, *, roughly: bool) -> complex:
+        """Iterate k + iωc [N/m] until it stagnates, or with `roughly` to `TRIAL_TOLERANCE`.
 
-        What is left of the equations tells little of the damping: the smaller it is, the closer
-        they have to be met.
+        The residual says little about the damping: the smaller the damping, the smaller the
+        residual it requires.
         """
-        said: list[complex] = []
+        responses: list[complex] = []
         while True:
             if sweep.count:
-                said.append(self._response(sweep.sum))
-                if sweep.left <= (ROUGHLY if roughly else CLOSEST) or (
-                    not roughly and _stands(said, sweep)
+                responses.append(self._response(sweep.sum))
+                if sweep.left <= (TRIAL_TOLERANCE if roughly else MIN_RESIDUAL) or (
+                    not roughly and _stagnated(responses, sweep)
                 ):
-                    return said[-1]
+                    return responses[-1]
             if sweep.full or not sweep.step():
                 return self._response(sweep.sum)
 
-    def _found(self, sweep: Shifted, frequency_hz: float) -> DynamicStiffness:
-        """Where a sweep has come to, unless it is short of what it says: then solved on by rounds."""
+    def _finish(self, sweep: Shifted, frequency_hz: float) -> DynamicStiffness:
+        """Return the result of a sweep, refined by rounds if its true residual is too large."""
         answer = self.oscillating.swept(sweep)
-        if answer.left > max(SHORT * sweep.left, AT_RESONANCE) or sweep.left > STANDS_FROM:
-            return self._at(frequency_hz, AT_RESONANCE, answer)
-        return self._read(answer, frequency_hz)
+        if (
+            answer.left > max(RESIDUAL_MISMATCH * sweep.left, RESONANCE_TOLERANCE)
+            or sweep.left > MONITOR_FROM
+        ):
+            return self._solve(frequency_hz, RESONANCE_TOLERANCE, answer)
+        return self._to_stiffness(answer, frequency_hz)
 
-    def _bodies(self) -> float:
-        """Stiffness of the smooth dry bodies under the whole load [N/m], near any contact's that has been loaded."""
+    def _smooth_stiffness(self) -> float:
+        """Return the stiffness of the smooth dry bodies [N/m], the initial guess."""
         conditions = self.conditions
         if not conditions.long:
             approach = conditions.hertz.approach
@@ -223,11 +226,11 @@ class ShakenContact:
             conditions.pair.reduced_modulus,
             conditions.line_length,
         )
-        depth = length if self.depth is None else self.depth  # of a roller its length counts as one
+        depth = length if self.depth is None else self.depth  # for a roller its length
         return line_stiffness(conditions.load, length, radius, modulus, depth)
 
-    def _newtons_per_metre(self) -> float:
-        """What one dimensionless cell's pressure per gap is worth, over the whole length of a line contact."""
+    def _stiffness_scale(self) -> float:
+        """Return the factor from dimensionless to physical stiffness [N/m]."""
         problem, scales, conditions = self.balance.problem, self.scales, self.conditions
         dx, dy = problem.spacing
         cell = scales.pressure * scales.length**2 / scales.gap * dx * dy
@@ -235,8 +238,8 @@ class ShakenContact:
             return cell
         return cell * conditions.length / (problem.cells[1] * dy * scales.length)
 
-    def _from_reference(self, response: complex) -> complex:
-        """The solver measures a line's approach from points one half-width away; deeper ones give way besides."""
+    def _at_reference(self, response: complex) -> complex:
+        """Convert from points one half-width away (the solver's reference) to `depth`."""
         conditions = self.conditions
         if self.depth is None or conditions.length is None:
             return response
@@ -249,9 +252,9 @@ class ShakenContact:
 
 @dataclass(frozen=True, kw_only=True)
 class OwnResonance:
-    """Where a mass resonates on a solved contact: the contact once it has borne its load, and while it still yields.
+    """Resonance of a mass on a solved contact, with cells at the cap elastic (run in) or flowing.
 
-    `yields` tells whether any cell of the `solution` is at the pressure cap.
+    `yields` is True if any cell of the `solution` is at the pressure cap.
     """
 
     elastic: DynamicStiffness
@@ -260,45 +263,53 @@ class OwnResonance:
 
     @cached_property
     def virgin(self) -> DynamicStiffness:
-        """Cells at the pressure cap flowing, at the frequency of `elastic`; worked out when first asked for.
+        """Stiffness with flowing cells at the cap, at the frequency of `elastic`; lazy.
 
         Raises
         ------
         AsperityError
-            where the linear equations cannot be solved.
+            if the linear equations do not converge.
         """
-        if not self.yields:  # and both limits are one
+        if not self.yields:  # both limits coincide
             return replace(self.elastic, yielded=FLOWING)
-        shaken = ShakenContact(
+        oscillating = OscillatingContact(
             self.solution, yielded=FLOWING, reference_depth=self.elastic.reference_depth
         )
-        return shaken.settled(self.elastic.frequency_hz)
+        return oscillating.converged_at(self.elastic.frequency_hz)
 
 
 def own_resonance(
     solution: ContactSolution, mass: float, *, reference_depth: float | None = None
 ) -> OwnResonance:
-    """Stiffness and damping that a mass [kg] meets on a solved contact; raises what `ShakenContact` does."""
-    shaken = ShakenContact(solution, reference_depth=reference_depth)
-    return OwnResonance(elastic=shaken.resonance(mass), yields=shaken.yields, solution=solution)
+    """Compute the resonance of a mass [kg] on a solved contact.
+
+    Raises
+    ------
+    BadInput, AsperityError
+        see `OscillatingContact`.
+    """
+    oscillating = OscillatingContact(solution, reference_depth=reference_depth)
+    return OwnResonance(
+        elastic=oscillating.resonance(mass), yields=oscillating.yields, solution=solution
+    )
 
 
 def _resonance_hz(stiffness: float, mass: float) -> float:
-    """Of a mass [kg] on a spring [N/m]."""
+    """Return the natural frequency [Hz] of a mass [kg] on a spring [N/m]."""
     return math.sqrt(stiffness / mass) / (2.0 * math.pi)
 
 
-def _stands(said: list[complex], sweep: Shifted) -> bool:
-    """Whether stiffness and damping have kept still over the last steps, and enough of the equations is met."""
-    watched = max(FEWEST_WATCHED, int(WATCHED * sweep.count))
-    if sweep.left > STANDS_FROM or len(said) < watched:
+def _stagnated(responses: list[complex], sweep: Shifted) -> bool:
+    """Return whether k and c have stagnated over the last steps at a sufficient residual."""
+    monitored = max(MIN_MONITORED_STEPS, int(MONITORED_SHARE * sweep.count))
+    if sweep.left > MONITOR_FROM or len(responses) < monitored:
         return False
-    *before, last = said[-watched:]
-    damping = max(abs(one.imag - last.imag) for one in before)
-    stiffness = max(abs(one.real - last.real) for one in before)
+    *before, last = responses[-monitored:]
+    damping = max(abs(response.imag - last.imag) for response in before)
+    stiffness = max(abs(response.real - last.real) for response in before)
     return damping <= max(
-        STILL * abs(last.imag), LEAST_LOSS * abs(last)
-    ) and stiffness <= STILL * abs(last.real)
+        STAGNATION * abs(last.imag), MIN_LOSS_FACTOR * abs(last)
+    ) and stiffness <= STAGNATION * abs(last.real)
 
 
 def dynamic_stiffness(
@@ -308,7 +319,15 @@ def dynamic_stiffness(
     yielded: Yielded = ELASTIC,
     reference_depth: float | None = None,
 ) -> DynamicStiffness:
-    """k(ω) and c(ω) of a solved contact at one frequency [Hz]; `ShakenContact` for many, and for what it raises."""
-    return ShakenContact(solution, yielded=yielded, reference_depth=reference_depth).at(
+    """Compute k(ω) and c(ω) of a solved contact at one frequency [Hz].
+
+    Use `OscillatingContact` for several frequencies.
+
+    Raises
+    ------
+    BadInput, AsperityError
+        see `OscillatingContact`.
+    """
+    return OscillatingContact(solution, yielded=yielded, reference_depth=reference_depth).evaluate(
         frequency_hz
     )

@@ -1,17 +1,17 @@
-"""Flash temperature: sliding heat that both bodies take up as it passes, shared between them through the film.
+"""Flash temperature: frictional heat divided between both moving bodies by the film.
 
-Per area q = |τ| Δu. Half of it flows to each surface, and k_f/h of their difference across the
-film (the paper's Eqs 15 and 16): q_1 = q/2 + k_f (T_2 - T_1)/h, q_2 = q - q_1. Each surface
-answers its heat by a convolution, exactly for heat that is constant over cells: the integral of an
-instantaneous source over time,
+Heat per area is q = |τ| Δu. Half of it flows to each surface, plus k_f/h times their temperature
+difference across the film (the paper's Eqs 15 and 16): q_1 = q/2 + k_f (T_2 - T_1)/h, q_2 = q -
+q_1. Each surface responds by a convolution, exact for heat that is constant over cells, the time
+integral of an instantaneous source,
 
     T(X, Y) = 2/(k sqrt(pi)) * int_0^inf E_x(X, s) E_y(Y, s) ds,   s = sqrt(kappa t),
 
 where E is a cell's share of the Gaussian of width 2 s around the source, which has moved by u
-s^2/kappa. It holds at any speed, forward, backward or at rest; the paper's one-dimensional
-integrals are its limit of great speed. A line contact repeats in y and is as long as it is: at
-rest its temperature has a limit for that reason alone. Source: H. S. Carslaw, J. C. Jaeger,
-Conduction of Heat in Solids (1959), section 10.7.
+s^2/kappa. It holds at any speed, forward, backward or zero; the paper's one-dimensional integrals
+are the limit of high speed. A line contact is periodic in y but has finite length; only the finite
+length bounds its temperature at zero speed. Source: H. S. Carslaw, J. C. Jaeger, Conduction of Heat
+in Solids (1959), section 10.7.
 """
 
 import math
@@ -32,26 +32,25 @@ from asperity.solution.traction import Friction, friction
 
 Waves = npt.NDArray[np.complexfloating[Any, Any]]
 
-NODES = 6  # of Gauss's rule in a panel
-RATIO = 1.25  # of the s at both ends of a panel, at most
-SPREAD = 1.0  # of s, by which the source drifts in a panel, at most
-EARLIEST, LATEST = 1.0 / 16.0, 1e4  # first s in cells; last s in lengths of the source
+NODES = 6  # Gauss-Legendre nodes per panel
+PANEL_RATIO = 1.25  # largest ratio of s at the two ends of a panel
+MAX_DRIFT = 1.0  # largest drift of the source within a panel, in s
+FIRST_S, LAST_S = 1.0 / 16.0, 1e4  # first s [cells]; last s [lengths of the source]
 HARMONICS = 6
-AT_ONCE = 256  # values of s: what they need stays in the processor's cache
-SHARING_TOLERANCE, SURELY = 1e-6, 0.5
-AT_A_TIME, MOST_STEPS, MOST_ROUNDS = (
-    1e-3,
-    100,
-    8,
-)  # of GMRES in single precision; what it leaves is measured in double
+BATCH = 256  # values of s per batch, so that the arrays stay in the processor's cache
+SHARING_TOLERANCE = 1e-6  # relative residual of the heat division
+SAFETY = 0.5  # on the tolerance of the last round
+# GMRES runs in single precision in rounds; residuals are evaluated in double precision.
+ROUND_TOLERANCE = 1e-3
+MAX_STEPS, MAX_ROUNDS = 100, 8
 
 
 @dataclass(frozen=True, slots=True)
 class MovingSource:
-    """Surface temperature of a body that moves past a heat input: an exact cell-to-cell convolution by FFT.
+    """Surface temperature of a body moving past a heat input: exact convolution by FFT.
 
-    `spectrum` is the transformed kernel, in double and in single precision, and `own` the rise of
-    a cell by its own heat [K m^2/W].
+    `spectrum` is the transformed kernel in double and in single precision, and `own` the
+    temperature rise of a cell per own heat flux [K m^2/W].
     """
 
     cells: tuple[int, int]
@@ -60,7 +59,7 @@ class MovingSource:
     periodic: bool
 
     def __call__(self, heat: Field) -> Field:
-        """Temperature rise [K] of a heat input [W/m^2], both (nx, ny) and of one precision."""
+        """Return the temperature rise [K] of a heat input [W/m^2], both (nx, ny)."""
         nx, ny = self.cells
         length = ny if self.periodic else 2 * ny
         waves = scipy.fft.fft(
@@ -83,50 +82,52 @@ def moving_source(
     *,
     length: float | None,
 ) -> MovingSource:
-    """A body of `solid` that moves at `speed` along x [m/s] under cells of `spacing` [m].
+    """Return the convolution for a body of `solid` moving at `speed` along x [m/s].
 
-    `length` of a line contact [m], which repeats in y; None for heat that is bounded both ways.
+    `spacing` of the cells [m]; `length` of a line contact [m], periodic in y; None for heat that is
+    bounded in both directions.
     """
     (nx, ny), (dx, dy) = cells, spacing
     drift = speed / solid.diffusivity
     s, weight = _times(nx, dx, dy, drift, max(nx * dx, ny * dy, length or 0.0))
-    along = np.arange(2 * nx)
-    x = (
-        np.where(along < nx, along, along - 2.0 * nx) * dx
-    )  # downstream, then upstream of the source
+    index = np.arange(2 * nx)
+    # downstream, then upstream of the source
+    x = np.where(index < nx, index, index - 2.0 * nx) * dx
     edges = np.append(np.sort(x) - dx / 2.0, (nx - 0.5) * dx)
     kernel = np.zeros((2 * nx, ny if length is not None else ny + 1))
-    for first in range(0, s.size, AT_ONCE):
-        now, weighs = s[first : first + AT_ONCE], weight[first : first + AT_ONCE]
-        share_x = np.diff(_gaussian(edges[:, None] - drift * now**2, now), axis=0) * weighs
+    for first in range(0, s.size, BATCH):
+        s_batch, weight_batch = s[first : first + BATCH], weight[first : first + BATCH]
+        share_x = (
+            np.diff(_gaussian(edges[:, None] - drift * s_batch**2, s_batch), axis=0) * weight_batch
+        )
         if length is None:
-            kernel += share_x @ _shares(ny + 1, dy, now).T
+            kernel += share_x @ _shares(ny + 1, dy, s_batch).T
         else:
-            kernel += _over_line(share_x, ny, dy, length, now)
+            kernel += _over_line(share_x, ny, dy, length, s_batch)
     kernel *= 2.0 / (solid.conductivity * np.sqrt(np.pi))
     kernel = np.roll(kernel, nx, axis=0)
     mirrored = np.concatenate([kernel, kernel[:, -2:0:-1]], axis=1) if length is None else kernel
     spectrum = scipy.fft.fft(scipy.fft.rfft(mirrored, axis=1), axis=0)
-    both = spectrum, spectrum.astype(np.complex64)
-    for array in both:
+    combined = spectrum, spectrum.astype(np.complex64)
+    for array in combined:
         array.flags.writeable = False
-    return MovingSource(cells, both, float(kernel[0, 0]), length is not None)
+    return MovingSource(cells, combined, float(kernel[0, 0]), length is not None)
 
 
 def _times(nx: int, dx: float, dy: float, drift: float, reach: float) -> tuple[Field, Field]:
-    """The values of s and their weights, Gauss's rule in panels.
+    """Return quadrature nodes s and their weights (Gauss-Legendre in panels).
 
-    Panels grow by a ratio, and end where the source has drifted by half cells: however little the
-    heat spreads, each panel then lies on one side of a cell's edge. Once it has spread beyond a
-    cell, drifts may be as long as it.
+    Panels grow by a constant ratio, and also end where the source has drifted by half cells:
+    however little the heat has spread, each panel then lies on one side of a cell edge. Once the
+    heat has spread beyond a cell, the drift per panel may be as long as the spread.
     """
-    first, last = EARLIEST * min(dx, dy), LATEST * reach
-    ends = np.geomspace(first, last, int(np.ceil(np.log(last / first) / np.log(RATIO))) + 1)
+    first, last = FIRST_S * min(dx, dy), LAST_S * reach
+    ends = np.geomspace(first, last, int(np.ceil(np.log(last / first) / np.log(PANEL_RATIO))) + 1)
     if drift != 0.0:
         drifted = [0.5 * dx]
         while drifted[-1] < (nx + 3.0) * dx:
             drifted.append(
-                drifted[-1] + max(0.5 * dx, SPREAD * math.sqrt(drifted[-1] / abs(drift)))
+                drifted[-1] + max(0.5 * dx, MAX_DRIFT * math.sqrt(drifted[-1] / abs(drift)))
             )
         ends = np.concatenate([ends, np.sqrt(np.array(drifted) / abs(drift))])
     ends = np.concatenate([[0.0], np.unique(ends)])
@@ -137,47 +138,46 @@ def _times(nx: int, dx: float, dy: float, drift: float, reach: float) -> tuple[F
 
 
 def _gaussian(x: Field, s: Field) -> Field:
-    """Heat that has spread by s, left of x."""
+    """Return the share of heat, spread by s, that lies to the left of x."""
     widths = x / (2.0 * s)
     return np.asarray(0.5 * scipy.special.erf(widths, out=widths))
 
 
 def _shares(cells: int, dy: float, s: Field) -> Field:
-    """Shares of cells 0, 1, ... of heat that started at cell 0, shape (cells, s)."""
+    """Return the shares in cells 0, 1, ... of heat released in cell 0, shape (cells, s)."""
     edges = (np.arange(cells + 1) - 0.5) * dy
     return np.diff(_gaussian(edges[:, None], s), axis=0)
 
 
 def _over_line(share_x: Field, ny: int, dy: float, length: float, s: Field) -> Field:
-    """The sum over s of shares along x times those along a line, in which heat repeats, shape (shares, ny).
+    """Return the sum over s of shares along x times those along a periodic line, (shares, ny).
 
-    Images while heat has not spread far, a few harmonics afterwards.
+    Images are summed while the heat has spread little, a few harmonics afterwards.
     """
-    share_x = (
-        share_x * 2.0 * _gaussian(np.array(length / 2.0), s)
-    )  # heat from beyond the line's ends is missing
-    near = s < ny * dy / 8.0
+    # no heat arrives from beyond the ends of the line
+    share_x = share_x * 2.0 * _gaussian(np.array(length / 2.0), s)
+    local = s < ny * dy / 8.0
     images = (
-        _shares(2 * ny + 1, dy, s[near])[np.abs(np.arange(-2 * ny, 2 * ny))]
+        _shares(2 * ny + 1, dy, s[local])[np.abs(np.arange(-2 * ny, 2 * ny))]
         .reshape(4, ny, -1)
         .sum(axis=0)
     )
     order = np.arange(HARMONICS + 1)
     wave = 2.0 * np.pi * order / (ny * dy)
-    decay = np.exp(-((wave[:, None] * s[~near]) ** 2)) * np.sinc(order / ny)[:, None]
+    decay = np.exp(-((wave[:, None] * s[~local]) ** 2)) * np.sinc(order / ny)[:, None]
     cosines = np.where(order > 0, 2.0, 1.0) * np.cos(np.arange(ny)[:, None] * dy * wave) / ny
-    return np.asarray(share_x[:, near] @ images.T + share_x[:, ~near] @ decay.T @ cosines.T)
+    return np.asarray(share_x[:, local] @ images.T + share_x[:, ~local] @ decay.T @ cosines.T)
 
 
 @dataclass(frozen=True, kw_only=True)
 class FlashTemperature:
-    """What sliding heat does; fields of shape (nx, ny).
+    """Temperatures and heat flows due to sliding; fields of shape (nx, ny).
 
-    `surface_1`, `surface_2` and `film` (its mean over the thickness) are temperatures above
-    ambient [K]; `heat` is what a unit of area makes and `into_1` what of it flows into body 1
-    [W/m^2]. `max_k` is the largest rise of either surface above its own bulk, `film_max_k` that of
-    the film above ambient [K]; `heat_1_w` and `heat_2_w` flow into the bodies [W], of a line
-    contact over its length.
+    `surface_1`, `surface_2` and `film` (its mean over the thickness) are temperatures above ambient
+    [K]; `heat` is generated per area and `into_1` its part that flows into body 1 [W/m^2]. `max_k`
+    is the largest rise of either surface above its own bulk temperature, `film_max_k` that of the
+    film above ambient [K]; `heat_1_w` and `heat_2_w` flow into the bodies [W], for a line contact
+    over its length.
     """
 
     surface_1: Field
@@ -192,26 +192,29 @@ class FlashTemperature:
 
 
 def flash_temperature(
-    solution: ContactSolution, rubbing: Friction | None = None, *, thermal: Thermal | None = None
+    solution: ContactSolution,
+    friction_result: Friction | None = None,
+    *,
+    thermal: Thermal | None = None,
 ) -> FlashTemperature:
-    """Temperatures of both surfaces and of the film, as friction heats them.
+    """Compute the temperatures of both surfaces and of the film under frictional heating.
 
     Parameters
     ----------
-    rubbing : the friction; that of `friction(solution)` unless given
-    thermal : the bodies, the oil's conductivity, the temperatures around; `Thermal()` unless given
+    friction_result : friction of the contact; default `friction(solution)`
+    thermal : solids, oil conductivity and ambient temperatures; default `Thermal()`
 
     Raises
     ------
     AsperityError
-        if the two bodies' temperatures could not be matched.
+        if the division of heat between the bodies does not converge.
     """
     thermal = thermal or Thermal()
     conditions, grid = solution.conditions, solution.grid
-    rubbing = rubbing or friction(solution, thermal=thermal)
-    heat = np.abs(rubbing.shear) * conditions.sliding_speed
+    friction_result = friction_result or friction(solution, thermal=thermal)
+    heat = np.abs(friction_result.shear) * conditions.sliding_speed
     length = conditions.length
-    one, two = (
+    body_1, body_2 = (
         moving_source(grid.cells, grid.spacing, speed, solid, length=length)
         for speed, solid in zip(conditions.surface_speeds, thermal.solids, strict=True)
     )
@@ -223,15 +226,14 @@ def flash_temperature(
         solution.gap / thermal.oil_conductivity,
         np.ones(grid.cells, dtype=bool),
     )
-    if solution.lubricant is None:  # no film, and nothing beside the contact
+    if solution.lubricant is None:  # no film, and no heat flow outside the contact
         resistance, exchanging = 0.0 * resistance, solution.in_contact
-    passed = _passed_on(one, two, heat, resistance, exchanging, bulk[1] - bulk[0])
+    passed = _heat_across_film(body_1, body_2, heat, resistance, exchanging, bulk[1] - bulk[0])
     into_1, into_2 = 0.5 * heat + passed, 0.5 * heat - passed
-    rise_1, rise_2 = one(into_1), two(into_2)
+    rise_1, rise_2 = body_1(into_1), body_2(into_2)
     surface_1, surface_2 = bulk[0] + rise_1, bulk[1] + rise_2
-    film = (
-        0.5 * (surface_1 + surface_2) + heat * resistance / 12.0
-    )  # a parabola across the film above the mean
+    # parabolic temperature profile across the film
+    film = 0.5 * (surface_1 + surface_2) + heat * resistance / 12.0
     dx, dy = grid.spacing
     area = dx * dy * (length / grid.extent[1] if length is not None else 1.0)
     return FlashTemperature(
@@ -247,45 +249,50 @@ def flash_temperature(
     )
 
 
-def _passed_on(
-    one: MovingSource,
-    two: MovingSource,
+def _heat_across_film(
+    body_1: MovingSource,
+    body_2: MovingSource,
     heat: Field,
     resistance: Field,
     exchanging: Mask,
-    warmer: float,
+    bulk_difference: float,
 ) -> Field:
-    """Heat that crosses the film from body 2 to body 1 [W/m^2]: resistance times it is the surfaces' difference."""
+    """Return the heat flux across the film from body 2 to body 1 [W/m^2].
+
+    The flux times `resistance` equals the temperature difference of the surfaces. `bulk_difference`
+    [K] is the bulk temperature of body 2 less that of body 1.
+    """
     half = 0.5 * heat
-    wanted = np.asarray(np.where(exchanging, warmer + two(half) - one(half), 0.0))
-    if not np.any(wanted):
-        return wanted
-    summed = one.spectrum[0] + two.spectrum[0], one.spectrum[1] + two.spectrum[1]
-    both = MovingSource(one.cells, summed, one.own + two.own, one.periodic)
-    scale = 1.0 / (resistance + both.own)
+    target = np.asarray(np.where(exchanging, bulk_difference + body_2(half) - body_1(half), 0.0))
+    if not np.any(target):
+        return target
+    summed = body_1.spectrum[0] + body_2.spectrum[0], body_1.spectrum[1] + body_2.spectrum[1]
+    combined = MovingSource(body_1.cells, summed, body_1.own + body_2.own, body_1.periodic)
+    scale = 1.0 / (resistance + combined.own)
     parts: dict[Any, tuple[Field, Field]] = {
         np.dtype(kind): (resistance.astype(kind), scale.astype(kind))
         for kind in (np.float32, np.float64)
     }
 
-    def unbalanced(vector: Field) -> Field:
+    def operator(vector: Field) -> Field:
         resisted, scaled = parts[vector.dtype]
         crossing = vector.reshape(heat.shape) * scaled
-        answer = resisted * crossing + both(crossing)
-        return np.where(exchanging, answer, vector.reshape(heat.shape)).ravel()
+        response = resisted * crossing + combined(crossing)
+        return np.where(exchanging, response, vector.reshape(heat.shape)).ravel()
 
-    solved, left, size = np.zeros(heat.size), wanted.ravel(), float(np.linalg.norm(wanted))
-    for number in range(MOST_ROUNDS + 1):
-        rest = float(np.linalg.norm(left))
-        if rest <= SHARING_TOLERANCE * size:
-            return np.asarray(np.where(exchanging, solved.reshape(heat.shape) * scale, 0.0))
-        if number < MOST_ROUNDS:
-            tolerance = max(AT_A_TIME, SURELY * SHARING_TOLERANCE * size / rest)
-            single = (left / rest).astype(np.float32)
-            solved += rest * gmres(
-                unbalanced, np.asarray, single, tolerance=tolerance, max_steps=MOST_STEPS
+    scaled_flux, residual, size = np.zeros(heat.size), target.ravel(), float(np.linalg.norm(target))
+    for rounds in range(MAX_ROUNDS + 1):
+        residual_norm = float(np.linalg.norm(residual))
+        if residual_norm <= SHARING_TOLERANCE * size:
+            return np.asarray(np.where(exchanging, scaled_flux.reshape(heat.shape) * scale, 0.0))
+        if rounds < MAX_ROUNDS:
+            tolerance = max(ROUND_TOLERANCE, SAFETY * SHARING_TOLERANCE * size / residual_norm)
+            right_side = (residual / residual_norm).astype(np.float32)
+            scaled_flux += residual_norm * gmres(
+                operator, np.asarray, right_side, tolerance=tolerance, max_steps=MAX_STEPS
             )
-            left = wanted.ravel() - unbalanced(solved)
+            residual = target.ravel() - operator(scaled_flux)
     raise AsperityError(
-        "the heat could not be shared between the bodies; is the film far thinner than a cell?"
+        "the division of heat between the bodies did not converge; check whether the film is far "
+        "thinner than a cell"
     )

@@ -1,7 +1,7 @@
-"""Who carries the load at which film: shares that name their threshold, of any model.
+"""Load shares by film thickness, for any model.
 
-A share of load on "contact" means little without the film below which a cell counts: where the oil
-stands at the cap it may lie tens of nanometres thick between bodies that touch.
+A load share of "contact" means little without the film threshold below which a cell counts: at the
+pressure cap, oil films of tens of nanometres can lie between touching bodies.
 """
 
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ FILMS = (20e-9, 50e-9, 100e-9, 200e-9)  # [m]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoadSharing:
-    """Shares of load and area by side and by film.
+    """Load and area shares by kind of contact and by film thickness.
 
     `clr_solid` and `car_solid` count cells whose elastic bodies touch, over the load and over the
-    Hertz zone; `clr_floor` those of them, and others, whose film is no thicker than the contact
-    film (`films[0]`); `below` is the share of the load on films up to each of `films` [m].
-    `cavitated` is the share of the Hertz zone that is not full of oil, `oil` the oil in it as a
-    mean film [m]: the unified model takes its cavities for full.
+    Hertz zone; `clr_floor` counts all cells whose film is at most the contact film (`films[0]`);
+    `below` is the share of the load on films up to each of `films` [m]. `cavitated` is the share of
+    the Hertz zone that is not filled with oil, `oil` the oil in the zone as a mean film thickness
+    [m]; the unified model counts cavities as filled.
     """
 
     clr_solid: float
@@ -41,7 +41,7 @@ class LoadSharing:
 
 
 def clr_below(solution: ContactSolution, film: float) -> float:
-    """Share of the load, 0 to 1, on cells whose film is no thicker than `film` [m]; 1 % above it counts as it.
+    """Return the load share, 0 to 1, of cells with a film of at most `film` [m] (1 % tolerance).
 
     Raises
     ------
@@ -54,7 +54,7 @@ def clr_below(solution: ContactSolution, film: float) -> float:
 
 
 def sharing_by_film(solution: ContactSolution) -> LoadSharing:
-    """Read the shares off a solution of any model."""
+    """Compute the load shares of a solution of any model."""
     zone = hertz_zone(solution.conditions, solution.grid)
     films = (
         solution.options.contact_film,

@@ -1,4 +1,4 @@
-"""The regime card: what kind of contact a solution is of, and how far its film is from the fits that hold there."""
+"""Regime card: lubrication regime of a solved contact, compared with published film formulas."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -27,16 +27,16 @@ _NUMBERS = {  # key in the catalogue -> field
     "moes_load": "moes_load",
     "moes_oil": "moes_oil",
 }
-FAR = 0.25  # of a film from every fit of its kind; their authors claim 5 to 15 %
-PARTED = 3.0  # film ratio from which a rough contact's film is that of the smooth one
+_PLACES = {"central": "central film thickness", "least": "minimum film thickness"}
+MAX_DEVIATION = 0.25  # of the film from all fits; their authors claim 5 to 15 %
+FULL_FILM = 3.0  # film ratio from which roughness does not affect the mean film
 
 
 @dataclass(frozen=True, slots=True)
 class FittedFilm:
-    """A film by a published fit and as solved [m], and what is solved over the fit, less 1.
+    """Film thickness by a published formula and as solved [m].
 
-    Where the fit is about an oil that cannot be compressed, `solved` is what the film would be at
-    ambient density.
+    If the formula assumes incompressible oil, `solved` is converted to ambient density.
     """
 
     source: str
@@ -46,18 +46,18 @@ class FittedFilm:
 
     @property
     def deviation(self) -> float:
-        """How much thicker the solved film is, as a share of the fit's."""
+        """Solved film over the fitted one, less 1."""
         return self.solved / self.film - 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegimeCard:
-    """What kind of contact it is.
+    """Lubrication regime and dimensionless numbers of a contact.
 
-    Half-widths a and b [m] (a alone for a line contact), Hertz's largest pressure [Pa], E' [Pa],
-    the dimensionless numbers, the regime, and the fits that hold there; the last three None and
-    empty for a dry contact. `fits` is empty too for a contact narrower across rolling than along
-    it, which none of them is about.
+    Half-widths a and b [m] (only a for a line contact), maximum Hertz pressure [Pa], E' [Pa], the
+    dimensionless numbers, the regime, and the film formulas valid there; the last three are None or
+    empty for a dry contact. `fits` is also empty for a contact narrower across rolling than along
+    it, which no formula covers.
     """
 
     half_width: float
@@ -69,7 +69,7 @@ class RegimeCard:
     fits: tuple[FittedFilm, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON has it, SI, by the catalogue's keys; None where there is none."""
+        """Return the card as a dictionary for JSON in SI units; None if undefined."""
         return {
             "half_width_m": self.half_width,
             "half_width_across_m": self.half_width_across,
@@ -93,28 +93,29 @@ class RegimeCard:
         }
 
     def rows(self) -> list[tuple[str, str]]:
-        """What kind of contact, Hertz's zone, the numbers, and the films by fit, each named and in display units."""
-        shown = self.to_dict()
+        """Return the card as named rows in display units."""
+        values = self.to_dict()
         pair = [quantity("half_width_m").named(self.half_width)]
         if self.half_width_across is not None:
             pair.append(f"across rolling {quantity('half_width_m').text(self.half_width_across)}")
         hertz = [
             *pair,
             *(
-                quantity(key).named(shown[key])
+                quantity(key).named(values[key])
                 for key in ("hertz_pressure_pa", "effective_modulus_pa")
             ),
         ]
         rows = [("Hertz zone", ", ".join(hertz))]
         if self.numbers is None:
             return rows
-        numbers = ", ".join(quantity(key).named(shown[key]) for key in _NUMBERS)
+        numbers = ", ".join(quantity(key).named(values[key]) for key in _NUMBERS)
         rows += [("regime", str(self.regime)), ("dimensionless numbers", numbers)]
         film, deviation = quantity("film_thickness_m"), quantity("film_deviation")
         rows += [
             (
-                f"fitted {fit.place} film, {fit.source}",
-                f"{film.text(fit.film)}; solved {film.text(fit.solved)}, {deviation.text(fit.deviation)}",
+                f"fitted {_PLACES[fit.place]}, {fit.source}",
+                f"{film.text(fit.film)}; solved {film.text(fit.solved)}, "
+                f"{deviation.text(fit.deviation)}",
             )
             for fit in self.fits
         ]
@@ -122,7 +123,7 @@ class RegimeCard:
 
 
 def regime_card(solution: ContactSolution) -> RegimeCard:
-    """The regime card of a solved contact."""
+    """Return the regime card of a solved contact."""
     conditions, lubricant, hertz = (
         solution.conditions,
         solution.lubricant,
@@ -156,39 +157,43 @@ def regime_card(solution: ContactSolution) -> RegimeCard:
 
 
 def far_from_fits(solution: ContactSolution) -> str | None:
-    """A sentence where the central film of a contact without asperities in it is far from every fit that holds."""
+    """Return a note if the central film without asperity contact is far from all valid fits."""
     conditions, lubricant, sq = solution.conditions, solution.lubricant, solution.surface.sq
     if (
         lubricant is None
         or solution.in_contact.any()
-        or least_film(conditions, lubricant) < PARTED * sq
+        or least_film(conditions, lubricant) < FULL_FILM * sq
     ):
         return None
     central = [fit for fit in regime_card(solution).fits if fit.place == "central"]
-    if not central or min(abs(fit.deviation) for fit in central) <= FAR:
+    if not central or min(abs(fit.deviation) for fit in central) <= MAX_DEVIATION:
         return None
     nearest = min(central, key=lambda fit: abs(fit.deviation))
     length, cell = inlet_length(conditions, lubricant), solution.grid.spacing[0]
-    flooded, begins = flooded_inlet(conditions, lubricant, missing=0.05), -solution.grid.lower[0]
+    flooded, inlet_start = (
+        flooded_inlet(conditions, lubricant, missing=0.05),
+        -solution.grid.lower[0],
+    )
     reason = (
         f"the grid has {length / cell:.2g} cells across the inlet"
         if length < MIN_CELLS_IN_INLET * cell
-        else "the inlet starves it"
-        if begins < flooded
-        else "the grid is fine enough and the inlet flooded: the fit may not hold for these bodies and this oil"
+        else "the inlet is starved"
+        if inlet_start < flooded
+        else "the grid is fine enough and the inlet flooded; the formula may not cover this contact"
     )
     return (
-        f"The central film of {nearest.solved * 1e6:.3g} um is {100.0 * abs(nearest.deviation):.0f} % "
-        f"{'above' if nearest.deviation > 0.0 else 'below'} the nearest fit's {nearest.film * 1e6:.3g} um "
-        f"({nearest.source}): {reason}."
+        f"The central film of {nearest.solved * 1e6:.3g} um is "
+        f"{100.0 * abs(nearest.deviation):.0f} % "
+        f"{'above' if nearest.deviation > 0.0 else 'below'} the nearest fit, "
+        f"{nearest.film * 1e6:.3g} um ({nearest.source}): {reason}."
     )
 
 
 def _central(solution: ContactSolution, *, at_the_peak: bool) -> tuple[float, float]:
-    """Central film [m], and the oil's density there over the ambient one.
+    """Return the central film [m] and the oil density there over the ambient one.
 
-    Mean over the middle tenth of the Hertz zone; between bodies that stay rigid the film under the
-    highest pressure, which is what fits call central there.
+    Mean over the middle tenth of the Hertz zone. In the rigid regimes it is the film under the
+    highest pressure, which the formulas call central there.
     """
     middle = hertz_zone(solution.conditions, solution.grid, CENTRE)
     if at_the_peak:

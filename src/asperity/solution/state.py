@@ -1,4 +1,4 @@
-"""What a tribologist reads off a solved contact: load and area shares, film, and how well the equations are met."""
+"""Scalars of a solved contact: load and area shares, film thickness, pressure and residuals."""
 
 import numpy as np
 
@@ -23,14 +23,14 @@ from asperity.kernels.reynolds import CAPPED, LUBRICATED
 
 
 def contact_state(solution: ContactSolution) -> ContactState:
-    """Read the scalars off a solution; the residuals are evaluated anew from its fields."""
+    """Return the scalars of a solution; residuals are re-evaluated from its fields."""
     return state_of(solution, balance_of(solution))
 
 
 def balance_of(solution: ContactSolution, *, whole: bool = True) -> Balance | MixedBalance:
-    """What is left of a solution's equations, evaluated anew from its fields on its own grid.
+    """Re-evaluate the equations of a solution from its fields, on its own grid.
 
-    Unless `whole`, a contact in which nothing varies along y is taken on one line of cells.
+    With `whole=False`, a contact that is uniform along y is evaluated on one line of cells.
     """
     scales = Scales.from_conditions(solution.conditions, solution.lubricant)
     problem = contact_problem(
@@ -50,11 +50,13 @@ def balance_of(solution: ContactSolution, *, whole: bool = True) -> Balance | Mi
 
 
 def plastic_overlap(solution: ContactSolution) -> Field:
-    """How deep the pressure cap has let the bodies overlap [m], (nx, ny): what stays flattened when they part."""
+    """Return the overlap [m], (nx, ny), that the pressure cap has permitted.
+
+    This much of the heights stays flattened when the bodies separate.
+    """
     balance = balance_of(solution)
-    depth = np.maximum(
-        balance.problem.contact_gap - balance.gap, 0.0
-    )  # the solution's own gap ends at the film
+    # the gap of the solution itself is limited by the contact film
+    depth = np.maximum(balance.problem.contact_gap - balance.gap, 0.0)
     depth = (
         depth
         * (balance.pressure >= balance.problem.p_cap)
@@ -64,28 +66,25 @@ def plastic_overlap(solution: ContactSolution) -> Field:
 
 
 def state_of(solution: ContactSolution, balance: Balance | MixedBalance) -> ContactState:
-    """The scalars of a solution whose equations, those of a moving contact perhaps, are left with `balance`."""
-    grid, touching, problem = solution.grid, solution.in_contact, balance.problem
+    """Return the scalars of a solution from its evaluated equations (also of a moving contact)."""
+    grid, in_contact, problem = solution.grid, solution.in_contact, balance.problem
     sq, oil = solution.surface.sq, solution.lubricant
     zone, centre = problem.zone(), problem.zone(CENTRE)
     dx, dy = problem.spacing
     width = grid.cells[1] * dy if problem.form.periodic else 2.0 * problem.form.aspect
-    lost = balance.rows.state != LUBRICATED
+    counted = balance.rows.state != LUBRICATED
     if isinstance(balance, MixedBalance):
-        capped, carried = balance.yielded, balance.content[zone].mean()
-        lost[:] = (
-            # what is left of any cell's equation: at low speed it is as much as what is refilled
-            True
-        )
+        capped, carried_oil = balance.yielded, balance.content[zone].mean()
+        counted[:] = True  # residuals of all cells count: at low speed they equal the refilled oil
     else:
         capped = balance.rows.state == CAPPED
-        carried = balance.film.content[zone].mean() if balance.film else np.inf
-    unbalanced = np.abs(balance.outflow[zone & lost]).sum()
+        carried_oil = balance.film.content[zone].mean() if balance.film else np.inf
+    unbalanced = np.abs(balance.outflow[zone & counted]).sum()
     return ContactState(
-        car=area_share(touching, zone),
-        car_domain=float(touching.mean() * _hertz_areas(solution.conditions, grid)),
-        clr=carried_share(solution.pressure, touching),
-        capped_oil_load_ratio=carried_share(solution.pressure, capped & ~touching),
+        car=area_share(in_contact, zone),
+        car_domain=float(in_contact.mean() * _hertz_areas(solution.conditions, grid)),
+        clr=carried_share(solution.pressure, in_contact),
+        capped_oil_load_ratio=carried_share(solution.pressure, capped & ~in_contact),
         sq=sq,
         h_min=float(solution.gap.min()),
         h_central=float(solution.gap[centre].mean()),
@@ -94,14 +93,14 @@ def state_of(solution: ContactSolution, balance: Balance | MixedBalance) -> Cont
         p_max=float(solution.pressure.max()),
         reynolds_residual=balance.residual_rms,
         load_error=balance.load_error,
-        mass_flux_imbalance=float(unbalanced * dx * dy / (carried * width)),
+        mass_flux_imbalance=float(unbalanced * dx * dy / (carried_oil * width)),
         contact_slope=_contact_slope(solution),
         error=_error(solution),
     )
 
 
 def _error(solution: ContactSolution) -> ContactError:
-    """What the solution alone can tell: iteration and grid, and what was chosen."""
+    """Return the errors known from the solution alone (iteration and grid), and the assumptions."""
     convergence, options = solution.convergence, solution.options
     step, cells = convergence.iteration_error, convergence.discretisation_error
     iteration, grid = (
@@ -120,13 +119,13 @@ def _error(solution: ContactSolution) -> ContactError:
                 if solution.lubricant is None
                 else [f"contact threshold {options.contact_film * 1e9:.3g} nm"]
             ),
-            f"inlet {inlet:.3g} half-widths long",
+            f"inlet length {inlet:.3g} half-widths",
         ),
     )
 
 
 def _contact_slope(solution: ContactSolution) -> float | None:
-    """Central differences; y goes round."""
+    """Return the mean slope of the touching cells by central differences; y is periodic."""
     heights, (dx, dy) = solution.surface.heights, solution.grid.spacing
     across = (np.roll(heights, -1, axis=1) - np.roll(heights, 1, axis=1)) / (2.0 * dy)
     slope = np.hypot(np.gradient(heights, dx, axis=0), across)
@@ -134,7 +133,7 @@ def _contact_slope(solution: ContactSolution) -> float | None:
 
 
 def _hertz_areas(conditions: ContactConditions, grid: Grid) -> float:
-    """Area of the grid in Hertz contact areas."""
+    """Return the area of the grid in Hertz contact areas."""
     if conditions.endless:
         return grid.extent[0] / (2.0 * conditions.hertz.half_widths[0])
     return grid.extent[0] * grid.extent[1] / conditions.hertz.area

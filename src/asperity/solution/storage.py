@@ -1,4 +1,4 @@
-"""A contact solution read back from disk, every number as it was; `ContactSolution.save` writes it."""
+"""Reading of contact solutions from disk; `ContactSolution.save` writes them."""
 
 import json
 from pathlib import Path
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def load_solution(path: str | Path) -> ContactSolution:
-    """Read a solution back, every number as it was.
+    """Load a contact solution saved by `ContactSolution.save`, every number unchanged.
 
     Raises
     ------
@@ -41,7 +41,8 @@ def load_solution(path: str | Path) -> ContactSolution:
         raise UnreadableFile(f"{path} is netCDF but not a run of asperity; solve a case to get one")
     if dataset.attrs["asperity_format"] != FORMAT:
         raise UnreadableFile(
-            f"{path} has run format {dataset.attrs['asperity_format']}, this asperity reads format {FORMAT}; {remedy}"
+            f"{path} has run format {dataset.attrs['asperity_format']}, this asperity reads "
+            f"format {FORMAT}; {remedy}"
         )
     try:
         return _solution(dataset)
@@ -105,8 +106,7 @@ def _convergence(described: dict[str, Any], history: tuple[Iteration, ...]) -> C
         errors["iteration_error"] = Figures(**described["iteration_error"])
     if described.get("discretisation_error"):
         half = described["discretisation_error"]
-        lean = Figures(
-            **(half.pop("lean", None) or dict.fromkeys(half, 0.0))
-        )  # of a run that knew none
+        # runs of earlier versions have no `lean`
+        lean = Figures(**(half.pop("lean", None) or dict.fromkeys(half, 0.0)))
         errors["discretisation_error"] = GridError(**half, lean=lean)
     return Convergence(**rest, **errors, status=SolveStatus(described["status"]), history=history)

@@ -1,8 +1,8 @@
-"""What the contact does to the material below it: the stress tensor, von Mises stress, and where it is largest.
+"""Subsurface stress: stress tensor, von Mises stress, and their largest values.
 
-The half-space is elastic and smooth: stresses above yield mean that the material yields, not what
-it carries then. Residual stresses, and the change of pressure that traction between unlike bodies
-brings, are left out.
+The half-space is elastic and smooth: stresses above yield show that the material yields, not the
+stress it then carries. Residual stresses, and the pressure change due to traction between
+dissimilar bodies, are not included.
 """
 
 from collections.abc import Callable
@@ -18,12 +18,12 @@ from asperity.core.errors import BadInput
 from asperity.ehl import ContactSolution
 from asperity.solution.stress_influence import COMPONENTS, Tractions
 
-DEPTHS = 16  # where none are given, the surface among them
-DEEPEST = 2.5  # Hertz half-widths
-CORE = 0.1  # Hertz half-widths below which the cell size has no say
-HERTZ_CELLS = 96  # across the smooth contact; its largest stress is then right to 0.1 %
-REFINEMENTS = 3  # depths looked at between the given ones for the largest stress, at most
-CLOSE = 0.001  # depths nearer to one another than twice this share are not told apart
+DEPTHS = 16  # default number of depths, including the surface
+MAX_DEPTH = 2.5  # default largest depth [Hertz half-widths]
+CORE = 0.1  # depth [Hertz half-widths] below which the stress does not depend on the cell size
+HERTZ_CELLS = 96  # across the smooth contact; its largest stress is then accurate to 0.1 %
+REFINEMENTS = 3  # largest number of depths added to locate the largest stress
+MIN_DISTANCE = 0.001  # relative distance below which depths are not distinguished
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +39,15 @@ class StressTensor:
 
     @property
     def von_mises(self) -> Field:
-        """sqrt(3 J2) [Pa]."""
+        """Von Mises stress sqrt(3 J2) [Pa]."""
         return np.asarray(np.sqrt(3.0 * self._second_invariant))
 
     @property
     def max_shear(self) -> Field:
-        """Half the difference of the largest and the smallest principal stress [Pa], Tresca's measure.
+        """Half the difference of the largest and the smallest principal stress [Pa] (Tresca).
 
-        In double precision: where two principal stresses are equal, Lode's angle has half of the
-        digits.
+        In double precision, because Lode's angle loses half of its digits where two principal
+        stresses are equal.
         """
         xx, yy, zz, xy, yz, xz = (
             np.asarray(getattr(self, name), dtype=float) for name in COMPONENTS
@@ -69,7 +69,7 @@ class StressTensor:
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """A largest stress [Pa], and where it is [m]: depth below the surface, and the cell centre above it."""
+    """Largest stress [Pa] and its position [m]: depth, and cell centre above it."""
 
     value: float
     depth: float
@@ -81,12 +81,12 @@ class Peak:
 class SubsurfaceStress:
     """Stresses in one body of a contact.
 
-    `depths` [m], shape (nz,), growing; `von_mises` [Pa], shape (nx, ny, nz), below the cell
+    `depths` [m], shape (nz,), increasing; `von_mises` [Pa], shape (nx, ny, nz), below the cell
     centres of `grid`; `peak` is the largest von Mises stress and `shear_peak` the largest shear
-    stress (half the difference of principal stresses), each sought at the depths and, by
+    stress (half the difference of principal stresses), each located at the depths and, by
     parabolas, between them; `core` is the largest von Mises stress at least `core_depth` [m] deep.
-    Where pressure and traction end suddenly, as at the edge of a capped asperity, `peak` has no
-    bound but the cell size, and `core` hardly knows it. `body` is 1 or 2.
+    Where pressure and traction end abruptly, as at the edge of a capped asperity, `peak` is bounded
+    only by the cell size; `core` hardly depends on it. `body` is 1 or 2.
     """
 
     grid: Grid
@@ -102,12 +102,12 @@ class SubsurfaceStress:
 
     @property
     def largest(self) -> Field:
-        """The largest von Mises stress of the depths below each cell [Pa], shape (nx, ny)."""
+        """Largest von Mises stress over the depths below each cell [Pa], shape (nx, ny)."""
         return np.asarray(self.von_mises.max(axis=2))
 
     @property
     def depth_of_largest(self) -> Field:
-        """The depth of `largest` [m], shape (nx, ny)."""
+        """Depth of `largest` [m], shape (nx, ny)."""
         return np.asarray(self.depths[self.von_mises.argmax(axis=2)])
 
     @property
@@ -117,24 +117,24 @@ class SubsurfaceStress:
 
     @cached_property
     def section(self) -> StressTensor:
-        """The whole tensor in the plane along rolling through `peak`, shape (nx, nz)."""
+        """Full tensor in the plane along rolling through `peak`, shape (nx, nz)."""
         levels = [
             self.tractions.stresses(float(depth), self.poisson_ratio)[:, :, self.row]
             for depth in self.depths
         ]
         return StressTensor(*np.stack(levels, axis=-1))
 
-    def at(self, depth: float) -> StressTensor:
-        """The whole tensor at any depth [m], 0 included, shape (nx, ny).
+    def tensor_at(self, depth: float) -> StressTensor:
+        """Return the full tensor at any depth [m], including 0, shape (nx, ny).
 
         Raises
         ------
         BadInput
-            for a depth above the surface.
+            for a negative depth.
         """
         (checked,) = _checked_depths(np.array([depth]))
         return StressTensor(
-            *self.tractions.stresses(float(checked), self.poisson_ratio, keep=False)
+            *self.tractions.stresses(float(checked), self.poisson_ratio, cache=False)
         )
 
 
@@ -145,19 +145,19 @@ def subsurface_stress(
     depths: Field | None = None,
     body: int = 1,
 ) -> SubsurfaceStress:
-    """Stresses below a solved contact.
+    """Compute the stresses below a solved contact.
 
     Parameters
     ----------
-    shear : traction along x that the surface of body 1 feels [Pa], shape (nx, ny), such as `friction(...).shear`; body
-        2 feels the opposite. None for a contact without friction
-    depths : where to work stresses out [m], 0 or more, growing; None takes `default_depths`
+    shear : traction along x on body 1 [Pa], shape (nx, ny), such as `friction(...).shear`; body 2
+        has the opposite. None for a frictionless contact
+    depths : increasing depths [m], 0 or more; default `default_depths`
     body : 1 or 2; z points into it
 
     Raises
     ------
     BadInput
-        for a shear of another shape than the pressure, depths that do not grow or lie above the surface, or no body.
+        for a shear of another shape than the pressure, invalid depths, or an invalid body.
     """
     if body not in (1, 2):
         raise BadInput(f"body must be 1 or 2, got {body!r}")
@@ -177,7 +177,10 @@ def subsurface_stress(
 def hertz_stress(
     conditions: ContactConditions, depths: Field, *, body: int = 1
 ) -> SubsurfaceStress:
-    """Stresses below the smooth, dry, frictionless contact of the same conditions, on a grid of its own."""
+    """Compute the stresses below the smooth, dry, frictionless contact of the same conditions.
+
+    It has its own grid.
+    """
     line = conditions.long
     (a, b), cells = conditions.hertz.half_widths, HERTZ_CELLS
     reach = (1.25 * a, a if line else 1.25 * b)
@@ -204,10 +207,13 @@ def _half_width(conditions: ContactConditions) -> float:
 
 
 def default_depths(conditions: ContactConditions, grid: Grid) -> Field:
-    """The surface, the core's depth, and 14 in equal ratios from half a cell along x to 2.5 half-widths [m]."""
+    """Return the surface, the core depth, and 14 depths up to 2.5 half-widths [m].
+
+    The 14 depths are in geometric progression, starting at half a cell along x.
+    """
     half_width, first = _half_width(conditions), 0.5 * grid.spacing[0]
-    below = np.geomspace(first, max(DEEPEST * half_width, 10.0 * first), DEPTHS - 2)
-    return np.unique(np.concatenate([[0.0, CORE * half_width], below]))
+    min_depth = np.geomspace(first, max(MAX_DEPTH * half_width, 10.0 * first), DEPTHS - 2)
+    return np.unique(np.concatenate([[0.0, CORE * half_width], min_depth]))
 
 
 def stress_below(
@@ -220,39 +226,38 @@ def stress_below(
     body: int = 1,
     core_depth: float = 0.0,
 ) -> SubsurfaceStress:
-    """Stresses below a pressure and a traction along x, both [Pa] and of shape (nx, ny), constant over each cell.
+    """Compute the stresses below a pressure and a traction along x, constant over each cell.
+
+    Both [Pa], shape (nx, ny).
 
     Raises
     ------
     BadInput
-        for fields that do not fit the grid, or depths that do not grow or lie above the surface.
+        for fields of another shape than the grid, or invalid depths.
     """
     for name, given in (("pressure", pressure), ("shear", shear)):
         if given is not None and given.shape != grid.cells:
-            raise BadInput(
-                f"{name} must have the grid's shape {grid.cells}, got {given.shape}; make it on that grid"
-            )
+            raise BadInput(f"{name} must have the grid's shape {grid.cells}, got {given.shape}")
     depths = _checked_depths(depths)
-    tractions = Tractions.of(grid, pressure, shear)
+    tractions = Tractions.from_fields(grid, pressure, shear)
     levels: _Levels = {}
 
-    def look(depth: float, *, keep: bool = False) -> Field:
-        tensor = StressTensor(*tractions.stresses(depth, poisson_ratio, keep=keep))
+    def evaluate(depth: float, *, cache: bool = False) -> Field:
+        tensor = StressTensor(*tractions.stresses(depth, poisson_ratio, cache=cache))
         von_mises = tensor.von_mises
         levels[depth] = _peaks(tensor, von_mises, depth, grid)
         return von_mises
 
-    von_mises = np.stack([look(float(depth), keep=True) for depth in depths], axis=-1)
+    von_mises = np.stack([evaluate(float(depth), cache=True) for depth in depths], axis=-1)
     core_depth = max(core_depth, float(depths[0]))
     if core_depth not in levels:
-        look(core_depth)
+        evaluate(core_depth)
     core, _, shear_peak = (
-        _largest(levels, measure, below, grid.spacing[0], look)
-        for measure, below in ((0, core_depth), (0, 0.0), (1, 0.0))
+        _largest_from(levels, measure, min_depth, grid.spacing[0], evaluate)
+        for measure, min_depth in ((0, core_depth), (0, 0.0), (1, 0.0))
     )
-    peak = max(
-        (level[0] for level in levels.values()), key=lambda one: one.value
-    )  # of all depths looked at by now
+    # over all depths evaluated so far
+    peak = max((level[0] for level in levels.values()), key=lambda candidate: candidate.value)
     return SubsurfaceStress(
         grid=grid,
         depths=depths,
@@ -270,24 +275,23 @@ def stress_below(
 def _checked_depths(depths: Field) -> Field:
     depths = np.atleast_1d(np.asarray(depths, dtype=float))
     if depths.ndim != 1 or depths.size == 0 or not np.isfinite(depths).all() or depths.min() < 0.0:
-        raise BadInput(
-            f"depths must be a row of lengths from 0 m (the surface) on, got {depths}; correct them"
-        )
+        raise BadInput(f"depths must be finite lengths of 0 m (the surface) or more, got {depths}")
     if np.any(np.diff(depths) <= 0.0):
-        raise BadInput(f"depths must grow, got {depths}; sort them and leave out what is double")
+        raise BadInput(f"depths must increase, got {depths}; sort them and remove duplicates")
     return depths
 
 
-_Levels = dict[
-    float, tuple[Peak, Peak]
-]  # by depth: the largest von Mises stress, the largest shear stress
+# by depth: the largest von Mises stress, the largest shear stress
+_Levels = dict[float, tuple[Peak, Peak]]
 
 
 def _peaks(tensor: StressTensor, von_mises: Field, depth: float, grid: Grid) -> tuple[Peak, Peak]:
-    # the shear stress lies between a half and 1/sqrt(3) of von Mises'
-    few = von_mises >= np.sqrt(0.75) * von_mises.max()
+    # the largest shear stress is between 1/2 and 1/sqrt(3) of the von Mises stress
+    candidates = von_mises >= np.sqrt(0.75) * von_mises.max()
     shear = np.zeros_like(von_mises)
-    shear[few] = StressTensor(*(getattr(tensor, name)[few] for name in COMPONENTS)).max_shear
+    shear[candidates] = StressTensor(
+        *(getattr(tensor, name)[candidates] for name in COMPONENTS)
+    ).max_shear
     first, second = (_peak(stress, depth, grid) for stress in (von_mises, shear))
     return first, second
 
@@ -297,33 +301,37 @@ def _peak(stress: Field, depth: float, grid: Grid) -> Peak:
     return Peak(float(stress[i, j]), depth, float(grid.x[i]), float(grid.y[j]))
 
 
-def _largest(
-    levels: _Levels, measure: int, below: float, cell: float, look: Callable[[float], object]
+def _largest_from(
+    levels: _Levels,
+    measure: int,
+    min_depth: float,
+    cell: float,
+    evaluate: Callable[[float], object],
 ) -> Peak:
-    """The largest of a measure from a depth on, sought between depths by parabolas through the highest of them.
+    """Return the largest of a measure from a depth on, refined between depths by parabolas.
 
-    Within a depth of less than a cell along x nothing is sought: there the cells decide.
+    No refinement within a distance of less than a cell along x, where the cells limit the
+    resolution.
     """
     for _ in range(REFINEMENTS):
-        depths = sorted(depth for depth in levels if depth >= below)
+        depths = sorted(depth for depth in levels if depth >= min_depth)
         values = [levels[depth][measure].value for depth in depths]
         top = int(np.argmax(values))
         if not 0 < top < len(depths) - 1 or depths[top + 1] - depths[top - 1] < cell:
             break
         around = slice(top - 1, top + 2)
-        shift = depths[
-            top
-        ]  # depths grow in equal ratios, which a logarithm takes out; the surface needs a shift
+        # the logarithm makes geometric depths equidistant; the surface needs a shift
+        shift = depths[top]
         a, b, c = np.log(np.array(depths[around]) + shift)
         fa, fb, fc = values[around]
         left, right = (b - a) * (fb - fc), (b - c) * (fb - fa)
         if left == right:  # level
             break
         vertex = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
-        if min(abs(vertex - a), abs(vertex - b), abs(vertex - c)) < CLOSE:
+        if min(abs(vertex - a), abs(vertex - b), abs(vertex - c)) < MIN_DISTANCE:
             break
-        look(float(np.exp(vertex) - shift))
+        evaluate(float(np.exp(vertex) - shift))
     return max(
-        (level[measure] for depth, level in levels.items() if depth >= below),
+        (level[measure] for depth, level in levels.items() if depth >= min_depth),
         key=lambda peak: peak.value,
     )

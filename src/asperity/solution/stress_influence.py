@@ -1,17 +1,17 @@
-"""The stresses in an elastic half-space below tractions that are constant over cells: convolutions by FFT.
+"""Stresses in an elastic half-space below cell-wise constant tractions, by FFT convolution.
 
-z points into the body. Pressure p gives σ_zz = -p on the surface, a traction q that pulls the body
-along x gives σ_xz = -q. Where y does not repeat, the kernels are the closed forms for a loaded
-rectangle, padded with zeros both ways. Where y repeats, its wavenumber 0 is the closed form for a
-loaded strip, and the others are the half-space's exact answer to waves, summed over the aliases
-that a traction constant over each cell excites. Knows no contact.
+z points into the body. Pressure p gives σ_zz = -p on the surface; a traction q that pulls the body
+along x gives σ_xz = -q. If y is not periodic, the kernels are the closed forms for a loaded
+rectangle, zero-padded in both directions. If y is periodic, its wavenumber 0 is the closed form for
+a loaded strip, and the others are the half-space's exact response to waves, summed over the aliases
+that a traction constant over each cell excites. The module knows no contact.
 
 All follow from three harmonic functions of a point load, φ = 1/(2πr), χ = -log(r + z)/2π, ψ = (z
-log(r + z) - r)/2π, of transforms e/α, e/α², e/α³ with e = exp(-αz), α² = m² + n². Source: A. E. H.
+log(r + z) - r)/2π, with transforms e/α, e/α², e/α³, e = exp(-αz), α² = m² + n². Source: A. E. H.
 Love, Phil. Trans. A 228 (1929) 377; S. Liu, Q. Wang, J. Tribol. 124 (2002) 36, derived anew here.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -26,21 +26,21 @@ from asperity.core.arrays import Field
 Waves = npt.NDArray[np.complexfloating[Any, Any]]
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
-# Which components change sign when x (y) does, under pressure and under traction along x.
+# Components that are odd in x (y), under pressure and under traction along x.
 ODD_IN_X = ((False, False, False, True, False, True), (True, True, True, False, True, False))
 ODD_IN_Y = (False, False, False, True, True, False)
 
-CACHED_CELLS = 2**17  # grids up to here keep their kernels: at most 3 MB a depth at 256 x 256
-DEEP, SHALLOW = 3.5, 1.25  # in cells: below, no aliases are felt; above, too many
-QUIET = 1e-8  # what an image of the padded domain, or a wave at its depth, may still exert
-NEARBY = 1.25  # periods along x from a loaded cell, beyond which its images make it a strip
+CACHED_CELLS = 2**17  # largest grid whose kernels are cached: at most 3 MB a depth at 256 x 256
+DEEP, SHALLOW = 3.5, 1.25  # depths [cells]: deeper, aliases vanish; shallower, they are too many
+NEGLIGIBLE = 1e-8  # relative amplitude below which images and waves are neglected
+IMAGE_REACH = 1.25  # distance along x [periods] beyond which images along y act as a strip
 
 
 @dataclass(frozen=True, slots=True)
 class Tractions:
-    """Transformed tractions on a grid: pressure, and the pull along x on the body (None where there is none).
+    """Transformed tractions on a grid: pressure, and pull along x on the body (None if absent).
 
-    In single precision, like the kernels: 1e-6 of a stress, for half the time and memory.
+    In single precision, like the kernels: stresses to 1e-6, for half the time and memory.
     """
 
     grid: Grid
@@ -48,29 +48,30 @@ class Tractions:
     shear: Waves | None
 
     @classmethod
-    def of(cls, grid: Grid, pressure: Field, shear: Field | None) -> "Tractions":
-        """From fields [Pa], shape (nx, ny)."""
+    def from_fields(cls, grid: Grid, pressure: Field, shear: Field | None) -> "Tractions":
+        """Return the transformed tractions of fields [Pa], shape (nx, ny)."""
         return cls(
             grid, _transformed(pressure, grid), None if shear is None else _transformed(shear, grid)
         )
 
-    def stresses(self, depth: float, poisson_ratio: float, *, keep: bool = True) -> Field:
-        """σ_xx, σ_yy, σ_zz, σ_xy, σ_yz, σ_xz [Pa] below every cell's centre, shape (6, nx, ny)."""
+    def stresses(self, depth: float, poisson_ratio: float, *, cache: bool = True) -> Field:
+        """Return σ_xx, σ_yy, σ_zz, σ_xy, σ_yz, σ_xz [Pa] below all cell centres, (6, nx, ny)."""
         (nx, ny), (_, repeats) = self.grid.cells, self.grid.periodic
-        influence = _kept_influence if keep and nx * ny <= CACHED_CELLS else _influence
+        influence = _cached_influence if cache and nx * ny <= CACHED_CELLS else _influence
         kernels = influence(self.grid.cells, self.grid.spacing, repeats, depth, poisson_ratio)
-        felt = kernels.shape[
-            -1
-        ]  # columns of wavenumbers along y; the transform back takes the others as zeros
+        # columns of wavenumbers along y; the inverse transform takes the others as zero
+        reaching = kernels.shape[-1]
         stresses = np.empty((6, nx, ny), np.float32)
         for component, out in enumerate(stresses):
-            waves = np.zeros((2 * nx, felt), self.pressure.dtype)
+            waves = np.zeros((2 * nx, reaching), self.pressure.dtype)
             for traction, kernel, odd in zip(
                 (self.pressure, self.shear), kernels, ODD_IN_X, strict=True
             ):
                 if traction is not None:
                     turn = np.complex64(1j ** (odd[component] + ODD_IN_Y[component]))
-                    _accumulate(waves, kernel[component], odd[component], turn * traction[:, :felt])
+                    _accumulate(
+                        waves, kernel[component], odd[component], turn * traction[:, :reaching]
+                    )
             along_x = scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx]
             out[:] = scipy.fft.irfft(along_x, n=ny if repeats else 2 * ny, axis=1)[:, :ny]
         return stresses
@@ -85,7 +86,10 @@ def _transformed(field: Field, grid: Grid) -> Waves:
 
 
 def _accumulate(waves: Waves, kernel: Field, odd: bool, traction: Waves) -> None:
-    """Add kernel times traction; the kernel knows wavenumbers 0 to Nyquist along x, the others mirror them."""
+    """Add kernel times traction.
+
+    The kernel has wavenumbers 0 to Nyquist along x; the others mirror them.
+    """
     nx = kernel.shape[0] - 1
     waves[: nx + 1] += kernel * traction[: nx + 1]
     mirrored = kernel[nx - 1 : 0 : -1] * traction[nx + 1 :]
@@ -99,9 +103,10 @@ def _influence(
     depth: float,
     poisson_ratio: float,
 ) -> Field:
-    """Transformed kernels at one depth, shape (traction, component, nx + 1, wavenumbers along y that reach it).
+    """Return the transformed kernels at one depth, (traction, component, nx + 1, wavenumbers in y).
 
-    Transforms are divided by i for each axis in which their kernel is odd, which leaves them real.
+    Only wavenumbers that reach the depth are included. Transforms are divided by i for each axis in
+    which their kernel is odd, so that they are real.
     """
     nu = poisson_ratio
     if not periodic:
@@ -115,16 +120,16 @@ def _influence(
     kernels[..., 0] = _to_waves(_strips(cells[0], spacing[0], depth, nu)[..., None], axis=-2)[
         ..., 0
     ]
-    felt = int(np.flatnonzero(kernels.any(axis=(0, 1, 2)))[-1]) + 1
-    return kernels[..., :felt].astype(np.float32)
+    reaching = int(np.flatnonzero(kernels.any(axis=(0, 1, 2)))[-1]) + 1
+    return kernels[..., :reaching].astype(np.float32)
 
 
-_kept_influence = lru_cache(maxsize=32)(_influence)
+_cached_influence = lru_cache(maxsize=32)(_influence)
 
 
 def clear_kernels() -> None:
-    """Forget the kernels kept so far: 50 MB after one contact of 256 x 256 cells that does not repeat."""
-    _kept_influence.cache_clear()
+    """Clear the kernel caches (50 MB after one non-periodic contact of 256 x 256 cells)."""
+    _cached_influence.cache_clear()
     _below_surface.cache_clear()
 
 
@@ -135,10 +140,11 @@ def clear_kernels() -> None:
 def _rectangles(
     cells: tuple[int, int], spacing: tuple[float, float], depth: float, nu: float
 ) -> Field:
-    """Stresses at cells 0, 1, ... along x and y from a loaded cell 0, shape (traction, component, nx + 1, ny + 1).
+    """Return the stresses at cells 0, 1, ... along x and y from a loaded cell 0.
 
-    Each line is the double integral over x and y of what stands behind it; what depends on one of
-    them alone is dropped, as it cancels between the rectangle's corners.
+    Shape (traction, component, nx + 1, ny + 1). Each line is the double integral over x and y of
+    the expression in its comment; terms that depend on x or y alone are dropped, because they
+    cancel between the corners of the rectangle.
     """
     z = depth
     x, y = ((np.arange(count + 2) - 0.5) * step for count, step in zip(cells, spacing, strict=True))
@@ -182,7 +188,7 @@ def _rectangles(
 
 
 def _strips(count: int, dx: float, depth: float, nu: float) -> Field:
-    """Stresses at cells 0, 1, ... along x below a strip that reaches to infinity along y, shape (2, 6, nx + 1)."""
+    """Return the stresses at cells 0, 1, ... along x below an infinite strip, (2, 6, nx + 1)."""
     x, z = (np.arange(count + 2) - 0.5) * dx, depth
     square = x * x + z * z
     angle, beside, below = np.arctan2(x, z), z * x / square, z * z / square
@@ -208,19 +214,19 @@ def _strips(count: int, dx: float, depth: float, nu: float) -> Field:
 
 @lru_cache(maxsize=2)
 def _below_surface(cells: tuple[int, int], spacing: tuple[float, float], nu: float) -> Field:
-    """What few images leave out of the kernels at small depths: the same as a little deeper, where waves are summed.
+    """Return the part of shallow kernels that few images omit, evaluated a little deeper by waves.
 
-    Close to the surface the sum over aliases is long; but what sets a shallow depth apart from a
-    deeper one fades so fast along the surface that the nearest images hold all of it.
+    Close to the surface the sum over aliases is long. The difference between a shallow and a deeper
+    depth decays so fast along the surface that the nearest images contain all of it.
     """
-    near = SHALLOW * max(spacing)
-    return _waves(cells, spacing, near, nu) - _images(cells, spacing, near, nu)
+    shallow_depth = SHALLOW * max(spacing)
+    return _waves(cells, spacing, shallow_depth, nu) - _images(cells, spacing, shallow_depth, nu)
 
 
 def _images(cells: tuple[int, int], spacing: tuple[float, float], depth: float, nu: float) -> Field:
-    """Transformed kernels of a loaded cell and its three nearest images along y, shape as of `_waves`."""
+    """Return transformed kernels of a cell and its three nearest images along y."""
     (nx, ny), (dx, dy) = cells, spacing
-    reach = min(nx, int(NEARBY * ny * dy / dx) + 1)
+    reach = min(nx, int(IMAGE_REACH * ny * dy / dx) + 1)
     rectangles = _rectangles((reach, 2 * ny), spacing, depth, nu)
     kernels = np.zeros((2, 6, nx + 1, ny // 2 + 1))
     for traction, component in np.ndindex(2, 6):
@@ -232,28 +238,30 @@ def _images(cells: tuple[int, int], spacing: tuple[float, float], depth: float, 
 
 
 # Waves
-# ---------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------------------------
 
 
 def _waves(cells: tuple[int, int], spacing: tuple[float, float], depth: float, nu: float) -> Field:
-    """Transformed kernels of cells that repeat along y, shape (traction, component, nx + 1, ny//2 + 1); depth > 0.
+    """Return transformed kernels of cells periodic along y, depth > 0.
 
-    The column of wavenumber 0 along y is left at zero.
+    Shape (traction, component, nx + 1, ny//2 + 1). The column of wavenumber 0 along y is zero.
     """
     (nx, ny), (dx, dy) = cells, spacing
     kernels = np.zeros((2, 6, nx + 1, ny // 2 + 1))
     for wrap, columns in _wraps(cells, spacing):
         along = np.arange(wrap * nx // 2 + 1) * (2.0 * np.pi / (wrap * nx * dx))
         across = columns * (2.0 * np.pi / (ny * dy))
-        felt = -np.log(QUIET) / depth
-        columns, across, along = columns[across < felt], across[across < felt], along[along < felt]
+        reaching = -np.log(NEGLIGIBLE) / depth
+        columns, across, along = (
+            columns[across < reaching],
+            across[across < reaching],
+            along[along < reaching],
+        )
         if columns.size == 0:
             continue
         found = np.zeros((2, 6, wrap * nx // 2 + 1, columns.size))
         found[..., : along.size, :] = _aliased(along, across, spacing, depth, nu)
-        if (
-            wrap > 2
-        ):  # taken on a longer domain, whose images are far away, and cut to the padded one
+        if wrap > 2:  # evaluated on a longer domain with distant images, cut to the padded one
             found = _to_waves(_to_cells(found)[..., : nx + 1, :], axis=-2)
         kernels[..., columns] = found
     return kernels
@@ -262,10 +270,13 @@ def _waves(cells: tuple[int, int], spacing: tuple[float, float], depth: float, n
 def _wraps(
     cells: tuple[int, int], spacing: tuple[float, float]
 ) -> Iterator[tuple[int, npt.NDArray[np.intp]]]:
-    """Wavenumbers along y that need a domain of `wrap` lengths for its images along x, e^(-q (wrap - 1) L), to fade."""
+    """Yield domain lengths and the wavenumbers along y that need them.
+
+    Images along x decay as e^(-q (wrap - 1) L) on a domain of `wrap` lengths.
+    """
     (nx, ny), (dx, dy) = cells, spacing
     columns = np.arange(1, ny // 2 + 1)
-    lengths = 1.0 - np.log(QUIET) * ny * dy / (2.0 * np.pi * columns * nx * dx)
+    lengths = 1.0 - np.log(NEGLIGIBLE) * ny * dy / (2.0 * np.pi * columns * nx * dx)
     wraps = np.maximum(2 * np.ceil(lengths / 2.0).astype(int), 2)
     for wrap in np.unique(wraps):
         yield int(wrap), columns[wraps == wrap]
@@ -274,7 +285,10 @@ def _wraps(
 def _aliased(
     along: Field, across: Field, spacing: tuple[float, float], depth: float, nu: float
 ) -> Field:
-    """Answer to unit waves, averaged over cells, shape (traction, component, wavenumbers along x, along y)."""
+    """Return the response to unit waves, averaged over cells.
+
+    Shape (traction, component, wavenumbers along x, along y).
+    """
     (dx, dy), z = spacing, depth
     aliases = [(0, 0)]
     if depth < DEEP * max(spacing):
@@ -282,7 +296,7 @@ def _aliased(
     total = np.zeros((12, along.size, across.size))
     for i, j in aliases:
         m, n = along[:, None] + 2.0 * np.pi * i / dx, across[None, :] + 2.0 * np.pi * j / dy
-        if max(np.abs(m).min(), np.abs(n).min()) * z > -np.log(QUIET):
+        if max(np.abs(m).min(), np.abs(n).min()) * z > -np.log(NEGLIGIBLE):
             continue
         alpha = np.hypot(m, n)
         c, s = m / alpha, n / alpha
@@ -311,13 +325,13 @@ def _aliased(
 
 
 def _to_waves(kernels: Field, axis: int) -> Field:
-    """Transform kernels at cells 0, 1, ... n to wavenumbers 0, 1, ... n of the even or odd sequence of 2n cells."""
+    """Transform kernels at cells 0 ... n to wavenumbers 0 ... n of the even or odd sequence."""
     odd_axes = ODD_IN_X if axis == -2 else (ODD_IN_Y, ODD_IN_Y)
     return _by_parity(kernels, axis, odd_axes, scipy.fft.dct, scipy.fft.dst)
 
 
 def _to_cells(waves: Field) -> Field:
-    """The inverse of `_to_waves` along x."""
+    """Transform wavenumbers along x back to cells, the inverse of `_to_waves`."""
     return _by_parity(waves, -2, ODD_IN_X, scipy.fft.idct, scipy.fft.idst)
 
 
@@ -325,8 +339,8 @@ def _by_parity(
     values: Field,
     axis: int,
     odd: tuple[tuple[bool, ...], ...],
-    even_transform: Any,
-    odd_transform: Any,
+    even_transform: Callable[..., Field],
+    odd_transform: Callable[..., Field],
 ) -> Field:
     out = np.zeros_like(values)
     inner = (slice(None), slice(1, -1)) if axis == -1 else (slice(1, -1), slice(None))

@@ -1,11 +1,12 @@
-"""Friction and heat of a solved contact together, and the way back: oil thinned by the heat of its own shearing.
+"""Friction and heat of a solved contact together, with optional thermal feedback on viscosity.
 
-With `Thermal.feedback` the film's temperature sets the oil's shear stress, and its viscosity in
+With `Thermal.feedback` the film temperature sets the oil's shear stress and its viscosity in
 Reynolds' equation; without it heat is only a result.
 """
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -19,13 +20,13 @@ from asperity.solution.flash import FlashTemperature, flash_temperature
 from asperity.solution.traction import BOUNDARY_FRICTION, Friction, friction, warm_factor
 from asperity.surface import Surface
 
-SETTLED = 1e-3  # change of the film's temperature, over its largest rise
-LEAST_RISE = 1.0  # [K]; below it the change is measured against this
-MOST_ROUNDS = 400
-HOT = 30.0  # rise of the film [K] that no oil stays as viscous through
-MOST_SOLVES = 25
-MOST_WARM_ITERATIONS = 40  # a solve that starts from one a little colder takes ten
-MEMORY = 5  # rounds that the next guess is mixed from
+TEMPERATURE_TOLERANCE = 1e-3  # change of the film temperature over its largest rise
+MIN_SCALE = 1.0  # [K] smallest rise to which the tolerance refers
+MAX_ROUNDS = 400
+HOT = 30.0  # rise of the film temperature [K] above which the viscosity of any oil changes clearly
+MAX_SOLVES = 25
+MAX_WARM_ITERATIONS = 40  # a warm start from a slightly colder solution takes about ten
+MEMORY = 5  # previous guesses in Anderson mixing
 
 
 def friction_and_heat(
@@ -34,75 +35,83 @@ def friction_and_heat(
     boundary_friction: float = BOUNDARY_FRICTION,
     thermal: Thermal | None = None,
 ) -> tuple[Friction, FlashTemperature]:
-    """Friction and flash temperature; with `thermal.feedback` each at the other's value.
+    """Compute friction and flash temperature; with `thermal.feedback` mutually consistent.
 
     Raises
     ------
     BadInput
         for a boundary friction outside 0 to 2.
     AsperityError
-        if friction and temperature do not settle.
+        if friction and temperature do not converge.
     """
     thermal = thermal or Thermal()
     if not thermal.feedback or solution.lubricant is None:
-        rubbing = friction(solution, boundary_friction=boundary_friction, thermal=thermal)
-        return rubbing, flash_temperature(solution, rubbing, thermal=thermal)
+        friction_result = friction(solution, boundary_friction=boundary_friction, thermal=thermal)
+        return friction_result, flash_temperature(solution, friction_result, thermal=thermal)
     rise: Field = np.zeros(solution.grid.cells)
     mixer = Mixer()
-    for _ in range(MOST_ROUNDS):
-        rubbing = friction(
+    for _ in range(MAX_ROUNDS):
+        friction_result = friction(
             solution,
             boundary_friction=boundary_friction,
             thermal=thermal,
             film_temperature=thermal.ambient + rise,
         )
-        heat = flash_temperature(solution, rubbing, thermal=thermal)
+        heat = flash_temperature(solution, friction_result, thermal=thermal)
         change = heat.film - rise
-        left = float(np.max(np.abs(change)))
-        if left < SETTLED * max(heat.film_max_k, LEAST_RISE):
-            return rubbing, heat
-        # a cell's own warming thins its oil and cools it: the step of Newton's method that sees
-        # this and nothing else
+        residual = float(np.max(np.abs(change)))
+        if residual < TEMPERATURE_TOLERANCE * max(heat.film_max_k, MIN_SCALE):
+            return friction_result, heat
+        # Newton step with the diagonal of the Jacobian: a cell's own heating thins its oil
         warm = thermal.ambient + rise
         thinning = np.log(
             warm_factor(solution, thermal, warm) / warm_factor(solution, thermal, warm + 1.0)
         )
         rise = mixer(rise, change / (1.0 + thinning * np.maximum(heat.film, 0.0)))
     raise AsperityError(
-        f"friction and temperature did not settle: {left:.2g} K apart after {MOST_ROUNDS} rounds; "
-        "take the feedback of heat out, or a friction law with a limit"
+        f"friction and temperature did not converge: {residual:.2g} K change after {MAX_ROUNDS} "
+        "iterations; switch thermal feedback off, or use a friction law with a limiting stress"
     )
 
 
+class SolveSettings(TypedDict, total=False):
+    """Optional settings of `solve_contact`."""
+
+    options: Options | None
+    start: ContactSolution | None
+    strict: bool
+    progress: Progress | None
+
+
 class Mixer:
-    """The next guess of a fixed point from the last few: Anderson's method, with half the step after a worse round.
+    """Anderson mixing for a fixed point; the step is halved when the residual grows.
 
     Source: D. G. Anderson, J. ACM 12 (1965) 547.
     """
 
     def __init__(self) -> None:
-        self.share, self.before = 1.0, np.inf
+        self.damping, self.last_residual = 1.0, np.inf
         self.guesses: list[Field] = []
         self.changes: list[Field] = []
 
     def __call__(self, guess: Field, change: Field) -> Field:
-        """A better guess than `guess`, which the iteration would change by `change`."""
-        left = float(np.linalg.norm(change))
-        if left > self.before:
-            self.share = max(0.5 * self.share, 0.05)
+        """Return the next guess, given the change that the iteration proposes at `guess`."""
+        residual = float(np.linalg.norm(change))
+        if residual > self.last_residual:
+            self.damping = max(0.5 * self.damping, 0.05)
             self.guesses, self.changes = [], []
-        self.before = left
+        self.last_residual = residual
         self.guesses = [*self.guesses[-MEMORY:], guess]
         self.changes = [*self.changes[-MEMORY:], change]
         if len(self.guesses) == 1:
-            return np.asarray(guess + self.share * change)
+            return np.asarray(guess + self.damping * change)
         guesses = np.stack([(new - old).ravel() for old, new in pairwise(self.guesses)], axis=1)
         changes = np.stack([(new - old).ravel() for old, new in pairwise(self.changes)], axis=1)
         weights = np.linalg.lstsq(changes, change.ravel(), rcond=1e-10)[0]
         return (
             guess
-            + self.share * change
-            - ((guesses + self.share * changes) @ weights).reshape(guess.shape)
+            + self.damping * change
+            - ((guesses + self.damping * changes) @ weights).reshape(guess.shape)
         )
 
 
@@ -113,77 +122,78 @@ def solve_thermal_contact(
     *,
     boundary_friction: float = BOUNDARY_FRICTION,
     thermal: Thermal | None = None,
-    options: Options | None = None,
-    start: ContactSolution | None = None,
-    strict: bool = True,
-    progress: Progress | None = None,
+    **settings: Unpack[SolveSettings],
 ) -> ContactSolution:
-    """Solve the contact with the oil as viscous as the film's own temperature leaves it, if `thermal.feedback` asks.
+    """Solve the contact with the viscosity at the film temperature, if `thermal.feedback` is set.
 
-    Contact and heat are solved in turn until the film's temperature stands still (root mean square
-    of its change below a thousandth of its largest rise). Parameters are those of `solve_contact`
-    and `friction_and_heat`; the solution carries the viscosity factors, and all steps of all
-    rounds.
+    Contact and heat are solved in turn until the film temperature converges (root mean square of
+    its change below a thousandth of its largest rise). Parameters are those of `solve_contact` and
+    `friction_and_heat`; the solution carries the viscosity factors and the iterations of all
+    solves.
 
     Raises
     ------
     BadInput, NotConverged, AsperityError
-        as those two; NotConverged too if contact and heat do not settle.
+        as those two; NotConverged also if contact and heat do not converge.
     """
     thermal = thermal or Thermal()
-    solution = solve_contact(
-        conditions,
-        lubricant,
-        surface,
-        options=options,
-        start=start,
-        strict=strict,
-        progress=progress,
-    )
-    nothing_fed_back = lubricant is None or not thermal.feedback or conditions.sliding_speed == 0.0
-    if nothing_fed_back or not solution.convergence.converged:
+    solution = solve_contact(conditions, lubricant, surface, **settings)
+    isothermal = lubricant is None or not thermal.feedback or conditions.sliding_speed == 0.0
+    if isothermal or not solution.convergence.converged:
         return solution
+    options = settings.get("options") or Options()
+    solution, settled = _iterate_with_heat(
+        solution,
+        options,
+        boundary_friction=boundary_friction,
+        thermal=thermal,
+        progress=settings.get("progress"),
+    )
+    status = SolveStatus.CONVERGED if settled else SolveStatus.OUT_OF_ITERATIONS
+    solution = replace(solution, convergence=replace(solution.convergence, status=status))
+    if settings.get("strict", True) and not solution.convergence.converged:
+        raise NotConverged(solution, f"contact and heat did not converge in {MAX_SOLVES} solves")
+    return solution
+
+
+def _iterate_with_heat(
+    solution: ContactSolution,
+    options: Options,
+    *,
+    boundary_friction: float,
+    thermal: Thermal,
+    progress: Progress | None,
+) -> tuple[ContactSolution, bool]:
+    """Solve contact and heat in turn from an isothermal solution; return convergence, too."""
     history, seconds = solution.convergence.history, solution.convergence.seconds
-    options = options or Options()
-    few = replace(options, max_iterations=min(options.max_iterations, MOST_WARM_ITERATIONS))
-    solved_at: Field = np.zeros(
-        surface.grid.cells
-    )  # rise of the film that the solution's viscosity belongs to
-    share, settled = 1.0, False
-    for _ in range(MOST_SOLVES):
-        film = friction_and_heat(solution, boundary_friction=boundary_friction, thermal=thermal)[
-            1
-        ].film
-        left = float(np.sqrt(np.mean((film - solved_at) ** 2)))
-        settled = left < SETTLED * max(float(np.max(film)), LEAST_RISE)
-        if settled:
+    warm_options = replace(options, max_iterations=min(options.max_iterations, MAX_WARM_ITERATIONS))
+    # film temperature rise at which the solution's viscosity was evaluated
+    temperature_rise: Field = np.zeros(solution.grid.cells)
+    damping, temperature_converged = 1.0, False
+    for _ in range(MAX_SOLVES):
+        _, heat = friction_and_heat(solution, boundary_friction=boundary_friction, thermal=thermal)
+        residual = float(np.sqrt(np.mean((heat.film - temperature_rise) ** 2)))
+        scale = max(float(np.max(heat.film)), MIN_SCALE)
+        temperature_converged = residual < TEMPERATURE_TOLERANCE * scale
+        if temperature_converged:
             break
-        wanted = solved_at + share * (film - solved_at)
-        warmer = solve_contact(
-            conditions,
-            lubricant,
-            surface,
-            options=few,
+        target = temperature_rise + damping * (heat.film - temperature_rise)
+        candidate = solve_contact(
+            solution.conditions,
+            solution.lubricant,
+            solution.surface,
+            options=warm_options,
             start=solution,
-            viscosity_factor=warm_factor(solution, thermal, thermal.ambient + wanted),
+            viscosity_factor=warm_factor(solution, thermal, thermal.ambient + target),
             strict=False,
             progress=progress,
         )
-        history, seconds = (
-            history + warmer.convergence.history,
-            seconds + warmer.convergence.seconds,
-        )
-        if warmer.convergence.converged:
-            solution, solved_at, share = (
-                replace(warmer, options=options),
-                wanted,
-                min(1.0, 2.0 * share),
-            )
-        else:  # too far from cold to hot: go part of the way
-            share *= 0.5
-    status = SolveStatus.CONVERGED if settled else SolveStatus.OUT_OF_ITERATIONS
-    ending = replace(solution.convergence, status=status, history=history, seconds=seconds)
-    solution = replace(solution, convergence=ending)
-    if strict and not ending.converged:
-        raise NotConverged(solution, f"contact and heat did not settle in {MOST_SOLVES} rounds")
-    return solution
+        history += candidate.convergence.history
+        seconds += candidate.convergence.seconds
+        if candidate.convergence.converged:
+            solution, temperature_rise = replace(candidate, options=options), target
+            damping = min(1.0, 2.0 * damping)
+        else:  # temperature step too large
+            damping *= 0.5
+    convergence = replace(solution.convergence, history=history, seconds=seconds)
+    return replace(solution, convergence=convergence), temperature_converged

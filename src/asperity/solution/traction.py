@@ -1,7 +1,7 @@
-"""Friction of a solved contact: the oil's shear stress where a film parts the bodies, f_b p where they touch.
+"""Friction of a solved contact: oil shear stress in the film, f_b p on touching cells.
 
-The oil is sheared by sliding alone, at Δu/h: the stress at mid-film. What the pressure gradient
-adds at the two surfaces (rolling resistance) is left out, as it is from the heat.
+The oil is sheared by sliding alone, at the rate Δu/h at mid-film. The shear stress of the pressure
+gradient at the two surfaces (rolling resistance) is neglected, here and in the heat.
 """
 
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ BOUNDARY_FRICTION = 0.15  # the paper's Table 2
 class Friction:
     """Friction of a contact.
 
-    `coefficient` shear force over load, and its parts: `asperity_part` from touching cells,
-    `oil_part` from all others. `shear` [Pa], shape (nx, ny), is what body 1 feels along rolling
-    (body 2 feels the opposite): negative where body 1 is the faster one. `shear_force` [N] is its
-    sum over the whole contact, of a line contact over its length; `power` [W] what it turns to
-    heat, |shear force| times sliding speed. In pure rolling all are zero.
+    `coefficient` is shear force over load; its parts are `asperity_part` (touching cells) and
+    `oil_part` (all others). `shear` [Pa], shape (nx, ny), acts on body 1 along rolling (the
+    opposite on body 2): negative if body 1 is the faster one. `shear_force` [N] is its sum over the
+    whole contact, for a line contact over its length; `power` [W] is the heat generated, |shear
+    force| times sliding speed. All are zero in pure rolling.
     """
 
     coefficient: float
@@ -43,43 +43,45 @@ def friction(
     thermal: Thermal | None = None,
     film_temperature: Field | None = None,
 ) -> Friction:
-    """Friction of a solved contact.
+    """Compute the friction of a solved contact.
 
     Parameters
     ----------
-    boundary_friction : f_b, shear stress over pressure where the bodies touch; the paper's 0.15 unless given
-    thermal : ambient temperature, and how warmth thins the oil; `Thermal()` unless given
-    film_temperature : mean over the film's thickness, (nx, ny) [K]; ambient unless given, and the oil is then as
-        viscous as it was solved
+    boundary_friction : f_b, shear stress over pressure on touching cells; default the paper's 0.15
+    thermal : ambient temperature and viscosity-temperature law; default `Thermal()`
+    film_temperature : mean over the film's thickness, (nx, ny) [K]; default ambient, with the
+        viscosity of the solution
 
     Raises
     ------
     BadInput
-        for a boundary friction outside 0 to 2, or temperatures that do not lie on the grid.
+        for a boundary friction outside 0 to 2, or temperatures of another shape than the grid.
     """
     if not 0.0 <= boundary_friction <= 2.0:
         raise BadInput(
-            f"boundary friction must lie between 0 and 2, got {boundary_friction:g}; steel in oil has 0.15"
+            f"boundary friction must be between 0 and 2, got {boundary_friction:g}; typical of "
+            "steel in oil is 0.15"
         )
     thermal = thermal or Thermal()
     conditions, grid = solution.conditions, solution.grid
     if film_temperature is not None and film_temperature.shape != grid.cells:
         raise BadInput(
-            f"film_temperature must have the grid's {grid.cells} cells, got {film_temperature.shape}"
+            f"film_temperature must have the grid's shape {grid.cells}, got "
+            f"{film_temperature.shape}"
         )
     sliding = conditions.surface_speeds[0] - conditions.surface_speeds[1]
     stress: Field = np.zeros(grid.cells)
     if sliding != 0.0:
         stress = _oil_stress(solution, thermal, film_temperature)
         stress[solution.in_contact] = boundary_friction * solution.pressure[solution.in_contact]
-    borne = float(solution.pressure.sum())
-    touching = float(stress[solution.in_contact].sum()) / borne
-    parted = float(stress[~solution.in_contact].sum()) / borne
-    force = (touching + parted) * conditions.load
+    pressure_sum = float(solution.pressure.sum())
+    asperity_part = float(stress[solution.in_contact].sum()) / pressure_sum
+    oil_part = float(stress[~solution.in_contact].sum()) / pressure_sum
+    force = (asperity_part + oil_part) * conditions.load
     return Friction(
-        coefficient=touching + parted,
-        asperity_part=touching,
-        oil_part=parted,
+        coefficient=asperity_part + oil_part,
+        asperity_part=asperity_part,
+        oil_part=oil_part,
         shear=-np.sign(sliding) * stress,
         shear_force=-float(np.sign(sliding)) * force,
         power=force * abs(sliding),
@@ -88,9 +90,9 @@ def friction(
 
 
 def warm_factor(solution: ContactSolution, thermal: Thermal, film_temperature: Field) -> Field:
-    """Viscosity at the film's temperature over that at ambient, each cell at its pressure, shape (nx, ny)."""
+    """Return viscosity at film temperature over that at ambient, per cell, (nx, ny)."""
     if solution.lubricant is None:
-        raise BadInput("a dry contact has no viscosity; leave the feedback of heat out")
+        raise BadInput("a dry contact has no viscosity; switch thermal feedback off")
     cold = solution.lubricant.viscosity(solution.pressure)
     return thermal.warmth.factor(cold, film_temperature, thermal.ambient)
 
@@ -98,7 +100,7 @@ def warm_factor(solution: ContactSolution, thermal: Thermal, film_temperature: F
 def _oil_stress(
     solution: ContactSolution, thermal: Thermal, film_temperature: Field | None
 ) -> Field:
-    """Shear stress of the oil [Pa], not negative; nothing where it has ruptured."""
+    """Return the shear stress of the oil [Pa], not negative; zero where the oil is cavitated."""
     oil, conditions = solution.lubricant, solution.conditions
     if oil is None:
         return np.zeros(solution.grid.cells)

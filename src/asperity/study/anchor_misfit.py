@@ -89,7 +89,7 @@ class MisfitSolver:
         curve = self.curve(shares)
         if not (curve.table["status"] == DONE).any():
             return np.full(len(self.aimed), LOST)
-        each = ((anchor, anchor.of(curve)[0]) for anchor in self.aimed)
+        each = ((anchor, anchor.evaluate(curve)[0]) for anchor in self.aimed)
         return np.array(
             [
                 anchor.miss(ours) / anchor.tolerance if np.isfinite(ours) else LOST

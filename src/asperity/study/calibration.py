@@ -232,7 +232,7 @@ def _start(case: Case, entry: ParameterRange) -> float | None:
 
 def _compared(curve: WearCurve, anchors: Sequence[Anchor]) -> pandas.DataFrame:
     """The anchors that the curve's levels can tell."""
-    reached = [a for a in anchors if a.sq is not None and np.isfinite(a.of(curve)[0])]
+    reached = [a for a in anchors if a.sq is not None and np.isfinite(a.evaluate(curve)[0])]
     return compare_with_anchors(
         curve, [*reached, *(a for a in anchors if a.fitted and a not in reached)]
     )

@@ -82,7 +82,7 @@ class WearCurve:
         reach = student_reach(self.std(quantity), counts, level)
         return self.mean(quantity)[:, None] + np.outer(reach, (-1.0, 1.0))
 
-    def at(
+    def interpolate(
         self, sq: float, quantity: str, level: float = MEAN_CONFIDENCE
     ) -> tuple[float, float, float]:
         """Mean at any roughness [m] and its interval, straight between levels; nan outside of them."""

@@ -41,7 +41,7 @@ class MisfitSlopes:
                 rows = table[(table["realisation"] == seed) & (table["status"] == DONE)]
                 if len(rows) == len(solver.sq):
                     curve = WearCurve(np.array(solver.sq), rows)
-                    each[seed] = [anchor.of(curve)[0] for anchor in solver.aimed]
+                    each[seed] = [anchor.evaluate(curve)[0] for anchor in solver.aimed]
             return each
 
         here, *around = (values(table) for table in tables)

@@ -1,11 +1,11 @@
-"""A contact in time: rough surfaces that run through it and the oil that they squeeze, step after step.
+"""Transient contact: rough surfaces moving through the contact, with the squeeze term of the oil.
 
-Along the way of the oil, dx/dt = u, the wedge and the squeeze term of Reynolds' equation are one
-derivative, d(ρh)/dt + u d(ρh)/dx = D(ρh)/Dt. A step of one cell follows the oil from cell to cell,
-by the backward difference (3 m_i^n - 4 m_(i-1)^(n-1) + m_(i-2)^(n-2))/(2 Δt): second order,
-nothing is smeared, and where nothing moves it is the snapshot's own wedge. Steps of other lengths
-difference time and wedge apart. Steps are yielded; keeping them, and deciding when to stop, is
-left to others (`asperity.simulation.motion`).
+Following the oil, dx/dt = u, the wedge and the squeeze term of Reynolds' equation are one
+derivative, d(ρh)/dt + u d(ρh)/dx = D(ρh)/Dt. A time step of one cell follows the oil from cell to
+cell, by the backward difference (3 m_i^n - 4 m_(i-1)^(n-1) + m_(i-2)^(n-2))/(2 Δt): second order,
+without numerical diffusion, and identical to the steady wedge where nothing moves. Other time steps
+discretise time and wedge separately. Steps are yielded; the caller stores them and decides when to
+stop (`asperity.simulation`).
 """
 
 import time
@@ -34,7 +34,7 @@ from asperity.ehl.models.single_pressure import Balance, Problem, TransientTerm
 from asperity.ehl.newton.single_pressure import Step
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, MIXED, TWO_PRESSURES
 from asperity.ehl.problem_setup import contact_problem
-from asperity.ehl.strategies.grid_continuation import Progress, Search
+from asperity.ehl.strategies.grid_continuation import Search
 from asperity.ehl.strategies.mixed_search import MixedSearch
 from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.lubricant import Lubricant
@@ -43,22 +43,21 @@ from asperity.surface import MovingSurfaces, Surface
 
 Memory = Mapping[str, "np.ndarray[Any, Any]"]
 
-HELD = ATTEMPTS[2]
+HELD_APPROACH = ATTEMPTS[2]
 _LOWERED = ("lowered_first", "lowered_second")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Snapshot:
-    """A contact at one time of its history.
+    """Contact at one time of a transient simulation.
 
-    `number` of the step (0 is the start) and its `time` [s]; `solution` and `state` as of a
-    contact that stands still, with the squeeze term in the balance of oil; `flow_power` [W] what
-    the pressure-driven flow of the oil turns to heat where a film parts the bodies (the rest is
-    friction's), `elastic_energy` [J] half of the sum of pressure times deflection, of a line
-    contact up to a constant; both of the whole contact. `flattened` [m] is how far the tracks of
-    the rough surfaces have been pressed down on average since the start, both together, and
-    `track_sq` [m] the root of their Sq squared and added. `memory` is all that the next step needs
-    to know.
+    `number` of the step (0 is the start) and its `time` [s]; `solution` and `state` as for a steady
+    contact, with the squeeze term in the oil balance; `flow_power` [W] is the viscous dissipation
+    of the pressure-driven flow where a film separates the bodies (sliding dissipation is in the
+    friction), `elastic_energy` [J] half the sum of pressure times deflection (up to a constant for
+    a line contact); both for the whole contact. `flattened` [m] is the mean plastic flattening of
+    both rough tracks together since the start, and `track_sq` [m] the root sum square of their Sq.
+    `memory` holds all that the next step needs.
     """
 
     number: int
@@ -72,9 +71,7 @@ class Snapshot:
     memory: Memory
 
 
-Steps = Callable[
-    ..., Iterator[Snapshot]
-]  # what a model of a moving contact is to whoever keeps its history
+Steps = Callable[..., Iterator[Snapshot]]  # interface of a transient model
 
 
 def moving_contact(
@@ -87,46 +84,45 @@ def moving_contact(
     time_step: float = 1.0,
     flattening: bool = False,
     options: Options | None = None,
-    progress: Progress | None = None,
 ) -> Iterator[Snapshot]:
-    """Yield the contact at time 0 and then after each step, for as long as anybody asks.
+    """Yield the contact at time 0 and after each time step, without end.
 
     Parameters
     ----------
-    conditions, lubricant : the contact and its oil; the load is held at every step
-    surfaces : both bodies' roughness, and how fast it moves
-    start : "steady" from the snapshot, in which the oil has always flowed and the roughness stood still; "stationary"
-        from rest, bodies pressed together dry and every gap full of oil
-    resume : `memory` of an earlier snapshot, to go on from; that snapshot is not yielded again
-    time_step : over the time that the oil takes from cell to cell; 1 follows the oil along its way
-    flattening : remember where the cap has let the bodies overlap: the rough surface (both, by halves, where both are
-        rough) is lower there by as much when it comes again
-    options : tolerances of every step; `Options()` unless given
-    progress : called after every Newton step
+    conditions, lubricant : the contact and its oil; the load is constant
+    surfaces : roughness of both bodies and its speeds
+    start : "steady" from the steady solution with stationary roughness; "stationary" from rest,
+        with dry contact and all gaps full of oil
+    resume : `memory` of an earlier snapshot to continue from; that snapshot is not yielded again
+    time_step : over the transit time of the oil through a cell; 1 follows the oil
+    flattening : lower the rough surface permanently by the overlap that the pressure cap permits
+        (half each if both are rough)
+    options : solver settings of every step; default `Options()`
 
-    A step that does not converge is yielded as it is, marked in `solution.convergence`, and the
-    next goes on from it.
+    A step that does not converge is yielded, marked in `solution.convergence`, and the next step
+    starts from it.
 
     Raises
     ------
     BadInput
-        for a time step that is not positive or longer than 8 cells, a start that is none, and what `solve_contact`
-        refuses.
+        for a time step that is not positive or longer than 8 cells, an unknown start, and as
+        `solve_contact`.
     NotConverged
-        if there is no snapshot to start from.
+        if the initial solution does not converge.
     """
     require_positive("time step", time_step, "cells")
     if time_step > MAX_CELLS_PER_TIME_STEP:
         raise BadInput(
-            f"time step must be at most {MAX_CELLS_PER_TIME_STEP:g} cells, got {time_step:g}; 1 follows the oil"
+            f"time step must be at most {MAX_CELLS_PER_TIME_STEP:g} cells, got {time_step:g}; 1 follows the "
+            "oil"
         )
     if start not in ("steady", "stationary"):
         raise BadInput(f"start must be steady or stationary, got {start!r}")
-    contact = _Contact(
-        conditions, lubricant, surfaces, options or Options(), time_step, flattening, progress
+    contact = _TransientContact(
+        conditions, lubricant, surfaces, options or Options(), time_step, flattening
     )
     if resume is None:
-        first = contact.start(standing=start == "steady")
+        first = contact.start(steady=start == "steady")
         yield first
         resume = first.memory
     for number in count(int(resume["number"]) + 1):
@@ -138,12 +134,12 @@ def moving_contact(
 def step_seconds(
     conditions: ContactConditions, surfaces: MovingSurfaces, time_step: float
 ) -> float:
-    """Length of a step [s] of `time_step` times the time from cell to cell."""
+    """Return the length of a time step [s] of `time_step` cells."""
     return time_step * surfaces.grid.spacing[0] / conditions.entrainment_speed
 
 
-class _Contact:
-    """What stays the same from step to step, and how one is taken."""
+class _TransientContact:
+    """Constants of a transient simulation, and its time step."""
 
     def __init__(
         self,
@@ -153,29 +149,25 @@ class _Contact:
         options: Options,
         time_step: float,
         flattening: bool,
-        progress: Progress | None,
     ) -> None:
         self.conditions, self.lubricant, self.surfaces = conditions, lubricant, surfaces
-        self.options, self.flattening, self.progress = options, flattening, progress
+        self.options, self.flattening = options, flattening
         self.scales = Scales.from_conditions(conditions, lubricant)
         self.seconds = step_seconds(conditions, surfaces, time_step)
         self.length = self.seconds * conditions.entrainment_speed / self.scales.length
         self.one_line = surfaces.uniform and conditions.endless
         rough = any(surfaces.rough)
-        self.shares = [
-            float(one) / max(sum(surfaces.rough), 1) for one in surfaces.rough
-        ]  # of what is flattened
-        self.attempt = ATTEMPTS[1] if rough else ATTEMPTS[0]  # on smooth bodies, the accurate wedge
-        self.followed = rough and time_step == 1.0
+        # shares of the bodies in the flattening
+        self.shares = [float(is_rough) / max(sum(surfaces.rough), 1) for is_rough in surfaces.rough]
+        self.attempt = ATTEMPTS[1] if rough else ATTEMPTS[0]  # smooth bodies: the accurate wedge
+        self.follows_oil = rough and time_step == 1.0
         self.moved = _cells_moved(surfaces, self.seconds)
 
-    def start(self, *, standing: bool) -> Snapshot:
-        """Time 0, from a contact that has always been as it is, or from one at rest."""
+    def start(self, *, steady: bool) -> Snapshot:
+        """Return the snapshot at time 0, from a steady contact (`steady`) or from rest."""
         surface = self.surfaces.at(0.0)
-        oil = self.lubricant if standing else None
-        solution = solve_contact(
-            self.conditions, oil, surface, options=self.options, progress=self.progress
-        )
+        oil = self.lubricant if steady else None
+        solution = solve_contact(self.conditions, oil, surface, options=self.options)
         solution = replace(solution, lubricant=self.lubricant)
         approach = solution.rigid_approach / self.scales.gap
         pressure, problem = solution.pressure / self.scales.pressure, self._problem(surface, None)
@@ -183,20 +175,18 @@ class _Contact:
         if solution.oil is not None:
             unknowns = pressures_of(solution, problem, self.scales)
         balance = self._balance(problem, unknowns)
-        if not standing:  # what was touching dry has the contact film between
-            gap, nothing = (
-                np.maximum(solution.gap, self.options.contact_film),
-                np.zeros_like(solution.gap),
-            )
+        if not steady:  # cells in dry contact get the contact film
+            gap = np.maximum(solution.gap, self.options.contact_film)
+            nothing = np.zeros_like(solution.gap)
             solution = replace(solution, gap=gap)
             if self.options.model in TWO_PRESSURES:
                 full = Oil(content=np.ones_like(nothing), pressure=nothing, growth=nothing)
                 solution = replace(solution, oil=full)
-        memory = {} if not standing else {"content_before": balance.content}
+        memory = {} if not steady else {"content_before": balance.content}
         return self._snapshot(0, solution, balance, approach, memory, self.surfaces)
 
     def step(self, number: int, memory: Memory) -> Snapshot:
-        """The contact a step later."""
+        """Return the snapshot one time step later."""
         began = time.perf_counter()
         surfaces = self.surfaces
         if self.flattening:
@@ -204,7 +194,7 @@ class _Contact:
         surface = surfaces.at(number * self.seconds)
         whole = self._problem(surface, self._past(memory))
         problem = _on_one_line(whole) if self.one_line else whole
-        search, step, attempt = self._search(problem, self._carried(memory, problem))
+        search, step, attempt = self._search(problem, self._initial_guess(memory, problem))
         solution = search.solution(
             step,
             surface,
@@ -222,39 +212,37 @@ class _Contact:
                 step.approach,
             )
             balance = self._balance(whole, unknowns)
-        kept = {"content_before": memory["content"]}
-        kept |= {name: memory[name] for name in _LOWERED if self.flattening}
-        return self._snapshot(number, solution, balance, step.approach, kept, surfaces)
+        carried_memory = {"content_before": memory["content"]}
+        carried_memory |= {name: memory[name] for name in _LOWERED if self.flattening}
+        return self._snapshot(number, solution, balance, step.approach, carried_memory, surfaces)
 
-    def _carried(self, memory: Memory, problem: Problem) -> Pressures:
-        """Where a step begins: what stood in each cell a step before, or it gone on with the roughness by whole cells.
+    def _initial_guess(self, memory: Memory, problem: Problem) -> Pressures:
+        """Return the initial guess: the last pressures in place, or moved with the roughness.
 
-        Asperities take their contacts, cavities and shut-in oil with them, and Newton's steps
-        would move each border of these by a cell or two at a time; the smooth bodies' own pressure
-        stays. What leaves less is the start.
+        Asperities carry their contacts, cavities and trapped oil along, and Newton's method would
+        move their borders by only a cell or two per iteration; the macroscopic pressure stays in
+        place. The guess with the smaller residual is used.
         """
         (nx, lines), approach = problem.cells, float(memory["approach"])
         starts = []
         for cells in dict.fromkeys((self.moved, 0)):
-            before = np.clip(np.arange(nx) - cells, 0, nx - 1)
-            oil, pressure = (memory[name][before, :lines] for name in ("oil", "pressure"))
+            previous = np.clip(np.arange(nx) - cells, 0, nx - 1)
+            oil, pressure = (memory[name][previous, :lines] for name in ("oil", "pressure"))
             starts.append(Pressures(oil, pressure, approach))
         return min(starts, key=lambda start: self._balance(problem, start).residual_rms)
 
     def _search(self, problem: Problem, unknowns: Pressures) -> tuple[Search, Step, str]:
-        """The step's way to its solution, and by which attempt."""
+        """Solve a step; return the search, its last iterate and the attempt used."""
         if self.options.model in TWO_PRESSURES:
-            mixed = MixedSearch(self.options, self.scales.gap, self.progress)
+            mixed = MixedSearch(self.options, self.scales.gap, None)
             return mixed, mixed.continue_from(problem, unknowns), ATTEMPTS[0]
-        search = Search(self.options, self.scales.gap, self.progress)
-        for held in (
-            False,
-            True,
-        ):  # where Newton's steps lead nowhere, the bodies are held and their distance searched
+        search = Search(self.options, self.scales.gap, None)
+        # if Newton's method fails: at fixed approach, found by bracketing
+        for held in (False, True):
             step = search.solve_levels([problem], unknowns.total, unknowns.approach, fixed=held)
             if search.converged(self.options.tolerance):
                 break
-        return search, step, HELD if held else ATTEMPTS[0]
+        return search, step, HELD_APPROACH if held else ATTEMPTS[0]
 
     def _balance(self, problem: Problem, unknowns: Pressures) -> Balance | MixedBalance:
         if self.options.model in TWO_PRESSURES:
@@ -262,28 +250,33 @@ class _Contact:
         return problem.evaluate(unknowns.total, unknowns.approach)
 
     def _problem(self, surface: Surface, past: TransientTerm | None) -> Problem:
-        posed = contact_problem(
+        steady_problem = contact_problem(
             self.conditions, self.lubricant, surface, self.options, attempt=self.attempt
         )
-        return replace(posed, past=past)
+        return replace(steady_problem, past=past)
 
     def _past(self, memory: Memory) -> TransientTerm:
         content = memory["content"]
-        leans = self.options.model == MIXED and self.followed
-        first_order = leans or self.options.model == CONSERVING
+        upwinded = self.options.model == MIXED and self.follows_oil
+        first_order = upwinded or self.options.model == CONSERVING
         if "content_before" in memory and not first_order:
-            before, rate, once, twice = memory["content_before"], 1.5, -2.0, 0.5
-        else:  # first order: a start from rest has no time before it that flowed, and what leans back does so in space
-            before, rate, once, twice = content, 1.0, -1.0, 0.0
-        source = once * content + twice * before
-        if not self.followed:
-            return TransientTerm(rate / self.length, source / self.length, self.followed)
+            previous, rate, previous_weight, earlier_weight = (
+                memory["content_before"],
+                1.5,
+                -2.0,
+                0.5,
+            )
+        else:  # first order: no earlier flow after a start from rest, or upwinding in space
+            previous, rate, previous_weight, earlier_weight = content, 1.0, -1.0, 0.0
+        source = previous_weight * content + earlier_weight * previous
+        if not self.follows_oil:
+            return TransientTerm(rate / self.length, source / self.length, self.follows_oil)
         if self.options.model == CONSERVING:
             source[0], source[1:] = 0.0, -content[:-1]
-            return TransientTerm(rate / self.length, source / self.length, self.followed)
-        source[2:] = once * content[1:-1] + twice * before[:-2]
-        past = TransientTerm(rate / self.length, source / self.length, self.followed)
-        if not leans:
+            return TransientTerm(rate / self.length, source / self.length, self.follows_oil)
+        source[2:] = previous_weight * content[1:-1] + earlier_weight * previous[:-2]
+        past = TransientTerm(rate / self.length, source / self.length, self.follows_oil)
+        if not upwinded:
             return past
         upstream, leant = (
             np.concatenate([memory[name][:1], memory[name][:-1]]) for name in ("content", "leant")
@@ -297,11 +290,11 @@ class _Contact:
         solution: ContactSolution,
         balance: Balance | MixedBalance,
         approach: float,
-        kept: dict[str, Any],
+        carried_memory: dict[str, Any],
         surfaces: MovingSurfaces,
     ) -> Snapshot:
-        when = number * self.seconds
-        memory = kept | {
+        time_s = number * self.seconds
+        memory = carried_memory | {
             "number": np.array(number),
             "pressure": balance.pressure,
             "oil": _oil(balance),
@@ -321,12 +314,12 @@ class _Contact:
             overlap = _overlap(balance) * self.scales.gap * solution.convergence.converged
             for index, name in enumerate(_LOWERED):
                 share = self.shares[index] * overlap
-                before = kept.get(name, 0.0)
-                memory[name] = before + self.surfaces.on_track(index, share, when)
+                previous = carried_memory.get(name, 0.0)
+                memory[name] = previous + self.surfaces.on_track(index, share, time_s)
                 flattened += float(memory[name].mean())
         return Snapshot(
             number=number,
-            time=when,
+            time=time_s,
             solution=solution,
             state=state_of(solution, balance),
             flow_power=flow * energy * conditions.entrainment_speed / self.scales.length,
@@ -338,24 +331,24 @@ class _Contact:
 
 
 def _cells_moved(surfaces: MovingSurfaces, seconds: float) -> int:
-    """How many cells roughness goes in a step, the mean of both bodies' where both are rough."""
+    """Return the number of cells that roughness moves per step (mean of the rough bodies)."""
     speeds = [speed for speed, rough in zip(surfaces.speeds, surfaces.rough, strict=True) if rough]
     return round(sum(speeds) / max(len(speeds), 1) * seconds / surfaces.grid.spacing[0])
 
 
 def _oil(balance: Balance | MixedBalance) -> Field:
-    """The oil's unknown."""
+    """Return the unknown of the oil."""
     return balance.unknowns.oil if isinstance(balance, MixedBalance) else balance.pressure
 
 
 def _overlap(balance: Balance | MixedBalance) -> Field:
-    """How deep the cap has let the bodies overlap, dimensionless."""
+    """Return the overlap that the pressure cap permits, dimensionless."""
     depth = np.maximum(balance.problem.contact_gap - balance.gap, 0.0)
     return np.where(balance.yielded, depth, 0.0)
 
 
 def _on_one_line(problem: Problem) -> Problem:
-    """What does not vary along y, on one line of cells that is as wide as all."""
+    """Return a problem uniform along y on one line of cells of the same total width."""
     past, (dx, dy) = problem.past, problem.spacing
     return replace(
         problem,
@@ -366,8 +359,8 @@ def _on_one_line(problem: Problem) -> Problem:
 
 
 def _powers(balance: Balance | MixedBalance) -> tuple[float, float]:
-    """∫ ε |grad P|² where a film parts the bodies on both sides of a face, and the elastic energy ½ ∫ P V."""
-    problem, pressure, faces, parted = (
+    """Return ∫ ε |grad P|² over faces between separated cells, and the elastic energy ½ ∫ P V."""
+    problem, pressure, faces, separated = (
         balance.problem,
         balance.oil_pressure,
         balance.faces,
@@ -375,14 +368,15 @@ def _powers(balance: Balance | MixedBalance) -> tuple[float, float]:
     )
     assert faces is not None
     dx, dy = problem.spacing
-    along = faces.east[:-1] * np.diff(pressure, axis=0) ** 2 * (parted[:-1] & parted[1:])
+    along = faces.east[:-1] * np.diff(pressure, axis=0) ** 2 * (separated[:-1] & separated[1:])
     across = (
         faces.north
         * (np.roll(pressure, -1, axis=1) - pressure) ** 2
-        * (parted & np.roll(parted, -1, axis=1))
+        * (separated & np.roll(separated, -1, axis=1))
     )
     ends = 2.0 * (
-        faces.inlet * pressure[0] ** 2 * parted[0] + faces.east[-1] * pressure[-1] ** 2 * parted[-1]
+        faces.inlet * pressure[0] ** 2 * separated[0]
+        + faces.east[-1] * pressure[-1] ** 2 * separated[-1]
     )
     flow = float((along.sum() + ends.sum()) / dx**2 + across.sum() / dy**2) * dx * dy
     total = balance.pressure

@@ -1,4 +1,4 @@
-"""A mass on a contact spring over a moving profile, and what passes under it. Knows nothing of oil."""
+"""Vibration of a mass on a contact spring over a moving profile, independent of the lubricant."""
 
 import lazy_loader
 

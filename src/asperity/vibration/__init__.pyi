@@ -11,7 +11,7 @@ from .excitation import PatchShape as PatchShape
 from .excitation import SurfaceTrack as SurfaceTrack
 from .excitation import white_noise as white_noise
 from .orders import Turning as Turning
-from .orders import steadied as steadied
+from .orders import resample_to_constant_speed as resample_to_constant_speed
 from .orders import turning_by_pulses as turning_by_pulses
 from .orders import turning_by_speed as turning_by_speed
 from .oscillator import RESPONSE_METHODS as RESPONSE_METHODS

@@ -1,6 +1,6 @@
-"""The squared envelope of a band, and how deep it is modulated at the rates at which faults of a machine pass.
+"""Squared envelope of a frequency band, and its modulation depth at the fault rates of a machine.
 
-What those rates are is left to `machine`; whether a depth grows to `wear`.
+`machine` computes these rates; `wear` evaluates whether a depth grows.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -11,18 +11,18 @@ import scipy
 from asperity.core.arrays import Field
 from asperity.core.signals import taper
 
-CHUNK_S = 4.0  # transformed together: lines a quarter of a hertz apart
+CHUNK_S = 4.0  # length of a Fourier transform [s]: lines 0.25 Hz apart
 BAND = (0.1, 0.4)  # of the sampling rate: above shafts and meshes, below the anti-alias filter
 HARMONICS = 3
-SLIP = 0.015  # of a rate: rolling elements slip by 1 to 2 %
-FEWEST = 64  # samples of an envelope that tell anything
+SLIP = 0.015  # relative tolerance of a rate: rolling elements slip by 1 to 2 %
+MIN_SAMPLES = 64  # of an envelope
 
 
 class Envelope:
-    """Gathers the spectrum of the squared envelope from blocks as they pass through `watch`.
+    """Spectrum of the squared envelope, accumulated from blocks that pass through `watch`.
 
     The band is cut out of each chunk's Fourier transform and shifted to 0, so that the envelope
-    needs no filter and no more samples than the band is wide. Chunks with a gap are left out.
+    needs no filter and no more samples than the band is wide. Chunks with a gap are skipped.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -36,20 +36,20 @@ class Envelope:
         self._waiting: list[Field] = []
 
     def watch(self, blocks: Iterable[Field]) -> Iterator[Field]:
-        """Pass the blocks on."""
+        """Accumulate the blocks and yield them unchanged."""
         for block in blocks:
             self._waiting.append(block)
             self._take(self.chunk)
             yield block
         if self.chunks == 0:
-            self._take(1)  # a record shorter than a chunk: as long as it is
+            self._take(1)  # a record shorter than a chunk
 
-    def _take(self, least: int) -> None:
-        held = sum(block.size for block in self._waiting)
-        if held < least:
+    def _take(self, min_size: int) -> None:
+        available = sum(block.size for block in self._waiting)
+        if available < min_size:
             return
         values = np.concatenate(self._waiting)
-        size = self.chunk if held >= self.chunk else held
+        size = self.chunk if available >= self.chunk else available
         whole = values.size // size
         for chunk in values[: whole * size].reshape(whole, size):
             self._add(chunk)
@@ -61,7 +61,7 @@ class Envelope:
         lines = scipy.fft.rfft(chunk - chunk.mean())
         low, high = (round(end * chunk.size) for end in BAND)
         squared = np.abs(scipy.fft.ifft(lines[low:high])) ** 2
-        if squared.size < FEWEST:
+        if squared.size < MIN_SAMPLES:
             return
         weights = taper("hann", squared.size)
         spectrum = np.abs(scipy.fft.rfft((squared - squared.mean()) * weights)) ** 2
@@ -72,9 +72,9 @@ class Envelope:
         self.chunks += 1
 
     def depths(self, rates_hz: Mapping[str, float]) -> dict[str, float]:
-        """How deep the envelope is modulated at each rate [Hz] and its first harmonics: rms over the mean.
+        """Return the modulation depth (rms over mean) at each rate [Hz] with its first harmonics.
 
-        nan where the record is too short or the band too narrow for the rate.
+        nan if the record is too short or the band too narrow for the rate.
         """
         return {name: self._depth(rate) for name, rate in rates_hz.items()}
 
@@ -83,14 +83,14 @@ class Envelope:
             return float("nan")
         power = 0.0
         for harmonic in range(1, HARMONICS + 1):
-            at, reach = (
+            centre, reach = (
                 harmonic * rate_hz / self.spacing_hz,
                 max(SLIP * harmonic * rate_hz / self.spacing_hz, 1.0),
             )
-            near = self.total[max(int(np.ceil(at - reach)), 2) : int(at + reach) + 1]
-            if harmonic == 1 and not near.size:
+            lines = self.total[max(int(np.ceil(centre - reach)), 2) : int(centre + reach) + 1]
+            if harmonic == 1 and not lines.size:
                 return float("nan")
-            if near.size:
-                power += 2.0 * float(near.max()) / self.chunks / self.squares
+            if lines.size:
+                power += 2.0 * float(lines.max()) / self.chunks / self.squares
         mean = self.mean / self.chunks
         return float(np.sqrt(power) / mean) if mean > 0.0 else float("nan")

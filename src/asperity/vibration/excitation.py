@@ -1,8 +1,8 @@
-"""What passes under the contact: rough heights in time, as a record and as a spectrum.
+"""Excitation under a contact: rough heights in time, as a record and as a spectrum.
 
-Two sources, filtered noise (the paper's section 2.2) and a surface's own spectrum run over at a
-speed, and the contact patch that averages either. Which of them a contact rides over is for
-`asperity.coupling` to say.
+There are two sources, filtered noise (the paper's section 2.2) and a surface's spectrum traversed
+at a speed, and the average of either over the contact patch. `asperity.coupling` chooses among
+them.
 """
 
 from collections.abc import Callable
@@ -22,32 +22,39 @@ HeightAs: TypeAlias = Literal["rms", "ra"]
 HeightOf: TypeAlias = Literal["process", "record", "noise"]
 PatchShape: TypeAlias = Literal["line", "point"]
 RA_TO_RMS = float(np.sqrt(np.pi / 2.0))  # of Gaussian heights
-HIGHEST_ORDER = 8
+MAX_ORDER = 8
 
 
 class Excitation(Protocol):
-    """A profile's spectrum, and records of it."""
+    """Spectrum and records of a profile."""
 
     def density(self, frequency_hz: Field, rate_hz: float) -> Field:
-        """Expected one-sided spectrum at `frequency_hz` (any shape), for records of that sampling rate [m^2/Hz]."""
+        """Return the expected one-sided spectrum of records of that sampling rate [m^2/Hz]."""
 
     def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
-        """One record [m]; one seed, one record."""
+        """Return one record [m], reproducible by its seed."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseFilter:
-    """A Butterworth low pass, and what of the noise has the stated height; BadInput for an order or a name not known.
+    """Butterworth low pass, and the definition of the noise's height.
 
     Parameters
     ----------
-    filter : "continuous", the process sampled without error; "bilinear", the digital filter of the same name, started
-        from rest: what the paper must have used. It has no power left at rate/2, so a resonance near there is starved
-    filter_order : the paper names none, 2 reproduces its Table 1
+    filter : "continuous", the process sampled without error; "bilinear", the digital filter of the
+        same name, started from rest, which the paper must have used. It has no power at rate/2, so
+        that a resonance near there is hardly excited
+    filter_order : not stated in the paper; 2 reproduces its Table 1
     height_as : "rms" or "ra", the mean absolute height
-    height_of : what has that height. "process": the filtered noise at large, so that one record scatters about it.
-        "record": this very record is scaled to it; chance in the few slow waves of a record then passes to every other
-        frequency. "noise": the noise before the filter, sample by sample; what is left behind depends on the rate
+    height_of : what has that height. "process": the filtered noise on average, so that single
+        records scatter about it. "record": this very record is scaled to it, so that the scatter of
+        its few slow waves passes to all other frequencies. "noise": the noise before the filter,
+        sample by sample; the height behind the filter depends on the rate
+
+    Raises
+    ------
+    BadInput
+        for an order out of range or an unknown name.
     """
 
     filter: FilterName = "continuous"
@@ -56,9 +63,10 @@ class NoiseFilter:
     height_of: HeightOf = "process"
 
     def __post_init__(self) -> None:
-        if not 1 <= self.filter_order <= HIGHEST_ORDER:
+        if not 1 <= self.filter_order <= MAX_ORDER:
             raise BadInput(
-                f"filter order must lie between 1 and {HIGHEST_ORDER}, got {self.filter_order}; 2 is the default"
+                f"filter order must be between 1 and {MAX_ORDER}, got {self.filter_order}; the "
+                "default is 2"
             )
         require_choice("filter", self.filter, get_args(FilterName))
         require_choice("height_as", self.height_as, get_args(HeightAs))
@@ -67,11 +75,11 @@ class NoiseFilter:
 
 @dataclass(frozen=True, kw_only=True)
 class FilteredNoise(NoiseFilter):
-    """Gaussian white noise behind a Butterworth low pass: `height` of the profile [m], `cutoff_hz` of the filter [Hz].
+    """Gaussian white noise behind a Butterworth low pass of `cutoff_hz`, with `height` [m].
 
-    `reference_cutoff_hz` is the cut-off [Hz] at which the noise's coefficient is set so that the
-    height comes out, and then kept: spectra at the resonance grow as cut-off^4 (order 2). None:
-    readjusted at each cut-off, ^3. Raises BadInput for a quantity out of range.
+    `reference_cutoff_hz` is the cut-off [Hz] at which the noise coefficient is set to give that
+    height, and then kept: spectra at the resonance grow as cut-off^4 (order 2). None: readjusted at
+    each cut-off, ^3. Raises BadInput for a quantity out of range.
     """
 
     height: float
@@ -86,7 +94,7 @@ class FilteredNoise(NoiseFilter):
         super().__post_init__()
 
     def density(self, frequency_hz: Field, rate_hz: float) -> Field:
-        """White noise times |H|^2 [m^2/Hz]; without a rescaling of the record the exact expectation.
+        """Return white noise times |H|^2 [m^2/Hz], exact unless records are rescaled.
 
         |H|^2 = 1 / (1 + (f/fc)^2n), with tan(π f/rate) for f, likewise fc, if bilinear.
         """
@@ -104,26 +112,32 @@ class FilteredNoise(NoiseFilter):
         )
 
     def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
-        """Record of `samples` heights [m].
+        """Return a record of `samples` heights [m].
 
-        Raises BadInput for a cut-off above rate/2 (bilinear) or rate/10 (continuous), or a record
-        shorter than one of its periods.
+        Raises
+        ------
+        BadInput
+            for a cut-off above rate/2 (bilinear) or rate/10 (continuous), or a record shorter than
+            one of its periods.
         """
         for cutoff in {self.cutoff_hz, self.reference_cutoff_hz or self.cutoff_hz}:
-            top = rate_hz / (10.0 if self.filter == "continuous" else 2.0)
-            if not rate_hz / samples <= cutoff < top:
+            upper_hz = rate_hz / (10.0 if self.filter == "continuous" else 2.0)
+            if not rate_hz / samples <= cutoff < upper_hz:
                 raise BadInput(
-                    f"profile cut-off must lie between 1/duration ({rate_hz / samples:g} Hz) and {top:g} Hz at "
-                    f"{rate_hz:g} samples a second, got {cutoff:g} Hz; change the cut-off law, duration or rate"
+                    f"profile cut-off must be between 1/duration ({rate_hz / samples:g} Hz) and "
+                    f"{upper_hz:g} Hz at a sampling rate of {rate_hz:g} Hz, got {cutoff:g} Hz; "
+                    "change cut-off law, duration or rate"
                 )
         heights = self._filtered(self.cutoff_hz, samples, rate_hz, seed)
         if self.height_of == "record":
-            kept = self.reference_cutoff_hz
-            judged = heights if kept is None else self._filtered(kept, samples, rate_hz, seed)
+            reference = self.reference_cutoff_hz
+            scaled_record = (
+                heights if reference is None else self._filtered(reference, samples, rate_hz, seed)
+            )
             height = (
-                np.std(judged)
+                np.std(scaled_record)
                 if self.height_as == "rms"
-                else np.mean(np.abs(judged - np.mean(judged)))
+                else np.mean(np.abs(scaled_record - np.mean(scaled_record)))
             )
             heights *= self.height / float(height)
         return Signal(heights, rate_hz, "m")
@@ -133,7 +147,7 @@ class FilteredNoise(NoiseFilter):
         return self.height * (RA_TO_RMS if self.height_as == "ra" else 1.0)
 
     def _white_density(self, rate_hz: float) -> float:
-        """One-sided density of the noise before the filter [m^2/Hz]."""
+        """Return the one-sided density of the noise before the filter [m^2/Hz]."""
         if self.height_of == "noise":
             return self._rms**2 * 2.0 / rate_hz
         return self._rms**2 / self._noise_bandwidth(
@@ -141,7 +155,7 @@ class FilteredNoise(NoiseFilter):
         )
 
     def _noise_bandwidth(self, cutoff: float, rate_hz: float) -> float:
-        """∫|H|^2 df [Hz]: fc (π/2n) / sin(π/2n), or over the warped axis."""
+        """Return ∫|H|^2 df [Hz]: fc (π/2n) / sin(π/2n), or over the warped axis."""
         quarter = np.pi / (2.0 * self.filter_order)
         if self.filter == "continuous":
             return float(cutoff * quarter / np.sin(quarter))
@@ -156,7 +170,7 @@ class FilteredNoise(NoiseFilter):
         return float(rate_hz / np.pi * corner * area)
 
     def _filtered(self, cutoff: float, samples: int, rate_hz: float, seed: int) -> Field:
-        """Noise behind the filter at `cutoff`, of the expected height before any rescaling of the record."""
+        """Return noise behind the filter at `cutoff`, before any rescaling of the record."""
         white_density = self._white_density(rate_hz)
         if self.filter == "bilinear":
             sections = scipy.signal.butter(self.filter_order, cutoff, fs=rate_hz, output="sos")
@@ -168,29 +182,30 @@ class FilteredNoise(NoiseFilter):
         source = replace(
             self, cutoff_hz=cutoff, reference_cutoff_hz=self.reference_cutoff_hz or self.cutoff_hz
         )
-        return synthesised(source, samples, rate_hz, seed)
+        return synthesise(source, samples, rate_hz, seed)
 
 
 def white_noise(samples: int, seed: int) -> Field:
-    """Independent Gaussian samples of variance 1: what a digital filter of that seed is fed, the paper's Fig 3a."""
+    """Return independent Gaussian samples of variance 1, as in the paper's Fig 3a."""
     return np.random.default_rng(seed).standard_normal(samples)
 
 
 def _require_below_half(cutoff: float, rate_hz: float) -> None:
     if cutoff >= rate_hz / 2.0:
         raise BadInput(
-            f"a digital filter's cut-off must lie below rate/2, {rate_hz / 2.0:g} Hz, got {cutoff:g} Hz"
+            f"a digital filter's cut-off must be below rate/2, {rate_hz / 2.0:g} Hz, got "
+            f"{cutoff:g} Hz"
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurfaceTrack:
-    """A surface's own profile run over at a speed: S(f) = Φ(f/v)/v.
+    """Profile of a surface traversed at a speed: S(f) = Φ(f/v)/v.
 
     `wavenumber` [cycles/m] evenly spaced from 0 and `spectrum` Φ [m^3], one-sided, both of shape
-    (lines,); `speed` v [m/s]. Between the lines Φ is linear, above the last it is 0: the map shows
-    nothing finer than two of its pixels. Records are Gaussian, and as long as one likes; they know
-    the surface's spectrum, not its shapes.
+    (lines,); `speed` v [m/s]. Φ is linear between the lines and 0 above the last, since the map
+    contains nothing shorter than two pixels. Records are Gaussian and of any length; they have the
+    surface's spectrum, not its shapes.
     """
 
     wavenumber: Field
@@ -201,11 +216,14 @@ class SurfaceTrack:
         require_positive("speed at which the surface passes", self.speed, "m/s")
 
     @classmethod
-    def of(cls, surface: Surface, speed: float) -> "SurfaceTrack":
-        """The mean spectrum of the surface's cuts along rolling, Hann-tapered: line width 1.5 over the length."""
+    def from_surface(cls, surface: Surface, speed: float) -> "SurfaceTrack":
+        """Return the track with the mean spectrum of the surface's profiles along rolling.
+
+        Hann-tapered: line width 1.5 over the length.
+        """
         if surface.sq == 0.0:
             raise BadInput(
-                "a flat surface excites nothing; give it a roughness, or take filtered noise"
+                "a flat surface excites no vibration; give it a roughness or use filtered noise"
             )
         heights = surface.heights - np.mean(surface.heights)
         spacing = surface.grid.spacing[0]
@@ -215,22 +233,23 @@ class SurfaceTrack:
         return cls(wavenumber=wavenumber, spectrum=np.mean(spectra, axis=1), speed=speed)
 
     def density(self, frequency_hz: Field, rate_hz: float) -> Field:  # noqa: ARG002 - the same at any rate
-        """Φ(f/v)/v [m^2/Hz]."""
-        at = np.asarray(frequency_hz) / self.speed
-        return np.asarray(np.interp(at, self.wavenumber, self.spectrum, right=0.0) / self.speed)
+        """Return Φ(f/v)/v [m^2/Hz]."""
+        wavenumbers = np.asarray(frequency_hz) / self.speed
+        return np.asarray(
+            np.interp(wavenumbers, self.wavenumber, self.spectrum, right=0.0) / self.speed
+        )
 
     def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
-        """Gaussian record with that spectrum [m]."""
-        return Signal(synthesised(self, samples, rate_hz, seed), rate_hz, "m")
+        """Return a Gaussian record with that spectrum [m]."""
+        return Signal(synthesise(self, samples, rate_hz, seed), rate_hz, "m")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PatchAverage:
-    """An excitation averaged over the contact patch, with the weight of Hertz's pressure.
+    """Excitation averaged over the contact patch, weighted by Hertz's pressure.
 
-    Waves of k = 2π f/v run across the patch of half-width a [m]: their height shrinks by 2
-    J1(ka)/(ka) in a line contact (`shape` "line"), by 3 (sin ka - ka cos ka)/(ka)^3 in a round one
-    ("point").
+    Waves of k = 2π f/v pass the patch of half-width a [m]: their height shrinks by 2 J1(ka)/(ka) in
+    a line contact (`shape` "line"), by 3 (sin ka - ka cos ka)/(ka)^3 in a round one ("point").
     """
 
     source: Excitation
@@ -244,21 +263,20 @@ class PatchAverage:
         require_choice("contact patch", self.shape, PATCHES)
 
     def weight(self, frequency_hz: Field) -> Field:
-        """What is left of a wave's height, 1 at 0 Hz, sign included."""
+        """Return the factor on a wave's height, 1 at 0 Hz, with its sign."""
         ka = 2.0 * np.pi * np.asarray(frequency_hz) * self.half_width / self.speed
         return np.asarray(PATCHES[self.shape](np.maximum(ka, 1e-6)))
 
     def density(self, frequency_hz: Field, rate_hz: float) -> Field:
-        """The source's, times the weight squared [m^2/Hz]."""
+        """Return the density of the source times the weight squared [m^2/Hz]."""
         return np.asarray(
             self.source.density(frequency_hz, rate_hz) * self.weight(frequency_hz) ** 2
         )
 
     def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
-        """The source's record, averaged [m]."""
-        reach = (
-            int(np.ceil(4.0 * self.half_width / self.speed * rate_hz)) + 64
-        )  # beyond the reach of either end
+        """Return the averaged record of the source [m]."""
+        # margin at both ends, longer than the patch
+        reach = int(np.ceil(4.0 * self.half_width / self.speed * rate_hz)) + 64
         heights = self.source.profile(samples + 2 * reach, rate_hz, seed).values
         length = scipy.fft.next_fast_len(heights.size, real=True)
         weight = self.weight(scipy.fft.rfftfreq(length, 1.0 / rate_hz))
@@ -266,19 +284,18 @@ class PatchAverage:
         return Signal(np.ascontiguousarray(averaged[reach : reach + samples]), rate_hz, "m")
 
 
-PATCHES: dict[
-    PatchShape, Callable[[Field], Field]
-] = {  # what is left of a wave's height, of ka > 0
+# factor on a wave's height for ka > 0
+PATCHES: dict[PatchShape, Callable[[Field], Field]] = {
     "line": lambda ka: 2.0 * scipy.special.j1(ka) / ka,
     "point": lambda ka: 3.0 * scipy.special.spherical_jn(1, ka) / ka,
 }
 
 
-def synthesised(source: Excitation, samples: int, rate_hz: float, seed: int) -> Field:
-    """Gaussian heights with the source's spectrum: random waves on the lines of a record a quarter longer, cut off.
+def synthesise(source: Excitation, samples: int, rate_hz: float, seed: int) -> Field:
+    """Return Gaussian heights with the source's spectrum.
 
-    What is left is not periodic, as no real record is. What lies above rate/2 is left out, not
-    folded.
+    Random waves on the lines of a record a quarter longer, cut off: the result is not periodic, as
+    no real record is. Power above rate/2 is omitted, not folded.
     """
     length = scipy.fft.next_fast_len(samples + samples // 4, real=True)
     frequency = scipy.fft.rfftfreq(length, 1.0 / rate_hz)
@@ -290,10 +307,10 @@ def synthesised(source: Excitation, samples: int, rate_hz: float, seed: int) -> 
 
 
 def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Field:
-    """Samples of y'' + √2 ω y' + ω^2 y = white noise, of standard deviation `rms`; `cutoff` in cycles a sample.
+    """Return samples of y'' + √2 ω y' + ω^2 y = white noise with standard deviation `rms`.
 
-    State x = (y, y') obeys x⁺ = A x + e with cov e = Q (Van Loan 1978): y is an ARMA(2, 1) series
-    of one white noise.
+    `cutoff` is in cycles per sample. State x = (y, y') obeys x⁺ = A x + e with cov e = Q (Van Loan
+    1978): y is an ARMA(2, 1) series of one white noise.
     """
     omega = 2.0 * np.pi * cutoff
     drift = np.array([[0.0, 1.0], [-(omega**2), -np.sqrt(2.0) * omega]])
@@ -302,21 +319,19 @@ def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Fi
     )
     step = exponential[2:, 2:].T
     noise = step @ exponential[:2, 2:]
-    # y_n - tr(A) y_(n-1) + det(A) y_(n-2) = e1_(n-1) + (A12 e2 - A22 e1)_(n-2): its variance,
+    # y_n - tr(A) y_(n-1) + det(A) y_(n-2) = e1_(n-1) + (A12 e2 - A22 e1)_(n-2): its variance and
     # neighbour covariance ...
     back = np.array([-step[1, 1], step[0, 1]])
     variance = noise[0, 0] + back @ noise @ back
     neighbour = back @ noise[:, 0]
-    # ... are those of b0 w_n + b1 w_(n-1)
+    # ... equal those of b0 w_n + b1 w_(n-1)
     plus, minus = np.sqrt(variance + 2.0 * neighbour), np.sqrt(variance - 2.0 * neighbour)
     numerator = np.array([plus + minus, plus - minus]) / 2.0
     denominator = np.array([1.0, -np.trace(step), np.linalg.det(step)])
 
-    settling = int(
-        np.ceil(12.0 * np.sqrt(2.0) / omega)
-    )  # 12 time constants: what is left of the start is e^-12
+    # 12 time constants: the initial state has decayed to e^-12
+    settling = int(np.ceil(12.0 * np.sqrt(2.0) / omega))
     white = white_noise(settling + samples, seed)
-    to_rms = rms * np.sqrt(
-        2.0 * np.sqrt(2.0) * omega**3
-    )  # unit white noise would have variance 1 / (2 √2 ω^3)
+    # unit white noise would give the variance 1 / (2 √2 ω^3)
+    to_rms = rms * np.sqrt(2.0 * np.sqrt(2.0) * omega**3)
     return np.asarray(to_rms * recursion(numerator, denominator, white)[settling:])

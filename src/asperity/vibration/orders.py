@@ -1,6 +1,6 @@
-"""A vibration as if its shaft had turned evenly: resampled at constant angle, by tacho pulses or a speed channel.
+"""Order tracking: resample a vibration at constant shaft angle, by tacho pulses or a speed channel.
 
-What turns at which multiple of the shaft's speed is left to `machine`.
+The orders of machine elements are in `machine`.
 """
 
 from typing import NamedTuple
@@ -11,46 +11,43 @@ import scipy
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_positive
 
-FINER = (
-    2  # samples in place of one before the spline, which is good to a third of the rate it is given
-)
-FEWEST_PULSES = 4
-# of the mean speed: what turned more slowly is left out, or samples would have to be ever finer
-SLOWEST = 0.25
-LEVELS = (
-    0.25,
-    0.75,
-)  # of a tacho's range: it has to pass both to count, so that its noise makes no pulses
-# times the median interval, or a share of it so small, between pulses: these are no shaft's
-UNEVEN = 4.0
+OVERSAMPLING = 2  # before the spline, which is accurate up to a third of its sampling rate
+MIN_PULSES = 4
+MIN_SPEED = 0.25  # of the mean speed; slower turning would need ever finer samples
+LEVELS = (0.25, 0.75)  # of a tacho's range; a pulse passes both, so that noise makes no pulses
+MAX_INTERVAL_RATIO = 4.0  # of pulse intervals to their median, either way
 
 
 class Turning(NamedTuple):
-    """The shaft's angle [turns], shape (samples,), nan where it is not known; `speed_hz` in the mean."""
+    """Shaft angle [turns], shape (samples,), nan if unknown, and mean speed `speed_hz`."""
 
     turns: Field
     speed_hz: float
 
 
 def turning_by_pulses(pulses: Field, rate_hz: float, per_turn: float = 1.0) -> Turning:
-    """The angle by the rising edges of a tacho, each at its place between two samples; smooth in between.
+    """Return the shaft angle from the rising edges of a tacho signal.
+
+    Edges are located between samples and interpolated smoothly.
 
     Raises
     ------
     BadInput
-        for fewer than four pulses, pulses that come at no shaft's intervals, or pulses per turn that are not positive.
+        for fewer than four pulses, irregular pulse intervals, or pulses per turn that are not
+        positive.
     """
     require_positive("pulses per turn", per_turn)
     edges = _rising(pulses)
-    if edges.size < FEWEST_PULSES:
+    if edges.size < MIN_PULSES:
         raise BadInput(
-            f"the tacho shows {edges.size} pulses, and {FEWEST_PULSES} are needed; name another channel"
+            f"the tacho signal has {edges.size} pulses, but {MIN_PULSES} are required; use "
+            "another channel"
         )
-    between = np.diff(edges) / np.median(np.diff(edges))
-    if between.min() < 1.0 / UNEVEN or between.max() > UNEVEN:
+    intervals = np.diff(edges) / np.median(np.diff(edges))
+    if intervals.min() < 1.0 / MAX_INTERVAL_RATIO or intervals.max() > MAX_INTERVAL_RATIO:
         raise BadInput(
-            f"the tacho's pulses come at {between.min():.2g} to {between.max():.2g} times their median interval, as no "
-            "shaft turns; name another channel"
+            f"the tacho's pulse intervals are {intervals.min():.2g} to {intervals.max():.2g} "
+            "times their median, which no shaft produces; use another channel"
         )
     angle = scipy.interpolate.PchipInterpolator(
         edges, np.arange(edges.size) / per_turn, extrapolate=False
@@ -60,54 +57,64 @@ def turning_by_pulses(pulses: Field, rate_hz: float, per_turn: float = 1.0) -> T
 
 
 def turning_by_speed(speed_hz: Field, rate_hz: float) -> Turning:
-    """The angle by a channel of the shaft's speed [Hz], on the same samples.
+    """Return the shaft angle from a channel of the shaft speed [Hz], on the same samples.
 
     Raises
     ------
     BadInput
-        for a shaft that turns back or stands still.
+        for a shaft that reverses or stops.
     """
     if not np.all(speed_hz > 0.0):
-        raise BadInput("the shaft stands still or turns back for a time; leave its channel out")
+        raise BadInput("the shaft stops or reverses at times; omit its speed channel")
     turns = np.concatenate([[0.0], np.cumsum(0.5 * (speed_hz[1:] + speed_hz[:-1]))]) / rate_hz
     return Turning(turns, float(turns[-1] / (turns.size - 1) * rate_hz))
 
 
-def steadied(values: Field, turning: Turning, rate_hz: float) -> tuple[Field, float]:
-    """The values as if the shaft had turned at its mean speed all the time, and how many of them there are a second.
+def resample_to_constant_speed(
+    values: Field, turning: Turning, rate_hz: float
+) -> tuple[Field, float]:
+    """Resample the values to constant shaft speed; return them with their sampling rate [Hz].
 
-    Sampled so finely that nothing folds back where the shaft turned slowest. Raises BadInput for a
-    shaft that turned at less than a quarter of its mean speed for a time.
+    The rate is high enough to avoid aliasing at the slowest turning.
+
+    Raises
+    ------
+    BadInput
+        if the shaft turns at less than a quarter of its mean speed at times.
     """
     known = np.flatnonzero(np.isfinite(turning.turns))
     turns = turning.turns[known]
     step = turning.speed_hz / rate_hz
     slowest = float(np.diff(turns).min())
-    if slowest < SLOWEST * step:
+    if slowest < MIN_SPEED * step:
         raise BadInput(
-            f"the shaft turned at less than {SLOWEST:g} of its mean speed for a time; its orders are not followed"
+            f"the shaft turns at less than {MIN_SPEED:g} of its mean speed at times; order "
+            "tracking is not possible"
         )
-    at = np.interp(np.arange(turns[0], turns[-1], slowest), turns, known.astype(float))
-    finer = scipy.signal.resample_poly(values, FINER, 1)
-    even = scipy.ndimage.map_coordinates(finer, [FINER * at], order=3, mode="mirror")
-    return np.asarray(even), rate_hz * step / slowest
+    positions = np.interp(np.arange(turns[0], turns[-1], slowest), turns, known.astype(float))
+    oversampled = scipy.signal.resample_poly(values, OVERSAMPLING, 1)
+    resampled = scipy.ndimage.map_coordinates(
+        oversampled, [OVERSAMPLING * positions], order=3, mode="mirror"
+    )
+    return np.asarray(resampled), rate_hz * step / slowest
 
 
 def _rising(pulses: Field) -> Field:
-    """Places of rising edges, in samples, between which the signal has gone low again."""
-    low, high = (
-        float(np.nanmin(pulses)),
-        float(np.nanmax(pulses)),
-    )  # a pulse may be two samples of ten thousand
-    middle, (under, over) = 0.5 * (low + high), (low + level * (high - low) for level in LEVELS)
-    state = np.where(pulses > over, 1, np.where(pulses < under, -1, 0))
-    told = np.flatnonzero(state)
-    ends = told[1:][(state[told[1:]] == 1) & (state[told[:-1]] == -1)]
-    found = []
+    """Return the positions of rising edges [samples] between which the signal returns to low."""
+    # the full range, since a pulse may last two samples of ten thousand
+    low, high = float(np.nanmin(pulses)), float(np.nanmax(pulses))
+    middle, (low_level, high_level) = (
+        0.5 * (low + high),
+        (low + level * (high - low) for level in LEVELS),
+    )
+    state = np.where(pulses > high_level, 1, np.where(pulses < low_level, -1, 0))
+    decided = np.flatnonzero(state)
+    ends = decided[1:][(state[decided[1:]] == 1) & (state[decided[:-1]] == -1)]
+    crossings = []
     for end in ends:
         first = end
         while pulses[first - 1] > middle:
             first -= 1
         rise = pulses[first] - pulses[first - 1]
-        found.append(first - (pulses[first] - middle) / rise if rise > 0.0 else float(first))
-    return np.array(found)
+        crossings.append(first - (pulses[first] - middle) / rise if rise > 0.0 else float(first))
+    return np.array(crossings)

@@ -173,7 +173,9 @@ def stress_path(
     for position, patch in enumerate(patches, start=1):
         ahead = _to_the_middle(patch.pressure)
         pressure, shear = (np.roll(field, ahead, axis=0) for field in (patch.pressure, patch.shear))
-        below = solution.Tractions.of(around, pressure, shear).stresses(depth, poisson_ratio)
+        below = solution.Tractions.from_fields(around, pressure, shear).stresses(
+            depth, poisson_ratio
+        )
         path[:, :, position] = np.roll(below, -ahead, axis=1).reshape(6, -1)
     return path
 

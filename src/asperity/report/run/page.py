@@ -13,7 +13,7 @@ from asperity.report.run import contact, friction_maps, roller, several_runs
 from asperity.report.run.conditions import conditions_table
 from asperity.report.run.stiffness import stiffness_over_frequency
 from asperity.report.run.vibration import spectrum
-from asperity.results import ENDS, RUN_GROUPS, Run, doubt_rows
+from asperity.results import ENDS, RUN_GROUPS, Run, uncertainty_rows
 
 TILES = (
     "clr",
@@ -55,7 +55,7 @@ def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = N
 def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
     """The page as HTML text."""
     oils = [run.solution.lubricant for run in runs]
-    ends = any(run.along is not None for run in runs)
+    ends = any(run.axial is not None for run in runs)
     groups = [
         name
         for group in RUN_GROUPS
@@ -114,7 +114,7 @@ def _view(run: Run, number: int, several_runs: bool) -> _RunView:
         convergence=run.solution.convergence,
         tiles=[tile(quantity(key), scalars) for key in TILES],
         pictures=[exhibit.picture() for exhibit in _exhibits(run)],
-        doubts=doubt_rows(run.error),
+        doubts=uncertainty_rows(run.error),
         notes=[*run.remarks, *_missing_exhibits(run)],
     )
 
@@ -125,8 +125,8 @@ def _exhibits(run: Run) -> Iterator[Exhibit]:
     yield contact.film_map(run)
     yield contact.pressure_map(run)
     yield contact.centre_line(run)
-    if run.along is not None:
-        yield roller.along_length(run, run.along)
+    if run.axial is not None:
+        yield roller.along_length(run, run.axial)
     yield contact.roughness_map(run)
     yield contact.height_distribution(run)
     friction, heat = run.friction, run.heat
@@ -138,7 +138,7 @@ def _exhibits(run: Run) -> Iterator[Exhibit]:
     yield friction_maps.stress_section(run)
     yield friction_maps.stress_over_depth(run)
     if run.vibration is not None and run.vibration.spectrum is not None:
-        yield spectrum(run.vibration, run.resonance_in_words())
+        yield spectrum(run.vibration, run.resonance_text())
     if run.dynamic_curve is not None:
         yield stiffness_over_frequency(run)
     yield contact.convergence_history(run)

@@ -7,17 +7,17 @@ from asperity.report.base import Exhibit
 from asperity.report.drawing import display, legend_below, name_axes
 from asperity.report.style import BLUE, GREEN, GREY, VERMILION, Medium
 from asperity.results import UNDETERMINED, Run
-from asperity.solution import AlongRoller, AtEnd
+from asperity.solution import AxialDistribution, EndValue
 
 
-def doubted(key: str, figure: AtEnd | None) -> str:
+def doubted(key: str, figure: EndValue | None) -> str:
     """A figure of a roller's ends with its error bar, or that it is not determined."""
     if figure is None:
         return "beyond the grid"
     return UNDETERMINED if figure.value is None else quantity(key).text(figure.value, figure.bar)
 
 
-def along_length(run: Run, along: AlongRoller) -> Exhibit:
+def along_length(run: Run, along: AxialDistribution) -> Exhibit:
     """Load per length and largest pressure, beside Hertz's of an even load, and the smallest gap of each line."""
     hertz = run.solution.conditions.hertz.p_max
     places, oiled = display("y_m", along.y), run.solution.lubricant is not None

@@ -26,7 +26,7 @@ LOADS = (100.0, 200.0, 300.0, 400.0)
 HEIGHT, CUTOFF = 2e-6, 30.0  # of Table 1's first four rows
 
 
-def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
+def spectrum(vibration: Vibration, resonance_text: str) -> Exhibit:
     """Acceleration spectrum around the search band, with the fitted resonance and its two-standard-deviation interval.
 
     Raises
@@ -69,9 +69,9 @@ def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
         "spectrum",
         draw,
         f"Acceleration spectrum of a simulated record of {quantity('duration_s').text(density.duration_s)}, resolution "
-        f"{quantity('resolution_hz').text(density.resolution_hz)}: {resonance_in_words}. Searched from {band}, where "
+        f"{quantity('resolution_hz').text(density.resolution_hz)}: {resonance_text}. Searched from {band}, where "
         f"this contact can resonate; asperities that carry the whole load would give {full_load}.",
-        f"Acceleration spectrum around the search band {band}: {resonance_in_words}.",
+        f"Acceleration spectrum around the search band {band}: {resonance_text}.",
     )
 
 

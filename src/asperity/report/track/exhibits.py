@@ -90,12 +90,12 @@ def _draw_crf(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> Non
     colours = SEVERITY(np.nan_to_num([recording.severe_probability for recording in resonant]))
     label = quantity("crf_hz").short
     axes.scatter(x, crf, c=colours, s=22, zorder=2, edgecolors="white", linewidths=0.4, label=label)
-    steadied = np.array([recording.crf_reference_hz for recording in resonant])
-    moved = np.abs(steadied - crf) > STEADIED * crf
+    resample_to_constant_speed = np.array([recording.crf_reference_hz for recording in resonant])
+    moved = np.abs(resample_to_constant_speed - crf) > STEADIED * crf
     if moved.any():
         axes.plot(
             x[moved],
-            steadied[moved],
+            resample_to_constant_speed[moved],
             "o",
             markersize=5,
             markerfacecolor="none",

@@ -19,7 +19,7 @@ from asperity.core.errors import AsperityError, BadInput, NotConverged
 from asperity.core.quantities import lines, quantity, read
 from asperity.core.signals import Signal, Spectrum, power_spectrum
 from asperity.coupling import (
-    LINEAR_UP_TO,
+    MAX_LINEAR_LOAD,
     Tangent,
     Vibration,
     VibrationModel,
@@ -29,7 +29,7 @@ from asperity.coupling import (
 from asperity.ehl import Scales, solve_contact
 from asperity.resonance import FEWEST_LINES, Resonance, contact_resonance, no_resonance
 from asperity.simulation.motion.history import History
-from asperity.solution import ShakenContact
+from asperity.solution import OscillatingContact, tangent_stiffness
 from asperity.surface import MovingSurfaces
 from asperity.vibration import ContactOscillator, acceleration
 
@@ -149,7 +149,7 @@ class HistoryVibration:
                 f"; the approach of the bodies drives a mass on it by {1e9 * self.approach_std:.3g} nm rms, "
                 f"with a force of {100 * force:.0f} % of the load"
             )
-            if force > LINEAR_UP_TO:
+            if force > MAX_LINEAR_LOAD:
                 sentence += ", too much for a linear spring"
         if self.resonance.found:
             return f"{sentence}; the history shows {self.resonance.crf_hz:.0f} Hz."
@@ -244,7 +244,8 @@ def _passage(history: History, period: float) -> tuple[Signal | None, float | No
     )
     if (
         profile is not None
-        and np.std(profile.values) < SILENT * Scales.from_conditions(case.conditions, case.lubricant).gap
+        and np.std(profile.values)
+        < SILENT * Scales.from_conditions(case.conditions, case.lubricant).gap
     ):
         return (
             None,
@@ -348,14 +349,16 @@ def _moments(
             contact = solve_contact(
                 case.conditions, case.lubricant, surfaces.at(float(time)), options=case.options
             )
-            stiffness.append(spring.of(contact))
+            stiffness.append(
+                tangent_stiffness(contact, reference_depth=spring.reference_depth).total
+            )
         except NotConverged as unfinished:
             lost = unfinished
             unsolved.append(int(number))
             continue
         solved.append(int(number))
         try:
-            found = ShakenContact(contact, reference_depth=spring.reference_depth).resonance(
+            found = OscillatingContact(contact, reference_depth=spring.reference_depth).resonance(
                 model.mass
             )
             shaken.append((found.damping_ratio, found.stiffness))

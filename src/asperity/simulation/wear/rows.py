@@ -11,7 +11,7 @@ from asperity.case import Case
 from asperity.core.errors import BadInput
 from asperity.coupling import excitation, oscillator, resonance_at
 from asperity.ehl import ContactState, Sides, Uncertainty
-from asperity.results import one_surface
+from asperity.results import prediction_interval
 from asperity.simulation.wear.contact import Solved
 from asperity.surface import Surface, height_parameters
 
@@ -91,7 +91,9 @@ def load_share(solved: Sequence[Solved]) -> Uncertainty:
         )
         return None if math.isnan(below) else (float(below), float(above))
 
-    value, scatter = (shares[0], None) if len(shares) < 2 else one_surface(shares, share=True)
+    value, scatter = (
+        (shares[0], None) if len(shares) < 2 else prediction_interval(shares, share=True)
+    )
     return Uncertainty(
         value=float(np.mean(shares)) if len(shares) > 1 else value,
         iteration=mean([one.iteration for one in own]),
