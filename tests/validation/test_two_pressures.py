@@ -82,11 +82,11 @@ def test_one_answer_from_two_starts():
 
     dry, hertz = MixedSearch(MIXED, scales.gap, None), MixedSearch(MIXED, scales.gap, None)
     dry.from_dry([problem])
-    hertz.climb_from(
+    hertz.coarse_to_fine(
         grid_levels(problem), lambda level: first_guess(level, conditions, oil, scales)
     )
     assert dry.converged(MIXED.tolerance)
-    assert hertz.settled(MIXED.tolerance)
+    assert hertz.converged(MIXED.tolerance)
     assert dry.figures[-1].clr == pytest.approx(hertz.figures[-1].clr, abs=0.002)
 
 
@@ -243,7 +243,7 @@ def test_steps_of_time_lead_where_newtons_steps_alone_do_not():
     assert len(search.history) > 80
 
     search.history.clear()
-    arrived = search.march_in_time(problem, dry, 1.0, met=1e-2)
+    arrived = search.march_in_time(problem, dry, 1.0, tolerance=1e-2)
     still = search.run(
         problem, newton(problem, arrived.balance.unknowns, second_order=False), 1e-4, 80
     )
