@@ -183,9 +183,7 @@ def test_files_without_a_run_are_refused(tmp_path):
         (OSError(errno.ENOSPC, "No space left on device"), AsperityError),
     ],
 )
-def test_an_interrupted_save_keeps_the_old_file(
-    solution, tmp_path, monkeypatch, failure, raised
-):
+def test_an_interrupted_save_keeps_the_old_file(solution, tmp_path, monkeypatch, failure, raised):
     path = solution.save(tmp_path / "run.nc")
     before = path.read_bytes()
 
