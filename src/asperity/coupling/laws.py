@@ -13,7 +13,7 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.hertz import line_stiffness, point_stiffness
-from asperity.core.errors import BadInput, articled
+from asperity.core.errors import BadInput, with_article
 from asperity.core.quantities import Parameter, Parametric
 from asperity.ehl import ContactSolution, ContactState
 from asperity.solution import dynamic_stiffness, roller_depth, tangent_stiffness
@@ -96,7 +96,7 @@ class HertzLine(_LineApproach, StiffnessLaw):
         conditions = contact.conditions
         if not conditions.long:
             raise BadInput(
-                f"stiffness law hertz-line needs a line contact, got {articled(conditions.geometry)} contact"
+                f"stiffness law hertz-line needs a line contact, got {with_article(conditions.geometry)} contact"
             )
         return line_stiffness(
             contact.asperity_load,

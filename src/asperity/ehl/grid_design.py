@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.contact.conditions import ContactConditions
-from asperity.contact.grid import FEWEST_CELLS, Grid
+from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.contact.hertz import line_gap
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
@@ -378,4 +378,4 @@ def _finite(length: float, otherwise: float) -> float:
 
 def _even(count: float) -> int:
     """At least this many cells, and a number that halves well."""
-    return max(FEWEST_CELLS, 8 * math.ceil(count / 8.0))
+    return max(MIN_CELLS, 8 * math.ceil(count / 8.0))

@@ -20,7 +20,7 @@ from asperity.case import Case
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_choice, require_positive
-from asperity.core.files import whole_file, write_text
+from asperity.core.files import atomic_write, write_text
 from asperity.core.limits import require_affordable
 from asperity.core.signals import Signal
 from asperity.coupling import STIFFNESS_LAWS, VibrationModel, dry_full_load, oscillator, search_band
@@ -364,7 +364,7 @@ def write_rig(
     paths = [folder / f"{recording.name}.{file_format}" for recording in rig.recordings]
 
     def write(recording: RigRecording, path: Path) -> None:
-        with whole_file(path) as part:
+        with atomic_write(path) as part:
             WRITERS[file_format](part, recording.signal())
 
     pool = ThreadPoolExecutor(max_workers=AT_ONCE)

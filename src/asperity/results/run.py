@@ -383,7 +383,7 @@ class Run:
         axis = {"axis": "Z", "positive": "down"}
         coordinates["depth"] = ("depth", stress.depths, quantity("depth").attributes | axis)
         for entry in map(quantity, MAPS):
-            values: Field | None = entry.at(self)
+            values: Field | None = entry.value_from(self)
             if values is not None:
                 variables[entry.key] = (("x", "y"), values.astype(np.float32), entry.attributes)
         variables["von_mises"][2]["comment"] = f"Poisson's ratio {stress.poisson_ratio:g}"

@@ -170,7 +170,7 @@ class _Contact:
 
     def start(self, *, standing: bool) -> Snapshot:
         """Time 0, from a contact that has always been as it is, or from one at rest."""
-        surface = self.surfaces.at(0.0)
+        surface = self.surfaces.composite_at(0.0)
         oil = self.lubricant if standing else None
         solution = solve_contact(
             self.conditions, oil, surface, options=self.options, progress=self.progress
@@ -200,7 +200,7 @@ class _Contact:
         surfaces = self.surfaces
         if self.flattening:
             surfaces = surfaces.lowered(memory["lowered_first"], memory["lowered_second"])
-        surface = surfaces.at(number * self.seconds)
+        surface = surfaces.composite_at(number * self.seconds)
         whole = self._problem(surface, self._past(memory))
         problem = _on_one_line(whole) if self.one_line else whole
         search, step, attempt = self._search(problem, self._carried(memory, problem))
@@ -321,7 +321,7 @@ class _Contact:
             for index, name in enumerate(_LOWERED):
                 share = self.shares[index] * overlap
                 before = kept.get(name, 0.0)
-                memory[name] = before + self.surfaces.on_track(index, share, when)
+                memory[name] = before + self.surfaces.project_on_track(index, share, when)
                 flattened += float(memory[name].mean())
         return Snapshot(
             number=number,
