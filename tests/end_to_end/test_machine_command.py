@@ -229,7 +229,7 @@ def test_what_is_not_solved_is_loud(asp):
             "lubricant.temperature=170 degC",
             "temperature must lie between -20 and 150 degC",
         ),
-        ("fzg-c", "lubricant.base=ester", "alpha is missing, which base ester has to state"),
+        ("fzg-c", "lubricant.base=ester", "alpha is missing and is required for base ester"),
         ("fzg-c", "machine.profile_shift=[-0.6, 0.3]", "the teeth cannot mesh"),
         ("fzg-c", 'machine.tip_diameters=["74 mm", "110 mm"]', "the teeth lose contact"),
         ("fzg-c", "machine.centre_distance=80 mm", "lets the base circles overlap"),

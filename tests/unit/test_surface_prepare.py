@@ -317,7 +317,7 @@ def test_another_place_is_what_lies_beside_the_centre():
             measured(heights), grid, conditioning=SurfaceConditioning(form="none")
         ).surface.heights,
     )
-    with pytest.raises(BadInput, match="room for 25 of the contact's"):
+    with pytest.raises(BadInput, match="room for 25 separate places of the contact's"):
         prepare_surface(measured(heights), grid, place=25)
 
 

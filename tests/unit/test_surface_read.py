@@ -119,8 +119,8 @@ def test_a_folder(tmp_path):
     ("name", "content", "said"),
     [
         ("empty.opd", b"", "empty"),
-        ("text.opd", b"this is not a Wyko file\n" * 40, "something else"),
-        ("noise.al3d", np.random.default_rng(1).bytes(5000), "something else"),
+        ("text.opd", b"this is not a Wyko file\n" * 40, "another format"),
+        ("noise.al3d", np.random.default_rng(1).bytes(5000), "another format"),
         ("noise.bin", np.random.default_rng(2).bytes(2 * 1201 * 1201), "no format"),
         ("archive.x3p", b"PK\x03\x04" + b"x" * 300, "zip"),
         ("words.txt", b"once upon a time\n" * 30, "txt"),

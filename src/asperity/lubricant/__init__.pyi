@@ -4,7 +4,7 @@ from .density import DENSITY_LAWS as DENSITY_LAWS
 from .density import DensityLaw as DensityLaw
 from .density import DowsonHigginson as DowsonHigginson
 from .density import Incompressible as Incompressible
-from .friction import FREEZING as FREEZING
+from .friction import ZERO_CELSIUS as ZERO_CELSIUS
 from .friction import FRICTION_LAWS as FRICTION_LAWS
 from .friction import BairWiner as BairWiner
 from .friction import EyringShear as EyringShear
@@ -27,7 +27,7 @@ from .origins import oil_notes as oil_notes
 from .pressure_viscosity import ESTIMATORS as ESTIMATORS
 from .pressure_viscosity import Base as Base
 from .pressure_viscosity import Estimator as Estimator
-from .pressure_viscosity import KnownOil as KnownOil
+from .pressure_viscosity import OilProperties as OilProperties
 from .rheology import RHEOLOGY_LAWS as RHEOLOGY_LAWS
 from .rheology import Newtonian as Newtonian
 from .rheology import ReeEyring as ReeEyring

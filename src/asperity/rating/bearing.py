@@ -15,7 +15,7 @@ from asperity.core.errors import BadInput, require_positive
 RollingElement = Literal["ball", "roller"]
 
 SLOW = 1000.0  # r/min, below which the reference viscosity has another law
-THICKEST, THINNEST = (
+MAX_COMPARED_VISCOSITY, MIN_VISCOSITY = (
     4.0,
     0.1,
 )  # viscosity ratio beyond which nothing is gained, and below which nothing is rated
@@ -65,9 +65,9 @@ def life_factor(element: RollingElement, kappa: float, contamination: float) -> 
         raise BadInput(
             f"contamination times fatigue load limit over load must not be negative, got {contamination:g}"
         )
-    if kappa < THINNEST:
+    if kappa < MIN_VISCOSITY:
         return None
-    kappa, law = min(kappa, THICKEST), _FACTORS[element]
+    kappa, law = min(kappa, MAX_COMPARED_VISCOSITY), _FACTORS[element]
     range_of = 0 if kappa < 0.4 else 1 if kappa < 1.0 else 2
     lubricated = max(law.c1 - law.c2[range_of] / kappa ** _POWERS[range_of], 0.0)
     bracket = 1.0 - lubricated**law.g * contamination**law.h
