@@ -429,7 +429,7 @@ def test_alpha_rises_as_oil_cools_or_none_is_given(name, grade):
 def test_a_thin_grade_says_what_is_missing():
     with pytest.raises(
         BadInput,
-        match=r"viscosity_100 is missing; give it: the index of 95 .* 2.2 mm.2/s at 40 degC",
+        match=r"viscosity_100 is missing; give it, as the default .* index of 95 .* 2.2 mm.2/s at 40 degC",
     ):
         OilSheet(grade="VG 2")
 

@@ -16,8 +16,8 @@ from asperity.case.units import OPTIONAL, PAIRED, amount_in, default_amount, pla
 from asperity.core.errors import BadInput
 from asperity.core.quantities import parameters
 from asperity.lubricant import (
-    ZERO_CELSIUS,
     LAWS,
+    ZERO_CELSIUS,
     ExponentialWarmth,
     LawFamily,
     Lubricant,

@@ -4,8 +4,8 @@ from .density import DENSITY_LAWS as DENSITY_LAWS
 from .density import DensityLaw as DensityLaw
 from .density import DowsonHigginson as DowsonHigginson
 from .density import Incompressible as Incompressible
-from .friction import ZERO_CELSIUS as ZERO_CELSIUS
 from .friction import FRICTION_LAWS as FRICTION_LAWS
+from .friction import ZERO_CELSIUS as ZERO_CELSIUS
 from .friction import BairWiner as BairWiner
 from .friction import EyringShear as EyringShear
 from .friction import FrictionLaw as FrictionLaw

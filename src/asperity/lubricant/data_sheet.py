@@ -17,9 +17,9 @@ from asperity.lubricant.rheology import Newtonian, RheologyLaw
 from asperity.lubricant.viscosity import Barus, Roelands
 from asperity.lubricant.walther import (
     HOT,
+    MIN_VISCOSITY,
     MIN_VISCOSITY_OF_INDEX,
     MM2,
-    MIN_VISCOSITY,
     WARM,
     Walther,
     viscosity_100_of,

@@ -122,8 +122,8 @@ class Estimator:
         if self.law(oil, temperature + 1.0) > alpha:
             raise BadInput(
                 f"{self.title} is invalid at {temperature - 273.15:.4g} degC ({nu / MM2:.3g} "
-                "mm^2/s), where its alpha falls with decreasing temperature; give alpha, or use another "
-                "alpha_estimate"
+                "mm^2/s), where its alpha falls with decreasing temperature; give alpha, or use "
+                "another alpha_estimate"
             )
         return alpha
 

@@ -197,8 +197,8 @@ def _fitting(measured: MeasuredSurface, grid: Grid, fit: FitMode) -> str:
         if fit == "crop":
             raise BadInput(
                 f"{measured.name} is a profile of {length_text(length)}, shorter than the "
-                f"contact's {length_text(side)}; use a smaller grid, a longer profile, or fit = tile to "
-                "repeat it mirrored"
+                f"contact's {length_text(side)}; use a smaller grid, a longer profile, or fit = "
+                "tile to repeat it mirrored"
             )
         return f"repeated {profile}, mirrored at its ends, to {length_text(side)}, {extended}"
     # tolerance: the corners of a grid have rounding errors
