@@ -62,18 +62,7 @@ def elliptic_contact(
     if np.isclose(r_large, r_small, rtol=3e-9, atol=0.0):  # no bracket, or a root without digits
         return point_contact(load, r_small, reduced_modulus)
 
-    def curvature_ratio(log_k: float) -> float:
-        k = np.exp(log_k)  # ratio of short to long semi-axis
-        m = 1.0 - k**2
-        return float((ellipe(m) / k**2 - ellipk(m)) / (ellipk(m) - ellipe(m)) - r_large / r_small)
-
-    k = float(
-        np.exp(
-            scipy.optimize.brentq(
-                curvature_ratio, np.log(1e-6), np.log(1.0 - 1e-9), xtol=1e-15, rtol=1e-14
-            )
-        )
-    )
+    k = _axis_ratio(r_large / r_small)
     m = 1.0 - k**2
     # 1/R_small = 2 p0 k c (E/k^2 - K)/(E* m c^2), c: long semi-axis, p0 = 3F/(2 pi k c^2)
     long_axis = float(
@@ -87,6 +76,19 @@ def elliptic_contact(
     axes = (short_axis, long_axis) if radii[0] < radii[1] else (long_axis, short_axis)
     area = float(np.pi * long_axis * short_axis)
     return HertzContact(axes, float(p_max), load / area, area, float(approach))
+
+
+def _axis_ratio(radius_ratio: float) -> float:
+    """Return the ratio of short to long semi-axis for a ratio of large to small radius."""
+    ellipe, ellipk = scipy.special.ellipe, scipy.special.ellipk
+
+    def residual(log_k: float) -> float:
+        k = np.exp(log_k)
+        m = 1.0 - k**2
+        return float((ellipe(m) / k**2 - ellipk(m)) / (ellipk(m) - ellipe(m)) - radius_ratio)
+
+    limits = np.log(1e-6), np.log(1.0 - 1e-9)
+    return float(np.exp(scipy.optimize.brentq(residual, *limits, xtol=1e-15, rtol=1e-14)))
 
 
 def point_compression(load: float, radius: float, reduced_modulus: float) -> float:

@@ -25,7 +25,7 @@ from .origins import OilFact as OilFact
 from .origins import oil_facts as oil_facts
 from .origins import oil_notes as oil_notes
 from .pressure_viscosity import ESTIMATORS as ESTIMATORS
-from .pressure_viscosity import Base as Base
+from .pressure_viscosity import BaseOil as BaseOil
 from .pressure_viscosity import Estimator as Estimator
 from .pressure_viscosity import OilProperties as OilProperties
 from .rheology import RHEOLOGY_LAWS as RHEOLOGY_LAWS

@@ -12,7 +12,7 @@ from asperity.core.errors import BadInput, require_choice, require_positive
 from asperity.lubricant.density import DowsonHigginson
 from asperity.lubricant.friction import ZERO_CELSIUS, BairWiner, FrictionLaw
 from asperity.lubricant.model import Lubricant
-from asperity.lubricant.pressure_viscosity import ESTIMATORS, Base, Estimator
+from asperity.lubricant.pressure_viscosity import ESTIMATORS, BaseOil, Estimator
 from asperity.lubricant.rheology import Newtonian, RheologyLaw
 from asperity.lubricant.viscosity import Barus, Roelands
 from asperity.lubricant.walther import (
@@ -76,14 +76,14 @@ class OilSheet:
     viscosity_100: float | None = None
     viscosity_index: float | None = None
     density_15: float | None = None
-    base: Base = "mineral"
+    base: BaseOil = "mineral"
     alpha: float | None = None
     alpha_estimate: str | None = None
     measured: str | None = None
     walther: Walther = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        require_choice("base", self.base, get_args(Base))
+        require_choice("base", self.base, get_args(BaseOil))
         for name, unit in _UNITS.items():
             value = getattr(self, name)
             if value is not None:

@@ -14,18 +14,18 @@ from typing import Literal, Protocol
 from asperity.core.errors import BadInput
 from asperity.lubricant.walther import MM2, Walther
 
-Base = Literal["mineral", "pao", "ester", "polyglycol"]
+BaseOil = Literal["mineral", "pao", "ester", "polyglycol"]
 
 ROELANDS_Z = 0.65  # mineral oils: 0.6 to 0.68
 ROELANDS_P0 = 1.96e8  # [Pa]
 AT_38 = 311.15  # temperature of the viscosity in ISO/TR 15144-1 [K]
-_GOLD: dict[Base, tuple[float, float]] = {
+_GOLD: dict[BaseOil, tuple[float, float]] = {
     "mineral": (9.904, 0.1390),
     "pao": (7.382, 0.1335),
     "ester": (6.605, 0.1360),
     "polyglycol": (5.489, 0.1485),
 }
-_ISO: dict[Base, tuple[float, float]] = {
+_ISO: dict[BaseOil, tuple[float, float]] = {
     "mineral": (26.57, 0.1348),
     "pao": (14.66, 0.0507),
     "polyglycol": (13.92, 0.1572),
@@ -38,7 +38,7 @@ class OilProperties(Protocol):
     """Interface of an oil for the estimators; temperatures in kelvin."""
 
     @property
-    def base(self) -> Base:
+    def base(self) -> BaseOil:
         """Base oil."""
 
     @property
@@ -99,7 +99,7 @@ class Estimator:
     definition: str
     spread: float
     min_viscosity: float
-    bases: tuple[Base, ...] = ("mineral",)
+    bases: tuple[BaseOil, ...] = ("mineral",)
 
     def __call__(self, oil: OilProperties, temperature: float) -> float:
         """Return alpha [1/Pa]; BadInput outside the range of validity.

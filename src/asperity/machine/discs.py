@@ -115,7 +115,7 @@ class TwinDisc:
             "disc_2_hz": rotation_hz(self.turning[1]),
         }
 
-    def notes(self, pair: ElasticPair) -> tuple[str, ...]:  # noqa: ARG002 (whatever they are made of)
+    def notes(self, pair: ElasticPair) -> tuple[str, ...]:  # noqa: ARG002 (independent of the material)
         """Return no notes, as the model of a rig is complete."""
         return ()
 

@@ -89,7 +89,14 @@ def condition_surface(
     elif count:
         steps.append(f"kept {count} heights {criterion}; outliers = remove drops them")
     measured, levelling = level(measured, settings.form)
-    steps.append(levelling)
+    measured, filtering = _filter_waves(measured, settings)
+    return measured, (*steps, levelling, *filtering)
+
+
+def _filter_waves(
+    measured: MeasuredSurface, settings: SurfaceConditioning
+) -> tuple[MeasuredSurface, list[str]]:
+    steps = []
     shortest = 2.0 * max(measured.grid.spacing)
     for name, cutoff in (("s_filter", settings.s_filter), ("l_filter", settings.l_filter)):
         if cutoff is not None and cutoff < shortest:
@@ -109,7 +116,7 @@ def condition_surface(
             f"removed waves {removed} than {length_text(cutoff)} by the Gaussian filter of ISO "
             f"16610 (Sq {length_text(before)} before, {length_text(measured.sq)} after)"
         )
-    return measured, tuple(steps)
+    return measured, steps
 
 
 def level(measured: MeasuredSurface, form: Form) -> tuple[MeasuredSurface, str]:
@@ -171,31 +178,7 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
     coarse = np.flatnonzero(known)[:: max(1, np.count_nonzero(known) // _MAX_FIT_POINTS)]
     at_x, at_y, z = x.flat[coarse], y.flat[coarse], heights.flat[coarse] / scale
 
-    def shape(p: Field, x: Field, y: Field) -> Field:
-        z0, slope, tilt, angle, curvature = p
-        across, along = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
-        # w = across - w0, w0 = slope/curvature, in a form that holds for a plane (curvature 0)
-        flat = np.sqrt(np.maximum(1.0 - slope**2, 1e-12))
-        round_ = np.sqrt(np.maximum(1.0 - (slope - curvature * across) ** 2, 1e-12))
-        bow = across * (2.0 * slope - curvature * across) / (flat + round_)
-        return np.asarray(z0 + tilt * along + np.sqrt(1.0 + tilt**2) * bow)
-
-    quadratic = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-    powers = [
-        power for power in quadratic if measured.uniform is None or power[measured.uniform] == 0
-    ]
-    fitted, *_ = np.linalg.lstsq(
-        np.stack([at_x**i * at_y**j for i, j in powers], axis=-1), z, rcond=None
-    )
-    c = dict.fromkeys(quadratic, 0.0) | dict(zip(powers, fitted, strict=True))
-    gradient = np.array([c[1, 0], c[0, 1]])
-    bends, axes = np.linalg.eigh(np.array([[2.0 * c[2, 0], c[1, 1]], [c[1, 1], 2.0 * c[0, 2]]]))
-    steep = int(np.argmax(np.abs(bends)))
-    direction = axes[:, steep]
-    angle = float(np.arctan2(direction[1], direction[0]))
-    slope, tilt = gradient @ direction, gradient @ np.array([-direction[1], direction[0]])
-    start = np.array([c[0, 0], np.clip(slope, -0.9, 0.9), tilt, angle, -bends[steep]])
-
+    start = _cylinder_guess(at_x, at_y, z, measured.uniform)
     # the axis of a cylinder cannot be fitted to a profile
     free = [0, 1, 2, 3, 4] if measured.uniform is None else [0, 1, 4]
 
@@ -205,14 +188,39 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
         return values
 
     def residuals(free_values: Field) -> Field:
-        return np.asarray(shape(parameters(free_values), at_x, at_y) - z)
+        return np.asarray(_cylinder_heights(parameters(free_values), at_x, at_y) - z)
 
     nearest = scipy.optimize.least_squares(
         residuals, start[free], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14
     )
     best = parameters(nearest.x)
     curvature = float(best[4])
-    return scale * shape(best, x, y), scale / curvature if curvature else np.inf
+    return scale * _cylinder_heights(best, x, y), scale / curvature if curvature else np.inf
+
+
+def _cylinder_heights(p: Field, x: Field, y: Field) -> Field:
+    z0, slope, tilt, angle, curvature = p
+    across, along = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    # w = across - w0, w0 = slope/curvature, in a form that holds for a plane (curvature 0)
+    flat = np.sqrt(np.maximum(1.0 - slope**2, 1e-12))
+    round_ = np.sqrt(np.maximum(1.0 - (slope - curvature * across) ** 2, 1e-12))
+    bow = across * (2.0 * slope - curvature * across) / (flat + round_)
+    return np.asarray(z0 + tilt * along + np.sqrt(1.0 + tilt**2) * bow)
+
+
+def _cylinder_guess(x: Field, y: Field, z: Field, uniform: int | None) -> Field:
+    """Return parameters of the cylinder from the principal curvature of a quadratic fit."""
+    quadratic = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+    powers = [power for power in quadratic if uniform is None or power[uniform] == 0]
+    fitted, *_ = np.linalg.lstsq(np.stack([x**i * y**j for i, j in powers], axis=-1), z, rcond=None)
+    c = dict.fromkeys(quadratic, 0.0) | dict(zip(powers, fitted, strict=True))
+    gradient = np.array([c[1, 0], c[0, 1]])
+    bends, axes = np.linalg.eigh(np.array([[2.0 * c[2, 0], c[1, 1]], [c[1, 1], 2.0 * c[0, 2]]]))
+    steep = int(np.argmax(np.abs(bends)))
+    direction = axes[:, steep]
+    angle = float(np.arctan2(direction[1], direction[0]))
+    slope, tilt = gradient @ direction, gradient @ np.array([-direction[1], direction[0]])
+    return np.array([c[0, 0], np.clip(slope, -0.9, 0.9), tilt, angle, -bends[steep]])
 
 
 def find_outliers(measured: MeasuredSurface) -> Mask:

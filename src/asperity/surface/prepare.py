@@ -120,21 +120,22 @@ def prepare_surface(
             heights = _blend_ends(heights, axis, cells, shared)
             after = _height_statistics(heights, grid)
             steps.append(_blending_step(axis, shared, levelled, grid, before, after))
-    heights = heights - heights.mean()
+    heights, scaling = _scale(heights - heights.mean(), sq, measured.name)
+    return PreparedSurface(Surface(heights, grid), (*steps, scaling))
+
+
+def _scale(heights: Field, sq: float | None, name: str) -> tuple[Field, str]:
     natural_sq = float(np.std(heights))
     if sq is None:
-        steps.append(f"removed the mean; Sq is {length_text(natural_sq)}")
-        return PreparedSurface(Surface(heights, grid), tuple(steps))
+        return heights, f"removed the mean; Sq is {length_text(natural_sq)}"
     if natural_sq == 0.0:
         raise BadInput(
-            f"{measured.name} is flat and cannot be scaled to an Sq of {length_text(sq)}; leave sq "
-            "out"
+            f"{name} is flat and cannot be scaled to an Sq of {length_text(sq)}; leave sq out"
         )
-    steps.append(
+    return heights * (sq / natural_sq), (
         f"removed the mean and scaled the heights by {sq / natural_sq:.4g}, "
         f"from Sq {length_text(natural_sq)} to {length_text(sq)}"
     )
-    return PreparedSurface(Surface(heights * (sq / natural_sq), grid), tuple(steps))
 
 
 def count_places(measured: MeasuredSurface, grid: Grid, *, turn: bool = False) -> int:
