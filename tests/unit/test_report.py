@@ -232,7 +232,7 @@ def test_page_loads_nothing(which, request):
     [
         ("Asperity load share", "54.2", "%"),
         ("Contact area ratio", "37.1", "%"),
-        ("Contact area ratio of the domain", "60.3", "%"),
+        ("Domain contact area ratio", "60.3", "%"),
         ("Composite roughness", "1.25", "µm"),
         ("Minimum film thickness", "0.005", "µm"),
         ("Central film thickness", "0.512", "µm"),
@@ -388,7 +388,7 @@ def test_figures_carry_their_error_where_it_shows():
         == "54.2"
     )
     assert (
-        next(value for name, value in rows.items() if name.startswith("Contact area share"))
+        next(value for name, value in rows.items() if name.startswith("Contact area ratio"))
         == "37.1 ± 1.2"
     )
     assert (
@@ -642,10 +642,10 @@ def test_friction_heat_and_stress_are_numbers_of_the_page(single):
         f"{run.friction.coefficient:.4f}"
     )
     assert (
-        next(rows[name] for name in rows if name.startswith("Flash temp"))
+        next(rows[name] for name in rows if name.startswith("Maximum flash temp"))
         == f"{run.heat.max_k:.1f}"
     )
-    assert next(rows[name] for name in rows if name.startswith("Largest von Mises")) == (
+    assert next(rows[name] for name in rows if name.startswith("Maximum von Mises")) == (
         f"{run.stress.peak.value * 1e-9:.3f}"
     )
     assert (
