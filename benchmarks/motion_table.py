@@ -82,7 +82,7 @@ def outcomes(model: str, sq_um: float, seed: int, cells: int) -> Iterator[Outcom
     case = table_case(sq_um, seed, cells).with_overrides({"model": MODELS[model]})
     assert case.lubricant is not None
     surfaces = case.moving_surfaces()
-    passage = surfaces.passage(0) / step_seconds(case.conditions, surfaces, 1.0)
+    passage = surfaces.passage_time(0) / step_seconds(case.conditions, surfaces, 1.0)
     last = cells + math.ceil(passage)
     began = perf_counter()
     settled: list[Snapshot] = []
@@ -164,7 +164,7 @@ def tangent_in_motion(
     assert case.lubricant is not None
     conditions, mass = case.conditions, case.vibration.mass if case.vibration else math.nan
     surfaces, depth = case.moving_surfaces(), roller_depth(conditions)
-    last = cells + math.ceil(surfaces.passage(0) / step_seconds(conditions, surfaces, 1.0))
+    last = cells + math.ceil(surfaces.passage_time(0) / step_seconds(conditions, surfaces, 1.0))
     approaches = []
     for load in ((1.0 - LOAD_STEP) * conditions.load, (1.0 + LOAD_STEP) * conditions.load):
         pressed = replace(conditions, load=load)

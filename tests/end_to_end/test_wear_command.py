@@ -100,7 +100,7 @@ def test_the_verdict_comes_first_and_tables_follow(asp, worn_case):  # noqa: ARG
     first, *rest = out.splitlines()
     assert first.startswith("After 0.5 h the bodies have worn by ")
     assert any(line.split() == ["new", "after", "0.5", "h"] for line in rest)
-    assert any(line.strip().startswith("worn volume") for line in rest)
+    assert any(line.strip().startswith("wear volume") for line in rest)
     assert "  note: Nothing but removal acts." in rest
 
 

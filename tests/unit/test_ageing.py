@@ -14,7 +14,7 @@ import pytest
 
 from asperity import read_surface, run_wear
 from asperity.core.errors import AsperityError, BadInput, NotConverged, UnreadableFile
-from asperity.core.storage import read_sealed, write_sealed
+from asperity.core.storage import read_with_digest, write_with_digest
 from asperity.paper import RigSettings, simulate_rig, write_rig
 from asperity.simulation import WearHistory, WearProgress, load_wear, of_body
 from asperity.simulation.wear import frames, store
@@ -195,7 +195,7 @@ def test_what_cannot_be_meant_is_refused_and_nothing_is_left(tmp_path):
     with pytest.raises(BadInput, match="hours of wear must be positive"):
         run_wear(case(), hours=0.0, out=tmp_path / "worn")
     with pytest.raises(
-        BadInput, match=r"wear of 10000 h in .* jumps would take about .*; ask for less"
+        BadInput, match=r"wear of 10000 h in .* jumps would take about .*; reduce it"
     ):
         run_wear(case({"wear.k": "1e-9 1/Pa"}), hours=1e4, out=tmp_path / "worn")
     assert not (tmp_path / "worn").exists()
@@ -304,18 +304,18 @@ def test_a_folder_of_another_layout_is_refused_in_a_sentence(tmp_path, monkeypat
     ):
         with pytest.raises(
             UnreadableFile,
-            match="not a wear's manifest that this asperity can read; choose another",
+            match="not a wear manifest that this version of asperity can read; choose another",
         ):
             opened()
     run_wear(case(), hours=0.05, out=tmp_path / "worn")
     for name in (store.MEMORY, store.END):
         shutil.copytree(tmp_path / "worn", tmp_path / name)
-        with np.load(BytesIO(read_sealed(tmp_path / "worn" / name, ""))) as packed:
+        with np.load(BytesIO(read_with_digest(tmp_path / "worn" / name, ""))) as packed:
             arrays = {key: packed[key] for key in packed.files}
         arrays["numbers"] = arrays["numbers"][:5]
         shorter = BytesIO()
         np.savez(shorter, **arrays)
-        write_sealed(tmp_path / name / name, shorter.getvalue())
+        write_with_digest(tmp_path / name / name, shorter.getvalue())
         with pytest.raises(
             UnreadableFile,
             match="is damaged, or of another asperity; wear the case in another folder",

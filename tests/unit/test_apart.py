@@ -9,7 +9,7 @@ import pytest
 
 from asperity.core import sandbox as apart
 from asperity.core.errors import BadInput, UnreadableFile
-from asperity.core.sandbox import read_apart
+from asperity.core.sandbox import read_in_subprocess
 
 
 def reads(path, factor):
@@ -61,7 +61,7 @@ def who(path):  # noqa: ARG001
 @pytest.fixture
 def read(tmp_path):
     (tmp_path / "file.dat").write_bytes(b"content")
-    return lambda reader, *more: read_apart(
+    return lambda reader, *more: read_in_subprocess(
         tmp_path / "file.dat", f"{__name__}:{reader.__name__}", *more, remedy="export it again"
     )
 
@@ -83,7 +83,7 @@ def test_a_refusal_is_the_readers_own(read):
     ("reader", "reason"),
     [
         (stumbles, r"file.dat is damaged \(file.dat\); export it again"),
-        (crashes, "file.dat is damaged: its reader crashed on it; export it again"),
+        (crashes, "file.dat is damaged: its reader crashed; export it again"),
         (ends, "its reader crashed"),
         (swells, "needs more than 0.51 GB of memory"),
     ],
@@ -96,21 +96,24 @@ def test_what_a_reader_does_not_survive_is_a_sentence_and_the_next_read_works(re
 
 @pytest.mark.parametrize("reader", [hangs, turns])
 def test_a_reader_that_hangs_is_stopped(read, monkeypatch, reader):
-    monkeypatch.setattr(apart, "SECONDS", 1.0)
+    monkeypatch.setattr(apart, "BASE_SECONDS", 1.0)
     with pytest.raises(UnreadableFile, match="took longer than 1 s"):
         read(reader)
     assert read(reads, 1.0)[0] == "file.dat"
 
 
 def test_loading_a_library_is_no_reading(tmp_path, monkeypatch):
-    monkeypatch.setattr(apart, "SECONDS", 1.0)
+    monkeypatch.setattr(apart, "BASE_SECONDS", 1.0)
     monkeypatch.syspath_prepend(tmp_path)
     slow = "import time\nbegun = time.process_time()\nwhile time.process_time() < begun + 3: pass\n"
     (tmp_path / "slow_library.py").write_text(slow)
     apart._servers.clear()  # one that knows of the library's folder
     (tmp_path / "file.dat").write_bytes(b"content")
     about = {"remedy": "", "library": "slow_library"}
-    assert read_apart(tmp_path / "file.dat", f"{__name__}:reads", 1.0, **about)[0] == "file.dat"
+    assert (
+        read_in_subprocess(tmp_path / "file.dat", f"{__name__}:reads", 1.0, **about)[0]
+        == "file.dat"
+    )
 
 
 def test_what_a_library_prints_is_not_taken_for_its_answer(read, capfd):

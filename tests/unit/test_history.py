@@ -48,18 +48,20 @@ def rough(grid=GRID, seed=1):
 
 def test_whole_cells_are_the_same_heights_further_on():
     surfaces = MovingSurfaces.one_rough(rough(), (2.0, 0.0))
-    np.testing.assert_array_equal(surfaces.at(3e-6).heights, np.roll(rough().heights, 3, axis=0))
+    np.testing.assert_array_equal(
+        surfaces.composite_at(3e-6).heights, np.roll(rough().heights, 3, axis=0)
+    )
 
 
 def test_the_second_surface_moves_at_its_own_speed_face_down():
     composite = CompositeSurface(rough(seed=1), rough(seed=2), (4.0, 2.0))
-    surfaces = MovingSurfaces.of(composite)
-    np.testing.assert_allclose(surfaces.at(0.0).heights, composite.surface.heights)
+    surfaces = MovingSurfaces.from_composite(composite)
+    np.testing.assert_allclose(surfaces.composite_at(0.0).heights, composite.surface.heights)
     moved = (
         np.roll(composite.first.heights, 4, axis=0)
         + np.roll(composite.second.heights, 2, axis=0)[:, ::-1]
     )
-    np.testing.assert_allclose(surfaces.at(2e-6).heights, moved)
+    np.testing.assert_allclose(surfaces.composite_at(2e-6).heights, moved)
 
 
 def test_parts_of_a_cell_move_every_wave_exactly():
@@ -71,14 +73,16 @@ def test_parts_of_a_cell_move_every_wave_exactly():
 
     surfaces = MovingSurfaces.one_rough(Surface(heights(0.0), GRID), (1.0, 0.0))
     for shift in (0.37e-6, 12.9e-6, 640.0077e-6):
-        np.testing.assert_allclose(surfaces.at(shift).heights, heights(shift), atol=1e-16)
+        np.testing.assert_allclose(surfaces.composite_at(shift).heights, heights(shift), atol=1e-16)
 
 
 def test_a_surface_neither_fades_nor_strays_however_long_it_runs():
     surfaces = MovingSurfaces.one_rough(rough(), (1.0, 0.0))
-    assert surfaces.at(123.4567e-3).sq == pytest.approx(surfaces.at(0.0).sq, rel=1e-6)
+    assert surfaces.composite_at(123.4567e-3).sq == pytest.approx(
+        surfaces.composite_at(0.0).sq, rel=1e-6
+    )
     np.testing.assert_allclose(
-        surfaces.at(1000 * 64e-6).heights, surfaces.at(0.0).heights, atol=1e-15
+        surfaces.composite_at(1000 * 64e-6).heights, surfaces.composite_at(0.0).heights, atol=1e-15
     )
 
 
@@ -86,10 +90,10 @@ def test_a_track_may_be_longer_than_the_contact():
     track = track_grid(GRID, 3)
     surface = rough(track)
     surfaces = MovingSurfaces(surface, flat_surface(track), (1.0, 0.0), GRID)
-    np.testing.assert_array_equal(surfaces.at(0.0).heights, surface.heights[:32])
-    np.testing.assert_allclose(surfaces.at(64e-6).heights, surface.heights[64:])
-    assert surfaces.passage(0) == pytest.approx(192e-6)
-    assert surfaces.passage(1) == float("inf")
+    np.testing.assert_array_equal(surfaces.composite_at(0.0).heights, surface.heights[:32])
+    np.testing.assert_allclose(surfaces.composite_at(64e-6).heights, surface.heights[64:])
+    assert surfaces.passage_time(0) == pytest.approx(192e-6)
+    assert surfaces.passage_time(1) == float("inf")
 
 
 @pytest.mark.parametrize("index", [0, 1])
@@ -97,9 +101,9 @@ def test_what_a_contact_leaves_lies_where_it_was_left(index):
     surfaces = MovingSurfaces(rough(), rough(seed=2), (1.0, 1.0), GRID)
     mark = np.zeros(GRID.cells)
     mark[10, 3], side = 1.0, 3 if index == 0 else 12
-    whole = surfaces.on_track(index, mark, 8e-6)  # four cells
+    whole = surfaces.project_on_track(index, mark, 8e-6)  # four cells
     assert whole[6, side] == whole.sum() == 1.0
-    between = surfaces.on_track(index, mark, 8.5e-6)
+    between = surfaces.project_on_track(index, mark, 8.5e-6)
     assert between[6, side] == pytest.approx(0.75)
     assert between[5, side] == pytest.approx(0.25)
     assert between.sum() == pytest.approx(1.0)
@@ -115,7 +119,9 @@ def test_a_track_shorter_than_the_contact_is_refused():
 def test_a_case_begins_with_the_roughness_that_it_solves(which):
     chosen = case(**{"motion.rough": which})
     surfaces = chosen.moving_surfaces()
-    np.testing.assert_allclose(surfaces.at(0.0).heights, chosen.surface().heights, atol=1e-18)
+    np.testing.assert_allclose(
+        surfaces.composite_at(0.0).heights, chosen.surface().heights, atol=1e-18
+    )
     assert surfaces.rough == (which == "first", which == "second")
 
 

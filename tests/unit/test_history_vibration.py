@@ -156,7 +156,7 @@ def test_the_approach_follows_a_wave_much_longer_than_the_contact():
     profile, left, objection = repeating(
         np.array([one.time for one in rows]),
         np.array([one.solution.rigid_approach for one in rows]),
-        surfaces.passage(0),
+        surfaces.passage_time(0),
     )
     assert objection is None
     assert left < 0.01

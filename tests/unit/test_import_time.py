@@ -12,7 +12,7 @@ import pytest
 import x3pio
 
 import asperity
-from asperity.core.processes import GARBAGE_FROM, set_up_worker
+from asperity.core.processes import GC_THRESHOLD, set_up_worker
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 HEAVY = (
@@ -237,7 +237,7 @@ def test_a_name_that_is_not_there_is_named():
 def test_what_is_freed_is_kept():
     """Fields of 16 MB: the system clears 4096 pages of memory that it hands out."""
     probe = (
-        "import resource, numpy as np\nfrom asperity.core.processes import save_time\nsave_time()\n"
+        "import resource, numpy as np\nfrom asperity.core.processes import tune_memory_use\ntune_memory_use()\n"
         "def faults():\n  before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
         "  np.ones(1 << 21) + np.ones(1 << 21)\n"
         "  return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before\n"
@@ -254,4 +254,4 @@ def test_what_is_freed_is_kept():
 
 def test_workers_save_time_too():
     with ProcessPoolExecutor(1, get_context("spawn"), set_up_worker) as pool:
-        assert pool.submit(gc.get_threshold).result()[0] == GARBAGE_FROM
+        assert pool.submit(gc.get_threshold).result()[0] == GC_THRESHOLD

@@ -11,12 +11,12 @@ from asperity.core.errors import UnreadableFile
 from asperity.core.storage import (
     digest,
     read_json,
-    read_sealed,
     read_table,
+    read_with_digest,
     version_notes,
     write_json,
-    write_sealed,
     write_table,
+    write_with_digest,
 )
 from asperity.paper import papers_case
 from asperity.simulation import load_history, run_history
@@ -55,11 +55,11 @@ def test_a_digest_is_of_names_types_shapes_and_values():
 def test_what_was_sealed_comes_back_and_nothing_else_does(tmp_path):
     path = tmp_path / "file"
     for body in (b"", b"some bytes"):
-        write_sealed(path, body)
-        assert read_sealed(path, "write it again") == body
+        write_with_digest(path, body)
+        assert read_with_digest(path, "write it again") == body
     path.write_bytes(b"short")
     with pytest.raises(UnreadableFile, match=r"no digest.*; write it again"):
-        read_sealed(path, "write it again")
+        read_with_digest(path, "write it again")
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -127,6 +127,6 @@ def test_every_has_its_table():
     assert law_name("warmth", WARMTH_LAWS["exponential"]()) == "exponential"
     with pytest.raises(
         BadInput,
-        match="NewtonianShear is not a viscosity law that can be kept; add it to its table",
+        match="NewtonianShear is not a viscosity law that can be stored; add it to its table",
     ):
         law_name("viscosity", NewtonianShear())

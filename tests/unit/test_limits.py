@@ -20,12 +20,13 @@ def test_the_estimate_and_the_remedy_are_said(monkeypatch):
     monkeypatch.setenv("ASPERITY_MEMORY_GB", "2")
     with pytest.raises(
         BadInput,
-        match=r"a map would take about 3 GB of memory, where 2 GB may be used; .*MEMORY_GB",
+        match=r"a map would take about 3 GB of memory, more than the limit of 2 GB; .*MEMORY_GB",
     ):
         require_affordable("a map", memory=3e9)
     monkeypatch.setenv("ASPERITY_DAYS", "1.5")
     with pytest.raises(
-        BadInput, match=r"a map would take about 2 days, where 1\.5 may be used; .*ASPERITY_DAYS"
+        BadInput,
+        match=r"a map would take about 2 days, more than the limit of 1\.5; .*ASPERITY_DAYS",
     ):
         require_affordable("a map", seconds=2 * 86400.0)
     require_affordable("a map", memory=1.9e9, seconds=86400.0)
@@ -51,7 +52,8 @@ def test_a_file_may_unpack_to_what_measured_data_do(tmp_path, monkeypatch):
     path.write_bytes(bytes(range(256)) * 40000)  # 10 MB
     require_unpacked(path, 5e8, "export it again")
     with pytest.raises(
-        UnreadableFile, match=r"x\.h5 of 0\.01 GB claims to hold 0\.6 GB, where 0\.51 GB may be"
+        UnreadableFile,
+        match=r"x\.h5 of 0\.01 GB declares 0\.6 GB of content, more than the limit of 0\.51",
     ):
         require_unpacked(path, 6e8, "export it again")
     monkeypatch.setenv("ASPERITY_MEMORY_GB", "1")
@@ -81,7 +83,7 @@ ASKED = {
 @pytest.mark.parametrize("what", ASKED)
 def test_what_no_machine_has_is_refused_before_the_work(monkeypatch, what):
     monkeypatch.setenv("ASPERITY_MEMORY_GB", "16")
-    with pytest.raises(BadInput, match=f"{what}.* would take about .*; ask for less"):
+    with pytest.raises(BadInput, match=f"{what}.* would take about .*; reduce it"):
         ASKED[what]()
 
 

@@ -123,7 +123,9 @@ def test_both_sides_of_a_load_zone_are_drawn_in_their_order():
 
 def test_a_rating_is_drawn_beside_what_was_solved():
     figure = along_path(solved(load_machine(EXAMPLES / "fzg-c.toml"))).figure()
-    heat = next(axes for axes in figure.axes if axes.get_title(loc="left").startswith("flash"))
+    heat = next(
+        axes for axes in figure.axes if axes.get_title(loc="left").startswith("maximum flash")
+    )
     (_, rating) = heat.get_lines()
     assert rating.get_ydata()[3] == pytest.approx(0.0, abs=1e-9)
     assert rating.get_ydata()[0] > 50.0

@@ -40,7 +40,7 @@ def test_the_worst_is_where_asperities_carry_most(gears):
     assert found.worst["name"] == "D"
     assert found.verdict() == (
         "Spur gear pair 16/24, contact ratio 1.44: mixed lubrication at 3 of 7 contacts; worst is D, where asperities "
-        "carry 40.0 % of the load on a film of 0.200 µm, Λ 1.10, flash temperature 12.5 K; rated λGF 0.256 at A."
+        "carry 40.0 % of the load on a film of 0.200 µm, Λ 1.10, maximum flash temperature 12.5 K; rated λGF 0.256 at A."
     )
 
 

@@ -128,7 +128,7 @@ def test_a_measured_oil_by_name():
             {"lubricant.temperature": "151 degC"},
             "lubricant: temperature must lie between -20 and 150 degC",
         ),
-        ({"lubricant.base": "pao"}, "lubricant: alpha is missing, which base pao has to state"),
+        ({"lubricant.base": "pao"}, "lubricant: alpha is missing and is required for base pao"),
         (
             {"lubricant.thickening": "bar"},
             'lubricant.thickening must be "roelands" or "barus", got "bar"',
@@ -181,7 +181,7 @@ def test_a_run_and_its_page_say_what_was_estimated(tmp_path):
     assert said["notes"][1].startswith("Oil by its data sheet, estimated: viscosity index 95")
     page = write_report([kept], tmp_path / "page.html").read_text("utf-8")
     assert "Oil, estimated" in page
-    assert "(the middle of VG 100)" in page
+    assert "(mid-point of VG 100)" in page
     assert "oil" not in solve_case(PAPER.with_overrides(small)).summary()
 
 

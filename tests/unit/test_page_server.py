@@ -131,7 +131,7 @@ def test_what_is_shown_is_escaped():
 def test_the_page_is_opened_with_what_is_named(tmp_path):
     assert (open_page(None).kind, open_page(None).case.grid.cells) == ("contact", (192, 128))
     (tmp_path / "manifest.json").write_text("{}", "utf-8")
-    with pytest.raises(UnreadableFile, match="carries no digest"):
+    with pytest.raises(UnreadableFile, match="has no digest"):
         open_page(tmp_path)
     (tmp_path / "recordings").mkdir()
     assert open_page(tmp_path / "recordings").kind == "recordings"

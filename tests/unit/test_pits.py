@@ -7,7 +7,7 @@ import pytest
 
 from asperity import BadInput
 from asperity.contact.grid import Grid
-from asperity.rating import dang_van, dang_van_of_each
+from asperity.rating import dang_van, dang_van_per_path
 from asperity.solution import stress_below
 from asperity.wear.fatigue import (
     DangVanPits,
@@ -28,7 +28,7 @@ def test_each_paths_measure_is_the_exact_one_within_a_hundredth():
     for times in (2, 3, 6, 12):
         stresses = rng.normal(size=(6, 60, times)).cumsum(axis=2)
         exact = [dang_van(stresses[:, [path]], 0.3) for path in range(60)]
-        np.testing.assert_allclose(dang_van_of_each(stresses, 0.3), exact, rtol=0.02, atol=0.01)
+        np.testing.assert_allclose(dang_van_per_path(stresses, 0.3), exact, rtol=0.02, atol=0.01)
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.3])
@@ -37,15 +37,15 @@ def test_pulsating_tension_and_torsion_have_their_closed_measures(slope):
     stresses = np.zeros((6, 2, 2))
     stresses[0, 0, 1] = stresses[3, 1, 1] = 1.0
     np.testing.assert_allclose(
-        dang_van_of_each(stresses, slope), [0.25 + slope / 3.0, 0.5], rtol=1e-9
+        dang_van_per_path(stresses, slope), [0.25 + slope / 3.0, 0.5], rtol=1e-9
     )
 
 
 def test_a_path_that_stays_below_is_given_a_bound_that_does_too():
     stresses = np.random.default_rng(2).normal(size=(6, 50, 5))
-    full = dang_van_of_each(stresses, 0.2)
+    full = dang_van_per_path(stresses, 0.2)
     level = float(np.median(full))
-    some = dang_van_of_each(stresses, 0.2, above=level)
+    some = dang_van_per_path(stresses, 0.2, above=level)
     assert np.array_equal(some > level, full > level)
     assert np.array_equal(some[full > level], full[full > level])
     assert np.any(some != full)
@@ -57,7 +57,7 @@ def test_the_path_below_a_rolling_line_contact_is_hertz():
     found = []
     for count in (16, 128):
         path = stress_path(hertz_patches(grid, WIDTH, P_MAX, count), grid, 0.5 * WIDTH, 0.3)
-        found.append(float(dang_van_of_each(path, 0.0).max()) / P_MAX)
+        found.append(float(dang_van_per_path(path, 0.0).max()) / P_MAX)
     assert found[1] == pytest.approx(0.25, rel=0.01, abs=0.0)
     assert 0.23 < found[0] < 0.256
 

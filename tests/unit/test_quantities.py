@@ -89,7 +89,7 @@ def test_no_deviation_leads_beyond_what_a_share_or_film_can_be():
     film = quantity("h_central_m").text_in({"h_central_m": 1e-8, "h_central_error_m": 4e-8})
     assert film == "0.010 (0.000 to 0.050) µm"
     assert (
-        quantity("car_domain").left(1.2, 0.05) is None
+        quantity("car_domain").clipped_interval(1.2, 0.05) is None
     )  # over the Hertz area, beyond which bodies may touch
     assert quantity("crfa").number(1.0, 2.0) == "1.0 ± 2.0"  # what only scatters, and is no share
 

@@ -358,7 +358,7 @@ def test_flash_temperature_in_the_standards_form():
     ) / printed == pytest.approx(0.6222, rel=1e-4)
     assert 1e3 * (1e-6 * modulus) ** 0.25 / 435.0 == pytest.approx(50.14, rel=1e-3)
     assert flash_rise(0.1, 3e5, width, (2.0, 2.0)) == 0.0
-    with pytest.raises(BadInput, match="the same way"):
+    with pytest.raises(BadInput, match="the same direction"):
         flash_rise(0.1, 3e5, width, (2.0, -1.0))
 
 

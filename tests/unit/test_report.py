@@ -230,20 +230,20 @@ def test_page_loads_nothing(which, request):
 @pytest.mark.parametrize(
     ("name", "value", "unit"),
     [
-        ("Load share of asperities", "54.2", "%"),
-        ("Contact area share in the Hertz zone", "37.1", "%"),
-        ("Contact area of the whole domain", "60.3", "%"),
+        ("Asperity load share", "54.2", "%"),
+        ("Contact area ratio", "37.1", "%"),
+        ("Domain contact area ratio", "60.3", "%"),
         ("Composite roughness", "1.25", "µm"),
-        ("Smallest film", "0.005", "µm"),
-        ("Central film", "0.512", "µm"),
-        ("Mean film", "0.634", "µm"),
-        ("Film ratio", "0.58", ""),
-        ("Largest pressure", "1.987", "GPa"),
+        ("Minimum film thickness", "0.005", "µm"),
+        ("Central film thickness", "0.512", "µm"),
+        ("Mean film thickness", "0.634", "µm"),
+        ("Lambda ratio", "0.58", ""),
+        ("Maximum pressure", "1.987", "GPa"),
         ("Reynolds residual", "3.1×10⁻⁶", ""),
         ("Load error", "2.3×10⁻⁷", ""),
-        ("Oil-flow imbalance", "69.4", "%"),
-        ("Newton steps", "12", ""),
-        ("Time to solve", "1.23", "s"),
+        ("Oil mass imbalance", "69.4", "%"),
+        ("Newton iterations", "12", ""),
+        ("Solution time", "1.23", "s"),
         ("Converged", "yes", ""),
     ],
 )
@@ -276,7 +276,7 @@ def test_a_resonance_is_not_given_with_its_record_s_deviation_alone(single):
     low, high = (float(end) for end in re.search(r"\((\d+) to (\d+)\)", row[1]).groups())
     assert high - low > 10.0 * resonance.crf_std
     assert row[2] == "Hz"
-    (row,) = [row for row in single.rows if row[0].startswith("Resonance amplitude")]
+    (row,) = [row for row in single.rows if row[0].startswith("Contact resonance amplitude")]
     assert row[2] == "(m/s²)²/Hz"
     assert "±" in row[1]
 
@@ -384,19 +384,20 @@ def test_figures_carry_their_error_where_it_shows():
         row[0].split(",")[0]: row[1] for row in Page(page.render_page([run])).rows if len(row) > 1
     }
     assert (
-        next(value for name, value in rows.items() if name.startswith("Load share of asperities"))
+        next(value for name, value in rows.items() if name.startswith("Asperity load share"))
         == "54.2"
     )
     assert (
-        next(value for name, value in rows.items() if name.startswith("Contact area share"))
+        next(value for name, value in rows.items() if name.startswith("Contact area ratio"))
         == "37.1 ± 1.2"
     )
     assert (
-        next(value for name, value in rows.items() if name.startswith("Central film"))
+        next(value for name, value in rows.items() if name.startswith("Central film thickness"))
         == "0.512 ± 0.007"
     )
     assert (
-        next(value for name, value in rows.items() if name.startswith("Smallest film")) == "0.005"
+        next(value for name, value in rows.items() if name.startswith("Minimum film thickness"))
+        == "0.005"
     )
 
 
@@ -451,7 +452,7 @@ def test_silent_dry_and_deaf_runs_have_a_page_too():
     )
     silent = Page(page.render_page([run_like(smooth, sq=0.0, clr=0.0, car=0.0, lambda_ratio=None)]))
     assert "There is no spectrum to show" in silent.text
-    assert next(row for row in silent.rows if row[0].startswith("Film ratio"))[1] == "–"
+    assert next(row for row in silent.rows if row[0].startswith("Lambda ratio"))[1] == "–"
     assert next(row for row in silent.rows if row[0].startswith("Contact resonance"))[1] == "–"
 
     dry = re.sub(r"\[lubricant\].*?(?=\[surface\])", "", CASE, flags=re.DOTALL)
@@ -527,7 +528,7 @@ def test_load_on_capped_oil_is_not_hidden():
 # Figures -------------------------------------------------------------------------------------------------------------
 
 
-MAP = ["x along rolling [µm]", "y [µm]"]
+MAP = ["x along rolling [µm]", "y across rolling [µm]"]
 ROUGH = "composite roughness, Sq [µm]"
 
 
@@ -545,11 +546,11 @@ def labels_of(exhibit):
     ("draw", "labels"),
     [
         (contact.contact_map, MAP),
-        (contact.film_map, [*MAP, "gap between the deformed surfaces, h [µm]"]),
+        (contact.film_map, [*MAP, "film thickness, h [µm]"]),
         (contact.pressure_map, [*MAP, "contact pressure, p [GPa]"]),
         (contact.roughness_map, [*MAP, "composite roughness height, z [µm]"]),
         (contact.centre_line, ["p [GPa]", "x along rolling [µm]", "h [µm]"]),
-        (contact.height_distribution, ["height above the mean [µm]", "density [1/µm]"]),
+        (contact.height_distribution, ["height [µm]", "probability density [1/µm]"]),
         (contact.convergence_history, ["Newton step", "relative size [-]"]),
         (friction_maps.stress_map, [*MAP, "von Mises stress [GPa]"]),
         (
@@ -566,12 +567,12 @@ def test_every_axis_has_a_label_with_its_unit(draw, labels):
 def test_every_axis_of_friction_and_heat_has_a_label_with_its_unit():
     run = run_like()
     shear = labels_of(friction_maps.traction_map(run, run.friction))
-    assert shear == [*MAP, "traction along rolling on body 1 [MPa]"]
+    assert shear == [*MAP, "surface traction [MPa]"]
     hotter = labels_of(friction_maps.temperature_map(run, run.friction, run.heat))
-    assert hotter == [*MAP, "hotter surface above ambient [K]"]
+    assert hotter == [*MAP, "surface temperature rise [K]"]
     assert labels_of(friction_maps.temperature_line(run, run.heat)) == [
         "x along rolling [µm]",
-        "rise above ambient [K]",
+        "temperature rise [K]",
     ]
 
 
@@ -641,13 +642,16 @@ def test_friction_heat_and_stress_are_numbers_of_the_page(single):
         f"{run.friction.coefficient:.4f}"
     )
     assert (
-        next(rows[name] for name in rows if name.startswith("Flash temp"))
+        next(rows[name] for name in rows if name.startswith("Maximum flash temp"))
         == f"{run.heat.max_k:.1f}"
     )
-    assert next(rows[name] for name in rows if name.startswith("Largest von Mises")) == (
+    assert next(rows[name] for name in rows if name.startswith("Maximum von Mises")) == (
         f"{run.stress.peak.value * 1e-9:.3f}"
     )
-    assert next(rows[name] for name in rows if name.startswith("Boundary friction")) == "0.15"
+    assert (
+        next(rows[name] for name in rows if name.startswith("Boundary friction coefficient"))
+        == "0.15"
+    )
     assert "bair-winer" in next(
         rows[name] for name in rows if name.startswith("Friction of the film")
     )

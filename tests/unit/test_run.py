@@ -224,7 +224,7 @@ def test_the_command_line_prints_every_number_the_catalogue_has_for_a_table(run)
 
 
 def test_one_line_of_the_catalogue_brings_a_number_wherever_numbers_are(run, tmp_path):
-    slope, name = run.state.contact_slope, "mean slope of touching cells"
+    slope, name = run.state.contact_slope, "mean slope of contact cells"
     assert run.scalars()["contact_slope"] == slope
     assert any(
         line.split("  ")[1:] and name in line and f"{slope:.3f}" in line for line in run_table(run)

@@ -4,7 +4,7 @@ from scipy.signal import get_window, lfilter, welch
 
 from asperity.core.errors import BadInput
 from asperity.core.signals import (
-    SAMPLES_A_BLOCK,
+    FILTER_BLOCK_SAMPLES,
     Signal,
     Spectrum,
     averaged_spectrum,
@@ -177,7 +177,7 @@ def test_averages_count_what_the_pieces_beside_a_gap_share():
 
 
 @pytest.mark.parametrize(
-    "samples", [1, 2, SAMPLES_A_BLOCK - 1, SAMPLES_A_BLOCK, 2 * SAMPLES_A_BLOCK + 1]
+    "samples", [1, 2, FILTER_BLOCK_SAMPLES - 1, FILTER_BLOCK_SAMPLES, 2 * FILTER_BLOCK_SAMPLES + 1]
 )
 @pytest.mark.parametrize(
     "filter_", [([0.3], [1.0]), ([0.1, 0.2], [2.0, -1.9]), ([1.0, 0.5, 0.1], [1.0, -1.9, 0.95])]

@@ -9,7 +9,7 @@ import xarray
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.contact.grid import Grid
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
-from asperity.core.storage import netcdf_bytes, write_sealed
+from asperity.core.storage import netcdf_bytes, write_with_digest
 from asperity.ehl import ContactSolution, Convergence, Iteration, Options, SolveStatus
 from asperity.ehl.contact_solution import FORMAT
 from asperity.ehl.outcome import ATTEMPTS, Figures, GridError
@@ -160,11 +160,13 @@ def test_files_without_a_run_are_refused(tmp_path):
         "newer": {"asperity_format": 99},
         "empty": {"asperity_format": FORMAT},
     }.items():
-        write_sealed(tmp_path / f"{name}.nc", netcdf_bytes(xarray.Dataset(attrs=attributes), {}))
-    write_sealed(tmp_path / "letter.nc", b"pressure 1 GPa")
+        write_with_digest(
+            tmp_path / f"{name}.nc", netcdf_bytes(xarray.Dataset(attrs=attributes), {})
+        )
+    write_with_digest(tmp_path / "letter.nc", b"pressure 1 GPa")
     reasons = {
-        "text": "carries no digest",
-        "foreign": "carries no digest",
+        "text": "has no digest",
+        "foreign": "has no digest",
         "letter": "no netCDF file",
         "other": "not a run of asperity",
         "newer": "run format 99",

@@ -360,7 +360,7 @@ def test_a_map_that_claims_more_than_it_stores_is_refused_before_it_is_read(mapp
     about = folder / "fields.zarr" / case_id / "gap" / "zarr.json"
     told = json.loads(about.read_text())
     about.write_text(json.dumps({**told, "shape": [10**6, 10**6]}))
-    with pytest.raises(UnreadableFile, match="claims to hold 8e"):
+    with pytest.raises(UnreadableFile, match="declares 8e"):
         result.maps(case_id)
 
 
@@ -415,7 +415,7 @@ def test_a_folder_that_is_no_study_is_said_so(tmp_path):
     with pytest.raises(UnreadableFile, match="holds no study"):
         load_study(tmp_path)
     (tmp_path / "manifest.json").write_text("{}")
-    with pytest.raises(UnreadableFile, match="carries no digest"):
+    with pytest.raises(UnreadableFile, match="has no digest"):
         load_study(tmp_path)
     write_json(tmp_path / "manifest.json", {"of": "history"})
     with pytest.raises(UnreadableFile, match="not a study's manifest"):

@@ -3,7 +3,13 @@ import pytest
 
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
-from asperity.surface import MeasuredSurface, condition_surface, gaussian_surface, level
+from asperity.surface import (
+    MeasuredSurface,
+    SurfaceConditioning,
+    condition_surface,
+    gaussian_surface,
+    level,
+)
 
 
 def measured(heights, pixel=1e-6, uniform=None):
@@ -67,8 +73,8 @@ def test_a_polynomial_takes_its_degree_and_no_higher(form, degree):
 def test_the_filters_pass_what_iso_16610_says(wavelength, passed, axis):
     """Transmission exp(-ln 2 (cut-off/wavelength)^2) of the Gaussian, and the rest of 1 for the L-filter."""
     z = wave((600, 600), wavelength, axis)
-    short, _ = condition_surface(measured(z), form="none", s_filter=20e-6)
-    long, _ = condition_surface(measured(z), form="none", l_filter=20e-6)
+    short, _ = condition_surface(measured(z), SurfaceConditioning(form="none", s_filter=20e-6))
+    long, _ = condition_surface(measured(z), SurfaceConditioning(form="none", l_filter=20e-6))
     middle = (slice(100, -100), slice(100, -100))
     assert np.ptp(short.heights[middle]) / 2e-6 == pytest.approx(passed, abs=1e-3)
     assert np.ptp(long.heights[middle]) / 2e-6 == pytest.approx(1.0 - passed, abs=1e-3)
@@ -77,7 +83,7 @@ def test_the_filters_pass_what_iso_16610_says(wavelength, passed, axis):
 def test_the_filters_leave_missing_cells_missing_and_a_plateau_flat():
     z = np.full((80, 60), 1e-6)
     z[20:30, 10:40] = np.nan
-    filtered, _ = condition_surface(measured(z), form="none", s_filter=15e-6)
+    filtered, _ = condition_surface(measured(z), SurfaceConditioning(form="none", s_filter=15e-6))
     np.testing.assert_array_equal(np.isnan(filtered.heights), np.isnan(z))
     assert np.nanmax(np.abs(filtered.heights)) < 1e-18
 
@@ -88,7 +94,7 @@ def test_outliers_are_told_and_dropped_when_asked():
     kept, said = condition_surface(measured(z))
     assert kept.missing == 0.0
     assert said[0].startswith("kept 3 heights")
-    dropped, said = condition_surface(measured(z), outliers="remove")
+    dropped, said = condition_surface(measured(z), SurfaceConditioning(outliers="remove"))
     assert said[0].startswith("removed 3 outliers")
     assert np.isnan(dropped.heights[[30, 70, 100], [20, 50, 90]]).all()
     assert np.count_nonzero(np.isnan(dropped.heights)) == 3
@@ -109,7 +115,10 @@ def test_a_quarter_turn_makes_y_of_x():
     assert turned.heights[at] == z[i, j]
     again = turned.turned().turned().turned()
     np.testing.assert_array_equal(again.heights, z)
-    assert "turned by 90 degrees" in condition_surface(measured(z), turn=True)[1][0]
+    assert (
+        "turned by 90 degrees"
+        in condition_surface(measured(z), SurfaceConditioning(turn=True))[1][0]
+    )
 
 
 def test_a_turned_profile_goes_on_unchanged_along_x():

@@ -8,9 +8,10 @@ from asperity.core.errors import BadInput
 from asperity.surface import (
     CompositeSurface,
     MeasuredSurface,
+    SurfaceConditioning,
+    count_places,
     gaussian_surface,
     level,
-    places,
     prepare_surface,
 )
 
@@ -66,7 +67,9 @@ def test_a_plane_leaves_curvature_and_none_leaves_tilt():
 def test_the_centre_of_the_map_becomes_the_contact():
     heights = rough()
     grid = contact((120, 80), periodic=(False, False))
-    prepared = prepare_surface(measured(heights), grid, form="none")
+    prepared = prepare_surface(
+        measured(heights), grid, conditioning=SurfaceConditioning(form="none")
+    )
     middle = heights[90:210, 80:160]
     np.testing.assert_allclose(prepared.surface.heights, middle - middle.mean(), atol=1e-12)
 
@@ -78,7 +81,9 @@ def test_interpolation_follows_a_wave():
         return 1e-6 * np.cos(2.0 * np.pi * x / 20e-6) * np.cos(2.0 * np.pi * y / 24e-6)
 
     grid = Grid((200, 160), (-60e-6, -40e-6), (60e-6, 40e-6), periodic=(False, False))
-    prepared = prepare_surface(measured(wave(x * 1e-6, y * 1e-6)), grid, form="none")
+    prepared = prepare_surface(
+        measured(wave(x * 1e-6, y * 1e-6)), grid, conditioning=SurfaceConditioning(form="none")
+    )
     expected = wave(grid.x[:, None], grid.y[None, :])
     np.testing.assert_allclose(prepared.surface.heights, expected - expected.mean(), atol=2e-9)
 
@@ -92,7 +97,9 @@ def test_a_coarser_grid_keeps_the_waves_it_can_show_and_no_others(wavelength, pa
     grid = Grid(
         (48, 16), (-120e-6, -40e-6), (120e-6, 40e-6), periodic=(False, False)
     )  # 5 um cells: none below 10 um
-    resampled = prepare_surface(measured(heights), grid, form="none").surface.heights
+    resampled = prepare_surface(
+        measured(heights), grid, conditioning=SurfaceConditioning(form="none")
+    ).surface.heights
     expected = passed * np.cos(2.0 * np.pi * grid.x / wavelength)
     np.testing.assert_allclose(resampled[:, 8], expected - expected.mean(), atol=0.005)
 
@@ -116,7 +123,9 @@ def test_closing_the_ends_keeps_the_roughness_of_both_scattered_and_grooved_surf
         heights = rough(seed=seed, length=4e-6)
         if grooved:
             heights = heights[:, :1] * np.ones(heights.shape[1])
-        closed = prepare_surface(measured(heights), contact((120, 80)), form="none").surface.heights
+        closed = prepare_surface(
+            measured(heights), contact((120, 80)), conditioning=SurfaceConditioning(form="none")
+        ).surface.heights
         blended.append(np.var(closed[:, :10]))
         untouched.append(np.var(closed[:, 10:]))
     assert np.mean(blended) / np.mean(untouched) == pytest.approx(1.0, abs=0.1)
@@ -127,7 +136,10 @@ def test_holes_are_filled_from_around_them():
     holed = truth.copy()
     holed[np.random.default_rng(1).random(holed.shape) < 0.1] = np.nan
     grid = contact((120, 80))
-    whole, filled = (prepare_surface(measured(h), grid, form="none") for h in (truth, holed))
+    whole, filled = (
+        prepare_surface(measured(h), grid, conditioning=SurfaceConditioning(form="none"))
+        for h in (truth, holed)
+    )
     assert np.std(filled.surface.heights - whole.surface.heights) < 0.01 * whole.surface.sq
     assert any("missing cells" in step and "10 %" in step for step in filled.steps)
 
@@ -145,7 +157,9 @@ def test_a_map_smaller_than_the_contact_is_refused_with_both_sizes_and_tiled_whe
         BadInput, match=r"80 x 130 um, smaller than the contact's 120 x 80 um.*smaller grid"
     ):
         prepare_surface(small, contact())
-    tiled = prepare_surface(small, contact((120, 80)), fit="tile", form="none")
+    tiled = prepare_surface(
+        small, contact((120, 80)), conditioning=SurfaceConditioning(form="none"), fit="tile"
+    )
     heights = tiled.surface.heights
     # 20 cells stand out on either side: they mirror what lies inside of the map's edge
     np.testing.assert_allclose(heights[:20], heights[20:40][::-1], atol=1e-12)
@@ -176,8 +190,12 @@ def test_scaling_gives_the_sq_asked_for_and_nothing_else_changes():
     ],
 )
 def test_unknown_options_are_refused(option, said):
+    others = {name: value for name, value in option.items() if name in ("fit", "sq")}
+    settings = {name: value for name, value in option.items() if name not in others}
     with pytest.raises(BadInput, match=said):
-        prepare_surface(measured(rough()), contact(), **option)
+        prepare_surface(
+            measured(rough()), contact(), conditioning=SurfaceConditioning(**settings), **others
+        )
 
 
 def test_a_flat_map_cannot_be_scaled():
@@ -193,16 +211,20 @@ def profile(length=400e-6, pixel=1e-6, seed=2):
 
 
 def test_a_profile_becomes_roughness_that_goes_on_along_y():
-    prepared = prepare_surface(profile(), contact((120, 64)), form="none")
+    prepared = prepare_surface(
+        profile(), contact((120, 64)), conditioning=SurfaceConditioning(form="none")
+    )
     heights = prepared.surface.heights
     np.testing.assert_allclose(heights, heights[:, :1] * np.ones(64), atol=1e-18)
     line = profile().profile[140:260]
     np.testing.assert_allclose(heights[:, 0], line - line.mean(), atol=1e-12)
-    assert any("go on unchanged along y" in step for step in prepared.steps)
+    assert any("extended unchanged along y" in step for step in prepared.steps)
 
 
 def test_a_turned_profile_repeats_along_y_and_goes_on_along_x():
-    prepared = prepare_surface(profile(), contact((64, 96)), turn=True)
+    prepared = prepare_surface(
+        profile(), contact((64, 96)), conditioning=SurfaceConditioning(turn=True)
+    )
     heights = prepared.surface.heights
     np.testing.assert_allclose(heights, heights[:1] * np.ones((64, 1)), atol=1e-18)
     assert abs(heights[0, 0] - heights[0, -1]) < 4.0 * np.std(np.diff(heights[0]))
@@ -211,7 +233,12 @@ def test_a_turned_profile_repeats_along_y_and_goes_on_along_x():
 def test_a_profile_shorter_than_the_contact_is_refused_and_mirrored_when_asked():
     with pytest.raises(BadInput, match=r"profile of 80 um, shorter than the contact's 120 um"):
         prepare_surface(profile(80e-6), contact())
-    prepared = prepare_surface(profile(80e-6), contact((120, 64)), fit="tile", form="none")
+    prepared = prepare_surface(
+        profile(80e-6),
+        contact((120, 64)),
+        conditioning=SurfaceConditioning(form="none"),
+        fit="tile",
+    )
     np.testing.assert_allclose(
         prepared.surface.heights[:20], prepared.surface.heights[20:40][::-1], atol=1e-12
     )
@@ -224,7 +251,8 @@ def test_resampling_keeps_the_spectrum_up_to_nine_tenths_of_the_last_wave():
     fine = Grid((200, 160), (-100e-6, -80e-6), (100e-6, 80e-6), (False, False))
     heights = rough(length=2e-6)
     coarse, same = (
-        prepare_surface(measured(heights), g, form="none").surface for g in (grid, fine)
+        prepare_surface(measured(heights), g, conditioning=SurfaceConditioning(form="none")).surface
+        for g in (grid, fine)
     )
     window = np.outer(np.hanning(100), np.hanning(80))
     found = np.abs(np.fft.fft2(coarse.heights * window))[:45, :36]
@@ -237,7 +265,10 @@ def test_turning_a_map_turns_what_is_prepared():
     heights = rough((300, 300))
     square = contact((80, 80), (80e-6, 80e-6), periodic=(False, False))
     plain, turned = (
-        prepare_surface(measured(heights), square, turn=turn).surface for turn in (False, True)
+        prepare_surface(
+            measured(heights), square, conditioning=SurfaceConditioning(turn=turn)
+        ).surface
+        for turn in (False, True)
     )
     np.testing.assert_allclose(turned.heights, plain.heights[:, ::-1].T, atol=1e-12)
 
@@ -263,8 +294,10 @@ def test_another_place_is_what_lies_beside_the_centre():
     heights = rough((600, 500), seed=4)
     grid = contact((120, 80), periodic=(False, False))
     everywhere = [
-        prepare_surface(measured(heights), grid, form="none", place=place).surface.heights
-        for place in range(places(measured(heights), grid))
+        prepare_surface(
+            measured(heights), grid, conditioning=SurfaceConditioning(form="none"), place=place
+        ).surface.heights
+        for place in range(count_places(measured(heights), grid))
     ]
     assert (
         len(everywhere) == 5 * 5
@@ -279,13 +312,16 @@ def test_another_place_is_what_lies_beside_the_centre():
         assert min(np.abs(place - block).max() for block in blocks) < 1e-12
     assert len({place.tobytes() for place in everywhere}) == 25
     np.testing.assert_array_equal(
-        everywhere[0], prepare_surface(measured(heights), grid, form="none").surface.heights
+        everywhere[0],
+        prepare_surface(
+            measured(heights), grid, conditioning=SurfaceConditioning(form="none")
+        ).surface.heights,
     )
-    with pytest.raises(BadInput, match="room for 25 of the contact's"):
+    with pytest.raises(BadInput, match="room for 25 separate places of the contact's"):
         prepare_surface(measured(heights), grid, place=25)
 
 
 def test_a_small_map_has_one_place_and_a_profile_those_along_it():
     grid = contact((120, 80), periodic=(False, False))
-    assert places(measured(rough((130, 90))), grid) == 1
-    assert places(replace(measured(rough((400, 500))), uniform=1), grid) == 3
+    assert count_places(measured(rough((130, 90))), grid) == 1
+    assert count_places(replace(measured(rough((400, 500))), uniform=1), grid) == 3

@@ -263,7 +263,7 @@ def test_the_film_at_loaded_ends_asks_for_close_lines():
     )
     assert few.end_film.value is None
     assert any(
-        "film at the ends is not determined: the lines of cells are 0.45" in said
+        "minimum film thickness at the ends is not determined: the lines of cells are 0.45" in said
         for said in few.undetermined
     )
     assert (

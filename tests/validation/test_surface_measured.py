@@ -8,7 +8,7 @@ import pytest
 
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput, UnreadableFile
-from asperity.surface import describe_surface, prepare_surface, read_surface
+from asperity.surface import SurfaceConditioning, describe_surface, prepare_surface, read_surface
 
 FILES = Path(__file__).parents[2].parent / "shared" / "data" / "surfaces"
 pytestmark = pytest.mark.skipif(
@@ -67,11 +67,13 @@ def test_profiles_read_as_their_readme_says():
 
 
 def test_an_archive_that_strays_from_the_standard_reads_as_its_readme_says():
-    found = describe_surface(FILES / "bullet_land.x3p", form="cylinder").scalars()
+    found = describe_surface(
+        FILES / "bullet_land.x3p", conditioning=SurfaceConditioning(form="cylinder")
+    ).scalars()
     assert found["cells"] == [918, 256]
     assert found["pixel_m"] == pytest.approx([2.58e-6, 2.58e-6], rel=1e-3)
     assert found["missing"] == pytest.approx(0.11, abs=0.01)
-    assert any("strays from the standard" in note for note in found["notes"])
+    assert any("violates the standard" in note for note in found["notes"])
 
 
 @pytest.mark.parametrize("name", ["nanovea_test1.txt", "wear_track_C1.csv"])
@@ -95,7 +97,7 @@ def test_a_file_cut_short_is_refused(tmp_path, name, share):
 def test_another_formats_name_is_told(tmp_path):
     disguised = tmp_path / "disguised.opd"
     disguised.write_bytes((FILES / "isotropic.al3d").read_bytes())
-    with pytest.raises(UnreadableFile, match=r"looks like al3d inside; rename it to \.al3d"):
+    with pytest.raises(UnreadableFile, match=r"looks like al3d; rename it to \.al3d"):
         read_surface(disguised)
 
 

@@ -138,7 +138,7 @@ class Answer(Picture):
             deviation = self.row.get(entry.deviation)
             if deviation is None:
                 return NOT_DETERMINED
-            left = entry.left(value, deviation)
+            left = entry.clipped_interval(value, deviation)
             if left is not None:
                 return entry.interval(*left)
             _, _, spread = entry.number(value, deviation).partition(" ± ")

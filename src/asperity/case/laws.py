@@ -16,8 +16,8 @@ from asperity.case.units import OPTIONAL, PAIRED, amount_in, default_amount, pla
 from asperity.core.errors import BadInput
 from asperity.core.quantities import parameters
 from asperity.lubricant import (
-    FREEZING,
     LAWS,
+    ZERO_CELSIUS,
     ExponentialWarmth,
     LawFamily,
     Lubricant,
@@ -139,7 +139,7 @@ class ThermalSection(_Numbers):  # type: ignore[misc]  # its numbers are those o
         if oil is not None:
             if "ambient" not in tacit and ambient != oil.temperature:
                 raise BadInput(
-                    f"ambient of {self.ambient.text} is not the {oil.temperature - FREEZING:.6g} degC of "
+                    f"ambient of {self.ambient.text} is not the {oil.temperature - ZERO_CELSIUS:.6g} degC of "
                     "lubricant.temperature; leave ambient out"
                 )
             ambient = oil.temperature

@@ -11,7 +11,7 @@ from asperity.case.messages import Section, validated
 from asperity.case.units import OPTIONAL, Number, amount_in, plain
 from asperity.core.errors import BadInput
 from asperity.lubricant import (
-    Base,
+    BaseOil,
     Lubricant,
     OilFact,
     OilSheet,
@@ -42,7 +42,7 @@ class SheetSection(Section):
     viscosity_100: Annotated[Annotated[float, amount_in("m^2/s")] | None, OPTIONAL] = None
     viscosity_index: Annotated[Number | None, OPTIONAL] = None
     density_15: Annotated[Annotated[float, amount_in("kg/m^3")] | None, OPTIONAL] = None
-    base: Base = "mineral"
+    base: BaseOil = "mineral"
     alpha: Annotated[Annotated[float, amount_in("1/Pa")] | None, OPTIONAL] = None
     alpha_estimate: Annotated[str | None, OPTIONAL] = None
     temperature: Annotated[float, amount_in("K")]

@@ -105,14 +105,7 @@ def _measured(section: FileSection, folder: Path) -> Texture:
         lateral_unit=section.lateral_unit,
         pixel=plain(section.pixel),
     )
-    levelled, _ = condition_surface(
-        measured,
-        form=section.form,
-        turn=section.turn,
-        outliers=section.outliers,
-        s_filter=plain(section.s_filter),
-        l_filter=plain(section.l_filter),
-    )
+    levelled, _ = condition_surface(measured, section.conditioning)
     sq = plain(section.sq) or float(np.nanstd(levelled.heights))
     lengths = correlation_lengths(levelled)
     extents = [

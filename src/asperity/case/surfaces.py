@@ -19,21 +19,22 @@ from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
 from asperity.surface import (
     CompositeSurface,
-    Fit,
+    FitMode,
     Form,
     MeasuredSurface,
     MovingSurfaces,
     Outliers,
     PreparedSurface,
     Surface,
+    SurfaceConditioning,
     area_text,
     correlation_lengths,
+    count_places,
     flat_surface,
     gaussian_surface,
     ground_surface,
     length_text,
     non_gaussian_surface,
-    places,
     prepare_surface,
     read_surface,
     run_in_surface,
@@ -242,7 +243,7 @@ class FileSection(SurfaceSection):
     file: str
     sq: Annotated[Length | None, OPTIONAL] = None  # scale to this; left out: as measured
     form: Form = "quadratic"
-    fit: Fit = "crop"
+    fit: FitMode = "crop"
     turn: Annotated[bool, Strict()] = (
         False  # by a quarter turn: what the file has along x runs along y
     )
@@ -277,7 +278,7 @@ class FileSection(SurfaceSection):
 
     def room(self, grid: Grid, folder: Path) -> int | None:
         """As many as the map holds side by side, from its own place on."""
-        return max(1, places(self.measured(folder), grid, turn=self.turn) - (self.place or 0))
+        return max(1, count_places(self.measured(folder), grid, turn=self.turn) - (self.place or 0))
 
     def numbered(self, number: int) -> dict[str, object]:
         """At the place so many places on."""
@@ -288,19 +289,26 @@ class FileSection(SurfaceSection):
         prepared = self.prepare(grid, folder)
         return prepared.surface, prepared.steps
 
+    @property
+    def conditioning(self) -> SurfaceConditioning:
+        """Settings of form removal, rotation, outliers and filters."""
+        return SurfaceConditioning(
+            form=self.form,
+            turn=self.turn,
+            outliers=self.outliers,
+            s_filter=plain(self.s_filter),
+            l_filter=plain(self.l_filter),
+        )
+
     def prepare(self, grid: Grid, folder: Path) -> PreparedSurface:
         """The file's map on a grid; `folder` is where the file is looked for."""
         measured = self.measured(folder)
         prepared = prepare_surface(
             measured,
             grid,
+            conditioning=self.conditioning,
             sq=plain(self.sq),
-            form=self.form,
             fit=self.fit,
-            turn=self.turn,
-            outliers=self.outliers,
-            s_filter=plain(self.s_filter),
-            l_filter=plain(self.l_filter),
             place=self.place or 0,
         )
         return replace(prepared, steps=(*measured.notes, *prepared.steps))

@@ -14,7 +14,7 @@ import asperity
 from asperity.cli.options import with_flags
 from asperity.core import quantities
 from asperity.core.errors import AsperityError, BadInput
-from asperity.core.processes import save_time
+from asperity.core.processes import tune_memory_use
 from asperity.core.third_party import printable
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
@@ -34,7 +34,7 @@ app = typer.Typer(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit with its code; what asperity refuses is one line on stderr."""
-    save_time()
+    tune_memory_use()
     codecs.register_error("plain", _plain)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):

@@ -1,7 +1,7 @@
 """`asperity surface`: what a measured surface holds."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -54,15 +54,19 @@ def surface_command(
         )
     lengths = {"pixel": pixel, "s_filter": s_filter, "l_filter": l_filter}
     given = {name: text for name, text in lengths.items() if text is not None}
-    options: dict[str, Any] = {
+    metres: dict[str, Any] = {
         name: case.read_length(f"--{name.replace('_', '-')}", text) for name, text in given.items()
     }
-    options |= {
+    options: dict[str, Any] = {
         "unit": unit,
         "lateral_unit": lateral_unit,
-        "form": form,
-        "turn": turn,
-        "outliers": outliers,
+        "pixel": metres.pop("pixel", None),
+        "conditioning": surface.SurfaceConditioning(
+            form=cast("surface.Form", form),
+            turn=turn,
+            outliers=cast("surface.Outliers", outliers),
+            **metres,
+        ),
     }
     described: list[SurfaceDescription] = []
     refused: list[tuple[Path, BadInput]] = []

@@ -1,4 +1,4 @@
-"""What the two bodies are and how they are pressed and driven: elastic pair and contact conditions."""
+"""Conditions of a contact: elastic pair, geometry, load and surface speeds."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,14 +6,14 @@ from typing import Literal, get_args
 
 from asperity.contact.hertz import HertzContact, elliptic_contact, line_contact, point_contact
 from asperity.contact.rollers import RollerShape, SlicedLoad, sliced_load
-from asperity.core.errors import BadInput, articled, require_positive
+from asperity.core.errors import BadInput, require_positive, with_article
 
 Geometry = Literal["line", "point", "elliptic", "roller"]
 
 
 @dataclass(frozen=True)
 class ElasticPair:
-    """The two bodies' elasticity: Young's moduli [Pa] and Poisson's ratios."""
+    """Elastic constants of the two bodies: Young's moduli [Pa] and Poisson's ratios."""
 
     youngs_moduli: tuple[float, float]
     poisson_ratios: tuple[float, float]
@@ -24,42 +24,43 @@ class ElasticPair:
         for ratio in self.poisson_ratios:
             if not -1.0 < ratio <= 0.5:
                 raise BadInput(
-                    f"Poisson's ratio must lie above -1 and at most at 0.5, got {ratio:g}; steel has 0.3"
+                    f"Poisson's ratio must lie above -1 and be at most 0.5, got {ratio:g}; steel "
+                    "has 0.3"
                 )
 
     @property
     def reduced_modulus(self) -> float:
-        """E* [Pa]: 1/E* = sum (1 - nu^2)/E; what Hertz's equations take."""
+        """E* [Pa], 1/E* = sum (1 - nu^2)/E, as in Hertz's equations."""
         return 1.0 / sum(
             (1.0 - nu**2) / e for e, nu in zip(self.youngs_moduli, self.poisson_ratios, strict=True)
         )
 
     @property
     def effective_modulus(self) -> float:
-        """E' = 2 E* [Pa]; what the EHL literature takes."""
+        """E' = 2 E* [Pa], as in the EHL literature."""
         return 2.0 * self.reduced_modulus
 
 
 @dataclass(frozen=True, kw_only=True)
 class ContactConditions:
-    """A contact as a tribologist states it.
+    """Operating conditions of a contact.
 
     Parameters
     ----------
     pair : elasticity of the two bodies
-    geometry : "line" (needs `length`), "point", "elliptic" (`radius` is then (Rx, Ry)), or "roller" (needs `length`, at
-        whose ends it ends; a line goes on)
+    geometry : "line" (needs `length`), "point", "elliptic" (`radius` is then (Rx, Ry)) or "roller"
+        (needs `length`; unlike a line contact it has ends)
     radius : effective radius of curvature along rolling, 1/R = 1/R1 + 1/R2 [m]
     load : normal load on the whole contact [N]
     surface_speeds : speeds of the two surfaces along x [m/s]
     length : length of a line contact or a roller [m]
-    shape : of a roller along its length; None for a straight one
-    hardness : pressure that no point of the contact can exceed [Pa]; None for a purely elastic contact
+    shape : profile of a roller along its length; None for a straight one
+    hardness : upper limit of the pressure [Pa]; None for a purely elastic contact
 
     Raises
     ------
     BadInput
-        for a quantity that is not positive, a missing length, or surfaces that draw no oil in.
+        A quantity is not positive, the length is missing, or the entrainment speed is zero.
     """
 
     pair: ElasticPair
@@ -78,9 +79,10 @@ class ContactConditions:
             )
         if (self.geometry == "elliptic") != isinstance(self.radius, tuple):
             article = "an" if self.geometry == "elliptic" else "a"
-            wanted = "a pair (Rx, Ry)" if self.geometry == "elliptic" else "one number"
+            required = "a pair (Rx, Ry)" if self.geometry == "elliptic" else "one number"
             raise BadInput(
-                f"radius of {article} {self.geometry} contact is {wanted} in metres, got {self.radius!r}; correct it"
+                f"radius of {article} {self.geometry} contact is {required} in metres, got "
+                f"{self.radius!r}; correct it"
             )
         for radius in self.radius if isinstance(self.radius, tuple) else (self.radius,):
             require_positive("radius", radius, "m")
@@ -91,38 +93,41 @@ class ContactConditions:
         require_positive("entrainment speed", self.entrainment_speed, "m/s")
 
     def _check_length(self) -> None:
-        named = f"{articled(self.geometry)} contact"
+        subject = f"{with_article(self.geometry)} contact"
         if self.long:
             if self.length is None:
-                raise BadInput(f"{named} needs its length; give length in metres")
+                raise BadInput(f"{subject} needs its length; give length in metres")
             require_positive("length", self.length, "m")
         elif self.length is not None:
             raise BadInput(
-                f"length belongs to a line contact, got {self.length:g} m for {named}; leave it out"
+                f"length belongs to a line contact, got {self.length:g} m for {subject}; "
+                "leave it out"
             )
         if self.geometry == "roller" and self.length is not None:
             self.roller.between_chamfers(self.length)
         elif self.shape is not None:
-            raise BadInput(f"shape belongs to a roller contact, got one for {named}; leave it out")
+            raise BadInput(
+                f"shape belongs to a roller contact, got one for {subject}; leave it out"
+            )
 
     @property
     def long(self) -> bool:
-        """Whether the bodies touch along a line, with or without ends: forms for line contacts hold."""
+        """True for line contacts and rollers, for which formulas for line contacts hold."""
         return self.geometry in ("line", "roller")
 
     @property
     def endless(self) -> bool:
-        """Whether the contact is a piece of one that goes on across rolling: a line contact."""
+        """True for a line contact, a section of an infinitely long one."""
         return self.geometry == "line"
 
     @property
     def roller(self) -> RollerShape:
-        """The shape along a roller; a straight one unless stated."""
+        """Profile of a roller along its length; straight unless given."""
         return self.shape or RollerShape()
 
     @property
     def entrainment_speed(self) -> float:
-        """Mean of the two surface speeds, (u1 + u2)/2 [m/s]: what draws the oil in."""
+        """Mean of the two surface speeds, (u1 + u2)/2 [m/s]."""
         return sum(self.surface_speeds) / 2.0
 
     @property
@@ -142,41 +147,43 @@ class ContactConditions:
 
     @property
     def radius_across_rolling(self) -> float:
-        """Ry [m]; infinite for a line contact and a roller, whose crown is its shape's."""
+        """Ry [m]; infinite for a line contact and a roller, whose crown belongs to its shape."""
         if isinstance(self.radius, tuple):
             return self.radius[1]
         return float("inf") if self.long else self.radius
 
     @property
     def line_load(self) -> float:
-        """Load per length of a line contact, or of a roller between its chamfers, in the mean [N/m]."""
+        """Mean load per length of a line contact, or of a roller between its chamfers [N/m]."""
         return self.load / self.line_length
 
     @property
     def line_length(self) -> float:
         """Length of a line contact, or of a roller between its chamfers [m]."""
         if self.length is None:
-            raise BadInput(f"{articled(self.geometry)} contact has no load per length; use load")
+            raise BadInput(
+                f"{with_article(self.geometry)} contact has no load per length; use load"
+            )
         return self.roller.between_chamfers(self.length)
 
     @property
     def end(self) -> float:
-        """Where a roller ends to both sides of its middle [m]; infinite for a line contact, which does not."""
+        """Distance of a roller's ends from its middle [m]; infinite for a line contact."""
         if self.geometry != "roller" or self.length is None:
             return float("inf")
         return self.roller.ends(self.length)
 
     @property
     def sliced_load(self) -> SlicedLoad:
-        """The load along a roller by slices."""
+        """Load distribution along a roller by the slice model."""
         if self.length is None:
-            raise BadInput(f"{articled(self.geometry)} contact has no slices; use a roller")
+            raise BadInput(f"{with_article(self.geometry)} contact has no slices; use a roller")
         radius, modulus = self.radius_along_rolling, self.pair.reduced_modulus
         return sliced_load(self.roller, self.length, self.load, radius, modulus)
 
     @cached_property
     def hertz(self) -> HertzContact:
-        """The smooth, dry, elastic contact under these conditions."""
+        """Hertz contact (smooth, dry, elastic) under these conditions."""
         modulus = self.pair.reduced_modulus
         if isinstance(self.radius, tuple):
             return elliptic_contact(self.load, self.radius, modulus)

@@ -1,7 +1,4 @@
-"""The rectangle a contact is computed on: cells, corners, and which axes repeat.
-
-Samples sit at cell centres. Knows nothing of surfaces or physics.
-"""
+"""Computational grid of a contact: cells, corners and periodic axes; samples at cell centres."""
 
 from dataclasses import dataclass
 
@@ -10,23 +7,23 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 
-FEWEST_CELLS = 8
+MIN_CELLS = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A uniform rectangular grid; x runs along rolling, y along the contact line.
+    """Uniform rectangular grid; x runs along rolling, y along the contact line.
 
     Parameters
     ----------
     cells : (nx, ny)
     lower, upper : corners (x, y) [m], measured from the contact centre
-    periodic : which axes repeat; a line contact repeats in y
+    periodic : periodic axes; a line contact is periodic in y
 
     Raises
     ------
     BadInput
-        for fewer than 8 cells along an axis, or an upper corner that is not beyond the lower one.
+        An axis has fewer than 8 cells, or the upper corner is not beyond the lower one.
     """
 
     cells: tuple[int, int]
@@ -36,13 +33,15 @@ class Grid:
 
     def __post_init__(self) -> None:
         for axis, count, low, high in zip("xy", self.cells, self.lower, self.upper, strict=True):
-            if count < FEWEST_CELLS:
+            if count < MIN_CELLS:
                 raise BadInput(
-                    f"grid must have at least {FEWEST_CELLS} cells along {axis}, got {count}; use 64 or more"
+                    f"grid must have at least {MIN_CELLS} cells along {axis}, got {count}; use 64 "
+                    "or more"
                 )
             if not low < high:
                 raise BadInput(
-                    f"grid must have an upper {axis} beyond its lower one, got {low:g} m to {high:g} m; swap them"
+                    f"grid must have an upper {axis} beyond its lower one, got {low:g} m to "
+                    f"{high:g} m; swap them"
                 )
 
     @property

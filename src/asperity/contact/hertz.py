@@ -1,4 +1,4 @@
-"""Hertz's closed forms for smooth, dry, elastic contact: pure functions of SI numbers.
+"""Hertz theory of smooth, dry, elastic contact in closed form, in SI units.
 
 E* is the reduced modulus, 1/E* = sum (1 - nu^2)/E; the EHL literature's E' is 2 E*.
 Source: K. L. Johnson, Contact Mechanics (1985), chapter 4 and appendix 3.
@@ -14,12 +14,12 @@ from asperity.core.arrays import Field
 
 @dataclass(frozen=True, slots=True)
 class HertzContact:
-    """A solved Hertz contact.
+    """Solution of a Hertz contact.
 
     `half_widths` (a, b) are the semi-axes along and across rolling [m] (b is half the length of a
-    line contact), `p_max` the largest pressure [Pa], `p_mean` load over area [Pa], `area` [m^2],
-    `approach` of the two bodies [m] (None for a line contact, where it depends on the bodies'
-    size).
+    line contact), `p_max` the maximum pressure [Pa], `p_mean` load over area [Pa], `area` [m^2],
+    `approach` of the two bodies [m] (None for a line contact, where it depends on the size of the
+    bodies).
     """
 
     half_widths: tuple[float, float]
@@ -30,7 +30,7 @@ class HertzContact:
 
 
 def line_contact(load: float, length: float, radius: float, reduced_modulus: float) -> HertzContact:
-    """Cylinder on plane: a = sqrt(4 w' R / (pi E*)), p_h = 2 w' / (pi a), with w' = load/length [N/m]."""
+    """Solve cylinder on plane: a = sqrt(4 w' R / (pi E*)), p_h = 2 w' / (pi a), w' = F/length."""
     line_load = load / length
     a = np.sqrt(4.0 * line_load * radius / (np.pi * reduced_modulus))
     p_max = 2.0 * line_load / (np.pi * a)
@@ -44,7 +44,7 @@ def line_contact(load: float, length: float, radius: float, reduced_modulus: flo
 
 
 def point_contact(load: float, radius: float, reduced_modulus: float) -> HertzContact:
-    """Sphere on plane: a = (3 F R / (4 E*))^(1/3), p_h = 3 F / (2 pi a^2), approach a^2 / R."""
+    """Solve sphere on plane: a = (3 F R / (4 E*))^(1/3), p_h = 3 F / (2 pi a^2), approach a^2/R."""
     a = float(np.cbrt(3.0 * load * radius / (4.0 * reduced_modulus)))
     area = float(np.pi * a**2)
     return HertzContact((a, a), 1.5 * load / area, load / area, area, a**2 / radius)
@@ -53,32 +53,18 @@ def point_contact(load: float, radius: float, reduced_modulus: float) -> HertzCo
 def elliptic_contact(
     load: float, radii: tuple[float, float], reduced_modulus: float
 ) -> HertzContact:
-    """General contact of principal radii (Rx, Ry): the exact elliptic-integral solution (Johnson eqs 4.25-4.28).
+    """Solve the contact of radii (Rx, Ry) by elliptic integrals (Johnson eqs 4.25-4.28).
 
     The ellipse is longer along the axis with the larger radius.
     """
     ellipe, ellipk = scipy.special.ellipe, scipy.special.ellipk
     r_large, r_small = max(radii), min(radii)
-    if np.isclose(
-        r_large, r_small, rtol=3e-9, atol=0.0
-    ):  # the root below loses its digits, or its bracket
+    if np.isclose(r_large, r_small, rtol=3e-9, atol=0.0):  # no bracket, or a root without digits
         return point_contact(load, r_small, reduced_modulus)
 
-    def curvature_ratio(log_k: float) -> float:
-        k = np.exp(log_k)  # short over long semi-axis
-        m = 1.0 - k**2
-        return float((ellipe(m) / k**2 - ellipk(m)) / (ellipk(m) - ellipe(m)) - r_large / r_small)
-
-    k = float(
-        np.exp(
-            scipy.optimize.brentq(
-                curvature_ratio, np.log(1e-6), np.log(1.0 - 1e-9), xtol=1e-15, rtol=1e-14
-            )
-        )
-    )
+    k = _axis_ratio(r_large / r_small)
     m = 1.0 - k**2
-    # 1/R_small = 2 p0 k c (E/k^2 - K)/(E* m c^2) for the long semi-axis c, with p0 = 3F/(2 pi k
-    # c^2)
+    # 1/R_small = 2 p0 k c (E/k^2 - K)/(E* m c^2), c: long semi-axis, p0 = 3F/(2 pi k c^2)
     long_axis = float(
         np.cbrt(
             3.0 * load * r_small * (ellipe(m) / k**2 - ellipk(m)) / (np.pi * reduced_modulus * m)
@@ -92,36 +78,50 @@ def elliptic_contact(
     return HertzContact(axes, float(p_max), load / area, area, float(approach))
 
 
+def _axis_ratio(radius_ratio: float) -> float:
+    """Return the ratio of short to long semi-axis for a ratio of large to small radius."""
+    ellipe, ellipk = scipy.special.ellipe, scipy.special.ellipk
+
+    def residual(log_k: float) -> float:
+        k = np.exp(log_k)
+        m = 1.0 - k**2
+        return float((ellipe(m) / k**2 - ellipk(m)) / (ellipk(m) - ellipe(m)) - radius_ratio)
+
+    limits = np.log(1e-6), np.log(1.0 - 1e-9)
+    return float(np.exp(scipy.optimize.brentq(residual, *limits, xtol=1e-15, rtol=1e-14)))
+
+
 def point_compression(load: float, radius: float, reduced_modulus: float) -> float:
-    """Static compression of sphere on plane [m]: z0 = (9 F^2 / (16 E*^2 R))^(1/3), the paper's Eq 2."""
+    """Return the compression of sphere on plane [m]: z0 = (9 F^2/(16 E*^2 R))^(1/3), paper Eq 2."""
     return float(np.cbrt(9.0 * load**2 / (16.0 * reduced_modulus**2 * radius)))
 
 
 def point_stiffness(load: float, radius: float, reduced_modulus: float) -> float:
-    """Incremental stiffness dF/dz0 of sphere on plane [N/m]: S0 = 1.5 F / z0, the paper's Eq 3."""
+    """Return the stiffness dF/dz0 of sphere on plane [N/m]: S0 = 1.5 F / z0, paper Eq 3."""
     return 1.5 * load / point_compression(load, radius, reduced_modulus)
 
 
 def line_stiffness(
     load: float, length: float, radius: float, reduced_modulus: float, depth: float
 ) -> float:
-    """Incremental stiffness dF/dδ of cylinder on plane [N/m], δ from points `depth` away: π E* L / (2 ln(2d/a)).
+    """Return the stiffness dF/dδ of cylinder on plane [N/m]: π E* L / (2 ln(2d/a)).
 
-    From δ = (P'/πE*) (2 ln(2d/a) + 1), a ~ sqrt(P'). Source: K. L. Johnson, Contact Mechanics
-    (1985), section 5.6.
+    δ is the approach of points at the depth d = `depth`: δ = (P'/πE*) (2 ln(2d/a) + 1), a ~
+    sqrt(P'). Source: K. L. Johnson, Contact Mechanics (1985), section 5.6.
     """
     half_width = line_contact(load, length, radius, reduced_modulus).half_widths[0]
     return float(np.pi * reduced_modulus * length / (2.0 * np.log(2.0 * depth / half_width)))
 
 
 def line_pressure(x: Field, half_width: float, p_max: float) -> Field:
-    """Pressure of a line contact at x [Pa]: p_h sqrt(1 - (x/a)^2) inside |x| < a, zero outside."""
+    """Return the pressure of a line contact at x [Pa]: p_h sqrt(1 - (x/a)^2), zero for |x| > a."""
     return np.asarray(p_max * np.sqrt(np.maximum(1.0 - (x / half_width) ** 2, 0.0)))
 
 
 def ellipse_pressure(x: Field, y: float, half_widths: tuple[float, float], p_max: float) -> Field:
-    """Pressure of a point or elliptic contact along the line at y [Pa]: p_h sqrt(1 - (x/a)^2 - (y/b)^2), 0 outside.
+    """Return the pressure of a point or elliptic contact along the line at y [Pa].
 
+    p = p_h sqrt(1 - (x/a)^2 - (y/b)^2), zero outside.
     Source: K. L. Johnson, Contact Mechanics (1985), section 3.2 and eq. 4.24.
     """
     a, b = half_widths
@@ -129,7 +129,10 @@ def ellipse_pressure(x: Field, y: float, half_widths: tuple[float, float], p_max
 
 
 def line_gap(x: Field, half_width: float, radius: float) -> Field:
-    """Gap of a dry line contact at x [m], zero inside: a²/(2R) (X √(X²−1) − ln(X + √(X²−1))), X = |x|/a."""
+    """Return the gap of a dry line contact at x [m], zero inside.
+
+    h = a²/(2R) (X √(X²−1) − ln(X + √(X²−1))), X = |x|/a.
+    """
     outside = np.maximum(np.abs(x) / half_width, 1.0)
     root = np.sqrt(outside**2 - 1.0)
     return np.asarray(half_width**2 / (2.0 * radius) * (outside * root - np.log(outside + root)))

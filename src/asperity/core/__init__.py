@@ -1,1 +1,1 @@
-"""What every room uses: errors, arrays, files, limits, processes, storage, quantities, signals."""
+"""Shared basics: errors, arrays, files, limits, processes, storage, quantities and signals."""

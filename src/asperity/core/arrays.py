@@ -1,4 +1,4 @@
-"""The array types every layer speaks, and numbers as JSON holds them."""
+"""Array types of all layers, and the JSON form of a number."""
 
 import math
 from typing import Any, TypeAlias
@@ -12,5 +12,5 @@ Codes: TypeAlias = npt.NDArray[np.int8]
 
 
 def finite_or_none(value: float | None) -> float | None:
-    """A number as JSON holds it: None for nan and infinity."""
+    """Return the number as a float; None if it is missing, nan or infinite (JSON has neither)."""
     return float(value) if value is not None and math.isfinite(value) else None

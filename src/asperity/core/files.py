@@ -1,4 +1,4 @@
-"""What all that writes files and folders shares: whole or not at all, refused before the work, versions beside it."""
+"""Files and folders: atomic writing, checks before long computations, and version records."""
 
 import os
 from collections.abc import Iterator
@@ -12,15 +12,15 @@ from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 if TYPE_CHECKING:
     import pandas
 
-FORMULAS = ("=", "+", "-", "@", "\t", "\r")  # what begins one in a spreadsheet
+FORMULAS = ("=", "+", "-", "@", "\t", "\r")  # first characters of a spreadsheet formula
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Yield a temporary path in the same folder, renamed to `path` when all went well and removed when not.
+def atomic_write(path: Path) -> Iterator[Path]:
+    """Yield a temporary path in the same folder; rename it to `path` on success, else remove it.
 
-    Raises BadInput as `require_writable`, AsperityError if the system refuses to write, as on a
-    full disk.
+    Raises BadInput as `require_writable`, AsperityError if the system cannot write, as on a full
+    disk.
     """
     require_writable(path)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -39,46 +39,46 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all; raises as `whole_file`."""
-    with whole_file(path) as part:
+    """Write a file atomically; raises as `atomic_write`."""
+    with atomic_write(path) as part:
         part.write_bytes(content)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all; raises as `whole_file`."""
+    """Write a text file atomically; raises as `atomic_write`."""
     write_bytes(path, text.encode())
 
 
 def write_csv(path: Path, table: "pandas.DataFrame") -> None:
-    """Write a table as csv, whole or not at all; raises as `whole_file`.
+    """Write a table as csv atomically; raises as `atomic_write`.
 
-    Text that a spreadsheet would take for a formula begins with an apostrophe: names and units are
-    other people's.
+    Text that a spreadsheet would evaluate as a formula gets a leading apostrophe, because names and
+    units come from untrusted files.
     """
-    told = table.select_dtypes(exclude=["number", "bool"]).columns
-    safe = table.assign(**{name: table[name].map(_no_formula) for name in told})
+    text_columns = table.select_dtypes(exclude=["number", "bool"]).columns
+    safe = table.assign(**{name: table[name].map(_escape_formula) for name in text_columns})
     write_text(path, safe.to_csv(index=False, lineterminator="\n"))
 
 
-def _no_formula(value: Any) -> Any:
+def _escape_formula(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(FORMULAS) else value
 
 
 def require_file(path: Path) -> None:
-    """Raise UnreadableFile for what is no file to be read to its end: nothing, a folder, a pipe or a device."""
+    """Raise UnreadableFile unless `path` is a regular file (no folder, pipe or device)."""
     if path.is_file():
         return
     if path.is_dir():
         raise UnreadableFile(f"{path} is a folder; name a file")
     if path.exists():
         raise UnreadableFile(
-            f"{path} is a pipe or a device; write what it gives to a file, and name that"
+            f"{path} is a pipe or a device; save its content to a file and name that file"
         )
     raise UnreadableFile(f"{path} does not exist; check its name")
 
 
 def require_writable(path: Path) -> None:
-    """Raise BadInput for a path that could not be written, before the work that would be lost."""
+    """Raise BadInput for a path that cannot be written; call it before a long computation."""
     folder = path.parent
     if not folder.is_dir():
         raise BadInput(f"cannot write {path}: the folder {folder} does not exist; make it first")
@@ -89,7 +89,7 @@ def require_writable(path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder to write into, if it is not there; raises BadInput where that cannot be."""
+    """Create a folder if it is missing; raise BadInput if that is impossible."""
     if path.exists() and not path.is_dir():
         raise BadInput(f"cannot write into {path}: it is a file; name a folder")
     try:
@@ -99,7 +99,7 @@ def make_folder(path: Path) -> None:
 
 
 def user_cache() -> Path:
-    """Where is kept for a user what takes long to work out, and may be deleted."""
+    """Return the user's cache folder; its content can be deleted and computed again."""
     base = os.environ.get("XDG_CACHE_HOME") or (
         os.environ.get("LOCALAPPDATA") if os.name == "nt" else None
     )
@@ -107,10 +107,8 @@ def user_cache() -> Path:
 
 
 def versions() -> dict[str, str]:
-    """Versions of what decides numbers, to stand beside them."""
-    from importlib.metadata import (
-        version,
-    )  # here: it takes longer to load than the rest of the room
+    """Return the versions of the packages that affect numerical results."""
+    from importlib.metadata import version  # slow import
 
     return {
         **{name: version(name) for name in ("asperity", "numpy", "scipy", "numba")},

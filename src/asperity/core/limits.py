@@ -1,7 +1,7 @@
-"""How much memory and time a piece of work may take: worked out beforehand, and refused in a sentence where it is more.
+"""Limits on memory and time, estimated and checked before the computation starts.
 
-`ASPERITY_MEMORY_GB` and `ASPERITY_DAYS` raise the limits (or lower them); worker processes inherit
-them.
+The environment variables `ASPERITY_MEMORY_GB` and `ASPERITY_DAYS` override the limits; worker
+processes inherit them.
 """
 
 import math
@@ -11,15 +11,15 @@ from pathlib import Path
 from asperity.core.errors import BadInput, UnreadableFile
 
 MEMORY, DAYS = "ASPERITY_MEMORY_GB", "ASPERITY_DAYS"
-SMALL_FILE = 256e6  # bytes that any file may unpack to
-MOST_PACKED = 50.0  # times that a larger one may grow: measured data are not packed more tightly
-READING = 12.0  # times its size, that a reader may take of memory: text that becomes numbers
-LONGEST_DAYS = 30.0
+UNPACKED_BYTES = 256e6  # any file may unpack to this size
+UNPACKING_RATIO = 50.0  # largest expansion of a larger file; measured data compress less
+READING_RATIO = 12.0  # memory of a reader over the file's size, for text that becomes numbers
+DEFAULT_DAYS = 30.0
 GIGABYTE = 1e9
-_SHARE = 0.8  # of the machine's memory
+_MEMORY_SHARE = 0.8  # of the machine's memory
 
 
-def _stated(variable: str) -> float | None:
+def _environment_value(variable: str) -> float | None:
     text = os.environ.get(variable, "").strip()
     if not text:
         return None
@@ -35,65 +35,65 @@ def _stated(variable: str) -> float | None:
 
 
 def memory_limit() -> float:
-    """Bytes that a computation may take: what is stated, or four fifths of the machine's memory."""
-    stated = _stated(MEMORY)
+    """Return the memory limit [bytes]: the environment variable, or 80 % of the machine memory."""
+    stated = _environment_value(MEMORY)
     if stated is not None:
         return stated * GIGABYTE
     limits = [_physical_memory()]
     for name in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         try:
             limits.append(float(Path(name).read_text("ascii")))
-        except (OSError, ValueError):  # no such system, or "max"
+        except (OSError, ValueError):  # no cgroup, or "max"
             continue
-    return _SHARE * min(limits)
+    return _MEMORY_SHARE * min(limits)
 
 
 def _physical_memory() -> float:
     try:
         return float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):  # not on every system
+    except (AttributeError, ValueError, OSError):  # not available on every system
         return 16.0 * GIGABYTE
 
 
-def require_affordable(what: str, *, memory: float = 0.0, seconds: float = 0.0) -> None:
-    """Refuse what would take more bytes or seconds than there are.
+def require_affordable(task: str, *, memory: float = 0.0, seconds: float = 0.0) -> None:
+    """Raise BadInput if a task would exceed the memory or time limit.
 
     Parameters
     ----------
-    what : the thing and its value, as the sentence begins with it
-    memory, seconds : estimates, of which an infinite or unknown one is too much
+    task : subject of the message, with its value
+    memory, seconds : estimates [bytes, s]; infinite and nan exceed every limit
     """
-    most, days = memory_limit(), _stated(DAYS) or LONGEST_DAYS
-    if not memory <= most:
+    limit, days = memory_limit(), _environment_value(DAYS) or DEFAULT_DAYS
+    if not memory <= limit:
         raise BadInput(
-            f"{what} would take about {memory / GIGABYTE:.2g} GB of memory, where {most / GIGABYTE:.2g} GB may be "
-            f"used; ask for less, or set {MEMORY}"
+            f"{task} would take about {memory / GIGABYTE:.2g} GB of memory, more than the limit of "
+            f"{limit / GIGABYTE:.2g} GB; reduce it, or set {MEMORY}"
         )
     if not seconds <= 86400.0 * days:
         raise BadInput(
-            f"{what} would take about {seconds / 86400.0:.2g} days, where {days:g} may be used; "
-            f"ask for less, or set {DAYS}"
+            f"{task} would take about {seconds / 86400.0:.2g} days, more than the limit of "
+            f"{days:g}; reduce it, or set {DAYS}"
         )
 
 
 def unpacked_limit(stored: int) -> float:
-    """Bytes that a file of so many stored bytes may unpack to."""
-    stated = _stated(MEMORY)
-    return max(SMALL_FILE, MOST_PACKED * stored) if stated is None else stated * GIGABYTE
+    """Return the largest unpacked size [bytes] of a file of `stored` bytes."""
+    stated = _environment_value(MEMORY)
+    return max(UNPACKED_BYTES, UNPACKING_RATIO * stored) if stated is None else stated * GIGABYTE
 
 
 def reading_limit(stored: int) -> float:
-    """Bytes of memory that a reader of such a file may take, which holds all of it at once."""
-    stated = _stated(MEMORY)
+    """Return the memory [bytes] that a reader may use, which holds the whole file at once."""
+    stated = _environment_value(MEMORY)
     return (
-        min(max(2.0 * SMALL_FILE, READING * stored), memory_limit())
+        min(max(2.0 * UNPACKED_BYTES, READING_RATIO * stored), memory_limit())
         if stated is None
         else stated * GIGABYTE
     )
 
 
 def stored_size(path: Path) -> int:
-    """Bytes that a file takes on the disk: fewer than it claims where it has holes; of a folder, all files in it."""
+    """Return the bytes on disk of a file (a sparse file has fewer than its size) or folder."""
     if path.is_dir():
         return sum(stored_size(file) for file in path.rglob("*") if file.is_file())
     status = path.stat()
@@ -101,11 +101,12 @@ def stored_size(path: Path) -> int:
 
 
 def require_unpacked(path: Path, declared: float, remedy: str) -> None:
-    """Refuse a file that claims to hold far more than it stores, before anything is unpacked."""
+    """Raise UnreadableFile if a file declares far more content than it stores (a zip bomb)."""
     stored = stored_size(path)
     limit = unpacked_limit(stored)
     if declared > limit:
         raise UnreadableFile(
-            f"{path.name} of {stored / GIGABYTE:.2g} GB claims to hold {declared / GIGABYTE:.2g} GB, where "
-            f"{limit / GIGABYTE:.2g} GB may be unpacked; {remedy}, or set {MEMORY} if it is right"
+            f"{path.name} of {stored / GIGABYTE:.2g} GB declares {declared / GIGABYTE:.2g} GB of "
+            f"content, more than the limit of {limit / GIGABYTE:.2g} GB; {remedy}, or set {MEMORY} "
+            "if the file is correct"
         )

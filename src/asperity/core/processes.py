@@ -1,8 +1,4 @@
-"""What all that starts processes needs: how many, that Ctrl-C is the parent's business, and that they end with it.
-
-And what all processes want: not to search for garbage or ask for memory again and again, and to
-end at once.
-"""
+"""Worker processes (number, interrupts, end with the parent) and memory settings of processes."""
 
 import atexit
 import ctypes
@@ -12,50 +8,51 @@ import signal
 import sys
 import threading
 
-GARBAGE_FROM = (
-    300_000  # objects; libraries make half as many while they load, and each search takes 0.03 s
-)
-KEPT = {-1: 128 << 20, -3: 32 << 20}  # M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of malloc.h, in bytes
+# Threshold of the garbage collector [objects]: imports create half as many, and each collection
+# takes 0.03 s
+GC_THRESHOLD = 300_000
+# M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of malloc.h [bytes]
+MALLOC_OPTIONS = {-1: 128 << 20, -3: 32 << 20}
 
 
 def cores() -> int:
-    """Processors that this process may use."""
+    """Return the number of processors available to this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def save_time() -> None:
-    """Search for garbage seldom, and not at the end, where that takes 0.2 s; keep memory that is freed.
+def tune_memory_use() -> None:
+    """Collect garbage rarely and not at exit (0.2 s), and let malloc keep freed memory.
 
-    A solve frees and asks for the same fields again and again, and the system clears what it hands
-    out. glibc only.
+    A solve allocates and frees the same fields repeatedly, and the system clears each new page.
+    The malloc options need glibc.
     """
-    gc.set_threshold(GARBAGE_FROM)
+    gc.set_threshold(GC_THRESHOLD)
     atexit.register(gc.freeze)
     if (
         sys.platform == "linux"
-        and (keep := getattr(ctypes.CDLL(None), "mallopt", None)) is not None
+        and (mallopt := getattr(ctypes.CDLL(None), "mallopt", None)) is not None
     ):
-        for what, size in KEPT.items():
-            keep(what, size)
+        for option, size in MALLOC_OPTIONS.items():
+            mallopt(option, size)
 
 
-def leave_interrupts_to_the_parent() -> None:
+def ignore_interrupts() -> None:
     """Ignore Ctrl-C in a worker process: the parent stops it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def set_up_worker() -> None:
-    """Leave Ctrl-C to the parent, and end with it: a parent that is killed cannot tell its workers to stop."""
-    import multiprocessing  # here, and below: only those who start processes need it
+    """Ignore Ctrl-C and exit with the parent, which cannot stop its workers if it is killed."""
+    import multiprocessing  # slow import, not needed without workers
 
-    leave_interrupts_to_the_parent()
-    save_time()
+    ignore_interrupts()
+    tune_memory_use()
     parent = multiprocessing.parent_process()
     if parent is not None:
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+        threading.Thread(target=_exit_with_parent, args=(parent.sentinel,), daemon=True).start()
 
 
-def _end_with(sentinel: int) -> None:
+def _exit_with_parent(sentinel: int) -> None:
     from multiprocessing.connection import wait
 
     wait([sentinel])

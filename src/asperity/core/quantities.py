@@ -1,7 +1,7 @@
-"""The one catalogue of quantities: what each is called, its unit, how it is shown and which field holds its deviation.
+"""Catalogue of quantities: name, unit, display format and key of the standard deviation.
 
-`quantities.csv` has a line each. Tables, pages, axes, tiles, JSON, netCDF and docs select keys
-here and add nothing. Parameters of laws say their unit and symbol beside the parameter, as
+`quantities.csv` has a line for each quantity. Tables, pages, axes, JSON, netCDF and docs take
+labels and units only from here. Parameters of laws carry unit and symbol in their annotation, as
 `Parameter`.
 """
 
@@ -16,9 +16,9 @@ from typing import Any, get_type_hints
 from asperity.core.errors import require_positive
 
 NO_VALUE = "–"
-BOUNDED = ("load", "film")  # groups of what is never negative: shares, mostly at most 1, and films
+BOUNDED = ("load", "film")  # groups of non-negative quantities: shares and film thicknesses
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-# display units over their SI unit; any other display unit is the SI unit itself
+# display units per SI unit; any other display unit is the SI unit itself
 _FACTORS = {
     "%": 1e2,
     "nm": 1e9,
@@ -41,22 +41,22 @@ _FACTORS |= {
     "mPa s": 1e3,
 }
 _FACTORS |= {"mm³": 1e9, "°": 180.0 / math.pi, "h": 1.0 / 3600.0, "10⁶ turns": 1e-6}
-_DISPLAYS = {
+_DISPLAYS = {  # display units of laws' parameters, where not the SI unit
     "Pa": "MPa",
     "1/Pa": "1/GPa",
     "kg/m^3": "kg/m³",
-}  # of laws' parameters, where it is not the SI unit
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """A line of the catalogue.
+    """An entry of the catalogue.
 
-    `unit` is that of the stored number (SI, as netCDF writes it), `display` the one people read,
-    `form` a format specification for the number in it. `deviation` is the key that holds the
-    standard deviation or error bar. `group` is the table it belongs to; `source` the attribute
-    that it is read from, of a solved case or of what else the group is about; `detail` keeps it
-    out of short tables. `standard_name` is CF's, where CF has one.
+    `unit` is that of the stored number (SI, in netCDF notation), `display` the unit in tables and
+    figures, `form` the format specification in that unit. `deviation` is the key of the standard
+    deviation or error bar. `group` is the table of the quantity; `source` the attribute path in a
+    solved case or other owner of the group; `detail` excludes it from short tables.
+    `standard_name` is the CF name, if any.
     """
 
     key: str
@@ -74,37 +74,37 @@ class Quantity:
 
     @property
     def factor(self) -> float:
-        """What a stored number is multiplied with to be in the display unit."""
+        """Display units per stored unit."""
         return 1.0 if self.display == self.unit else _FACTORS.get(self.display, 1.0)
 
     @property
     def title(self) -> str:
-        """Name and symbol: "load share of asperities, CLR"."""
+        """Name and symbol: "asperity load share, CLR"."""
         return f"{self.name}, {self.symbol}" if self.symbol else self.name
 
     @property
     def short(self) -> str:
-        """Its symbol, or its name where it has none."""
+        """Symbol, or name if there is none."""
         return self.symbol or self.name
 
     @property
     def label(self) -> str:
-        """What an axis is called: symbol or name, and display unit."""
+        """Short axis label: symbol or name, and display unit."""
         return f"{self.short} [{self.display}]" if self.display else self.short
 
     @property
     def axis(self) -> str:
-        """What an axis with room for it is called: name and symbol, and display unit."""
+        """Long axis label: name and symbol, and display unit."""
         return f"{self.title} [{self.display}]" if self.display else self.title
 
     @property
     def attributes(self) -> dict[str, str]:
-        """What netCDF says of it, by the CF conventions."""
+        """Attributes of the netCDF variable, by the CF conventions."""
         known = {"long_name": self.title, "units": self.unit, "standard_name": self.standard_name}
         return {name: text for name, text in known.items() if text}
 
-    def at(self, owner: Any) -> Any:
-        """What stands at `source` in its owner; None where something on the way is None."""
+    def value_from(self, owner: Any) -> Any:
+        """Return the value at the path `source` in its owner; None if a part of it is None."""
         for name in self.source.split("."):
             if owner is None:
                 return None
@@ -112,7 +112,7 @@ class Quantity:
         return owner
 
     def number(self, value: Any, deviation: float | None = None) -> str:
-        """A stored value as people read it, without its unit: "84.0 ± 2.4"; `NO_VALUE` for None and nan."""
+        """Format a stored value without its unit: "84.0 ± 2.4"; `NO_VALUE` for None and nan."""
         if isinstance(value, bool | str):
             return value if isinstance(value, str) else "yes" if value else "NO"
         if value is None or not math.isfinite(value):
@@ -122,12 +122,12 @@ class Quantity:
         )
 
     def text(self, value: Any, deviation: float | None = None) -> str:
-        """A stored value with its unit: "84.0 ± 2.4 %"."""
+        """Format a stored value with its unit: "84.0 ± 2.4 %"."""
         number = self.number(value, deviation)
         return number if number == NO_VALUE or not self.display else f"{number} {self.display}"
 
     def interval(self, low: float, high: float) -> str:
-        """From where to where, with its unit and no more digits than its width bears: "55.1 to 69.9 %"."""
+        """Format an interval with its unit, digits by its width: "55.1 to 69.9 %"."""
         return f"{self._span(low, high)} {self.display}".rstrip()
 
     def _span(self, low: float, high: float) -> str:
@@ -139,39 +139,41 @@ class Quantity:
         return " to ".join(with_deviation(end * self.factor, None, form) for end in (low, high))
 
     def named(self, value: Any, deviation: float | None = None) -> str:
-        """A stored value behind its symbol: "CLR 84.0 ± 2.4 %"."""
+        """Format a stored value after its symbol: "CLR 84.0 ± 2.4 %"."""
         return f"{self.short} {self.text(value, deviation)}"
 
     @property
     def ends(self) -> tuple[str, str]:
-        """Keys of the ends of its 90 % interval, where a row has one: `crf_low_hz` and `crf_high_hz` of `crf_hz`."""
+        """Keys of the ends of the 90 % interval: `crf_low_hz` and `crf_high_hz` of `crf_hz`."""
         stem, unit = (
             (self.key.removesuffix("_hz"), "_hz") if self.key.endswith("_hz") else (self.key, "")
         )
         return f"{stem}_low{unit}", f"{stem}_high{unit}"
 
     def number_in(self, values: Mapping[str, Any]) -> str:
-        """Its number in a row, a run's or a table's: "61.3 (44 to 78)", or "61.3 ± 2.4".
+        """Format its number in a row of a run or table: "61.3 (44 to 78)", or "61.3 ± 2.4".
 
-        One that has a whole interval, known or not, bears no deviation: that would be a part of
-        the doubt alone. A share or film whose deviation reaches beyond what it can be has the
-        interval that is left: "0.2 (0.0 to 7.1)".
+        A quantity with keys for an interval shows no deviation, which is only a part of the
+        uncertainty. A share or film thickness whose deviation exceeds the physical range shows the
+        clipped interval: "0.2 (0.0 to 7.1)".
         """
         value, (low, high) = values.get(self.key), (values.get(end) for end in self.ends)
         if self.ends[0] not in values:
             deviation = values.get(self.deviation)
-            left = self.left(value, deviation)
+            clipped = self.clipped_interval(value, deviation)
             return (
                 self.number(value, deviation)
-                if left is None
-                else f"{self.number(value)} ({self._span(*left)})"
+                if clipped is None
+                else f"{self.number(value)} ({self._span(*clipped)})"
             )
         if value is None or low is None or high is None:
             return self.number(value)
         return f"{self.number(value)} ({self._span(low, high)})"
 
-    def left(self, value: float | None, deviation: float | None) -> tuple[float, float] | None:
-        """The interval that is left of a share or film whose deviation reaches beyond what it can be; else None."""
+    def clipped_interval(
+        self, value: float | None, deviation: float | None
+    ) -> tuple[float, float] | None:
+        """Return value ± deviation clipped to the physical range; None where nothing is clipped."""
         if (
             self.group not in BOUNDED
             or value is None
@@ -184,17 +186,16 @@ class Quantity:
         return None if (low, high) == (value - deviation, value + deviation) else (low, high)
 
     def text_in(self, values: Mapping[str, Any]) -> str:
-        """The same with its unit: "61.3 (44 to 78) %"."""
+        """Format its number in a row with its unit: "61.3 (44 to 78) %"."""
         number = self.number_in(values)
         return number if number == NO_VALUE or not self.display else f"{number} {self.display}"
 
 
 def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> str:
-    """A value, its deviation where one is known and shows, and the power of ten of both.
+    """Format a value with its deviation, if known and visible, and their common power of ten.
 
-    A fixed number of decimals (`.1f`) is what to show at most; `.3g` and `.1e` go over to powers
-    of ten where a number is small or large. The deviation has two digits and the value ends where
-    it does.
+    A fixed number of decimals (`.1f`) is an upper limit; `.3g` and `.1e` use powers of ten for
+    small and large numbers. The deviation has two digits, the value the same number of decimals.
     """
     exponent = math.floor(math.log10(abs(value))) if value and not form.endswith("f") else 0
     if not form.endswith("e") and -3 <= exponent < 6:
@@ -215,7 +216,7 @@ def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> 
 
 
 def in_print(text: str) -> str:
-    """Prose with 1.3e-05 as 1.3×10⁻⁵, um as µm, and numbers that stay on one line with their unit."""
+    """Typeset prose: 1.3e-05 as 1.3×10⁻⁵, um as µm, and no line break before a unit."""
     text = re.sub(r"\bum\b|(?<=\d )us\b", lambda unit: f"µ{unit[0][1]}", text)
     text = re.sub(
         r"\b\d(\.\d+)?e[+-]\d+",
@@ -227,8 +228,8 @@ def in_print(text: str) -> str:
 
 @cache
 def catalogue() -> dict[str, Quantity]:
-    """Every quantity by its key, in the order in which tables have them."""
-    from importlib.resources import files  # here: `asperity --help` shows no quantity
+    """Return all quantities by key, in the order of tables."""
+    from importlib.resources import files  # slow import, not needed by `asperity --help`
 
     lines = files("asperity.core").joinpath("quantities.csv").read_text("utf-8").splitlines()
     return {
@@ -237,7 +238,11 @@ def catalogue() -> dict[str, Quantity]:
 
 
 def quantity(key: str) -> Quantity:
-    """The quantity of this key; `crf_sound_hz` is `crf_hz` by the vibration preset sound, `sq_1_m` `sq_m` of body 1."""
+    """Return the quantity of a key.
+
+    A key may name a vibration preset (`crf_sound_hz`: `crf_hz` of the preset sound) or a body
+    (`sq_1_m`: `sq_m` of body 1).
+    """
     known = catalogue()
     if key in known:
         return known[key]
@@ -259,18 +264,18 @@ def quantity(key: str) -> Quantity:
 
 
 def lines(*groups: str) -> list[Quantity]:
-    """Every quantity of these groups, deviations and details too."""
+    """Return all quantities of these groups, including deviations and details."""
     return [entry for entry in catalogue().values() if entry.group in groups]
 
 
 def read(owner: object, entries: Iterable[Quantity]) -> dict[str, Any]:
-    """Numbers by key, each at the `source` that its line names in the owner; None where there is none or it is nan."""
-    numbers = ((entry.key, entry.at(owner)) for entry in entries if entry.source)
+    """Return numbers by key, each read from the owner at its `source`; None if missing or nan."""
+    numbers = ((entry.key, entry.value_from(owner)) for entry in entries if entry.source)
     return {key: None if isinstance(n, float) and not math.isfinite(n) else n for key, n in numbers}
 
 
 def select(*groups: str, detail: bool = False) -> list[Quantity]:
-    """The quantities of these groups, deviations left out; those in `detail` too where asked."""
+    """Return the quantities of these groups without deviations; details only with `detail`."""
     deviations = {entry.deviation for entry in catalogue().values()}
     return [
         entry
@@ -281,9 +286,9 @@ def select(*groups: str, detail: bool = False) -> list[Quantity]:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """Unit [SI] and symbol of a law's parameter, beside it: `eta0: Annotated[float, Parameter("Pa s", "η₀")]`.
+    """Unit [SI] and symbol of a parameter: `eta0: Annotated[float, Parameter("Pa s", "η₀")]`.
 
-    `positive` is what messages call a parameter that has to be positive; see `Parametric`.
+    `positive` is the name, in messages, of a parameter that must be positive; see `Parametric`.
     """
 
     unit: str = ""
@@ -291,7 +296,7 @@ class Parameter:
     positive: str = ""
 
     def text(self, value: object) -> str:
-        """A value in SI as people read it, with its unit: "18.2 1/GPa"; what is no number as it stands."""
+        """Format an SI value in its display unit: "18.2 1/GPa"; other values unchanged."""
         if isinstance(value, bool | str) or not isinstance(value, int | float):
             return str(value)
         display = _DISPLAYS.get(self.unit, self.unit)
@@ -299,22 +304,22 @@ class Parameter:
 
 
 def parameters(law: type) -> Mapping[str, Parameter]:
-    """The fields of a law by name, each with its unit and symbol; a field that states none is a plain number."""
-    return _stated(law)
+    """Return the parameters of a law by name; a field without annotation is dimensionless."""
+    return _annotated_parameters(law)
 
 
-@cache  # every case of a study and every surface asks a dozen laws: 8 ms of evaluated hints
-def _stated(law: type) -> Mapping[str, Parameter]:
+@cache  # a study uses a dozen laws per case; evaluating their hints takes 8 ms
+def _annotated_parameters(law: type) -> Mapping[str, Parameter]:
     hints = get_type_hints(law, include_extras=True)
-    marks = {entry.name: getattr(hints[entry.name], "__metadata__", ()) for entry in fields(law)}
+    metadata = {entry.name: getattr(hints[entry.name], "__metadata__", ()) for entry in fields(law)}
     return {
-        name: next((mark for mark in of if isinstance(mark, Parameter)), Parameter())
-        for name, of in marks.items()
+        name: next((mark for mark in marks if isinstance(mark, Parameter)), Parameter())
+        for name, marks in metadata.items()
     }
 
 
 class Parametric:
-    """A dataclass with parameters; BadInput for one that has to be positive and is not, where it is not left out."""
+    """Base of dataclasses with parameters; raises BadInput for one that must be positive."""
 
     __slots__ = ()
 

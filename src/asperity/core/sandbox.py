@@ -1,8 +1,7 @@
-"""Readers that cannot be trusted with damaged files, in a process of their own: there they may crash, hang or swell.
+"""Readers in a subprocess, where a damaged file may crash them, hang them or exhaust memory.
 
-One process serves all reads of its parent and ends with it. It is started when it is first needed;
-a read that it does not survive, or that takes too long, is a sentence, and the next one starts
-another.
+One subprocess serves all reads of its parent and ends with it. It starts with the first read and
+again after a crash or timeout, which the caller gets as UnreadableFile.
 """
 
 import atexit
@@ -24,68 +23,76 @@ from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.limits import GIGABYTE, MEMORY, reading_limit, stored_size
 from asperity.core.third_party import first_line
 
-SECONDS, A_MEGABYTE = (
-    12.0,
-    1.0,
-)  # of a processor that a read may take: at all, and for every megabyte of the file
-PATIENCE = 4.0  # times that by the clock, for a machine that has other work
-LOADING_S = 300.0  # by the clock, in which a library must be there
+BASE_SECONDS = 12.0  # processor time of a read
+SECONDS_PER_MEGABYTE = 1.0  # additional processor time, by the file's size
+WALL_CLOCK_FACTOR = 4.0  # wall-clock over processor time, for a busy machine
+EXIT_TIMEOUT_S = 4.0  # wall-clock limit for a crashed subprocess to end
+LOADING_S = 300.0  # wall-clock limit for importing a library
 _START = "import sys; sys.path[:] = sys.argv[1:]; from asperity.core.sandbox import serve; serve()"
 
 
-def read_apart(path: Path, reader: str, *arguments: Any, remedy: str, library: str = "") -> Any:
-    """What a reader ("module:function") makes of the absolute `path` of a file and further arguments.
+def read_in_subprocess(
+    path: Path, reader: str, *arguments: Any, remedy: str, library: str = ""
+) -> Any:
+    """Return `reader(path, *arguments)`, run in the subprocess.
 
-    The `library` that it needs is loaded before, in time of its own.
+    Parameters
+    ----------
+    path : absolute path of the file
+    reader : "module:function"
+    remedy : end of the message of UnreadableFile
+    library : module to import before the read; its import has a time limit of its own
 
     Raises
     ------
     BadInput
-        as the reader raises it.
+        Raised by the reader.
     ImportError
-        where it needs a library that is not installed.
+        The reader needs a library that is not installed.
     UnreadableFile
-        for whatever else becomes of the reader; it ends with the remedy.
+        The reader failed, crashed, or exceeded its time or memory.
     """
     stored = stored_size(path)
-    memory, seconds = reading_limit(stored), SECONDS + A_MEGABYTE * stored / 1e6
+    memory, seconds = reading_limit(stored), BASE_SECONDS + SECONDS_PER_MEGABYTE * stored / 1e6
     limits = (memory, seconds)
-    server = _serving()
-    if library:  # before the read, whose time it is not
-        server.ask(("asperity.core.sandbox:load", (library,), (math.inf, math.inf)), LOADING_S)
-    fate, told = server.ask((reader, (path, *arguments), limits), PATIENCE * seconds)
-    if fate == "read":
-        return told
-    if fate == "refused":
-        refusal: BadInput = told
+    server = _current_server()
+    if library:  # outside the time limit of the read
+        server.request(("asperity.core.sandbox:load", (library,), (math.inf, math.inf)), LOADING_S)
+    outcome, content = server.request(
+        (reader, (path, *arguments), limits), WALL_CLOCK_FACTOR * seconds
+    )
+    if outcome == "read":
+        return content
+    if outcome == "refused":
+        refusal: BadInput = content
         raise refusal
-    if fate == "missing":
-        raise ImportError(told)
+    if outcome == "missing":
+        raise ImportError(content)
     raise UnreadableFile(
         {
-            "failed": f"{path.name} is damaged ({told}); {remedy}",
+            "failed": f"{path.name} is damaged ({content}); {remedy}",
             "late": f"{path.name} took longer than {seconds:.0f} s to read; {remedy}",
-            "full": f"{path.name} needs more than {memory / GIGABYTE:.2g} GB of memory to be read; {remedy}, or set "
-            f"{MEMORY} if it is right",
-            "died": f"{path.name} is damaged: its reader crashed on it; {remedy}",
-        }[fate]
+            "full": f"{path.name} needs more than {memory / GIGABYTE:.2g} GB of memory to be read; "
+            f"{remedy}, or set {MEMORY} if the file is correct",
+            "died": f"{path.name} is damaged: its reader crashed; {remedy}",
+        }[outcome]
     )
 
 
-# The parent's side
-# ----------------------------------------------------------------------------------------------------
+# Parent process
+# ------------------------------------------------------------------------------------------
 
 
 class _Server:
-    """The process that reads, as its parent sees it."""
+    """The parent's handle on the reading subprocess."""
 
     def __init__(self) -> None:
         self.parent = os.getpid()
         self.lock = threading.Lock()
         self.process: subprocess.Popen[bytes] | None = None
 
-    def ask(self, request: Any, seconds: float) -> tuple[str, Any]:
-        """What became of a request, and what was made of it."""
+    def request(self, message: Any, seconds: float) -> tuple[str, Any]:
+        """Send a request; return its outcome and content."""
         with self.lock:
             if self.process is None:
                 self.process = subprocess.Popen(
@@ -106,20 +113,18 @@ class _Server:
             timer.daemon = True
             timer.start()
             try:
-                pickle.dump(request, process.stdin, 5)
+                pickle.dump(message, process.stdin, 5)
                 process.stdin.flush()
                 answer: tuple[str, Any] = pickle.load(process.stdout)
             except (EOFError, OSError, pickle.UnpicklingError):
                 with suppress(subprocess.TimeoutExpired):
-                    process.wait(PATIENCE)
+                    process.wait(EXIT_TIMEOUT_S)
                 code = process.returncode
                 self.end()
                 return (
                     "late" if late.is_set() or code == -getattr(signal, "SIGXCPU", 0) else "died"
                 ), None
-            except (
-                BaseException
-            ):  # Ctrl-C: an answer that nobody waits for must not be taken for the next one's
+            except BaseException:  # Ctrl-C: a late answer must not be taken for the next request's
                 self.end()
                 raise
             finally:
@@ -129,7 +134,7 @@ class _Server:
             return answer
 
     def end(self) -> None:
-        """Stop the process, if it runs."""
+        """Stop the subprocess if it runs."""
         process, self.process = self.process, None
         if process is None or os.getpid() != self.parent:
             return
@@ -144,25 +149,25 @@ class _Server:
 _servers: list[_Server] = []
 
 
-def _serving() -> _Server:
-    """The server of this process: one that was inherited by forking is the parent's."""
+def _current_server() -> _Server:
+    """Return the server of this process; an inherited one belongs to the parent."""
     if not _servers or _servers[0].parent != os.getpid():
         _servers[:] = [_Server()]
         atexit.register(_servers[0].end)
     return _servers[0]
 
 
-# The reader's side
-# ----------------------------------------------------------------------------------------------------
+# Reading subprocess
+# ------------------------------------------------------------------------------------------
 
 
 def serve() -> None:
-    """Answer requests on standard input until it is closed; run in the process of its own."""
+    """Answer requests from standard input until it closes; main function of the subprocess."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
-    silence = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silence, 1)
-    os.dup2(silence, 2)
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    os.dup2(null, 2)
     while True:
         try:
             reader, arguments, limits = pickle.load(sys.stdin.buffer)
@@ -173,7 +178,7 @@ def serve() -> None:
 
 
 def load(library: str) -> None:
-    """Load a library, and nothing else."""
+    """Import a library without its warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         import_module(library)
@@ -185,7 +190,7 @@ def _answer(
     module, _, name = reader.partition(":")
     try:
         function = getattr(import_module(module), name)
-        _take_at_most(memory, seconds)
+        _limit_resources(memory, seconds)
         return "read", function(*arguments)
     except BadInput as refusal:
         return "refused", type(refusal)(str(refusal))
@@ -193,23 +198,23 @@ def _answer(
         return "missing", str(error)
     except MemoryError:
         return "full", None
-    except Exception as error:  # noqa: BLE001 - whatever a library stumbles over
+    except Exception as error:  # noqa: BLE001 - any error of a library
         return "failed", first_line(error)
 
 
-def _take_at_most(memory: float, seconds: float) -> None:
-    """Let this process take so much beside what it has; where the system knows no such limits, its parent's clock."""
+def _limit_resources(memory: float, seconds: float) -> None:
+    """Limit additional memory and processor time, where the system supports such limits."""
     with suppress(ImportError, OSError, ValueError, StopIteration):
         import resource
 
-        _, most = resource.getrlimit(resource.RLIMIT_CPU)
+        _, hard = resource.getrlimit(resource.RLIMIT_CPU)
         spent = time.process_time()
-        soft = most if math.isinf(seconds) else math.ceil(spent + seconds)
-        resource.setrlimit(resource.RLIMIT_CPU, (soft, most))
+        soft = hard if math.isinf(seconds) else math.ceil(spent + seconds)
+        resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
 
         status = Path("/proc/self/status").read_text("ascii").splitlines()
-        taken = next(int(line.split()[1]) << 10 for line in status if line.startswith("VmData:"))
-        _, most = resource.getrlimit(resource.RLIMIT_DATA)
+        used = next(int(line.split()[1]) << 10 for line in status if line.startswith("VmData:"))
+        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
         resource.setrlimit(
-            resource.RLIMIT_DATA, (most if math.isinf(memory) else int(taken + memory), most)
+            resource.RLIMIT_DATA, (hard if math.isinf(memory) else int(used + memory), hard)
         )

@@ -1,8 +1,7 @@
-"""Results on disk: one digest over everything that a file holds, written with it and held against it on reading.
+"""Result files with a SHA-256 digest of their content, verified on reading.
 
-netCDF and npz files end with it, as bytes that their libraries pass over; tables have it in their
-metadata, manifests under a key. What is damaged is told from what never had a digest; folders and
-their layout are left to their stores.
+netCDF and npz files end with the digest, which their libraries ignore; tables have it in their
+metadata, JSON files under a key. Errors distinguish a damaged file from one without a digest.
 """
 
 import hashlib
@@ -24,14 +23,11 @@ if TYPE_CHECKING:
 
 MANIFEST = "manifest.json"
 _MARK, _DIGITS = b"\nasperity-sha256 ", 64
-_SEAL, _CASE = (
-    "seal",
-    "asperity_case",
-)  # keys of the digest, and of the case that a table belongs to
+_SEAL, _CASE = "seal", "asperity_case"  # keys of the digest and of a table's case
 
 
 def digest(content: Any) -> str:
-    """SHA-256 of bytes, arrays, whatever JSON can hold, and mappings of them in whatever order."""
+    """Return the SHA-256 of bytes, arrays, JSON values, or mappings of them in any order."""
     state = hashlib.sha256()
     _feed(state, content)
     return state.hexdigest()
@@ -51,49 +47,48 @@ def _feed(state: Any, content: Any) -> None:
         state.update(json.dumps(content, sort_keys=True).encode())
 
 
-def _believed(path: Path, stated: str | None, content: Any, remedy: str) -> None:
+def _verify(path: Path, stated: str | None, content: Any, remedy: str) -> None:
     if stated is None:
         raise UnreadableFile(
-            f"{path} carries no digest: it is not of this version of asperity, cut short, or changed since; {remedy}"
+            f"{path} has no digest: it is from another version of asperity, truncated or modified; "
+            f"{remedy}"
         )
     if stated != digest(content):
         raise UnreadableFile(
-            f"{path} is damaged or was changed: its digest is of other content; {remedy}"
+            f"{path} is damaged or modified: its digest does not match its content; {remedy}"
         )
 
 
 # Files of bytes
-# -------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------
 
 
-def sealed(body: bytes) -> bytes:
-    """Bytes with their digest behind them."""
+def append_digest(body: bytes) -> bytes:
+    """Return the bytes followed by their digest."""
     return body + _MARK + digest(body).encode()
 
 
-def unsealed(content: bytes, name: str, remedy: str) -> bytes:
-    """The bytes that `sealed` took; UnreadableFile, which names the thing and ends with the remedy, for any others."""
+def strip_digest(content: bytes, name: str, remedy: str) -> bytes:
+    """Return the bytes before the digest of `append_digest`; UnreadableFile on a mismatch."""
     body, mark, stated = (
         content[: -_DIGITS - len(_MARK)],
         content[-_DIGITS - len(_MARK) : -_DIGITS],
         content[-_DIGITS:],
     )
-    _believed(Path(name), stated.decode("latin-1") if mark == _MARK else None, body, remedy)
+    _verify(Path(name), stated.decode("latin-1") if mark == _MARK else None, body, remedy)
     return body
 
 
-def write_sealed(path: Path, body: bytes) -> None:
-    """Write bytes and their digest behind them, whole or not at all; raises as `files.whole_file`."""
-    write_bytes(path, sealed(body))
+def write_with_digest(path: Path, body: bytes) -> None:
+    """Write bytes followed by their digest, atomically; raises as `files.atomic_write`."""
+    write_bytes(path, append_digest(body))
 
 
-def read_sealed(path: Path, remedy: str) -> bytes:
-    """The bytes that `write_sealed` wrote; UnreadableFile, which ends with the remedy, for any others."""
+def read_with_digest(path: Path, remedy: str) -> bytes:
+    """Return the bytes that `write_with_digest` wrote; raise UnreadableFile on a mismatch."""
     require_file(path)
     try:
-        with path.open(
-            "rb"
-        ) as file:  # its end first: a file of another kind may be far too large to read
+        with path.open("rb") as file:  # end first: a file of another type may be too large to read
             body = file.seek(0, os.SEEK_END) - _DIGITS - len(_MARK)
             file.seek(max(0, body))
             end = file.read()
@@ -101,24 +96,24 @@ def read_sealed(path: Path, remedy: str) -> bytes:
             content = file.read(max(0, body)) if end.startswith(_MARK) else b""
     except OSError as error:
         raise UnreadableFile(f"{path} cannot be read: {error.strerror}; {remedy}") from None
-    _believed(
+    _verify(
         path, end[-_DIGITS:].decode("latin-1") if end.startswith(_MARK) else None, content, remedy
     )
     return content
 
 
 def netcdf_bytes(dataset: "xarray.Dataset", encoding: Mapping[str, Any]) -> bytes:
-    """A dataset as netCDF, made in memory: the HDF5 library does not survive a disk that is full."""
+    """Return a dataset as netCDF bytes, made in memory, as HDF5 crashes on a full disk."""
     buffer = BytesIO()
     dataset.to_netcdf(buffer, engine="h5netcdf", encoding=encoding)
     return buffer.getvalue()
 
 
 def read_netcdf(path: Path, remedy: str) -> "xarray.Dataset":
-    """A dataset that was written sealed, in memory; raises as `read_sealed`."""
+    """Read a netCDF file with a digest into memory; raises as `read_with_digest`."""
     import xarray
 
-    body = BytesIO(read_sealed(path, remedy))
+    body = BytesIO(read_with_digest(path, remedy))
     try:
         with xarray.open_dataset(body, engine="h5netcdf", decode_cf=False) as opened:
             return opened.load()
@@ -127,99 +122,102 @@ def read_netcdf(path: Path, remedy: str) -> "xarray.Dataset":
 
 
 # Tables
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------
 
 
 def write_table(path: Path, table: "pyarrow.Table", case: str) -> None:
-    """Write a table as parquet with page checksums, its digest and the `case` that it belongs to, whole or not at all.
+    """Write a table as parquet with page checksums, its digest and its `case`, atomically.
 
-    Raises as `files.whole_file`.
+    Raises as `files.atomic_write`.
     """
     import pyarrow.parquet
 
-    told = {**(table.schema.metadata or {}), _CASE.encode(): case.encode()}
-    table = table.replace_schema_metadata(told)
-    sealed = table.replace_schema_metadata(
-        {**told, _SEAL.encode(): digest(_columns(table)).encode()}
+    metadata = {**(table.schema.metadata or {}), _CASE.encode(): case.encode()}
+    table = table.replace_schema_metadata(metadata)
+    with_digest = table.replace_schema_metadata(
+        {**metadata, _SEAL.encode(): digest(_columns(table)).encode()}
     )
     buffer = BytesIO()
-    pyarrow.parquet.write_table(sealed, buffer, write_page_checksum=True)
+    pyarrow.parquet.write_table(with_digest, buffer, write_page_checksum=True)
     write_bytes(path, buffer.getvalue())
 
 
 def read_table(path: Path, case: str, remedy: str) -> "pyarrow.Table":
-    """The table that `write_table` wrote for that case; UnreadableFile, which ends with the remedy, for any other."""
+    """Return the table that `write_table` wrote for this case; raise UnreadableFile for others."""
     import pyarrow.parquet
 
     require_file(path)
     try:
         table = pyarrow.parquet.read_table(path, page_checksum_verification=True)
-        told = {
-            key.decode(): value.decode() for key, value in (table.schema.metadata or {}).items()
-        }
-        sealed = told.pop(_SEAL, None)
-        table = table.replace_schema_metadata(told)
+        metadata = _metadata(table)
+        stated = metadata.pop(_SEAL, None)
+        table = table.replace_schema_metadata(metadata)
         content = _columns(table)
     except Exception as error:
         raise UnreadableFile(f"{path} is damaged ({first_line(error)}); {remedy}") from error
-    _believed(path, sealed, content, remedy)
-    require_case(path, told.get(_CASE), case, remedy)
+    _verify(path, stated, content, remedy)
+    require_case(path, metadata.get(_CASE), case, remedy)
     return table
 
 
-def require_case(path: Path, theirs: str | None, case: str, remedy: str) -> None:
-    """Refuse a file of another case than the folder's that it lies in."""
-    if theirs != case:
+def require_case(path: Path, found: str | None, case: str, remedy: str) -> None:
+    """Raise UnreadableFile unless the file belongs to the case of its folder."""
+    if found != case:
         raise UnreadableFile(f"{path} belongs to another case than its folder; {remedy}")
 
 
+def _metadata(table: "pyarrow.Table") -> dict[str, str]:
+    metadata = table.schema.metadata or {}
+    return {key.decode(): value.decode() for key, value in metadata.items()}
+
+
 def _columns(table: "pyarrow.Table") -> dict[str, Any]:
-    """What a table holds: its metadata, and the type and values of each column."""
+    """Return a table's metadata, and the type and values of each column."""
     import pyarrow
 
-    told = {key.decode(): value.decode() for key, value in (table.schema.metadata or {}).items()}
-    held: dict[str, Any] = {"": [told, table.column_names]}
+    content: dict[str, Any] = {"": [_metadata(table), table.column_names]}
     for name, column in zip(table.column_names, table.columns, strict=True):
         kind = column.type
-        # a list's items are called otherwise by the file than by what was written
-        held[f"type of {name}"] = (
+        # parquet renames the items of a list type
+        content[f"type of {name}"] = (
             f"list of {kind.value_type}" if pyarrow.types.is_list(kind) else str(kind)
         )
         if pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind):
-            held[f"where {name}"] = column.is_valid().to_numpy()
-            held[f"values of {name}"] = column.fill_null(0).to_numpy()
+            content[f"where {name}"] = column.is_valid().to_numpy()
+            content[f"values of {name}"] = column.fill_null(0).to_numpy()
         else:
-            held[f"values of {name}"] = column.to_pylist()
-    return held
+            content[f"values of {name}"] = column.to_pylist()
+    return content
 
 
 # Folders
-# --------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write keys and values with their digest; raises as `files.whole_file`."""
-    held = json.loads(json.dumps(content))
-    write_text(path, json.dumps({**held, _SEAL: digest(held)}, indent=1))
+    """Write a JSON object with its digest; raises as `files.atomic_write`."""
+    plain = json.loads(json.dumps(content))
+    write_text(path, json.dumps({**plain, _SEAL: digest(plain)}, indent=1))
 
 
 def read_json(path: Path, remedy: str) -> dict[str, Any]:
-    """What `write_json` wrote; UnreadableFile, which ends with the remedy, for anything else."""
+    """Return the object that `write_json` wrote; raise UnreadableFile for anything else."""
     require_file(path)
     try:
         content = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError):
         raise UnreadableFile(f"{path} is damaged; {remedy}") from None
     if not isinstance(content, dict):
-        raise UnreadableFile(f"{path} is damaged: it holds no keys; {remedy}")
-    _believed(path, content.pop(_SEAL, None), content, remedy)
+        raise UnreadableFile(f"{path} is damaged: it is not a JSON object; {remedy}")
+    _verify(path, content.pop(_SEAL, None), content, remedy)
     return content
 
 
 def read_manifest(folder: Path, *, of: str, layout: int) -> dict[str, Any]:
-    """What a folder that holds a study or a history (`of`) in a layout of that number says about itself.
+    """Return the manifest of a folder with results of the kind `of` ("study", "history").
 
-    Raises UnreadableFile where it says nothing that can be read, or not what was written.
+    Raises UnreadableFile if the manifest is missing, damaged, of another kind or of another
+    `layout`.
     """
     path = folder / MANIFEST
     if not path.exists():
@@ -227,23 +225,24 @@ def read_manifest(folder: Path, *, of: str, layout: int) -> dict[str, Any]:
     manifest = read_json(path, f"compute the {of} into another folder")
     if manifest.get("format") != layout or manifest.get("of") != of:
         raise UnreadableFile(
-            f"{path} is not a {of}'s manifest that this asperity can read; choose another folder"
+            f"{path} is not a {of} manifest that this version of asperity can read; choose another "
+            "folder"
         )
     return manifest
 
 
 def require_same_version(manifest: Mapping[str, Any], folder: Path) -> None:
-    """Refuse to go on in a folder that another asperity began: its numbers would stand beside ours."""
-    theirs, ours = manifest["versions"]["asperity"], asperity.__version__
-    if theirs != ours:
+    """Raise BadInput if another version of asperity began the folder, so that results never mix."""
+    found, current = manifest["versions"]["asperity"], asperity.__version__
+    if found != current:
         raise BadInput(
-            f"{folder} was computed by asperity {theirs}, this is {ours}; choose another folder"
+            f"{folder} was computed by asperity {found}, this is {current}; choose another folder"
         )
 
 
 def version_notes(versions: Mapping[str, Any]) -> tuple[str, ...]:
-    """A sentence where results are of another asperity than this; nothing where they are of this one."""
-    theirs, ours = versions.get("asperity"), asperity.__version__
-    if theirs == ours:
+    """Return a note if the results are from another version of asperity."""
+    found, current = versions.get("asperity"), asperity.__version__
+    if found == current:
         return ()
-    return (f"Computed by asperity {theirs}, read by {ours}: what is worked out anew may differ.",)
+    return (f"Computed by asperity {found}, read by {current}: recomputed values may differ.",)

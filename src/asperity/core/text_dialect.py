@@ -1,6 +1,6 @@
-"""Numbers in text: what separates them, whether decimals follow a comma, what stands for one that is missing.
+"""Numbers in text files: separator, decimal comma and markers of missing values.
 
-What the columns mean is left to `asperity.recording` and `asperity.surface`.
+`asperity.recording` and `asperity.surface` interpret the columns.
 """
 
 import csv
@@ -29,7 +29,7 @@ MISSING = {
     "overload",
 }
 _DATE = re.compile(r"\b\d{1,4}([./-])\d{1,2}\1\d{2,4}\b|\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?")
-_THOUSANDS = {  # by whether decimals follow a comma
+_THOUSANDS = {  # key: decimal comma
     False: re.compile(r"[-+]?\d{1,3}(,\d{3})+(\.\d*)?([eE][-+]?\d+)?"),
     True: re.compile(r"[-+]?\d{1,3}(\.\d{3})+(,\d*)?([eE][-+]?\d+)?"),
 }
@@ -40,13 +40,13 @@ _COMMAS_BETWEEN_BLANKS = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """How a text writes rows of numbers; a `separator` of None stands for blanks."""
+    """Format of rows of numbers in a text; a `separator` of None means blanks."""
 
     separator: str | None
     comma: bool
 
     def fields(self, line: str) -> list[str]:
-        """What stands between the separators of a line."""
+        """Split a line at the separators."""
         if self.separator is None:
             return line.split()
         parts = line.split(self.separator)
@@ -58,7 +58,7 @@ class Dialect:
         return parts
 
     def number(self, field: str) -> float | None:
-        """The number in a field, nan where one is marked as missing; None where there is something else."""
+        """Return the number in a field; nan for a missing value, None for other text."""
         text = field.strip().strip('"').strip()
         if text.lower() in MISSING:
             return np.nan
@@ -73,7 +73,7 @@ class Dialect:
 
 
 def sniff_dialect(sample: Sequence[str], fewest_columns: int = 1) -> Dialect:
-    """The dialect of lines that are mostly rows of at least so many numbers."""
+    """Detect the dialect of lines that mostly hold rows of at least `fewest_columns` numbers."""
     sample = [_DATE.sub("", line) for line in sample]
     rows = [line for line in sample if re.fullmatch(r"[\s\d.,;+\-eE\"]+", line)] or sample
     numbers = "\n".join(rows)
@@ -87,8 +87,7 @@ def sniff_dialect(sample: Sequence[str], fewest_columns: int = 1) -> Dialect:
         return Dialect("," if re.search(r'"\s*,|,\s*"', numbers) else None, comma)
     if not any("," in line for line in sample):
         return Dialect(None, False)
-    # 0,5 1,25, or 0,5 alone where one column will do: two columns of whole numbers would look the
-    # same
+    # "0,5 1,25", or "0,5" alone if one column is enough; two columns of integers are ambiguous
     enough = all(len(row.split()) >= fewest_columns for row in rows)
     if enough and "." not in numbers and all(_COMMAS_BETWEEN_BLANKS.fullmatch(row) for row in rows):
         return Dialect(None, True)

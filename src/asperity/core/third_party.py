@@ -1,4 +1,4 @@
-"""Libraries that read files: kept silent, and what they complain of in a line."""
+"""Third-party file readers: suppressed output, and their errors and warnings as one line."""
 
 import logging
 import re
@@ -8,15 +8,15 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from typing import Any
 
-LONGEST = 100  # characters of a complaint
-_STEERING = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
+MAX_LENGTH = 100  # characters of an error message
+_CONTROL_CHARACTERS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 
 
 @contextmanager
-def quietly() -> Iterator[list[str]]:
-    """Drop what libraries print or log: the terminal belongs to the caller. What they warn users of is in the list."""
+def suppress_output() -> Iterator[list[str]]:
+    """Suppress printed and logged output of libraries; yield a list that receives user warnings."""
     notes: list[str] = []
-    before = logging.root.manager.disable
+    disabled_level = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:
         with (
@@ -29,18 +29,18 @@ def quietly() -> Iterator[list[str]]:
             yield notes
         notes.extend(f"the reader warns: {first_line(warning.message)}" for warning in caught)
     finally:
-        logging.disable(before)
+        logging.disable(disabled_level)
 
 
 def first_line(reason: Any) -> str:
-    """The first line of what a library complains about, short enough for a sentence."""
+    """Return the first line of an error message, at most `MAX_LENGTH` characters long."""
     text = next(
         (line.strip() for line in str(reason).splitlines() if line.strip()), type(reason).__name__
     )
     shown = "".join(c for c in text if c.isprintable()).rstrip(".;")
-    return shown if len(shown) <= LONGEST else shown[: LONGEST - 3] + "..."
+    return shown if len(shown) <= MAX_LENGTH else shown[: MAX_LENGTH - 3] + "..."
 
 
 def printable(text: str) -> str:
-    """A line without what steers a terminal: names of files and channels are other people's."""
-    return _STEERING.sub("?", text)
+    """Replace terminal control characters, as names of files and channels are untrusted."""
+    return _CONTROL_CHARACTERS.sub("?", text)

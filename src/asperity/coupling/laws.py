@@ -14,7 +14,7 @@ import numpy as np
 from asperity import solution as postprocessing
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.hertz import line_stiffness, point_stiffness
-from asperity.core.errors import BadInput, articled
+from asperity.core.errors import BadInput, with_article
 from asperity.core.quantities import Parameter, Parametric
 from asperity.ehl import ContactSolution, ContactState
 
@@ -97,7 +97,7 @@ class HertzLine(_LineApproach, StiffnessLaw):
         if not conditions.long:
             raise BadInput(
                 "stiffness law hertz-line needs a line contact, got "
-                f"{articled(conditions.geometry)} contact"
+                f"{with_article(conditions.geometry)} contact"
             )
         return line_stiffness(
             contact.asperity_load,

@@ -15,7 +15,7 @@ from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
 from asperity.core.files import versions
 from asperity.core.quantities import quantity
-from asperity.core.storage import write_sealed
+from asperity.core.storage import write_with_digest
 from asperity.ehl.outcome import CONSERVING, Convergence, Options
 from asperity.lubricant import Lubricant, describe_lubricant
 from asperity.surface import Surface
@@ -89,7 +89,7 @@ class FileContents(NamedTuple):
                 kind = packed if values.ndim == 2 else {}
                 file.create_variable(name, along, data=values, **kind).attrs.update(attributes)
             file.attrs.update(self.attributes)
-        write_sealed(path, buffer.getvalue())
+        write_with_digest(path, buffer.getvalue())
         return path
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.contact.conditions import ContactConditions
-from asperity.contact.grid import FEWEST_CELLS, Grid
+from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.contact.hertz import line_gap
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
@@ -383,4 +383,4 @@ def _finite(length: float, otherwise: float) -> float:
 
 def _even(count: float) -> int:
     """Return at least this many cells, divisible by 8."""
-    return max(FEWEST_CELLS, 8 * math.ceil(count / 8.0))
+    return max(MIN_CELLS, 8 * math.ceil(count / 8.0))

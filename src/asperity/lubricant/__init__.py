@@ -1,4 +1,4 @@
-"""The oil: one family of laws a file, and the lubricant made of one of each."""
+"""Oils: a family of laws per module, and lubricants with one law of each family."""
 
 import lazy_loader
 

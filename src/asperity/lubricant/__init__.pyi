@@ -4,8 +4,8 @@ from .density import DENSITY_LAWS as DENSITY_LAWS
 from .density import DensityLaw as DensityLaw
 from .density import DowsonHigginson as DowsonHigginson
 from .density import Incompressible as Incompressible
-from .friction import FREEZING as FREEZING
 from .friction import FRICTION_LAWS as FRICTION_LAWS
+from .friction import ZERO_CELSIUS as ZERO_CELSIUS
 from .friction import BairWiner as BairWiner
 from .friction import EyringShear as EyringShear
 from .friction import FrictionLaw as FrictionLaw
@@ -25,9 +25,9 @@ from .origins import OilFact as OilFact
 from .origins import oil_facts as oil_facts
 from .origins import oil_notes as oil_notes
 from .pressure_viscosity import ESTIMATORS as ESTIMATORS
-from .pressure_viscosity import Base as Base
+from .pressure_viscosity import BaseOil as BaseOil
 from .pressure_viscosity import Estimator as Estimator
-from .pressure_viscosity import KnownOil as KnownOil
+from .pressure_viscosity import OilProperties as OilProperties
 from .rheology import RHEOLOGY_LAWS as RHEOLOGY_LAWS
 from .rheology import Newtonian as Newtonian
 from .rheology import ReeEyring as ReeEyring

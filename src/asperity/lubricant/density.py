@@ -1,4 +1,4 @@
-"""How density grows with pressure: one frozen, callable law a class."""
+"""Pressure-density laws of oils."""
 
 from dataclasses import dataclass
 from typing import Annotated, Protocol
@@ -10,46 +10,46 @@ from asperity.core.quantities import Parameter, Parametric
 
 
 class DensityLaw(Protocol):
-    """What the solver asks of a density law."""
+    """Interface of a density law."""
 
     @property
     def rho0(self) -> float:
         """Density at ambient pressure [kg/m^3]."""
 
     def __call__(self, pressure: Field) -> Field:
-        """Density [kg/m^3] at a pressure [Pa]."""
+        """Return the density [kg/m^3] at a pressure [Pa]."""
 
     def slope(self, pressure: Field) -> Field:
-        """d(rho)/dp [kg/m^3/Pa] at a pressure [Pa]."""
+        """Return d(rho)/dp [kg/m^3/Pa] at a pressure [Pa]."""
 
 
 @dataclass(frozen=True, slots=True)
 class DowsonHigginson(Parametric):
-    """Density that levels off at high pressure: ρ = ρ₀ (1 + 0.6e-9 p/(1 + 1.7e-9 p)). Source: the paper's Eq 8."""
+    """Dowson-Higginson density ρ = ρ₀ (1 + 0.6e-9 p/(1 + 1.7e-9 p)). Source: the paper's Eq 8."""
 
     rho0: Annotated[float, Parameter("kg/m^3", "ρ₀", "density rho0")]  # at ambient pressure
 
     def __call__(self, pressure: Field) -> Field:
-        """ρ(p) [kg/m^3]."""
+        """Return ρ(p) [kg/m^3]."""
         return self.rho0 * (1.0 + 0.6e-9 * pressure / (1.0 + 1.7e-9 * pressure))
 
     def slope(self, pressure: Field) -> Field:
-        """dρ/dp [kg/m^3/Pa]."""
+        """Return dρ/dp [kg/m^3/Pa]."""
         return self.rho0 * 0.6e-9 / (1.0 + 1.7e-9 * pressure) ** 2
 
 
 @dataclass(frozen=True, slots=True)
 class Incompressible(Parametric):
-    """Density that does not change: ρ = ρ₀."""
+    """Constant density ρ = ρ₀."""
 
     rho0: Annotated[float, Parameter("kg/m^3", "ρ₀", "density rho0")]
 
     def __call__(self, pressure: Field) -> Field:
-        """ρ [kg/m^3]."""
+        """Return ρ [kg/m^3]."""
         return np.full_like(pressure, self.rho0)
 
     def slope(self, pressure: Field) -> Field:
-        """dρ/dp = 0."""
+        """Return dρ/dp = 0."""
         return np.zeros_like(pressure)
 
 

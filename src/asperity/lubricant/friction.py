@@ -1,7 +1,7 @@
-"""The shear stress of the oil film, from which friction comes: one frozen, callable law a class.
+"""Friction laws: the shear stress of the oil film.
 
-What thins the film inside Reynolds' equation is `rheology`; the paper too takes one law there (Eq
-9) and another for friction (Eq 14).
+`rheology` holds the laws of shear thinning in the Reynolds equation; the paper also uses different
+laws there (Eq 9) and for friction (Eq 14).
 """
 
 from dataclasses import dataclass
@@ -12,16 +12,16 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.core.quantities import Parameter, Parametric
 
-FREEZING = 273.15  # of water [K]
+ZERO_CELSIUS = 273.15  # 0 °C [K]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShearedFilm:
-    """A film on its way through the contact; fields of shape (nx, ny), x along rolling.
+    """Sheared oil film; fields of shape (nx, ny), x along rolling.
 
-    `rate` of shear, not negative [1/s]; `viscosity` at the film's own pressure and temperature [Pa
-    s]; `pressure` [Pa]; `temperature` [K]; `transit` the time that oil at the mean of the surface
-    speeds takes from cell to cell [s].
+    `rate` shear rate, not negative [1/s]; `viscosity` at the local pressure and temperature [Pa s];
+    `pressure` [Pa]; `temperature` [K]; `transit` time from cell to cell at the entrainment speed
+    [s].
     """
 
     rate: Field
@@ -32,63 +32,65 @@ class ShearedFilm:
 
 
 class FrictionLaw(Protocol):
-    """What friction asks of an oil."""
+    """Interface of a friction law."""
 
     def __call__(self, film: ShearedFilm) -> Field:
-        """Shear stress [Pa], shape (nx, ny), not negative."""
+        """Return the shear stress [Pa], shape (nx, ny), not negative."""
 
 
 @dataclass(frozen=True, slots=True)
 class NewtonianShear:
-    """Shear stress without a limit: τ = η γ'. Real oils leave it at a few megapascals."""
+    """Newtonian shear stress τ = η γ'; real oils deviate from a few megapascals on."""
 
     def __call__(self, film: ShearedFilm) -> Field:
-        """τ [Pa]."""
+        """Return τ [Pa]."""
         return np.asarray(film.viscosity * film.rate)
 
 
 @dataclass(frozen=True, slots=True)
 class EyringShear(Parametric):
-    """Shear stress that grows with the logarithm of the rate: τ = τ₀ asinh(η γ'/τ₀)."""
+    """Eyring shear stress τ = τ₀ asinh(η γ'/τ₀)."""
 
     tau0: Annotated[float, Parameter("Pa", "τ₀", "Eyring stress tau0")]
 
     def __call__(self, film: ShearedFilm) -> Field:
-        """τ [Pa]."""
+        """Return τ [Pa]."""
         return np.asarray(self.tau0 * np.arcsinh(film.viscosity * film.rate / self.tau0))
 
 
 @dataclass(frozen=True, slots=True)
 class BairWiner(Parametric):
-    """Shear stress with a limit: γ' = (dτ/dt)/G - (τ_L/η) ln(1 - τ/τ_L). Source: the paper's Eq 14.
+    """Limiting shear stress, γ' = (dτ/dt)/G - (τ_L/η) ln(1 - τ/τ_L). Source: the paper's Eq 14.
 
-    dτ/dt is that of oil carried through the contact at the mean of the surface speeds. Limits are
+    dτ/dt follows oil that moves through the contact at the entrainment speed. G and τ_L are
     Dyson's for mineral oils, G = 1.2 p/(2.52 + 0.024 T) - 1e8 with T in degrees Celsius and G and
-    p in pascals, and τ_L = 0.25 G; they are negative below about 0.3 GPa, where `floor` stands for
-    τ_L. Source of the limits: A. Dyson, Phil. Trans. R. Soc. A 266 (1970) 1, as used by Zhu and
-    Hu, Tribol. Trans. 44 (2001) 383; recollected, not checked against either.
+    p in pascals, and τ_L = 0.25 G; below about 0.3 GPa, where they are negative, τ_L is `floor`.
+    Source: A. Dyson, Phil. Trans. R. Soc. A 266 (1970) 1, as used by Zhu and Hu, Tribol. Trans. 44
+    (2001) 383; quoted from memory, not verified.
     """
 
-    # τ_L of mineral oils at ambient: 1 to 5 MPa
+    # τ_L of mineral oils at ambient pressure: 1 to 5 MPa
     floor: Annotated[float, Parameter("Pa", "least limit", "floor of the limiting stress")] = 2e6
     ratio: Annotated[float, Parameter("", "τ_L/G", "ratio of limiting stress to modulus")] = 0.25
 
     def limits(self, pressure: Field, temperature: Field) -> tuple[Field, Field]:
-        """τ_L and G [Pa] at a pressure [Pa] and a temperature [K]."""
-        modulus = 1.2 * pressure / (2.52 + 0.024 * np.maximum(temperature - FREEZING, 0.0)) - 1e8
+        """Return τ_L and G [Pa] at a pressure [Pa] and a temperature [K]."""
+        modulus = (
+            1.2 * pressure / (2.52 + 0.024 * np.maximum(temperature - ZERO_CELSIUS, 0.0)) - 1e8
+        )
         limit = np.maximum(self.ratio * modulus, self.floor)
         return limit, limit / self.ratio
 
     def __call__(self, film: ShearedFilm) -> Field:
-        """τ [Pa]."""
-        return _carried(film, *self.limits(film.pressure, film.temperature))
+        """Return τ [Pa]."""
+        return _stress_along_flow(film, *self.limits(film.pressure, film.temperature))
 
 
 @dataclass(frozen=True, slots=True)
 class LinearBairWiner(Parametric):
-    """Bair and Winer's law with a limit linear in pressure: τ_L = (τ_L0 + ξ p) exp(-b (T - 313 K)), G = τ_L/ratio.
+    """Bair-Winer law with τ_L = (τ_L0 + ξ p) exp(-b (T - 313 K)) and G = τ_L/ratio.
 
-    For measured limits: ξ of mineral oils lies between 0.03 and 0.1.
+    Use it with measured limits; ξ of mineral oils lies between 0.03 and 0.1.
     """
 
     tau_l0: Annotated[
@@ -101,17 +103,17 @@ class LinearBairWiner(Parametric):
     ratio: Annotated[float, Parameter("", "τ_L/G", "ratio of limiting stress to modulus")] = 0.25
 
     def limits(self, pressure: Field, temperature: Field) -> tuple[Field, Field]:
-        """τ_L and G [Pa] at a pressure [Pa] and a temperature [K]."""
-        softer = np.exp(-(self.softening or 0.0) * (temperature - FREEZING - 40.0))
-        limit = (self.tau_l0 + self.slope * pressure) * softer
+        """Return τ_L and G [Pa] at a pressure [Pa] and a temperature [K]."""
+        factor = np.exp(-(self.softening or 0.0) * (temperature - ZERO_CELSIUS - 40.0))
+        limit = (self.tau_l0 + self.slope * pressure) * factor
         return limit, limit / self.ratio
 
     def __call__(self, film: ShearedFilm) -> Field:
-        """τ [Pa]."""
-        return _carried(film, *self.limits(film.pressure, film.temperature))
+        """Return τ [Pa]."""
+        return _stress_along_flow(film, *self.limits(film.pressure, film.temperature))
 
 
-def _carried(film: ShearedFilm, limit: Field, modulus: Field) -> Field:
+def _stress_along_flow(film: ShearedFilm, limit: Field, modulus: Field) -> Field:
     from asperity.kernels.shear_stress import march_shear_stress  # numba, for solved films only
 
     stress = np.empty_like(film.pressure)

@@ -1,4 +1,4 @@
-"""Every law that a case file and a run file can name, by its family, and laws as tables of their parameters."""
+"""Laws by the names in case and run files, and their conversion to and from parameter tables."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -23,22 +23,23 @@ LAWS: dict[LawFamily, Mapping[str, type]] = {
 
 
 def law_name(family: LawFamily, law: object) -> str:
-    """What its family's table calls a law; raises BadInput for one that is not in it."""
+    """Return the name of a law in the table of its family; raise BadInput if it is not there."""
     name = next((name for name, kind in LAWS[family].items() if type(law) is kind), None)
     if name is None:
         raise BadInput(
-            f"{type(law).__name__} is not a {family} law that can be kept; add it to its table of laws"
+            f"{type(law).__name__} is not a {family} law that can be stored; add it to its table "
+            "of laws"
         )
     return name
 
 
 def describe_law(family: LawFamily, law: Any) -> dict[str, Any]:
-    """Name and parameters [SI] of a law; raises what `law_name` does."""
+    """Return the name and parameters [SI] of a law; raises as `law_name`."""
     return {"law": law_name(family, law), **asdict(law)}
 
 
 def make_law(family: LawFamily, description: Mapping[str, Any]) -> Any:
-    """The law that `describe_law` describes."""
+    """Create a law from the result of `describe_law`."""
     return LAWS[family][description["law"]](
         **{name: value for name, value in description.items() if name != "law"}
     )

@@ -1,4 +1,4 @@
-"""Oils whose viscosity and pressure-viscosity coefficient were measured: a short table, and sheets made of it."""
+"""Table of oils with measured viscosity and pressure-viscosity coefficient."""
 
 import csv
 from dataclasses import dataclass
@@ -7,19 +7,19 @@ from importlib.resources import files
 
 from asperity.core.errors import BadInput
 from asperity.lubricant.data_sheet import OilSheet
-from asperity.lubricant.friction import FREEZING
+from asperity.lubricant.friction import ZERO_CELSIUS
 from asperity.lubricant.walther import HOT, WARM, Walther
 
 SOURCE = "Stachowiak and Batchelor, Engineering Tribology, table 2.3"
-_CELSIUS = (30, 60, 100)  # where they were measured
+_CELSIUS = (30, 60, 100)  # temperatures of measurement
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredOil:
-    """A mineral oil at 30, 60 and 100 °C: dynamic viscosities [Pa s] and alphas at ambient pressure [1/Pa].
+    """Mineral oil at 30, 60 and 100 °C: dynamic viscosities [Pa s] and alphas [1/Pa].
 
-    `index` says of which kind it is: of high, medium or low viscosity index. An alpha that was not
-    measured is None.
+    `alphas` are slopes at ambient pressure, None if not measured. `index` is the class of the
+    viscosity index: high, medium or low.
     """
 
     name: str
@@ -28,11 +28,11 @@ class MeasuredOil:
     alphas: tuple[float | None, ...]
 
     def sheet(self, temperature: float) -> OilSheet:
-        """The oil at a temperature [K] between those where it was measured, by D341 and a straight line for alpha.
+        """Return the oil at a temperature [K], interpolated by D341 and linearly in alpha.
 
-        Its density is estimated: the table has none. Raises BadInput outside.
+        The density is estimated. Raises BadInput outside the temperatures of measurement.
         """
-        celsius = temperature - FREEZING
+        celsius = temperature - ZERO_CELSIUS
         for low in (0, 1):
             first, last = self.alphas[low], self.alphas[low + 1]
             if (
@@ -49,18 +49,21 @@ class MeasuredOil:
                 alpha=first + share * (last - first),
                 measured=f"{self.name}, {SOURCE}",
             )
-        least = next(t for t, alpha in zip(_CELSIUS, self.alphas, strict=True) if alpha is not None)
+        lowest = next(
+            t for t, alpha in zip(_CELSIUS, self.alphas, strict=True) if alpha is not None
+        )
         raise BadInput(
-            f"temperature must lie between {least} and 100 degC, where the oil {self.name} was measured, got "
-            f"{celsius:.4g} degC; correct it, or give the oil by its grade"
+            f"temperature must lie between {lowest} and 100 degC, where the oil {self.name} was "
+            f"measured, got {celsius:.4g} degC; correct it, or give the oil by its grade"
         )
 
     def _line(self, low: int) -> Walther:
-        """D341 through two of its viscosities; kinematic ones take the density, which takes the one at 40 °C."""
+        """Fit D341 to two viscosities; iterate, as kinematic viscosity and density are coupled."""
         density = OilSheet(grade="VG 100").density
-        for _ in range(8):  # a decade of viscosity is 5 % of density: settled to 1e-12
+        for _ in range(8):  # converges to 1e-12: a decade of viscosity changes density by 5 %
             points = [
-                (t + FREEZING, self.viscosities[i] / density(t + FREEZING)) for i, t in _pair(low)
+                (t + ZERO_CELSIUS, self.viscosities[i] / density(t + ZERO_CELSIUS))
+                for i, t in _pair(low)
             ]
             line = Walther.through(points[0], points[1])
             density = OilSheet(viscosity_40=line(WARM), viscosity_100=line(HOT)).density
@@ -73,7 +76,7 @@ def _pair(low: int) -> list[tuple[int, int]]:
 
 @cache
 def measured_oils() -> dict[str, MeasuredOil]:
-    """The table, by name."""
+    """Return the table of measured oils by name."""
     lines = files("asperity.lubricant").joinpath("measured.csv").read_text("utf-8").splitlines()
     oils = {}
     for row in csv.DictReader(lines):

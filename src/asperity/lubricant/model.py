@@ -1,4 +1,4 @@
-"""An oil, made of one law of each family."""
+"""Lubricant with one law of each family."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from asperity.lubricant.viscosity import ViscosityLaw
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lubricant:
-    """An oil: how viscosity and density change with pressure, how shear thins it, and what shearing it costs."""
+    """Oil: pressure-viscosity, pressure-density, shear-thinning and friction laws."""
 
     viscosity: ViscosityLaw
     density: DensityLaw
@@ -25,12 +25,12 @@ _FAMILIES: tuple[LawFamily, ...] = ("viscosity", "density", "rheology", "frictio
 
 
 def describe_lubricant(lubricant: Lubricant) -> dict[str, dict[str, Any]]:
-    """Name and parameters [SI] of each law, as run files keep them; BadInput for one that is not in its table."""
+    """Return name and parameters [SI] of each law, for run files; BadInput for unknown laws."""
     return {family: describe_law(family, getattr(lubricant, family)) for family in _FAMILIES}
 
 
 def make_lubricant(description: Mapping[str, Mapping[str, Any]]) -> Lubricant:
-    """The oil that `describe_lubricant` describes."""
+    """Create an oil from the result of `describe_lubricant`."""
     return Lubricant(
         **{
             family: make_law(family, description[family])

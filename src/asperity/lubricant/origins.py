@@ -1,20 +1,20 @@
-"""What of an oil was given and what was estimated: its numbers with their origins, and what is to be noted of them."""
+"""Origins of an oil's properties (given, measured, estimated or computed), and notes on them."""
 
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 from asperity.core.quantities import quantity
 from asperity.lubricant.data_sheet import MINERAL_INDEX, OilSheet
-from asperity.lubricant.friction import FREEZING
+from asperity.lubricant.friction import ZERO_CELSIUS
 
 Origin = Literal["given", "measured", "estimated", "computed"]
 
-INDICES = 0.0, 250.0  # viscosity indices of oils
-THICKEST = 2.0  # viscosity up to which estimates were compared with measured oils [Pa s]
+PLAUSIBLE_INDICES = 0.0, 250.0
+MAX_COMPARED_VISCOSITY = 2.0  # [Pa s]; estimates were compared with measured oils up to here
 
 
 class OilFact(NamedTuple):
-    """A number of an oil: its key in the catalogue of quantities, SI, where it comes from, and how."""
+    """Property of an oil: key in the catalogue of quantities, SI value, origin and method."""
 
     key: str
     value: float
@@ -27,22 +27,22 @@ class OilFact(NamedTuple):
 
 
 def oil_facts(oil: OilSheet, temperature: float) -> tuple[OilFact, ...]:
-    """Every number of an oil at a temperature [K], with where it comes from; raises what `OilSheet.lubricant` does."""
+    """Return the properties of an oil at a temperature [K]; raises as `OilSheet.lubricant`."""
     return tuple(_facts(oil, temperature))
 
 
 def _facts(oil: OilSheet, temperature: float) -> Iterator[OilFact]:
-    yield OilFact("oil_temperature_k", temperature, "given", f"{temperature - FREEZING:.4g} °C")
+    yield OilFact("oil_temperature_k", temperature, "given", f"{temperature - ZERO_CELSIUS:.4g} °C")
     origin: Origin = "computed" if oil.measured is None else "measured"
     if oil.measured is None:
-        middle = f"the middle of {oil.grade}" if oil.viscosity_40 is None else ""
-        yield OilFact("oil_viscosity_40_m2_s", oil.at_40, "given", middle)
+        method = f"mid-point of {oil.grade}" if oil.viscosity_40 is None else ""
+        yield OilFact("oil_viscosity_40_m2_s", oil.at_40, "given", method)
         if oil.viscosity_100 is None:
             yield OilFact(
                 "oil_viscosity_100_m2_s",
                 oil.at_100,
                 "computed",
-                "of the viscosity index, ASTM D2270",
+                "from the viscosity index, ASTM D2270",
             )
         else:
             yield OilFact("oil_viscosity_100_m2_s", oil.at_100, "given")
@@ -58,7 +58,7 @@ def _facts(oil: OilSheet, temperature: float) -> Iterator[OilFact]:
         "oil_kinematic_viscosity_m2_s", oil.kinematic_viscosity(temperature), origin, line
     )
     yield OilFact(
-        "oil_density_kg_m3", oil.density(temperature), "computed", "0.7 kg/m³ less a kelvin"
+        "oil_density_kg_m3", oil.density(temperature), "computed", "-0.7 kg/m³ per kelvin"
     )
     yield OilFact("oil_viscosity_pa_s", oil.viscosity(temperature), origin, line)
     yield OilFact(
@@ -72,14 +72,12 @@ def _index(oil: OilSheet) -> Iterator[OilFact]:
         return
     if oil.viscosity_100 is not None:
         yield OilFact(
-            "oil_viscosity_index", oil.index, "computed", "of both viscosities, ASTM D2270"
+            "oil_viscosity_index", oil.index, "computed", "from both viscosities, ASTM D2270"
         )
     elif oil.viscosity_index is not None:
         yield OilFact("oil_viscosity_index", oil.index, "given")
     else:
-        yield OilFact(
-            "oil_viscosity_index", MINERAL_INDEX, "estimated", "about what mineral oils have"
-        )
+        yield OilFact("oil_viscosity_index", MINERAL_INDEX, "estimated", "typical of mineral oils")
 
 
 def _alpha(oil: OilSheet, temperature: float) -> OilFact:
@@ -96,27 +94,33 @@ def _alpha(oil: OilSheet, temperature: float) -> OilFact:
 
 
 def oil_notes(oil: OilSheet, temperature: float) -> tuple[str, ...]:
-    """What a reader of results with this oil has to know, a sentence each; raises what `OilSheet.lubricant` does."""
+    """Return notes for results with this oil, a sentence each; raises as `OilSheet.lubricant`."""
     return tuple(_notes(oil, temperature))
 
 
 def _notes(oil: OilSheet, temperature: float) -> Iterator[str]:
     facts = oil_facts(oil, temperature)
     for origin in ("given", "measured", "estimated"):
-        if told := "; ".join(str(fact) for fact in facts if fact.origin == origin):
-            yield f"Oil by its data sheet, {origin}: {told}."
+        if listed := "; ".join(str(fact) for fact in facts if fact.origin == origin):
+            yield f"Oil by its data sheet, {origin}: {listed}."
     if oil.alpha is None and oil.base != "mineral":
         yield (
-            f"Alpha of base {oil.base} is estimated by constants on which sources differ, without a measurement beside "
-            "them; the film goes with about its root: give a measured alpha."
+            f"Alpha of base {oil.base} is estimated with constants on which sources differ and "
+            "which were not compared with measurements; the film thickness scales with about its "
+            "square root: give a measured alpha."
         )
-    if oil.alpha is None and oil.viscosity(temperature) > THICKEST:
+    if oil.alpha is None and oil.viscosity(temperature) > MAX_COMPARED_VISCOSITY:
         yield (
-            f"The viscosity of {oil.viscosity(temperature):.3g} Pa s lies above the {THICKEST:g} Pa s up to which "
-            "estimates of alpha were compared with measured oils; give alpha."
+            f"The viscosity of {oil.viscosity(temperature):.3g} Pa s exceeds the range in which "
+            f"estimates of alpha were compared with measured oils, {MAX_COMPARED_VISCOSITY:g} Pa "
+            "s; give alpha."
         )
-    if oil.measured is None and oil.index is not None and not INDICES[0] <= oil.index <= INDICES[1]:
+    if (
+        oil.measured is None
+        and oil.index is not None
+        and not PLAUSIBLE_INDICES[0] <= oil.index <= PLAUSIBLE_INDICES[1]
+    ):
         yield (
-            f"The viscosity index of {oil.index:.4g} lies outside 0 to 250, where oils lie; check viscosity_40 and "
-            "viscosity_100."
+            f"The viscosity index of {oil.index:.4g} is implausible, outside 0 to 250; check "
+            "viscosity_40 and viscosity_100."
         )

@@ -1,6 +1,6 @@
-"""How heat changes and crosses a contact: an oil's viscosity over temperature, conductivities, the two solids.
+"""Thermal properties of a contact: temperature-viscosity laws, conductivities and the two solids.
 
-Every default has its reason in docs/case-file.md.
+docs/case-file.md gives the reasons for the defaults.
 """
 
 import math
@@ -12,37 +12,40 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.core.quantities import Parameter, Parametric
-from asperity.lubricant.friction import FREEZING
+from asperity.lubricant.friction import ZERO_CELSIUS
 
 AMBIENT = 313.15  # 40 °C [K]
-ROELANDS_ZERO = 138.0  # temperature that Roelands counts from [K]
+ROELANDS_ZERO = 138.0  # reference temperature of Roelands' law [K]
 
 
 class WarmthLaw(Protocol):
-    """What the thermal model asks of an oil's viscosity."""
+    """Interface of a temperature-viscosity law."""
 
     def factor(self, viscosity: Field, temperature: Field, ambient: float) -> Field:
-        """Viscosity at `temperature` over that at `ambient` [K], at one pressure; `viscosity` is the latter [Pa s]."""
+        """Return viscosity at `temperature` over that at `ambient` [K], at the same pressure.
+
+        `viscosity` is that at the ambient temperature [Pa s].
+        """
 
 
 @dataclass(frozen=True, slots=True)
 class ExponentialWarmth(Parametric):
-    """Viscosity that falls at one rate at every pressure: η(p, T) = η(p, T₀) exp(-β (T - T₀)). Source: Reynolds (1886).
+    """Exponential law η(p, T) = η(p, T₀) exp(-β (T - T₀)). Source: Reynolds (1886).
 
-    An ISO VG 100 mineral oil falls from 100 to 11 mm²/s between 40 and 100 °C: ln(100/11)/60 K =
-    0.037/K.
+    Default of β: an ISO VG 100 mineral oil has 100 mm²/s at 40 °C and 11 at 100 °C, ln(100/11)/60 K
+    = 0.037/K.
     """
 
     beta: Annotated[float, Parameter("1/K", "β", "temperature coefficient beta")] = 0.037
 
     def factor(self, viscosity: Field, temperature: Field, ambient: float) -> Field:
-        """exp(-β (T - T₀))."""
+        """Return exp(-β (T - T₀))."""
         return np.broadcast_to(np.exp(-self.beta * (temperature - ambient)), viscosity.shape).copy()
 
 
 @dataclass(frozen=True, slots=True)
 class RoelandsWarmth(Parametric):
-    """Viscosity that falls faster the thicker it is: ln η + 9.67 goes as ((T - 138)/(T₀ - 138))^-S₀, T in kelvin.
+    """Roelands' law: ln η + 9.67 scales with ((T - 138)/(T₀ - 138))^-S₀, T in kelvin.
 
     Source: Roelands (1966). S₀ of mineral oils lies between 1 and 1.5.
     """
@@ -50,9 +53,9 @@ class RoelandsWarmth(Parametric):
     s0: Annotated[float, Parameter("", "S₀", "Roelands' exponent s0")]
 
     def factor(self, viscosity: Field, temperature: Field, ambient: float) -> Field:
-        """exp((ln η + 9.67)(((T - 138)/(T₀ - 138))^-S₀ - 1))."""
-        warmer = np.maximum(temperature - ROELANDS_ZERO, 1.0) / (ambient - ROELANDS_ZERO)
-        return np.asarray(np.exp((np.log(viscosity) + 9.67) * (warmer**-self.s0 - 1.0)))
+        """Return exp((ln η + 9.67)(((T - 138)/(T₀ - 138))^-S₀ - 1))."""
+        ratio = np.maximum(temperature - ROELANDS_ZERO, 1.0) / (ambient - ROELANDS_ZERO)
+        return np.asarray(np.exp((np.log(viscosity) + 9.67) * (ratio**-self.s0 - 1.0)))
 
 
 WARMTH_LAWS: dict[str, type[WarmthLaw]] = {
@@ -63,10 +66,10 @@ WARMTH_LAWS: dict[str, type[WarmthLaw]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solid(Parametric):
-    """A body that takes up heat: conductivity, density and heat capacity; default 45 steel.
+    """Thermal properties of a body; default: 45 steel.
 
-    Density is the paper's; the others are handbook values of plain carbon steels, which lie within
-    10 % of them.
+    Density is the paper's; the others are handbook values of plain carbon steels, which vary by
+    10 %.
     """
 
     conductivity: Annotated[float, Parameter("W/m/K", "k", "thermal conductivity")] = 46.0
@@ -75,32 +78,32 @@ class Solid(Parametric):
 
     @property
     def diffusivity(self) -> float:
-        """κ = k/(ρ c) [m^2/s]."""
+        """Diffusivity κ = k/(ρ c) [m^2/s]."""
         return self.conductivity / (self.density * self.heat_capacity)
 
     @property
     def effusivity(self) -> float:
-        """B = sqrt(k ρ c) [J/m^2/K/s^0.5]."""
+        """Effusivity B = sqrt(k ρ c) [J/m^2/K/s^0.5]."""
         return math.sqrt(self.conductivity * self.density * self.heat_capacity)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Thermal(Parametric):
-    """The thermal side of a contact.
+    """Thermal settings of a contact.
 
     Parameters
     ----------
-    ambient : temperature of the oil where its viscosity and rheology are stated, and of the supply
-    bulk : temperatures of the two bodies away from the contact; None: ambient
-    oil_conductivity : of the film
-    warmth : how temperature thins the oil
+    ambient : temperature of the oil supply, at which viscosity and rheology are given [K]
+    bulk : temperatures of the two bodies away from the contact [K]; None: ambient
+    oil_conductivity : thermal conductivity of the film [W/m/K]
+    warmth : temperature-viscosity law
     solids : the two bodies
-    feedback : whether the film's temperature acts back on viscosity, friction and film (thermal mixed lubrication)
+    feedback : couple film temperature to viscosity, friction and film thickness (thermal EHL)
 
     Raises
     ------
     BadInput
-        for a temperature below -60 °C or above 500 °C, or a conductivity that is not positive.
+        A temperature is below -60 °C or above 500 °C, or the conductivity is not positive.
     """
 
     ambient: Annotated[float, Parameter("K", "T₀")] = AMBIENT
@@ -118,5 +121,5 @@ class Thermal(Parametric):
             if not 213.15 <= temperature <= 773.15:
                 raise BadInput(
                     "temperature must lie between -60 and 500 degC, 213.15 and 773.15 K, "
-                    f"got {temperature - FREEZING:g} degC, {temperature:g} K; correct it"
+                    f"got {temperature - ZERO_CELSIUS:g} degC, {temperature:g} K; correct it"
                 )

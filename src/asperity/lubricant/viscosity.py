@@ -1,4 +1,4 @@
-"""How viscosity grows with pressure: one frozen, callable law a class."""
+"""Pressure-viscosity laws of oils."""
 
 from dataclasses import dataclass
 from typing import Annotated, Protocol
@@ -9,44 +9,42 @@ from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.core.quantities import Parameter, Parametric
 
-LARGEST_EXPONENT = (
-    400.0  # of an exponential law: glass long before, and e^709 is no longer a number
-)
+MAX_EXPONENT = 400.0  # of an exponential law; the oil is glassy far below, and e^709 overflows
 
 
 class ViscosityLaw(Protocol):
-    """What the solver asks of a viscosity law."""
+    """Interface of a pressure-viscosity law."""
 
     @property
     def eta0(self) -> float:
         """Viscosity at ambient pressure [Pa s]."""
 
     def __call__(self, pressure: Field) -> Field:
-        """Viscosity [Pa s] at a pressure [Pa]."""
+        """Return the viscosity [Pa s] at a pressure [Pa]."""
 
     def log_slope(self, pressure: Field) -> Field:
-        """d(ln eta)/dp [1/Pa] at a pressure [Pa]."""
+        """Return d(ln eta)/dp [1/Pa] at a pressure [Pa]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Barus(Parametric):
-    """Viscosity that grows exponentially with pressure: η = η₀ exp(α p). Source: the paper's Eq 10."""
+    """Barus' law η = η₀ exp(α p). Source: the paper's Eq 10."""
 
     eta0: Annotated[float, Parameter("Pa s", "η₀", "viscosity eta0")]  # at ambient pressure
     alpha: Annotated[float, Parameter("1/Pa", "α", "pressure-viscosity coefficient alpha")]
 
     def __call__(self, pressure: Field) -> Field:
-        """η(p) [Pa s]."""
-        return np.asarray(self.eta0 * np.exp(np.minimum(self.alpha * pressure, LARGEST_EXPONENT)))
+        """Return η(p) [Pa s]."""
+        return np.asarray(self.eta0 * np.exp(np.minimum(self.alpha * pressure, MAX_EXPONENT)))
 
     def log_slope(self, pressure: Field) -> Field:
-        """d(ln η)/dp = α [1/Pa]."""
+        """Return d(ln η)/dp = α [1/Pa]."""
         return np.full_like(pressure, self.alpha)
 
 
 @dataclass(frozen=True, slots=True)
 class Roelands(Parametric):
-    """Viscosity that levels off against Barus: η = η₀ exp((ln η₀ + 9.67) ((1 + p/p₀)^z − 1)), z = α p₀/(ln η₀ + 9.67).
+    """Roelands' law η = η₀ exp((ln η₀ + 9.67) ((1 + p/p₀)^z − 1)), z = α p₀/(ln η₀ + 9.67).
 
     Source: Roelands (1966), isothermal form with α matched at ambient pressure.
     """
@@ -63,16 +61,16 @@ class Roelands(Parametric):
 
     @property
     def exponent(self) -> float:
-        """The exponent z."""
+        """Exponent z."""
         return self.alpha * self.p0 / self._scale
 
     def __call__(self, pressure: Field) -> Field:
-        """η(p) [Pa s]."""
+        """Return η(p) [Pa s]."""
         exponent = self._scale * ((1.0 + pressure / self.p0) ** self.exponent - 1.0)
-        return np.asarray(self.eta0 * np.exp(np.minimum(exponent, LARGEST_EXPONENT)))
+        return np.asarray(self.eta0 * np.exp(np.minimum(exponent, MAX_EXPONENT)))
 
     def log_slope(self, pressure: Field) -> Field:
-        """d(ln η)/dp [1/Pa]."""
+        """Return d(ln η)/dp [1/Pa]."""
         return self.alpha * (1.0 + pressure / self.p0) ** (self.exponent - 1.0)
 
 
@@ -80,22 +78,22 @@ VISCOSITY_LAWS: dict[str, type[ViscosityLaw]] = {"barus": Barus, "roelands": Roe
 
 
 def require_liquid(law: ViscosityLaw, pressure: float) -> None:
-    """Say that an oil's pressure-viscosity coefficient thickens it beyond any number, unless it does not.
+    """Raise BadInput if the viscosity overflows at a pressure.
 
     Parameters
     ----------
-    law : its viscosity
-    pressure : a contact's largest [Pa]
+    law : pressure-viscosity law
+    pressure : largest pressure of a contact [Pa]
 
     Raises
     ------
     BadInput
-        where the coefficient at ambient pressure times the pressure exceeds 400: no solver can tell films by it.
+        The coefficient at ambient pressure times the pressure exceeds 400.
     """
     slope = float(law.log_slope(np.zeros(1))[0])
-    if not slope * pressure <= LARGEST_EXPONENT:
+    if not slope * pressure <= MAX_EXPONENT:
         raise BadInput(
             f"a pressure-viscosity coefficient of {slope * 1e9:.3g} 1/GPa thickens the oil by "
-            f"exp({slope * pressure:.3g}) at Hertz's pressure of {pressure / 1e9:.3g} GPa, where "
-            f"exp({LARGEST_EXPONENT:g}) is glass; check its unit"
+            f"exp({slope * pressure:.3g}) at the Hertz pressure of {pressure / 1e9:.3g} GPa, above "
+            f"the limit of exp({MAX_EXPONENT:g}); check its unit"
         )

@@ -1,6 +1,6 @@
-"""Viscosity over temperature and the viscosity index: ASTM D341 and D2270. Kinematic viscosities in m^2/s, SI outside.
+"""Temperature-viscosity law (ASTM D341) and viscosity index (ASTM D2270) of kinematic viscosities.
 
-The standards count in mm^2/s, and so does the inside of this module.
+The interface uses m^2/s; the standards, and computations inside this module, use mm^2/s.
 """
 
 import math
@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 from asperity.core.errors import BadInput
 
-WARM, HOT = 313.15, 373.15  # 40 and 100 °C, where data sheets state viscosities [K]
+WARM, HOT = 313.15, 373.15  # 40 and 100 °C, the temperatures of data sheets [K]
 MM2 = 1e-6  # mm^2/s [m^2/s]
-THINNEST = 0.21 * MM2  # where D341 ends [m^2/s]
-LEAST_OF_INDEX = 2.0 * MM2  # viscosity at 100 °C from which D2270 counts [m^2/s]
-# D2270's table as its appendix fits it: from a viscosity at 100 °C [mm^2/s] on, L and H as a Y² + b
-# Y + c
+MIN_VISCOSITY = 0.21 * MM2  # lower limit of D341 [m^2/s]
+MIN_VISCOSITY_OF_INDEX = 2.0 * MM2  # lower limit of D2270, at 100 °C [m^2/s]
+# Fits of D2270's appendix to its table: lower limit of the viscosity Y at 100 °C [mm^2/s], and
+# coefficients of L and H, a Y² + b Y + c
 _BASIC_OILS = (
     (2.0, (1.14673, 1.7576, -0.109), (0.84155, 1.5521, -0.077)),
     (3.8, (3.38095, -15.4952, 33.196), (0.78571, 1.7929, -0.183)),
@@ -35,16 +35,16 @@ _BASIC_OILS = (
 )
 
 
-def _thin(nu: float) -> float:
-    """What D341 adds for thin oils; below 1e-3 from 2 mm^2/s on."""
+def _thin_oil_term(nu: float) -> float:
+    """Return the term of D341 for thin oils; below 1e-3 above 2 mm^2/s."""
     return math.exp(-1.47 - 1.84 * nu - 0.51 * nu**2)
 
 
 @dataclass(frozen=True, slots=True)
 class Walther:
-    """Viscosity over temperature: log₁₀ log₁₀ Z = A - B log₁₀ T, Z = ν + 0.7 + exp(-1.47 - 1.84 ν - 0.51 ν²).
+    """Walther's equation log₁₀ log₁₀ Z = A - B log₁₀ T. Source: ASTM D341.
 
-    ν in mm²/s, T in kelvin. Source: ASTM D341 (Walther's equation).
+    Z = ν + 0.7 + exp(-1.47 - 1.84 ν - 0.51 ν²), ν in mm²/s, T in kelvin.
     """
 
     a: float
@@ -52,9 +52,9 @@ class Walther:
 
     @classmethod
     def through(cls, first: tuple[float, float], second: tuple[float, float]) -> "Walther":
-        """The line through two pairs of temperature [K] and kinematic viscosity [m^2/s]."""
+        """Fit the line through two pairs of temperature [K] and kinematic viscosity [m^2/s]."""
         (x1, w1), (x2, w2) = (
-            (math.log10(t), math.log10(math.log10(nu / MM2 + 0.7 + _thin(nu / MM2))))
+            (math.log10(t), math.log10(math.log10(nu / MM2 + 0.7 + _thin_oil_term(nu / MM2))))
             for t, nu in (first, second)
         )
         b = (w1 - w2) / (x2 - x1)
@@ -64,37 +64,40 @@ class Walther:
         return float(10.0**10.0 ** (self.a - self.b * math.log10(temperature)))
 
     def __call__(self, temperature: float) -> float:
-        """ν [m²/s] at a temperature [K]."""
-        thick = self._z(temperature) - 0.7
-        nu = thick
-        for _ in range(60):  # a contraction by 0.42 or better
-            nu = thick - _thin(nu)
+        """Return ν [m²/s] at a temperature [K]."""
+        without_term = self._z(temperature) - 0.7
+        nu = without_term
+        for _ in range(60):  # fixed-point iteration, contraction factor at most 0.42
+            nu = without_term - _thin_oil_term(nu)
         return nu * MM2
 
     def thinning(self, temperature: float) -> float:
-        """-d(ln ν)/dT [1/K]."""
+        """Return -d(ln ν)/dT [1/K]."""
         z, nu = self._z(temperature), self(temperature) / MM2
-        slope = 1.0 - (1.84 + 1.02 * nu) * _thin(nu)  # dZ/dν
+        slope = 1.0 - (1.84 + 1.02 * nu) * _thin_oil_term(nu)  # dZ/dν
         return self.b * z * math.log(z) / (nu * temperature * slope)
 
 
 def _basic_oils(hot: float) -> tuple[float, float]:
-    """L and H [mm^2/s]: viscosity at 40 °C of the oils of index 0 and 100 that have `hot` [mm^2/s] at 100 °C."""
+    """Return L and H [mm^2/s], viscosities at 40 °C of oils of index 0 and 100.
+
+    `hot` is their viscosity at 100 °C [mm^2/s].
+    """
     row = _BASIC_OILS[bisect_right(_BASIC_OILS, hot, key=lambda entry: entry[0]) - 1]
     low, high = ((a * hot + b) * hot + c for a, b, c in row[1:])
     return low, high
 
 
 def viscosity_index(viscosity_40: float, viscosity_100: float) -> float:
-    """The viscosity index of kinematic viscosities [m^2/s] at 40 and 100 °C. Source: ASTM D2270, ISO 2909.
+    """Return the viscosity index of kinematic viscosities [m^2/s] at 40 and 100 °C.
 
-    L and H are the standard's own fits to its table, within 0.1 % of it. Raises BadInput below 2
-    mm²/s at 100 °C.
+    L and H follow the standard's fits to its table, accurate to 0.1 %. Raises BadInput below 2
+    mm²/s at 100 °C. Source: ASTM D2270, ISO 2909.
     """
     warm, hot = viscosity_40 / MM2, viscosity_100 / MM2
-    if viscosity_100 < LEAST_OF_INDEX:
+    if viscosity_100 < MIN_VISCOSITY_OF_INDEX:
         raise BadInput(
-            f"a viscosity index is defined from 2 mm^2/s at 100 degC upwards, got {hot:.4g} mm^2/s; "
+            f"a viscosity index is defined above 2 mm^2/s at 100 degC, got {hot:.4g} mm^2/s; "
             "give viscosity_40 and viscosity_100 without an index"
         )
     low, high = _basic_oils(hot)
@@ -105,26 +108,26 @@ def viscosity_index(viscosity_40: float, viscosity_100: float) -> float:
 
 
 def viscosity_100_of(viscosity_40: float, index: float) -> float:
-    """The kinematic viscosity [m^2/s] at 100 °C of an oil of that viscosity at 40 °C and that viscosity index.
+    """Return the kinematic viscosity [m^2/s] at 100 °C from that at 40 °C and the viscosity index.
 
-    Raises BadInput where no viscosity from 2 mm²/s on has that index.
+    Raises BadInput if no viscosity above 2 mm²/s has that index.
     """
-    from scipy.optimize import brentq  # here: an oil of two viscosities needs no search
+    from scipy.optimize import brentq  # slow import, rarely needed
 
-    least, most = LEAST_OF_INDEX, viscosity_40
+    lowest, highest = MIN_VISCOSITY_OF_INDEX, viscosity_40
     if not (
-        most > least
-        and viscosity_index(viscosity_40, least) <= index <= viscosity_index(viscosity_40, most)
+        highest > lowest
+        and viscosity_index(viscosity_40, lowest) <= index <= viscosity_index(viscosity_40, highest)
     ):
         raise BadInput(
-            f"viscosity_index of {index:g} belongs to no oil of {viscosity_40 / MM2:.4g} mm^2/s at 40 degC and at "
-            "least 2 mm^2/s at 100 degC; give viscosity_100 in its place"
+            f"viscosity_index of {index:g} is impossible for {viscosity_40 / MM2:.4g} mm^2/s at 40 "
+            "degC and at least 2 mm^2/s at 100 degC; give viscosity_100 instead"
         )
     return float(
         brentq(
             lambda hot: viscosity_index(viscosity_40, hot) - index,
-            least,
-            most,
+            lowest,
+            highest,
             xtol=1e-15,
             rtol=1e-12,
         )

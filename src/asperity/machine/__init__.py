@@ -1,4 +1,4 @@
-"""Machine elements: what bearings, gears, discs and cams are made of becomes the list of their contacts; no film."""
+"""Machine elements: contacts of bearings, gears, discs and cams from their dimensions."""
 
 import lazy_loader
 

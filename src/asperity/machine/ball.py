@@ -1,7 +1,7 @@
-"""A ball bearing under radial and axial load: every ball's load and contact angle, deep groove or angular contact.
+"""Deep-groove and angular-contact ball bearings: load and contact angle of each ball.
 
-Rings are rigid (ISO 16281): the shaft holds the inner one at a tilt, or lets it tilt until it
-bears no moment. Spin of the balls and gyroscopic moments are not covered.
+Rings are rigid (ISO 16281). The inner ring has a given tilt, or is free to tilt without moment.
+Spin of the balls and gyroscopic moments are not modelled.
 """
 
 import math
@@ -18,44 +18,44 @@ from asperity.contact.hertz import elliptic_contact
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.machine.element import MachineContact
-from asperity.machine.roller import require_carried
+from asperity.machine.roller import require_load
 from asperity.machine.rolling import (
     STEEL_DENSITY,
     RollingKinematics,
     centrifugal_notes,
-    grown,
+    double_until,
     load_zone_notes,
 )
 
 EXPONENT = 1.5
-STEEPEST = math.radians(60.0)  # contact angle
-LARGEST_TILT = 0.02  # rad
-# thrust from which half of the balls bear over radial load times tan α: Sjövall's integrals
+MAX_CONTACT_ANGLE = math.radians(60.0)
+MAX_TILT = 0.02  # rad
+# Thrust over radial load times tan α above which half of the balls are loaded (Sjövall's integrals)
 HALF_ZONE = 1.22
-OSCULATION = 0.52, 0.53  # groove radius over ball diameter, of inner and outer ring: ISO 281's
+OSCULATION = 0.52, 0.53  # groove radius over ball diameter, inner and outer ring (ISO 281)
 RINGS = "inner ring", "outer ring"
 
 
 @dataclass(frozen=True, kw_only=True)
 class BallBearing:
-    """A ball bearing, its inner ring turning.
+    """Ball bearing with a rotating inner ring.
 
     Parameters
     ----------
-    balls : how many
+    balls : number of balls
     ball_diameter, pitch_diameter : [m]
     radial_load, axial_load : [N]
-    speed : of the inner ring [rad/s]
+    speed : speed of the inner ring [rad/s]
     osculation : groove radius over ball diameter, of inner and outer ring
-    clearance : diametral [m]; negative: preload. It decides the free contact angle
-    contact_angle : free contact angle [rad], in place of the clearance
-    tilt : of the inner ring, as its shaft holds it [rad]; None: free, until it bears no moment
+    clearance : diametral clearance [m]; negative: preload. It determines the free contact angle
+    contact_angle : free contact angle [rad], alternative to the clearance
+    tilt : tilt of the inner ring imposed by the shaft [rad]; None: free to tilt
 
     Raises
     ------
     BadInput
-        for balls that do not fit or none of which carries, grooves that the ball does not fit, a clearance beside a
-        contact angle that it contradicts, or an angular-contact bearing without the thrust that holds it together.
+        The balls do not fit or carry no load, the osculation is invalid, clearance and contact
+        angle are both given, or the thrust does not hold an angular-contact bearing together.
     """
 
     place: ClassVar[str] = "cycle_angle"
@@ -75,17 +75,20 @@ class BallBearing:
         for groove in self.osculation:
             if not 0.5 < groove <= 0.6:
                 raise BadInput(
-                    f"osculation must lie above 0.5 and at most at 0.6, got {groove:g}; 0.52 is usual"
+                    f"osculation must lie above 0.5 and be at most 0.6, got {groove:g}; 0.52 is "
+                    "usual"
                 )
-        if not 0.0 <= self.contact_angle <= math.radians(60.0):
+        if not 0.0 <= self.contact_angle <= MAX_CONTACT_ANGLE:
             raise BadInput(
-                f"contact_angle must lie between 0 and 60 deg, got {math.degrees(self.contact_angle):g} deg; correct it"
+                "contact_angle must lie between 0 and 60 deg, got "
+                f"{math.degrees(self.contact_angle):g} deg; correct it"
             )
         if self.contact_angle > 0.0 and self.clearance != 0.0:
-            own = 2e6 * self.groove_distance * (1.0 - math.cos(self.contact_angle))
+            equivalent = 2e6 * self.groove_distance * (1.0 - math.cos(self.contact_angle))
             raise BadInput(
-                f"clearance and contact_angle say the same thing: {math.degrees(self.contact_angle):g} deg is a "
-                f"clearance of {own:.1f} um in these grooves; leave one of them out"
+                "clearance and contact_angle are equivalent, "
+                f"{math.degrees(self.contact_angle):g} deg is a clearance of {equivalent:.1f} um "
+                "in these grooves; leave one of them out"
             )
         self._require_shape()
         if not 0.0 <= self.axial_load < math.inf:
@@ -101,8 +104,8 @@ class BallBearing:
                 "radial_load and axial_load are both 0 N, no ball carries; give one of them"
             )
         if self.contact_angle > 0.0 and self.axial_load == 0.0:
-            raise BadInput(self._apart(f"radial_load of {self.radial_load:g} N alone"))
-        require_carried(
+            raise BadInput(self._separation(f"radial_load of {self.radial_load:g} N alone"))
+        require_load(
             math.hypot(self.radial_load, self.axial_load),
             self.clearance,
             self.ball_diameter,
@@ -112,55 +115,57 @@ class BallBearing:
 
     def _require_shape(self) -> None:
         require_positive("ball_diameter", self.ball_diameter, "m")
-        widest = 2.0 * self.groove_distance * (1.0 - math.cos(STEEPEST))
-        if self.clearance > widest:
+        limit = 2.0 * self.groove_distance * (1.0 - math.cos(MAX_CONTACT_ANGLE))
+        if self.clearance > limit:
             raise BadInput(
-                f"clearance of {1e6 * self.clearance:g} um lets the balls of these grooves bear at more than 60 deg; "
-                f"it must be at most {1e6 * widest:.1f} um, or the osculation wider"
+                f"clearance of {1e6 * self.clearance:g} um gives a contact angle above 60 deg in "
+                f"these grooves; it must be at most {1e6 * limit:.1f} um, or the osculation larger"
             )
-        if self.tilt is not None and not abs(self.tilt) <= LARGEST_TILT:
+        if self.tilt is not None and not abs(self.tilt) <= MAX_TILT:
             raise BadInput(
-                f"tilt must lie between -20 and 20 mrad, got {1e3 * self.tilt:g} mrad; bearings bear 1 or 2"
+                f"tilt must lie between -20 and 20 mrad, got {1e3 * self.tilt:g} mrad; bearings "
+                "tolerate 1 or 2"
             )
 
-    def _apart(self, under: str) -> str:
-        """That an angular-contact bearing comes apart, and what would hold it."""
-        needed = HALF_ZONE * self.radial_load * math.tan(self.contact_angle)
+    def _separation(self, load: str) -> str:
+        """Return the message that the load separates an angular-contact bearing."""
+        required = HALF_ZONE * self.radial_load * math.tan(self.contact_angle)
         return (
-            f"an angular-contact bearing comes apart under a {under}: its rings hold the balls on one side only; "
-            f"give axial_load, which half of the balls bear from about {needed:.3g} N"
+            f"an angular-contact bearing comes apart under a {load}, as its rings support the "
+            f"balls on one side only; give axial_load, of at least about {required:.3g} N to load "
+            "half of the balls"
         )
 
     @property
     def groove_distance(self) -> float:
-        """Between the centres of the two grooves where the ball is just held, A = r_i + r_e - D [m]."""
+        """Distance of the groove centres at zero clearance and load, A = r_i + r_e - D [m]."""
         return (sum(self.osculation) - 1.0) * self.ball_diameter
 
     @cached_property
     def play(self) -> float:
-        """Diametral clearance, given or that of the contact angle [m]."""
+        """Diametral clearance, given or from the contact angle [m]."""
         if self.contact_angle > 0.0:
             return 2.0 * self.groove_distance * (1.0 - math.cos(self.contact_angle))
         return self.clearance
 
     @property
     def angles(self) -> Field:
-        """Where the balls are, from the direction of the radial load [rad]."""
+        """Positions of the balls, from the direction of the radial load [rad]."""
         return 2.0 * np.pi * np.arange(self.balls) / self.balls
 
     def stiffness(self, pair: ElasticPair) -> float:
-        """Load over the power 3/2 of the approach of both rings [N/m^1.5], at the nominal contact angle."""
+        """Return load over approach of both rings to the power 3/2, nominal angle [N/m^1.5]."""
         approach = 0.0
         for radii in self._radii(self.contact_angle):
-            found = elliptic_contact(1.0, radii, pair.reduced_modulus).approach
-            assert found is not None
-            approach += found
+            of_contact = elliptic_contact(1.0, radii, pair.reduced_modulus).approach
+            assert of_contact is not None
+            approach += of_contact
         return float(approach**-EXPONENT)
 
     def shifts(self, pair: ElasticPair) -> tuple[float, float, float]:
-        """Of the inner ring, where the balls carry the load: radial and axial [m], tilt [rad].
+        """Return the displacements of the inner ring: radial and axial [m], tilt [rad].
 
-        The axial one counts from the middle of the axial play.
+        The axial one is measured from the middle of the axial play.
         """
         if self.radial_load == self.axial_load == 0.0:
             return 0.0, 0.0, self.tilt or 0.0
@@ -168,99 +173,102 @@ class BallBearing:
         elastic = (max(self.radial_load, self.axial_load) / stiffness) ** (1.0 / EXPONENT)
         if not self.tilt and (self.axial_load == 0.0 or self.radial_load == 0.0):
             return self._under_one_load(stiffness, elastic)
-        return self._moved(elastic * self._balanced(stiffness, elastic))
+        return self._in_si(elastic * self._equilibrium(stiffness, elastic))
 
     def moment(self, pair: ElasticPair) -> float:
-        """What the shaft bears of the inner ring's tilting [N m]; 0 where the ring is free to tilt."""
+        """Return the tilting moment on the shaft [N m]; 0 if the ring is free to tilt."""
         if self.tilt is None:
             return 0.0
         radial, axial, tilt = self.shifts(pair)
         forces = self._forces(np.array([radial, axial, tilt * self._arm]), self.stiffness(pair))
         return float(forces[2]) * self._arm
 
-    def _balanced(self, stiffness: float, elastic: float) -> Field:
-        """Shifts over `elastic` under both loads: the least of a convex energy, so that there is one balance.
+    def _equilibrium(self, stiffness: float, elastic: float) -> Field:
+        """Return the shifts over `elastic` that minimise the potential energy under both loads.
 
-        Balls' approaches are distances less a constant, convex in the shifts, and so is their
-        power 5/2. A tilt that the shaft holds is no unknown.
+        The minimum is unique: approaches are distances less a constant, so that they and their
+        power 5/2 are convex in the shifts. An imposed tilt is not an unknown.
         """
         free = 3 if self.tilt is None else 2
-        held = np.array([0.0, 0.0, (self.tilt or 0.0) * self._arm / elastic])
-        wanted = np.array([self.radial_load, self.axial_load, 0.0])[:free]
+        imposed = np.array([0.0, 0.0, (self.tilt or 0.0) * self._arm / elastic])
+        applied = np.array([self.radial_load, self.axial_load, 0.0])[:free]
         force = max(self.radial_load, self.axial_load)
 
-        def whole(shifts: Field) -> Field:
-            return np.concatenate([shifts, held[free:]])
+        def with_tilt(shifts: Field) -> Field:
+            return np.concatenate([shifts, imposed[free:]])
 
         def energy(shifts: Field) -> float:
-            loads, _ = self._balls(elastic * whole(shifts), stiffness)
+            loads, _ = self._balls(elastic * with_tilt(shifts), stiffness)
             approaches = (loads / stiffness) ** (1.0 / EXPONENT)
-            return float(0.4 * loads @ approaches / elastic - wanted @ shifts) / force
+            return float(0.4 * loads @ approaches / elastic - applied @ shifts) / force
 
-        def excess(shifts: Field) -> Field:
+        def residual(shifts: Field) -> Field:
             return np.asarray(
-                (self._forces(elastic * whole(shifts), stiffness)[:free] - wanted) / force
+                (self._forces(elastic * with_tilt(shifts), stiffness)[:free] - applied) / force
             )
 
-        pressed = (max(self.play, 0.0) / 2.0 + elastic) / elastic
-        aside = self.groove_distance * math.sqrt(1.0 - self._held_cosine**2) / elastic
-        manner: Any = {
-            "jac": excess,
-            "hess": lambda shifts: self._stiffnesses(whole(shifts), stiffness, elastic)[
+        radial = (max(self.play, 0.0) / 2.0 + elastic) / elastic
+        axial = self.groove_distance * math.sqrt(1.0 - self._free_cosine**2) / elastic
+        options: Any = {
+            "jac": residual,
+            "hess": lambda shifts: self._stiffnesses(with_tilt(shifts), stiffness, elastic)[
                 :free, :free
             ],
             "method": "trust-exact",
             "options": {"gtol": 1e-8, "maxiter": 2000},
         }
-        found = scipy.optimize.minimize(energy, np.array([pressed, aside, 0.0])[:free], **manner).x
-        polished = scipy.optimize.root(excess, found, options={"xtol": 1e-13}).x
-        best = min((found, polished), key=lambda shifts: float(np.max(np.abs(excess(shifts)))))
-        if np.max(np.abs(excess(best))) < 1e-8:
-            return whole(np.asarray(best))
+        minimum = scipy.optimize.minimize(
+            energy, np.array([radial, axial, 0.0])[:free], **options
+        ).x
+        polished = scipy.optimize.root(residual, minimum, options={"xtol": 1e-13}).x
+        best = min((minimum, polished), key=lambda shifts: float(np.max(np.abs(residual(shifts)))))
+        if np.max(np.abs(residual(best))) < 1e-8:
+            return with_tilt(np.asarray(best))
         raise AsperityError(
-            f"no balance was found under a radial load of {self.radial_load:g} N and an axial one of "
-            f"{self.axial_load:g} N; leave a small axial load out, or check ball_diameter and osculation"
+            f"no equilibrium was found under a radial load of {self.radial_load:g} N and an axial "
+            f"load of {self.axial_load:g} N; leave a small axial load out, or check ball_diameter "
+            "and osculation"
         )
 
     def _stiffnesses(self, shifts: Field, stiffness: float, elastic: float) -> Field:
-        """Slopes of the forces by the shifts, in units of `elastic` and of the larger load, shape (3, 3)."""
+        """Return the tangent stiffness, per `elastic` and the larger load, shape (3, 3)."""
         loads, angles = self._balls(elastic * shifts, stiffness)
         approaches = (loads / stiffness) ** (1.0 / EXPONENT)
         place, across, along = np.cos(self.angles), np.cos(angles), np.sin(angles)
-        pressing = np.stack([across * place, along, along * place])
-        turning = np.stack([-along * place, across, across * place])
-        stiff = (
+        normal = np.stack([across * place, along, along * place])
+        tangential = np.stack([-along * place, across, across * place])
+        stiffnesses = (
             EXPONENT * stiffness * np.sqrt(approaches),
             loads / (self.groove_distance + approaches),
         )
-        slopes = (pressing * stiff[0]) @ pressing.T + (turning * stiff[1]) @ turning.T
+        slopes = (normal * stiffnesses[0]) @ normal.T
+        slopes = slopes + (tangential * stiffnesses[1]) @ tangential.T
         return np.asarray(slopes * elastic / max(self.radial_load, self.axial_load))
 
     def _under_one_load(self, stiffness: float, elastic: float) -> tuple[float, float, float]:
-        """Shifts under a radial or an axial load alone, where the ring goes one way only."""
+        """Return the shifts under a radial or an axial load alone, along one axis only."""
         axis, load = (0, self.radial_load) if self.axial_load == 0.0 else (1, self.axial_load)
 
-        def at(shift: float) -> Field:
-            return np.array([shift if place == axis else 0.0 for place in range(3)])
+        def along_axis(shift: float) -> Field:
+            return np.array([shift if index == axis else 0.0 for index in range(3)])
 
         def excess(shift: float) -> float:
-            return float(self._forces(at(shift), stiffness)[axis]) - load
+            return float(self._forces(along_axis(shift), stiffness)[axis]) - load
 
-        enough = grown(elastic + abs(self.play), lambda shift: excess(shift) > 0.0)
-        return self._moved(
-            at(float(scipy.optimize.brentq(excess, 0.0, enough, xtol=1e-18, rtol=1e-14)))
-        )
+        upper = double_until(elastic + abs(self.play), lambda shift: excess(shift) > 0.0)
+        shift = float(scipy.optimize.brentq(excess, 0.0, upper, xtol=1e-18, rtol=1e-14))
+        return self._in_si(along_axis(shift))
 
-    def _moved(self, shifts: Field) -> tuple[float, float, float]:
+    def _in_si(self, shifts: Field) -> tuple[float, float, float]:
         return float(shifts[0]), float(shifts[1]), float(shifts[2]) / self._arm
 
     def loads(self, pair: ElasticPair) -> tuple[Field, Field]:
-        """On every ball [N], and its contact angle [rad].
+        """Return the loads [N] and contact angles [rad] of the balls.
 
         Raises
         ------
         BadInput
-            for an angular-contact bearing whose thrust does not hold its balls.
+            The thrust does not hold an angular-contact bearing together.
         """
         radial, axial, tilt = self.shifts(pair)
         loads, angles = self._balls(
@@ -268,13 +276,15 @@ class BallBearing:
         )
         if self.contact_angle > 0.0 and np.any(angles[loads > 0.0] <= 0.0):
             raise BadInput(
-                self._apart(f"thrust of {self.axial_load:g} N beside {self.radial_load:g} N across")
+                self._separation(
+                    f"thrust of {self.axial_load:g} N with {self.radial_load:g} N radial load"
+                )
             )
         return loads, angles
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:
-        """Both contacts of every loaded ball."""
-        found, (loads, contact_angles) = [], self.loads(pair)
+        """Return both contacts of each loaded ball."""
+        contacts, (loads, contact_angles) = [], self.loads(pair)
         for number, (place, load, angle) in enumerate(
             zip(self.angles, loads, contact_angles, strict=True)
         ):
@@ -292,85 +302,85 @@ class BallBearing:
                     surface_speeds=(kinematics.surface_speed, kinematics.surface_speed),
                     overrolling_hz=passages,
                 )
-                found.append(contact)
-        return tuple(found)
+                contacts.append(contact)
+        return tuple(contacts)
 
     @property
     def frequencies(self) -> dict[str, float]:
-        """Of shaft, rings, ball and cage, at the free contact angle [Hz]."""
+        """Frequencies of shaft, rings, ball and cage at the free contact angle [Hz]."""
         return self._kinematics(self.free_angle).frequencies
 
     @property
     def free_angle(self) -> float:
-        """Contact angle at which the grooves just hold the balls under thrust [rad]; 0 under radial load alone.
+        """Contact angle under a vanishing thrust [rad]; 0 under radial load alone.
 
-        Loads change it a little; a bearing's characteristic frequencies are usually given for this
-        one.
+        Characteristic frequencies of a bearing are usually given for this angle.
         """
-        return self.contact_angle if self.axial_load == 0.0 else math.acos(self._held_cosine)
+        return self.contact_angle if self.axial_load == 0.0 else math.acos(self._free_cosine)
 
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:
-        """What the model leaves out, and where it does not hold."""
+        """Return the limits of the model, the tilt and the largest contact angle."""
         contacts = self.contacts(pair)
         loads, angles = self.loads(pair)
-        said = ["Rings are rigid; spin of the balls is not covered."]
-        said += self._tilting(pair)
+        notes = ["Rings are rigid; spin of the balls is not covered."]
+        notes += self._tilt_notes(pair)
         largest = float(angles[np.argmax(loads)])
         if largest > 1e-6:
-            said.append(
-                f"The most loaded ball bears at a contact angle of {math.degrees(largest):.2f} deg."
+            notes.append(
+                f"The most loaded ball has a contact angle of {math.degrees(largest):.2f} deg."
             )
         mass = STEEL_DENSITY * math.pi / 6.0 * self.ball_diameter**3
         centrifugal = centrifugal_notes(self._kinematics(largest).centrifugal_load(mass), contacts)
-        return (*said, *load_zone_notes(loads.tolist(), "ball"), *centrifugal)
+        return (*notes, *load_zone_notes(loads.tolist(), "ball"), *centrifugal)
 
     def title(self) -> str:
-        """Balls and kind."""
+        """Return type and number of balls."""
         kind = "Angular-contact" if self.contact_angle > 0.0 else "Deep-groove"
         return f"{kind} ball bearing, {self.balls} balls"
 
-    def _tilting(self, pair: ElasticPair) -> Iterator[str]:
-        """How the inner ring is held where that makes a difference, and with what moment."""
+    def _tilt_notes(self, pair: ElasticPair) -> Iterator[str]:
+        """Yield notes on tilt and moment of the inner ring, if relevant, and on the load zone."""
         if 0.0 in (self.radial_load, self.axial_load) and not self.tilt:
             return
         if self.tilt is None:
             tilted = 1e3 * self.shifts(pair)[2]
             yield (
-                f"The inner ring is free and tilts by {tilted:.2f} mrad, until it bears no moment; a shaft that holds "
-                "it upright changes loads and contact angles."
+                f"The inner ring is free and tilts by {tilted:.2f} mrad, without moment; a shaft "
+                "that prevents the tilt changes loads and contact angles."
             )
         else:
             yield (
-                f"The shaft holds the inner ring at a tilt of {1e3 * self.tilt:g} mrad, with a moment of "
-                f'{abs(self.moment(pair)):.3g} N m; a ring that is free to tilt (tilt = "free") is loaded otherwise.'
+                f"The shaft holds the inner ring at a tilt of {1e3 * self.tilt:g} mrad, with a "
+                f"moment of {abs(self.moment(pair)):.3g} N m; loads differ for a ring that is free "
+                'to tilt (tilt = "free").'
             )
-        bearing = int(np.count_nonzero(self.loads(pair)[0]))
-        if self.contact_angle > 0.0 and bearing < self.balls // 2:
+        loaded = int(np.count_nonzero(self.loads(pair)[0]))
+        if self.contact_angle > 0.0 and loaded < self.balls // 2:
             yield (
-                f"The thrust holds {bearing} of {self.balls} balls; angular-contact bearings are mounted so that half "
-                "of them bear or more."
+                f"The thrust loads {loaded} of {self.balls} balls; angular-contact bearings are "
+                "usually preloaded so that at least half of the balls are loaded."
             )
 
     @property
-    def _held_cosine(self) -> float:
-        """Of the contact angle at which the grooves just hold the balls."""
+    def _free_cosine(self) -> float:
+        """Cosine of the free contact angle."""
         return min(1.0 - self.play / (2.0 * self.groove_distance), 1.0)
 
     @property
     def _arm(self) -> float:
-        """Radius of the circle of the inner groove's centres, on which a tilt acts [m]."""
+        """Radius of the circle of the inner groove's centres, the arm of a tilt [m]."""
         inner = (self.osculation[0] - 0.5) * self.ball_diameter
-        return self.pitch_diameter / 2.0 + inner * self._held_cosine
+        return self.pitch_diameter / 2.0 + inner * self._free_cosine
 
     def _balls(self, shifts: Field, stiffness: float) -> tuple[Field, Field]:
-        """Loads and contact angles where the inner ring is shifted so; the third shift is the tilt at `_arm`."""
+        """Return loads and contact angles for shifts of the inner ring; the third: tilt · `_arm`."""
         across = self.groove_distance - self.play / 2.0 + shifts[0] * np.cos(self.angles)
         along = shifts[1] + shifts[2] * np.cos(self.angles)
         elastic = np.maximum(np.hypot(across, along) - self.groove_distance, 0.0)
         return stiffness * elastic**EXPONENT, np.arctan2(along, across)
 
     def _forces(self, shifts: Field, stiffness: float) -> Field:
-        """Radial and axial force, and the moment over `_arm` [N]."""
+        """Return radial force, axial force and moment over `_arm` [N]."""
         loads, angles = self._balls(shifts, stiffness)
         axial, place = loads * np.sin(angles), np.cos(self.angles)
         return np.array([(loads * np.cos(angles)) @ place, axial.sum(), axial @ place])
@@ -385,7 +395,7 @@ class BallBearing:
         )
 
     def _radii(self, angle: float) -> tuple[tuple[float, float], tuple[float, float]]:
-        """(R_x, R_y) at the inner and the outer ring [m]."""
+        """Return the effective radii (R_x, R_y) at the inner and the outer ring [m]."""
         inner, outer = self._kinematics(angle).radii
         across = [
             1.0 / (2.0 / self.ball_diameter - 1.0 / (f * self.ball_diameter))

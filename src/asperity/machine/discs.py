@@ -1,31 +1,32 @@
-"""Two discs that run against each other, as on a twin-disc rig."""
+"""Contact of a twin-disc rig."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
 from asperity.contact.conditions import ElasticPair
 from asperity.core.errors import BadInput, require_positive
-from asperity.machine.element import MachineContact, turns
+from asperity.machine.element import MachineContact, rotation_hz
 
 
 @dataclass(frozen=True, kw_only=True)
 class TwinDisc:
-    """Two discs pressed together, turning in opposite senses so that their surfaces run along.
+    """Two discs pressed together whose surfaces move in the same direction at the contact.
 
     Parameters
     ----------
-    radii : of the discs [m]
-    speeds : of the discs [rad/s], or else
-    entrainment_speed : mean of both surfaces' [m/s]
-    slide_to_roll : (u1 - u2) over it, with its sign
-    load : [N]
-    length : of the line contact [m]; None where a disc is crowned
-    crown_radius : across rolling, of the pair [m]; None for cylinders
+    radii : radii of the discs [m]
+    speeds : angular speeds of the discs [rad/s]; alternative: the next two
+    entrainment_speed : mean of both surface speeds [m/s]
+    slide_to_roll : (u1 - u2) over the entrainment speed, with sign
+    load : normal load [N]
+    length : length of the line contact [m]; None if a disc is crowned
+    crown_radius : effective radius across rolling [m]; None for cylinders
 
     Raises
     ------
     BadInput
-        for a quantity that is not positive, not exactly one of length and crown_radius, or both ways to state speeds.
+        A quantity is not positive, length and crown_radius are both or neither given, or so are
+        speeds and entrainment_speed.
     """
 
     place: ClassVar[str] = "cycle_angle"
@@ -46,14 +47,15 @@ class TwinDisc:
         if (self.length is None) == (self.crown_radius is None):
             both = "both are" if self.length is not None else "neither is"
             raise BadInput(
-                f"discs have length (cylinders) or crown_radius (one is crowned), {both} given; give one"
+                f"discs have length (cylinders) or crown_radius (one is crowned), {both} given; "
+                "give one"
             )
         for name, value in (("length", self.length), ("crown_radius", self.crown_radius)):
             if value is not None:
                 require_positive(name, value, "m")
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (one contact, all the load)
-        """The one contact."""
+        """Return the contact."""
         (first, second), (slow, fast) = self.radii, self.turning
         radius = first * second / (first + second)
         contact = MachineContact(
@@ -65,13 +67,13 @@ class TwinDisc:
             radius=radius if self.crown_radius is None else (radius, self.crown_radius),
             length=self.length,
             surface_speeds=(slow * first, fast * second),
-            overrolling_hz=(turns(slow), turns(fast)),
+            overrolling_hz=(rotation_hz(slow), rotation_hz(fast)),
         )
         return (contact,)
 
     @property
     def turning(self) -> tuple[float, float]:
-        """Of the discs [rad/s], as given or by entrainment and slide-to-roll ratio."""
+        """Angular speeds of the discs [rad/s], given or by entrainment and slide-to-roll ratio."""
         if self.speeds is not None:
             return self.speeds
         assert self.entrainment_speed is not None
@@ -83,35 +85,40 @@ class TwinDisc:
         if (self.speeds is None) == (self.entrainment_speed is None):
             both = "both are" if self.speeds is not None else "neither is"
             raise BadInput(
-                f"discs have speeds, or entrainment_speed with slide_to_roll, {both} given; give one"
+                f"discs have speeds, or entrainment_speed with slide_to_roll, {both} given; give "
+                "one"
             )
         if self.speeds is not None:
             if self.slide_to_roll is not None:
                 raise BadInput(
-                    "slide_to_roll is that of both speeds, which are given; leave it out"
+                    "slide_to_roll follows from both speeds, which are given; leave it out"
                 )
             if min(self.speeds) < 0.0 or max(self.speeds) <= 0.0:
                 raise BadInput(
-                    f"speeds must not be negative nor both 0, got {self.speeds[0]:g} and {self.speeds[1]:g} rad/s; one "
-                    "disc may stand"
+                    f"speeds must not be negative nor both 0, got {self.speeds[0]:g} and "
+                    f"{self.speeds[1]:g} rad/s; only one disc may be at rest"
                 )
             return
         require_positive("entrainment_speed", self.entrainment_speed or 0.0, "m/s")
         if abs(self.slide_to_roll or 0.0) > 2.0:
             raise BadInput(
-                f"slide_to_roll must lie between -2 and 2, where one disc stands, got {self.slide_to_roll:g}: beyond, "
-                "it runs backwards against the other; correct it"
+                "slide_to_roll must lie between -2 and 2, where one disc is at rest, got "
+                f"{self.slide_to_roll:g}: beyond, the surfaces move in opposite directions; "
+                "correct it"
             )
 
     @property
     def frequencies(self) -> dict[str, float]:
-        """Of both discs [Hz]."""
-        return {"disc_1_hz": turns(self.turning[0]), "disc_2_hz": turns(self.turning[1])}
+        """Rotational frequencies of both discs [Hz]."""
+        return {
+            "disc_1_hz": rotation_hz(self.turning[0]),
+            "disc_2_hz": rotation_hz(self.turning[1]),
+        }
 
-    def notes(self, pair: ElasticPair) -> tuple[str, ...]:  # noqa: ARG002 (whatever they are made of)
-        """None: the model leaves nothing out that a rig has."""
+    def notes(self, pair: ElasticPair) -> tuple[str, ...]:  # noqa: ARG002 (independent of the material)
+        """Return no notes, as the model of a rig is complete."""
         return ()
 
     def title(self) -> str:
-        """What it is."""
+        """Return the name of the machine."""
         return "Twin disc"

@@ -1,8 +1,8 @@
-"""A pair of external spur gears: contacts along the line of action, load shared between pairs of teeth.
+"""External spur gear pair: contacts along the line of action, with load sharing.
 
-Geometry, speeds and radii are exact for rigid involutes. How load is shared is ISO/TR 15144-1's
-unmodified profile (1/3 to 2/3 on two pairs, 1 on one); tip relief, tooth stiffness and dynamic
-loads are not covered.
+Geometry, speeds and radii are exact for rigid involutes. Load sharing follows ISO/TR 15144-1 for
+unmodified profiles (1/3 to 2/3 with two pairs in contact, 1 with one); tip relief, tooth stiffness
+and dynamic loads are not modelled.
 """
 
 import math
@@ -15,37 +15,37 @@ import scipy
 
 from asperity.contact.conditions import ElasticPair
 from asperity.core.errors import BadInput, require_positive
-from asperity.machine.element import MachineContact, require_count, turns
+from asperity.machine.element import MachineContact, require_count, rotation_hz
 
 PathPoint = Literal["A", "AB", "B", "C", "D", "DE", "E"]
-# modules by which the shifts may exceed what the centre distance leaves, for rounded catalogue
-# values
-JAMMED = 0.002
-DEDENDUM = 1.25  # of the same, down to the roots that it cuts
-# of the basic rack over the module; its straight flank ends as far below the reference line
+# Tolerance of the sum of profile shifts [modules], for rounded catalogue values
+SHIFT_TOLERANCE = 0.002
+# Basic rack [modules]; its straight flank ends one addendum below the reference line
 ADDENDUM = 1.0
+DEDENDUM = 1.25
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpurGear:
-    """A spur gear pair, the pinion driving.
+    """Spur gear pair with driving pinion.
 
     Parameters
     ----------
     module : [m]
-    teeth : of pinion and wheel
-    pressure_angle : of the basic rack [rad]
-    profile_shift : of pinion and wheel, over the module
-    face_width : the one that bears [m]
-    torque : on the pinion [N m]
-    speed : of the pinion [rad/s]
+    teeth : numbers of teeth of pinion and wheel
+    pressure_angle : pressure angle of the basic rack [rad]
+    profile_shift : profile shift coefficients of pinion and wheel
+    face_width : common face width [m]
+    torque : torque on the pinion [N m]
+    speed : speed of the pinion [rad/s]
     centre_distance : [m]; None: without backlash
-    tip_diameters : of pinion and wheel [m]; None: one module above the shifted reference, not shortened
+    tip_diameters : of pinion and wheel [m]; None: one module above the shifted reference line
 
     Raises
     ------
     BadInput
-        for teeth that do not mesh, jam, run into the roots, end in a point, or are undercut where they bear.
+        The teeth do not mesh, jam, interfere with the roots, are pointed, or undercut within the
+        path of contact.
     """
 
     place: ClassVar[str] = "path_position_m"
@@ -73,15 +73,16 @@ class SpurGear:
         if not 10.0 <= math.degrees(self.pressure_angle) <= 35.0:
             degrees = math.degrees(self.pressure_angle)
             raise BadInput(
-                f"pressure_angle must lie between 10 and 35 deg, got {degrees:g} deg; 20 deg is usual"
+                f"pressure_angle must lie between 10 and 35 deg, got {degrees:g} deg; 20 deg is "
+                "usual"
             )
         self._require_mesh()
         for body in (0, 1):
-            self._require_whole_teeth(body)
+            self._require_sound_teeth(body)
 
     @cached_property
     def base_radii(self) -> tuple[float, float]:
-        """Of pinion and wheel [m]."""
+        """Base radii of pinion and wheel [m]."""
         first, second = (
             0.5 * self.module * count * math.cos(self.pressure_angle) for count in self.teeth
         )
@@ -89,7 +90,7 @@ class SpurGear:
 
     @cached_property
     def tip_radii(self) -> tuple[float, float]:
-        """Of pinion and wheel [m]."""
+        """Tip radii of pinion and wheel [m]."""
         if self.tip_diameters is not None:
             return self.tip_diameters[0] / 2.0, self.tip_diameters[1] / 2.0
         first, second = (
@@ -100,42 +101,42 @@ class SpurGear:
 
     @cached_property
     def centres(self) -> float:
-        """Distance of the axes [m]."""
+        """Centre distance [m]."""
         if self.centre_distance is not None:
             return self.centre_distance
         shift = 2.0 * sum(self.profile_shift) * math.tan(self.pressure_angle) / sum(self.teeth)
-        wanted = _involute(self.pressure_angle) + shift
-        if wanted <= 0.0:
+        target = _involute(self.pressure_angle) + shift
+        if target <= 0.0:
             total = sum(self.profile_shift)
             raise BadInput(
-                f"profile_shift {total:g} in sum leaves no room between the axes; raise it"
+                f"the sum of profile_shift, {total:g}, leaves no room between the axes; raise it"
             )
         angle = float(
-            scipy.optimize.brentq(lambda trial: _involute(trial) - wanted, 1e-6, 1.5, xtol=1e-15)
+            scipy.optimize.brentq(lambda trial: _involute(trial) - target, 1e-6, 1.5, xtol=1e-15)
         )
         return sum(self.base_radii) / math.cos(angle)
 
     @cached_property
     def working_angle(self) -> float:
-        """Pressure angle in the mesh [rad]: cos = (r_b1 + r_b2)/a."""
+        """Working pressure angle [rad]: cos = (r_b1 + r_b2)/a."""
         return math.acos(sum(self.base_radii) / self.centres)
 
     @property
     def base_pitch(self) -> float:
-        """π m cos α [m]."""
+        """Base pitch π m cos α [m]."""
         return math.pi * self.module * math.cos(self.pressure_angle)
 
     @property
     def line_of_action(self) -> float:
-        """From one base circle to the other, T = a sin αw [m]."""
+        """Length between the base circles, T = a sin αw [m]."""
         return self.centres * math.sin(self.working_angle)
 
     @cached_property
     def path(self) -> dict[PathPoint, float]:
-        """Points of the path of contact by their distance from the pinion's base circle [m], in the order of contact.
+        """Points of the path of contact: distance from the pinion's base circle [m], in order.
 
-        A begins, E ends; one pair bears from B to D; C is the pitch point, AB and DE lie half way.
-        C is left out where the teeth do not meet there.
+        A: start; E: end; B to D: single-pair contact; C: pitch point, omitted if it is outside the
+        path; AB and DE: halfway.
         """
         start, end = self._ends
         points: dict[PathPoint, float] = {
@@ -154,32 +155,35 @@ class SpurGear:
 
     @property
     def contact_ratio(self) -> float:
-        """Transverse contact ratio: mean number of pairs that bear."""
+        """Transverse contact ratio."""
         start, end = self._ends
         return (end - start) / self.base_pitch
 
     @property
     def normal_force(self) -> float:
-        """Along the line of action, on all pairs together [N]."""
+        """Total force along the line of action [N]."""
         return self.torque / self.base_radii[0]
 
     def share(self, distance: float) -> float:
-        """Share of the load on the pair that meets at this distance [m] from the pinion's base circle."""
+        """Return the load share of the pair at a distance [m] from the pinion's base circle."""
         start, end = self._ends
         first, last = end - self.base_pitch, start + self.base_pitch
-        tiny = 1e-9 * self.base_pitch
-        if distance < first - tiny:
+        tolerance = 1e-9 * self.base_pitch
+        if distance < first - tolerance:
             return 1.0 / 3.0 + (distance - start) / (first - start) / 3.0
-        if distance > last + tiny:
+        if distance > last + tolerance:
             return 1.0 / 3.0 + (end - distance) / (end - last) / 3.0
         return 1.0
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (rigid teeth)
-        """The contacts at the points of `path`."""
+        """Return the contacts at the points of `path`."""
         return tuple(self.contact(name, distance) for name, distance in self.path.items())
 
     def contact(self, name: str, distance: float) -> MachineContact:
-        """The contact at a distance [m] from the pinion's base circle: u1 = ω1 s, u2 = ω2 (T - s), R = s (T - s)/T."""
+        """Return the contact at a distance s [m] from the pinion's base circle.
+
+        u1 = ω1 s, u2 = ω2 (T - s), R = s (T - s)/T.
+        """
         length, slower = self.line_of_action, self.speed * self.teeth[0] / self.teeth[1]
         return MachineContact(
             name=name,
@@ -190,14 +194,14 @@ class SpurGear:
             radius=distance * (length - distance) / length,
             length=self.face_width,
             surface_speeds=(self.speed * distance, slower * (length - distance)),
-            overrolling_hz=(turns(self.speed), turns(slower)),
+            overrolling_hz=(rotation_hz(self.speed), rotation_hz(slower)),
         )
 
     @property
     def frequencies(self) -> dict[str, float]:
-        """Mesh, both shafts, and the same two teeth meeting again [Hz]."""
+        """Frequencies of mesh, both shafts and hunting tooth [Hz]."""
         first, second = self.teeth
-        pinion = turns(self.speed)
+        pinion = rotation_hz(self.speed)
         return {
             "mesh_hz": first * pinion,
             "pinion_hz": pinion,
@@ -206,23 +210,25 @@ class SpurGear:
         }
 
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:  # noqa: ARG002 (rigid teeth)
-        """What the model leaves out, and where the pitch point is not what tables take it for."""
-        said = [
-            "Load is shared as ISO/TR 15144-1 has it for unmodified teeth; tip relief, tooth stiffness and dynamic "
-            "loads are not covered."
+        """Return the limits of the model, and a note on an unusual pitch point."""
+        notes = [
+            "Load sharing follows ISO/TR 15144-1 for unmodified teeth; tip relief, tooth stiffness "
+            "and dynamic loads are not covered."
         ]
         pitch = self.path.get("C")
         if pitch is None:
-            said.append("The teeth do not meet at the pitch point.")
+            notes.append("The pitch point lies outside the path of contact.")
         elif self.share(pitch) < 1.0:
-            said.append(
-                "The pitch point C lies where two pairs bear: a nominal pressure for one pair is never reached there."
+            notes.append(
+                "At the pitch point C two pairs carry load: the nominal pressure for one pair is "
+                "never reached there."
             )
-        return tuple(said)
+        return tuple(notes)
 
     def title(self) -> str:
-        """Numbers of teeth and contact ratio."""
-        return f"Spur gear pair {self.teeth[0]}/{self.teeth[1]}, contact ratio {self.contact_ratio:.2f}"
+        """Return numbers of teeth and contact ratio."""
+        first, second = self.teeth
+        return f"Spur gear pair {first}/{second}, contact ratio {self.contact_ratio:.2f}"
 
     @cached_property
     def _ends(self) -> tuple[float, float]:
@@ -235,22 +241,24 @@ class SpurGear:
         millimetres, bases = 1e3, sum(self.base_radii)
         if self.centres <= bases:
             raise BadInput(
-                f"centre_distance {self.centres * millimetres:g} mm lets the base circles overlap, the teeth cannot "
-                f"mesh; it must be above {bases * millimetres:.4g} mm"
+                f"at centre_distance {self.centres * millimetres:g} mm the base circles overlap "
+                f"and the teeth cannot mesh; it must be above {bases * millimetres:.4g} mm"
             )
-        left = (_involute(self.working_angle) - _involute(self.pressure_angle)) * sum(self.teeth)
-        room = left / (2.0 * math.tan(self.pressure_angle))
-        if sum(self.profile_shift) > room + JAMMED:
+        opening = (_involute(self.working_angle) - _involute(self.pressure_angle)) * sum(self.teeth)
+        limit = opening / (2.0 * math.tan(self.pressure_angle))
+        if sum(self.profile_shift) > limit + SHIFT_TOLERANCE:
             raise BadInput(
-                f"profile_shift {sum(self.profile_shift):.4g} in sum jams the teeth: at this centre distance at most "
-                f"{room:.4f} leaves backlash; lower it or set the axes further apart"
+                f"the sum of profile_shift, {sum(self.profile_shift):.4g}, jams the teeth, as it "
+                f"must be at most {limit:.4f} at this centre distance; lower it or raise "
+                "centre_distance"
             )
         for name, tip, base in zip(
             ("pinion", "wheel"), self.tip_radii, self.base_radii, strict=True
         ):
             if tip <= base:
                 raise BadInput(
-                    f"tip_diameters: the {name}'s {2e3 * tip:g} mm lies inside its base circle; raise it"
+                    f"tip_diameters: the {name}'s {2e3 * tip:g} mm lies inside its base circle; "
+                    "raise it"
                 )
         start, end = self._ends
         for name, other, beyond in (
@@ -259,26 +267,24 @@ class SpurGear:
         ):
             if beyond:
                 raise BadInput(
-                    f"the {name}'s tip reaches below the {other}'s base circle, the teeth cannot mesh; lower the "
-                    f"{name}'s tip diameter or raise the {other}'s profile shift"
+                    f"the {name}'s tip reaches below the {other}'s base circle and the teeth "
+                    f"cannot mesh; lower the {name}'s tip diameter or raise the {other}'s profile "
+                    "shift"
                 )
-        self._require_room()
+        self._require_root_clearance()
         if not 1.0 <= self.contact_ratio < 2.0:
-            few = self.contact_ratio < 1.0
-            remedy = (
-                "raise the tip diameters or bring the axes closer"
-                if few
-                else "lower the tip diameters"
+            cause, remedy = (
+                ("the teeth lose contact", "raise the tip diameters or lower centre_distance")
+                if self.contact_ratio < 1.0
+                else (
+                    "three pairs carry load, which the load sharing does not cover",
+                    "lower the tip diameters",
+                )
             )
-            why = (
-                "the teeth lose contact"
-                if few
-                else "three pairs bear, which the load sharing does not cover"
-            )
-            raise BadInput(f"the contact ratio is {self.contact_ratio:.3f}: {why}; {remedy}")
+            raise BadInput(f"the contact ratio is {self.contact_ratio:.3f}: {cause}; {remedy}")
 
-    def _require_room(self) -> None:
-        """BadInput where tips that are as long as the standard rack makes them reach the roots that it cuts."""
+    def _require_root_clearance(self) -> None:
+        """Raise BadInput if tips of standard length interfere with the roots."""
         if self.tip_diameters is not None:
             return
         for body, (name, other) in enumerate((("pinion", "wheel"), ("wheel", "pinion"))):
@@ -287,11 +293,12 @@ class SpurGear:
             room = self.centres - self.tip_radii[body] - root
             if room < 0.0:
                 raise BadInput(
-                    f"the {name}'s tips run {-1e3 * room:.3f} mm into the {other}'s roots; give tip_diameters that are "
-                    f"{-2e3 * room:.3f} mm less, or lower profile_shift"
+                    f"the {name}'s tips interfere with the {other}'s roots by {-1e3 * room:.3f} "
+                    f"mm; give tip_diameters reduced by {-2e3 * room:.3f} mm, or lower "
+                    "profile_shift"
                 )
 
-    def _require_whole_teeth(self, body: int) -> None:
+    def _require_sound_teeth(self, body: int) -> None:
         name, tip, base = ("pinion", "wheel")[body], self.tip_radii[body], self.base_radii[body]
         count, shift = self.teeth[body], self.profile_shift[body]
         half = (
@@ -302,8 +309,8 @@ class SpurGear:
         )
         if half <= 0.0:
             raise BadInput(
-                f"the {name}'s teeth end in a point inside their tip circle of {2e3 * tip:g} mm; lower its tip "
-                "diameter or its profile shift"
+                f"the {name}'s teeth end in a point inside their tip circle of {2e3 * tip:g} mm; "
+                "lower its tip diameter or its profile shift"
             )
         start, end = self._ends
         used = math.hypot(base, start if body == 0 else self.line_of_action - end)
@@ -311,8 +318,9 @@ class SpurGear:
         if cut > used:
             least = ADDENDUM - count * math.sin(self.pressure_angle) ** 2 / 2.0
             raise BadInput(
-                f"the {name}'s teeth are undercut up to a radius of {1e3 * cut:.3f} mm and bear from "
-                f"{1e3 * used:.3f} mm; raise its profile shift to {least:.3f}, or its number of teeth"
+                f"the {name}'s teeth are undercut up to a radius of {1e3 * cut:.3f} mm, but "
+                f"contact starts at {1e3 * used:.3f} mm; raise its profile shift to {least:.3f}, "
+                "or its number of teeth"
             )
 
 
@@ -321,22 +329,21 @@ def _involute(angle: float) -> float:
 
 
 def _undercut_radius(count: int, shift: float, module: float, angle: float) -> float:
-    """Radius [m] up to which the rack's corner cuts the involute away; 0 where it does not.
+    """Return the radius [m] up to which the rack's corner cuts the involute away; 0 for none.
 
-    The corner, at a depth h below the pitch line, runs on a trochoid; what it cuts ends where that
-    meets the involute.
+    The corner, at the depth h below the pitch line, moves on a trochoid; the undercut ends where it
+    intersects the involute.
     """
     pitch = 0.5 * module * count
     base, depth = pitch * math.cos(angle), (ADDENDUM - shift) * module
     if depth <= pitch * math.sin(angle) ** 2:
         return 0.0
-    # the rack has moved by `travel` from where its flank passes the pitch point, the gear has
-    # turned by travel/pitch; a flank bounds the tooth until it touches at the base circle, at
-    # -pitch tan(angle)
+    # travel of the rack from the position with the flank at the pitch point; the gear turns by
+    # travel/pitch; the flank forms the tooth down to the base circle, at -pitch tan(angle)
     travel = np.linspace(-2.0 * pitch, -pitch * math.tan(angle), 4000)
     across, up = travel + depth * math.tan(angle), pitch - depth
     radius = np.hypot(across, up)
-    corner = np.arctan2(across, up) - travel / pitch  # both as polar angles on the gear
+    corner = np.arctan2(across, up) - travel / pitch  # polar angles on the gear
     at_radius = np.arccos(np.minimum(base / radius, 1.0))
     flank = _involute(angle) - (np.tan(at_radius) - at_radius)
     return float(np.max(radius[(radius > base) & (corner < flank)], initial=base))

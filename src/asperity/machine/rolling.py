@@ -1,26 +1,26 @@
-"""Kinematics of rolling bearings: what turns how fast, and how often what passes."""
+"""Kinematics of rolling bearings: speeds and characteristic frequencies."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from asperity.core.errors import BadInput, require_positive
-from asperity.machine.element import MachineContact, require_count, turns
+from asperity.machine.element import MachineContact, require_count, rotation_hz
 
 STEEL_DENSITY = 7800.0  # kg/m^3
-WORTH_SAYING = 0.01  # centrifugal load over the largest contact load
+CENTRIFUGAL_THRESHOLD = 0.01  # centrifugal over largest contact load, above which a note is given
 
 
 @dataclass(frozen=True, kw_only=True)
 class RollingKinematics:
-    """Rolling elements between two rings, of which the inner one turns, without slip.
+    """Rolling elements between a rotating inner and a fixed outer ring, without slip.
 
     Parameters
     ----------
-    count : rolling elements
-    diameter : of one [m]
-    pitch_diameter : of the circle of their centres [m]
-    speed : of the inner ring [rad/s]
+    count : number of rolling elements
+    diameter : diameter of a rolling element [m]
+    pitch_diameter : diameter of the circle of their centres [m]
+    speed : speed of the inner ring [rad/s]
     contact_angle : [rad]
     """
 
@@ -37,8 +37,9 @@ class RollingKinematics:
         require_positive("speed", self.speed, "rad/s")
         if self.diameter >= self.pitch_diameter * math.sin(math.pi / self.count):
             raise BadInput(
-                f"{self.count} rolling elements of {1e3 * self.diameter:g} mm do not fit on a pitch_diameter of "
-                f"{1e3 * self.pitch_diameter:g} mm; lower their number or raise pitch_diameter"
+                f"{self.count} rolling elements of {1e3 * self.diameter:g} mm do not fit on a "
+                f"pitch_diameter of {1e3 * self.pitch_diameter:g} mm; lower their number or raise "
+                "pitch_diameter"
             )
 
     @property
@@ -48,17 +49,17 @@ class RollingKinematics:
 
     @property
     def cage_speed(self) -> float:
-        """[rad/s]: ω_i (1 - γ)/2."""
+        """Speed of the cage [rad/s]: ω_i (1 - γ)/2."""
         return self.speed * (1.0 - self.ratio) / 2.0
 
     @property
     def spin(self) -> float:
-        """Of a rolling element about its own axis, in the frame of the cage [rad/s]: (d_m/2D)(1 - γ²) ω_i."""
+        """Speed of a rolling element about its axis [rad/s]: (d_m/2D)(1 - γ²) ω_i."""
         return self.pitch_diameter / (2.0 * self.diameter) * (1.0 - self.ratio**2) * self.speed
 
     @property
     def surface_speed(self) -> float:
-        """Of every surface of both contacts, in the frame of the cage [m/s]: (d_m/4)(1 - γ²) ω_i."""
+        """Speed of all surfaces in the frame of the cage [m/s]: (d_m/4)(1 - γ²) ω_i."""
         return self.pitch_diameter / 4.0 * (1.0 - self.ratio**2) * self.speed
 
     @property
@@ -68,51 +69,53 @@ class RollingKinematics:
 
     @property
     def frequencies(self) -> dict[str, float]:
-        """Shaft, passages over the outer and inner ring, rolling element about its axis, and cage [Hz]."""
-        cage = turns(self.cage_speed)
+        """Frequencies of shaft, outer- and inner-ring passage, rolling element and cage [Hz]."""
+        cage = rotation_hz(self.cage_speed)
         return {
-            "shaft_hz": turns(self.speed),
+            "shaft_hz": rotation_hz(self.speed),
             "bpfo_hz": self.count * cage,
-            "bpfi_hz": self.count * (turns(self.speed) - cage),
-            "bsf_hz": turns(self.spin),
+            "bpfi_hz": self.count * (rotation_hz(self.speed) - cage),
+            "bsf_hz": rotation_hz(self.spin),
             "ftf_hz": cage,
         }
 
     @property
     def overrolling_hz(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Of ring and rolling element, at the inner and at the outer ring [Hz]."""
-        found = self.frequencies
-        return (found["bpfi_hz"], found["bsf_hz"]), (found["bpfo_hz"], found["bsf_hz"])
+        """Overrolling rates of ring and rolling element, at the inner and the outer ring [Hz]."""
+        hertz = self.frequencies
+        return (hertz["bpfi_hz"], hertz["bsf_hz"]), (hertz["bpfo_hz"], hertz["bsf_hz"])
 
     def centrifugal_load(self, mass: float) -> float:
-        """Of a rolling element of this mass [kg], on the outer ring [N]."""
+        """Return the centrifugal load of a rolling element of this mass [kg] [N]."""
         return mass * self.pitch_diameter / 2.0 * self.cage_speed**2
 
 
 def centrifugal_notes(load: float, contacts: tuple[MachineContact, ...]) -> tuple[str, ...]:
-    """That the centrifugal load is left out, where it would count."""
+    """Return a note that the centrifugal load is neglected, if it is relevant."""
     largest = max(contact.load for contact in contacts)
-    if load <= WORTH_SAYING * largest:
+    if load <= CENTRIFUGAL_THRESHOLD * largest:
         return ()
     return (
-        f"The centrifugal load of {load:.3g} N on the outer ring is left out (largest load {largest:.4g} N).",
+        f"The centrifugal load of {load:.3g} N on the outer ring is neglected (largest load "
+        f"{largest:.4g} N).",
     )
 
 
 def load_zone_notes(loads: list[float], element: str) -> tuple[str, ...]:
-    """That one rolling element alone bears the load, or where they stand."""
+    """Return a note on a single loaded element, or on the positions of the elements."""
     if sum(load > 0.0 for load in loads) == 1:
-        return (f"One {element} alone carries the whole load.",)
+        return (f"A single {element} carries the whole load.",)
     if max(loads) == min(loads):
         return ()
     return (
-        f"{element.capitalize()} 0 stands under the radial load; where it passes between two, they bear less.",
+        f"{element.capitalize()} 0 is in line with the radial load; the maximum load is smaller "
+        f"when the load passes between two {element}s.",
     )
 
 
-def grown(start: float, enough: Callable[[float], bool]) -> float:
-    """`start`, doubled until it is enough."""
+def double_until(start: float, sufficient: Callable[[float], bool]) -> float:
+    """Double `start` until it is sufficient."""
     value = start
-    while not enough(value):
+    while not sufficient(value):
         value *= 2.0
     return value

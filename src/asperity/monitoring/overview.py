@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from asperity.core.errors import BadInput
-from asperity.core.files import whole_file, write_csv
+from asperity.core.files import atomic_write, write_csv
 from asperity.monitoring.alarm import LAST
 from asperity.monitoring.sensor import ACKNOWLEDGED
 from asperity.monitoring.sensors import opened, those_of
@@ -76,7 +76,7 @@ class StoreOverview:
         if path.suffix.lower() == ".csv":
             write_csv(path, table)
         else:
-            with whole_file(path) as part:
+            with atomic_write(path) as part:
                 table.to_parquet(part, index=False)
         return path
 

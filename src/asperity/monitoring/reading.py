@@ -18,9 +18,9 @@ import numpy as np
 import scipy
 
 from asperity.core.errors import BadInput, UnreadableFile
-from asperity.core.processes import leave_interrupts_to_the_parent
+from asperity.core.processes import ignore_interrupts
 from asperity.core.signals import Spectrum, averaged_spectrum
-from asperity.core.storage import sealed, unsealed
+from asperity.core.storage import append_digest, strip_digest
 from asperity.monitoring.auxiliary_channels import bands, beside, heard_at, lines, rates, steady
 from asperity.monitoring.files import Place
 from asperity.monitoring.target import Target
@@ -232,9 +232,7 @@ def _done(jobs: Sequence[tuple[Any, ...]], workers: int) -> Iterator[tuple[int, 
         for number, job in enumerate(jobs):
             yield number, read_spectrum(*job)
         return
-    pool = ProcessPoolExecutor(
-        min(workers, len(jobs)), get_context("spawn"), leave_interrupts_to_the_parent
-    )
+    pool = ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn"), ignore_interrupts)
     try:
         yield from enumerate(pool.map(read_spectrum, *zip(*jobs, strict=True)))
     finally:
@@ -258,7 +256,7 @@ def reading_bytes(reading: Reading) -> bytes:
         content["spectrum"] = {name: getattr(reading.spectrum, name) for name in kept}
     packed = BytesIO()
     np.savez(packed, density=density, told=np.array(json.dumps(content)))
-    return sealed(packed.getvalue())
+    return append_digest(packed.getvalue())
 
 
 def reading_from(packed: bytes, name: str) -> Reading:
@@ -270,7 +268,7 @@ def reading_from(packed: bytes, name: str) -> Reading:
         for anything else.
     """
     remedy = "its recording is read again"
-    body = BytesIO(unsealed(packed, name, remedy))
+    body = BytesIO(strip_digest(packed, name, remedy))
     try:
         with np.load(body, allow_pickle=False) as stored:
             density, content = stored["density"], json.loads(str(stored["told"]))

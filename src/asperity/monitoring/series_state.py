@@ -16,7 +16,7 @@ import numpy as np
 from asperity.core.arrays import Mask
 from asperity.core.errors import UnreadableFile
 from asperity.core.signals import Spectrum
-from asperity.core.storage import sealed, unsealed
+from asperity.core.storage import append_digest, strip_digest
 from asperity.resonance import (
     Agreement,
     CleanSpectrum,
@@ -205,14 +205,14 @@ def learned_bytes(shared: Shared | SharedBySensors) -> bytes:
         told["agreement"] = [[[*pair, share] for pair, share in common.items()], wider, established]
     packed = BytesIO()
     np.savez(packed, told=np.array(json.dumps(told)), **arrays)
-    return sealed(packed.getvalue())
+    return append_digest(packed.getvalue())
 
 
 def learned_from(content: bytes, since: int) -> Learned:
     """What `learned_bytes` made, `since` recordings ago; nothing, where that is damaged: it is learned anew."""
     try:
         with np.load(
-            BytesIO(unsealed(content, "what was learned", "it is learned anew"))
+            BytesIO(strip_digest(content, "what was learned", "it is learned anew"))
         ) as stored:
             told = json.loads(str(stored["told"]))
             arrays = {name: stored[name] for name in stored.files if name != "told"}

@@ -13,7 +13,7 @@ import numpy as np
 
 from asperity.core.arrays import finite_or_none
 from asperity.core.errors import BadInput
-from asperity.core.files import whole_file, write_csv
+from asperity.core.files import atomic_write, write_csv
 from asperity.core.quantities import quantity
 from asperity.core.storage import netcdf_bytes
 from asperity.monitoring.forecast import FORECAST, Foretold
@@ -293,7 +293,7 @@ class Track:
         if suffix == ".csv":
             write_csv(path, self.table)
             return path
-        with whole_file(path) as part:
+        with atomic_write(path) as part:
             if suffix == ".parquet":
                 try:
                     self.table.to_parquet(part, index=False)

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from asperity.core.errors import BadInput
-from asperity.core.files import whole_file, write_text
+from asperity.core.files import atomic_write, write_text
 from asperity.core.signals import Signal
 from asperity.paper.rig import WRITERS_AT_ONCE, Rig
 from asperity.paper.rig_recording import RigRecording
@@ -61,7 +61,7 @@ def write_rig(
     paths = [folder / f"{recording.name}.{file_format}" for recording in rig.recordings]
 
     def write(recording: RigRecording, path: Path) -> None:
-        with whole_file(path) as part:
+        with atomic_write(path) as part:
             WRITERS[file_format](part, recording.signal())
 
     pool = ThreadPoolExecutor(max_workers=WRITERS_AT_ONCE)

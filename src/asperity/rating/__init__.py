@@ -1,4 +1,4 @@
-"""Ratings as standards print them: bearing life, specific film, flash temperature, Dang Van; they solve nothing."""
+"""Ratings by standards and closed forms: bearing life, micropitting, flash temperature, fatigue."""
 
 import lazy_loader
 

@@ -5,7 +5,7 @@ from .bearing import life_factor as life_factor
 from .bearing import reference_viscosity as reference_viscosity
 from .bearing import roller_life as roller_life
 from .fatigue import dang_van as dang_van
-from .fatigue import dang_van_of_each as dang_van_of_each
+from .fatigue import dang_van_per_path as dang_van_per_path
 from .fatigue import dang_van_slope as dang_van_slope
 from .flash import STEEL_EFFUSIVITY as STEEL_EFFUSIVITY
 from .flash import flash_rise as flash_rise

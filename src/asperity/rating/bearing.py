@@ -1,7 +1,7 @@
-"""Rolling bearings rated as ISO 281 and ISO/TS 16281 have it: viscosity ratio, life factor, reference rating life.
+"""Rating of rolling bearings by ISO 281 and ISO/TS 16281: viscosity ratio, life factor and life.
 
-Ratings already hold roughness, by statistics of bearings that failed: nothing of a solved contact
-goes into them.
+Roughness enters statistically, through the failed bearings behind the standards; results of solved
+contacts are not used.
 """
 
 import math
@@ -14,18 +14,19 @@ from asperity.core.errors import BadInput, require_positive
 
 RollingElement = Literal["ball", "roller"]
 
-SLOW = 1000.0  # r/min, below which the reference viscosity has another law
-THICKEST, THINNEST = (
-    4.0,
-    0.1,
-)  # viscosity ratio beyond which nothing is gained, and below which nothing is rated
-LARGEST_FACTOR = 50.0
+BRANCH_SPEED = 1000.0  # r/min; the reference viscosity has another law below
+MAX_KAPPA = 4.0  # upper limit of the viscosity ratio in the rating
+MIN_KAPPA = 0.1  # no rating below this viscosity ratio
+MAX_LIFE_FACTOR = 50.0
 ROLLER_REDUCTION = 0.83  # λν of radial roller bearings, ISO/TS 16281
-STRAIGHT_EDGE = 0.01, 1.985  # of the factor on the load of a straight roller's slices, ISO/TS 16281
+STRAIGHT_EDGE = 0.01, 1.985  # constants of the edge factor of straight rollers, ISO/TS 16281
 
 
 class _Factor(NamedTuple):
-    """1 - (c1 - c2/κ^e)^g (e_C C_u/P)^h to the power -k, ISO 281:2007, 9.3.3; c2 and e by κ below 0.4, below 1."""
+    """Constants of (1 - (c1 - c2/κ^e)^g (e_C C_u/P)^h)^-k, ISO 281:2007, 9.3.3.
+
+    c2 and e have values for κ below 0.4, below 1 and above.
+    """
 
     c1: float
     c2: tuple[float, float, float]
@@ -42,42 +43,51 @@ _FACTORS: dict[RollingElement, _Factor] = {
 
 
 def reference_viscosity(speed: float, pitch_diameter: float) -> float:
-    """ν1 [m²/s] at a speed [rad/s] and pitch diameter [m]: 45 000 n^-0.83 D^-0.5, from 1000 r/min 4500 (n D)^-0.5.
+    """Return the reference viscosity ν1 [m²/s] at a speed [rad/s] and pitch diameter [m].
 
-    In mm²/s, r/min and mm, as ISO 281 prints it. Its two branches differ by 2.3 % where they meet.
+    45 000 n^-0.83 D^-0.5, above 1000 r/min 4500 (n D)^-0.5, in mm²/s, r/min and mm (ISO 281). The
+    branches differ by 2.3 % at 1000 r/min.
     """
-    turning, diameter = speed * 30.0 / math.pi, 1e3 * pitch_diameter
-    law = 45000.0 * turning**-0.83 if turning < SLOW else 4500.0 * turning**-0.5
+    rpm, diameter = speed * 30.0 / math.pi, 1e3 * pitch_diameter
+    law = 45000.0 * rpm**-0.83 if rpm < BRANCH_SPEED else 4500.0 * rpm**-0.5
     return float(1e-6 * law / math.sqrt(diameter))
 
 
 def life_factor(element: RollingElement, kappa: float, contamination: float) -> float | None:
-    """a_ISO of a radial bearing, at most 50, of the viscosity ratio κ and e_C C_u/P; None below κ = 0.1.
+    """Return the life modification factor a_ISO of a radial bearing; None below κ = 0.1.
 
-    0.1 (1 - (c1 - c2/κ^e)^g (e_C C_u/P)^h)^-k. κ counts up to 4. Source: ISO 281:2007.
+    a_ISO = 0.1 (1 - (c1 - c2/κ^e)^g (e_C C_u/P)^h)^-k, at most 50, with κ limited to 4. Source: ISO
+    281:2007.
+
+    Parameters
+    ----------
+    element : "ball" or "roller"
+    kappa : viscosity ratio κ
+    contamination : e_C C_u/P
 
     Raises
     ------
     BadInput
-        for a contamination that is negative.
+        The contamination is negative.
     """
     if contamination < 0.0:
         raise BadInput(
-            f"contamination times fatigue load limit over load must not be negative, got {contamination:g}"
+            "contamination times fatigue load limit over load must not be negative, got "
+            f"{contamination:g}"
         )
-    if kappa < THINNEST:
+    if kappa < MIN_KAPPA:
         return None
-    kappa, law = min(kappa, THICKEST), _FACTORS[element]
-    range_of = 0 if kappa < 0.4 else 1 if kappa < 1.0 else 2
-    lubricated = max(law.c1 - law.c2[range_of] / kappa ** _POWERS[range_of], 0.0)
-    bracket = 1.0 - lubricated**law.g * contamination**law.h
+    kappa, law = min(kappa, MAX_KAPPA), _FACTORS[element]
+    branch = 0 if kappa < 0.4 else 1 if kappa < 1.0 else 2
+    lubrication = max(law.c1 - law.c2[branch] / kappa ** _POWERS[branch], 0.0)
+    bracket = 1.0 - lubrication**law.g * contamination**law.h
     if bracket <= 0.0:
-        return LARGEST_FACTOR
-    return float(min(0.1 * bracket**-law.k, LARGEST_FACTOR))
+        return MAX_LIFE_FACTOR
+    return float(min(0.1 * bracket**-law.k, MAX_LIFE_FACTOR))
 
 
 class BallRaceway(NamedTuple):
-    """What a ball bearing's life needs of its shape: γ, osculations of inner and outer ring, nominal contact angle."""
+    """Geometry of a ball bearing for its life: γ, osculations, nominal contact angle [rad]."""
 
     ratio: float
     osculation: tuple[float, float]
@@ -85,65 +95,65 @@ class BallRaceway(NamedTuple):
 
 
 def ball_life(loads: Field, rating: float, raceway: BallRaceway) -> float:
-    """Basic reference rating life of a single-row radial ball bearing [revolutions], its inner ring turning.
+    """Return the basic reference rating life of a single-row radial ball bearing [revolutions].
+
+    The inner ring rotates. Source: ISO/TS 16281:2008, 4.3.
 
     Parameters
     ----------
-    loads : on every ball [N]
+    loads : loads of all balls [N]
     rating : basic dynamic load rating C [N]
-    raceway : the bearing's shape
-
-    Source: ISO/TS 16281:2008, 4.3.
+    raceway : geometry of the bearing
     """
     require_positive("dynamic_load_rating", rating, "N")
     inner, outer = raceway.osculation
     grooves = (inner / outer * (2.0 * outer - 1.0) / (2.0 * inner - 1.0)) ** 0.41
     both = 1.044 * ((1.0 - raceway.ratio) / (1.0 + raceway.ratio)) ** 1.72 * grooves
     per_ball = rating / (loads.size * math.cos(raceway.contact_angle) ** 0.7)
-    turning = per_ball / 0.407 * (1.0 + both ** (10.0 / 3.0)) ** 0.3
-    standing = per_ball / 0.389 * (1.0 + both ** (-10.0 / 3.0)) ** 0.3
-    worn = (_mean(loads, 3.0) / turning) ** (10.0 / 3.0) + (
-        _mean(loads, 10.0 / 3.0) / standing
+    rotating = per_ball / 0.407 * (1.0 + both ** (10.0 / 3.0)) ** 0.3
+    stationary = per_ball / 0.389 * (1.0 + both ** (-10.0 / 3.0)) ** 0.3
+    damage = (_mean(loads, 3.0) / rotating) ** (10.0 / 3.0) + (
+        _mean(loads, 10.0 / 3.0) / stationary
     ) ** (10.0 / 3.0)
-    return float(1e6 * worn**-0.9)
+    return float(1e6 * damage**-0.9)
 
 
 def roller_life(loads: Field, rating: float, ratio: float, *, straight: bool) -> float:
-    """Basic reference rating life of a single-row radial roller bearing [revolutions], its inner ring turning.
+    """Return the basic reference rating life of a single-row radial roller bearing [revolutions].
+
+    The inner ring rotates. Source: ISO/TS 16281:2008, 5.3.
 
     Parameters
     ----------
-    loads : on every slice of every roller [N], shape (rollers, slices)
+    loads : loads of all slices [N], shape (rollers, slices)
     rating : basic dynamic load rating C [N]
-    ratio : γ, roller's diameter over pitch diameter
-    straight : rollers without a profile, whose outer slices are taken for more by 1 - 0.01/ln(1.985 |x|), x from -1/2
-        to 1/2 along a roller
-
-    Source: ISO/TS 16281:2008, 5.3.
+    ratio : γ, roller diameter over pitch diameter
+    straight : rollers without a profile, whose slice loads are multiplied by 1 - 0.01/ln(1.985
+        |x|), x from -1/2 to 1/2 along a roller
     """
     require_positive("dynamic_load_rating", rating, "N")
     rollers, slices = loads.shape
     both = 1.038 * ((1.0 - ratio) / (1.0 + ratio)) ** (143.0 / 108.0)
     per_slice = rating / ROLLER_REDUCTION / rollers * slices ** (-7.0 / 9.0)
-    turning = per_slice / 0.378 * (1.0 + both**4.5) ** (2.0 / 9.0)
-    standing = per_slice / 0.364 * (1.0 + both**-4.5) ** (2.0 / 9.0)
-    pressed = loads * (edge_factors(slices) if straight else 1.0)
-    worn = (_mean(pressed, 4.0) / turning) ** 4.5 + (_mean(pressed, 4.5) / standing) ** 4.5
-    return float(1e6 * np.sum(worn) ** (-8.0 / 9.0))
+    rotating = per_slice / 0.378 * (1.0 + both**4.5) ** (2.0 / 9.0)
+    stationary = per_slice / 0.364 * (1.0 + both**-4.5) ** (2.0 / 9.0)
+    weighted = loads * (edge_factors(slices) if straight else 1.0)
+    damage = (_mean(weighted, 4.0) / rotating) ** 4.5 + (_mean(weighted, 4.5) / stationary) ** 4.5
+    return float(1e6 * np.sum(damage) ** (-8.0 / 9.0))
 
 
 def edge_factors(slices: int) -> Field:
-    """By which the slices of a straight roller count for more: 1 - 0.01/ln(1.985 |(2k - n - 1)/(2n - 2)|)."""
+    """Return the edge factors of a straight roller, 1 - 0.01/ln(1.985 |(2k - n - 1)/(2n - 2)|)."""
     number = np.arange(1, slices + 1)
-    place = np.abs((2.0 * number - slices - 1.0) / (2.0 * slices - 2.0))
-    middle = place == 0.0  # of an odd number: the factor's limit there is 1
+    distance = np.abs((2.0 * number - slices - 1.0) / (2.0 * slices - 2.0))
+    middle = distance == 0.0  # odd number of slices; the limit of the factor is 1
     return np.where(
         middle,
         1.0,
-        1.0 - STRAIGHT_EDGE[0] / np.log(STRAIGHT_EDGE[1] * np.where(middle, 0.1, place)),
+        1.0 - STRAIGHT_EDGE[0] / np.log(STRAIGHT_EDGE[1] * np.where(middle, 0.1, distance)),
     )
 
 
 def _mean(loads: Field, power: float) -> Field:
-    """Over the rolling elements."""
+    """Return the power mean over the rolling elements."""
     return np.asarray(np.mean(loads**power, axis=0) ** (1.0 / power))

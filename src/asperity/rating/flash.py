@@ -1,18 +1,17 @@
-"""Flash temperature by Blok's closed form, and the temperature at which a gear oil's film is taken to scuff.
+"""Blok's flash temperature, and the scuffing temperature of gear oils.
 
-ISO/TS 6336-20 (ISO/TR 13989-1) judges the sum of bulk and flash temperature against a limit of the
-oil's FZG test.
+ISO/TS 6336-20 (ISO/TR 13989-1) compares the sum of bulk and flash temperature with the scuffing
+temperature of the oil's FZG test.
 """
 
 import math
 
 from asperity.core.errors import BadInput
 
-HERTZ_HEAT = 1.1115  # of the largest rise, for heat of Hertz' shape
-UNIFORM_HEAT = 2.0 / math.sqrt(math.pi)  # for even heat, as ISO/TR 15144-1 has it
-STEEL_EFFUSIVITY = (
-    13756.0  # sqrt(k ρ c) [J/(m² K s^0.5)]: the standards' B_M of 435 N/(mm^0.5 m^0.5 s^0.5 K)
-)
+HERTZ_HEAT = 1.1115  # factor for a Hertzian heat distribution
+UNIFORM_HEAT = 2.0 / math.sqrt(math.pi)  # factor for a uniform heat distribution, ISO/TR 15144-1
+# sqrt(k ρ c) [J/(m² K s^0.5)]: the standards' B_M of 435 N/(mm^0.5 m^0.5 s^0.5 K)
+STEEL_EFFUSIVITY = 13756.0
 STAGES = 1, 13  # FZG load stages of A/8.3/90
 
 
@@ -25,57 +24,61 @@ def flash_rise(
     *,
     shape: float = HERTZ_HEAT,
 ) -> float:
-    """Largest rise of the surfaces in a fast line contact [K].
+    """Return the maximum temperature rise of the surfaces in a fast line contact [K].
 
-    c μ w' |u1 - u2|/((B1 sqrt u1 + B2 sqrt u2) sqrt(2 a)), of Peclet numbers above 5 and surfaces
-    that move the same way. Source: H. Blok (1937), A. Cameron (1966); c is 1.1115 for heat of
-    Hertz' shape, 2/sqrt(π) for even heat.
+    c μ w' |u1 - u2|/((B1 sqrt u1 + B2 sqrt u2) sqrt(2 a)), for Peclet numbers above 5 and surfaces
+    that move in the same direction. Source: H. Blok (1937), A. Cameron (1966); c is 1.1115 for a
+    Hertzian, 2/sqrt(π) for a uniform heat distribution.
 
     Parameters
     ----------
-    friction : coefficient
-    line_load : [N/m]
-    half_width : Hertz' a [m]
-    speeds : of the surfaces in the contact's frame [m/s]
+    friction : coefficient of friction μ
+    line_load : w' [N/m]
+    half_width : Hertzian half-width a [m]
+    speeds : speeds of the surfaces in the frame of the contact [m/s]
     effusivities : sqrt(k ρ c) of both bodies [J/(m² K s^0.5)]
     shape : c
 
     Raises
     ------
     BadInput
-        for surfaces that run against each other.
+        The surfaces move in opposite directions, or both are at rest.
     """
     first, second = speeds
     if min(first, second) < 0.0 or first == second == 0.0:
         raise BadInput(
-            f"Blok's flash temperature is of surfaces that run the same way, got {first:g} and {second:g} m/s"
+            "Blok's flash temperature needs surfaces that move in the same direction, got "
+            f"{first:g} and {second:g} m/s"
         )
-    taken_up = effusivities[0] * math.sqrt(first) + effusivities[1] * math.sqrt(second)
+    absorption = effusivities[0] * math.sqrt(first) + effusivities[1] * math.sqrt(second)
     return (
         shape
         * friction
         * line_load
         * abs(first - second)
-        / (taken_up * math.sqrt(2.0 * half_width))
+        / (absorption * math.sqrt(2.0 * half_width))
     )
 
 
 def scuffing_temperature(stage: float, oil_factor: float, structure: float = 1.0) -> float:
-    """θ_S of an oil by its FZG scuffing test [degC]: 80 + (0.85 + 1.4 X_W) X_L S². Source: ISO/TR 13989-1:2000.
+    """Return the scuffing temperature θ_S of an oil from its FZG test [degC].
+
+    θ_S = 80 + (0.85 + 1.4 X_W) X_L S². Source: ISO/TR 13989-1:2000.
 
     Parameters
     ----------
-    stage : the load stage S that the oil failed in A/8.3/90
+    stage : failure load stage S in A/8.3/90
     oil_factor : X_L = (η_oil/mPa s)^-0.05, times 0.8 for a PAO
-    structure : X_W, 1 for case-hardened steel of usual structure
+    structure : X_W, 1 for case-hardened steel of normal structure
 
     Raises
     ------
     BadInput
-        for a stage that the test has not.
+        The stage is not one of the test.
     """
     if not STAGES[0] <= stage <= STAGES[1]:
         raise BadInput(
-            f"scuffing_stage must be an FZG load stage from {STAGES[0]} to {STAGES[1]}, got {stage:g}"
+            f"scuffing_stage must be an FZG load stage from {STAGES[0]} to {STAGES[1]}, got "
+            f"{stage:g}"
         )
     return 80.0 + (0.85 + 1.4 * structure) * oil_factor * stage**2

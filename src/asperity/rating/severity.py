@@ -1,7 +1,7 @@
-"""How severe a machine's vibration is by its velocity: zones A to D of ISO 20816-3:2022, of rms from 10 to 1000 Hz.
+"""Vibration severity zones A to D of ISO 20816-3:2022, from the rms velocity of 10 to 1000 Hz.
 
-The standard is for machines above 15 kW in their place, measured on bearing housings. For those
-below 600 1/min its range begins at 2 Hz, which is not worked out here.
+The standard holds for machines above 15 kW in situ, measured on bearing housings. Its range from 2
+Hz for machines below 600 1/min is not implemented.
 """
 
 import numpy as np
@@ -10,11 +10,8 @@ from asperity.core.arrays import Field
 from asperity.core.errors import require_choice
 
 LOWEST_HZ, HIGHEST_HZ = 10.0, 1000.0
-COARSEST_HZ = (
-    2.5  # spacing of lines with a Hann taper: at the lower end part of a line falls out of the band
-)
-# ends of zones A, B and C [m/s]: ISO 20816-3:2022, tables A.1 and A.2, the same as in ISO
-# 10816-3:2009
+MAX_SPACING_HZ = 2.5  # line spacing (Hann taper); coarser lines extend beyond the band's lower end
+# Limits of zones A, B and C [m/s]: ISO 20816-3:2022, tables A.1 and A.2, as in ISO 10816-3:2009
 LIMITS = {
     "large-rigid": (2.3e-3, 4.5e-3, 7.1e-3),
     "large-flexible": (3.5e-3, 7.1e-3, 11.0e-3),
@@ -22,22 +19,25 @@ LIMITS = {
     "medium-flexible": (2.3e-3, 4.5e-3, 7.1e-3),
 }
 ZONES = {
-    "A": "as newly commissioned machines have it",
-    "B": "acceptable for unrestricted long-term running",
-    "C": "unsatisfactory for continuous running; for a limited time, until it can be mended",
+    "A": "typical of newly commissioned machines",
+    "B": "acceptable for unrestricted long-term operation",
+    "C": "unsatisfactory for continuous operation; limited operation until repair",
     "D": "severe enough to damage the machine",
 }
 
 
 def velocity_rms(frequency_hz: Field, density: Field) -> float:
-    """Rms velocity from 10 to 1000 Hz [m/s]: v² = Σ S_a/(2π f)² Δf; nan where the lines do not tell it.
+    """Return the rms velocity from 10 to 1000 Hz [m/s], v² = Σ S_a/(2π f)² Δf.
+
+    The result is nan if the lines are too coarse or end below 1000 Hz.
 
     Parameters
     ----------
-    frequency_hz, density : an acceleration's power spectral density [(m/s²)²/Hz], on evenly spaced lines from 0
+    frequency_hz, density : power spectral density of an acceleration [(m/s²)²/Hz], on evenly spaced
+        lines from 0
     """
     spacing = float(frequency_hz[1])
-    if spacing > COARSEST_HZ or frequency_hz[-1] < HIGHEST_HZ:
+    if spacing > MAX_SPACING_HZ or frequency_hz[-1] < HIGHEST_HZ:
         return float("nan")
     inside = (frequency_hz >= LOWEST_HZ) & (frequency_hz <= HIGHEST_HZ)
     return float(
@@ -46,17 +46,18 @@ def velocity_rms(frequency_hz: Field, density: Field) -> float:
 
 
 def severity_zone(velocity: float, machine_class: str) -> str:
-    """The zone, A to D, of an rms velocity [m/s].
+    """Return the zone, A to D, of an rms velocity [m/s].
 
     Parameters
     ----------
-    machine_class : large (above 300 kW, or shaft height from 315 mm) or medium (above 15 kW, or from 160 mm), on a
-        rigid or a flexible support: "large-rigid", "large-flexible", "medium-rigid", "medium-flexible"
+    velocity : [m/s]
+    machine_class : "large-rigid", "large-flexible", "medium-rigid" or "medium-flexible"; large:
+        above 300 kW or shaft height from 315 mm, medium: above 15 kW or from 160 mm; by its support
 
     Raises
     ------
     BadInput
-        for another class.
+        The class is unknown.
     """
     require_choice("machine class", machine_class, tuple(LIMITS))
     return "ABCD"[int(np.searchsorted(LIMITS[machine_class], velocity))]

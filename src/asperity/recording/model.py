@@ -15,7 +15,7 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.signals import Signal
-from asperity.core.third_party import quietly
+from asperity.core.third_party import suppress_output
 
 ACCELERATION = "m/s^2"
 UNKNOWN = "unknown"  # unit of values where nothing states one
@@ -147,7 +147,7 @@ class OpenRecording:
         """
         source = self.channel.blocks(samples)
         while True:
-            with quietly():
+            with suppress_output():
                 block = next(source, None)
             if block is None:
                 return

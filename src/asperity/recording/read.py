@@ -16,7 +16,7 @@ from zipfile import BadZipFile, ZipFile
 from asperity.core.errors import BadInput, UnreadableFile, require_positive
 from asperity.core.files import require_file
 from asperity.core.limits import require_unpacked
-from asperity.core.third_party import first_line, quietly
+from asperity.core.third_party import first_line, suppress_output
 from asperity.recording import hdf5, ide, matlab, parquet, tdms, text, uff, wav
 from asperity.recording import numpy_files as numpys
 from asperity.recording import sandboxed as foreign
@@ -107,14 +107,14 @@ def read_recording(
 
 def open_recording(path: str | Path, **stated: Any) -> OpenRecording:
     """Open one channel of a recording, its samples still in the file; otherwise as `read_recording`."""
-    with quietly():
+    with suppress_output():
         return _chosen(Path(path), read_contents(Path(path)), ReadOptions(**stated))
 
 
 def open_channels(path: str | Path, **stated: Any) -> list[OpenRecording]:
     """Every channel of a recording, opened as by `open_recording`; only the one named, where one is."""
     path, options = Path(path), ReadOptions(**stated)
-    with quietly():
+    with suppress_output():
         contents = read_contents(path)
         if (
             options.channel is not None
@@ -134,7 +134,7 @@ def open_channels(path: str | Path, **stated: Any) -> list[OpenRecording]:
 
 def other_channel(path: Path, name: str) -> Channel:
     """A channel as it is in the file, whatever a sidecar states of the vibration: a tacho, a load, a temperature."""
-    with quietly():
+    with suppress_output():
         return _channel(path, read_contents(path), name)
 
 

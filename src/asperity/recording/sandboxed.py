@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.core.sandbox import read_apart
-from asperity.core.third_party import quietly
+from asperity.core.sandbox import read_in_subprocess
+from asperity.core.third_party import suppress_output
 from asperity.recording.model import Channel, Contents
 from asperity.recording.reader import REMEDY
 
@@ -24,19 +24,19 @@ _KEPT = 4  # files at a time: threads of a caller may read several
 
 
 def contents(path: Path, reader: str, library: str) -> Contents:
-    """What the `read` of the module `reader` finds in a file; raises as `read_apart`.
+    """What the `read` of the module `reader` finds in a file; raises as `read_in_subprocess`.
 
     `library` is loaded before, in time of its own.
     """
     path = path.absolute()
-    form, notes, channels = read_apart(
+    form, notes, channels = read_in_subprocess(
         path, f"{__name__}:listed", reader, remedy=REMEDY, library=library
     )
 
     def blocks(number: int, size: int) -> Iterator[Field]:
         for done in count():
             place = (reader, number, size, done)
-            block, notes[:] = read_apart(
+            block, notes[:] = read_in_subprocess(
                 path, f"{__name__}:piece", *place, remedy=REMEDY, library=library
             )
             if block is None:
@@ -90,7 +90,7 @@ def listed(path: Path, reader: str) -> tuple[str, list[str], list[dict[str, Any]
     """Format, notes and channels of a file, without what reads its samples."""
     for key in [key for key in _opened if key[0] == path]:  # asked for anew, it is read anew
         del _opened[key]
-    with quietly():
+    with suppress_output():
         found = _open(path, reader).contents
     about = [entry.name for entry in fields(Channel) if entry.name != "blocks"]
     return (
@@ -104,6 +104,6 @@ def piece(
     path: Path, reader: str, number: int, size: int, done: int
 ) -> tuple[Field | None, list[str]]:
     """The block of a channel behind so many that are done, or None; and the notes so far."""
-    with quietly():
+    with suppress_output():
         opened = _open(path, reader)
         return opened.block(number, size, done), opened.contents.notes

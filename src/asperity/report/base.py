@@ -16,7 +16,7 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from asperity.core.files import require_writable, whole_file
+from asperity.core.files import atomic_write, require_writable
 from asperity.core.quantities import Quantity, in_print, quantity
 from asperity.paper import CITATION
 from asperity.report.style import ON_PAGE, ON_PAPER, ON_TELEPHONE, Medium, svg, write_figure
@@ -90,7 +90,7 @@ def write_exhibits(
         for suffix in (".pdf", ".png"):
             write_figure(figure, folder / f"{exhibit.name}{suffix}", medium=ON_PAPER, dpi=300)
         captions.append(f"**{exhibit.name}**: {exhibit.caption}\n\n")
-    with whole_file(folder / "captions.md") as part:
+    with atomic_write(folder / "captions.md") as part:
         part.write_text(
             f"{''.join(captions)}asperity {version('asperity')}; method: doi:{CITATION.doi}\n",
             "utf-8",
@@ -169,6 +169,6 @@ def write_page(path: str | Path, page: Callable[[], str]) -> Path:
     """Write a page whole or not at all, and return its path; BadInput, before anything is drawn, where it cannot be."""
     path = Path(path)
     require_writable(path)
-    with whole_file(path) as part:
+    with atomic_write(path) as part:
         part.write_text(page(), encoding="utf-8", newline="\n")
     return path

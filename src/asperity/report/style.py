@@ -19,7 +19,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from asperity.core.errors import BadInput
-from asperity.core.files import whole_file
+from asperity.core.files import atomic_write
 
 # Okabe and Ito's colours, told apart with any colour vision; every line also has its own stroke or
 # marker.
@@ -189,7 +189,7 @@ def write_figure(figure: Figure, path: Path, *, medium: Medium = ON_PAGE, dpi: i
         raise BadInput(f"a figure must end in {' or '.join(FORMATS)}, got {path}")
     kind = path.suffix.lower()[1:]
     about: dict[str, Any] = {"Software": None} if kind == "png" else {"CreationDate": None}
-    with whole_file(path) as part, medium.drawing():
+    with atomic_write(path) as part, medium.drawing():
         fit_titles(figure)
         figure.savefig(part, format=kind, dpi=dpi, metadata=about)
     return path

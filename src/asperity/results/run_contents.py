@@ -31,7 +31,7 @@ def run_contents(run: "Run") -> ehl.FileContents:
     axis = {"axis": "Z", "positive": "down"}
     coordinates["depth"] = ("depth", stress.depths, quantity("depth").attributes | axis)
     for entry in map(quantity, MAPS):
-        values: Field | None = entry.at(run)
+        values: Field | None = entry.value_from(run)
         if values is not None:
             variables[entry.key] = (("x", "y"), values.astype(np.float32), entry.attributes)
     variables["von_mises"][2]["comment"] = f"Poisson's ratio {stress.poisson_ratio:g}"

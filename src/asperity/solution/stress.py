@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from asperity.contact.conditions import ContactConditions
-from asperity.contact.grid import FEWEST_CELLS, Grid
+from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.ehl import ContactSolution
@@ -184,9 +184,7 @@ def hertz_stress(
     line = conditions.long
     (a, b), cells = conditions.hertz.half_widths, HERTZ_CELLS
     reach = (1.25 * a, a if line else 1.25 * b)
-    grid = Grid(
-        (cells, FEWEST_CELLS if line else cells), (-reach[0], -reach[1]), reach, (False, line)
-    )
+    grid = Grid((cells, MIN_CELLS if line else cells), (-reach[0], -reach[1]), reach, (False, line))
     inside = (
         1.0
         - (grid.x[:, None] / a) ** 2

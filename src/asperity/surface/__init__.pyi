@@ -2,6 +2,7 @@ from .bearing import BearingCurve as BearingCurve
 from .bearing import bearing_curve as bearing_curve
 from .condition import Form as Form
 from .condition import Outliers as Outliers
+from .condition import SurfaceConditioning as SurfaceConditioning
 from .condition import condition_surface as condition_surface
 from .condition import level as level
 from .generate import gaussian_surface as gaussian_surface
@@ -22,13 +23,13 @@ from .parameters import SurfaceDescription as SurfaceDescription
 from .parameters import SurfaceParameters as SurfaceParameters
 from .parameters import correlation_lengths as correlation_lengths
 from .parameters import describe_surface as describe_surface
+from .parameters import distinct_heights as distinct_heights
 from .parameters import height_parameters as height_parameters
-from .parameters import known_once as known_once
 from .parameters import surface_parameters as surface_parameters
 from .prepare import CompositeSurface as CompositeSurface
-from .prepare import Fit as Fit
+from .prepare import FitMode as FitMode
 from .prepare import PreparedSurface as PreparedSurface
-from .prepare import places as places
+from .prepare import count_places as count_places
 from .prepare import prepare_surface as prepare_surface
 from .profile import ProfileParameters as ProfileParameters
 from .profile import profile_parameters as profile_parameters

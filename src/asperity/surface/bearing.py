@@ -1,4 +1,4 @@
-"""The bearing curve of Abbott and Firestone, of maps and profiles alike, and the core, peaks and pits read off it.
+"""Bearing (Abbott-Firestone) curve of maps and profiles, and its core, peak and pit heights.
 
 Source: ISO 25178-2 and ISO 21920-2, material ratio curve and Sk (Rk) parameters.
 """
@@ -11,27 +11,27 @@ import numpy as np
 from asperity.core.arrays import Field
 
 _POINTS = 10_001  # of the curve
-_SECANT = 0.4  # share of the surface that the flattest secant spans
+_SECANT = 0.4  # share of the surface spanned by the flattest secant
 
 
 @dataclass(frozen=True, slots=True)
 class BearingCurve:
-    """`height` [m from the mean] over the `share` of the surface that lies above it, 0 to 1."""
+    """Bearing curve: `height` [m from the mean] against the `share` of the surface above it."""
 
     share: Field
     height: Field
 
     def material_ratio(self, height: float) -> float:
-        """Smr(c), Rmr(c): the share of the surface above `height` [m from the mean]."""
+        """Return Smr(c) or Rmr(c), the share of the surface above `height` [m from the mean]."""
         return float(np.interp(-height, -self.height, self.share))
 
     def height_at(self, share: float) -> float:
-        """Smc(p), Rmc(p): the height [m from the mean] above which that share of the surface lies."""
+        """Return Smc(p) or Rmc(p), the height [m from the mean] exceeded by `share`."""
         return float(np.interp(share, self.share, self.height))
 
 
 class CoreHeights(NamedTuple):
-    """Sk, Spk, Svk [m], Smr1 and Smr2; for a profile Rk and so on."""
+    """Sk, Spk, Svk [m], Smr1 and Smr2; Rk, Rpk ... for a profile."""
 
     core: float
     peaks: float
@@ -41,19 +41,20 @@ class CoreHeights(NamedTuple):
 
 
 def bearing_curve(heights: Field) -> BearingCurve:
-    """The curve of heights of any shape [m]; NaN are left out, the mean is removed."""
+    """Compute the bearing curve of heights [m] of any shape, about their mean; nan is ignored."""
     known = heights[np.isfinite(heights)]
     share = np.linspace(0.0, 1.0, _POINTS)
-    ordered = np.sort(
-        known - known.mean(), axis=None
-    )  # once: numpy's quantile is fifty times slower for so many
+    ordered = np.sort(known - known.mean(), axis=None)  # np.quantile is fifty times slower
     return BearingCurve(
         share, np.interp((1.0 - share) * (known.size - 1), np.arange(known.size), ordered)
     )
 
 
 def core_heights(curve: BearingCurve) -> CoreHeights:
-    """Core, peaks and pits: the flattest 40 % of the curve carry a line, whose ends at 0 and 1 bound the core."""
+    """Compute core, peak and pit heights.
+
+    A line is fitted to the flattest 40 % of the curve; its values at 0 and 1 bound the core.
+    """
     share, height = curve.share, curve.height
     span = round(_SECANT * (_POINTS - 1))
     first = int(np.argmin(height[:-span] - height[span:]))

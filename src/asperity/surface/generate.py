@@ -1,9 +1,8 @@
-"""Random rough surfaces with a wanted spectrum and height distribution, by seed.
+"""Random rough surfaces with a given spectrum and height distribution.
 
-White noise is filtered in wavenumber space, so a surface repeats along both axes. The noise
-belongs to the domain, not to its cells: one seed gives one physical surface, sampled at the cell
-centres of whatever grid resolves it. Surfaces made by cutting and denting are in
-`asperity.surface.machined`.
+White noise is filtered in wavenumber space, so a surface is periodic along both axes. The noise
+belongs to the domain, not to its cells: a seed defines one physical surface, sampled at the cell
+centres of any grid that resolves it. `asperity.surface.machined` models cutting and denting.
 """
 
 from collections.abc import Callable
@@ -16,9 +15,8 @@ from asperity.core.errors import BadInput, require_positive
 from asperity.surface import johnson
 from asperity.surface.model import Surface, length_text, require_roughness
 
-_LARGEST_WAVENUMBER = (
-    9.0  # times the correlation length: beyond it a Gaussian spectrum holds exp(-81/4), nothing
-)
+# Largest wavenumber times correlation length; a Gaussian spectrum is negligible beyond: exp(-81/4)
+_LARGEST_WAVENUMBER = 9.0
 
 
 def gaussian_surface(
@@ -29,24 +27,23 @@ def gaussian_surface(
     direction: float = 0.0,
     rng: np.random.Generator,
 ) -> Surface:
-    """Gaussian heights with a Gaussian autocorrelation: R(u, v) = Sq^2 exp(-(u/l1)^2 - (v/l2)^2).
+    """Generate Gaussian heights with the autocorrelation Sq^2 exp(-(u/l1)^2 - (v/l2)^2).
 
-    The correlation length is where the autocorrelation has fallen to 1/e. ISO 25178's Sal is
-    another length, where it has fallen to 0.2: Sal = l sqrt(ln 5) = 1.27 l.
+    The autocorrelation falls to 1/e at the correlation length, and to 0.2 at Sal of ISO 25178:
+    Sal = l sqrt(ln 5) = 1.27 l.
 
     Parameters
     ----------
-    grid : where the heights are wanted
-    sq : root-mean-square height of this very sample [m]; the mean is zero
+    grid : grid of the heights
+    sq : root-mean-square height of the sample [m]; the mean is zero
     correlation_length : l1 = l2, or (l1, l2) [m]
-    direction : angle of u, along which l1 is measured, from x towards y [rad]
-    rng : the only source of chance; seeds that are equal give surfaces that differ by the factor of `sq` alone
+    direction : angle of u, the axis of l1, from x towards y [rad]
+    rng : random generator; surfaces of equal seeds differ only by the factor `sq`
 
     Raises
     ------
     BadInput
-        for a correlation length below 2 cells, which the grid cannot show, or above half the domain, which then
-        holds no sample of the roughness.
+        A correlation length is below 2 cells, the resolution of the grid, or above half the domain.
     """
     lengths = _lengths(grid, correlation_length, direction)
     return _filtered_noise(grid, sq, *_gaussian_spectrum(lengths, direction), rng)
@@ -66,25 +63,25 @@ def require_lengths(
     direction: float,
     names: tuple[str, str] = ("correlation length along x", "correlation length along y"),
 ) -> None:
-    """Refuse lengths along and across `direction` that the grid cannot show or the domain cannot hold."""
+    """Raise BadInput for a length below 2 cells or above half the domain in its direction."""
     cosine, sine = abs(np.cos(direction)), abs(np.sin(direction))
     for name, length, along in zip(names, lengths, ((cosine, sine), (sine, cosine)), strict=True):
-        where = (
+        subject = (
             name
             if direction == 0.0
             else name.replace("along x", "along the lay").replace("along y", "across it")
         )
-        require_positive(where, length, "m")
+        require_positive(subject, length, "m")
         coarsest = 2.0 / np.hypot(along[0] / grid.spacing[0], along[1] / grid.spacing[1])
         longest = 0.5 / max(along[0] / grid.extent[0], along[1] / grid.extent[1])
         if length < coarsest * (1.0 - 1e-9):
             raise BadInput(
-                f"{where} must be at least 2 cells, {length_text(coarsest)}, "
+                f"{subject} must be at least 2 cells, {length_text(coarsest)}, "
                 f"got {length_text(length)}; use more cells or a longer one"
             )
         if length > longest * (1.0 + 1e-9):
             raise BadInput(
-                f"{where} must be at most half the domain, {length_text(longest)}, "
+                f"{subject} must be at most half the domain, {length_text(longest)}, "
                 f"got {length_text(length)}; use a larger domain or a shorter one"
             )
 
@@ -92,7 +89,7 @@ def require_lengths(
 def _gaussian_spectrum(
     lengths: tuple[float, float], direction: float
 ) -> tuple[Callable[[Field, Field], Field], tuple[float, float]]:
-    """Amplitude over (kx, ky), and the largest of either that matters."""
+    """Return the amplitude as a function of (kx, ky), and the largest relevant kx and ky."""
     (first, second), cosine, sine = lengths, np.cos(direction), np.sin(direction)
 
     def amplitude(kx: Field, ky: Field) -> Field:
@@ -115,13 +112,13 @@ def non_gaussian_surface(
     direction: float = 0.0,
     rng: np.random.Generator,
 ) -> Surface:
-    """Heights of wanted skewness and kurtosis, met by this very sample, at wanted correlation lengths.
+    """Generate heights whose sample has the given skewness, kurtosis and correlation lengths.
 
-    A Gaussian surface is translated height by height by the curve of Johnson's system (SU or SB)
-    that gives its sample the two moments. Translation shortens correlations; the Gaussian surface
-    has longer ones to make up for it, so that the autocorrelation falls to 1/e at the lengths
-    asked for. Sources: N. L. Johnson, Biometrika 36 (1949) 149; the polynomial of correlations of
-    M. Grigoriu, J. Eng. Mech. 110 (1984) 610.
+    A Gaussian surface is translated by the Johnson curve (SU or SB) that gives its sample both
+    moments. Translation shortens correlations, so the Gaussian surface has longer ones and the
+    autocorrelation of the result falls to 1/e at the given lengths. Sources: N. L. Johnson,
+    Biometrika 36 (1949) 149; the polynomial of correlations of M. Grigoriu, J. Eng. Mech. 110
+    (1984) 610.
 
     Parameters
     ----------
@@ -132,26 +129,27 @@ def non_gaussian_surface(
     Raises
     ------
     BadInput
-        for moments that no distribution has (kurtosis below 1 + skewness^2), or this sample cannot take, and as
-        `gaussian_surface` does.
+        The moments are impossible (kurtosis below 1 + skewness^2) or not attainable by this sample;
+        and as `gaussian_surface`.
     """
     if not kurtosis > 1.0 + skewness**2:
         raise BadInput(
-            f"kurtosis must be above 1 + skewness^2 = {1.0 + skewness**2:.4g}, got {kurtosis:g}; raise it, or bring "
-            "the skewness nearer to 0"
+            f"kurtosis must be above 1 + skewness^2 = {1.0 + skewness**2:.4g}, got {kurtosis:g}; "
+            "raise it, or reduce the skewness"
         )
     lengths = _lengths(grid, correlation_length, direction)
     stretch = johnson.stretch(skewness, kurtosis)
     longer = (lengths[0] * stretch, lengths[1] * stretch)
     gaussian = _filtered_noise(grid, 1.0, *_gaussian_spectrum(longer, direction), rng).heights
-    curve, reached = johnson.fit(*johnson.histogram(gaussian), skewness, kurtosis)
+    curve, moments = johnson.fit(*johnson.histogram(gaussian), skewness, kurtosis)
     if (
-        abs(reached[0] - skewness) > 0.02 * max(1.0, abs(skewness))
-        or abs(reached[1] - kurtosis) > 0.02 * kurtosis
+        abs(moments[0] - skewness) > 0.02 * max(1.0, abs(skewness))
+        or abs(moments[1] - kurtosis) > 0.02 * kurtosis
     ):
         raise BadInput(
-            f"this sample cannot take a skewness of {skewness:g} and a kurtosis of {kurtosis:g} (nearest: "
-            f"{reached[0]:.3g} and {reached[1]:.3g}); use a larger domain, shorter correlation lengths or milder values"
+            f"this sample cannot have a skewness of {skewness:g} and a kurtosis of {kurtosis:g} "
+            f"(nearest: {moments[0]:.3g} and {moments[1]:.3g}); use a larger domain, shorter "
+            "correlation lengths or less extreme values"
         )
     return Surface.scaled(curve(gaussian), grid, sq)
 
@@ -166,26 +164,28 @@ def run_in_surface(
     direction: float = 0.0,
     rng: np.random.Generator,
 ) -> Surface:
-    """A Gaussian surface whose peaks are worn to a plateau, as running-in and plateau honing leave it.
+    """Generate a Gaussian surface with peaks worn to a plateau, as by running-in or plateau honing.
 
-    z = min(z1, c + r z2): of the rough z1, what stood above c is gone, replaced by the finer
-    roughness of the plateau. Source: the two processes of ISO 13565-3.
+    z = min(z1, c + r z2): above the height c the rough surface z1 is replaced by the finer
+    roughness z2 of the plateau. Source: the two processes of ISO 13565-3.
 
     Parameters
     ----------
-    grid, sq, correlation_length, direction, rng : as for `gaussian_surface`; the lengths are those of z1
-    plateau_share : share of the surface whose peaks are worn off, above 0 and below 1; c follows from it
-    plateau_roughness : r, the plateau's Sq over that of z1; its correlation lengths are half as long, where the
-        grid can show that
+    grid, sq, correlation_length, direction, rng : as for `gaussian_surface`; the lengths are those
+        of z1
+    plateau_share : share of the surface on the plateau, above 0 and below 1; determines c
+    plateau_roughness : r, Sq of the plateau over that of z1; its correlation lengths are half as
+        long, as far as the grid resolves them
 
     Raises
     ------
     BadInput
-        for a share out of range, a negative roughness, and as `gaussian_surface` does.
+        The share is out of range or the roughness negative; and as `gaussian_surface`.
     """
     if not 0.0 < plateau_share < 1.0:
         raise BadInput(
-            f"plateau_share must lie between 0 and 1, got {plateau_share:g}; a run-in surface has about 0.4"
+            f"plateau_share must lie between 0 and 1, got {plateau_share:g}; a run-in "
+            "surface has about 0.4"
         )
     if not 0.0 <= plateau_roughness <= 1.0:
         raise BadInput(
@@ -202,35 +202,36 @@ def run_in_surface(
 def self_affine_surface(
     grid: Grid, *, sq: float, hurst: float, cutoffs: tuple[float, float], rng: np.random.Generator
 ) -> Surface:
-    """Gaussian heights with a power-law spectrum: C(q) ~ q^(-2 (1 + H)) between two wavelengths.
+    """Generate Gaussian heights with the spectrum C(q) ~ q^(-2 (1 + H)) between two wavelengths.
 
-    Waves longer than the longest have the spectrum of the longest (roll-off plateau), waves
-    shorter than the shortest are absent. Source: B. N. J. Persson et al., J. Phys.: Condens.
-    Matter 17 (2005) R1, section 2.
+    The spectrum is constant above the longest wavelength (roll-off) and zero below the shortest.
+    Source: B. N. J. Persson et al., J. Phys.: Condens. Matter 17 (2005) R1, section 2.
 
     Parameters
     ----------
-    grid : where the heights are wanted
-    sq : root-mean-square height of this very sample [m]; the mean is zero
+    grid : grid of the heights
+    sq : root-mean-square height of the sample [m]; the mean is zero
     hurst : H, above 0 and at most 1
     cutoffs : shortest and longest wavelength of the power law [m]
-    rng : the only source of chance
+    rng : random generator
 
     Raises
     ------
     BadInput
-        for a Hurst exponent out of range, or cut-offs that are swapped, below 2 cells or beyond the domain.
+        The Hurst exponent is out of range, or the cut-offs are swapped, below 2 cells or beyond the
+        domain.
     """
     if not 0.0 < hurst <= 1.0:
         raise BadInput(
-            f"hurst must lie above 0 and at most at 1, got {hurst:g}; machined metal has about 0.8"
+            f"hurst must lie above 0 and be at most 1, got {hurst:g}; machined metal has about 0.8"
         )
     shortest, longest = cutoffs
     coarsest, domain = 2.0 * max(grid.spacing), min(grid.extent)
     if not coarsest <= shortest < longest <= domain:
         raise BadInput(
-            f"cutoffs must rise from at least 2 cells, {length_text(coarsest)}, to at most the domain, "
-            f"{length_text(domain)}, got {length_text(shortest)} to {length_text(longest)}; change them or the grid"
+            f"cutoffs must rise from at least 2 cells, {length_text(coarsest)}, to at most the "
+            f"domain, {length_text(domain)}, got {length_text(shortest)} to "
+            f"{length_text(longest)}; change them or the grid"
         )
     k_short, k_long = 2.0 * np.pi / shortest, 2.0 * np.pi / longest
 
@@ -249,9 +250,9 @@ def _filtered_noise(
     largest_wavenumbers: tuple[float, float],
     rng: np.random.Generator,
 ) -> Surface:
-    """White noise on as many samples as the spectrum needs, filtered, then evaluated at the grid's cell centres."""
+    """Filter white noise, sampled as the spectrum needs, and evaluate it at the cell centres."""
     require_roughness(sq)
-    # an odd count has no Nyquist wave, so every wave of the noise has its conjugate
+    # odd counts have no Nyquist wave, so every wave has a conjugate
     sides = list(zip(largest_wavenumbers, grid.extent, strict=True))
     highest = [int(np.ceil(k * extent / (2.0 * np.pi))) for k, extent in sides]
     noise = rng.standard_normal([2 * m + 1 for m in highest])
@@ -259,7 +260,7 @@ def _filtered_noise(
     wavenumbers: list[Field] = [
         2.0 * np.pi / extent * m for m, extent in zip(modes, grid.extent, strict=True)
     ]
-    # samples sit at cell centres, half a cell from the corner that the noise starts at
+    # cell centres are half a cell from the corner, where the noise starts
     phases = [
         np.exp(0.5j * k * spacing) for k, spacing in zip(wavenumbers, grid.spacing, strict=True)
     ]
@@ -268,8 +269,8 @@ def _filtered_noise(
         * amplitude(wavenumbers[0][:, None], wavenumbers[1][None, :])
         * np.outer(*phases)
     )
-    waves[0, 0] = 0.0  # roughness is measured from its mean
-    kept = [np.abs(m) < cells / 2.0 for m, cells in zip(modes, grid.cells, strict=True)]
+    waves[0, 0] = 0.0  # zero mean
+    resolved = [np.abs(m) < cells / 2.0 for m, cells in zip(modes, grid.cells, strict=True)]
     spectrum = np.zeros(grid.cells, dtype=complex)
-    spectrum[np.ix_(modes[0][kept[0]], modes[1][kept[1]])] = waves[np.ix_(*kept)]
+    spectrum[np.ix_(modes[0][resolved[0]], modes[1][resolved[1]])] = waves[np.ix_(*resolved)]
     return Surface.scaled(np.fft.ifft2(spectrum).real, grid, sq)

@@ -1,7 +1,7 @@
-"""Johnson's curves: turn a standard normal height into one of wanted skewness and kurtosis.
+"""Johnson translation of standard normal heights to a given skewness and kurtosis.
 
-SU: sinh(z/d + s) for heavy tails, SB: 1/(1 + exp(s - z/d)) for light ones; between them they reach
-every pair of moments that a distribution can have. Mirrored for negative skewness.
+SU: sinh(z/d + s) for heavy tails, SB: 1/(1 + exp(s - z/d)) for light ones; together they cover all
+possible pairs of moments. The curve is mirrored for negative skewness.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ def _sb(z: Field, spread: float, shift: float) -> Field:
 
 
 def histogram(heights: Field) -> tuple[Field, Field]:
-    """Heights and their shares: a stand-in for a large sample that has its moments to about 1e-4."""
+    """Return heights and their shares, whose moments equal the sample's to about 1e-4."""
     shares, edges = np.histogram(heights, bins=_BINS)
     return (edges[1:] + edges[:-1]) / 2.0, shares / heights.size
 
@@ -34,43 +34,45 @@ def histogram(heights: Field) -> tuple[Field, Field]:
 def fit(
     z: Field, shares: Field, skewness: float, kurtosis: float
 ) -> tuple[Curve, tuple[float, float]]:
-    """The curve that gives heights z with those shares the two moments, and the moments it gives."""
-    side = -1.0 if skewness < 0.0 else 1.0
-    z, wanted = side * z, np.array([abs(skewness), kurtosis])
+    """Fit the translation of heights z with these shares; return the curve and its moments."""
+    sign = -1.0 if skewness < 0.0 else 1.0
+    z, target = sign * z, np.array([abs(skewness), kurtosis])
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        heavy, light = (_nearest(family, z, shares, wanted) for family in (_su, _sb))
+        heavy, light = (_fit_family(family, z, shares, target) for family in (_su, _sb))
         family, (_, spread, shift) = (_su, heavy) if heavy[0] <= light[0] else (_sb, light)
-        reached = _moments(family(z, spread, shift), shares)
+        moments = _moments(family(z, spread, shift), shares)
 
     def curve(heights: Field) -> Field:
-        return np.asarray(side * family(side * heights, spread, shift))
+        return np.asarray(sign * family(sign * heights, spread, shift))
 
-    return curve, (side * float(reached[0]), float(reached[1]))
+    return curve, (sign * float(moments[0]), float(moments[1]))
 
 
-def _nearest(
-    family: Callable[[Field, float, float], Field], z: Field, shares: Field, wanted: Field
+def _fit_family(
+    family: Callable[[Field, float, float], Field], z: Field, shares: Field, target: Field
 ) -> tuple[float, float, float]:
-    """Misfit, spread and shift of the family's best curve: the best of a coarse net, refined."""
+    """Return cost, spread and shift of the best curve: a grid search, then least squares."""
 
-    def misfit(parameters: Field) -> Field:
-        reached = _moments(family(z, float(np.exp(parameters[0])), float(parameters[1])), shares)
+    def residuals(parameters: Field) -> Field:
+        moments = _moments(family(z, float(np.exp(parameters[0])), float(parameters[1])), shares)
         return np.asarray(
-            np.nan_to_num((reached - wanted) / np.array([1.0, wanted[1]]), nan=1e3, posinf=1e3)
+            np.nan_to_num((moments - target) / np.array([1.0, target[1]]), nan=1e3, posinf=1e3)
         )
 
-    net = [np.array([d, s]) for d in np.linspace(-1.5, 3.5, 11) for s in np.linspace(0.0, 5.0, 9)]
-    start = min(net, key=lambda parameters: float(np.sum(misfit(parameters) ** 2)))
-    nearest = scipy.optimize.least_squares(misfit, start, bounds=([-3.0, -1.0], [6.0, 20.0]))
-    return float(nearest.cost), float(np.exp(nearest.x[0])), float(nearest.x[1])
+    trials = [
+        np.array([d, s]) for d in np.linspace(-1.5, 3.5, 11) for s in np.linspace(0.0, 5.0, 9)
+    ]
+    start = min(trials, key=lambda parameters: float(np.sum(residuals(parameters) ** 2)))
+    best = scipy.optimize.least_squares(residuals, start, bounds=([-3.0, -1.0], [6.0, 20.0]))
+    return float(best.cost), float(np.exp(best.x[0])), float(best.x[1])
 
 
 @cache
 def stretch(skewness: float, kurtosis: float) -> float:
-    """How much longer the Gaussian autocorrelation must be, for the translated one to fall to 1/e where it would.
+    """Return the factor on Gaussian correlation lengths that compensates for the translation.
 
-    The translated heights correlate as sum c_n^2 rho^n / sum c_n^2, c_n the curve's Hermite
-    coefficients.
+    The translated heights have the autocorrelation sum c_n^2 rho^n / sum c_n^2 with the Hermite
+    coefficients c_n of the curve; it falls to 1/e at the lengths before stretching.
     """
     nodes, weights = np.polynomial.hermite_e.hermegauss(120)
     weights = weights / weights.sum()
@@ -93,9 +95,9 @@ def stretch(skewness: float, kurtosis: float) -> float:
 
 
 def _moments(heights: Field, shares: Field) -> Field:
-    """Skewness and kurtosis."""
-    off = heights - np.sum(shares * heights)
-    variance = np.sum(shares * off**2)
+    """Return skewness and kurtosis."""
+    deviation = heights - np.sum(shares * heights)
+    variance = np.sum(shares * deviation**2)
     return np.array(
-        [np.sum(shares * off**3) / variance**1.5, np.sum(shares * off**4) / variance**2]
+        [np.sum(shares * deviation**3) / variance**1.5, np.sum(shares * deviation**4) / variance**2]
     )

@@ -1,4 +1,4 @@
-"""A rough surface on a grid: heights only, no physics."""
+"""Rough surfaces on a grid, generated and measured."""
 
 from dataclasses import dataclass, replace
 
@@ -8,26 +8,26 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_positive
 
-LEAST_SQ = 1e-15  # m, the size of an atom's nucleus
+MIN_SQ = 1e-15  # m, the size of an atomic nucleus
 
 
 def require_roughness(sq: float) -> float:
-    """Return an Sq [m], or say why it is none that a surface can be scaled to."""
-    if require_positive("sq", sq, "m") < LEAST_SQ:
+    """Return an Sq [m]; raise BadInput unless a surface can be scaled to it."""
+    if require_positive("sq", sq, "m") < MIN_SQ:
         raise BadInput(
-            f'sq must be at least {LEAST_SQ:g} m, got {sq:.3g} m; raise it, or take kind = "flat"'
+            f'sq must be at least {MIN_SQ:g} m, got {sq:.3g} m; raise it, or take kind = "flat"'
         )
     return sq
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """Composite roughness: heights [m], shape (nx, ny) on `grid`, x along rolling; positive = material.
+    """Composite roughness: heights [m], shape (nx, ny), x along rolling, positive towards material.
 
     Raises
     ------
     BadInput
-        if the shape is not the grid's or a height is not finite.
+        The shape is not the grid's, or a height is not finite.
     """
 
     heights: Field
@@ -47,7 +47,7 @@ class Surface:
 
     @classmethod
     def scaled(cls, heights: Field, grid: Grid, sq: float) -> "Surface":
-        """Heights of any size, less their mean and scaled to an `sq` [m]."""
+        """Remove the mean of heights and scale them to `sq` [m]."""
         heights = np.ascontiguousarray(heights - heights.mean())
         return cls(heights * (require_roughness(sq) / np.std(heights)), grid)
 
@@ -59,17 +59,16 @@ class Surface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredSurface:
-    """A measured map as its file gives it, apart from the unit.
+    """Measured map as stored in its file, in metres.
 
-    `heights` [m], shape (nx, ny) on `grid`, NaN where the instrument saw nothing; `grid` is
-    centred on zero and repeats along neither axis. `name` and `format` of the file; `notes` say in
-    a sentence each what looks odd. `uniform` is the axis along which a measured profile is taken
-    to go on unchanged, None for a map.
+    `heights` [m] have shape (nx, ny), nan for missing cells; `grid` is centred on zero and not
+    periodic. `name` and `format` are those of the file; `notes` are warnings, a sentence each.
+    `uniform` is the axis along which a profile is extended unchanged; None for a map.
 
     Raises
     ------
     BadInput
-        if the shape is not the grid's, or no height is known.
+        The shape is not the grid's, or no height is valid.
     """
 
     heights: Field
@@ -82,7 +81,8 @@ class MeasuredSurface:
     def __post_init__(self) -> None:
         if self.heights.shape != self.grid.cells:
             raise BadInput(
-                f"{self.name} must have its grid's shape {self.grid.cells}, got {self.heights.shape}"
+                f"{self.name} must have its grid's shape {self.grid.cells}, got "
+                f"{self.heights.shape}"
             )
         if not np.isfinite(self.heights).any():
             raise BadInput(
@@ -91,26 +91,26 @@ class MeasuredSurface:
 
     @property
     def missing(self) -> float:
-        """Share of the cells without a height, 0 to 1."""
+        """Share of missing cells, 0 to 1."""
         return float(np.mean(~np.isfinite(self.heights)))
 
     @property
     def sq(self) -> float:
-        """Root-mean-square height about the mean [m], missing cells left out."""
+        """Root-mean-square height about the mean [m] of the valid cells."""
         return float(np.nanstd(self.heights))
 
     @property
     def surface(self) -> Surface:
-        """The same heights as a `Surface`; missing cells raise `BadInput`."""
+        """Heights as a `Surface`; missing cells raise `BadInput`."""
         return Surface(self.heights, self.grid)
 
     @property
     def profile(self) -> Field:
-        """The heights [m] of a measured profile, shape (n,); of a map, its middle row along x."""
+        """Heights [m] of a profile, shape (n,); of a map, its middle row along x."""
         return self.heights[0] if self.uniform == 0 else self.heights[:, self.heights.shape[1] // 2]
 
     def turned(self) -> "MeasuredSurface":
-        """The same surface mounted a quarter turn counter-clockwise: what ran along x runs along y."""
+        """Return the surface rotated by 90 degrees counter-clockwise, so that x becomes y."""
         (x0, y0), (x1, y1) = self.grid.lower, self.grid.upper
         grid = replace(
             self.grid,
@@ -126,12 +126,12 @@ class MeasuredSurface:
 
 
 def flat_surface(grid: Grid) -> Surface:
-    """A perfectly smooth surface."""
+    """Return a perfectly smooth surface."""
     return Surface(np.zeros(grid.cells), grid)
 
 
 def length_text(metres: float) -> str:
-    """A length as people write it: three digits and the unit that suits its size."""
+    """Format a length with four digits in the unit that suits its size."""
     for unit, size in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
         if abs(metres) >= 0.9995 * size:
             return f"{metres / size:.4g} {unit}"
@@ -139,7 +139,7 @@ def length_text(metres: float) -> str:
 
 
 def area_text(metres: tuple[float, float]) -> str:
-    """Two lengths as one size: 358 x 179 um."""
+    """Format two lengths as a size: 358 x 179 um."""
     unit, size = next(
         ((u, s) for u, s in (("mm", 1e-3), ("um", 1e-6)) if max(metres) >= s), ("nm", 1e-9)
     )

@@ -1,9 +1,8 @@
-"""Rough surfaces that run through a contact, each at its own speed: where they are at any time.
+"""Rough surfaces that move through a contact, each at its own speed.
 
-Each lies on a track that repeats along rolling. What has moved by whole cells is the same numbers
-further on; between them heights are interpolated by their own Fourier series, which on a track
-that repeats is exact for every wave that the cells can show: nothing is smeared however long it
-runs.
+Each surface has a track that is periodic along rolling. A shift by whole cells is exact; other
+shifts interpolate with the Fourier series of the heights, which is exact for all waves that the
+cells resolve, so that heights are not smeared over time.
 """
 
 from dataclasses import dataclass, replace
@@ -20,23 +19,23 @@ from asperity.core.errors import BadInput
 from asperity.surface.model import Surface, flat_surface
 from asperity.surface.prepare import CompositeSurface
 
-Spectrum: TypeAlias = npt.NDArray[np.complexfloating[Any, Any]]
+ComplexField: TypeAlias = npt.NDArray[np.complexfloating[Any, Any]]
 
-WHOLE = 1e-9  # of a cell: closer to a whole number of cells is one
+WHOLE_CELL_TOLERANCE = 1e-9  # cells
 
 
 @dataclass(frozen=True)
 class MovingSurfaces:
-    """Two surfaces that face each other and run along x at `speeds` [m/s], seen through the contact's `grid`.
+    """Two facing surfaces that move along x at `speeds` [m/s] through the contact's `grid`.
 
-    Each one's own grid is its track: it begins where the contact's does, has its cells, is as long
-    or longer, and repeats along x. The second lies face down, turned over about x, so its y runs
-    back.
+    The grid of each surface is its track: it begins with the contact's grid, has the same cells, is
+    at least as long, and is periodic along x. The second surface lies face down, turned over about
+    x, so its y axis is reversed.
 
     Raises
     ------
     BadInput
-        for a track that is shorter than the contact, or has other cells.
+        A track is shorter than the contact, or has other cells.
     """
 
     first: Surface
@@ -60,8 +59,8 @@ class MovingSurfaces:
                 )
 
     @classmethod
-    def of(cls, composite: CompositeSurface) -> "MovingSurfaces":
-        """Two surfaces as they stand in a contact, their ends joined."""
+    def from_composite(cls, composite: CompositeSurface) -> "MovingSurfaces":
+        """Make moving surfaces of a composite one, whose grid becomes the track."""
         return cls(composite.first, composite.second, composite.speeds, composite.first.grid)
 
     @classmethod
@@ -73,9 +72,9 @@ class MovingSurfaces:
         *,
         first: bool = True,
     ) -> "MovingSurfaces":
-        """All roughness on the first surface, or on the second, and seen by the contact as it lies here.
+        """Put all roughness on the first or the second surface, in its present orientation.
 
-        The contact's grid is the surface's own, unless given.
+        The contact's grid is the surface's own unless given.
         """
         flat, grid = flat_surface(surface.grid), grid or surface.grid
         if first:
@@ -84,24 +83,24 @@ class MovingSurfaces:
 
     @property
     def rough(self) -> tuple[bool, bool]:
-        """Which of the two has any height that differs."""
+        """True for each surface that is not flat."""
         return bool(np.ptp(self.first.heights) > 0.0), bool(np.ptp(self.second.heights) > 0.0)
 
     @property
     def uniform(self) -> bool:
-        """Whether nothing varies along y."""
+        """True if no height varies along y."""
         return all(
             bool(np.all(surface.heights == surface.heights[:, :1]))
             for surface in (self.first, self.second)
         )
 
-    def at(self, time: float) -> Surface:
-        """What the gap sees after `time` [s]: the sum of both, on the contact's grid."""
-        first, second = (self._seen(index, time) for index in (0, 1))
+    def composite_at(self, time: float) -> Surface:
+        """Return the composite roughness at `time` [s], the sum of both on the contact's grid."""
+        first, second = (self._heights_at(index, time) for index in (0, 1))
         return Surface(first + second[:, ::-1], self.grid)
 
     def lowered(self, first: Field, second: Field) -> "MovingSurfaces":
-        """The same surfaces, their heights lower by so much on each track [m]."""
+        """Return the surfaces with the heights of each track lowered by these fields [m]."""
         return MovingSurfaces(
             Surface(self.first.heights - first, self.first.grid),
             Surface(self.second.heights - second, self.second.grid),
@@ -109,55 +108,55 @@ class MovingSurfaces:
             self.grid,
         )
 
-    def on_track(self, index: int, field: Field, time: float) -> Field:
-        """What a field on the contact's grid at `time` [s] is on the track of surface 0 or 1, and nothing beside it.
+    def project_on_track(self, index: int, field: Field, time: float) -> Field:
+        """Project a field on the contact's grid at `time` [s] onto the track of surface 0 or 1.
 
-        What straddles two cells of the track is shared between them, so that its sum is kept and
-        its sign.
+        The field is zero outside the contact. A value between two cells of the track is divided
+        between them, which preserves the sum and the sign.
         """
         surface = (self.first, self.second)[index]
         cells = self.speeds[index] * time / self.grid.spacing[0]
         whole, part = round(cells), 0.0
-        if abs(cells - whole) >= WHOLE:
+        if abs(cells - whole) >= WHOLE_CELL_TOLERANCE:
             whole = int(np.floor(cells))
             part = cells - whole
         track = np.zeros(surface.grid.cells)
         track[: self.grid.cells[0]] = field if index == 0 else field[:, ::-1]
-        here = np.roll(track, -whole, axis=0)
-        return np.asarray((1.0 - part) * here + part * np.roll(here, -1, axis=0))
+        shifted = np.roll(track, -whole, axis=0)
+        return np.asarray((1.0 - part) * shifted + part * np.roll(shifted, -1, axis=0))
 
-    def passage(self, index: int) -> float:
-        """Time in which surface 0 or 1 runs its whole track [s]; infinite for one that stands still."""
+    def passage_time(self, index: int) -> float:
+        """Return the time of one passage of the track of surface 0 or 1 [s]; infinite at rest."""
         surface, speed = (self.first, self.second)[index], abs(self.speeds[index])
         return surface.grid.extent[0] / speed if speed > 0.0 else float("inf")
 
-    def _seen(self, index: int, time: float) -> Field:
+    def _heights_at(self, index: int, time: float) -> Field:
         heights = (self.first, self.second)[index].heights
         cells = self.speeds[index] * time / self.grid.spacing[0]
-        return moved(heights, cells, self._spectra[index])[: self.grid.cells[0]]
+        return shift_periodic(heights, cells, self._spectra[index])[: self.grid.cells[0]]
 
     @cached_property
-    def _spectra(self) -> tuple[Spectrum, Spectrum]:
+    def _spectra(self) -> tuple[ComplexField, ComplexField]:
         return scipy.fft.rfft(self.first.heights, axis=0), scipy.fft.rfft(
             self.second.heights, axis=0
         )
 
 
-def moved(heights: Field, cells: float, spectrum: Spectrum) -> Field:
-    """Heights that repeat along the first axis, moved on by a number of `cells`; `spectrum` is their rfft along it."""
+def shift_periodic(heights: Field, cells: float, spectrum: ComplexField) -> Field:
+    """Shift periodic heights by a number of cells along axis 0; `spectrum` is their rfft."""
     whole = round(cells)
-    if abs(cells - whole) < WHOLE:
+    if abs(cells - whole) < WHOLE_CELL_TOLERANCE:
         return np.roll(heights, whole, axis=0)
     count = heights.shape[0]
     wave = np.arange(spectrum.shape[0])
     phase = np.exp(-2j * np.pi * np.mod(wave * (cells / count), 1.0))
     if count % 2 == 0:
-        phase[-1] = np.cos(np.pi * cells)  # the shortest wave is known at its crests only
+        phase[-1] = np.cos(np.pi * cells)  # the Nyquist wave is sampled at its crests only
     return np.asarray(scipy.fft.irfft(spectrum * phase[:, None], n=count, axis=0))
 
 
 def track_grid(grid: Grid, lengths: int = 1) -> Grid:
-    """A track of so many lengths of the contact's grid, closed along rolling."""
+    """Return a track of several lengths of the contact's grid, periodic along rolling."""
     (nx, ny), (left, front), (right, back) = grid.cells, grid.lower, grid.upper
     return replace(
         grid,

@@ -1,4 +1,4 @@
-"""ISO 25178-2 parameters of a rough surface, and the description of a measured file that the command line prints."""
+"""ISO 25178-2 parameters of rough surfaces, and descriptions of measured files."""
 
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
@@ -12,29 +12,33 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.quantities import Quantity, catalogue
 from asperity.surface.bearing import bearing_curve, core_heights
-from asperity.surface.condition import Form, Outliers, condition_surface
+from asperity.surface.condition import (
+    DEFAULT_CONDITIONING,
+    SurfaceConditioning,
+    condition_surface,
+)
 from asperity.surface.model import MeasuredSurface, Surface
 from asperity.surface.profile import ProfileParameters, profile_parameters
 from asperity.surface.read import read_surface
 
-_DECAYED = 0.2  # ISO 25178-2: the autocorrelation at which Sal and Str are read
-_DIRECTIONS = 180  # rays over half a turn; the autocorrelation is the same backwards
+_DECAY_THRESHOLD = 0.2  # ISO 25178-2: autocorrelation that defines Sal and Str
+_DIRECTIONS = 180  # rays over half a turn; the autocorrelation is symmetric
 
 
 @dataclass(frozen=True, slots=True)
 class SurfaceParameters:
-    """Areal parameters of ISO 25178-2, about the mean of the cells that are known.
+    """Areal parameters of ISO 25178-2, about the mean of the valid cells.
 
     Height: `sa`, `sq` arithmetic and root mean square height [m]; `ssk`, `sku` skewness and
-    kurtosis (0 and 3 for Gaussian heights); `sp`, `sv`, `sz` highest peak, deepest pit and their
-    sum [m]. Hybrid: `sdq` root mean square gradient, from differences of neighbouring cells; `sdr`
-    area of the surface over its projection, less 1. Spatial: `sal` the shortest distance over
-    which the autocorrelation falls to 0.2 [m]; `str_` that distance over the longest one (1
-    isotropic, towards 0 with a lay). Where the autocorrelation stays above 0.2 within half the map
-    in some direction, `str_` is an upper bound and `str_bounded` is true. Functional: core height
+    kurtosis (0 and 3 for Gaussian heights); `sp`, `sv`, `sz` maximum peak height, maximum pit depth
+    and their sum [m]. Hybrid: `sdq` root mean square gradient, from differences of neighbouring
+    cells; `sdr` developed interfacial area ratio. Spatial: `sal` shortest distance over which the
+    autocorrelation falls to 0.2 [m]; `str_` ratio of the shortest to the longest such distance (1
+    isotropic, towards 0 with a lay). If the autocorrelation stays above 0.2 within half the map in
+    some direction, `str_` is an upper bound and `str_bounded` is true. Functional: core height
     `sk`, reduced peak height `spk`, reduced pit depth `svk` [m], and the material ratios `smr1`,
-    `smr2` that bound the core, 0 to 1. NaN: ssk, sku, sal and str_ of a flat surface, sal and str_
-    where nothing decays.
+    `smr2` of the core, 0 to 1. `ssk`, `sku`, `sal` and `str_` of a flat surface are nan, as are
+    `sal` and `str_` without decay.
     """
 
     sa: float
@@ -58,11 +62,10 @@ class SurfaceParameters:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceDescription:
-    """A measured file: as read, levelled (the map to draw), its parameters after levelling, and what was done.
+    """Description of a measured file: raw and levelled map, parameters after levelling and steps.
 
-    `profile` are the parameters of ISO 21920-2, of a file that holds a profile only;
-    `profile_letter` is what that standard calls them by: "R" of what a filter has left of the
-    waviness, "P" of a primary profile.
+    `profile` holds the parameters of ISO 21920-2 if the file is a profile; `profile_letter` is
+    their prefix in that standard: "R" after an L-filter, else "P" (primary profile).
     """
 
     path: Path
@@ -74,24 +77,24 @@ class SurfaceDescription:
     profile_letter: Literal["P", "R"] = "P"
 
     def symbol(self, quantity: Quantity) -> Quantity:
-        """A parameter of a profile, with the symbol that it has here: Pq in place of Rq."""
+        """Return a profile parameter with the symbol of this profile: Pq instead of Rq."""
         return replace(quantity, symbol=self.profile_letter + quantity.symbol.removeprefix("R"))
 
     def verdict(self) -> str:
-        """One sentence: roughness, cells and what is missing."""
+        """Return one sentence: roughness, cells and missing data."""
         measured, (nx, ny), (dx, dy) = (
             self.measured,
             self.measured.grid.cells,
             self.measured.grid.spacing,
         )
-        what = f"Sq {1e6 * self.parameters.sq:.3g} um, {nx} x {ny} cells of {1e6 * dx:.4g} x {1e6 * dy:.4g} um"
+        rms = f"{1e6 * self.parameters.sq:.3g} um"
+        summary = f"Sq {rms}, {nx} x {ny} cells of {1e6 * dx:.4g} x {1e6 * dy:.4g} um"
         if measured.uniform is not None:
-            rms = f"{self.profile_letter}q {1e6 * self.parameters.sq:.3g} um"
-            what = f"profile, {rms}, {nx} points every {1e6 * dx:.4g} um"
-        return f"{self.path}: {what}, {100 * measured.missing:.2g} % missing."
+            summary = f"profile, {self.profile_letter}q {rms}, {nx} points every {1e6 * dx:.4g} um"
+        return f"{self.path}: {summary}, {100 * measured.missing:.2g} % missing."
 
     def scalars(self) -> dict[str, Any]:
-        """What `asperity surface --json` prints for the file: SI numbers, None for what is not a number."""
+        """Return the SI numbers of `asperity surface --json` for the file; None for nan."""
         return {
             "file": str(self.path),
             "format": self.measured.format,
@@ -99,17 +102,17 @@ class SurfaceDescription:
             "pixel_m": list(self.measured.grid.spacing),
             "size_m": list(self.measured.grid.extent),
             "missing": self.measured.missing,
-            **_plain(self.parameters),
+            **_by_key(self.parameters),
             "profile": None
             if self.profile is None
-            else {"letter": self.profile_letter, **_plain(self.profile)},
+            else {"letter": self.profile_letter, **_by_key(self.profile)},
             "steps": list(self.steps),
             "notes": list(self.measured.notes),
         }
 
 
-def _plain(parameters: SurfaceParameters | ProfileParameters) -> dict[str, object]:
-    """By the keys of the catalogue, where lengths end in _m; None for what is not a number."""
+def _by_key(parameters: SurfaceParameters | ProfileParameters) -> dict[str, object]:
+    """Return parameters by their keys in the catalogue, where lengths end in _m; None for nan."""
     known = catalogue()
     return {
         f"{name}_m" if f"{name}_m" in known else name.rstrip("_"): value if value == value else None
@@ -120,42 +123,36 @@ def _plain(parameters: SurfaceParameters | ProfileParameters) -> dict[str, objec
 def describe_surface(
     path: str | Path,
     *,
-    form: Form = "quadratic",
     unit: str | None = None,
     lateral_unit: str | None = None,
     pixel: float | tuple[float, float] | None = None,
-    turn: bool = False,
-    outliers: Outliers = "keep",
-    s_filter: float | None = None,
-    l_filter: float | None = None,
+    conditioning: SurfaceConditioning = DEFAULT_CONDITIONING,
 ) -> SurfaceDescription:
-    """Read a measured file, level it, and compute its parameters; missing cells are left out, not filled.
+    """Read and level a measured file and compute its parameters; missing cells are not filled.
 
     Parameters
     ----------
     path, unit, lateral_unit, pixel : as for `read_surface`
-    form, turn, outliers, s_filter, l_filter : as for `prepare_surface`
+    conditioning : form removal, filters and other settings
 
     Raises
     ------
     UnreadableFile, BadInput
-        as `read_surface` and `condition` do.
+        As `read_surface` and `condition_surface`.
     """
     measured = read_surface(path, unit=unit, lateral_unit=lateral_unit, pixel=pixel)
-    levelled, steps = condition_surface(
-        measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter
-    )
+    levelled, steps = condition_surface(measured, conditioning)
     profile = None
     if levelled.uniform is not None:
         profile = profile_parameters(levelled.profile, levelled.grid.spacing[1 - levelled.uniform])
-    letter: Literal["P", "R"] = "P" if l_filter is None else "R"
+    letter: Literal["P", "R"] = "P" if conditioning.l_filter is None else "R"
     return SurfaceDescription(
         Path(path), measured, levelled, surface_parameters(levelled), steps, profile, letter
     )
 
 
 class HeightParameters(NamedTuple):
-    """Those of `SurfaceParameters` that ask for heights alone, wherever they lie."""
+    """Parameters of `SurfaceParameters` that depend only on the distribution of heights."""
 
     sa: float
     sq: float
@@ -169,12 +166,12 @@ class HeightParameters(NamedTuple):
 
 
 def height_parameters(surface: Surface | MeasuredSurface) -> HeightParameters:
-    """Mean heights, skewness, kurtosis and the bearing curve's core, of a surface as it is."""
+    """Compute mean heights, skewness, kurtosis and core heights, without form removal."""
     heights = surface.heights - np.nanmean(surface.heights)
     sq = float(np.sqrt(np.nanmean(heights**2)))
     if sq == 0.0:
         return HeightParameters(0.0, 0.0, float("nan"), float("nan"), 0.0, 0.0, 0.0, 0.0, 1.0)
-    core = core_heights(bearing_curve(known_once(surface)))
+    core = core_heights(bearing_curve(distinct_heights(surface)))
     return HeightParameters(
         sa=float(np.nanmean(np.abs(heights))),
         sq=sq,
@@ -189,12 +186,13 @@ def height_parameters(surface: Surface | MeasuredSurface) -> HeightParameters:
 
 
 def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
-    """The parameters of a surface as it is; a measured one wants its form removed first (`level`)."""
-    heights, own = surface.heights - np.nanmean(surface.heights), height_parameters(surface)
-    if own.sq == 0.0:
+    """Compute the ISO 25178-2 parameters; remove the form of a measured surface first (`level`)."""
+    heights = surface.heights - np.nanmean(surface.heights)
+    of_heights = height_parameters(surface)
+    if of_heights.sq == 0.0:
         nan = float("nan")
         return SurfaceParameters(
-            **own._asdict(),
+            **of_heights._asdict(),
             sp=0.0,
             sv=0.0,
             sz=0.0,
@@ -207,7 +205,7 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
     sal, texture, bounded = _texture(heights, surface.grid)
     sp, sv = float(np.nanmax(heights)), -float(np.nanmin(heights))
     return SurfaceParameters(
-        **own._asdict(),
+        **of_heights._asdict(),
         sp=sp,
         sv=sv,
         sz=sp + sv,
@@ -219,8 +217,8 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
     )
 
 
-def known_once(surface: Surface | MeasuredSurface) -> Field:
-    """The heights, of a profile those of one of its equal rows: the bearing curve is that of its own points."""
+def distinct_heights(surface: Surface | MeasuredSurface) -> Field:
+    """Return the heights; of a profile only one of its equal rows."""
     return (
         surface.profile
         if isinstance(surface, MeasuredSurface) and surface.uniform is not None
@@ -231,17 +229,15 @@ def known_once(surface: Surface | MeasuredSurface) -> Field:
 def correlation_lengths(
     surface: Surface | MeasuredSurface, direction: float = 0.0
 ) -> tuple[float, float]:
-    """Distances along and across `direction` [rad from x] over which the autocorrelation falls to 1/e [m].
+    """Return the correlation lengths [m] along and across `direction` [rad from x].
 
-    NaN where it does not within half the map. Generators take these lengths; Sal is where it has
-    fallen to 0.2.
+    At this distance the autocorrelation falls to 1/e; nan if it does not within half the map.
+    Generators take these lengths; the threshold of Sal is 0.2.
     """
     return _correlation_lengths(surface, direction)
 
 
-@lru_cache(
-    maxsize=2
-)  # of a solve: a surface's notes, those of its solution and whether that is determined all ask
+@lru_cache(maxsize=2)  # used by the notes of a surface, by those of its solution and by its checks
 def _correlation_lengths(
     surface: Surface | MeasuredSurface, direction: float
 ) -> tuple[float, float]:
@@ -255,16 +251,16 @@ def _correlation_lengths(
 
 def _gradient(heights: Field, grid: Grid) -> float:
     squares = 0.0
-    for axis, (spacing, repeats) in enumerate(zip(grid.spacing, grid.periodic, strict=True)):
-        steps = np.roll(heights, -1, axis) - heights if repeats else np.diff(heights, axis=axis)
+    for axis, (spacing, periodic) in enumerate(zip(grid.spacing, grid.periodic, strict=True)):
+        steps = np.roll(heights, -1, axis) - heights if periodic else np.diff(heights, axis=axis)
         squares += float(np.nanmean(steps**2)) / spacing**2
     return float(np.sqrt(squares))
 
 
 def _developed_area(heights: Field, grid: Grid) -> float:
-    """Area over its projection; each square of four cells is the mean of its two ways into triangles (ISO 25178-2)."""
-    for axis, repeats in enumerate(grid.periodic):
-        if repeats:
+    """Return area over projected area, the mean of two triangulations (ISO 25178-2)."""
+    for axis, periodic in enumerate(grid.periodic):
+        if periodic:
             heights = np.concatenate([heights, np.take(heights, [0], axis)], axis)
     slope_x = (np.diff(heights, axis=0) / grid.spacing[0]) ** 2
     slope_y = (np.diff(heights, axis=1) / grid.spacing[1]) ** 2
@@ -277,15 +273,14 @@ def _developed_area(heights: Field, grid: Grid) -> float:
 
 
 def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]]:
-    """ISO 25178-2 3.2.x f_ACF for lags up to half the map, zero lag in the middle, and where the middle is.
+    """Return f_ACF of ISO 25178-2 3.2.x for lags up to half the map, and the index of zero lag.
 
-    Each lag is the mean over the pairs of cells that are both known; an axis that repeats is not
-    padded.
+    Each lag is the mean over the pairs of valid cells; a periodic axis is not padded.
     """
     reach = (grid.cells[0] // 2, grid.cells[1] // 2)
     shape = [
-        n if repeats else scipy.fft.next_fast_len(n + m, real=True)
-        for n, m, repeats in zip(grid.cells, reach, grid.periodic, strict=True)
+        n if periodic else scipy.fft.next_fast_len(n + m, real=True)
+        for n, m, periodic in zip(grid.cells, reach, grid.periodic, strict=True)
     ]
     known = np.isfinite(heights)
     sums = scipy.fft.irfft2(
@@ -302,20 +297,20 @@ def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]
     return means / means[reach], reach
 
 
-def _pairs(cells: int, reach: int, repeats: bool) -> Field:
-    """How many pairs of cells lie each lag apart along an axis."""
+def _pairs(cells: int, reach: int, periodic: bool) -> Field:
+    """Return the number of pairs of cells for each lag along an axis."""
     return (
         np.full(2 * reach + 1, float(cells))
-        if repeats
+        if periodic
         else cells - np.abs(np.arange(-reach, reach + 1.0))
     )
 
 
 def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:
-    """Sal, Str, and whether Str is only an upper bound."""
+    """Return Sal, Str, and true if Str is only an upper bound."""
     correlation, middle = _autocorrelation(heights, grid)
     distances, ends = _decay(
-        correlation, middle, grid, np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS, _DECAYED
+        correlation, middle, grid, np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS, _DECAY_THRESHOLD
     )
     if np.isnan(distances).all():
         return float("nan"), float("nan"), False
@@ -327,12 +322,12 @@ def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:
 def _decay(
     correlation: Field, middle: tuple[int, int], grid: Grid, angles: Field, threshold: float
 ) -> tuple[Field, Field]:
-    """Where the autocorrelation falls below the threshold along rays, NaN where it does not; and where they end."""
+    """Return the distances at which rays fall below the threshold (or nan), and their lengths."""
     cosines, sines = (
         np.cos(angles)[:, None] / grid.spacing[0],
         np.sin(angles)[:, None] / grid.spacing[1],
     )
-    # the ray ends where it leaves the known lags; its samples are half a cell apart, at most
+    # a ray ends at the largest lag; its samples are at most half a cell apart
     ends = 1.0 / np.maximum(np.abs(cosines) / middle[0], np.abs(sines) / middle[1])
     radii = np.linspace(0.0, 1.0, 4 * max(middle) + 1) * ends
     along = scipy.ndimage.map_coordinates(

@@ -1,6 +1,6 @@
-"""From a measured map to roughness on a contact grid: condition, cut, fill, resample, close the ends, scale, combine.
+"""Roughness on a contact grid from a measured map: condition, cut, fill, resample, blend and scale.
 
-Every step says in one sentence what it did; the sentences travel with the result.
+Each step is reported in one sentence, stored with the result.
 """
 
 from dataclasses import dataclass
@@ -11,8 +11,12 @@ import numpy.typing as npt
 
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
-from asperity.core.errors import BadInput
-from asperity.surface.condition import Form, Outliers, condition_surface
+from asperity.core.errors import BadInput, require_choice
+from asperity.surface.condition import (
+    DEFAULT_CONDITIONING,
+    SurfaceConditioning,
+    condition_surface,
+)
 from asperity.surface.model import (
     MeasuredSurface,
     Surface,
@@ -22,18 +26,17 @@ from asperity.surface.model import (
 )
 from asperity.surface.read import surface_topography
 
-Fit = Literal["crop", "tile"]
+FitMode = Literal["crop", "tile"]
 
-_OVERLAP = (
-    1.0 / 8.0
-)  # of a repeating side, over which its ends are blended: long enough to hide, short enough to spare
-_LOBES = 16  # of the windowed sinc to either side; Kaiser's 6 then stops aliases to 1e-3 ...
-_KAISER = 6.0  # ... and passes waves longer than 2.3 cells untouched
+_OVERLAP = 1.0 / 8.0  # share of a periodic side over which its ends are blended
+# Windowed sinc: with these settings aliases are below 1e-3, waves longer than 2.3 cells unchanged
+_LOBES = 16  # to either side
+_KAISER = 6.0  # parameter of the Kaiser window
 
 
 @dataclass(frozen=True, slots=True)
 class PreparedSurface:
-    """Roughness on the contact grid, and the sentences that say how it came about."""
+    """Roughness on the contact grid, and a sentence for each step of its preparation."""
 
     surface: Surface
     steps: tuple[str, ...]
@@ -41,12 +44,12 @@ class PreparedSurface:
 
 @dataclass(frozen=True, slots=True)
 class CompositeSurface:
-    """Two rough surfaces that face each other, and the speed [m/s] along x at which each moves.
+    """Two facing rough surfaces, and their speeds along x [m/s].
 
     Raises
     ------
     BadInput
-        if they do not lie on one grid.
+        The surfaces have different grids.
     """
 
     first: Surface
@@ -56,13 +59,13 @@ class CompositeSurface:
     def __post_init__(self) -> None:
         if self.first.grid != self.second.grid:
             raise BadInput(
-                f"two surfaces in contact need one grid, got {self.first.grid} and {self.second.grid}; "
-                "prepare both for the same one"
+                f"two surfaces in contact need one grid, got {self.first.grid} and "
+                f"{self.second.grid}; prepare both for the same one"
             )
 
     @property
     def surface(self) -> Surface:
-        """What the gap sees: the sum of both. The second lies face down, turned over about x, so its y runs back."""
+        """Composite roughness, the sum of both; the second is turned over about x (y reversed)."""
         return Surface(self.first.heights + self.second.heights[:, ::-1], self.first.grid)
 
 
@@ -70,152 +73,150 @@ def prepare_surface(
     measured: MeasuredSurface,
     grid: Grid,
     *,
+    conditioning: SurfaceConditioning = DEFAULT_CONDITIONING,
     sq: float | None = None,
-    form: Form = "quadratic",
-    fit: Fit = "crop",
-    turn: bool = False,
-    outliers: Outliers = "keep",
-    s_filter: float | None = None,
-    l_filter: float | None = None,
-    most_missing: float = 0.25,
+    fit: FitMode = "crop",
+    max_missing: float = 0.25,
     place: int = 0,
 ) -> PreparedSurface:
-    """Put a measured map onto a contact grid as roughness about a zero mean.
+    """Transfer a measured map to a contact grid as roughness about a zero mean.
 
-    The map is conditioned as a whole, a place of it cut out, its missing cells filled, resampled
-    by a windowed sinc that keeps every wave that the coarser of pixel and cell can show, and,
-    along an axis that repeats, its ends blended into one another. A profile goes on unchanged
-    across its direction.
+    The whole map is conditioned; then a part is cut out, missing cells are filled, and the heights
+    are resampled by a windowed sinc that preserves all waves resolved by the coarser of pixel and
+    cell. The ends of a periodic axis are blended. A profile is extended unchanged across its
+    direction.
 
     Parameters
     ----------
-    measured : what the instrument gave
+    measured : measured map or profile
     grid : the contact's grid; x of the map runs along rolling
-    sq : scale the heights to this Sq [m]; None keeps them as measured
-    form, turn, outliers, s_filter, l_filter : how to condition the map first, see `condition`
-    fit : "crop" needs a map as large as the grid; "tile" repeats a smaller one, mirrored so that no seam shows
-    most_missing : the largest share of missing cells that is filled
-    place : which part of the map, of as many as `places` counts that do not overlap; 0 is its centre
+    conditioning : form removal, rotation, outliers and filters
+    sq : scale the heights to this Sq [m]; None keeps the measured heights
+    fit : "crop" requires a map as large as the grid; "tile" repeats a smaller map, mirrored
+    max_missing : largest share of missing cells that is filled
+    place : number of the part, below `count_places`; 0 is the centre of the map
 
     Raises
     ------
     BadInput
-        for a map smaller than the grid, a place that it has not, too many missing cells, or a flat map that is to be
-        scaled.
+        The map is smaller than the grid, the place does not exist, too many cells are missing, or a
+        flat map is to be scaled.
     """
-    if fit not in get_args(Fit):
-        raise BadInput(f"fit must be one of {', '.join(get_args(Fit))}, got {fit!r}")
+    require_choice("fit", fit, get_args(FitMode))
     if sq is not None:
         require_roughness(sq)
-    levelled, conditioning = condition_surface(
-        measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter
-    )
+    levelled, conditioning_steps = condition_surface(measured, conditioning)
     overlap = _overlap(levelled, grid)
     fitting, centre = _fitting(levelled, grid, fit), _centre(levelled, grid, place)
     if place:
         fitting += f", then moved by {' and '.join(map(length_text, centre))} to place {place}"
     heights, positions = _cut(levelled, grid, overlap, centre)
-    heights, filling = _fill(heights, levelled, most_missing)
+    heights, filling = _fill(heights, levelled, max_missing)
     heights, resampling = _resample(heights, positions, levelled.grid, grid, overlap)
-    steps = [*conditioning, fitting, filling, resampling]
+    steps = [*conditioning_steps, fitting, filling, resampling]
     for axis, (cells, shared) in enumerate(zip(grid.cells, overlap, strict=True)):
         if shared:
-            before = _shape_inside(heights, grid)
-            heights = _close(heights, axis, cells, shared)
-            steps.append(
-                _closing(axis, shared, levelled, grid, before, _shape_inside(heights, grid))
-            )
-    heights = heights - heights.mean()
+            before = _height_statistics(heights, grid)
+            heights = _blend_ends(heights, axis, cells, shared)
+            after = _height_statistics(heights, grid)
+            steps.append(_blending_step(axis, shared, levelled, grid, before, after))
+    heights, scaling = _scale(heights - heights.mean(), sq, measured.name)
+    return PreparedSurface(Surface(heights, grid), (*steps, scaling))
+
+
+def _scale(heights: Field, sq: float | None, name: str) -> tuple[Field, str]:
     natural_sq = float(np.std(heights))
     if sq is None:
-        steps.append(f"removed the mean; Sq is {length_text(natural_sq)}")
-        return PreparedSurface(Surface(heights, grid), tuple(steps))
+        return heights, f"removed the mean; Sq is {length_text(natural_sq)}"
     if natural_sq == 0.0:
         raise BadInput(
-            f"{measured.name} is flat and cannot be scaled to an Sq of {length_text(sq)}; leave sq out"
+            f"{name} is flat and cannot be scaled to an Sq of {length_text(sq)}; leave sq out"
         )
-    steps.append(
+    return heights * (sq / natural_sq), (
         f"removed the mean and scaled the heights by {sq / natural_sq:.4g}, "
         f"from Sq {length_text(natural_sq)} to {length_text(sq)}"
     )
-    return PreparedSurface(Surface(heights * (sq / natural_sq), grid), tuple(steps))
 
 
-def places(measured: MeasuredSurface, grid: Grid, *, turn: bool = False) -> int:
-    """How many parts of a map as large as the grid do not overlap, its centre one of them; at least 1."""
-    return len(_places(measured.turned() if turn else measured, grid))
+def count_places(measured: MeasuredSurface, grid: Grid, *, turn: bool = False) -> int:
+    """Return the number of parts of the grid's size that fit into a map side by side; at least 1.
+
+    One of them is centred on the map.
+    """
+    return len(_place_centres(measured.turned() if turn else measured, grid))
 
 
 def _overlap(measured: MeasuredSurface, grid: Grid) -> tuple[int, ...]:
-    """Cells over which the ends of each axis are blended."""
+    """Return the number of cells over which the ends of each axis are blended."""
     return tuple(
-        max(4, round(n * _OVERLAP)) if ends and axis != measured.uniform else 0
-        for axis, (n, ends) in enumerate(zip(grid.cells, grid.periodic, strict=True))
+        max(4, round(n * _OVERLAP)) if periodic and axis != measured.uniform else 0
+        for axis, (n, periodic) in enumerate(zip(grid.cells, grid.periodic, strict=True))
     )
 
 
-def _places(measured: MeasuredSurface, grid: Grid) -> list[tuple[float, float]]:
-    """Centres of parts that lie side by side within the map, from the map's own centre [m], the nearest first."""
-    steps, each_way = [], []
+def _place_centres(measured: MeasuredSurface, grid: Grid) -> list[tuple[float, float]]:
+    """Return centres of parts side by side, relative to the map's centre [m], nearest first."""
+    steps, counts = [], []
     for axis, (side, cell, shared) in enumerate(
         zip(grid.extent, grid.spacing, _overlap(measured, grid), strict=True)
     ):
-        step, have = side + shared * cell, measured.grid.extent[axis]
+        step, extent = side + shared * cell, measured.grid.extent[axis]
         steps.append(step)
-        each_way.append(
-            0 if axis == measured.uniform else max(0, int((have / step * (1.0 + 1e-9) - 1.0) / 2.0))
+        counts.append(  # to either side
+            0
+            if axis == measured.uniform
+            else max(0, int((extent / step * (1.0 + 1e-9) - 1.0) / 2.0))
         )
     lattice = [
-        (i, j)
-        for i in range(-each_way[0], each_way[0] + 1)
-        for j in range(-each_way[1], each_way[1] + 1)
+        (i, j) for i in range(-counts[0], counts[0] + 1) for j in range(-counts[1], counts[1] + 1)
     ]
-    lattice.sort(key=lambda at: (abs(at[0]) + abs(at[1]), at))
+    lattice.sort(key=lambda node: (abs(node[0]) + abs(node[1]), node))
     return [(i * steps[0], j * steps[1]) for i, j in lattice]
 
 
 def _centre(measured: MeasuredSurface, grid: Grid, place: int) -> tuple[float, float]:
-    """Of a place, from the map's own centre [m]."""
-    centres = _places(measured, grid)
+    """Return the centre of a place relative to the map's centre [m]."""
+    centres = _place_centres(measured, grid)
     if not 0 <= place < len(centres):
         raise BadInput(
-            f"{measured.name} has room for {len(centres)} of the contact's {area_text(grid.extent)} apart from one "
-            f"another, got place {place}; count them from 0"
+            f"{measured.name} has room for {len(centres)} separate places of the contact's "
+            f"{area_text(grid.extent)}, got place {place}; places count from 0"
         )
     return centres[place]
 
 
-def _fitting(measured: MeasuredSurface, grid: Grid, fit: Fit) -> str:
-    """What part of the map is used, or why it cannot be."""
-    have, need = area_text(measured.grid.extent), area_text(grid.extent)
+def _fitting(measured: MeasuredSurface, grid: Grid, fit: FitMode) -> str:
+    """Return a sentence on the part of the map that is used; raise BadInput if it is too small."""
+    available, required = area_text(measured.grid.extent), area_text(grid.extent)
     if measured.uniform is not None:
         axis = 1 - measured.uniform
         length, side = measured.grid.extent[axis], grid.extent[axis]
-        steady = f"taken to go on unchanged along {'xy'[measured.uniform]}"
+        extended = f"extended unchanged along {'xy'[measured.uniform]}"
+        profile = f"the profile of {length_text(length)}"
         if length >= side * (1.0 - 1e-9):
-            return f"cut {length_text(side)} from the centre of the profile of {length_text(length)}, {steady}"
+            return f"cut {length_text(side)} from the centre of {profile}, {extended}"
         if fit == "crop":
             raise BadInput(
-                f"{measured.name} is a profile of {length_text(length)}, shorter than the contact's "
-                f"{length_text(side)}; use a smaller grid, a longer profile, or fit = tile to repeat it mirrored"
+                f"{measured.name} is a profile of {length_text(length)}, shorter than the "
+                f"contact's {length_text(side)}; use a smaller grid, a longer profile, or fit = "
+                "tile to repeat it mirrored"
             )
-        return f"repeated the profile of {length_text(length)}, mirrored at its ends, to {length_text(side)}, {steady}"
-    # a grid whose corners come out of a division may exceed the map it was cut to by a rounding
-    # error
+        return f"repeated {profile}, mirrored at its ends, to {length_text(side)}, {extended}"
+    # tolerance: the corners of a grid have rounding errors
     if all(m >= g * (1.0 - 1e-9) for m, g in zip(measured.grid.extent, grid.extent, strict=True)):
-        return f"cut {need} from the centre of the {have} measured"
+        return f"cut {required} from the centre of the {available} measured"
     if fit == "crop":
         raise BadInput(
-            f"{measured.name} covers {have}, smaller than the contact's {need}; "
+            f"{measured.name} covers {available}, smaller than the contact's {required}; "
             "use a smaller grid, a larger map, or fit = tile to repeat it mirrored"
         )
-    return f"repeated the {have} measured, mirrored at its edges, to cover {need}"
+    return f"repeated the {available} measured, mirrored at its edges, to cover {required}"
 
 
 def _cut(
     measured: MeasuredSurface, grid: Grid, overlap: tuple[int, ...], centre: tuple[float, float]
 ) -> tuple[Field, list[Field]]:
-    """The part around a centre that resampling needs, mirrored beyond the edges, and where its cells sit [m]."""
+    """Return the part that resampling needs, mirrored beyond the edges, and its positions [m]."""
     indices: list[npt.NDArray[np.intp]] = []
     positions: list[Field] = []
     for n, pixel, extent, cell, shared, offset in zip(
@@ -228,26 +229,26 @@ def _cut(
         strict=True,
     ):
         half = (extent + shared * cell) / 2.0
-        margin = 1 + int(np.ceil(_LOBES * max(pixel, cell) / pixel))  # the sinc's reach
+        margin = 1 + int(np.ceil(_LOBES * max(pixel, cell) / pixel))  # range of the sinc
         reach = int(np.ceil(half / pixel)) + margin
-        moved = round(offset / pixel)
-        wanted = np.arange(n // 2 - reach, n // 2 + reach + 1) + moved
-        folded = np.mod(wanted, 2 * n)
+        shift = round(offset / pixel)
+        pixels = np.arange(n // 2 - reach, n // 2 + reach + 1) + shift
+        folded = np.mod(pixels, 2 * n)
         indices.append(np.minimum(folded, 2 * n - 1 - folded))
-        positions.append(np.asarray((wanted - moved + 0.5 - n / 2.0) * pixel, dtype=np.float64))
+        positions.append(np.asarray((pixels - shift + 0.5 - n / 2.0) * pixel, dtype=np.float64))
     return measured.heights[np.ix_(*indices)], positions
 
 
-def _fill(heights: Field, measured: MeasuredSurface, most_missing: float) -> tuple[Field, str]:
-    """Missing cells by a harmonic function: the smoothest that meets the heights around each hole."""
+def _fill(heights: Field, measured: MeasuredSurface, max_missing: float) -> tuple[Field, str]:
+    """Fill missing cells by harmonic interpolation of the heights around each hole."""
     missing = ~np.isfinite(heights)
     share = float(np.mean(missing))
     if share == 0.0:
         return heights, "found no missing cells to fill"
-    if share > most_missing:
+    if share > max_missing:
         raise BadInput(
-            f"{measured.name} misses {100.0 * share:.3g} % of the cells in the part used, more than the "
-            f"{100.0 * most_missing:g} % that are filled; measure it again or use another part"
+            f"{measured.name} misses {100.0 * share:.3g} % of the cells in the part used, more "
+            f"than the limit of {100.0 * max_missing:g} %; measure it again or use another part"
         )
     sizes = (float(heights.shape[0]), float(heights.shape[1]))
     filled = (
@@ -255,21 +256,21 @@ def _fill(heights: Field, measured: MeasuredSurface, most_missing: float) -> tup
         .Topography(np.ma.masked_array(heights, missing), sizes)
         .interpolate_undefined_data()
     )
-    whole = np.ma.filled(filled.heights(), np.nan)
-    return whole, f"filled {100.0 * share:.2g} % missing cells by harmonic interpolation"
+    complete = np.ma.filled(filled.heights(), np.nan)
+    return complete, f"filled {100.0 * share:.2g} % missing cells by harmonic interpolation"
 
 
 def _resample(
     heights: Field, positions: list[Field], source: Grid, grid: Grid, overlap: tuple[int, ...]
 ) -> tuple[Field, str]:
-    """Band-limited interpolation along each axis; `overlap` cells more than the grid has."""
+    """Interpolate band-limited along each axis, onto the grid and `overlap` additional cells."""
     shortest = []
     for axis, (n, shared, pixel, cell) in enumerate(
         zip(grid.cells, overlap, source.spacing, grid.spacing, strict=True)
     ):
-        wanted = (np.arange(n + shared) + 0.5 - (n + shared) / 2.0) * cell
+        centres = (np.arange(n + shared) + 0.5 - (n + shared) / 2.0) * cell
         step = max(pixel, cell)
-        t = (wanted[:, None] - positions[axis][None, :]) / step
+        t = (centres[:, None] - positions[axis][None, :]) / step
         weights = np.sinc(t) * np.i0(_KAISER * np.sqrt(np.maximum(1.0 - (t / _LOBES) ** 2, 0.0)))
         weights[np.abs(t) > _LOBES] = 0.0
         weights /= weights.sum(axis=1, keepdims=True)
@@ -278,14 +279,14 @@ def _resample(
     pixels, cells = area_text(source.spacing), area_text(grid.spacing)
     return np.ascontiguousarray(heights), (
         f"resampled from pixels of {pixels} to cells of {cells} by a windowed sinc, "
-        f"which keeps the waves longer than {area_text((shortest[0], shortest[1]))} as they are"
+        f"which preserves waves longer than {area_text((shortest[0], shortest[1]))}"
     )
 
 
-def _close(heights: Field, axis: int, cells: int, shared: int) -> Field:
-    """Blend what follows the last cell into the first ones, so that the surface goes on where it began.
+def _blend_ends(heights: Field, axis: int, cells: int, shared: int) -> Field:
+    """Blend the cells after the last one into the first ones, so that the surface is periodic.
 
-    The weights keep the variance whatever the correlation rho of the two ends: w1^2 + w2^2 + 2 rho
+    The weights preserve the variance for any correlation rho of the two ends: w1^2 + w2^2 + 2 rho
     w1 w2 = 1.
     """
     rows = np.moveaxis(heights, axis, 0)
@@ -307,21 +308,27 @@ def _close(heights: Field, axis: int, cells: int, shared: int) -> Field:
     return np.moveaxis(closed, 0, axis)
 
 
-def _closing(
-    axis: int, shared: int, measured: MeasuredSurface, grid: Grid, before: "_Shape", after: "_Shape"
+def _blending_step(
+    axis: int,
+    shared: int,
+    measured: MeasuredSurface,
+    grid: Grid,
+    before: "_HeightStatistics",
+    after: "_HeightStatistics",
 ) -> str:
     length = shared * grid.spacing[axis]
     spare = measured.grid.extent[axis] - grid.extent[axis]
-    mirrored = "" if spare >= length else ", mirrored there for want of more measurement,"
+    mirrored = "" if spare >= length else ", mirrored beyond the edge of the map,"
     return (
-        f"blended the ends along {'xy'[axis]} over {length_text(length)}{mirrored} so that the surface repeats "
-        f"(Sq {length_text(before.sq)} before, {length_text(after.sq)} after; Sdq {before.sdq:.3g}, {after.sdq:.3g}; "
-        f"Ssk {before.ssk:.2f}, {after.ssk:.2f}; Sku {before.sku:.2f}, {after.sku:.2f})"
+        f"blended the ends along {'xy'[axis]} over {length_text(length)}{mirrored} so that the "
+        f"surface repeats (Sq {length_text(before.sq)} before, {length_text(after.sq)} after; Sdq "
+        f"{before.sdq:.3g}, {after.sdq:.3g}; Ssk {before.ssk:.2f}, {after.ssk:.2f}; Sku "
+        f"{before.sku:.2f}, {after.sku:.2f})"
     )
 
 
-class _Shape(NamedTuple):
-    """The parameters that blending may move."""
+class _HeightStatistics(NamedTuple):
+    """Parameters that blending may change."""
 
     sq: float
     sdq: float
@@ -329,7 +336,7 @@ class _Shape(NamedTuple):
     sku: float
 
 
-def _shape_inside(heights: Field, grid: Grid) -> _Shape:
+def _height_statistics(heights: Field, grid: Grid) -> _HeightStatistics:
     inside = (
         heights[: grid.cells[0], : grid.cells[1]] - heights[: grid.cells[0], : grid.cells[1]].mean()
     )
@@ -343,5 +350,6 @@ def _shape_inside(heights: Field, grid: Grid) -> _Shape:
         )
     )
     if sq == 0.0:
-        return _Shape(0.0, 0.0, 0.0, 0.0)
-    return _Shape(sq, sdq, float(np.mean(inside**3)) / sq**3, float(np.mean(inside**4)) / sq**4)
+        return _HeightStatistics(0.0, 0.0, 0.0, 0.0)
+    skewness, kurtosis = float(np.mean(inside**3)) / sq**3, float(np.mean(inside**4)) / sq**4
+    return _HeightStatistics(sq, sdq, skewness, kurtosis)

@@ -7,19 +7,19 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.surface.bearing import bearing_curve, core_heights
 
-SECTIONS = 5  # section lengths in the evaluation length, ISO 21920-3's default
-_DISCRIMINATION = 0.1  # of Rz: lower peaks and shallower pits belong to their neighbours
+SECTIONS = 5  # section lengths per evaluation length, default of ISO 21920-3
+_DISCRIMINATION = 0.1  # smallest height of a peak or pit, over Rz
 
 
 @dataclass(frozen=True, slots=True)
 class ProfileParameters:
-    """Parameters of ISO 21920-2 about the mean of the points that are known.
+    """Parameters of ISO 21920-2 about the mean of the valid points.
 
     `ra`, `rq` arithmetic and root mean square height [m]; `rsk`, `rku` skewness and kurtosis;
-    `rp`, `rv`, `rz` highest peak, deepest pit and their sum, means over five section lengths [m];
-    `rt` the whole height [m]; `rsm` mean spacing of profile elements [m], NaN for fewer than two;
+    `rp`, `rv`, `rz` mean peak height, mean pit depth and their sum, means over five section lengths
+    [m]; `rt` total height [m]; `rsm` mean spacing of profile elements [m], nan for fewer than two;
     `rdq` root mean square slope, from neighbouring points; `rk`, `rpk`, `rvk` core height, reduced
-    peak height and pit depth [m]; `rmr1`, `rmr2` the shares that bound the core.
+    peak height and pit depth [m]; `rmr1`, `rmr2` material ratios of the core.
     """
 
     ra: float
@@ -40,11 +40,11 @@ class ProfileParameters:
 
 
 def profile_parameters(heights: Field, spacing: float) -> ProfileParameters:
-    """The parameters of a levelled (and filtered, if wanted) profile.
+    """Compute the parameters of a levelled, optionally filtered, profile.
 
     Parameters
     ----------
-    heights : shape (n,) [m], NaN where unknown
+    heights : shape (n,) [m], nan for missing points
     spacing : distance of the points [m]
     """
     z = heights - np.nanmean(heights)
@@ -74,7 +74,7 @@ def profile_parameters(heights: Field, spacing: float) -> ProfileParameters:
 
 
 def _mean_spacing(z: Field, threshold: float) -> float:
-    """Rsm in points: from one upward crossing of the mean line that parts a pit from a peak to the next."""
+    """Return Rsm in points: mean distance of the mean-line crossings from a pit to a peak."""
     side = np.where(z > threshold, 1, np.where(z < -threshold, -1, 0))
     marked = np.flatnonzero(side)
     rises = np.flatnonzero((side[marked[:-1]] < 0) & (side[marked[1:]] > 0))

@@ -1,8 +1,7 @@
-"""Reading measured surfaces, in the formats of the instruments.
+"""Readers of measured surfaces in instrument formats.
 
-SurfaceTopography does the reading, x3pio and sdfio the x3p and SDF files that it cannot,
-`asperity.surface.text` the tables. Nothing is corrected here: levelling, filling and resampling
-are left to `asperity.surface.prepare`.
+SurfaceTopography reads most formats, x3pio and sdfio the x3p and SDF files that it cannot read,
+`asperity.surface.text` tables. Heights are not corrected; see `asperity.surface.prepare`.
 """
 
 import warnings
@@ -16,34 +15,31 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from asperity.contact.grid import FEWEST_CELLS, Grid
+from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, UnreadableFile, require_positive
 from asperity.core.files import require_file
 from asperity.core.limits import require_unpacked
-from asperity.core.sandbox import read_apart
-from asperity.core.third_party import first_line, quietly
+from asperity.core.sandbox import read_in_subprocess
+from asperity.core.third_party import first_line, suppress_output
 from asperity.surface.model import MeasuredSurface, length_text
 from asperity.surface.text import SUFFIXES as TABLES
 from asperity.surface.text import read_table
 
-_TEXT = {"xyz", "asc"}  # columns of numbers: any name will do for them
-_UNMARKED = {
-    "nms",
-    "hgt",
-}  # formats that accept nearly any bytes, so only the file's name can call for them
+_TEXT = {"xyz", "asc"}  # columns of numbers, in files of any name
+_UNMARKED = {"nms", "hgt"}  # accept nearly any bytes, so that they are tried only by file name
 _PLAUSIBLE_PIXEL = 1e-10, 1e-3  # an atom to a millimetre [m]
-_POSSIBLE = 1e-15, 1e6  # [m]: lengths beyond are a damaged file's
-_PLAUSIBLE_SLOPE = 3.0  # median over neighbours; 72 degrees, which no instrument sees everywhere
-_EVEN = 0.01  # of the mean step of a profile, up to which its steps may differ before that is noted
-_REMEDY = "export it again, as standard x3p or SDF if need be"
+_POSSIBLE_LENGTH = 1e-15, 1e6  # [m]; other lengths indicate a damaged file
+_PLAUSIBLE_SLOPE = 3.0  # median over neighbours, 72 degrees
+_STEP_TOLERANCE = 0.01  # deviation of a profile's steps, over the mean step, that is reported
+_REMEDY = "export it again, for example as standard x3p or SDF"
 
 
 @dataclass(frozen=True, slots=True)
 class RawMap:
-    """What a file holds: `heights` (nx, ny) and `pixel` in the units named, None where the file names none.
+    """Content of a file: `heights` (nx, ny) and `pixel` in `unit`, which is None if not stated.
 
-    Heights of shape (n, 1) are a profile. `pixel` is None where the caller gives it, in metres.
+    Heights of shape (n, 1) are a profile. `pixel` is None if the caller must give it.
     """
 
     heights: Field
@@ -60,24 +56,25 @@ def read_surface(
     lateral_unit: str | None = None,
     pixel: float | tuple[float, float] | None = None,
 ) -> MeasuredSurface:
-    """Read a measured map or profile; heights in metres, NaN where the instrument saw nothing.
+    """Read a measured map or profile; heights in metres, nan for missing cells.
 
-    A profile is taken to run along x and to go on unchanged along y, as ground or turned roughness
-    across the rolling direction of a line contact does; `MeasuredSurface.uniform` is then 1.
+    A profile runs along x and is extended unchanged along y, like ground or turned roughness across
+    the rolling direction of a line contact; `MeasuredSurface.uniform` is then 1.
 
     Parameters
     ----------
-    path : a file in any format of SurfaceTopography, x3pio or sdfio, or a table of numbers as text: two columns are a
-        profile, three a list of points, more a matrix of heights whose rows run along x
-    unit, lateral_unit : units of the heights and of x and y, such as "um" and "mm", for files that name none
-    pixel : distance of neighbouring heights [m], (dx, dy) where they differ, for a matrix of bare heights
+    path : file in any format of SurfaceTopography, x3pio or sdfio, or a text table: two columns are
+        a profile, three a list of points, more a matrix of heights with rows along x
+    unit, lateral_unit : units of the heights and of x and y, such as "um" and "mm", for files
+        without units
+    pixel : distance of neighbouring heights [m], one number or (dx, dy), for a matrix of heights
 
     Raises
     ------
     UnreadableFile
-        for a file that is missing, empty, cut short, not what its name says, or in no known format.
+        The file is missing, empty, truncated, of another type than its name, or of no known format.
     BadInput
-        for a file without units or pixel size when none are given, or either given for a file that has its own.
+        Units or pixel size are missing, or given for a file that states them.
     """
     path = Path(path)
     sizes = None if pixel is None else pixel if isinstance(pixel, tuple) else (pixel, pixel)
@@ -85,9 +82,9 @@ def read_surface(
         require_positive("pixel", size, "m")
     require_file(path)
     stated = (unit, lateral_unit, sizes)
-    surface: MeasuredSurface = read_apart(
+    surface: MeasuredSurface = read_in_subprocess(
         path.absolute(),
-        "asperity.surface.read:measured",
+        "asperity.surface.read:load_surface",
         *stated,
         remedy=_REMEDY,
         library="SurfaceTopography",
@@ -95,10 +92,10 @@ def read_surface(
     return surface
 
 
-def measured(
+def load_surface(
     path: Path, unit: str | None, lateral_unit: str | None, sizes: tuple[float, float] | None
 ) -> MeasuredSurface:
-    """What `read_surface` gives, worked out in this process."""
+    """Read a surface in this process; see `read_surface`."""
     raw = _read(path, matrix=sizes is not None)
     height_scale, sizes = _sizes(path.name, raw, unit, lateral_unit, sizes)
     heights = np.where(np.isfinite(raw.heights), raw.heights, np.nan) * height_scale
@@ -106,28 +103,28 @@ def measured(
         raise UnreadableFile(
             f"{path.name} holds no valid height among its {heights.size}; measure it again"
         )
-    if not all(_POSSIBLE[0] < size < _POSSIBLE[1] for size in sizes):
+    if not all(_POSSIBLE_LENGTH[0] < size < _POSSIBLE_LENGTH[1] for size in sizes):
         raise UnreadableFile(f"{path.name} has a pixel of {sizes[0]:g} x {sizes[1]:g} m; {_REMEDY}")
-    impossible = np.abs(heights - np.nanmedian(heights)) > _POSSIBLE[1]
+    impossible = np.abs(heights - np.nanmedian(heights)) > _POSSIBLE_LENGTH[1]
     notes = raw.notes
     if impossible.any():
         heights[impossible] = np.nan
         count = int(np.count_nonzero(impossible))
         notes += (
-            f"{count} heights, more than a thousand kilometres off, count as missing; check the file",
+            f"{count} heights, more than 1000 km from the median, count as missing; check the file",
         )
     uniform = 1 if heights.shape[1] == 1 else None
     if uniform:
-        heights, sizes = np.repeat(heights, FEWEST_CELLS, axis=1), (sizes[0], sizes[0])
-    if min(heights.shape) < FEWEST_CELLS:
+        heights, sizes = np.repeat(heights, MIN_CELLS, axis=1), (sizes[0], sizes[0])
+    if min(heights.shape) < MIN_CELLS:
         raise UnreadableFile(
-            f"{path.name} holds {heights.shape[0]} x {raw.heights.shape[1]} heights, too few for a map; "
-            f"give a measurement of at least {FEWEST_CELLS} x {FEWEST_CELLS}"
+            f"{path.name} holds {heights.shape[0]} x {raw.heights.shape[1]} heights, too few for a "
+            f"map; give a measurement of at least {MIN_CELLS} x {MIN_CELLS}"
         )
     nx, ny = heights.shape
     half = (nx * sizes[0] / 2.0, ny * sizes[1] / 2.0)
     grid = Grid(cells=(nx, ny), lower=(-half[0], -half[1]), upper=half, periodic=(False, False))
-    notes += tuple(_oddities(sizes, heights))
+    notes += tuple(_warnings(sizes, heights))
     return MeasuredSurface(heights, grid, path.name, raw.format, notes, uniform)
 
 
@@ -138,7 +135,7 @@ def _sizes(
     lateral_unit: str | None,
     pixel: tuple[float, float] | None,
 ) -> tuple[float, tuple[float, float]]:
-    """Metres in one unit of height, and the pixel [m]: from the file, or else from the caller."""
+    """Return metres per unit of height and the pixel [m], from the file or else the caller."""
     if raw.pixel is not None:
         if pixel is not None:
             raise BadInput(f"{name} states its own pixel size; leave out pixel")
@@ -148,28 +145,37 @@ def _sizes(
         raise BadInput(f"{name} holds heights without a pixel size; give pixel, their distance")
     if lateral_unit is not None:
         raise BadInput(
-            f"{name} holds bare heights, whose pixel is given in metres; leave out lateral_unit"
+            f"{name} holds only heights, whose pixel is in metres; leave out lateral_unit"
         )
     return _scales(name, raw.unit, unit, "m" if raw.unit is None else None)[0], pixel
 
 
-def _oddities(pixel: tuple[float, float], heights: Field) -> Iterator[str]:
+def _warnings(pixel: tuple[float, float], heights: Field) -> Iterator[str]:
     smallest, largest = _PLAUSIBLE_PIXEL
     steps = np.abs(np.diff(heights, axis=0)) / pixel[0]
     slope = float(np.nanmedian(steps)) if np.isfinite(steps).any() else 0.0
     if slope > _PLAUSIBLE_SLOPE:
-        yield f"neighbouring heights differ by {slope:.3g} times their distance; check the units of both"
+        yield (
+            f"neighbouring heights differ by {slope:.3g} times their distance; check the units of "
+            "both"
+        )
     for axis, size in zip("xy", pixel, strict=True):
         if not smallest <= size <= largest:
-            yield f"the pixel along {axis} is {length_text(size)}, hardly a roughness map; check the lateral unit"
+            yield (
+                f"the pixel along {axis} is {length_text(size)}, implausible for a roughness map; "
+                "check the lateral unit"
+            )
     if not np.isclose(*pixel, rtol=1e-3):
-        yield f"the pixel is not square: {length_text(pixel[0])} along x, {length_text(pixel[1])} along y"
+        yield (
+            f"the pixel is not square: {length_text(pixel[0])} along x, {length_text(pixel[1])} "
+            "along y"
+        )
 
 
 def _scales(
     name: str, stated: str | None, unit: str | None, lateral_unit: str | None
 ) -> tuple[float, float]:
-    """Metres in one unit of height and in one unit of length, from the file or else from the caller."""
+    """Return metres per unit of height and per unit of length, from the file or else the caller."""
     convert = surface_topography().Support.UnitConversion.get_unit_conversion_factor
 
     def metres(given: str) -> float:
@@ -186,14 +192,14 @@ def _scales(
         return metres(stated), metres(stated)
     if unit is None or lateral_unit is None:
         raise BadInput(
-            f"{name} names no units; give unit (of the heights) and lateral_unit, such as "
+            f"{name} states no units; give unit (of the heights) and lateral_unit, such as "
             "um and mm, or surface.unit in a case"
         )
     return metres(unit), metres(lateral_unit)
 
 
 def _read(path: Path, *, matrix: bool) -> RawMap:
-    """The map in the file, by the readers that its suffix names; without a telling suffix, by its content."""
+    """Read a file with the readers of its suffix, or by its content if the suffix is unknown."""
     name, suffix = path.name, path.suffix.lower().removeprefix(".")
     try:
         with path.open("rb") as file:
@@ -231,10 +237,10 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
             return _topography(path, form)
         except UnreadableFile:
             raise
-        except Exception as error:  # noqa: BLE001 - the readers of forty formats raise whatever they stumble over
+        except Exception as error:  # noqa: BLE001 - readers of forty formats raise any error
             reason = reason or error
             if isinstance(error, surface_topography().Exceptions.CorruptFile):
-                break  # recognised but damaged: the next reader would only misread it
+                break  # recognised but damaged: another reader would misread it
     if suffix in _LAST_RESORTS:
         try:
             return _LAST_RESORTS[suffix](path)
@@ -244,20 +250,19 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
             reason = error
     actual = _format_of(path)
     if actual is not None and actual not in formats:
-        remedy = f"rename it to .{min(suffixes[actual])} if that is right"
+        remedy = f"rename it to .{min(suffixes[actual])} if that is correct"
         raise UnreadableFile(
-            f"{name} is called .{suffix} but looks like {actual} inside; {remedy}"
+            f"{name} has the suffix .{suffix} but its content looks like {actual}; {remedy}"
         ) from reason
-    mismatch = (
-        surface_topography().Exceptions.FileFormatMismatch
-    )  # speaks of bytes that it did not expect
-    why = "its content is something else" if isinstance(reason, mismatch) else first_line(reason)
-    raise UnreadableFile(f"{name} is no readable .{suffix} file ({why}); {_REMEDY}") from reason
+    # messages of a mismatch mention unexpected bytes
+    mismatch = surface_topography().Exceptions.FileFormatMismatch
+    cause = "its content has another format" if isinstance(reason, mismatch) else first_line(reason)
+    raise UnreadableFile(f"{name} is no readable .{suffix} file ({cause}); {_REMEDY}") from reason
 
 
 def _format_of(path: Path) -> str | None:
-    """What the content is, as far as it bears a mark of its own."""
-    with quietly():
+    """Return the format of a file by its content; None if the content is ambiguous."""
+    with suppress_output():
         try:
             form = str(surface_topography().open_topography(str(path)).format())
         except Exception:  # noqa: BLE001 - as above
@@ -270,7 +275,7 @@ def _format_of(path: Path) -> str | None:
 
 
 def _topography(path: Path, form: str | None) -> RawMap:
-    with quietly() as notes:
+    with suppress_output() as notes:
         reader = surface_topography().open_topography(str(path), format=form)
         if form is None and reader.format() in _UNMARKED:
             raise UnreadableFile(f"{path.name} is in no format that can be read; {_REMEDY}")
@@ -293,16 +298,16 @@ def _topography(path: Path, form: str | None) -> RawMap:
 
 
 def _profile(path: Path, x: Field, z: Field, form: str, unit: str | None) -> RawMap:
-    """A profile on even steps; steps that differ are interpolated onto their mean, which is noted."""
+    """Return a profile with even steps; other profiles are interpolated, with a note."""
     steps = np.diff(x)
-    if x.size < FEWEST_CELLS or not (steps > 0.0).all():
+    if x.size < MIN_CELLS or not (steps > 0.0).all():
         raise UnreadableFile(
-            f"{path.name} is no profile of at least {FEWEST_CELLS} points along a rising x; {_REMEDY}"
+            f"{path.name} is no profile of at least {MIN_CELLS} points with increasing x; {_REMEDY}"
         )
     step = float(x[-1] - x[0]) / (x.size - 1)
     notes: tuple[str, ...] = ()
     z = np.ma.filled(np.ma.asarray(z, dtype=np.float64), np.nan)
-    if np.max(np.abs(steps - step)) > _EVEN * step:
+    if np.max(np.abs(steps - step)) > _STEP_TOLERANCE * step:
         notes = (
             "the profile's points are not evenly spaced; they were interpolated onto even steps",
         )
@@ -311,11 +316,11 @@ def _profile(path: Path, x: Field, z: Field, form: str, unit: str | None) -> Raw
 
 
 def _table(path: Path) -> RawMap:
-    """Two columns are a profile; a list of points is SurfaceTopography's to read, a matrix wants its pixel."""
+    """Read two columns as a profile, more as a matrix; SurfaceTopography reads lists of points."""
     numbers = read_table(path)
     if numbers.shape[1] == 2:
         return _profile(path, numbers[:, 0], numbers[:, 1], "text", None)
-    if min(numbers.shape) < FEWEST_CELLS:
+    if min(numbers.shape) < MIN_CELLS:
         raise UnreadableFile(
             f"{path.name} holds {numbers.shape[0]} rows of {numbers.shape[1]} numbers; "
             "give a profile (x, z), points on a regular grid (x, y, z) or a matrix of heights"
@@ -324,7 +329,7 @@ def _table(path: Path) -> RawMap:
 
 
 def _array(path: Path) -> RawMap:
-    """Heights of shape (nx, ny) as NumPy saves them; SurfaceTopography would leave the file open."""
+    """Read heights of shape (nx, ny) from .npy, a file that SurfaceTopography would leave open."""
     try:
         heights = np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
     except Exception as error:
@@ -344,10 +349,10 @@ def _x3p(path: Path) -> RawMap:
     try:
         content: Any = x3pio.read(path)
     except Exception:
-        loose = _loose_x3p(path)
-        if loose is None:
+        tolerant = _tolerant_x3p(path)
+        if tolerant is None:
             raise
-        return loose
+        return tolerant
     if not isinstance(content, x3pio.Surface):
         kind = type(content).__name__.lower()
         raise UnreadableFile(
@@ -357,10 +362,10 @@ def _x3p(path: Path) -> RawMap:
     return RawMap(_x_first(content.layers[0].z), pixel, "x3p", "m")
 
 
-def _loose_x3p(path: Path) -> RawMap | None:
-    """An x3p map whose archive strays from the standard: in a folder of its own, or with elements unknown to it.
+def _tolerant_x3p(path: Path) -> RawMap | None:
+    """Read an x3p map whose archive violates the standard (subfolder or unknown elements).
 
-    Damage is none of these: the archive's checksums find it. None for what is no map on a regular
+    The checksums of the archive detect damage. Returns None unless it holds a map on a regular
     grid.
     """
     try:
@@ -378,9 +383,9 @@ def _loose_x3p(path: Path) -> RawMap | None:
         kind = {"D": "<f8", "F": "<f4"}[root.findtext(".//{*}CZ/{*}DataType") or ""]
         cells = int(elements["SizeX"]), int(elements["SizeY"])
         rows = np.frombuffer(data, dtype=kind).reshape(cells[1], cells[0]) * steps[2]
-    except Exception:  # noqa: BLE001 - whatever damage makes of an archive and of its XML
+    except Exception:  # noqa: BLE001 - any error of a damaged archive or its XML
         return None
-    notes = ("the x3p archive strays from the standard, yet holds a map",)
+    notes = ("the x3p archive violates the standard, but holds a map",)
     return RawMap(_x_first(rows), (steps[0], steps[1]), "x3p", "m", notes)
 
 
@@ -404,12 +409,12 @@ _LAST_RESORTS: dict[str, Callable[[Path], RawMap]] = {
 
 
 def _x_first(rows: Any) -> Field:
-    """Rows of constant y, as the file has them, to (nx, ny)."""
+    """Transpose rows of constant y to shape (nx, ny)."""
     return np.ascontiguousarray(np.ma.filled(np.ma.asarray(rows, dtype=np.float64), np.nan).T)
 
 
 def surface_topography() -> Any:
-    """SurfaceTopography, without its remark that MPI is absent."""
+    """Import SurfaceTopography without its warning about missing MPI."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ImportWarning)
         import SurfaceTopography

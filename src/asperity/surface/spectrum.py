@@ -1,4 +1,4 @@
-"""Which wavelengths and directions roughness is made of: radial and directional spectra.
+"""Radial and directional power spectra of roughness.
 
 Source of the normalisation: T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr. Metrol. Prop. 5
 (2017) 013001.
@@ -17,12 +17,12 @@ _SECTORS = 36  # directional bins over half a turn
 
 @dataclass(frozen=True, slots=True)
 class SurfaceSpectrum:
-    """The power of roughness over wavelength and over direction.
+    """Power spectral density of roughness over wavenumber and direction.
 
-    `wavenumber` [1/m, 2 pi over the wavelength], ascending; `density` there: of a map the
-    isotropic C [m^4] with Sq^2 = (1/2 pi) integral of q C dq, of a profile the one-dimensional C
-    [m^3] with Rq^2 = (1/pi) integral of C dq. `lay` [rad], from x towards y, mid-sector, 0 to pi,
-    and `share` of Sq^2 in ridges that run that way; both empty for a profile.
+    `wavenumber` [1/m, 2 pi over the wavelength] ascends. `density` is, for a map, the isotropic C
+    [m^4] with Sq^2 = (1/2 pi) integral of q C dq, for a profile the one-dimensional C [m^3] with
+    Rq^2 = (1/pi) integral of C dq. `lay` [rad] are the middles of sectors from x towards y, 0 to
+    pi, and `share` the part of Sq^2 in ridges of that direction; both are empty for a profile.
     """
 
     wavenumber: Field
@@ -32,12 +32,15 @@ class SurfaceSpectrum:
 
     @property
     def slope(self) -> float:
-        """Exponent of the density over the wavenumber: -2 (1 + H) where a map is self-affine."""
+        """Exponent of the density over the wavenumber; -2 (1 + H) for a self-affine map."""
         return float(np.polyfit(np.log(self.wavenumber), np.log(self.density), 1)[0])
 
 
 def surface_spectrum(surface: Surface | MeasuredSurface) -> SurfaceSpectrum:
-    """The spectra of a levelled surface; missing cells count as the mean, axes that do not repeat are Hann tapered."""
+    """Compute the spectra of a levelled surface.
+
+    Missing cells are set to the mean; axes that are not periodic have a Hann taper.
+    """
     grid = surface.grid
     heights = np.nan_to_num(surface.heights - np.nanmean(surface.heights))
     if isinstance(surface, MeasuredSurface) and surface.uniform is not None:
@@ -46,8 +49,8 @@ def surface_spectrum(surface: Surface | MeasuredSurface) -> SurfaceSpectrum:
             np.nan_to_num(surface.profile - np.nanmean(surface.profile)), grid.spacing[axis]
         )
     windows = [
-        np.ones(n) if repeats else _hann(n)
-        for n, repeats in zip(grid.cells, grid.periodic, strict=True)
+        np.ones(n) if periodic else _hann(n)
+        for n, periodic in zip(grid.cells, grid.periodic, strict=True)
     ]
     window = np.outer(*windows)
     power = np.abs(np.fft.fft2(heights * window)) ** 2 / np.mean(window**2)  # |sum|^2
@@ -58,7 +61,7 @@ def surface_spectrum(surface: Surface | MeasuredSurface) -> SurfaceSpectrum:
         2.0 * np.pi * np.fft.fftfreq(ny, dy)[None, :],
     )
     k = np.hypot(kx, ky)
-    inside = (k > 0.0) & (k < np.pi / max(dx, dy))  # every direction up to the same wavenumber
+    inside = (k > 0.0) & (k < np.pi / max(dx, dy))  # the same limit in all directions
     wavenumber, radial = _binned(k[inside], density[inside])
     crest = np.mod(
         np.arctan2(np.broadcast_to(ky, k.shape), np.broadcast_to(kx, k.shape)) + np.pi / 2.0, np.pi
@@ -83,11 +86,11 @@ def _hann(count: int) -> Field:
 
 
 def _binned(k: Field, density: Field) -> tuple[Field, Field]:
-    """Means over bins of equal width in log k; empty bins are left out."""
+    """Average over bins of equal width in log k, without empty bins."""
     bins = np.floor(np.log10(k / k.min()) * _PER_DECADE + 0.5).astype(int)
     counts = np.bincount(bins)
-    some = counts > 0
+    filled = counts > 0
     return (
-        np.exp(np.bincount(bins, np.log(k))[some] / counts[some]),
-        np.bincount(bins, density)[some] / counts[some],
+        np.exp(np.bincount(bins, np.log(k))[filled] / counts[filled]),
+        np.bincount(bins, density)[filled] / counts[filled],
     )

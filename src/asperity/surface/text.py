@@ -1,6 +1,6 @@
-"""Tables of numbers as text: columns or a matrix, with any separator, decimal points or commas, and header lines.
+"""Text tables of numbers with any separator, decimal sign and header lines.
 
-Which column means what is left to `asperity.surface.read`.
+`asperity.surface.read` interprets the columns.
 """
 
 import re
@@ -13,16 +13,16 @@ from asperity.core.errors import UnreadableFile
 from asperity.core.text_dialect import sniff_dialect
 
 SUFFIXES = {"txt", "csv", "tsv", "asc", "dat", "xyz", "hfm", "prf"}
-_LONGEST_HEADER = 200  # lines
+_MAX_HEADER = 200  # lines
 
 
 def read_table(path: Path) -> Field:
-    """The numbers of a text file, one row a line; NaN for what its exporter marks as missing.
+    """Read the numbers of a text file, one row per line; nan for markers of missing values.
 
     Raises
     ------
     UnreadableFile
-        for bytes that are no text, no numbers, or rows of different lengths.
+        The file is not text, holds no numbers, or has rows of different lengths.
     """
     content = path.read_bytes()
     if b"\0" in content[:4096] and not content.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -39,14 +39,16 @@ def read_table(path: Path) -> Field:
         numbers = [dialect.number(field) for field in dialect.fields(line)]
         row = [value for value in numbers if value is not None]
         if len(row) < len(numbers) or (not np.isfinite(row).any() and not rows):
-            if rows or number >= _LONGEST_HEADER:
+            if rows or number >= _MAX_HEADER:
                 raise UnreadableFile(
-                    f"{path.name} has no numbers in {line.strip()[:40]!r}; mend or delete that line"
+                    f"{path.name} has no numbers in {line.strip()[:40]!r}; correct or delete that "
+                    "line"
                 )
             continue
         if rows and len(row) != len(rows[0]):
             raise UnreadableFile(
-                f"{path.name} has {len(row)} numbers in a row after rows of {len(rows[0])}; mend that row"
+                f"{path.name} has {len(row)} numbers in a row after rows of {len(rows[0])}; "
+                "correct that row"
             )
         rows.append(row)
     if not rows:

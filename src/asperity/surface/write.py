@@ -1,4 +1,4 @@
-"""A surface as a file that other programs open: x3p (ISO 5436-1), heights in full."""
+"""Export of surfaces as x3p (ISO 5436-1) in double precision."""
 
 from io import BytesIO
 from pathlib import Path
@@ -8,17 +8,19 @@ from asperity.surface.model import Surface
 
 
 def write_surface(surface: Surface, path: str | Path) -> Path:
-    """Write a surface as x3p, whole or not at all, and return the path; `read_surface` and SurfaceTopography open it.
+    """Write a surface as x3p, atomically, and return the path.
+
+    `read_surface` and SurfaceTopography can read the file.
 
     Raises
     ------
     BadInput
-        if the folder does not exist or cannot be written to.
+        The folder does not exist or is not writable.
     """
-    import x3pio  # here: few need it
+    import x3pio  # slow import, rarely used
 
-    path, made, (dx, dy) = Path(path), BytesIO(), surface.grid.spacing
-    older = x3pio.Revision.ISO5436_2000  # the one that SurfaceTopography knows
-    x3pio.write(made, surface.heights.T, x_scale=dx, y_scale=dy, revision=older)
-    write_bytes(path, made.getvalue())
+    path, buffer, (dx, dy) = Path(path), BytesIO(), surface.grid.spacing
+    revision = x3pio.Revision.ISO5436_2000  # SurfaceTopography reads no newer one
+    x3pio.write(buffer, surface.heights.T, x_scale=dx, y_scale=dy, revision=revision)
+    write_bytes(path, buffer.getvalue())
     return path

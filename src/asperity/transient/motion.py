@@ -165,7 +165,7 @@ class _TransientContact:
 
     def start(self, *, steady: bool) -> Snapshot:
         """Return the snapshot at time 0, from a steady contact (`steady`) or from rest."""
-        surface = self.surfaces.at(0.0)
+        surface = self.surfaces.composite_at(0.0)
         oil = self.lubricant if steady else None
         solution = solve_contact(self.conditions, oil, surface, options=self.options)
         solution = replace(solution, lubricant=self.lubricant)
@@ -191,7 +191,7 @@ class _TransientContact:
         surfaces = self.surfaces
         if self.flattening:
             surfaces = surfaces.lowered(memory["lowered_first"], memory["lowered_second"])
-        surface = surfaces.at(number * self.seconds)
+        surface = surfaces.composite_at(number * self.seconds)
         whole = self._problem(surface, self._past(memory))
         problem = _on_one_line(whole) if self.one_line else whole
         search, step, attempt = self._search(problem, self._initial_guess(memory, problem))
@@ -315,7 +315,7 @@ class _TransientContact:
             for index, name in enumerate(_LOWERED):
                 share = self.shares[index] * overlap
                 previous = carried_memory.get(name, 0.0)
-                memory[name] = previous + self.surfaces.on_track(index, share, time_s)
+                memory[name] = previous + self.surfaces.project_on_track(index, share, time_s)
                 flattened += float(memory[name].mean())
         return Snapshot(
             number=number,

@@ -132,7 +132,7 @@ class DangVanPits(Pits):
     def measured(self, path: Field) -> Field:
         """Dang Van's measure; a bound where that is below the limit of any cell."""
         weakest = max(WEAKEST, 1.0 - 6.0 * self.scatter) if self.scatter > 0.0 else 1.0
-        return rating.dang_van_of_each(path, self.slope, above=weakest * self.limit)
+        return rating.dang_van_per_path(path, self.slope, above=weakest * self.limit)
 
     def known(self, measure: float) -> float:
         """Not a number up to the limit, where only a bound is computed."""

@@ -9,7 +9,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.quantities import NO_VALUE, parameters, quantity, with_deviation
 from asperity.coupling import VibrationModel
 from asperity.ehl import ContactSolution
-from asperity.lubricant import FREEZING, LawFamily, Lubricant, Solid, law_name
+from asperity.lubricant import ZERO_CELSIUS, LawFamily, Lubricant, Solid, law_name
 from asperity.report.base import heading
 from asperity.results import Run
 
@@ -172,7 +172,7 @@ def _thermal_rows(run: Run) -> dict[str, str]:
 
 def _temperature(kelvin: float) -> str:
     """In degrees Celsius, as cases mostly have it, and in kelvin."""
-    return f"{with_deviation(kelvin - FREEZING, None)} °C ({quantity('oil_temperature_k').text(kelvin)})"
+    return f"{with_deviation(kelvin - ZERO_CELSIUS, None)} °C ({quantity('oil_temperature_k').text(kelvin)})"
 
 
 def _numerical_rows(solution: ContactSolution) -> dict[str, str]:

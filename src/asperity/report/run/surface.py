@@ -17,7 +17,7 @@ from asperity.surface import (
     SurfaceDescription,
     SurfaceSpectrum,
     bearing_curve,
-    known_once,
+    distinct_heights,
     surface_spectrum,
 )
 
@@ -101,7 +101,7 @@ def _draw_profile(axes: Axes, levelled: MeasuredSurface, title: str) -> None:
 
 def _draw_bearing_curve(axes: Axes, description: SurfaceDescription) -> None:
     curve, parameters, sq = (
-        bearing_curve(known_once(description.levelled)),
+        bearing_curve(distinct_heights(description.levelled)),
         description.parameters,
         quantity("sk_m"),
     )

@@ -195,5 +195,5 @@ class History:
 def steps_a_pass(case: Case, surfaces: MovingSurfaces) -> float:
     """Length of a pass of the rough surface's whole track, of two the slower one's."""
     rough = surfaces.rough if any(surfaces.rough) else (True, True)
-    passage = max(surfaces.passage(index) for index in (0, 1) if rough[index])
+    passage = max(surfaces.passage_time(index) for index in (0, 1) if rough[index])
     return passage / step_seconds(case.conditions, surfaces, case.motion.time_step)

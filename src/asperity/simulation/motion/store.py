@@ -29,14 +29,14 @@ from asperity.core.storage import (
     MANIFEST,
     read_manifest,
     read_netcdf,
-    read_sealed,
     read_table,
+    read_with_digest,
     require_case,
     require_same_version,
     version_notes,
     write_json,
-    write_sealed,
     write_table,
+    write_with_digest,
 )
 from asperity.ehl import FileContents
 from asperity.simulation.motion.history import History, MotionFrame
@@ -170,7 +170,7 @@ class Keeper:
         arrays: dict[str, Any] = {**self.memory, IDENTITY: np.array(self.identity)}
         packed = BytesIO()
         np.savez(packed, **arrays)
-        write_sealed(folder / MEMORY, packed.getvalue())
+        write_with_digest(folder / MEMORY, packed.getvalue())
         self.kept_at = time.monotonic()
 
     def history(self, seconds: float, computed: int) -> History:
@@ -278,7 +278,7 @@ def _memory(folder: Path, identity: str) -> Mapping[str, Field] | None:
     path = folder / MEMORY
     if not path.exists():
         return None
-    with np.load(BytesIO(read_sealed(path, REMEDY)), allow_pickle=False) as kept:
+    with np.load(BytesIO(read_with_digest(path, REMEDY)), allow_pickle=False) as kept:
         memory = {name: kept[name] for name in kept.files}
     require_case(path, str(memory.pop(IDENTITY, None)), identity, REMEDY)
     return memory

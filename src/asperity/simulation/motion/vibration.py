@@ -315,7 +315,7 @@ def _period(surfaces: MovingSurfaces) -> tuple[float | None, str | None]:
     """Time after which the contact is what it was [s], or why there is none."""
     if not any(surfaces.rough):
         return None, "the surfaces are flat: there is no roughness to excite a vibration"
-    passages = [surfaces.passage(index) for index in (0, 1) if surfaces.rough[index]]
+    passages = [surfaces.passage_time(index) for index in (0, 1) if surfaces.rough[index]]
     moving = [passage for passage in passages if math.isfinite(passage)]
     if not moving:
         return None, "the roughness stands still: nothing passes that could excite a vibration"
@@ -347,7 +347,10 @@ def _moments(
     for number, time in zip(rows["step"].iloc[chosen], rows["time_s"].iloc[chosen], strict=True):
         try:
             contact = solve_contact(
-                case.conditions, case.lubricant, surfaces.at(float(time)), options=case.options
+                case.conditions,
+                case.lubricant,
+                surfaces.composite_at(float(time)),
+                options=case.options,
             )
             stiffness.append(
                 tangent_stiffness(contact, reference_depth=spring.reference_depth).total

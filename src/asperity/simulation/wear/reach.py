@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from asperity.contact.grid import FEWEST_CELLS, Grid
+from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.core.arrays import Field
 from asperity.surface import Surface
 
@@ -15,9 +15,9 @@ def reached(depth: Field, places: Field, half_width: float) -> slice:
     first, last = (
         (int(inside[0]), int(inside[-1])) if inside.size else (places.size // 2, places.size // 2)
     )
-    short = max(FEWEST_CELLS - (last - first + 1), 0)
-    first = min(max(first - (short + 1) // 2, 0), places.size - FEWEST_CELLS)
-    return slice(first, max(last + (short + 1) // 2 + 1, first + FEWEST_CELLS))
+    short = max(MIN_CELLS - (last - first + 1), 0)
+    first = min(max(first - (short + 1) // 2, 0), places.size - MIN_CELLS)
+    return slice(first, max(last + (short + 1) // 2 + 1, first + MIN_CELLS))
 
 
 def part_of(surface: Surface, cells: tuple[slice, slice]) -> Surface:

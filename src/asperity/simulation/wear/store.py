@@ -29,14 +29,14 @@ from asperity.core.files import make_folder, require_writable, versions
 from asperity.core.storage import (
     MANIFEST,
     read_manifest,
-    read_sealed,
     read_table,
+    read_with_digest,
     require_case,
     require_same_version,
     version_notes,
     write_json,
-    write_sealed,
     write_table,
+    write_with_digest,
 )
 from asperity.simulation.wear.frames import WearFrame, is_kept
 from asperity.simulation.wear.history import WearHistory
@@ -115,7 +115,7 @@ class Keeper:
         for number in gone:
             _frame_file(self.folder, number).unlink(missing_ok=True)
         if frame.number in self.frames:
-            write_sealed(
+            write_with_digest(
                 _frame_file(self.folder, frame.number), _packed(frame.arrays(), self.identity)
             )
 
@@ -124,7 +124,7 @@ class Keeper:
         self.worn = worn
         if self.folder is not None and (at_once or time.monotonic() - self.kept_at > KEPT_EVERY_S):
             self._write_rows(self.folder)
-            write_sealed(self.folder / MEMORY, _packed(worn.arrays(), self.identity))
+            write_with_digest(self.folder / MEMORY, _packed(worn.arrays(), self.identity))
             self.kept_at = time.monotonic()
 
     def _write_rows(self, folder: Path) -> None:
@@ -148,7 +148,7 @@ class Keeper:
         after = self.ageing.worn_surfaces(worn)
         for name, surfaces in (("before", self.ageing.surfaces), ("after", after)):
             _write_both(surfaces, self.folder / SURFACES, name)
-        write_sealed(self.folder / END, _packed(self.end.arrays(), self.identity))
+        write_with_digest(self.folder / END, _packed(self.end.arrays(), self.identity))
 
     def history(self, seconds: float, computed: int) -> WearHistory:
         """All of it."""
@@ -319,7 +319,7 @@ def _read(path: Path, identity: str, made: Callable[[Arrays], T]) -> T | None:
     if not path.exists():
         return None
     try:
-        with np.load(BytesIO(read_sealed(path, REMEDY)), allow_pickle=False) as kept:
+        with np.load(BytesIO(read_with_digest(path, REMEDY)), allow_pickle=False) as kept:
             arrays = {name: kept[name] for name in kept.files}
         require_case(path, str(arrays.pop(IDENTITY, "")), identity, REMEDY)
         return made(arrays)
