@@ -44,7 +44,7 @@ from asperity.resonance import (
     series_resonances,
 )
 from asperity.trend import (
-    FALSE_ALARMS,
+    FALSE_ALARM_RATE,
     Detector,
     RecordingFacts,
     Stages,
@@ -76,7 +76,7 @@ def track_recordings(
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
     stages_from: StageSource = "crf",
-    false_alarm_rate: float = FALSE_ALARMS,
+    false_alarm_rate: float = FALSE_ALARM_RATE,
     acknowledge: str | None = None,
     foreteller: Foreteller | None = None,
     workers: int = 1,
@@ -176,7 +176,7 @@ def judge(
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
     stages_from: StageSource = "crf",
-    false_alarm_rate: float = FALSE_ALARMS,
+    false_alarm_rate: float = FALSE_ALARM_RATE,
     acknowledge: str | None = None,
     learned: Learned | None = None,
     before: Before | None = None,

@@ -34,7 +34,7 @@ from asperity.monitoring.track import judge
 from asperity.monitoring.track_result import Track
 from asperity.recording import ReadOptions, names_beside
 from asperity.resonance import SeriesMethod
-from asperity.trend import ALARM_STATES, FALSE_ALARMS, AlarmState, Detector, StageSource
+from asperity.trend import ALARM_STATES, FALSE_ALARM_RATE, AlarmState, Detector, StageSource
 
 SUFFIXES = (".toml", ".json")  # of sidecars
 STRIDE = 80  # recordings that are judged together where many arrive at once
@@ -72,7 +72,7 @@ def watch_folder(
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
     stages_from: StageSource = "crf",
-    false_alarm_rate: float = FALSE_ALARMS,
+    false_alarm_rate: float = FALSE_ALARM_RATE,
     acknowledge: str | None = None,
     store: str | Path | None = None,
     machine: str | None = None,

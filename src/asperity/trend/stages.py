@@ -40,7 +40,7 @@ StageSource = Literal["crf", "damping", "both"]
 
 STRONG_EVIDENCE = 6.0  # BIC difference, "strong": Kass and Raftery, J. Am. Stat. Assoc. 90 (1995)
 SEVERE_FROM = 0.5  # probability
-IN_WORDS: dict[str, str] = {"crf": "CRF", "damping": "damping", "both": "CRF and damping"}
+SOURCE_NAMES: dict[str, str] = {"crf": "CRF", "damping": "damping", "both": "CRF and damping"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -252,7 +252,7 @@ def _bayesian(
         for places, end in ((all_places[0], 0), (all_places[0], -1))
     )
     over = f"{first:.4g} to {last:.4g} {unit}".rstrip()
-    thing = IN_WORDS[source]
+    thing = SOURCE_NAMES[source]
     if outcome.constant - min(outcome.smooth, outcome.broken) < STRONG_EVIDENCE:
         means = " and ".join(course.mean for course in courses)
         return without(
@@ -302,7 +302,8 @@ _NAMES: dict[StageKind, tuple[str, tuple[str, str]]] = {
 def _no_common(series: Sequence[_Series], own: Sequence[float], against: float, over: str) -> str:
     """The verdict where each indicator breaks at a place of its own."""
     places = " and ".join(
-        f"{IN_WORDS[one.indicator]} at {place:.3g}" for one, place in zip(series, own, strict=True)
+        f"{SOURCE_NAMES[one.indicator]} at {place:.3g}"
+        for one, place in zip(series, own, strict=True)
     )
     sentence = f"No common stage over {over}: {places} change their pace, and one break does not explain both"
     return f"{sentence} (BIC {against:+.1f} against it)."
@@ -318,7 +319,7 @@ def _by(source: StageSource, sticks: tuple[bool, ...]) -> str:
     """What the stage is read from, where that is not CRF alone."""
     if source == "both" and not all(sticks):
         return f" by CRF and damping, in the {'damping' if sticks[1] else 'CRF'} alone"
-    return "" if source == "crf" else f" by {IN_WORDS[source]}"
+    return "" if source == "crf" else f" by {SOURCE_NAMES[source]}"
 
 
 def _outcome(each: list[Compared], crfa: Field | None, x: Field, x_std: Field) -> _Outcome:
