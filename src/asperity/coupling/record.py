@@ -175,7 +175,9 @@ def contact_vibration(
     if model.method == "likelihood" and model.linear and isinstance(below, FilteredNoise):
         seen = SampledLine(below, model.rate_hz)
     return Vibration(
-        resonance=contact_resonance(spectrum, band_hz=band_hz, method=model.method, seen=seen),
+        resonance=contact_resonance(
+            spectrum, band_hz=band_hz, method=model.method, sampling_factor=seen
+        ),
         band_hz=band_hz,
         full_load_crf_hz=full_load_crf_hz,
         oscillator=spring,

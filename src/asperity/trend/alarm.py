@@ -1,25 +1,26 @@
-"""Sequential alarm: one decision per recording, latched until acknowledged, at a set false-alarm rate.
+"""Sequential alarm: one decision per recording, latched until acknowledged, at a set error rate.
 
 Monitored series come in as `MonitoredSeries`; what a recording shows apart from any change, as
 `RecordingStatus`. docs/theory/alarms.md has the equations and the measured error rates.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import Literal, NamedTuple, get_args
+from functools import partial
+from typing import NamedTuple, get_args
 
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
-from asperity.trend.regressors import (
-    BASELINE_RECORDINGS,
-    NO_CONDITION_EFFECT,
-    Condition,
-    ConditionEffect,
-    fit_conditions,
+from asperity.trend.alarm_inputs import (
+    AlarmChecks,
+    AlarmHistory,
+    AlarmState,
+    MonitoredSeries,
+    RecordingStatus,
 )
+from asperity.trend.regressors import BASELINE_RECORDINGS, Condition
 from asperity.trend.sequential import (
     BASELINE_POINTS,
     ChangeTest,
@@ -30,7 +31,6 @@ from asperity.trend.sequential import (
     threshold,
 )
 
-AlarmState = Literal["none", "alert", "alarm", "blind", "cannot-tell"]
 ALARM_STATES: tuple[AlarmState, ...] = get_args(AlarmState)
 FALSE_ALARM_RATE = 1e-3  # per recording
 ALERT_RATE_FACTOR = 10.0  # false-alert rate over false-alarm rate
@@ -46,60 +46,8 @@ PRIOR_ODDS_AGAINST_KNEE = 5.0
 CONTACT_SHARE = 0.8
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MonitoredSeries:
-    """One indicator over the recordings of a series, which may raise the alarm.
-
-    Parameters
-    ----------
-    name : of the indicator, for sentences
-    values : shape (recordings,); nan where not determined
-    smallest_change : smallest change worth acting on, in units of `values` (dead band)
-    contact : True for an indicator of the contact, whose severe stage is a rise that flattens; False for a level, which
-        grows
-    describe : change to words, such as "rose by 5 %"
-    gain_dependent : whether the sensor's gain changes it
-    step_alarms : whether a step upwards raises the alarm, unless all gain-dependent series of the sensor move with it
-        (then the sensor may have been moved)
-    conditions : operating conditions that may explain changes; same recordings
-    relative : whether `values` are ratios; conditions then act on their logarithm
-    sensor : name of the sensor, empty for a single one
-    """
-
-    name: str
-    values: Field
-    smallest_change: float
-    contact: bool
-    describe: Callable[[float], str]
-    gain_dependent: bool = False
-    step_alarms: bool = False
-    sensor: str = ""
-    conditions: tuple[Condition, ...] = ()
-    relative: bool = False
-
-    def at_baseline_conditions(
-        self, first: int = 0, last: int | None = None
-    ) -> tuple[Field, ConditionEffect]:
-        """Return the values of recordings `first` to `last` corrected to the baseline's conditions."""
-        part = slice(first, last)
-        values = self.values[part]
-        if not self.conditions:
-            return values, NO_CONDITION_EFFECT
-        conditions = [
-            replace(condition, values=condition.values[part]) for condition in self.conditions
-        ]
-        fitted = fit_conditions(
-            np.log(values) if self.relative else values,
-            conditions,
-            smallest_change=self.smallest_change,
-        )
-        return np.asarray(
-            values * np.exp(-fitted.effect) if self.relative else values - fitted.effect
-        ), fitted
-
-
 def knee_weight(x: Field, monitored: Sequence[MonitoredSeries]) -> float:
-    """Return the probability (0 to 1) of a knee against steps, cycles, bends and correlated scatter.
+    """Return the probability of a knee against steps, cycles, bends and correlated scatter, 0 to 1.
 
     Uses the indicator with the clearest knee; 1 where there are too few points. The prior odds are
     calibrated so that stated probabilities match observed frequencies (docs/theory/alarms.md).
@@ -112,38 +60,7 @@ def knee_weight(x: Field, monitored: Sequence[MonitoredSeries]) -> float:
     return 1.0 / (1.0 + PRIOR_ODDS_AGAINST_KNEE * float(np.exp(-max(ratios)))) if ratios else 1.0
 
 
-class RecordingStatus(NamedTuple):
-    """State of one recording before any test: "none" (usable), "blind" or "cannot-tell", with its reason."""
-
-    state: AlarmState = "none"
-    reason: str = ""
-
-
-class AlarmHistory(NamedTuple):
-    """Earlier decisions: states by recording number, and the reason and source of a standing alarm.
-
-    Stored states are final, except that the last recording is always judged again.
-    """
-
-    states: Mapping[int, AlarmState] = MappingProxyType({})
-    reason: str = ""
-    raised_by: str = ""
-
-
 NO_HISTORY = AlarmHistory()
-
-
-class AlarmChecks(NamedTuple):
-    """Checks made before an alarm is raised.
-
-    `confirmed(number)` states whether the stage detector finds the severe stage in the recordings
-    up to `number`; an alarm by an indicator of the contact requires it. `explanation(number, name)`
-    returns in words what other than wear explains a change of the indicator `name` up to `number`
-    (empty for nothing); an explained alarm or alert is withheld.
-    """
-
-    confirmed: Callable[[int], bool] = lambda _: True
-    explanation: Callable[[int, str], str] = lambda _number, _name: ""
 
 
 NO_CHECKS = AlarmChecks()
@@ -248,7 +165,7 @@ def sequential_alarm(
             statuses[number],
             false_alarm_rate,
             unit,
-            lambda number=number: checks.confirmed(number),
+            partial(checks.confirmed, number),
         )
         if state in ("alert", "alarm") and (other := checks.explanation(number, raised_by)):
             state, reason, raised_by = "none", other, ""
@@ -273,7 +190,7 @@ def sequential_alarm(
 
 
 class _Assessment(NamedTuple):
-    """Tests of one indicator up to a recording, and its distinct points `x`, `values`; `points` counts them."""
+    """Tests of one indicator up to a recording, and its distinct points `x`, `values`."""
 
     change: ChangeTest
     step: ChangeTest
@@ -359,7 +276,7 @@ def _condition_change(condition: Condition, first: int, known: Mask) -> str:
 
 
 def _false_alarm_shares(monitored: Sequence[MonitoredSeries], rate: float) -> list[float]:
-    """Divide the false-alarm rate: `CONTACT_SHARE` among indicators of the contact, the rest among levels."""
+    """Divide the false-alarm rate: `CONTACT_SHARE` to contact indicators, the rest to levels."""
     of_contact = sum(series.contact for series in monitored)
     kinds = {
         True: (CONTACT_SHARE, of_contact),
@@ -452,13 +369,15 @@ def _step_alarm(
 def _unexplained_step(
     assessed: Sequence[tuple[MonitoredSeries, _Assessment]], shares: Sequence[float], unit: str
 ) -> _Decision | None:
-    """Return "cannot-tell" for the first significant step, whose cause the recordings do not show."""
+    """Return "cannot-tell" for the first significant step, whose cause recordings do not show."""
     for (series, assessment), share in zip(assessed, shares, strict=True):
         if assessment.step.log_ratio >= threshold(share):
             return (
                 "cannot-tell",
-                f"{_describe_step(series, assessment, unit)} and has stayed there (load, gain, a moved "
-                "sensor or damage: the recordings do not show which; acknowledge it once the cause is "
+                f"{_describe_step(series, assessment, unit)} and has stayed there (load, gain, "
+                f"a moved "
+                "sensor or damage: the recordings do not show which; acknowledge it once the "
+                "cause is "
                 "known)",
                 "",
             )

@@ -97,7 +97,7 @@ def comparability(series: Sequence[RecordingFacts]) -> tuple[str, ...]:
 
 
 def _differing_numbers(series: Sequence[RecordingFacts]) -> Iterator[str]:
-    """Yield a sentence for each number that differs between recordings, or is not stated for all."""
+    """Yield a sentence for each number that differs between recordings, or is partly unknown."""
     numbers = (
         (
             "sampling rate",

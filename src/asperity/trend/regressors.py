@@ -19,7 +19,7 @@ PRIOR_WIDTH = 0.25  # standard deviation of a coefficient over the span of its b
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """Operating condition that an indicator may follow: indicator = course + coefficient * `values`.
+    """Operating condition that an indicator may follow: indicator = course + c · `values`.
 
     Parameters
     ----------
