@@ -87,11 +87,9 @@ def test_what_no_one_states_is_asked_for(folder, tmp_path):
 
 def test_contradictions_are_refused(folder):
     where, _ = folder
-    with pytest.raises(
-        BadInput, match=r"states 5000 Hz in its header, the command line says 4000 Hz"
-    ):
+    with pytest.raises(BadInput, match=r"states 5000 Hz in its header, the command line 4000 Hz"):
         read_recording(where / "float.wav", rate_hz=4000.0)
-    with pytest.raises(BadInput, match=r"states its unit as g, the command line says m/s\^2"):
+    with pytest.raises(BadInput, match=r"states its unit as g, the command line as m/s\^2"):
         read_recording(where / "facts.npz", unit="m/s^2")
     with pytest.raises(BadInput, match="has no channel 'z'; it has acc"):
         read_recording(where / "facts.npz", channel="z")

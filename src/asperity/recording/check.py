@@ -206,86 +206,97 @@ class SampleStatistics:
         band_hz: tuple[float, float] | None,
     ) -> Quality:
         """Judge the statistics for a resonance `width_hz` wide (half power) within `band_hz`."""
-        rms = float(np.sqrt(self.squares / self.finite)) if self.finite else 0.0
-        duration = self.samples / recording.rate_hz
-        clipped = (self.clipped_low + self.clipped_high) / max(self.finite, 1)
-        if self.high == self.low:
-            clipped = 0.0
-        unit = recording.unit if recording.unit != UNKNOWN else "(unit unknown)"
-        off = _off(rms, self.step, comparable=recording.comparable) if self.finite else False
-        faults: list[str] = []
-        remarks = list(recording.notes)
-        if self.finite < 2:
-            faults.append(f"it holds {self.finite} values")
-        elif off:
-            faults.append(f"the machine was off, or the sensor disconnected: rms {rms:.2g} {unit}")
-        if width_hz is not None and duration * width_hz < FEWEST_WIDTHS and self.finite >= 2:
-            faults.append(
-                f"too short: {duration:.3g} s; a resonance {width_hz:.0f} Hz wide needs "
-                f"{FEWEST_WIDTHS / width_hz:.2g} s"
-            )
-        if band_hz is not None and band_hz[1] > USABLE_BAND * recording.rate_hz:
-            faults.append(
-                f"sampled too slowly: {recording.rate_hz:g} Hz; a band up to {band_hz[1]:.0f} Hz "
-                f"needs {ceil(band_hz[1] / USABLE_BAND)} Hz"
-            )
-        if not off and self.stuck > LARGEST_STUCK_SHARE * self.finite:
-            faults.append(
-                f"constant for {100 * self.stuck / self.finite:.4g} % of the time: a dead sensor?"
-            )
+        off = _off(self._rms, self.step, comparable=recording.comparable) if self.finite else False
         missing = (self.samples - self.finite) / max(self.samples, 1)
-        if missing > 0.5 and self.finite >= 2:
-            faults.append(f"{100 * missing:.0f} % of its samples are missing")
-        elif self.gaps:
-            remarks.append(
-                f"{self.gaps} {'gap' if self.gaps == 1 else 'gaps'}, {100 * missing:.2g} % of the "
-                "samples missing"
-            )
-        if not off:
-            if clipped > 0.0:
-                effect = "CRFA is too low" if clipped > CLIPPED_SHARE else "a negligible share"
-                remarks.append(
-                    f"clipped at its extremes: {100 * clipped:.2g} % of the samples, {effect}"
-                )
-            elif self.piled:
-                remarks.append(
-                    "values pile up below the largest: soft clipping, which makes CRFA too low, "
-                    "or a "
-                    "pure tone"
-                )
-            if 0 < self.stuck <= LARGEST_STUCK_SHARE * self.finite:
-                remarks.append(
-                    f"constant for {100 * self.stuck / self.finite:.2g} % of the time: lost "
-                    f"samples? "
-                    "Left out of the spectrum"
-                )
-            if rms > 0.0 and abs(self.mean) > OFFSET_RATIO * rms:
-                remarks.append(
-                    f"offset of {self.mean:.3g} {unit}, {abs(self.mean) / rms:.1f} times the rms; "
-                    "removed"
-                )
-        if not recording.comparable:
-            why = (
-                "are of unknown unit"
-                if recording.unit == UNKNOWN
-                else f"in {unit} are not accelerations"
-            )
-            remarks.append(f"amplitudes {why}: CRF can be used, CRFA is not comparable")
         return Quality(
             samples=self.samples,
-            duration_s=duration,
-            rms=rms,
+            duration_s=self.samples / recording.rate_hz,
+            rms=self._rms,
             peak=max(self.high - self.mean, self.mean - self.low) if self.finite else 0.0,
             offset=self.mean,
             kurtosis=self.finite * self.fourths / self.squares**2 if self.squares > 0.0 else np.nan,
             missing=missing,
             gaps=self.gaps,
-            clipped=clipped,
+            clipped=self._clipped,
             stuck=self.stuck / max(self.finite, 1),
             off=off,
-            faults=tuple(faults),
-            remarks=tuple(dict.fromkeys(remarks)),
+            faults=tuple(self._faults(recording, off, missing, width_hz, band_hz)),
+            remarks=tuple(dict.fromkeys(self._remarks(recording, off, missing))),
         )
+
+    @property
+    def _rms(self) -> float:
+        return float(np.sqrt(self.squares / self.finite)) if self.finite else 0.0
+
+    @property
+    def _clipped(self) -> float:
+        if self.high == self.low:
+            return 0.0
+        return (self.clipped_low + self.clipped_high) / max(self.finite, 1)
+
+    def _faults(
+        self,
+        recording: OpenRecording,
+        off: bool,
+        missing: float,
+        width_hz: float | None,
+        band_hz: tuple[float, float] | None,
+    ) -> Iterator[str]:
+        """Yield the reasons why the recording cannot be used."""
+        duration = self.samples / recording.rate_hz
+        if self.finite < 2:
+            yield f"it holds {self.finite} values"
+        elif off:
+            unit = _unit_in_words(recording)
+            yield f"the machine was off, or the sensor disconnected: rms {self._rms:.2g} {unit}"
+        if width_hz is not None and duration * width_hz < FEWEST_WIDTHS and self.finite >= 2:
+            yield (
+                f"too short: {duration:.3g} s; a resonance {width_hz:.0f} Hz wide needs "
+                f"{FEWEST_WIDTHS / width_hz:.2g} s"
+            )
+        if band_hz is not None and band_hz[1] > USABLE_BAND * recording.rate_hz:
+            yield (
+                f"sampled too slowly: {recording.rate_hz:g} Hz; a band up to {band_hz[1]:.0f} Hz "
+                f"needs {ceil(band_hz[1] / USABLE_BAND)} Hz"
+            )
+        if not off and self.stuck > LARGEST_STUCK_SHARE * self.finite:
+            yield f"constant for {100 * self.stuck / self.finite:.4g} % of the time: a dead sensor?"
+        if missing > 0.5 and self.finite >= 2:
+            yield f"{100 * missing:.0f} % of its samples are missing"
+
+    def _remarks(self, recording: OpenRecording, off: bool, missing: float) -> Iterator[str]:
+        """Yield sentences that qualify the recording's numbers."""
+        yield from recording.notes
+        if self.gaps and not (missing > 0.5 and self.finite >= 2):
+            gaps = "1 gap" if self.gaps == 1 else f"{self.gaps} gaps"
+            yield f"{gaps}, {100 * missing:.2g} % of the samples missing"
+        if not off:
+            yield from self._remarks_on_values(_unit_in_words(recording))
+        if not recording.comparable:
+            why = (
+                "are of unknown unit"
+                if recording.unit == UNKNOWN
+                else f"in {recording.unit} are not accelerations"
+            )
+            yield f"amplitudes {why}: CRF can be used, CRFA is not comparable"
+
+    def _remarks_on_values(self, unit: str) -> Iterator[str]:
+        if self._clipped > 0.0:
+            effect = "CRFA is too low" if self._clipped > CLIPPED_SHARE else "a negligible share"
+            yield f"clipped at its extremes: {100 * self._clipped:.2g} % of the samples, {effect}"
+        elif self.piled:
+            yield (
+                "values pile up below the largest: soft clipping, which makes CRFA too low, or a "
+                "pure tone"
+            )
+        if 0 < self.stuck <= LARGEST_STUCK_SHARE * self.finite:
+            yield (
+                f"constant for {100 * self.stuck / self.finite:.2g} % of the time: lost samples? "
+                "Left out of the spectrum"
+            )
+        if self._rms > 0.0 and abs(self.mean) > OFFSET_RATIO * self._rms:
+            ratio = abs(self.mean) / self._rms
+            yield f"offset of {self.mean:.3g} {unit}, {ratio:.1f} times the rms; removed"
 
 
 def check_recording(
@@ -306,6 +317,10 @@ def check_recording(
     for _ in gauge.pass_through(recording.blocks()):
         pass
     return gauge.quality(recording, width_hz=width_hz, band_hz=band_hz)
+
+
+def _unit_in_words(recording: OpenRecording) -> str:
+    return recording.unit if recording.unit != UNKNOWN else "(unit unknown)"
 
 
 def _is_piled(heights: NDArray[np.int64]) -> bool:

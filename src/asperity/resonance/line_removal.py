@@ -77,21 +77,7 @@ def remove_lines(
         for a speed that is not positive, a smoothed spectrum, one of fewer than 50 lines or with
         values that are not finite.
     """
-    for speed in shaft_hz or ():
-        require_positive("shaft speed", speed, "Hz")
-    if spectrum.smoothing_passes:
-        raise BadInput(
-            "removing tones needs an unsmoothed spectrum, got one smoothed "
-            f"{spectrum.smoothing_passes} times"
-        )
-    if spectrum.density.size <= 2 * NEIGHBOURS + 10:
-        raise BadInput(
-            f"a spectrum of {spectrum.density.size} lines is too short to detect tones; "
-            f"lengthen its "
-            "segment"
-        )
-    if not np.isfinite(spectrum.density).all():
-        raise BadInput("removing tones needs a finite spectrum; repair the record")
+    _require_removable(spectrum, shaft_hz)
     level = _level(spectrum)
     relative_density = spectrum.density / np.maximum(level, np.finfo(float).tiny)
     bound = _threshold(spectrum, CHANCE / relative_density.size)
@@ -130,6 +116,24 @@ def remove_lines(
         removed=tuple(removed),
         speeds_hz=tuple(combs),
     )
+
+
+def _require_removable(spectrum: Spectrum, shaft_hz: Sequence[float] | None) -> None:
+    for speed in shaft_hz or ():
+        require_positive("shaft speed", speed, "Hz")
+    if spectrum.smoothing_passes:
+        raise BadInput(
+            "removing tones needs an unsmoothed spectrum, got one smoothed "
+            f"{spectrum.smoothing_passes} times"
+        )
+    if spectrum.density.size <= 2 * NEIGHBOURS + 10:
+        raise BadInput(
+            f"a spectrum of {spectrum.density.size} lines is too short to detect tones; "
+            f"lengthen its "
+            "segment"
+        )
+    if not np.isfinite(spectrum.density).all():
+        raise BadInput("removing tones needs a finite spectrum; repair the record")
 
 
 def _tone_extent(relative_density: Field, peak: int, upper: float) -> tuple[int, int]:

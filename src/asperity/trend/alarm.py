@@ -173,13 +173,10 @@ def sequential_alarm(
     state = states[-1] if len(states) > acknowledged else "none"
     if len(states) == acknowledged:
         reason = f"all {acknowledged} recordings are acknowledged and no newer one has arrived"
-    since = len(states)
-    while state != "none" and since > acknowledged and states[since - 1] == state:
-        since -= 1
     return Alarm(
         state=state,
         states=tuple(states),
-        since=None if state == "none" else since,
+        since=None if state == "none" else _start_of_last_state(states, acknowledged),
         false_alarm_rate=false_alarm_rate,
         reason=reason,
         raised_by=raised_by,
@@ -187,6 +184,14 @@ def sequential_alarm(
             filter(None, (_explained_by_conditions(series, acknowledged) for series in monitored))
         ),
     )
+
+
+def _start_of_last_state(states: Sequence[AlarmState], acknowledged: int) -> int:
+    """Return the recording from which on all states equal the last one."""
+    since = len(states)
+    while since > acknowledged and states[since - 1] == states[-1]:
+        since -= 1
+    return since
 
 
 class _Assessment(NamedTuple):

@@ -47,7 +47,7 @@ class NoStage(NamedTuple):
 
 def reason_for_no_stage(
     outcome: Outcome,
-    courses: Sequence["Course"],
+    courses: Sequence["IndicatorCourse"],
     series: Sequence[IndicatorSeries],
     points: SeriesPoints,
     axis: Axis,
@@ -110,7 +110,7 @@ def name_indicators(source: StageSource, has_break: tuple[bool, ...]) -> str:
     return "" if source == "crf" else f" by {SOURCE_NAMES[source]}"
 
 
-class Course(NamedTuple):
+class IndicatorCourse(NamedTuple):
     """Course of one indicator by its stick, with the words for verdicts.
 
     `sign` is 1 where load transfers to asperities, -1 where it transfers back, 0 for no change.
@@ -131,7 +131,7 @@ def describe_course(
     split: float,
     has_break: bool,
     axis: Axis,
-) -> Course:
+) -> IndicatorCourse:
     """Describe a series by its stick at the break `split`."""
     points, fit = comparison.points, comparison.fits[STICK]
     nearest = int(np.argmin(np.abs(comparison.breaks - split)))
@@ -153,13 +153,13 @@ def describe_course(
 
 def _crf_course(
     points: SeriesPoints, sign: int, flattens: bool, slopes: tuple[float, float], unit: str
-) -> Course:
+) -> IndicatorCourse:
     mean, std = float(np.mean(points.y)), float(np.std(points.y, ddof=1))
     per = f"Hz per {unit}" if unit else "Hz per unit of x"
     before, after = (
         f"{'rises' if slope > 0.0 else 'falls'} by {abs(slope):.3g}" for slope in slopes
     )
-    return Course(
+    return IndicatorCourse(
         sign=sign,
         flattens=flattens,
         mean=f"CRF stays at {mean:.0f} ± {std:.0f} Hz",
@@ -174,7 +174,7 @@ def _crf_course(
 
 def _damping_course(
     points: SeriesPoints, sign: int, flattens: bool, log_levels: tuple[float, float, float]
-) -> Course:
+) -> IndicatorCourse:
     mean, std = float(np.mean(points.y)), float(np.std(points.y, ddof=1))
     first, middle, last = (float(np.exp(-value)) for value in log_levels)
     ways = [
@@ -182,7 +182,7 @@ def _damping_course(
     ]
     then = "" if ways[0] == ways[1] else f"{ways[1]} "
     mean_ratio = with_deviation(float(np.exp(-mean)), std * float(np.exp(-mean)))
-    return Course(
+    return IndicatorCourse(
         sign=sign,
         flattens=flattens,
         mean=f"damping stays at {mean_ratio}",
