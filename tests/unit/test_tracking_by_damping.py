@@ -110,7 +110,7 @@ def test_a_method_without_a_width_determines_no_damping(series):
     assert track.verdict().startswith(
         "Cannot tell: none of the last 3 recordings show what decides"
     )
-    assert "Not determined: " in track.verdict()
+    assert "Too few points: " in track.verdict()
     assert np.isnan([one.severe_probability for one in track.recordings]).all()
     assert track.alarm.state == "cannot-tell"
     assert any(
