@@ -19,10 +19,11 @@ import asperity
 from asperity.monitoring.alarm import CRF_LEAST, LEVEL_LEAST, RMS, Warming
 from asperity.monitoring.operating_point import ANY_CONTACT, LEVEL, Operating, conditions_of
 from asperity.trend import (
-    FALSE_ALARMS,
+    FALSE_ALARM_RATE,
     Alarm,
-    Sight,
-    Watched,
+    AlarmChecks,
+    MonitoredSeries,
+    RecordingStatus,
     knee_weight,
     sequential_alarm,
     split_stages,
@@ -292,24 +293,39 @@ def judged(one: Drawn) -> Alarm:
     of_crf, of_level = (
         conditions_of(met, follows, ANY_CONTACT.oil) for follows in (ANY_CONTACT.crf, LEVEL)
     )
-    choices = {"least": CRF_LEAST, "contact": True, "in_words": str, "relative": True}
-    crf = Watched(name="CRF", values=one.crf, conditions=of_crf, **choices)
-    choices = {"least": LEVEL_LEAST, "contact": False, "in_words": str, "conditions": of_level}
+    choices = {"smallest_change": CRF_LEAST, "contact": True, "describe": str, "relative": True}
+    crf = MonitoredSeries(name="CRF", values=one.crf, conditions=of_crf, **choices)
+    choices = {
+        "smallest_change": LEVEL_LEAST,
+        "contact": False,
+        "describe": str,
+        "conditions": of_level,
+    }
     every = zip(CHANNELS, (one.level, *one.bands, one.depth), strict=True)
     levels = [
-        Watched(name=name, values=values, loud=name != "depth", jumps=name == "depth", **choices)
+        MonitoredSeries(
+            name=name,
+            values=values,
+            gain_dependent=name != "depth",
+            step_alarms=name == "depth",
+            **choices,
+        )
         for name, values in every
     ]
 
     def severe(number: int) -> bool:
-        reference = crf.without_conditions(0, number + 1)[0]
+        reference = crf.at_baseline_conditions(0, number + 1)[0]
         return split_stages(NUMBER[: number + 1], CRF_HZ * reference).kind == "severe"
 
-    sight = Sight() if np.isfinite(one.crf).any() else Sight("cannot-tell", "no contact resonance")
+    sight = (
+        RecordingStatus()
+        if np.isfinite(one.crf).any()
+        else RecordingStatus("cannot-tell", "no contact resonance")
+    )
     watched = [crf, *levels] if np.isfinite(one.crf).any() else levels
     excuses = Warming(NUMBER, watched[:1], levels, "").excuses
     return sequential_alarm(
-        NUMBER, watched, [sight] * RECORDINGS, confirmed=severe, excused=excuses
+        NUMBER, watched, [sight] * RECORDINGS, checks=AlarmChecks(severe, excuses)
     )
 
 
@@ -343,7 +359,7 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     """Markdown, a line at a time; `fast` takes a tenth of the series. What was cut off goes on where it stopped."""
     series = SERIES // (10 if fast else 1)
     rows = Rows()
-    yield f"## Alarms: {series} series of {RECORDINGS} recordings a row, one false alarm in {1.0 / FALSE_ALARMS:.0f}\n"
+    yield f"## Alarms: {series} series of {RECORDINGS} recordings a row, one false alarm in {1.0 / FALSE_ALARM_RATE:.0f}\n"
     yield "| nothing wears | ever an alarm | ever an alert | ever cannot tell, behind the baseline |"
     yield "|---|---|---|---|"
     for name, draw in (WITHOUT_WEAR | GIVEN).items():
@@ -378,7 +394,9 @@ BETWEEN: tuple[Callable[[np.random.Generator], Drawn], ...] = (
 def probabilities(one: Drawn, recordings: int) -> np.ndarray:
     """P(severe) of each recording, as `track` gives it after the last."""
     at, crf = NUMBER[:recordings], one.crf[:recordings]
-    watched = Watched(name="CRF", values=crf, least=CRF_LEAST, contact=True, in_words=str)
+    watched = MonitoredSeries(
+        name="CRF", values=crf, smallest_change=CRF_LEAST, contact=True, describe=str
+    )
     return split_stages(at, CRF_HZ * crf).probability * knee_weight(at, [watched])
 
 

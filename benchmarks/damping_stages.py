@@ -17,7 +17,7 @@ from asperity.core.arrays import Field
 from asperity.paper import SAMPLES_SQ_UM, SAMPLES_STD_UM, Disturbance
 from asperity.paper.rig_recording import GRID_HZ, RigTest, draw_background
 from asperity.resonance import damping_objection, remove_lines, series_resonances
-from asperity.trend import StageSource, split_stages
+from asperity.trend import StageErrors, StageSource, split_stages
 from asperity.vibration import ContactOscillator
 from benchmarks.damping import (
     BAND_HZ,
@@ -141,9 +141,8 @@ def rows(name: str, knee: float | None, drawn: Sequence[tuple[Field, Field]]) ->
             split_stages(
                 sq,
                 crf,
-                crf_std_hz=CRF_STD,
                 damping_ratio=damping,
-                damping_std=DAMPING_STD * damping,
+                errors=StageErrors(crf_hz=CRF_STD, damping_ratio=DAMPING_STD * damping),
                 source=source,
             )
             for crf, damping in drawn
@@ -222,7 +221,7 @@ def judged(law: Course, scatter: float, number: int) -> Iterator[tuple[float, fl
     for ratio, resonance, one in zip(truth, found, clean, strict=True):
         known = damping_objection(resonance, one.spectrum.resolution_hz) is None
         own = resonance.damping_ratio
-        stands = "keeps its place" in resonance.reason
+        stands = "keeps its frequency" in resonance.reason
         yield (
             (float(np.log(own / ratio)), resonance.damping_ratio_std / own, stands)
             if known

@@ -28,7 +28,7 @@ from asperity.resonance import (
     remove_lines,
     series_resonances,
 )
-from asperity.trend import split_stages
+from asperity.trend import StageErrors, split_stages
 
 SNRS = (20.0, 10.0, 6.0, 3.0, 0.0)
 SERIES = 60
@@ -304,7 +304,9 @@ def stage_row(
         )
         crf = truth(np.repeat(true_sq, tests) * 1e-6) + CRF_STD * rng.standard_normal(12 * tests)
         x_std = np.repeat(SAMPLES_STD_UM, tests) * errors if errors else None
-        found = split_stages(np.repeat(SAMPLES_SQ_UM, tests), crf, crf_std_hz=CRF_STD, x_std=x_std)
+        found = split_stages(
+            np.repeat(SAMPLES_SQ_UM, tests), crf, errors=StageErrors(crf_hz=CRF_STD, x=x_std)
+        )
         kinds[found.kind] = kinds.get(found.kind, 0) + 1
         if found.found:
             splits.append(found.split)

@@ -12,7 +12,7 @@ import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.core.signals import Spectrum
-from asperity.resonance import DISAGREE, line_shape, resonances_of_sensors
+from asperity.resonance import SENSORS_DISAGREE, line_shape, resonances_of_sensors
 
 SERIES = 40
 BAND = (1800.0, 4000.0)
@@ -54,7 +54,7 @@ def row(choices: dict[str, Any], series: int) -> str:
     together, alone, claimed, wrong, apart, by_best = [], [], 0, 0, 0, 0
     for seed in range(series):
         told = resonances_of_sensors(two_sensors(seed, **choices), band_hz=BAND)
-        apart += sum(one.reason.startswith(DISAGREE) for one in told.resonances)
+        apart += sum(one.reason.startswith(SENSORS_DISAGREE) for one in told.resonances)
         by_best += max(
             sum(one is not None and one.found for one in every) for every in told.alone.values()
         )

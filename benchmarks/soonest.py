@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from asperity.trend import FALSE_ALARMS
+from asperity.trend import FALSE_ALARM_RATE
 from asperity.trend.alarm import CONTACT_SHARE
 from asperity.trend.sequential import LONGEST_CYCLE, SHORTEST_CYCLE
 from benchmarks.alarms import AFTER, RECORDINGS, RISE_HZ
@@ -89,7 +89,9 @@ def power(distances: np.ndarray, behind: np.ndarray, chance: float | None) -> np
     `chance` of ever speaking without a cause; None: at most the alarm's rate for CRF in each recording since the knee.
     """
     wrong = (
-        CONTACT_SHARE * FALSE_ALARMS * behind if chance is None else np.full(behind.shape, chance)
+        CONTACT_SHARE * FALSE_ALARM_RATE * behind
+        if chance is None
+        else np.full(behind.shape, chance)
     )
     return np.asarray(norm.cdf(distances - norm.isf(wrong)))
 
@@ -149,7 +151,7 @@ def row(scatter_hz: float, memory: float, others: Courses) -> str:
         _told(power(after, np.array(BEHIND), chance), power(ends, left, chance))
         for chance in (None, EVER)
     ]
-    rate = CONTACT_SHARE * FALSE_ALARMS
+    rate = CONTACT_SHARE * FALSE_ALARM_RATE
 
     def unknown(begins: int, many: int) -> float:
         return power_unknown(nearest(begins, many, *known), memory, rate * many)

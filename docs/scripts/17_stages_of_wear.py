@@ -25,7 +25,7 @@ found = resonance.series_resonances(
 sq = [1e6 * one.sq_m for one in rig.recordings]
 sq_std = [1e6 * one.sq_std_m for one in rig.recordings]
 crf = [one.crf_hz for one in found]
-stages = asp.split_stages(sq, crf, x_std=sq_std, unit="um")
+stages = asp.split_stages(sq, crf, errors=asp.StageErrors(x=sq_std), unit="um")
 
 figure, axis = plt.subplots(figsize=(7, 4))
 points = axis.scatter(

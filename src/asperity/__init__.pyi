@@ -49,6 +49,7 @@ from .surface import gaussian_surface as gaussian_surface
 from .surface import read_surface as read_surface
 from .surface import self_affine_surface as self_affine_surface
 from .surface import surface_parameters as surface_parameters
+from .trend import StageErrors as StageErrors
 from .trend import Stages as Stages
 from .trend import split_stages as split_stages
 from .vibration import ContactOscillator as ContactOscillator

@@ -115,8 +115,8 @@ def test_an_empty_folder_is_not_healthy(asp):
     ("arguments", "said"),
     [
         (("--false-alarms", "often"), "must be a rate such as 0.001 or 1/1000, got 'often'"),
-        (("--false-alarms", "0.5"), "must lie between 0 and 0.1 a recording, got 0.5"),
-        (("--false-alarms", "-1"), "must lie between 0 and 0.1 a recording, got -1"),
+        (("--false-alarms", "0.5"), "must lie between 0 and 0.1 per recording, got 0.5"),
+        (("--false-alarms", "-1"), "must lie between 0 and 0.1 per recording, got -1"),
         (("--acknowledge", "s-999.npz"), "s-999.npz is not among the 3 recordings"),
     ],
 )

@@ -34,7 +34,7 @@ def test_a_load_that_is_stated_explains_a_level_that_steps(asp):
     assert "the level (rms) rose to" in unknown["alarm"]["reason"]
     assert unknown["alarm"]["explained"] is None
     assert code == 4  # there is no resonance to see
-    assert "and holds since" not in given["alarm"]["reason"]
+    assert "and has stayed there" not in given["alarm"]["reason"]
     assert "load from 500 to 1200 N explains it" in given["alarm"]["explained"]
     assert given["alarm"]["explained"] in given["verdict"].replace("The level", "the level")
     assert [row["load_n"] for row in given["recordings"]] == loads

@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import BadInput
-from asperity.trend import Sight, Watched, knee_weight, sequential_alarm
-from asperity.trend.sequential import growth, knee, step, threshold
+from asperity.trend import (
+    AlarmChecks,
+    MonitoredSeries,
+    RecordingStatus,
+    knee_weight,
+    sequential_alarm,
+)
+from asperity.trend.sequential import growth_test, knee_test, step_test, threshold
 
 NUMBER = np.arange(40.0)
 PER_THOUSAND = threshold(1e-3)
@@ -20,37 +26,37 @@ def knee_at(place, scatter, seed, after=0.18):
     return (course + scatter * np.random.default_rng(seed).standard_normal(NUMBER.size)) / 2922.0
 
 
-def first(test, values, least, above=PER_THOUSAND):
+def first(test, values, smallest_change, above=PER_THOUSAND):
     """After how many recordings a test speaks first, judged after each."""
     for count in range(1, values.size + 1):
-        if test(NUMBER[:count], values[:count], least=least).log_ratio > above:
+        if test(NUMBER[:count], values[:count], smallest_change=smallest_change).log_ratio > above:
             return count
     return None
 
 
-def watched(values, contact=True, least=0.05):
-    return Watched(
+def watched(values, contact=True, smallest_change=0.05):
+    return MonitoredSeries(
         name="CRF",
         values=np.asarray(values),
-        least=least,
+        smallest_change=smallest_change,
         contact=contact,
-        in_words=lambda by: f"by {by:.2f}",
+        describe=lambda by: f"by {by:.2f}",
     )
 
 
-def judged(values, sights=None, **choices):
+def judged(values, statuses=None, **choices):
     values = np.asarray(values)
-    seen = sights or [Sight()] * values.size
+    seen = statuses or [RecordingStatus()] * values.size
     return sequential_alarm(np.arange(float(values.size)), [watched(values)], seen, **choices)
 
 
 @pytest.mark.parametrize("place", [12, 18, 24])
 def test_a_knee_is_found_soon_and_where_it_is(place):
     values = knee_at(place, 5.0, place)
-    count = first(knee, values, 0.05)
+    count = first(knee_test, values, 0.05)
     assert place < count <= place + 5
-    found = knee(NUMBER[:count], values[:count], least=0.05)
-    assert found.at == pytest.approx(place, abs=2.0)
+    found = knee_test(NUMBER[:count], values[:count], smallest_change=0.05)
+    assert found.x == pytest.approx(place, abs=2.0)
     assert found.change == pytest.approx(718.0 / 2922.0, abs=0.04)
 
 
@@ -73,18 +79,18 @@ HEALTHY = {
 
 @pytest.mark.parametrize("name", HEALTHY)
 def test_what_is_no_knee_raises_nothing_after_any_recording(name):
-    assert first(knee, HEALTHY[name] + scatter(3), 0.05) is None
+    assert first(knee_test, HEALTHY[name] + scatter(3), 0.05) is None
 
 
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e6])
 def test_the_evidence_of_a_knee_does_not_depend_on_the_unit_of_x(unit):
     values = knee_at(18, 5.0, 1)[:24]
     one, other = (
-        knee(NUMBER[:24], values, least=0.05),
-        knee(7.0 * unit + NUMBER[:24] * unit, values, least=0.05),
+        knee_test(NUMBER[:24], values, smallest_change=0.05),
+        knee_test(7.0 * unit + NUMBER[:24] * unit, values, smallest_change=0.05),
     )
     assert other.log_ratio == pytest.approx(one.log_ratio, rel=1e-4)
-    assert (other.at - 7.0 * unit) / unit == pytest.approx(one.at, rel=1e-4)
+    assert (other.x - 7.0 * unit) / unit == pytest.approx(one.x, rel=1e-4)
 
 
 def test_the_likelihood_ratio_of_white_scatter_is_that_of_least_squares():
@@ -101,8 +107,12 @@ def test_the_likelihood_ratio_of_white_scatter_is_that_of_least_squares():
     from asperity.trend import sequential
 
     hinges = np.maximum(at - np.arange(3.0, 18.0)[:, None], 0.0)
-    own = sequential._gains(values, hinges, beside=at)[list(sequential.MEMORY).index(0.0)]
-    straight = sequential._gains(values, at[None])[list(sequential.MEMORY).index(0.0)]
+    own = sequential._log_likelihoods(values, hinges, companion=at)[
+        list(sequential.CORRELATIONS).index(0.0)
+    ]
+    straight = sequential._log_likelihoods(values, at[None])[
+        list(sequential.CORRELATIONS).index(0.0)
+    ]
     twin = [10.0 * np.log(left([at]) / left([at, hinge])) for hinge in hinges]
     assert own - straight == pytest.approx(twin, rel=1e-6)
 
@@ -115,7 +125,7 @@ def test_scatter_that_remembers_has_the_likelihood_of_its_whole_covariance(memor
     from asperity.trend import sequential
 
     values = knee_at(10, 20.0, 6)[:20]
-    rows = sequential._saturating(NUMBER[:20])[::7]
+    rows = sequential._saturating_curves(NUMBER[:20])[::7]
     covariance = toeplitz(memory ** np.arange(20.0))
     inverse = np.linalg.inv(covariance)
 
@@ -125,14 +135,14 @@ def test_scatter_that_remembers_has_the_likelihood_of_its_whole_covariance(memor
         off = values - design @ fitted
         return -10.0 * np.log(off @ inverse @ off) - 0.5 * np.linalg.slogdet(covariance)[1]
 
-    own = sequential._gains(values, rows)[list(sequential.MEMORY).index(memory)]
+    own = sequential._log_likelihoods(values, rows)[list(sequential.CORRELATIONS).index(memory)]
     assert own == pytest.approx([likelihood(row) for row in rows], abs=1e-6)
 
 
 def test_an_alarm_stays_though_what_raised_it_is_gone():
     values = np.concatenate([knee_at(12, 5.0, 2)[:20], 1.0 + scatter(7)[:20]])
     count = judged(values).states.index("alarm") + 1
-    assert knee(NUMBER, values, least=0.05).log_ratio < PER_THOUSAND
+    assert knee_test(NUMBER, values, smallest_change=0.05).log_ratio < PER_THOUSAND
     assert count < 20
     assert set(judged(values).states[count:]) == {"alarm"}
     assert judged(values, acknowledged=20).state != "alarm"
@@ -141,10 +151,10 @@ def test_an_alarm_stays_though_what_raised_it_is_gone():
 def test_a_level_that_grows_is_told_from_one_that_steps():
     growing = np.log(np.where(NUMBER < 25, 1.0, np.exp(0.15 * (NUMBER - 25)))) + scatter(1, 0.05)
     stepping = np.log(3.0) * (NUMBER >= 20) + scatter(2, 0.05)
-    assert 25 < first(growth, growing, np.log(2.0)) <= 34
-    assert first(growth, stepping, np.log(2.0)) is None
-    assert first(step, stepping, np.log(2.0)) in range(22, 26)
-    assert first(step, scatter(3, 0.05), np.log(2.0)) is None
+    assert 25 < first(growth_test, growing, np.log(2.0)) <= 34
+    assert first(growth_test, stepping, np.log(2.0)) is None
+    assert first(step_test, stepping, np.log(2.0)) in range(22, 26)
+    assert first(step_test, scatter(3, 0.05), np.log(2.0)) is None
 
 
 def test_an_alarm_stays_until_it_is_acknowledged_and_then_learns_anew():
@@ -166,27 +176,29 @@ def test_an_alarm_stays_until_it_is_acknowledged_and_then_learns_anew():
 def test_an_alarm_by_the_contact_asks_the_stage():
     values = knee_at(15, 5.0, 2)
     asked = []
-    alarm = judged(values, confirmed=lambda number: asked.append(number) or False)
+    alarm = judged(
+        values, checks=AlarmChecks(confirmed=lambda number: asked.append(number) or False)
+    )
     assert asked
     assert set(alarm.states) == {"cannot-tell", "none", "alert"}
 
 
 def test_what_nobody_can_see_is_said_and_is_not_healthy():
     level = 1.0 + scatter(4)
-    off = [Sight()] * 39 + [Sight("blind", "the machine was off")]
+    off = [RecordingStatus()] * 39 + [RecordingStatus("blind", "the machine was off")]
     assert judged(level, off).state == "blind"
     assert judged(level, off).since == 39
-    unseen = [Sight()] * 38 + [Sight("cannot-tell", "nothing heard")] * 2
+    unseen = [RecordingStatus()] * 38 + [RecordingStatus("cannot-tell", "nothing heard")] * 2
     assert (judged(level, unseen).state, judged(level, unseen).since) == ("cannot-tell", 38)
     assert judged(level[:5]).state == "cannot-tell"
-    assert "5 of 8 places" in judged(level[:5]).reason
+    assert "5 of 8 points" in judged(level[:5]).reason
     assert judged(level).state == "none"
 
 
 def test_a_step_of_load_or_gain_is_not_told_from_damage():
     alarm = judged(HEALTHY["load step"] + scatter(5))
     assert alarm.state == "cannot-tell"
-    assert "at once, at 15" in alarm.reason
+    assert "in one step at 15" in alarm.reason
     assert "alarm" not in alarm.states
     assert judged(HEALTHY["load step"] + scatter(5), acknowledged=15).state == "none"
 
@@ -199,18 +211,18 @@ def test_a_depth_that_jumps_is_a_fault_unless_all_that_is_loud_moves_with_it(lev
     jump = (NUMBER >= 20).astype(float)
     series = {"depth": 0.9 * jump + scatter(1, 0.1), "rms": level * jump + scatter(2, 0.05)}
     watching = [
-        Watched(
+        MonitoredSeries(
             name=name,
             values=values,
-            least=np.log(2.0),
+            smallest_change=np.log(2.0),
             contact=False,
-            in_words="by {:.2f}".format,
-            loud=name == "rms",
-            jumps=name == "depth",
+            describe="by {:.2f}".format,
+            gain_dependent=name == "rms",
+            step_alarms=name == "depth",
         )
         for name, values in series.items()
     ]
-    assert sequential_alarm(NUMBER, watching, [Sight()] * 40).state == state
+    assert sequential_alarm(NUMBER, watching, [RecordingStatus()] * 40).state == state
 
 
 def test_a_knee_weighs_much_and_a_step_or_a_bend_little():
@@ -232,12 +244,12 @@ def test_a_smaller_rate_of_false_alarms_takes_longer():
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, 0.5, np.nan])
 def test_a_rate_that_is_none_is_refused(rate):
-    with pytest.raises(BadInput, match="rate of false alarms"):
+    with pytest.raises(BadInput, match="false-alarm rate"):
         judged(np.ones(3), false_alarm_rate=rate)
 
 
 def test_repeats_of_one_test_are_one_place():
     repeated = np.repeat(NUMBER[:4], 5)
     values = 1.0 + 0.1 * repeated
-    alarm = sequential_alarm(repeated, [watched(values)], [Sight()] * 20)
-    assert "4 of 8 places" in alarm.reason
+    alarm = sequential_alarm(repeated, [watched(values)], [RecordingStatus()] * 20)
+    assert "4 of 8 points" in alarm.reason

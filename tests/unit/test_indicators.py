@@ -243,7 +243,7 @@ def test_one_line_is_the_same_by_modes_and_noise_has_none():
         contact_resonance(several([], seed), band_hz=BAND, method="modes") for seed in range(25)
     ]
     assert not any(seen.found for seen in noise)
-    assert "nothing stands out" in noise[0].reason
+    assert "no line stands out" in noise[0].reason
 
 
 def test_sampling_is_for_the_fit_alone():
@@ -257,10 +257,10 @@ def test_sampling_is_for_the_fit_alone():
         resolution_hz=2.0,
         averages=1.0,
     )
-    with pytest.raises(BadInput, match="for the method likelihood, got 'peak'"):
+    with pytest.raises(BadInput, match="to the method likelihood only, got 'peak'"):
         contact_resonance(
             spectrum,
             band_hz=(1e3, 3e3),
             method="peak",
-            seen=lambda f, f0_hz, damping_ratio: f / f,  # noqa: ARG005
+            sampling_factor=lambda f, f0_hz, damping_ratio: f / f,  # noqa: ARG005
         )

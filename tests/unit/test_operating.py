@@ -20,8 +20,8 @@ from asperity.monitoring.operating_point import (
     response_of,
     unstated,
 )
-from asperity.trend import Condition, Sight, Watched, sequential, sequential_alarm
-from asperity.trend.regressors import explained
+from asperity.trend import Condition, MonitoredSeries, RecordingStatus, sequential, sequential_alarm
+from asperity.trend.regressors import fit_conditions
 
 NUMBER = np.arange(40.0)
 LOADS = np.where(NUMBER < 18, 500.0, 900.0)
@@ -40,19 +40,19 @@ def crf(values, follows=CRF, **met):
         for row in zip(*met.values(), strict=True)
     ]
     conditions = conditions_of(rows, follows, ANY_CONTACT.oil)
-    return Watched(
+    return MonitoredSeries(
         name="CRF",
         values=values,
-        least=0.05,
+        smallest_change=0.05,
         contact=True,
-        in_words="by {:.3f}".format,
+        describe="by {:.3f}".format,
         conditions=conditions,
         relative=True,
     )
 
 
 def judged(one):
-    return sequential_alarm(NUMBER, [one], [Sight()] * NUMBER.size)
+    return sequential_alarm(NUMBER, [one], [RecordingStatus()] * NUMBER.size)
 
 
 def test_a_load_step_that_is_given_explains_the_change():
@@ -70,7 +70,7 @@ def test_a_load_step_explains_no_more_than_a_contact_can_do():
     values = np.where(NUMBER < 18, 1.0, 1.1) + scatter(2)
     alarm = judged(crf(values, load_n=np.where(NUMBER < 18, 500.0, 520.0)))
     assert (alarm.state, alarm.explained) == ("cannot-tell", "")
-    assert "at once, at 18" in alarm.reason
+    assert "in one step at 18" in alarm.reason
 
 
 def test_what_has_the_wrong_sign_for_a_contact_explains_nothing():
@@ -127,10 +127,10 @@ def test_powers_are_found_exactly_where_nothing_scatters_and_held_within_their_b
     ]
     conditions = conditions_of(met, LEVEL, ANY_CONTACT.oil)
     values = 0.7 * np.log(LOADS) + 2.5 * np.log(speeds)
-    told = explained(values, conditions, least=0.7)
+    told = fit_conditions(values, conditions, smallest_change=0.7)
     assert told.coefficients == pytest.approx([0.7, 2.5], abs=1e-6)
     assert values - told.effect == pytest.approx(np.full(40, (values - told.effect)[0]), abs=1e-9)
-    beyond = explained(9.0 * np.log(LOADS), conditions, least=0.7)
+    beyond = fit_conditions(9.0 * np.log(LOADS), conditions, smallest_change=0.7)
     assert beyond.coefficients[0] == pytest.approx(2.0)
 
 
@@ -138,8 +138,8 @@ def test_powers_are_found_exactly_where_nothing_scatters_and_held_within_their_b
 def test_the_likelihood_beside_conditions_is_that_of_regression_with_a_prior(memory):
     """Slow twin: dense generalised least squares of the places and of one made-up reading of each coefficient."""
     values, loads = scatter(6)[:20] + 0.02 * NUMBER[:20], np.log(LOADS[10:30] / 500.0)
-    beside = sequential.Beside(loads[None], np.array([3.0]))
-    rows = sequential._saturating(NUMBER[:20])[::9]
+    beside = sequential.ConditionRows(loads[None], np.array([3.0]))
+    rows = sequential._saturating_curves(NUMBER[:20])[::9]
     weight = np.linalg.inv(
         np.pad(toeplitz(memory ** np.arange(20.0)), (0, 1)) + np.diag([*[0.0] * 20, 1.0])
     )
@@ -155,8 +155,10 @@ def test_the_likelihood_beside_conditions_is_that_of_regression_with_a_prior(mem
             - 0.5 * np.linalg.slogdet(toeplitz(memory ** np.arange(20.0)))[1]
         )
 
-    whites = sequential._whites_beside(20, beside)
-    own = sequential._gains(values, rows, whites=whites)[list(sequential.MEMORY).index(memory)]
+    whiteners = sequential._whiteners(20, beside)
+    own = sequential._log_likelihoods(values, rows, whiteners=whiteners)[
+        list(sequential.CORRELATIONS).index(memory)
+    ]
     assert own == pytest.approx([likelihood(row) for row in rows], abs=1e-6)
 
 
@@ -164,7 +166,7 @@ def test_wear_and_a_condition_that_drift_alike_are_not_taken_for_one_another():
     """Wear of 0.5 % a recording beside a load that grows by 1 % a recording and scatters: by its power of 0.1."""
     load = 0.01 * NUMBER + 0.05 * np.random.default_rng(8).standard_normal(NUMBER.size)
     met = Condition(name="load", values=load, low=0.0, high=1.0 / 3.0, shown=np.exp(load), unit="N")
-    told = explained(0.005 * NUMBER + 0.1 * load, [met], least=0.05)
+    told = fit_conditions(0.005 * NUMBER + 0.1 * load, [met], smallest_change=0.05)
     assert told.coefficients[0] == pytest.approx(0.1, abs=1e-6)
 
 

@@ -46,7 +46,7 @@ def test_facts_name_their_source(folder):
     assert (facts["rate"].source, facts["unit"].value, facts["unit"].source) == (
         "command line",
         "unknown",
-        "nobody",
+        "not stated",
     )
     assert (facts["started"].value, facts["started"].source) == (
         datetime(2024, 1, 31, 12),
@@ -72,7 +72,7 @@ def test_what_no_one_states_is_asked_for(folder, tmp_path):
     (tmp_path / "a.csv").write_text(
         "time,acc\n" + "".join(f"{i / 100:.2f},{i % 7}.5\n" for i in range(50))
     )
-    with pytest.raises(BadInput, match=r"names no unit; were it seconds, 100 Hz"):
+    with pytest.raises(BadInput, match=r"names no unit; in seconds: 100 Hz"):
         read_recording(tmp_path / "a.csv")
     np.save(tmp_path / "two.npy", np.ones((100, 2)))
     with pytest.raises(BadInput, match=r"holds 2 channels \(two\[1\], two\[2\]\); give channel"):
@@ -87,11 +87,9 @@ def test_what_no_one_states_is_asked_for(folder, tmp_path):
 
 def test_contradictions_are_refused(folder):
     where, _ = folder
-    with pytest.raises(
-        BadInput, match=r"states 5000 Hz in its header, the command line says 4000 Hz"
-    ):
+    with pytest.raises(BadInput, match=r"states 5000 Hz in its header, the command line 4000 Hz"):
         read_recording(where / "float.wav", rate_hz=4000.0)
-    with pytest.raises(BadInput, match=r"states its unit as g, the command line says m/s\^2"):
+    with pytest.raises(BadInput, match=r"states its unit as g, the command line as m/s\^2"):
         read_recording(where / "facts.npz", unit="m/s^2")
     with pytest.raises(BadInput, match="has no channel 'z'; it has acc"):
         read_recording(where / "facts.npz", channel="z")
@@ -291,7 +289,7 @@ def test_every_measured_file_is_read_or_refused_in_words():
             refused[path.name] = str(reason)
     assert list(refused) == ["trib_c1.csv"]
     assert refused["trib_c1.csv"] == (
-        "trib_c1.csv states no sampling rate (its column 'Time' names no unit; were it seconds, 9.99994 Hz); "
+        "trib_c1.csv states no sampling rate (its column 'Time' names no unit; in seconds: 9.99994 Hz); "
         "give rate_hz, or state it as rate_hz in trib_c1.csv.toml beside it"
     )
     assert channels["ActTest_009.IDE"] == 15

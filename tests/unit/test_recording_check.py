@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from asperity.recording import Gauge, check_recording, open_channels, open_recording
+from asperity.recording import SampleStatistics, check_recording, open_channels, open_recording
 from support.recordings import SHARED
 
 RATE = 1000.0
@@ -34,8 +34,8 @@ def test_statistics_do_not_depend_on_the_blocks(tmp_path):
     values[777:1234] = np.nan
     whole = checked(tmp_path, values)
     opened = open_recording(tmp_path / "a.npz")
-    gauge = Gauge()
-    for _ in gauge.watch(opened.blocks(613)):
+    gauge = SampleStatistics()
+    for _ in gauge.pass_through(opened.blocks(613)):
         pass
     pieces = gauge.quality(opened, width_hz=None, band_hz=None)
     assert pieces.rms == pytest.approx(whole.rms, rel=1e-12)
@@ -68,8 +68,8 @@ def test_soft_clipping_is_noticed(tmp_path, drive, piled):
         0.0,
         piled,
     )
-    gauge = Gauge()
-    for _ in gauge.watch(np.array_split(5.0 * np.tanh(drive * NOISE / NOISE.std()), 37)):
+    gauge = SampleStatistics()
+    for _ in gauge.pass_through(np.array_split(5.0 * np.tanh(drive * NOISE / NOISE.std()), 37)):
         pass
     assert gauge.piled == piled
 
@@ -115,8 +115,8 @@ def test_quantised_noise_is_not_off(tmp_path):
 
 def test_too_short_and_too_slow_for_the_resonance(tmp_path):
     found = checked(tmp_path, NOISE[:500], width_hz=20.0, band_hz=(100.0, 450.0))
-    assert "too short: 0.5 s, where a resonance 20 Hz wide needs 0.8 s" in found.faults[0]
-    assert "sampled too slowly: 1000 Hz, where a band up to 450 Hz needs 1125 Hz" in found.faults[1]
+    assert "too short: 0.5 s; a resonance 20 Hz wide needs 0.8 s" in found.faults[0]
+    assert "sampled too slowly: 1000 Hz; a band up to 450 Hz needs 1125 Hz" in found.faults[1]
 
 
 def test_offsets_are_said(tmp_path):

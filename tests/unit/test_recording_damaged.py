@@ -114,7 +114,7 @@ def test_damaged_flac_is_read_to_its_damage_or_refused(tmp_path):
     path.write_bytes(whole[:middle] + bytes(200) + whole[middle + 200 :])
     told = open_channels(path, unit="g", scale=16.0)[0].read()
     assert told.values.size == 262_144
-    assert told.notes == ("damaged after sample 262144 of 300000; what comes before was read",)
+    assert told.notes == ("damaged after sample 262144 of 300000; samples before that were read",)
     path.write_bytes(whole[:9000] + bytes(200) + whole[9200:])
     with pytest.raises(UnreadableFile, match=r"x\.flac cannot be read"):
         open_channels(path, unit="g", scale=16.0)[0].read()

@@ -112,4 +112,4 @@ def test_a_sensor_that_stands_still_most_of_the_time_is_dead(tmp_path, moving, u
     found = check_recording(open_recording(tmp_path / "a.npz"))
     assert (found.usable, found.dead) == (usable, not usable)
     words = found.remarks if usable else found.faults
-    assert any("stands still for" in sentence for sentence in words)
+    assert any("constant for" in sentence for sentence in words)

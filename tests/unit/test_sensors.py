@@ -8,13 +8,13 @@ from benchmarks.sensors import BAND, FREQUENCY, NINETY, TRUTH, two_sensors
 
 from asperity.core.errors import BadInput
 from asperity.resonance import (
-    DISAGREE,
+    SENSORS_DISAGREE,
     learn_sensors,
     line_shape,
     no_resonance,
     resonances_of_sensors,
 )
-from asperity.resonance.sensors import _Together
+from asperity.resonance.sensor_judgement import JointJudgement
 
 
 def pulls(told):
@@ -31,7 +31,7 @@ def test_a_line_on_both_is_found_and_held_as_often_as_the_interval_says():
     for seed in range(6):
         told = resonances_of_sensors(two_sensors(100 + seed, size=0.3), band_hz=BAND)
         assert all(one.found for one in told.resonances)
-        assert set(told.heard_on) == {("a", "b")}
+        assert set(told.detected_on) == {("a", "b")}
         off += pulls(told)
     assert np.mean(np.abs(off) < NINETY) == pytest.approx(0.9, abs=0.08)
 
@@ -69,13 +69,13 @@ def test_a_mode_that_moves_on_one_sensor_is_never_the_contacts():
         )
         assert all(one.found for one in told.alone["a"])
         assert not any(one.found for one in told.resonances)
-        assert "heard on a only, not on b" in told.resonances[0].reason
+        assert "detected on a only, not on b" in told.resonances[0].reason
 
 
 def test_sensors_that_disagree_make_no_single_claim():
     told = resonances_of_sensors(two_sensors(1, heights=(0.0, 0.7), moving=True), band_hz=BAND)
-    assert all(one.reason.startswith(DISAGREE) for one in told.resonances)
-    assert set(told.heard_on) == {()}
+    assert all(one.reason.startswith(SENSORS_DISAGREE) for one in told.resonances)
+    assert set(told.detected_on) == {()}
 
 
 def test_a_sensor_without_spectra_leaves_the_others_word():
@@ -83,7 +83,7 @@ def test_a_sensor_without_spectra_leaves_the_others_word():
     alone = resonances_of_sensors({"a": sensors["a"]}, band_hz=BAND)
     told = resonances_of_sensors({"a": sensors["a"], "b": [None] * TRUTH.size}, band_hz=BAND)
     assert [one.crf_hz for one in told.resonances] == [one.crf_hz for one in alone.resonances]
-    assert set(told.heard_on) == {("a",)}
+    assert set(told.detected_on) == {("a",)}
     with pytest.raises(BadInput, match="no sensor has 6 recordings"):
         resonances_of_sensors({"a": sensors["a"][:3], "b": sensors["b"][:3]}, band_hz=BAND)
 
@@ -93,7 +93,7 @@ def test_where_sensors_have_agreed_one_of_them_is_enough_for_a_recording():
     told = resonances_of_sensors(
         {"a": sensors["a"], "b": [*sensors["b"][:9], None, None, None]}, band_hz=BAND
     )
-    assert told.heard_on == (("a", "b"),) * 9 + (("a",),) * 3
+    assert told.detected_on == (("a", "b"),) * 9 + (("a",),) * 3
     assert told.resonances[10].reason.endswith("here on a only")
     deaf = [replace(one, density=np.ones_like(one.density)) for one in sensors["b"]]
     silent = resonances_of_sensors({"a": sensors["a"], "b": deaf}, band_hz=BAND)
@@ -112,8 +112,8 @@ def test_a_spectrum_without_vibration_is_one_that_its_sensor_does_not_have():
         {"a": sensors["a"], "b": [*dead[:9], None, *dead[10:]]}, band_hz=BAND
     )
     assert [one.crf_hz for one in told.resonances] == [one.crf_hz for one in without.resonances]
-    assert told.heard_on[9] == ("a",)
-    assert "no vibration at all" in told.alone["b"][9].reason
+    assert told.detected_on[9] == ("a",)
+    assert "no vibration" in told.alone["b"][9].reason
 
 
 def test_a_sensor_that_was_moved_parts_the_series_of_all():
@@ -144,9 +144,9 @@ def test_who_may_stand_alone_does_not_hang_on_the_order_of_sensors(order):
     """a hears a line for the first time; b hears what b and c have heard together elsewhere."""
     line = resonances_of_sensors(two_sensors(100, size=0.3), band_hz=BAND).resonances[0]
     nothing = no_resonance("nothing", BAND, "joint")
-    together = _Together({}, {name: [None] for name in order}, BAND)
+    together = JointJudgement({}, {name: [None] for name in order}, BAND)
     together.alone = {name: (nothing if name == "c" else line,) for name in order}
-    found, names = together._by_one(0, nothing, ["b", "c"], 1.0)
+    found, names = together._line_of_one_sensor(0, nothing, ["b", "c"], 1.0)
     assert found.found
     assert names == ("b",)
 
@@ -158,7 +158,7 @@ def test_heights_stay_those_of_one_sensor_whoever_is_named_first_later():
     heights = [[one.crfa for one in told.resonances] for told in (first, turned)]
     assert np.all(np.isfinite(heights))
     assert heights[1] == pytest.approx(heights[0], rel=0.1)
-    assert turned.heard_on[0] == first.heard_on[0]
+    assert turned.detected_on[0] == first.detected_on[0]
 
 
 def test_a_line_that_the_first_sensor_does_not_hear_has_no_height():
@@ -166,7 +166,7 @@ def test_a_line_that_the_first_sensor_does_not_hear_has_no_height():
     told = resonances_of_sensors({"deaf": other["a"], **two}, band_hz=BAND)
     found = [
         one
-        for one, names in zip(told.resonances, told.heard_on, strict=True)
+        for one, names in zip(told.resonances, told.detected_on, strict=True)
         if "deaf" not in names and names
     ]
     assert found

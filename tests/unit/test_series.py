@@ -6,20 +6,21 @@ import pytest
 from asperity.core.errors import BadInput
 from asperity.core.signals import Spectrum
 from asperity.resonance import learn_series, series_resonances
+from asperity.resonance.line_judgement import JudgedLine, line_objection
 from asperity.resonance.resonance import line_shape
-from asperity.resonance.separation import _lifted, _scored, separate
-from asperity.resonance.series import JudgedLine, objection_to, separated
+from asperity.resonance.separation import _fit_jointly, _with_positive_base, separate
+from asperity.resonance.series import separate_series
 from asperity.resonance.spectrum_model import (
-    Blocks,
-    Parameters,
-    away,
-    costs_at,
-    lines,
-    lines_and_slopes,
-    own_at,
-    point_at,
+    ModelParameters,
+    SpectrumBlocks,
+    joint_scoring_point,
+    line_densities,
+    line_densities_and_slopes,
+    line_scoring_point,
+    recording_costs,
+    relative_columns,
 )
-from asperity.resonance.transfer import through
+from asperity.resonance.transfer import unit_transfer
 
 BAND = (1800.0, 4000.0)
 FREQUENCY = np.arange(0.0, 6000.0, 1.0)
@@ -93,7 +94,7 @@ def test_a_further_recording_is_judged_beside_what_others_have_settled():
     )
     (silent,) = shared.resonances(series(0.0, truth=truth[:1], seed=6))
     assert not silent.found
-    with pytest.raises(BadInput, match="not of this series"):
+    with pytest.raises(BadInput, match="not belong to this series"):
         shared.resonances([replace(spectra[0], frequency_hz=2.0 * FREQUENCY)])
 
 
@@ -110,7 +111,7 @@ def fit_of_seven():
     """Blocks of seven spectra of chance, and parameters that say something else of them."""
     rng = np.random.default_rng(4)
     centre = np.linspace(2000.0, 4000.0, 50)
-    blocks = Blocks(centre, rng.gamma(5.0, 0.2, (7, 50)), np.full((7, 50), 30.0))
+    blocks = SpectrumBlocks(centre, rng.gamma(5.0, 0.2, (7, 50)), np.full((7, 50), 30.0))
     own = np.column_stack(
         [
             rng.normal(0, 1, 7),
@@ -119,27 +120,29 @@ def fit_of_seven():
             rng.normal(0, 1, 7),
         ]
     )
-    passed = through(1900.0, 4100.0)
+    passed = unit_transfer(1900.0, 4100.0)
     passed = passed._replace(coefficients=rng.normal(0.0, 0.3, passed.coefficients.size))
-    return blocks, Parameters(own, rng.normal(0.0, 0.5, 50), passed)
+    return blocks, ModelParameters(own, rng.normal(0.0, 0.5, 50), passed)
 
 
 def test_the_score_is_the_slope_of_the_cost(fit_of_seven):
     blocks, at = fit_of_seven
     own, passed = at.own, at.transfer
-    point, d = point_at(blocks, at, np.zeros((passed.coefficients.size,) * 2)), 1e-6
+    point, d = joint_scoring_point(blocks, at, np.zeros((passed.coefficients.size,) * 2)), 1e-6
     for row, column in ((0, 0), (3, 1), (5, 2), (6, 3)):
         shift = np.zeros_like(own)
         shift[row, column] = d
         up, down = (
-            np.sum(costs_at(blocks, at._replace(own=own + side * shift))) for side in (1.0, -1.0)
+            np.sum(recording_costs(blocks, at._replace(own=own + side * shift)))
+            for side in (1.0, -1.0)
         )
         slope = (up - down) / (2 * d)
         assert point.own_score[row, column] == pytest.approx(-slope, rel=1e-4, abs=1e-3)
     shift = np.zeros(50)
     shift[20] = d
     up, down = (
-        np.sum(costs_at(blocks, at._replace(base=at.base + side * shift))) for side in (1.0, -1.0)
+        np.sum(recording_costs(blocks, at._replace(base=at.base + side * shift)))
+        for side in (1.0, -1.0)
     )
     assert point.base_score[20] == pytest.approx(-(up - down) / (2 * d), rel=1e-4, abs=1e-3)
     for number in (0, 7, 30):
@@ -148,8 +151,8 @@ def test_the_score_is_the_slope_of_the_cost(fit_of_seven):
         ends = [
             passed._replace(coefficients=passed.coefficients + side * shift) for side in (1.0, -1.0)
         ]
-        up, down = (np.sum(costs_at(blocks, at._replace(transfer=end))) for end in ends)
-        assert point.passed_score[number] == pytest.approx(
+        up, down = (np.sum(recording_costs(blocks, at._replace(transfer=end))) for end in ends)
+        assert point.transfer_score[number] == pytest.approx(
             -(up - down) / (2 * d), rel=1e-4, abs=1e-3
         )
 
@@ -157,18 +160,20 @@ def test_the_score_is_the_slope_of_the_cost(fit_of_seven):
 def test_lines_beside_what_is_settled_are_those_of_the_whole_fit(fit_of_seven):
     """What the transfer does to a line, in sums over blocks, is what it does block by block."""
     blocks, at = fit_of_seven
-    whole = point_at(blocks, at, np.zeros((at.transfer.coefficients.size,) * 2))
-    alone = own_at(blocks, at)
+    whole = joint_scoring_point(blocks, at, np.zeros((at.transfer.coefficients.size,) * 2))
+    alone = line_scoring_point(blocks, at)
     np.testing.assert_array_equal(alone.score, whole.own_score)
     np.testing.assert_array_equal(alone.information, whole.own_information)
     np.testing.assert_allclose(
-        alone.passed(blocks.centre, at), whole.passed_own, rtol=1e-12, atol=1e-9
+        alone.transfer_coupling(blocks.centre, at), whole.transfer_own, rtol=1e-12, atol=1e-9
     )
-    np.testing.assert_array_equal(lines(blocks.centre, at), lines_and_slopes(blocks.centre, at)[0])
+    np.testing.assert_array_equal(
+        line_densities(blocks.centre, at), line_densities_and_slopes(blocks.centre, at)[0]
+    )
     level, f0, damping = (np.exp(at.own[:, column, None]) for column in range(3))
-    apart = np.exp(away(blocks.centre, at) @ at.transfer.coefficients)
+    apart = np.exp(relative_columns(blocks.centre, at) @ at.transfer.coefficients)
     told = level * apart * line_shape(blocks.centre, f0, damping)
-    np.testing.assert_allclose(lines(blocks.centre, at), told, rtol=1e-12)
+    np.testing.assert_allclose(line_densities(blocks.centre, at), told, rtol=1e-12)
 
 
 def test_a_line_heard_through_a_structure_is_held_by_its_interval():
@@ -188,7 +193,7 @@ def test_a_recording_without_the_contact_is_said_to_have_none():
     lifted = series(contact_height=1e-12, seed=5)[4]
     found = series_resonances([*spectra[:4], lifted, *spectra[5:]], band_hz=BAND)
     assert [one.found for one in found] == [True] * 4 + [False] + [True] * 7
-    assert "nothing moves" in found[4].reason
+    assert "no line moves" in found[4].reason
     assert np.isnan(found[4].crf_hz)
 
 
@@ -276,20 +281,20 @@ def test_of_a_long_series_some_settle_what_all_share():
     ("changes", "words"),
     [
         ({}, None),
-        ({"evidence": 9.0}, "nothing moves"),
-        ({"misfit": 0.5}, "off by 50 %"),
+        ({"evidence": 9.0}, "no line moves"),
+        ({"misfit": 0.5}, "misfit 50 %"),
         ({"f0": 1805.0}, "edge of the band"),
         ({"damping": 0.15}, "wider than a contact's damping"),
         ({"damping": 0.2}, "half the band"),
-        ({"lead": 5.0}, "a line at 2300 Hz would do as well"),
-        ({"f0_std": 130.0}, "cannot be told"),
+        ({"lead": 5.0}, "a line at 2300 Hz fits as well"),
+        ({"f0_std": 130.0}, "cannot be separated"),
     ],
 )
 def test_every_line_that_is_not_the_contacts_is_refused_with_its_reason(changes, words):
     line = JudgedLine(
         f0=2800.0, f0_std=2.0, damping=0.02, evidence=50.0, misfit=0.05, rival=2300.0, lead=40.0
     )
-    said = objection_to(line._replace(**changes), BAND)
+    said = line_objection(line._replace(**changes), BAND)
     assert said is None if words is None else words in said
 
 
@@ -316,7 +321,7 @@ def test_a_moved_sensor_is_told_and_each_part_has_its_own_transfer():
     assert moved == (12,)
     errors = np.array([(one.crf_hz - f) / one.crf_std for one, f in zip(found, truth, strict=True)])
     assert np.sqrt(np.mean(errors**2)) < 1.5
-    whole = separated(spectra, band_hz=BAND).resonances
+    whole = separate_series(spectra, band_hz=BAND).resonances
     together = np.array(
         [(one.crf_hz - f) / one.crf_std for one, f in zip(whole, truth, strict=True)]
     )
@@ -343,14 +348,15 @@ def test_a_louder_sensor_and_modes_that_drift_have_not_moved():
 
 def test_a_base_that_was_nil_below_a_line_comes_back():
     """The logarithm of nothing has no slope: a fit that began there stayed there, far from the best."""
-    blocks = separated(series(), band_hz=BAND).blocks
-    settled = separate(blocks).joint
+    blocks = separate_series(series(), band_hz=BAND).blocks
+    converged = separate(blocks).joint
     below = np.argmin(np.abs(blocks.centre - 3300.0))
-    base = settled.parameters.base.copy()
+    base = converged.parameters.base.copy()
     base[below - 20 : below + 20] = -60.0
-    nil = settled.parameters._replace(base=base)
+    nil = converged.parameters._replace(base=base)
     stays, comes_back = (
-        _scored(blocks, start, settled.pace) for start in (nil, _lifted(blocks, nil))
+        _fit_jointly(blocks, start, converged.step_std)
+        for start in (nil, _with_positive_base(blocks, nil))
     )
-    assert comes_back.cost == pytest.approx(settled.cost, abs=1.0)
-    assert stays.cost > settled.cost + 100.0
+    assert comes_back.cost == pytest.approx(converged.cost, abs=1.0)
+    assert stays.cost > converged.cost + 100.0

@@ -17,7 +17,7 @@ from benchmarks.soonest import (
 )
 from benchmarks.soonest import knee as course_of
 
-from asperity.trend.sequential import knee
+from asperity.trend.sequential import knee_test
 
 
 def test_independent_rows_are_those_of_the_dense_covariance():
@@ -71,7 +71,7 @@ def test_the_alarms_own_test_finds_no_more_than_the_bound():
 
     def ratios(course):
         drawn = (course + 30.0 * rng.standard_normal((150, x.size))) / 2921.93
-        return np.array([knee(x, one, least=0.05).log_ratio for one in drawn])
+        return np.array([knee_test(x, one, smallest_change=0.05).log_ratio for one in drawn])
 
     found = float(np.mean(ratios(bent) > np.quantile(ratios(line), 0.98)))
     (bound,) = power(np.array([distance(18, 5, 30.0, 0.0, courses)]), np.array([5]), 0.02)

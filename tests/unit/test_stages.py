@@ -7,7 +7,7 @@ import scipy
 from asperity.core.errors import BadInput
 from asperity.resonance import IndicatorMethod
 from asperity.resonance.indicators import INDICATOR_METHODS
-from asperity.trend import Detector, split_stages
+from asperity.trend import Detector, StageErrors, split_stages
 from asperity.trend.change_points import _precision
 from asperity.trend.stages import STAGE_DETECTORS
 
@@ -30,7 +30,9 @@ def saturating(x, length=0.8):
 
 def trial(truth, seed, std=15.0):
     return split_stages(
-        X, truth(X) + std * np.random.default_rng(seed).standard_normal(X.size), crf_std_hz=std
+        X,
+        truth(X) + std * np.random.default_rng(seed).standard_normal(X.size),
+        errors=StageErrors(crf_hz=std),
     )
 
 
@@ -65,7 +67,7 @@ def test_errors_in_roughness_widen_the_interval_and_soften_the_probability():
     exact = trial(knee, 1)
     rng = np.random.default_rng(1)
     crf = knee(X) + 15.0 * rng.standard_normal(X.size)
-    vague = split_stages(X, crf, crf_std_hz=15.0, x_std=np.repeat(SQ_STD, 5))
+    vague = split_stages(X, crf, errors=StageErrors(crf_hz=15.0, x=np.repeat(SQ_STD, 5)))
     assert np.diff(vague.interval) > 2.0 * np.diff(exact.interval)
     at = X == 1.92  # 0.12 um, about one of its errors, behind the break
     assert 0.6 < vague.probability[at][0] < 0.97 < exact.probability[at][0]
@@ -140,9 +142,9 @@ def test_too_few_places_are_called_so():
         ({"detector": "ruptures"}, "bayesian"),
         ({"crf_hz": np.ones(3)}, "one length"),
         ({"x": np.full(12, np.nan)}, "finite"),
-        ({"crf_std_hz": -1.0}, "CRF deviation"),
-        ({"x_std": -1.0}, "x deviation"),
-        ({"x_std": np.ones(3)}, "one number or 12"),
+        ({"errors": StageErrors(crf_hz=-1.0)}, "CRF deviation"),
+        ({"errors": StageErrors(x=-1.0)}, "x deviation"),
+        ({"errors": StageErrors(x=np.ones(3))}, "one number or 12"),
         ({"x": [], "crf_hz": []}, "got none"),
     ],
 )

@@ -7,7 +7,7 @@ import pytest
 
 from asperity.core.errors import BadInput
 from asperity.resonance import Resonance, damping_objection, line_shape, no_resonance
-from asperity.trend import split_stages
+from asperity.trend import StageErrors, split_stages
 
 SQ = np.array(
     [0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49]
@@ -40,9 +40,8 @@ def trial(seed, *, crf=level, damping=narrowing, source="damping", x=X, **change
     return split_stages(
         x,
         crf(x) + HERTZ * rng.standard_normal(x.size),
-        crf_std_hz=HERTZ,
         damping_ratio=damping(x) * np.exp(SHARE * rng.standard_normal(x.size)),
-        damping_std=SHARE * damping(x),
+        errors=StageErrors(crf_hz=HERTZ, damping_ratio=SHARE * damping(x)),
         source=source,
         **changes,
     )
@@ -69,7 +68,9 @@ def test_deviations_of_a_ratio_count_by_its_size():
     ratio, std = narrowing(SQ), 0.01 * narrowing(SQ)
     ratio[:2] *= 0.5
     std[:2] = 0.6 * ratio[:2]
-    found = split_stages(SQ, level(SQ), damping_ratio=ratio, damping_std=std, source="damping")
+    found = split_stages(
+        SQ, level(SQ), damping_ratio=ratio, errors=StageErrors(damping_ratio=std), source="damping"
+    )
     assert found.kind == "severe"
     assert found.damping[0] == pytest.approx(0.04, rel=0.1)
 
@@ -87,15 +88,17 @@ def test_a_smooth_fall_has_no_stage_and_level_damping_no_change():
     )
     still = [trial(seed, damping=lambda x: level(x, 0.02)) for seed in range(60)]
     assert np.mean([one.kind == "no change" for one in still]) >= 0.95
-    value, error = re.search(r"damping holds at ([\d.]+) ± ([\d.]+)", still[0].verdict).groups()
+    value, error = re.search(r"damping stays at ([\d.]+) ± ([\d.]+)", still[0].verdict).groups()
     assert float(value) == pytest.approx(0.02, abs=3.0 * float(error))
     assert len(value) == len(error)  # the value ends where its deviation does
     assert "CRF" not in still[0].verdict
 
 
 def test_crf_alone_is_what_it_was_whatever_the_damping():
-    plain = split_stages(X, rising(X), crf_std_hz=HERTZ)
-    beside = split_stages(X, rising(X), crf_std_hz=HERTZ, damping_ratio=curve(X), damping_std=0.001)
+    plain = split_stages(X, rising(X), errors=StageErrors(crf_hz=HERTZ))
+    beside = split_stages(
+        X, rising(X), damping_ratio=curve(X), errors=StageErrors(crf_hz=HERTZ, damping_ratio=0.001)
+    )
     assert beside.source == plain.source == "crf"
     assert (beside.verdict, beside.split, beside.evidence) == (
         plain.verdict,
@@ -171,8 +174,8 @@ def test_damping_known_at_too_few_places_is_not_determined(source):
     ratio[0] = np.nan
     found = split_stages(SQ, rising(SQ), damping_ratio=ratio, source=source)
     assert found.kind == "too few"
-    assert found.verdict.startswith("Not determined: ")
-    assert "7 different places, got 6" in found.verdict
+    assert found.verdict.startswith("Too few points: ")
+    assert "7 different x, got 6" in found.verdict
     assert np.isnan(found.probability).all()
 
 
@@ -181,10 +184,10 @@ def test_damping_known_at_too_few_places_is_not_determined(source):
     [
         ({"source": "damping"}, "needs damping ratios"),
         ({"source": "width", "damping_ratio": SQ}, "crf, damping, both"),
-        ({"source": "both", "damping_ratio": SQ[:3]}, "rows of one length"),
+        ({"source": "both", "damping_ratio": SQ[:3]}, "of one length"),
         ({"source": "both", "damping_ratio": -SQ}, "must be positive"),
         (
-            {"source": "both", "damping_ratio": SQ, "damping_std": -1.0},
+            {"source": "both", "damping_ratio": SQ, "errors": StageErrors(damping_ratio=-1.0)},
             "damping deviation must be 0 or more",
         ),
     ],
@@ -223,7 +226,7 @@ def test_a_line_that_lost_its_crest_to_a_tone_has_none():
     [
         (no_resonance("nothing moves", (2e3, 4e3), "joint"), "nothing moves"),
         (fitted(np.nan, np.nan), "method likelihood fits no width"),
-        (fitted(0.02, np.nan), "without a deviation"),
+        (fitted(0.02, np.nan), "without a standard deviation"),
         (fitted(0.02, 0.011), "0.020 ± 0.011"),
         (fitted(0.003, 0.0003), "18.0 Hz wide"),
     ],

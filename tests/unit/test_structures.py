@@ -63,4 +63,4 @@ def test_a_line_that_keeps_its_place_is_found_by_its_height():
     found = [one for one in series_resonances(spectra, band_hz=BAND) if one.found]
     assert len(found) >= 8
     assert np.mean([one.crf_hz for one in found]) == pytest.approx(3100.0, abs=10.0)
-    assert all("keeps its place" in one.reason for one in found)
+    assert all("keeps its frequency" in one.reason for one in found)

@@ -8,47 +8,47 @@ import pytest
 from asperity.core.errors import UnreadableFile
 from asperity.recording import open_recording
 from asperity.recording import text as text_reader
-from asperity.recording.timing import Filling, clock_of, timed
+from asperity.recording.timing import GapFiller, fit_clock, rate_from_times
 
-RATES = (2560, 8192, 10_240, 12_800, 20_000, 25_600, 44_100, 48_000, 51_200)
+FAULT_RATE_KEYS = (2560, 8192, 10_240, 12_800, 20_000, 25_600, 44_100, 48_000, 51_200)
 
 
 @pytest.mark.parametrize("digits", [5, 6, 9])
-@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("rate", FAULT_RATE_KEYS)
 def test_the_whole_slope_tells_the_rate(rate, digits):
     times = np.round(3.0 + np.arange(rate) / rate, digits)
-    whole = timed("t", "s", times)
+    whole = rate_from_times("t", "s", times)
     assert whole["rate_hz"] == rate
     assert whole["rate_doubt"] < 2.5e-5
-    assert timed("t", "s", np.delete(times, slice(1000, 1400)))["rate_hz"] == rate
+    assert rate_from_times("t", "s", np.delete(times, slice(1000, 1400)))["rate_hz"] == rate
 
 
 def test_a_rate_that_no_converter_has_is_known_as_well_as_its_times_say():
     times = np.round(np.arange(6000) / 11_937.4, 5)  # half a second
-    found = timed("t", "s", times)
+    found = rate_from_times("t", "s", times)
     assert abs(found["rate_hz"] / 11_937.4 - 1.0) < found["rate_doubt"] < 4e-5
 
 
 def test_gaps_are_found_behind_coarse_times():
     times = np.round(np.arange(44_100) / 44_100.0, 5)
     kept = np.delete(np.arange(44_100), np.r_[500:501, 20_000:23_000])
-    filling = Filling(clock_of(times[kept]))
+    filling = GapFiller(fit_clock(times[kept]))
     whole = np.concatenate(
-        [filling.spread(times[part], part.astype(float)) for part in np.array_split(kept, 7)]
+        [filling.fill(times[part], part.astype(float)) for part in np.array_split(kept, 7)]
     )
     assert whole.size == 44_100
     assert np.flatnonzero(np.isnan(whole)).tolist() == [500, *range(20_000, 23_000)]
     assert np.array_equal(whole[~np.isnan(whole)], kept)
     assert filling.note == "2 gaps in its times: 3001 samples are missing"
-    full = Filling(clock_of(times))
-    assert full.spread(times, times).size == 44_100
+    full = GapFiller(fit_clock(times))
+    assert full.fill(times, times).size == 44_100
     assert full.note == ""
 
 
 def test_times_with_next_to_nothing_between_gaps_are_refused():
     times = np.concatenate([np.arange(100.0), 1e9 + np.arange(100.0)])
     with pytest.raises(UnreadableFile, match="split the recording"):
-        Filling(clock_of(np.arange(200.0))).spread(times, times)
+        GapFiller(fit_clock(np.arange(200.0))).fill(times, times)
 
 
 def rows(rate, gap):

@@ -110,7 +110,7 @@ def test_a_method_without_a_width_determines_no_damping(series):
     assert track.verdict().startswith(
         "Cannot tell: none of the last 3 recordings show what decides"
     )
-    assert "Not determined: " in track.verdict()
+    assert "Too few points: " in track.verdict()
     assert np.isnan([one.severe_probability for one in track.recordings]).all()
     assert track.alarm.state == "cannot-tell"
     assert any(
@@ -125,7 +125,7 @@ def test_a_method_without_a_width_determines_no_damping(series):
     ("ratio", "said"),
     [
         (0.003, "less than 4 times the spectrum's resolution of 6.0 Hz"),
-        (0.0005, "of the line was taken out as tones"),
+        (0.0005, "of the line was removed as tones"),
     ],
 )
 def test_a_line_as_narrow_as_the_spectrum_is_not_taken_for_damping(tmp_path, ratio, said):

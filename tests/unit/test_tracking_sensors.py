@@ -193,7 +193,7 @@ def test_a_sensor_that_was_moved_is_noted_with_its_place(tmp_path, monkeypatch):
         np.savez(tmp_path / f"{number:02d}.npz", acc=heard, fs=RATE, unit="m/s^2")
     assert not any("mounting" in note for note in track_recordings([tmp_path], band_hz=BAND).notes)
     monkeypatch.setattr(
-        "asperity.resonance.series.moved_at",
+        "asperity.resonance.series.first_moved_recording",
         lambda blocks, _: 6 if len(blocks.density) == 14 else None,
     )
     track = track_recordings([tmp_path], band_hz=BAND)

@@ -68,7 +68,7 @@ def test_recordings_that_are_alike_have_no_problems():
         ({"unit": "V"}, "unit differs between recordings: m/s\\^2 \\(a.csv\\), V \\(b.csv\\)"),
         ({"unit": None}, "none \\(b.csv\\)"),
         ({"window": "boxcar"}, "window differs"),
-        ({"load_n": 500.0}, "load is known of 1 of 2 recordings, not of a.csv"),
+        ({"load_n": 500.0}, "load is stated for 1 of 2 recordings, not for a.csv"),
     ],
 )
 def test_a_difference_is_one_sentence_with_both_sides(change, words):

@@ -15,8 +15,7 @@ from benchmarks.alarms import (
 from benchmarks.alarms import warm_up as drawn_warm_up
 
 from asperity.monitoring.alarm import Warming
-from asperity.trend import Watched, warm_up
-from asperity.trend import warm_up as warming
+from asperity.trend import MonitoredSeries, warm_up, warming
 
 
 def test_a_warm_up_is_measured_as_it_was_made():
@@ -25,8 +24,10 @@ def test_a_warm_up_is_measured_as_it_was_made():
     crf = 1.0 - 0.08 * left + 0.002 * rng.standard_normal(NUMBER.size)
     level = 0.5 - 0.4 * left + 0.05 * rng.standard_normal(NUMBER.size)
     found = warm_up(3.0 * NUMBER, crf, level)
-    assert (found.crf, found.level, found.length) == pytest.approx((0.08, 0.4, 15.0), rel=0.2)
-    assert np.abs(found.left) == pytest.approx([0.0, 0.0], abs=0.1)
+    assert (found.crf, found.level, found.time_constant) == pytest.approx(
+        (0.08, 0.4, 15.0), rel=0.2
+    )
+    assert np.abs(found.residual) == pytest.approx([0.0, 0.0], abs=0.1)
     assert warm_up(NUMBER, crf, np.roll(level, 20)) is None  # the level goes its own way
     assert warm_up(NUMBER, 2.0 - crf, level) is None  # oil that warms makes CRF rise
     assert warm_up(NUMBER[:8], crf[:8], level[:8]) is None
@@ -67,8 +68,13 @@ def test_most_warm_ups_are_known_and_no_other_course_is():
 
 
 def watched(name, values, contact):
-    return Watched(
-        name=name, values=values, least=0.05, contact=contact, in_words=str, loud=not contact
+    return MonitoredSeries(
+        name=name,
+        values=values,
+        smallest_change=0.05,
+        contact=contact,
+        describe=str,
+        gain_dependent=not contact,
     )
 
 

@@ -166,7 +166,7 @@ def contact_vibration(
     f0 = np.array(spring.natural_frequency_hz)
     return Vibration(
         resonance=contact_resonance(
-            record.spectrum, band_hz=band_hz, method=model.method, seen=record.line_model
+            record.spectrum, band_hz=band_hz, method=model.method, sampling_factor=record.line_model
         ),
         band_hz=band_hz,
         full_load_crf_hz=full_load_crf_hz,

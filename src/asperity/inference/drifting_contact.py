@@ -28,7 +28,7 @@ from asperity.inference.likelihood import (
 from asperity.inference.observations import Heard, likeness
 from asperity.inference.outputs import CLR
 from asperity.inference.priors import si
-from asperity.inference.settings import OPERATING, TEMPERATURE
+from asperity.inference.settings import OPERATING_KEYS, TEMPERATURE
 from asperity.inference.visits import CHANNELS, Series, Sound
 
 KNOTS = 17  # of the table along the range of what drifts
@@ -247,7 +247,7 @@ class Table(NamedTuple):
 def _aside(forward: Forward, axis: int) -> tuple[Forward, Field]:
     """The same a step aside in load (0), speed (1) or temperature (2), towards the middle of its range; the steps."""
     entry = next(
-        one for one in forward.setting.operating if one.key == (*OPERATING, TEMPERATURE)[axis]
+        one for one in forward.setting.operating if one.key == (*OPERATING_KEYS, TEMPERATURE)[axis]
     )
     low, high = (si(end, entry.unit) for end in (entry.low, entry.high))
     name = ("load_n", "entrainment_m_s", "temperature_k")[axis]

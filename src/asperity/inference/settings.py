@@ -12,7 +12,7 @@ from asperity.study import ParameterRange, full_key, overrides_at, require_range
 
 LOAD, SPEED, TEMPERATURE = "contact.load", "contact.entrainment_speed", "lubricant.temperature"
 OFFSET, GRID_ERROR = "temperature_offset_k", "grid_error"
-OPERATING: Mapping[str, tuple[float, float]] = {
+OPERATING_KEYS: Mapping[str, tuple[float, float]] = {
     LOAD: (0.4, 2.0),
     SPEED: (0.25, 2.0),
 }  # of the case's own
@@ -157,9 +157,11 @@ def setting_of(case: Case) -> Setting:
 def _key_of(case: Case, name: str) -> str:
     """The case key that a name in [infer] means; BadInput for one that is neither an unknown nor an operating one."""
     key = name if name in UNKNOWNS else full_key(case, name, "infer")
-    if key not in UNKNOWNS and key not in (*OPERATING, TEMPERATURE):
+    if key not in UNKNOWNS and key not in (*OPERATING_KEYS, TEMPERATURE):
         known = ", ".join(
-            sorted({entry.rpartition(".")[2] for entry in (*UNKNOWNS, *OPERATING, TEMPERATURE)})
+            sorted(
+                {entry.rpartition(".")[2] for entry in (*UNKNOWNS, *OPERATING_KEYS, TEMPERATURE)}
+            )
         )
         raise BadInput(f"{case.source}: infer.{name} cannot be inferred; what can is {known}")
     return key
@@ -167,7 +169,7 @@ def _key_of(case: Case, name: str) -> str:
 
 def _operating(case: Case, stated: Mapping[str, Any]) -> tuple[ParameterRange, ...]:
     ranges = []
-    for key, (low, high) in OPERATING.items():
+    for key, (low, high) in OPERATING_KEYS.items():
         own, unit = split_amount(stated_value(case, key))
         default = ParameterRange(
             key, low * float(own), high * float(own), unit, "about the case's own"

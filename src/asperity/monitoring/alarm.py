@@ -28,12 +28,13 @@ from asperity.monitoring.recording import TrackedRecording
 from asperity.monitoring.series_state import Before
 from asperity.trend import (
     Alarm,
+    AlarmChecks,
+    AlarmHistory,
     Condition,
-    Said,
-    Sight,
+    MonitoredSeries,
+    RecordingStatus,
     Stages,
     StageSource,
-    Watched,
     knee_weight,
     sequential_alarm,
     warm_up,
@@ -85,17 +86,22 @@ def raise_alarm(
         [*contact, *levels],
         _sights(tracked, contact),
         false_alarm_rate=false_alarm_rate,
-        confirmed=lambda number: _severe(stages_of(tracked[: number + 1])),
-        excused=warming.excuses,
+        checks=AlarmChecks(
+            confirmed=lambda number: _severe(stages_of(tracked[: number + 1])),
+            explanation=warming.excuses,
+        ),
         acknowledged=_acknowledged(tracked, acknowledge),
         unit=unit,
-        said=_said(tracked, before),
+        history=_said(tracked, before),
     )
     if (said_of := warming.said(len(tracked) - 1)) and acknowledge is None:
         alarm = replace(alarm, explained="; ".join(filter(None, [alarm.explained, said_of])))
     elif stages is not None and stages.kind == "severe" and acknowledge is None:
-        chance = f"not yet beyond what chance does once in {1.0 / false_alarm_rate:.0f} recordings"
-        alarm = alarm.alerted(f"a severe stage is found, {chance}", source)
+        alarm = alarm.with_alert(
+            "a severe stage is indicated, not yet significant at the set false-alarm rate "
+            f"(1 in {1.0 / false_alarm_rate:.0f} recordings)",
+            source,
+        )
     return _by_zone(tracked, _acknowledged(tracked, acknowledge), alarm)
 
 
@@ -103,12 +109,16 @@ class Warming:
     """A warm-up known by its shape, where nobody states the temperature that would tell it."""
 
     def __init__(
-        self, x: Field, contact: Sequence[Watched], levels: Sequence[Watched], unit: str
+        self,
+        x: Field,
+        contact: Sequence[MonitoredSeries],
+        levels: Sequence[MonitoredSeries],
+        unit: str,
     ) -> None:
         crf = next((one for one in contact if one.name == CRF), None)
         level = next((one for one in levels if one.name.startswith(RMS)), None)
         self.x, self.unit, self.crf, self.level = x, unit, crf, level
-        self.names = {CRF, *(one.name for one in levels if one.loud)}
+        self.names = {CRF, *(one.name for one in levels if one.gain_dependent)}
         stated = [] if crf is None else [one.name for one in crf.conditions]
         self.known = crf is not None and level is not None and "temperature" not in " ".join(stated)
 
@@ -120,11 +130,11 @@ class Warming:
         found = warm_up(self.x[upto], self.crf.values[upto], self.level.values[upto])
         if (
             found is None
-            or abs(found.left[0]) > LEFT * CRF_LEAST
-            or abs(found.left[1]) > LEFT * LEVEL_LEAST
+            or abs(found.residual[0]) > LEFT * CRF_LEAST
+            or abs(found.residual[1]) > LEFT * LEVEL_LEAST
         ):
             return ""
-        length = f"{found.length:.2g} {self.unit}".rstrip()
+        length = f"{found.time_constant:.2g} {self.unit}".rstrip()
         return (
             f"this looks like a warm-up: CRF {_moved(found.crf)} and {self.level.name} {_times(found.level)}, both by "
             f"one exponential of length {length} from the beginning; state the oil's temperature to be sure"
@@ -135,15 +145,15 @@ class Warming:
         return self.said(number) if name in self.names else ""
 
 
-def _said(tracked: Sequence[TrackedRecording], before: Before | None) -> Said:
+def _said(tracked: Sequence[TrackedRecording], before: Before | None) -> AlarmHistory:
     if before is None:
-        return Said()
+        return AlarmHistory()
     states = {}
     for number, one in enumerate(tracked):
         for file in one.files:
             if file in before.states:
                 states[number] = before.states[file]
-    return Said(states, before.reason, before.raised_by)
+    return AlarmHistory(states, before.reason, before.raised_by)
 
 
 def _severe(stages: Stages | None) -> bool:
@@ -156,12 +166,12 @@ def at_reference(tracked: Sequence[TrackedRecording], response: Response) -> lis
     frequency = (
         np.full(len(tracked), np.nan)
         if crf is None
-        else _usual(tracked) * crf.without_conditions()[0]
+        else _usual(tracked) * crf.at_baseline_conditions()[0]
     )
     ratio = (
         np.full(len(tracked), np.nan)
         if damping is None
-        else np.exp(-damping.without_conditions()[0])
+        else np.exp(-damping.at_baseline_conditions()[0])
     )
     return [
         replace(one, crf_reference_hz=float(hertz), damping_reference=float(share))
@@ -187,38 +197,38 @@ def _conditions(
     return conditions_of([one.operating for one in tracked], follows, response.oil)
 
 
-def _crf(tracked: Sequence[TrackedRecording], response: Response) -> Watched | None:
+def _crf(tracked: Sequence[TrackedRecording], response: Response) -> MonitoredSeries | None:
     crf = np.array([one.resonance.crf_hz for one in tracked])
     if not np.isfinite(crf).any():
         return None
-    return Watched(
+    return MonitoredSeries(
         name=CRF,
         values=crf / _usual(tracked),
-        least=CRF_LEAST,
+        smallest_change=CRF_LEAST,
         contact=True,
-        in_words=_moved,
+        describe=_moved,
         conditions=_conditions(tracked, response.crf, response),
         relative=True,
     )
 
 
-def _damping(tracked: Sequence[TrackedRecording], response: Response) -> Watched | None:
+def _damping(tracked: Sequence[TrackedRecording], response: Response) -> MonitoredSeries | None:
     ratio = np.array([one.damping[0] for one in tracked])
     if not np.isfinite(ratio).any():
         return None
-    return Watched(
+    return MonitoredSeries(
         name="damping",
         values=-np.log(ratio),
-        least=DAMPING_LEAST,
+        smallest_change=DAMPING_LEAST,
         contact=True,
-        in_words=lambda by: _times(-by),
+        describe=lambda by: _times(-by),
         conditions=_conditions(tracked, DAMPING, response),
     )
 
 
 def _of_the_contact(
     tracked: Sequence[TrackedRecording], source: StageSource, response: Response
-) -> list[Watched]:
+) -> list[MonitoredSeries]:
     crf, damping = _crf(tracked, response), _damping(tracked, response)
     if source == "both" and (crf is None or damping is None):
         return []
@@ -229,7 +239,7 @@ def _of_the_contact(
     ]
 
 
-def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Watched]:
+def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[MonitoredSeries]:
     """Level and kurtosis of every recording of a running machine, on each sensor."""
     sensors = dict.fromkeys(name for one in tracked for name in one.readings)
     several = len(sensors) > 1
@@ -250,7 +260,7 @@ def _levels_on(
     readings: Sequence[Reading | None],
     tracked: Sequence[TrackedRecording],
     response: Response,
-) -> list[Watched]:
+) -> list[MonitoredSeries]:
     """What one sensor heard, in the unit that most of its recordings have; None where it has none."""
     units = Counter(one.unit for one in readings if one is not None and one.quality is not None)
     if not units:
@@ -290,14 +300,14 @@ def _levels_on(
     met, of_pulses = (_conditions(tracked, follows, response) for follows in (LEVEL, PULSES))
     every = {words: logarithms(value) for words, value in (heard | deep).items()}
     return [
-        Watched(
+        MonitoredSeries(
             name=f"{words} on {sensor}" if sensor else words,
             values=values,
-            least=LEVEL_LEAST,
+            smallest_change=LEVEL_LEAST,
             contact=False,
-            in_words=_times,
-            loud=words not in deep and words != KURTOSIS,
-            jumps=words in deep,
+            describe=_times,
+            gain_dependent=words not in deep and words != KURTOSIS,
+            step_alarms=words in deep,
             sensor=sensor,
             conditions=of_pulses if words in deep or words in lines or words == KURTOSIS else met,
         )
@@ -321,12 +331,14 @@ def _by_zone(tracked: Sequence[TrackedRecording], first: int, alarm: Alarm) -> A
         if before == zone == "D":
             sooner = alarm.state == "alarm" and alarm.since is not None and alarm.since <= number
             return (
-                alarm if sooner else alarm.raised_from(number, tracked[number].severity(), "zone")
+                alarm
+                if sooner
+                else alarm.with_alarm_since(number, tracked[number].severity(), "zone")
             )
     lately = zones[-2:]
     known = len(lately) == 2 and lately[-1][0] == len(tracked) - 1
     if known and min(zone for _, zone in lately) == "C" and alarm.state == "none":
-        return alarm.alerted(tracked[-1].severity(), "zone")
+        return alarm.with_alert(tracked[-1].severity(), "zone")
     return alarm
 
 
@@ -338,7 +350,9 @@ def _times(by: float) -> str:
     return f"{'rose' if by > 0.0 else 'fell'} to {np.exp(by):.3g} times what it was"
 
 
-def _sights(tracked: Sequence[TrackedRecording], contact: Sequence[Watched]) -> list[Sight]:
+def _sights(
+    tracked: Sequence[TrackedRecording], contact: Sequence[MonitoredSeries]
+) -> list[RecordingStatus]:
     """What each recording lets one see of the machine."""
     seen = np.any(
         [np.zeros(len(tracked), dtype=bool), *(np.isfinite(one.values) for one in contact)], axis=0
@@ -347,16 +361,18 @@ def _sights(tracked: Sequence[TrackedRecording], contact: Sequence[Watched]) -> 
     for number, recording in enumerate(tracked):
         if recording.dead:
             sights.append(
-                Sight("blind", f"{Path(recording.file).name}: {recording.reading.reason}")
+                RecordingStatus("blind", f"{Path(recording.file).name}: {recording.reading.reason}")
             )
         elif seen[max(number - UNSEEN + 1, 0) : number + 1].any():
-            sights.append(Sight())
+            sights.append(RecordingStatus())
         else:
             why = recording.resonance.reason or "not determined"
             last = (
                 "recording shows" if number == 0 else f"{min(number + 1, UNSEEN)} recordings show"
             )
-            sights.append(Sight("cannot-tell", f"none of the last {last} what decides ({why})"))
+            sights.append(
+                RecordingStatus("cannot-tell", f"none of the last {last} what decides ({why})")
+            )
     return sights
 
 

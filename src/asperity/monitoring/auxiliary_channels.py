@@ -16,7 +16,7 @@ from asperity.core.errors import BadInput
 from asperity.core.signals import averaged_spectrum
 from asperity.monitoring.files import Place
 from asperity.monitoring.target import Target
-from asperity.recording import OPERATING, OpenRecording, other_channel
+from asperity.recording import OPERATING_KEYS, OpenRecording, raw_channel
 from asperity.vibration import (
     Envelope,
     Turning,
@@ -96,7 +96,7 @@ def beside(opened: OpenRecording, place: Place | None) -> Beside:
             remarks.append(str(refusal))
     stated = {
         key: (f"{value:.10g}", "table")
-        for key in OPERATING
+        for key in OPERATING_KEYS
         if (value := getattr(place, key, None)) is not None
     }
     return Beside(facts=facts | stated, turning=turning, remarks=tuple(remarks))
@@ -178,7 +178,7 @@ def bands(opened: OpenRecording, frequency_hz: Field, density: Field) -> dict[st
 
 def _channel_in(path: Path, key: str, name: str) -> Field:
     """The values of a channel in the unit of a condition's key."""
-    channel = other_channel(path, name)
+    channel = raw_channel(path, name)
     return _values(path, name, None) * (
         _factor(channel.unit.strip(), key, path, name) if channel.unit else 1.0
     )
@@ -197,7 +197,7 @@ def _factor(unit: str, key: str, path: Path, name: str) -> float:
 
 def _require_beside(opened: OpenRecording, name: str) -> None:
     """BadInput for a tacho whose samples are not those of the vibration."""
-    tacho = other_channel(opened.path, name)
+    tacho = raw_channel(opened.path, name)
     for what, its, vibrations in (
         ("Hz", tacho.rate_hz, opened.channel.rate_hz),
         ("samples", tacho.samples, opened.samples),
@@ -211,7 +211,7 @@ def _require_beside(opened: OpenRecording, name: str) -> None:
 
 def _values(path: Path, name: str, most: int | None) -> Field:
     held: list[Any] = []
-    for block in other_channel(path, name).blocks(1 << 18):
+    for block in raw_channel(path, name).blocks(1 << 18):
         held.append(np.asarray(block, dtype=float))
         if most is not None and sum(part.size for part in held) >= most:
             break

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import require_file
-from asperity.recording import OPERATING, is_sidecar
+from asperity.recording import OPERATING_KEYS, is_sidecar
 
 _NO_RECORDINGS = {
     ".html",
@@ -251,10 +251,10 @@ def read_table(path: str | Path) -> Table:
     others = [
         name
         for name in columns
-        if name not in ("file", SENSOR, *OPERATING) and not name.endswith("_std")
+        if name not in ("file", SENSOR, *OPERATING_KEYS) and not name.endswith("_std")
     ]
     _require_units(path, others)
-    if "file" not in columns or not (others or set(columns) & {SENSOR, *OPERATING}):
+    if "file" not in columns or not (others or set(columns) & {SENSOR, *OPERATING_KEYS}):
         raise UnreadableFile(
             f"{path} needs a column file and one of x, such as sq_um; got {', '.join(columns) or 'none'}"
         )
@@ -268,7 +268,7 @@ def read_table(path: str | Path) -> Table:
             column: _number(
                 (row.get(column) or "").strip(), delimiter, f"{path}, line {number}: {column}"
             )
-            for column in (x_name, f"{x_name}_std", *OPERATING)
+            for column in (x_name, f"{x_name}_std", *OPERATING_KEYS)
         }
         _require_possible(said, f"{path}, line {number}")
         x, x_std = said.pop(x_name), said.pop(f"{x_name}_std")
@@ -301,7 +301,7 @@ def _require_units(path: Path, columns: Sequence[str]) -> None:
 
 def _require_possible(said: Mapping[str, float | None], where: str) -> None:
     """BadInput for a load or speed that is not positive, and a temperature below absolute zero."""
-    for column in OPERATING:
+    for column in OPERATING_KEYS:
         value, least = said[column], ABSOLUTE_ZERO if column == "temperature_degc" else 0.0
         if value is not None and value <= least:
             raise BadInput(

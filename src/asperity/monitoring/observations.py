@@ -178,7 +178,9 @@ def _together(
         cleaned.get(first),
         line.resonance,
         on_sensors={
-            name: OnSensor(reading=reading, alone=line.alone.get(name), hears=name in line.heard_on)
+            name: OnSensor(
+                reading=reading, alone=line.alone.get(name), hears=name in line.detected_on
+            )
             for name, reading in one.readings.items()
         },
         remounted=next((name for file, name in memory.moved if one.holds(file, name)), None),

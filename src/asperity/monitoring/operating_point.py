@@ -26,7 +26,7 @@ from asperity.core.files import make_folder, user_cache, write_text
 from asperity.lubricant import OilSheet
 from asperity.monitoring.files import Place
 from asperity.monitoring.reading import Reading
-from asperity.recording import OPERATING
+from asperity.recording import OPERATING_KEYS
 from asperity.trend import Condition
 
 ZERO_CELSIUS = 273.15
@@ -59,7 +59,7 @@ class Operating:
 def operating_of(reading: Reading, place: Place | None) -> Operating:
     """As the table says, or else a sidecar, or a channel of the recording."""
     said: dict[str, float | None] = {}
-    for key in OPERATING:
+    for key in OPERATING_KEYS:
         beside = reading.facts.get(key)
         stated = None if place is None else getattr(place, key)
         said[key] = float(beside[0]) if stated is None and beside is not None else stated
@@ -180,7 +180,7 @@ def response_of(case: Case | None, met: Sequence[Operating]) -> Response:
     changed = any(
         shown is not None
         and np.nanmax(shown) - np.nanmin(shown) > WORTH_SOLVING * np.nanmax(np.abs(shown))
-        for shown in (_known(met, attrgetter(key)) for key in OPERATING)
+        for shown in (_known(met, attrgetter(key)) for key in OPERATING_KEYS)
     )
     oil = case.oil_sheet or USUAL_OIL
     if not changed:

@@ -26,12 +26,12 @@ from asperity.monitoring.files import Place
 from asperity.monitoring.target import Target
 from asperity.rating import velocity_rms
 from asperity.recording import (
-    Gauge,
     OpenRecording,
     Quality,
     ReadOptions,
+    SampleStatistics,
     open_recording,
-    stated_beside,
+    read_sidecar,
 )
 from asperity.vibration import Envelope
 
@@ -113,8 +113,8 @@ def read_spectrum(
     )
     told = beside(opened, place)
     rates_hz = rates(opened, told, target)
-    gauge, envelope = Gauge(), Envelope(opened.rate_hz)
-    blocks = gauge.without_stuck(gauge.watch(opened.blocks()))
+    gauge, envelope = SampleStatistics(), Envelope(opened.rate_hz)
+    blocks = gauge.without_stuck(gauge.pass_through(opened.blocks()))
     segment = segment_length(opened.rate_hz, spacing_hz)
     try:
         spectrum: Spectrum | None = averaged_spectrum(
@@ -171,7 +171,7 @@ def _sensor_of_refused(path: Path, place: Place | None) -> str:
     if place is not None and place.sensor is not None:
         return place.sensor
     try:
-        return str(stated_beside(path)[0].get("sensor", ""))
+        return str(read_sidecar(path)[0].get("sensor", ""))
     except BadInput:
         return ""
 

@@ -12,7 +12,7 @@ from asperity.core.quantities import quantity
 from asperity.monitoring.operating_point import Operating
 from asperity.monitoring.reading import Reading
 from asperity.rating import ZONES, severity_zone
-from asperity.resonance import DISAGREE, CleanSpectrum, Resonance
+from asperity.resonance import SENSORS_DISAGREE, CleanSpectrum, Resonance
 from asperity.trend import AlarmState
 
 MISSED = 3  # recordings without one of the sensors, from which on that is said
@@ -219,7 +219,7 @@ def heard_in_words(recordings: Sequence[TrackedRecording]) -> str:
         if said
         else "No line was heard as one by two sensors."
     )
-    apart = sum(one.resonance.reason.startswith(DISAGREE) for one in recordings)
+    apart = sum(one.resonance.reason.startswith(SENSORS_DISAGREE) for one in recordings)
     if apart:
         sentence += f" The sensors disagree in {apart}: that is no single claim."
     for name in names:

@@ -49,7 +49,7 @@ class Together(NamedTuple):
     """What sensors say of a recording: the line, who hears it, and each by itself."""
 
     resonance: Resonance
-    heard_on: tuple[str, ...]
+    detected_on: tuple[str, ...]
     alone: Mapping[str, Resonance | None]
 
 
@@ -178,9 +178,11 @@ class Learned:
 
 def _by_recording(told: SensorLines) -> list[Together]:
     return [
-        Together(resonance, heard_on, {name: every[number] for name, every in told.alone.items()})
-        for number, (resonance, heard_on) in enumerate(
-            zip(told.resonances, told.heard_on, strict=True)
+        Together(
+            resonance, detected_on, {name: every[number] for name, every in told.alone.items()}
+        )
+        for number, (resonance, detected_on) in enumerate(
+            zip(told.resonances, told.detected_on, strict=True)
         )
     ]
 

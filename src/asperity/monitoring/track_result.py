@@ -20,7 +20,7 @@ from asperity.monitoring.forecast import FORECAST, Foretold
 from asperity.monitoring.recording import NAMED, TrackedRecording, heard_in_words
 from asperity.monitoring.silence import SILENCE
 from asperity.monitoring.target import Target
-from asperity.trend import IN_WORDS, Alarm, AlarmState, Stages, StageSource
+from asperity.trend import SOURCE_NAMES, Alarm, AlarmState, Stages, StageSource
 
 if TYPE_CHECKING:
     import pandas
@@ -112,7 +112,7 @@ class Track:
             return track
         reason = forecast.sentence().rstrip(".")
         return replace(
-            track, alarm=self.alarm.raised_from(len(self.alarm.states) - 1, reason, FORECAST)
+            track, alarm=self.alarm.with_alarm_since(len(self.alarm.states) - 1, reason, FORECAST)
         )
 
     def verdict(self) -> str:
@@ -154,7 +154,7 @@ class Track:
         decides = None if self.stages is None else self.stages.source
         return [
             (
-                f"stage by {IN_WORDS[source]}{', which decides' if source == decides else ''}",
+                f"stage by {SOURCE_NAMES[source]}{', which decides' if source == decides else ''}",
                 stages.verdict,
             )
             for source, stages in self.stages_by.items()

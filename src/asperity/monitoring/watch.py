@@ -32,9 +32,9 @@ from asperity.monitoring.store import STORE, Version
 from asperity.monitoring.target import Target, search_target
 from asperity.monitoring.track import judge
 from asperity.monitoring.track_result import Track
-from asperity.recording import ReadOptions, names_beside
+from asperity.recording import ReadOptions, sidecar_names
 from asperity.resonance import SeriesMethod
-from asperity.trend import ALARM_STATES, FALSE_ALARMS, AlarmState, Detector, StageSource
+from asperity.trend import ALARM_STATES, FALSE_ALARM_RATE, AlarmState, Detector, StageSource
 
 SUFFIXES = (".toml", ".json")  # of sidecars
 STRIDE = 80  # recordings that are judged together where many arrive at once
@@ -72,7 +72,7 @@ def watch_folder(
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
     stages_from: StageSource = "crf",
-    false_alarm_rate: float = FALSE_ALARMS,
+    false_alarm_rate: float = FALSE_ALARM_RATE,
     acknowledge: str | None = None,
     store: str | Path | None = None,
     machine: str | None = None,
@@ -229,7 +229,7 @@ def version_of(path: Path) -> Version:
     beside = next(
         (
             path.with_name(name)
-            for name in names_beside(path.name)
+            for name in sidecar_names(path.name)
             if path.with_name(name).is_file()
         ),
         None,
@@ -296,7 +296,7 @@ class _Memory:
                 self.unnamed.add(entry.name)
                 continue
             beside = (
-                next((name for name in names_beside(entry.name) if name in sidecars), None)
+                next((name for name in sidecar_names(entry.name) if name in sidecars), None)
                 if sidecars
                 else None
             )

@@ -1,5 +1,5 @@
-from .check import Gauge as Gauge
 from .check import Quality as Quality
+from .check import SampleStatistics as SampleStatistics
 from .check import check_recording as check_recording
 from .model import ACCELERATION as ACCELERATION
 from .model import Channel as Channel
@@ -9,9 +9,9 @@ from .model import ReadOptions as ReadOptions
 from .model import Recording as Recording
 from .read import open_channels as open_channels
 from .read import open_recording as open_recording
-from .read import other_channel as other_channel
+from .read import raw_channel as raw_channel
 from .read import read_recording as read_recording
-from .sidecar import OPERATING as OPERATING
+from .sidecar import OPERATING_KEYS as OPERATING_KEYS
 from .sidecar import is_sidecar as is_sidecar
-from .sidecar import names_beside as names_beside
-from .sidecar import stated_beside as stated_beside
+from .sidecar import read_sidecar as read_sidecar
+from .sidecar import sidecar_names as sidecar_names

@@ -1,7 +1,6 @@
-"""Whether a recording can be used: length, gaps, clipping, offset, a machine that stood still.
+"""Check of a recording: length, gaps, clipping, offset, and a machine that was off.
 
-Sample statistics only, gathered while the blocks go by to the spectrum; what the spectrum says is
-left to others.
+Sample statistics only, gathered while blocks pass to the spectrum.
 """
 
 from collections.abc import Iterable, Iterator
@@ -14,31 +13,33 @@ from numpy.typing import NDArray
 from asperity.core.arrays import Field, Mask
 from asperity.recording.model import UNKNOWN, OpenRecording
 
-QUIET = 0.01  # m/s^2 rms: the noise of an accelerometer, not a machine
-STEPS_OF_NOISE = (
-    1.5  # standard deviation in steps of the converter, below which only its last digit moves
+QUIET = 0.01  # m/s^2 rms: an accelerometer's noise
+QUIET_STEPS = 1.5  # standard deviation in converter steps below which only the last digit changes
+CLIPPED_RUN = 3  # equal extreme samples in a row that count as clipping
+CLIPPED_SHARE = 1e-3  # above which CRFA is too low
+HEIGHT_BINS = 1024  # bins of the histogram of heights
+TOP_FROM, COMPARED_FROM = (
+    0.95,
+    0.85,
+)  # of the largest value: the top bins, and those compared with them
+PILED_DENSITY_RATIO = (
+    1.5  # density at the top over that below it; unclipped signals are sparser at the top
 )
-CLIPPED_RUN = 3  # equal extreme samples in a row that make clipping
-CLIPPED_SHARE = 1e-3  # from which CRFA is off
-HEIGHTS = 1024  # steps in which heights are counted
-TOP, BELOW = 0.95, 0.85  # of the largest value: from there on, and from there to the first
-PILED = 1.5  # times as dense at the top as below it: what is not cut off falls towards its extremes
-FEWEST_AT_TOP = 50  # samples
-STUCK = 50  # equal samples in a row that make a stuck stretch
-MOST_STUCK = 0.5  # of the samples, from which the rest is no recording
-OFFSET = 3.0  # mean over standard deviation, from which the offset eats the converter's range
-PIECES = 16  # half-power widths that a record must hold in time for its line to be told from chance
-USABLE_BAND = 0.4  # of the sampling rate: above, the anti-alias filter has cut
+FEWEST_TOP_SAMPLES = 50  # samples
+STUCK_RUN = 50  # equal samples in a row that count as stuck
+LARGEST_STUCK_SHARE = 0.5  # of the samples, above which the recording is refused
+OFFSET_RATIO = 3.0  # mean over rms above which the offset takes up the converter's range
+FEWEST_WIDTHS = 16  # duration times half-power width that the detection of a line needs
+USABLE_BAND = 0.4  # of the sampling rate; the anti-alias filter cuts above
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quality:
-    """What the samples of a recording are like.
+    """Sample statistics of a recording, and its faults.
 
     `rms` (about the mean), `peak` (from the mean), `offset` in the recording's unit; `kurtosis` is
-    3 for Gaussian noise; `missing`, `clipped`, `stuck` shares of the samples, 0 to 1. `faults` are
-    sentences for which it must not be used, `remarks` such that a reader of its numbers has to
-    know.
+    3 for Gaussian noise; `missing`, `clipped`, `stuck` are shares of the samples, 0 to 1. `faults`
+    are sentences that exclude the recording from use, `remarks` sentences that qualify its numbers.
     """
 
     samples: int
@@ -57,22 +58,22 @@ class Quality:
 
     @property
     def dead(self) -> bool:
-        """Whether nothing of the machine is heard: it is off, or the sensor stands still."""
-        return self.off or self.stuck > MOST_STUCK
+        """True where the machine was off or the sensor is stuck."""
+        return self.off or self.stuck > LARGEST_STUCK_SHARE
 
     @property
     def crest(self) -> float:
-        """Peak over rms; nan where nothing moves."""
+        """Peak over rms; nan for a constant signal."""
         return self.peak / self.rms if self.rms > 0.0 else np.nan
 
     @property
     def usable(self) -> bool:
-        """Whether its spectrum means anything."""
+        """True where no fault excludes the recording."""
         return not self.faults
 
 
-class Gauge:
-    """Gathers statistics of blocks as they pass through `watch`."""
+class SampleStatistics:
+    """Statistics of blocks, gathered as they pass through `pass_through`."""
 
     def __init__(self) -> None:
         self.samples = self.finite = self.gaps = self.clipped_low = self.clipped_high = (
@@ -81,81 +82,81 @@ class Gauge:
         self.mean = self.squares = self.cubes = self.fourths = 0.0  # sums of powers about the mean
         self.low, self.high = np.inf, -np.inf
         self.step: float | None = None
-        self._heights: NDArray[np.int64] = np.zeros((2, HEIGHTS), dtype=np.int64)
+        self._heights: NDArray[np.int64] = np.zeros((2, HEIGHT_BINS), dtype=np.int64)
         self._top = 0.0
         self._centre: float | None = None
         self._last = np.zeros(0)
         self._in_gap = False
         self._run = 0
 
-    def watch(self, blocks: Iterable[Field]) -> Iterator[Field]:
-        """Pass the blocks on."""
+    def pass_through(self, blocks: Iterable[Field]) -> Iterator[Field]:
+        """Yield the blocks unchanged and add them to the statistics."""
         for block in blocks:
             if block.size:
-                self._take(block)
+                self._add(block)
             yield block
 
-    def _take(self, block: Field) -> None:
+    def _add(self, block: Field) -> None:
         self.samples += block.size
         mean = float(block.mean())
         if np.isfinite(mean):
-            values, begins = block, 0
+            values, new_gaps = block, 0
             self._in_gap = False
         else:
             known = np.isfinite(block)
             edges = np.flatnonzero(known[:-1] & ~known[1:]).size
-            begins = edges + (not known[0] and not self._in_gap)
+            new_gaps = edges + (not known[0] and not self._in_gap)
             self._in_gap = not bool(known[-1])
             values = block[known]
             mean = float(values.mean()) if values.size else 0.0
-        self.gaps += begins
+        self.gaps += new_gaps
         if not values.size:
             return
-        self._moments(values, mean)
-        self._extremes(values)
+        self._add_moments(values, mean)
+        self._update_extremes(values)
         self._count_heights(values, mean)
-        self._stand_still(values)
+        self._count_stuck(values)
         if self.step is None:
             self.step = _converter_step(values[: 1 << 16])
 
-    def _moments(self, values: Field, mean: float) -> None:
-        """Joins the block's central moments to those before (Pébay, Sandia report SAND2008-6212)."""
+    def _add_moments(self, values: Field, mean: float) -> None:
+        """Merge the block's central moments (Pébay, Sandia report SAND2008-6212)."""
         centred = values - mean
         square = centred**2
-        squares, cubes, fourths = (  # BLAS would wake its threads
+        squares, cubes, fourths = (  # not by BLAS, which would start its threads
             float(np.einsum("i,i->", *pair))
             for pair in ((centred, centred), (square, centred), (square, square))
         )
-        before, here = self.finite, values.size
-        both, apart = before + here, mean - self.mean
+        before, added = self.finite, values.size
+        total, distance = before + added, mean - self.mean
         self.fourths += (
             fourths
-            + apart**4 * before * here * (before**2 - before * here + here**2) / both**3
-            + 6.0 * apart**2 * (before**2 * squares + here**2 * self.squares) / both**2
-            + 4.0 * apart * (before * cubes - here * self.cubes) / both
+            + distance**4 * before * added * (before**2 - before * added + added**2) / total**3
+            + 6.0 * distance**2 * (before**2 * squares + added**2 * self.squares) / total**2
+            + 4.0 * distance * (before * cubes - added * self.cubes) / total
         )
         self.cubes += (
             cubes
-            + apart**3 * before * here * (before - here) / both**2
-            + 3.0 * apart * (before * squares - here * self.squares) / both
+            + distance**3 * before * added * (before - added) / total**2
+            + 3.0 * distance * (before * squares - added * self.squares) / total
         )
-        self.squares += squares + apart**2 * before * here / both
-        self.mean += apart * here / both
-        self.finite = both
+        self.squares += squares + distance**2 * before * added / total
+        self.mean += distance * added / total
+        self.finite = total
 
-    def _extremes(self, values: Field) -> None:
+    def _update_extremes(self, values: Field) -> None:
         low, high = float(values.min()), float(values.max())
         if low < self.low:
             self.low, self.clipped_low = low, 0
         if high > self.high:
             self.high, self.clipped_high = high, 0
         if low == self.low:
-            self.clipped_low += _in_runs(values == low)
+            self.clipped_low += _samples_in_runs(values == low)
         if high == self.high:
-            self.clipped_high += _in_runs(values == high)
+            self.clipped_high += _samples_in_runs(values == high)
 
     def _count_heights(self, values: Field, mean: float) -> None:
-        """Counts heights above and below the first mean, in steps that grow with the largest one."""
+        """Count heights above and below the first mean, in bins that grow with the largest one."""
         if self._centre is None:
             self._centre = mean
         heights = values - self._centre
@@ -167,30 +168,35 @@ class Gauge:
             self._top *= 2.0
         if self._top > 0.0:
             for side, over in enumerate((heights[heights > 0.0], -heights[heights < 0.0])):
-                step = np.minimum((over * (HEIGHTS / self._top)).astype(np.int64), HEIGHTS - 1)
-                self._heights[side] += np.bincount(step, minlength=HEIGHTS)
+                step = np.minimum(
+                    (over * (HEIGHT_BINS / self._top)).astype(np.int64), HEIGHT_BINS - 1
+                )
+                self._heights[side] += np.bincount(step, minlength=HEIGHT_BINS)
 
     @property
     def piled(self) -> bool:
-        """Whether values pile up below the largest or the least: a range that is left softly, or a tone alone."""
-        return any(_piled(side) for side in self._heights)
+        """True where values pile up below an extreme: soft clipping, or a pure tone."""
+        return any(_is_piled(side) for side in self._heights)
 
     def without_stuck(self, blocks: Iterable[Field]) -> Iterator[Field]:
-        """Pass the blocks on with stretches that stand still as missing: samples were lost there, and held or filled.
+        """Yield the blocks with stuck stretches as missing: samples were lost, and held or filled.
 
-        A box of held values raises the spectrum below the inverse of its length, and boxes in
-        turns make lines. What stands still for most of the time is left as it is, and refused by
-        `quality`.
+        Held values raise the spectrum below the inverse of their length, and regular ones cause
+        lines. A block that is mostly stuck is passed unchanged and refused by `quality`.
         """
         for block in blocks:
-            hit = _stuck(block)
-            yield block if hit is None or hit.mean() > MOST_STUCK else np.where(hit, np.nan, block)
+            stuck_mask = _stuck_samples(block)
+            yield (
+                block
+                if stuck_mask is None or stuck_mask.mean() > LARGEST_STUCK_SHARE
+                else np.where(stuck_mask, np.nan, block)
+            )
 
-    def _stand_still(self, values: Field) -> None:
-        """Counts samples that equal `STUCK` neighbours in a row; compared at a distance first, which is rare."""
-        hit = _stuck(values)
-        if hit is not None:
-            self.stuck += int(hit.sum())
+    def _count_stuck(self, values: Field) -> None:
+        """Count the samples of stuck stretches."""
+        stuck_mask = _stuck_samples(values)
+        if stuck_mask is not None:
+            self.stuck += int(stuck_mask.sum())
 
     def quality(
         self,
@@ -199,80 +205,98 @@ class Gauge:
         width_hz: float | None,
         band_hz: tuple[float, float] | None,
     ) -> Quality:
-        """What was gathered, judged for a resonance `width_hz` wide (half power) somewhere in `band_hz`."""
-        rms = float(np.sqrt(self.squares / self.finite)) if self.finite else 0.0
-        duration = self.samples / recording.rate_hz
-        clipped = (self.clipped_low + self.clipped_high) / max(self.finite, 1)
-        if self.high == self.low:
-            clipped = 0.0
-        unit = recording.unit if recording.unit != UNKNOWN else "(unit unknown)"
-        off = _off(rms, self.step, comparable=recording.comparable) if self.finite else False
-        faults: list[str] = []
-        remarks = list(recording.notes)
-        if self.finite < 2:
-            faults.append(f"it holds {self.finite} values")
-        elif off:
-            faults.append(f"the machine was off, or the sensor disconnected: rms {rms:.2g} {unit}")
-        if width_hz is not None and duration * width_hz < PIECES and self.finite >= 2:
-            faults.append(
-                f"too short: {duration:.3g} s, where a resonance {width_hz:.0f} Hz wide needs {PIECES / width_hz:.2g} s"
-            )
-        if band_hz is not None and band_hz[1] > USABLE_BAND * recording.rate_hz:
-            faults.append(
-                f"sampled too slowly: {recording.rate_hz:g} Hz, where a band up to {band_hz[1]:.0f} Hz needs "
-                f"{ceil(band_hz[1] / USABLE_BAND)} Hz"
-            )
-        if not off and self.stuck > MOST_STUCK * self.finite:
-            faults.append(
-                f"it stands still for {100 * self.stuck / self.finite:.4g} % of the time: a dead sensor?"
-            )
+        """Judge the statistics for a resonance `width_hz` wide (half power) within `band_hz`."""
+        off = _off(self._rms, self.step, comparable=recording.comparable) if self.finite else False
         missing = (self.samples - self.finite) / max(self.samples, 1)
-        if missing > 0.5 and self.finite >= 2:
-            faults.append(f"{100 * missing:.0f} % of its samples are missing")
-        elif self.gaps:
-            remarks.append(
-                f"{self.gaps} {'gap' if self.gaps == 1 else 'gaps'}, {100 * missing:.2g} % of the samples missing"
-            )
-        if not off:
-            if clipped > 0.0:
-                worth = "CRFA is too low" if clipped > CLIPPED_SHARE else "hardly matters"
-                remarks.append(
-                    f"clipped at its extremes: {100 * clipped:.2g} % of the samples, {worth}"
-                )
-            elif self.piled:
-                remarks.append(
-                    "values pile up below the largest: soft clipping, which makes CRFA too low, or a tone alone"
-                )
-            if 0 < self.stuck <= MOST_STUCK * self.finite:
-                remarks.append(
-                    f"stands still for {100 * self.stuck / self.finite:.2g} % of the time: samples lost? Left out"
-                )
-            if rms > 0.0 and abs(self.mean) > OFFSET * rms:
-                remarks.append(
-                    f"offset of {self.mean:.3g} {unit}, {abs(self.mean) / rms:.1f} times the rms; it is removed"
-                )
-        if not recording.comparable:
-            what = (
-                "are of unknown unit"
-                if recording.unit == UNKNOWN
-                else f"in {unit} are no accelerations"
-            )
-            remarks.append(f"amplitudes {what}: CRF can be used, CRFA is not comparable")
         return Quality(
             samples=self.samples,
-            duration_s=duration,
-            rms=rms,
+            duration_s=self.samples / recording.rate_hz,
+            rms=self._rms,
             peak=max(self.high - self.mean, self.mean - self.low) if self.finite else 0.0,
             offset=self.mean,
             kurtosis=self.finite * self.fourths / self.squares**2 if self.squares > 0.0 else np.nan,
             missing=missing,
             gaps=self.gaps,
-            clipped=clipped,
+            clipped=self._clipped,
             stuck=self.stuck / max(self.finite, 1),
             off=off,
-            faults=tuple(faults),
-            remarks=tuple(dict.fromkeys(remarks)),
+            faults=tuple(self._faults(recording, off, missing, width_hz, band_hz)),
+            remarks=tuple(dict.fromkeys(self._remarks(recording, off, missing))),
         )
+
+    @property
+    def _rms(self) -> float:
+        return float(np.sqrt(self.squares / self.finite)) if self.finite else 0.0
+
+    @property
+    def _clipped(self) -> float:
+        if self.high == self.low:
+            return 0.0
+        return (self.clipped_low + self.clipped_high) / max(self.finite, 1)
+
+    def _faults(
+        self,
+        recording: OpenRecording,
+        off: bool,
+        missing: float,
+        width_hz: float | None,
+        band_hz: tuple[float, float] | None,
+    ) -> Iterator[str]:
+        """Yield the reasons why the recording cannot be used."""
+        duration = self.samples / recording.rate_hz
+        if self.finite < 2:
+            yield f"it holds {self.finite} values"
+        elif off:
+            unit = _unit_in_words(recording)
+            yield f"the machine was off, or the sensor disconnected: rms {self._rms:.2g} {unit}"
+        if width_hz is not None and duration * width_hz < FEWEST_WIDTHS and self.finite >= 2:
+            yield (
+                f"too short: {duration:.3g} s; a resonance {width_hz:.0f} Hz wide needs "
+                f"{FEWEST_WIDTHS / width_hz:.2g} s"
+            )
+        if band_hz is not None and band_hz[1] > USABLE_BAND * recording.rate_hz:
+            yield (
+                f"sampled too slowly: {recording.rate_hz:g} Hz; a band up to {band_hz[1]:.0f} Hz "
+                f"needs {ceil(band_hz[1] / USABLE_BAND)} Hz"
+            )
+        if not off and self.stuck > LARGEST_STUCK_SHARE * self.finite:
+            yield f"constant for {100 * self.stuck / self.finite:.4g} % of the time: a dead sensor?"
+        if missing > 0.5 and self.finite >= 2:
+            yield f"{100 * missing:.0f} % of its samples are missing"
+
+    def _remarks(self, recording: OpenRecording, off: bool, missing: float) -> Iterator[str]:
+        """Yield sentences that qualify the recording's numbers."""
+        yield from recording.notes
+        if self.gaps and not (missing > 0.5 and self.finite >= 2):
+            gaps = "1 gap" if self.gaps == 1 else f"{self.gaps} gaps"
+            yield f"{gaps}, {100 * missing:.2g} % of the samples missing"
+        if not off:
+            yield from self._remarks_on_values(_unit_in_words(recording))
+        if not recording.comparable:
+            why = (
+                "are of unknown unit"
+                if recording.unit == UNKNOWN
+                else f"in {recording.unit} are not accelerations"
+            )
+            yield f"amplitudes {why}: CRF can be used, CRFA is not comparable"
+
+    def _remarks_on_values(self, unit: str) -> Iterator[str]:
+        if self._clipped > 0.0:
+            effect = "CRFA is too low" if self._clipped > CLIPPED_SHARE else "a negligible share"
+            yield f"clipped at its extremes: {100 * self._clipped:.2g} % of the samples, {effect}"
+        elif self.piled:
+            yield (
+                "values pile up below the largest: soft clipping, which makes CRFA too low, or a "
+                "pure tone"
+            )
+        if 0 < self.stuck <= LARGEST_STUCK_SHARE * self.finite:
+            yield (
+                f"constant for {100 * self.stuck / self.finite:.2g} % of the time: lost samples? "
+                "Left out of the spectrum"
+            )
+        if self._rms > 0.0 and abs(self.mean) > OFFSET_RATIO * self._rms:
+            ratio = abs(self.mean) / self._rms
+            yield f"offset of {self.mean:.3g} {unit}, {ratio:.1f} times the rms; removed"
 
 
 def check_recording(
@@ -281,64 +305,75 @@ def check_recording(
     width_hz: float | None = None,
     band_hz: tuple[float, float] | None = None,
 ) -> Quality:
-    """Read a recording to its end and say what it is like.
+    """Read a recording to its end and return its quality.
 
     Parameters
     ----------
-    width_hz : half-power width of the resonance that it is to show [Hz], for which it may be too short
-    band_hz : where that resonance may lie [Hz], for which it may be sampled too slowly
+    width_hz : half-power width of the expected resonance [Hz], for which the recording may be too
+        short
+    band_hz : search band of that resonance [Hz], for which the sampling rate may be too low
     """
-    gauge = Gauge()
-    for _ in gauge.watch(recording.blocks()):
+    gauge = SampleStatistics()
+    for _ in gauge.pass_through(recording.blocks()):
         pass
     return gauge.quality(recording, width_hz=width_hz, band_hz=band_hz)
 
 
-def _piled(heights: NDArray[np.int64]) -> bool:
-    """Whether counts of heights are denser at their top than below it."""
-    held = np.flatnonzero(heights)
-    if not held.size:
+def _unit_in_words(recording: OpenRecording) -> str:
+    return recording.unit if recording.unit != UNKNOWN else "(unit unknown)"
+
+
+def _is_piled(heights: NDArray[np.int64]) -> bool:
+    """Return whether the counts of heights are denser at their top than below it."""
+    occupied = np.flatnonzero(heights)
+    if not occupied.size:
         return False
-    edge = int(held[-1]) + 1
-    top, below = round(TOP * edge), round(BELOW * edge)
+    edge = int(occupied[-1]) + 1
+    top, below = round(TOP_FROM * edge), round(COMPARED_FROM * edge)
     at_top, beneath = int(heights[top:edge].sum()), int(heights[below:top].sum())
-    if at_top < FEWEST_AT_TOP or not below < top < edge:
+    if at_top < FEWEST_TOP_SAMPLES or not below < top < edge:
         return False
-    return at_top / (edge - top) > PILED * beneath / (top - below)
+    return at_top / (edge - top) > PILED_DENSITY_RATIO * beneath / (top - below)
 
 
 def _off(rms: float, step: float | None, *, comparable: bool) -> bool:
-    """Nothing moves but the converter's last digit, or less than any machine."""
+    """Return whether the signal is the converter's last digit only, or below any machine's."""
     return (
         rms == 0.0
-        or (step is not None and rms < STEPS_OF_NOISE * step)
+        or (step is not None and rms < QUIET_STEPS * step)
         or (comparable and rms < QUIET)
     )
 
 
 def _converter_step(values: Field) -> float | None:
-    """The least difference of neighbouring levels, where values keep to few of them; None for a continuous signal."""
+    """Return the smallest difference of levels, or None for a continuous signal."""
     levels = np.unique(values)
     if levels.size < 2 or levels.size > values.size / 16:
         return None
     return float(np.diff(levels).min())
 
 
-def _stuck(values: Field) -> Mask | None:
-    """Which samples follow an equal one in a stretch of `STUCK` or more; None, at once, where there is none."""
-    if values.size <= STUCK or not (values[:-STUCK:STUCK] == values[STUCK::STUCK]).any():
+def _stuck_samples(values: Field) -> Mask | None:
+    """Return the mask of samples in stuck stretches, except each first one; None for none.
+
+    Samples are first compared at a distance, which rules out nearly all blocks.
+    """
+    if (
+        values.size <= STUCK_RUN
+        or not (values[:-STUCK_RUN:STUCK_RUN] == values[STUCK_RUN::STUCK_RUN]).any()
+    ):
         return None
     edges = np.diff(np.concatenate([[False], np.diff(values) == 0.0, [False]]).astype(np.int8))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    hit = np.zeros(values.size, dtype=bool)
+    stuck_mask = np.zeros(values.size, dtype=bool)
     for start, end in zip(starts, ends, strict=True):
-        if end - start >= STUCK:
-            hit[start + 1 : end + 1] = True
-    return hit
+        if end - start >= STUCK_RUN:
+            stuck_mask[start + 1 : end + 1] = True
+    return stuck_mask
 
 
-def _in_runs(hit: Field, shortest: int = CLIPPED_RUN) -> int:
-    """How many of the true ones stand in runs of at least `shortest`."""
-    edges = np.diff(np.concatenate([[False], hit, [False]]).astype(np.int8))
+def _samples_in_runs(stuck_mask: Field, shortest: int = CLIPPED_RUN) -> int:
+    """Return the number of true samples in runs of at least `shortest`."""
+    edges = np.diff(np.concatenate([[False], stuck_mask, [False]]).astype(np.int8))
     lengths = np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
     return int(lengths[lengths >= shortest].sum())

@@ -1,7 +1,7 @@
-"""HDF5 (and MATLAB 7.3, which is HDF5), by h5py: every data set of numbers is a channel or several.
+"""HDF5 (and MATLAB 7.3, which is HDF5), by h5py: every numeric data set is one channel or several.
 
-Rate, unit and start may stand as attributes on the data set or a group above it, or as scalars
-beside it.
+Rate, unit and start may be attributes of the data set or of a group above it, or scalars next to
+it.
 """
 
 from collections.abc import Iterator
@@ -12,24 +12,24 @@ import numpy as np
 
 from asperity.core.errors import UnreadableFile
 from asperity.recording.model import Channel, Contents
-from asperity.recording.reader import columns, facts_in, numeric, refused_as
+from asperity.recording.reader import columns, numeric, reject_as, stated_facts
 
-_DEEPEST = 8  # groups in groups
+_MAX_DEPTH = 8  # levels of nested groups
 
 
 def is_hdf5(head: bytes) -> bool:
-    """Whether the HDF5 signature stands at one of the places where it may."""
+    """Return whether the HDF5 signature is at one of its allowed offsets."""
     return any(head[at : at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048))
 
 
 def read(path: Path) -> Contents:
-    """Channels named by their path in the file."""
+    """Read channels named by their path in the file."""
     import h5py
 
     notes: list[str] = []
-    with refused_as(path, "no readable HDF5 file"):
+    with reject_as(path, "not a readable HDF5 file"):
         file = h5py.File(path, "r")
-    with file, refused_as(path, "a damaged HDF5 file"):
+    with file, reject_as(path, "a damaged HDF5 file"):
         channels = list(_channels(path, file, "", {}, notes, set()))
         matlab = any(
             str(key).startswith("MATLAB") for member in file.values() for key in member.attrs
@@ -38,47 +38,52 @@ def read(path: Path) -> Contents:
 
 
 def _channels(
-    path: Path, group: Any, name: str, above: dict[str, Any], notes: list[str], seen: set[Any]
+    path: Path,
+    group: Any,
+    name: str,
+    inherited: dict[str, Any],
+    notes: list[str],
+    visited: set[Any],
 ) -> Iterator[Channel]:
     import h5py
 
-    if name.count("/") > _DEEPEST or group.id in seen:  # a group may be linked into itself
+    if name.count("/") > _MAX_DEPTH or group.id in visited:  # a group may be linked into itself
         return
-    seen.add(group.id)
-    around = above | dict(group.attrs)
+    visited.add(group.id)
+    attributes = inherited | dict(group.attrs)
     members = [(str(key), group.get(key)) for key in group if not str(key).startswith("#")]
     for key, member in members:
         if isinstance(member, h5py.Dataset) and member.size is not None and member.size <= 64:
-            around[key] = _scalar(member)
+            attributes[key] = _scalar(member)
     for key, member in members:
-        inner = f"{name}/{key}" if name else key
+        path_in_file = f"{name}/{key}" if name else key
         if isinstance(member, h5py.Group):
-            yield from _channels(path, member, inner, around, notes, seen)
+            yield from _channels(path, member, path_in_file, attributes, notes, visited)
         elif (
             isinstance(member, h5py.Dataset)
             and numeric(member)
             and member.size is not None
             and member.size > 64
         ):
-            facts = facts_in(path.name, around | dict(member.attrs))
+            facts = stated_facts(path.name, attributes | dict(member.attrs))
             packed = _packing(member, "scale_factor", 1.0), _packing(member, "add_offset", 0.0)
             yield from columns(
-                inner, _OnDisk(path, member.name, member.shape, packed), notes, **facts
+                path_in_file, _OnDisk(path, member.name, member.shape, packed), notes, **facts
             )
 
 
 def _packing(member: Any, name: str, usual: float) -> float:
-    """An attribute by which values were packed into integers (CF conventions 8.1)."""
+    """Return an attribute by which values were packed into integers (CF conventions 8.1)."""
     value = np.asarray(member.attrs.get(name, usual)).reshape(-1)
     if value.size != 1 or value.dtype.kind not in "iuf" or not np.isfinite(value[0]):
         raise UnreadableFile(
-            f"{member.name} states {name} = {value}, which is no number; export it again"
+            f"{member.name} states {name} = {value}, which is not a number; export it again"
         )
     return float(value[0])
 
 
 class _OnDisk:
-    """A data set whose file is opened at its first slice and closed after its last."""
+    """Data set whose file is opened at its first slice and closed after its last."""
 
     def __init__(
         self, path: Path, name: str, shape: tuple[int, ...], packed: tuple[float, float]
@@ -104,7 +109,7 @@ class _OnDisk:
 
 
 def _scalar(member: Any) -> Any:
-    """A small data set as a number, or as text: MATLAB keeps that as 16-bit characters."""
+    """Return a small data set as a number, or as text, which MATLAB stores as 16-bit characters."""
     value = member[()]
     if isinstance(value, np.ndarray) and member.attrs.get("MATLAB_class") == b"char":
         return "".join(map(chr, value.reshape(-1).tolist()))

@@ -1,4 +1,4 @@
-"""enDAQ (Mide) recorders' .IDE, by idelib: several rates in one file, so a channel has to be chosen.
+"""enDAQ (Mide) recorders' .IDE files, by idelib: several rates per file, so name a channel.
 
 Formulas in a file are evaluated.
 """
@@ -9,21 +9,24 @@ from pathlib import Path
 from typing import Any
 
 from asperity.recording.model import Channel, Contents
-from asperity.recording.reader import refused_as, sliced
+from asperity.recording.reader import reject_as, sliced_blocks
 
 
 def is_ide(head: bytes) -> bool:
-    """Whether a file is EBML, as IDE is."""
+    """Return whether a file is EBML, as IDE is."""
     return head[:4] == b"\x1a\x45\xdf\xa3"
 
 
 def read(path: Path) -> Contents:
-    """Channels named as the recorder does: "8.0 X (100g)". The file stays open: opening it reads its whole index."""
+    """Read channels named as the recorder does: "8.0 X (100g)".
+
+    The file stays open: opening it reads its whole index.
+    """
     import idelib
 
     notes: list[str] = []
     channels = []
-    with refused_as(path, "no readable IDE recording"):
+    with reject_as(path, "not a readable IDE recording"):
         data = idelib.importFile(str(path))
         for channel in data.channels.values():
             for sub in channel.subchannels:
@@ -33,7 +36,7 @@ def read(path: Path) -> Contents:
                 name, samples = f"{channel.id}.{sub.id} {sub.name}", len(events)
                 entry = Channel(
                     name=name,
-                    blocks=sliced(partial(_slice, events), samples, notes, name),
+                    blocks=sliced_blocks(partial(_slice, events), samples, notes, name),
                     samples=samples,
                     rate_hz=float(events.getSampleRate()),
                     rate_source="file (mean over the recording)",
@@ -49,7 +52,7 @@ def _slice(events: Any, first: int, last: int) -> Any:
 
 
 def _utc(seconds: Any) -> datetime | None:
-    """None for a recorder whose clock was never set, and began at 1970."""
+    """Return the time; None for a recorder whose clock was never set and started at 1970."""
     return (
         datetime.fromtimestamp(float(seconds), UTC).replace(tzinfo=None)
         if seconds and seconds > 1e9

@@ -1,6 +1,6 @@
-"""MATLAB files up to version 7, by scipy.io; newer ones are HDF5 and left to `hdf5`.
+"""MATLAB files up to version 7, by scipy.io; newer ones are HDF5 (see `hdf5`).
 
-Structs are walked into: a rate or a unit in a struct belongs to the rows of samples in it.
+A rate or unit in a struct applies to the arrays in it.
 """
 
 from collections.abc import Iterator
@@ -11,13 +11,16 @@ import numpy as np
 import scipy
 
 from asperity.recording.model import Contents
-from asperity.recording.reader import columns, facts_in, numeric, refused_as
+from asperity.recording.reader import columns, numeric, reject_as, stated_facts
 
-_DEEPEST = 8
+_MAX_DEPTH = 8
 
 
 def is_matlab(head: bytes) -> bool:
-    """Whether a file has the header of MATLAB 5 to 7; version 4 has none and is known by its name only."""
+    """Return whether a file has the header of MATLAB 5 to 7.
+
+    Version 4 has none and is recognised by its name only.
+    """
     return (
         head.startswith(b"MATLAB")
         and head[124:126] in (b"\x00\x01", b"\x01\x00")
@@ -26,41 +29,43 @@ def is_matlab(head: bytes) -> bool:
 
 
 def read(path: Path) -> Contents:
-    """Channels named by variable and field: bearing.gs."""
+    """Read channels named by variable and field: bearing.gs."""
     notes: list[str] = []
-    with refused_as(path, "no readable MATLAB file"):
-        held = scipy.io.loadmat(
+    with reject_as(path, "not a readable MATLAB file"):
+        variables = scipy.io.loadmat(
             path, struct_as_record=False, squeeze_me=True, chars_as_strings=True
         )
-        held = {key: value for key, value in held.items() if not key.startswith("__")}
-        rows = list(_rows(path.name, held, "", {}))
+        variables = {key: value for key, value in variables.items() if not key.startswith("__")}
+        rows = list(_rows(path.name, variables, "", {}))
     channels = [
         channel for name, values, facts in rows for channel in columns(name, values, notes, **facts)
     ]
     return Contents(format="mat v5", channels=channels, notes=notes)
 
 
-Row = tuple[str, Any, dict[str, Any]]  # name, array, and what the file states of it
+Row = tuple[str, Any, dict[str, Any]]  # name, array, facts stated in the file
 
 
-def _rows(file: str, held: dict[str, Any], name: str, above: dict[str, Any]) -> Iterator[Row]:
-    if name.count(".") > _DEEPEST:
+def _rows(
+    file: str, variables: dict[str, Any], name: str, inherited: dict[str, Any]
+) -> Iterator[Row]:
+    if name.count(".") > _MAX_DEPTH:
         return
-    around = above | {
-        key: value for key, value in held.items() if np.size(value) == 1 and not _fields(value)
+    scalars = inherited | {
+        key: value for key, value in variables.items() if np.size(value) == 1 and not _fields(value)
     }
-    for key, value in held.items():
-        inner = f"{name}.{key}" if name else key
+    for key, value in variables.items():
+        full_name = f"{name}.{key}" if name else key
         if fields := _fields(value):
-            yield from _rows(file, fields, inner, around)
+            yield from _rows(file, fields, full_name, scalars)
         elif isinstance(value, np.ndarray) and value.dtype == object:
             for number, entry in enumerate(value.reshape(-1)[:64], 1):
                 if fields := _fields(entry):
-                    yield from _rows(file, fields, f"{inner}({number})", around)
+                    yield from _rows(file, fields, f"{full_name}({number})", scalars)
                 elif isinstance(entry, np.ndarray) and numeric(entry) and entry.size > 64:
-                    yield f"{inner}({number})", entry, facts_in(file, around)
+                    yield f"{full_name}({number})", entry, stated_facts(file, scalars)
         elif isinstance(value, np.ndarray) and numeric(value) and value.size > 64:
-            yield inner, value, facts_in(file, around)
+            yield full_name, value, stated_facts(file, scalars)
 
 
 def _fields(value: Any) -> dict[str, Any]:

@@ -1,7 +1,6 @@
-"""What a recording is: channels that can be read piece by piece, and facts with the place that states each.
+"""A recording: channels that can be read in blocks, and facts with their sources.
 
-Formats are left to one module each beside this one; which channel is meant and in what unit to
-`read`.
+Each format has a module next to this one; `read` chooses the channel and the unit.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,14 +18,14 @@ from asperity.core.third_party import suppress_output
 
 ACCELERATION = "m/s^2"
 UNKNOWN = "unknown"  # unit of values where nothing states one
-FULL_SCALE = "full scale"  # what integer samples are shares of, when nothing says how much that is
+FULL_SCALE = "full scale"  # unit of integer samples whose full scale is not stated
 BLOCK = 1 << 18  # samples read at a time
-IMPOSSIBLE = 1e15  # in any unit: a damaged file's
+IMPOSSIBLE = 1e15  # in any unit: the file is damaged
 
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """Something known about a recording, and where it is stated: "file", the name of a sidecar, "command line"."""
+    """A fact about a recording and its source: "file", the name of a sidecar, "command line"."""
 
     value: Any
     source: str
@@ -36,9 +35,8 @@ class Fact:
 class Channel:
     """One row of samples in a file, not read yet.
 
-    `blocks(n)` yields its values, n at a time, as they are stored, NaN where samples are missing;
-    what it finds wrong on the way it says in the `notes` of the file. None stands for what the
-    file does not say.
+    `blocks(n)` yields its stored values, n at a time, NaN where samples are missing; problems found
+    while reading are added to the `notes` of the file. None means not stated in the file.
     """
 
     name: str
@@ -47,7 +45,7 @@ class Channel:
     rate_hz: float | None = None
     rate_doubt: float = 0.0  # relative standard deviation of the rate, where times state it
     rate_source: str = "file"
-    rate_hint: str = ""  # what to say beside "states no sampling rate"
+    rate_hint: str = ""  # added to "states no sampling rate"
     unit: str | None = None
     started: datetime | None = None
     full_scale: bool = False  # values are shares of the converter's full scale
@@ -55,7 +53,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contents:
-    """What a reader found in a file. `notes` grows while channels are read."""
+    """Result of a reader. `notes` grows while channels are read."""
 
     format: str
     channels: Sequence[Channel]
@@ -64,7 +62,7 @@ class Contents:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadOptions:
-    """What the caller states about recordings; None leaves it to the files. Meanings as in `read_recording`."""
+    """Facts that the caller states, as in `read_recording`; None leaves them to the files."""
 
     rate_hz: float | None = None
     unit: str | None = None
@@ -78,7 +76,7 @@ class Recording(Signal):
 
     `facts` holds "rate", "unit", "channel", "format" and, where known, "started" and "scale", each
     with its source. Accelerations are in m/s^2 whatever the file's unit, which stays in `facts`.
-    `notes` say in a sentence each what was wrong with the file.
+    `notes` are sentences about problems of the file.
     """
 
     path: Path
@@ -87,7 +85,7 @@ class Recording(Signal):
 
     @property
     def comparable(self) -> bool:
-        """Whether amplitudes such as CRFA can be compared with others: the values are accelerations."""
+        """True for accelerations: amplitudes such as CRFA can be compared with others."""
         return self.unit == ACCELERATION
 
 
@@ -95,27 +93,27 @@ class Recording(Signal):
 class OpenRecording:
     """A recording whose samples are still in the file.
 
-    `samples` is None where only reading to the end would tell; there may be more `notes` once
-    `blocks` were read.
+    `samples` is None where only reading to the end would tell; `notes` may grow as `blocks` are
+    read.
     """
 
     path: Path
     channel: Channel
     rate_hz: float
     unit: str
-    scale: float  # of what is stored, to `unit`
+    scale: float  # from stored values to `unit`
     facts: dict[str, Fact]
     first_notes: tuple[str, ...]
     later_notes: list[str]  # the reader adds to them
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is wrong with the file, in a sentence each: what was seen so far."""
+        """Problems of the file found so far, one sentence each."""
         return tuple(dict.fromkeys((*self.first_notes, *self.later_notes)))
 
     @property
     def rate_doubt(self) -> float:
-        """Relative standard deviation of the rate: that of the file's times, where they state it."""
+        """Relative standard deviation of the rate, where the file's times state it."""
         return (
             self.channel.rate_doubt
             if self.facts["rate"].source == self.channel.rate_source
@@ -124,26 +122,26 @@ class OpenRecording:
 
     @property
     def samples(self) -> int | None:
-        """How many samples the file says it holds."""
+        """Number of samples according to the file."""
         return self.channel.samples
 
     @property
     def started(self) -> datetime | None:
-        """When the recording began, if anything says so."""
+        """Start of the recording, if stated."""
         return self.facts["started"].value if "started" in self.facts else None
 
     @property
     def comparable(self) -> bool:
-        """Whether amplitudes such as CRFA can be compared with others: the values are accelerations."""
+        """True for accelerations: amplitudes such as CRFA can be compared with others."""
         return self.unit == ACCELERATION
 
     def blocks(self, samples: int = BLOCK) -> Iterator[Field]:
-        """The values in `unit`, at most `samples` at a time; NaN where there is none, or one that cannot be.
+        """Yield the values in `unit`, at most `samples` at a time; NaN where missing or impossible.
 
         Raises
         ------
         UnreadableFile
-            where the file is damaged so that nothing of this channel can be read.
+            where damage makes this channel unreadable.
         """
         source = self.channel.blocks(samples)
         while True:
@@ -157,7 +155,7 @@ class OpenRecording:
             yield values * self.scale if self.scale != 1.0 else values
 
     def read(self) -> Recording:
-        """All samples at once.
+        """Read all samples at once.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""NumPy's .npy and .npz: rows of samples, rate and unit as scalars beside them in the .npz."""
+"""NumPy's .npy and .npz files: arrays of samples; in .npz, rate and unit as scalars."""
 
 import zipfile
 from collections.abc import Iterator
@@ -13,46 +13,44 @@ from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.third_party import first_line
 from asperity.recording.model import Channel, Contents
-from asperity.recording.reader import MOST_CHANNELS, REMEDY, columns, facts_in, refused_as
+from asperity.recording.reader import MOST_CHANNELS, REMEDY, columns, reject_as, stated_facts
 
-_SMALL = 64  # samples: what is shorter describes the others
+_SMALL = 64  # samples: shorter arrays describe the others
 _LARGEST_HEADER = 1 << 16
-Header: TypeAlias = tuple[
-    tuple[int, ...], bool, np.dtype[Any]
-]  # shape, whether in Fortran's order, type
+Header: TypeAlias = tuple[tuple[int, ...], bool, np.dtype[Any]]  # shape, Fortran order, type
 
 
 def is_npy(head: bytes) -> bool:
-    """Whether a file is one array."""
+    """Return whether a file is one array."""
     return head.startswith(b"\x93NUMPY")
 
 
 def is_npz(head: bytes) -> bool:
-    """Whether a file is an archive, as .npz is."""
+    """Return whether a file is a zip archive, as .npz is."""
     return head.startswith(b"PK\x03\x04")
 
 
 def read_npy(path: Path) -> Contents:
-    """One row, several along the longer axis, or the fields of a structured array."""
+    """Read one row, several along the longer axis, or the fields of a structured array."""
     notes: list[str] = []
-    with refused_as(path, "no readable .npy file"):
+    with reject_as(path, "not a readable .npy file"):
         with path.open("rb") as file:
             shape, fortran, dtype = _header(file)
             offset = file.tell()
-        there = max(path.stat().st_size - offset, 0) // dtype.itemsize
-        if there < int(np.prod(shape, dtype=object)):
-            rows = there // max(1, int(np.prod(shape[1:], dtype=object)))
+        available = max(path.stat().st_size - offset, 0) // dtype.itemsize
+        if available < int(np.prod(shape, dtype=object)):
+            rows = available // max(1, int(np.prod(shape[1:], dtype=object)))
             if fortran or rows < 2:
                 raise UnreadableFile(f"{path.name} is cut short; {REMEDY}")
-            notes.append(f"cut short: {rows} of {shape[0]} samples are there")
+            notes.append(f"cut short: {rows} of {shape[0]} samples present")
             shape = (rows, *shape[1:])
     array = _Stored(path, dtype, offset, shape, fortran)
-    return Contents(format="npy", channels=list(_of_array(path, array, notes)), notes=notes)
+    return Contents(format="npy", channels=list(_array_channels(path, array, notes)), notes=notes)
 
 
 @dataclass(frozen=True, slots=True)
 class _Stored:
-    """An array in a file, mapped for each slice anew: pages that stay mapped would count as memory."""
+    """Array in a file, mapped for each slice: pages that stay mapped would count as memory."""
 
     path: Path
     dtype: np.dtype[Any]
@@ -68,7 +66,7 @@ class _Stored:
         return np.array(mapped[where] if self.name is None else mapped[self.name][where])
 
 
-def _of_array(path: Path, array: _Stored, notes: list[str]) -> Iterator[Channel]:
+def _array_channels(path: Path, array: _Stored, notes: list[str]) -> Iterator[Channel]:
     if array.dtype.names:
         for name in array.dtype.names:
             if (
@@ -82,11 +80,11 @@ def _of_array(path: Path, array: _Stored, notes: list[str]) -> Iterator[Channel]
 
 
 def read_npz(path: Path) -> Contents:
-    """Each array is a channel or several; scalars named fs, dt, unit ... tell about them."""
+    """Read each array as one channel or several; scalars named fs, dt, unit ... describe them."""
     notes: list[str] = []
-    around: dict[str, Any] = {}
+    scalars: dict[str, Any] = {}
     arrays: list[tuple[str, Header]] = []
-    with refused_as(path, "no readable .npz file"), zipfile.ZipFile(path) as archive:
+    with reject_as(path, "not a readable .npz file"), zipfile.ZipFile(path) as archive:
         for member in archive.namelist():
             if not member.endswith(".npy"):
                 continue
@@ -96,35 +94,37 @@ def read_npz(path: Path) -> Contents:
                 name = member.removesuffix(".npy")
                 if count <= _SMALL and dtype.kind in "iufUSM":
                     data = file.read(count * dtype.itemsize)
-                    around[name] = np.frombuffer(data, dtype, count).reshape(shape)
+                    scalars[name] = np.frombuffer(data, dtype, count).reshape(shape)
                 elif dtype.kind in "iuf":
                     arrays.append((member, (shape, fortran, dtype)))
-    facts = facts_in(
+    facts = stated_facts(
         path.name,
-        {key: value.item() if value.size == 1 else value for key, value in around.items()},
+        {key: value.item() if value.size == 1 else value for key, value in scalars.items()},
     )
     channels = [
         replace(channel, **facts)
         for member, header in arrays
-        for channel in _of_member(path, member, header, notes)
+        for channel in _member_channels(path, member, header, notes)
     ]
     return Contents(format="npz", channels=channels, notes=notes)
 
 
-def _of_member(path: Path, member: str, header: Header, notes: list[str]) -> Iterator[Channel]:
-    """A member of the archive, unpacked piece by piece: it cannot be sliced."""
+def _member_channels(
+    path: Path, member: str, header: Header, notes: list[str]
+) -> Iterator[Channel]:
+    """Yield the channels of a member of the archive, unpacked in blocks: it cannot be sliced."""
     shape, fortran, dtype = header
     name = member.removesuffix(".npy")
-    long = [n for n in shape if n != 1]
-    if len(long) > 2 or not long:
+    long_axes = [n for n in shape if n != 1]
+    if len(long_axes) > 2 or not long_axes:
         return
-    samples, count = max(long), min(long) if len(long) == 2 else 1
-    rows_last = (len(long) == 2) and (
-        (long[0] == samples) == fortran
+    samples, count = max(long_axes), min(long_axes) if len(long_axes) == 2 else 1
+    rows_last = (len(long_axes) == 2) and (
+        (long_axes[0] == samples) == fortran
     )  # each channel lies in one piece
     if count > MOST_CHANNELS:
         raise UnreadableFile(
-            f"{path.name} holds {name} of {shape}: no recording; give one row a channel"
+            f"{path.name} holds {name} of {shape}: not a recording; give one row per channel"
         )
     for k in range(count):
         first, stride = (k * samples, 1) if rows_last else (k, count)
@@ -147,17 +147,17 @@ def _unpacked(
     try:
         with zipfile.ZipFile(path) as archive, archive.open(member) as file:
             _header(file)
-            left = (first if stride == 1 else 0) * dtype.itemsize
-            while left > 0:
-                left -= len(file.read(min(left, 1 << 20))) or left
+            remaining = (first if stride == 1 else 0) * dtype.itemsize
+            while remaining > 0:
+                remaining -= len(file.read(min(remaining, 1 << 20))) or remaining
             while done < samples:
-                wanted = min(size, samples - done) * stride * dtype.itemsize
-                data = file.read(wanted)
-                whole = len(data) // (stride * dtype.itemsize)
-                if whole == 0:
+                size_in_bytes = min(size, samples - done) * stride * dtype.itemsize
+                data = file.read(size_in_bytes)
+                complete = len(data) // (stride * dtype.itemsize)
+                if complete == 0:
                     break
-                values = np.frombuffer(data, dtype, whole * stride)
-                done += whole
+                values = np.frombuffer(data, dtype, complete * stride)
+                done += complete
                 yield (values if stride == 1 else values[first::stride]).astype(np.float64)
     except (zipfile.BadZipFile, OSError, ValueError, EOFError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
         if done == 0:
@@ -165,7 +165,7 @@ def _unpacked(
                 f"{path.name} cannot be unpacked ({first_line(error)}); {REMEDY}"
             ) from error
     if done < samples:
-        notes.append(f"damaged after sample {done} of {samples}; what comes before was read")
+        notes.append(f"damaged after sample {done} of {samples}; samples before that were read")
 
 
 def _header(file: BinaryIO | Any) -> Header:

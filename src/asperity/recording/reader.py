@@ -1,4 +1,4 @@
-"""What several formats share: finding rate, unit and start among named values, and arrays as channels."""
+"""Helpers of the readers: rate, unit and start among named values; arrays as channels."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -14,28 +14,30 @@ from asperity.core.third_party import first_line
 from asperity.recording.model import Channel
 from asperity.recording.units import RATE_NAMES, START_NAMES, STEP_NAMES, UNIT_NAMES, stated
 
-MOST_CHANNELS = 512  # more columns than that are a matrix, or a damaged file's
+MOST_CHANNELS = 512  # an array with more columns is not a recording
 REMEDY = "copy or export it again"
 
 
 @contextmanager
-def refused_as(path: Path, what: str) -> Iterator[None]:
-    """Refuse a file of which a library complains, saying `what` it is: no readable HDF5 file, for one."""
+def reject_as(path: Path, description: str) -> Iterator[None]:
+    """Raise UnreadableFile for any error of a library: "NAME is `description`"."""
     try:
         yield
     except UnreadableFile:
         raise
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is {what} ({first_line(error)}); {REMEDY}") from error
+        raise UnreadableFile(
+            f"{path.name} is {description} ({first_line(error)}); {REMEDY}"
+        ) from error
 
 
-def facts_in(name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """`rate_hz`, `rate_source`, `unit`, `started` of a channel, as far as named values state them.
+def stated_facts(name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `rate_hz`, `rate_source`, `unit`, `started` of a channel, as far as stated.
 
     Raises
     ------
     UnreadableFile
-        for several rates that differ, or one that is no rate.
+        for several rates that differ, or an impossible one.
     """
     rates: dict[str, float] = {}
     for key, value in stated(attributes.items(), RATE_NAMES | STEP_NAMES):
@@ -44,18 +46,19 @@ def facts_in(name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
             continue
         if not 0.0 < number < 1e12:
             raise UnreadableFile(
-                f"{name} states {key} = {number:g}, which is no sampling rate or step; {REMEDY}"
+                f"{name} states {key} = {number:g}, which is not a sampling rate or step; {REMEDY}"
             )
         rates[key] = number if stated([(key, value)], RATE_NAMES) else 1.0 / number
     facts: dict[str, Any] = {}
     if rates:
         key, rate = next(iter(rates.items()))
-        other = next((k for k, r in rates.items() if abs(r / rate - 1.0) > 1e-4), None)
-        if other is not None:
+        conflicting = next((k for k, r in rates.items() if abs(r / rate - 1.0) > 1e-4), None)
+        if conflicting is not None:
             raise UnreadableFile(
-                f"{name} states two sampling rates, {key} and {other}; give it without one of them"
+                f"{name} states two sampling rates, {key} and {conflicting}; give it without "
+                f"one of them"
             )
-        facts |= {"rate_hz": whole_rate(rate, 1e-9), "rate_source": f"file ({key})"}
+        facts |= {"rate_hz": rounded_rate(rate, 1e-9), "rate_source": f"file ({key})"}
     for _, value in stated(attributes.items(), UNIT_NAMES):
         text = _text(value)
         if text:
@@ -67,14 +70,14 @@ def facts_in(name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
     return facts
 
 
-def whole_rate(rate: float, rounding: float) -> float:
-    """The whole number of hertz, where just one lies within the relative `rounding` of what the file printed."""
+def rounded_rate(rate: float, rounding: float) -> float:
+    """Return the whole number of hertz, if just one lies within the relative `rounding`."""
     whole = float(round(rate))
     return whole if whole > 0.0 and abs(whole / rate - 1.0) <= rounding < 0.5 / rate else rate
 
 
 def parse_time(value: Any) -> datetime | None:
-    """A time as files write it, in UTC where it states its zone; None for what is none."""
+    """Return a time as written in files, in UTC if it states its zone; None if it is no time."""
     if isinstance(value, datetime):
         return _in_utc(value)
     if isinstance(value, np.datetime64):
@@ -93,7 +96,7 @@ def parse_time(value: Any) -> datetime | None:
 
 
 def _in_utc(time: datetime) -> datetime:
-    """Without its zone: across a change of clocks local times stand still or jump."""
+    """Return the time in UTC without its zone: local times jump when clocks change."""
     return time if time.tzinfo is None else time.astimezone(UTC).replace(tzinfo=None)
 
 
@@ -109,7 +112,7 @@ _TIMES = (
     "%d.%m.%Y %H:%M:%S,%f",
     "%d.%m.%Y %H:%M",
     "%d.%m.%y %H:%M:%S",
-    "%m/%d/%Y %I:%M:%S %p",  # who writes AM and PM writes the month first
+    "%m/%d/%Y %I:%M:%S %p",  # with AM and PM the month comes first
     "%m/%d/%Y %I:%M:%S.%f %p",
     "%m/%d/%Y %I:%M %p",
     "%Y/%m/%d %H:%M:%S.%f",
@@ -136,10 +139,10 @@ def _text(value: Any) -> str | None:
 Reader = Callable[[int, int], Any]  # first sample, one after the last -> those samples
 
 
-def sliced(
+def sliced_blocks(
     read: Reader, samples: int, notes: list[str], name: str
 ) -> Callable[[int], Iterator[Field]]:
-    """Blocks of an array that can be sliced; what lies behind damage is left out, and noted."""
+    """Return a function that yields blocks of a sliceable array; data after damage is left out."""
 
     def blocks(size: int) -> Iterator[Field]:
         for first in range(0, samples, size):
@@ -153,7 +156,7 @@ def sliced(
                         f"{name} cannot be read ({first_line(error)}); {REMEDY}"
                     ) from error
                 notes.append(
-                    f"damaged after sample {first} of {samples}; what comes before was read"
+                    f"damaged after sample {first} of {samples}; samples before that were read"
                 )
                 return
             yield block
@@ -166,7 +169,7 @@ def sliced(
 def columns(
     name: str, array: Any, notes: list[str], *, labels: list[str] | None = None, **facts: Any
 ) -> Iterator[Channel]:
-    """The channels of an array that can be sliced: one row, or several along its shorter axis.
+    """Yield the channels of a sliceable array: one row, or several along its shorter axis.
 
     Raises
     ------
@@ -185,13 +188,14 @@ def columns(
             ]
 
         yield Channel(
-            name=name, blocks=sliced(read, shape[0], notes, name), samples=shape[0], **facts
+            name=name, blocks=sliced_blocks(read, shape[0], notes, name), samples=shape[0], **facts
         )
         return
     count = min(shape)
     if count > MOST_CHANNELS or len(array.shape) != 2:
         raise UnreadableFile(
-            f"{name} is an array of {shape[0]} x {shape[1]}: no recording; give one row a channel"
+            f"{name} is an array of {shape[0]} x {shape[1]}: not a recording; give one row per "
+            f"channel"
         )
     for k in range(count):
         label = labels[k] if labels and len(labels) == count else f"{name}[{k + 1}]"
@@ -201,12 +205,12 @@ def columns(
 
         yield Channel(
             name=label,
-            blocks=sliced(read_one, max(shape), notes, label),
+            blocks=sliced_blocks(read_one, max(shape), notes, label),
             samples=max(shape),
             **facts,
         )
 
 
 def numeric(array: Any) -> bool:
-    """Whether an array holds real numbers."""
+    """Return whether an array holds real numbers."""
     return getattr(getattr(array, "dtype", None), "kind", "?") in "iuf"

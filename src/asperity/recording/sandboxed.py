@@ -1,7 +1,7 @@
-"""Formats that somebody else's library reads, in the process of its own (`asperity.core.sandbox`): piece by piece, as others.
+"""Reading by third-party libraries in a separate process (`asperity.core.sandbox`), in blocks.
 
-That process keeps the files it was asked for last, and where each channel stands, so that a piece
-is read once.
+That process keeps the files used last and the position in each channel, so that a block is read
+once.
 """
 
 from collections.abc import Iterator
@@ -20,60 +20,61 @@ from asperity.core.third_party import suppress_output
 from asperity.recording.model import Channel, Contents
 from asperity.recording.reader import REMEDY
 
-_KEPT = 4  # files at a time: threads of a caller may read several
+_MAX_OPEN_FILES = 4  # threads of a caller may read several files
 
 
 def contents(path: Path, reader: str, library: str) -> Contents:
-    """What the `read` of the module `reader` finds in a file; raises as `read_in_subprocess`.
+    """List the channels of a file by the `read` of the module `reader`; raises as `read_apart`.
 
-    `library` is loaded before, in time of its own.
+    `library` is loaded before, within its own time limit.
     """
     path = path.absolute()
-    form, notes, channels = read_in_subprocess(
-        path, f"{__name__}:listed", reader, remedy=REMEDY, library=library
+    format, notes, channels = read_in_subprocess(
+        path, f"{__name__}:list_channels", reader, remedy=REMEDY, library=library
     )
 
     def blocks(number: int, size: int) -> Iterator[Field]:
         for done in count():
-            place = (reader, number, size, done)
+            arguments = (reader, number, size, done)
             block, notes[:] = read_in_subprocess(
-                path, f"{__name__}:piece", *place, remedy=REMEDY, library=library
+                path, f"{__name__}:read_block", *arguments, remedy=REMEDY, library=library
             )
             if block is None:
                 return
             yield block
 
-    every = [
-        Channel(blocks=partial(blocks, number), **about) for number, about in enumerate(channels)
+    channels_of_file = [
+        Channel(blocks=partial(blocks, number), **channel_fields)
+        for number, channel_fields in enumerate(channels)
     ]
-    return Contents(format=form, channels=every, notes=notes)
+    return Contents(format=format, channels=channels_of_file, notes=notes)
 
 
-# In the process that reads
-# --------------------------------------------------------------------------------------------
+# In the reading process
+# ----------------------------------------------------------------
 
 
 class _Opened:
-    """A file, and for each channel how many blocks of what size were read of it."""
+    """An open file with the position reached in each channel."""
 
     def __init__(self, path: Path, reader: str) -> None:
         self.contents: Contents = import_module(reader).read(path)
-        self.places: dict[int, tuple[int, int, Iterator[Field]]] = {}
+        self.positions: dict[int, tuple[int, int, Iterator[Field]]] = {}
 
     def block(self, number: int, size: int, done: int) -> Field | None:
-        """A block of a channel, or None behind its last."""
-        at_size, at, source = self.places.pop(number, (0, 0, None))
-        if source is None or at_size != size or at != done:
+        """Return a block of a channel, or None after its last."""
+        previous_size, previous_done, source = self.positions.pop(number, (0, 0, None))
+        if source is None or previous_size != size or previous_done != done:
             source = self.contents.channels[number].blocks(size)
             for _ in range(done):
                 next(source, None)
         block = next(source, None)
         if block is not None:
-            self.places[number] = (size, done + 1, source)
+            self.positions[number] = (size, done + 1, source)
         return None if block is None else np.asarray(block, dtype=np.float64)
 
 
-_opened: dict[tuple[Any, ...], _Opened] = {}  # the last asked for last
+_opened: dict[tuple[Any, ...], _Opened] = {}  # least recently used first
 
 
 def _open(path: Path, reader: str) -> _Opened:
@@ -81,29 +82,29 @@ def _open(path: Path, reader: str) -> _Opened:
     key = (path, reader, status.st_mtime_ns, status.st_size)
     opened = _opened.pop(key, None) or _Opened(path, reader)
     _opened[key] = opened
-    while len(_opened) > _KEPT:
+    while len(_opened) > _MAX_OPEN_FILES:
         _opened.pop(next(iter(_opened)))
     return opened
 
 
-def listed(path: Path, reader: str) -> tuple[str, list[str], list[dict[str, Any]]]:
-    """Format, notes and channels of a file, without what reads its samples."""
-    for key in [key for key in _opened if key[0] == path]:  # asked for anew, it is read anew
+def list_channels(path: Path, reader: str) -> tuple[str, list[str], list[dict[str, Any]]]:
+    """Return format, notes and channels of a file, without the functions that read samples."""
+    for key in [key for key in _opened if key[0] == path]:  # a new request reads the file again
         del _opened[key]
     with suppress_output():
-        found = _open(path, reader).contents
-    about = [entry.name for entry in fields(Channel) if entry.name != "blocks"]
+        listed = _open(path, reader).contents
+    channel_fields = [entry.name for entry in fields(Channel) if entry.name != "blocks"]
     return (
-        found.format,
-        found.notes,
-        [{name: getattr(channel, name) for name in about} for channel in found.channels],
+        listed.format,
+        listed.notes,
+        [{name: getattr(channel, name) for name in channel_fields} for channel in listed.channels],
     )
 
 
-def piece(
+def read_block(
     path: Path, reader: str, number: int, size: int, done: int
 ) -> tuple[Field | None, list[str]]:
-    """The block of a channel behind so many that are done, or None; and the notes so far."""
+    """Return the block of a channel after `done` others, or None; and the notes so far."""
     with suppress_output():
         opened = _open(path, reader)
         return opened.block(number, size, done), opened.contents.notes

@@ -1,4 +1,7 @@
-"""Facts that stand beside a recording: ring-07.csv.toml, ring-07.toml (or .json), or recordings.toml for a folder."""
+"""Sidecars with facts about recordings: ring-07.csv.toml, ring-07.toml (or .json), recordings.toml.
+
+recordings.toml applies to its whole folder.
+"""
 
 import json
 import tomllib
@@ -10,26 +13,26 @@ from asperity.core.errors import BadInput
 from asperity.recording.reader import parse_time
 
 FOLDER_WIDE = "recordings"
-OPERATING = (
+OPERATING_KEYS = (
     "load_n",
     "entrainment_m_s",
     "temperature_degc",
     "speed_hz",
-)  # what a recording was made at
-RATES = ("faults_hz", "faults_per_turn")
-SUCH = {"faults_hz": 87.3, "faults_per_turn": 3.58}
-OF_THE_MACHINE = (
+)  # operating conditions of a recording
+FAULT_RATE_KEYS = ("faults_hz", "faults_per_turn")
+EXAMPLE_RATES = {"faults_hz": 87.3, "faults_per_turn": 3.58}
+MACHINE_KEYS = (
     "sensor",
     "machine_class",
-    *RATES,
+    *FAULT_RATE_KEYS,
     "bands_hz",
     "tacho",
     "pulses_per_turn",
     "condition_channels",
 )
-KEYS = ("rate_hz", "unit", "channel", "scale", "started", *OF_THE_MACHINE, *OPERATING)
+SIDECAR_KEYS = ("rate_hz", "unit", "channel", "scale", "started", *MACHINE_KEYS, *OPERATING_KEYS)
 SUFFIXES = (".toml", ".json")
-NAMES = ("channel", "tacho", "sensor")  # which may be numbers
+TEXT_KEYS = ("channel", "tacho", "sensor")  # which may be numbers
 MACHINE_CLASSES = (
     "large-rigid",
     "large-flexible",
@@ -39,30 +42,30 @@ MACHINE_CLASSES = (
 
 
 def is_sidecar(path: Path) -> bool:
-    """Whether a file tells about recordings instead of being one."""
+    """Return whether a file has a sidecar's suffix."""
     return path.suffix.lower() in SUFFIXES
 
 
-def names_beside(name: str) -> list[str]:
-    """Names that a recording's sidecar may have, the one that counts first."""
-    bare = Path(name)
+def sidecar_names(name: str) -> list[str]:
+    """Return the possible names of a recording's sidecar, in order of precedence."""
+    file = Path(name)
     own = [f"{name}{suffix}" for suffix in SUFFIXES]
-    own += [f"{bare.stem}{suffix}" for suffix in SUFFIXES if bare.suffix]
+    own += [f"{file.stem}{suffix}" for suffix in SUFFIXES if file.suffix]
     return [*own, *(f"{FOLDER_WIDE}{suffix}" for suffix in SUFFIXES)]
 
 
-def stated_beside(path: Path) -> tuple[dict[str, Any], str]:
-    """What is stated beside `path`, and the name of the file that states it; nothing, if there is none.
+def read_sidecar(path: Path) -> tuple[dict[str, Any], str]:
+    """Return the facts stated in the sidecar of `path`, and its name; empty if there is none.
 
     Raises
     ------
     BadInput
-        for a sidecar that cannot be read, an unknown key, or a value that is none of its kind.
+        for a sidecar that cannot be read, an unknown key, or a wrong value.
     """
-    for name in names_beside(path.name):
-        there = path.with_name(name)
-        if there.is_file():
-            return _checked(there), name
+    for name in sidecar_names(path.name):
+        candidate = path.with_name(name)
+        if candidate.is_file():
+            return _checked(candidate), name
     return {}, ""
 
 
@@ -77,21 +80,25 @@ def _checked(path: Path) -> dict[str, Any]:
     if not isinstance(stated, dict):
         raise BadInput(f"{path.name} must hold keys such as rate_hz, got {type(stated).__name__}")
     for key, value in stated.items():
-        if key not in KEYS:
-            near = get_close_matches(key, KEYS, 1)
-            hint = f"did you mean {near[0]}?" if near else f"it may state {', '.join(KEYS)}"
+        if key not in SIDECAR_KEYS:
+            closest = get_close_matches(key, SIDECAR_KEYS, 1)
+            hint = (
+                f"did you mean {closest[0]}?"
+                if closest
+                else (f"it may state {', '.join(SIDECAR_KEYS)}")
+            )
             raise BadInput(f"{path.name} has an unknown key {key!r}; {hint}")
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if key in ("rate_hz", "scale") and not (
             number and 0.0 < abs(value) < float("inf") and (value > 0 or key == "scale")
         ):
             raise BadInput(f"{path.name}: {key} must be a positive number, got {value!r}")
-        if key in OPERATING and not (
-            number and -273.15 < value < float("inf") and (value > 0 or key == OPERATING[2])
+        if key in OPERATING_KEYS and not (
+            number and -273.15 < value < float("inf") and (value > 0 or key == OPERATING_KEYS[2])
         ):
-            what = "a temperature in degC" if key == OPERATING[2] else "a positive number"
-            raise BadInput(f"{path.name}: {key} must be {what}, got {value!r}")
-        if key in RATES:
+            expected = "a temperature in degC" if key == OPERATING_KEYS[2] else "a positive number"
+            raise BadInput(f"{path.name}: {key} must be {expected}, got {value!r}")
+        if key in FAULT_RATE_KEYS:
             _require_rates(path, key, value)
         if key == "bands_hz":
             _require_bands(path, value)
@@ -101,10 +108,11 @@ def _checked(path: Path) -> dict[str, Any]:
             raise BadInput(f"{path.name}: pulses_per_turn must be a positive number, got {value!r}")
         if key == "machine_class" and value not in MACHINE_CLASSES:
             raise BadInput(
-                f"{path.name}: machine_class must be one of {', '.join(MACHINE_CLASSES)}, got {value!r}"
+                f"{path.name}: machine_class must be one of {', '.join(MACHINE_CLASSES)}, got "
+                f"{value!r}"
             )
         if (
-            key in ("unit", *NAMES)
+            key in ("unit", *TEXT_KEYS)
             and not isinstance(value, str)
             and not (key != "unit" and number)
         ):
@@ -116,45 +124,47 @@ def _checked(path: Path) -> dict[str, Any]:
                 f"{path.name}: started must be a date and time such as 2025-01-31 12:00:00"
             )
         stated["started"] = started
-    for key in NAMES:
+    for key in TEXT_KEYS:
         if key in stated:
             stated[key] = str(stated[key])
     return stated
 
 
 def _require_bands(path: Path, value: Any) -> None:
-    """Bands by their names, such as housing = [2000, 5000]."""
-    numbers = isinstance(value, dict) and value
-    for ends in value.values() if numbers else ():
-        two = isinstance(ends, list) and len(ends) == 2
-        numbers = (
-            numbers
-            and two
+    """Require bands by name, such as housing = [2000, 5000]."""
+    valid = isinstance(value, dict) and value
+    for ends in value.values() if valid else ():
+        is_pair = isinstance(ends, list) and len(ends) == 2
+        valid = (
+            valid
+            and is_pair
             and all(type(end) in (int, float) for end in ends)
             and 0.0 <= ends[0] < ends[1]
         )
-    if not numbers:
+    if not valid:
         raise BadInput(
-            f"{path.name}: bands_hz must be two frequencies by name, such as {{ housing = [2000, 5000] }}, "
+            f"{path.name}: bands_hz must be two frequencies by name, such as {{ housing = "
+            f"[2000, 5000] }}, "
             f"got {value!r}"
         )
 
 
 def _require_channels(path: Path, value: Any) -> None:
-    """Channels by the condition that they hold, such as temperature_degc = "oil"."""
+    """Require channels by the condition that they hold, such as temperature_degc = "oil"."""
     known = (
         isinstance(value, dict) and value and all(isinstance(name, str) for name in value.values())
     )
-    if not known or not set(value) <= set(OPERATING):
+    if not known or not set(value) <= set(OPERATING_KEYS):
         raise BadInput(
-            f"{path.name}: condition_channels must name channels by {', '.join(OPERATING)}, such as "
+            f"{path.name}: condition_channels must name channels by "
+            f"{', '.join(OPERATING_KEYS)}, such as "
             f'{{ temperature_degc = "oil" }}, got {value!r}'
         )
 
 
 def _require_rates(path: Path, key: str, value: Any) -> None:
-    """Rates at which faults pass, by their names, such as BPFO = 87.3."""
-    numbers = (
+    """Require fault rates by name, such as BPFO = 87.3."""
+    valid = (
         isinstance(value, dict)
         and value
         and all(
@@ -164,7 +174,8 @@ def _require_rates(path: Path, key: str, value: Any) -> None:
             for rate in value.values()
         )
     )
-    if not numbers:
+    if not valid:
         raise BadInput(
-            f"{path.name}: {key} must be positive rates by name, such as {{ BPFO = {SUCH[key]} }}, got {value!r}"
+            f"{path.name}: {key} must be positive rates by name, such as {{ BPFO = "
+            f"{EXAMPLE_RATES[key]} }}, got {value!r}"
         )

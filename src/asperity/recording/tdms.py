@@ -5,32 +5,32 @@ from pathlib import Path
 from typing import Any
 
 from asperity.recording.model import Channel, Contents
-from asperity.recording.reader import facts_in, numeric, refused_as, sliced
+from asperity.recording.reader import numeric, reject_as, sliced_blocks, stated_facts
 
 
 def is_tdms(head: bytes) -> bool:
-    """Whether a file begins like TDMS or its index."""
+    """Return whether a file starts like TDMS or its index."""
     return head[:4] in (b"TDSm", b"TDSh")
 
 
 def read(path: Path) -> Contents:
-    """Channels "group/channel"; step, unit and start are the waveform's own properties."""
+    """Read channels "group/channel"; step, unit and start are the waveform's own properties."""
     import nptdms
 
     notes: list[str] = []
     channels = []
-    with refused_as(path, "no readable TDMS file"), nptdms.TdmsFile.open(path) as opened:
+    with reject_as(path, "not a readable TDMS file"), nptdms.TdmsFile.open(path) as opened:
         if opened.file_status.incomplete_final_segment:
             notes.append("cut short: its last segment is not complete")
         for group in opened.groups():
             for channel in group.channels():
                 if channel.data_type is None or len(channel) == 0 or not numeric(channel):
                     continue
-                facts = facts_in(
+                facts = stated_facts(
                     path.name, {**opened.properties, **group.properties, **channel.properties}
                 )
                 name, samples = f"{group.name}/{channel.name}", len(channel)
-                blocks = sliced(
+                blocks = sliced_blocks(
                     partial(_slice, path, group.name, channel.name), samples, notes, name
                 )
                 channels.append(Channel(name=name, blocks=blocks, samples=samples, **facts))

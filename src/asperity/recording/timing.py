@@ -1,4 +1,4 @@
-"""A column of times: what rate it states, and where samples are missing."""
+"""Columns of times: the sampling rate that they state, and missing samples."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
-from asperity.recording.reader import whole_rate
+from asperity.recording.reader import rounded_rate
 from asperity.recording.units import time_scale
 
 TIME_NAMES = {
@@ -24,32 +24,30 @@ TIME_NAMES = {
     "time stamp",
     "x_time",
 }
-# of a step, by which times may stray from an even grid, beyond what their printing rounds away
+# largest deviation from an even grid, in steps, beyond the rounding of the times
 _EVEN = 0.05
-MOST_LOST, WORTH = (
-    4,
-    1 << 16,
-)  # samples missing for each that is there, beyond some: more is no recording
-_HALF = 1.5  # steps, between one and a gap of one sample
+# most missing samples: so many for each one present, counted from so many on
+LARGEST_MISSING_RATIO, MISSING_FROM = 4, 1 << 16
+_HALF = 1.5  # steps: the limit between one step and a gap of one sample
 _DIGITS = 12
-_KNOWN = sorted(  # rates [Hz] that converters have, of which the one within the doubt is taken
+_KNOWN = sorted(  # common rates of converters [Hz]; one within the doubt is used
     {base / 2**k for base in (102400.0, 131072.0, 100e3, 96e3, 88200.0) for k in range(9)}
     | {20e3, 10e3, 40e3, 30e3}
 )
 
 
-def is_time(name: str) -> bool:
-    """Whether a column of that name holds times."""
+def is_time_column(name: str) -> bool:
+    """Return whether a column of that name holds times."""
     return name.strip().lower() in TIME_NAMES
 
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """An even grid behind a column of times.
+    """Uniform grid fitted to a column of times.
 
-    `step` between samples and `rounding` of the printed times, in the column's unit; `doubt` is
-    the relative standard deviation of the step; `even` whether the times keep to the grid, gaps
-    apart.
+    `step` between samples and `rounding` of the printed times, in the column's unit; `doubt` is the
+    relative standard deviation of the step; `even` states whether the times lie on the grid, apart
+    from gaps.
     """
 
     step: float
@@ -58,43 +56,46 @@ class Clock:
     even: bool
 
     def strides(self, steps: Field) -> Field:
-        """How many samples each step between two times is worth, 1 where none is missing."""
+        """Return the number of samples per step between two times; 1 where none is missing."""
         return np.asarray(np.maximum(np.rint(steps / self.step), 1.0))
 
 
-def clock_of(times: Field) -> Clock | None:
-    """The grid on which times lie, by their whole slope: printed with few digits, single steps say little.
+def fit_clock(times: Field) -> Clock | None:
+    """Fit a grid by the slope of all times: rounded times make single steps unreliable.
 
-    None for times that do not rise, or too few.
+    None for times that do not increase, or too few.
     """
     times = times[np.isfinite(times)]
     if times.size < 3:
         return None
     steps = np.diff(times)
     rounding = _rounding(times)
-    usual = float(np.median(steps))
-    if not np.isfinite(usual) or usual <= 0.0:
+    median_step = float(np.median(steps))
+    if not np.isfinite(median_step) or median_step <= 0.0:
         return None
-    near = steps[(steps > 0.0) & (steps < _HALF * usual + rounding)]  # without gaps
-    clock = Clock(step=float(near.mean()), rounding=rounding, doubt=0.0, even=False)
+    single_steps = steps[(steps > 0.0) & (steps < _HALF * median_step + rounding)]  # without gaps
+    clock = Clock(step=float(single_steps.mean()), rounding=rounding, doubt=0.0, even=False)
     for _ in range(2):
         number = np.concatenate([[0.0], np.cumsum(clock.strides(steps))])
         slope, start = np.polyfit(number, times, 1)
-        stray = float(np.max(np.abs(times - (start + slope * number))))
+        deviation = float(np.max(np.abs(times - (start + slope * number))))
         if not slope > 0.0:
             break
-        even = stray < 0.6 * rounding + _EVEN * slope and _telling(slope, rounding)
-        doubt = 2.0 * stray / (slope * number[-1]) if even else 1e-4
+        even = deviation < 0.6 * rounding + _EVEN * slope and _distinguishable(slope, rounding)
+        doubt = 2.0 * deviation / (slope * number[-1]) if even else 1e-4
         clock = Clock(
-            step=float(slope) if even else usual, rounding=rounding, doubt=doubt + 1e-12, even=even
+            step=float(slope) if even else median_step,
+            rounding=rounding,
+            doubt=doubt + 1e-12,
+            even=even,
         )
         if not even:
             break
     return clock
 
 
-def _telling(step: float, rounding: float) -> bool:
-    """Whether one step and two still differ when times are rounded."""
+def _distinguishable(step: float, rounding: float) -> bool:
+    """Return whether one step and two can be distinguished in rounded times."""
     if rounding <= _EVEN * step:
         return True
     return bool(
@@ -105,41 +106,42 @@ def _telling(step: float, rounding: float) -> bool:
 
 
 def _rounding(times: Field) -> float:
-    """The last decimal to which times are printed; 0 where they keep to none."""
-    some = np.concatenate([times[:4096], times[-4096:]])
+    """Return the last decimal to which times are printed; 0 if there is none."""
+    sample = np.concatenate([times[:4096], times[-4096:]])
     for digits in range(_DIGITS):
-        scaled = some * 10.0**digits
+        scaled = sample * 10.0**digits
         if np.all(np.abs(scaled - np.rint(scaled)) < 1e-6 + 1e-15 * np.abs(scaled)):
             return 10.0**-digits
     return 0.0
 
 
-def timed(column: str, unit: str | None, times: Field) -> dict[str, Any]:
-    """Rate, its doubt and its source as a channel takes them, of a column of times; a hint where it names no unit."""
+def rate_from_times(column: str, unit: str | None, times: Field) -> dict[str, Any]:
+    """Return rate, doubt and source from a column of times; a hint if its unit is unknown."""
     if np.count_nonzero(np.isfinite(times)) < 3:
         return {}
-    clock = clock_of(times)
+    clock = fit_clock(times)
     if clock is None:
-        return {"rate_hint": f" (its column {column!r} does not rise)"}
+        return {"rate_hint": f" (its column {column!r} does not increase)"}
     scale = 1.0 if unit is None and column == "seconds" else time_scale(unit or "")
     if scale is not None:
         rate = 1.0 / (clock.step * scale)
-        whole = whole_rate(rate, clock.doubt)
-        known = [one for one in _KNOWN if abs(one / rate - 1.0) <= clock.doubt]
+        rounded = rounded_rate(rate, clock.doubt)
+        common_rates = [known for known in _KNOWN if abs(known / rate - 1.0) <= clock.doubt]
         return {
-            "rate_hz": known[0] if len(known) == 1 and whole == rate else whole,
+            "rate_hz": common_rates[0] if len(common_rates) == 1 and rounded == rate else rounded,
             "rate_doubt": clock.doubt,
             "rate_source": f"file (column {column!r})",
         }
     if unit is None:
         return {
-            "rate_hint": f" (its column {column!r} names no unit; were it seconds, {1.0 / clock.step:.6g} Hz)"
+            "rate_hint": f" (its column {column!r} names no unit; in seconds: "
+            f"{1.0 / clock.step:.6g} Hz)"
         }
-    return {"rate_hint": f" (its column {column!r} is in {unit!r}, which is no unit of time)"}
+    return {"rate_hint": f" (its column {column!r} is in {unit!r}, which is not a unit of time)"}
 
 
-class Filling:
-    """Puts samples where their times say, gaps as NaN, while they go by in blocks; counts what is missing."""
+class GapFiller:
+    """Places samples by their times, block by block, with NaN in gaps; counts missing samples."""
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
@@ -147,15 +149,15 @@ class Filling:
         self.backwards = False
         self._last: float | None = None
 
-    def spread(self, times: Field, values: Field) -> Field:
-        """The block's values with its gaps and the one before it; rows without a time keep the file's order."""
+    def fill(self, times: Field, values: Field) -> Field:
+        """Return the block's values with its gaps; rows without a time keep the file's order."""
         if times.size == 0 or self.backwards:
             return values
-        known = np.isfinite(times)
-        if not known.all():
+        common_rates = np.isfinite(times)
+        if not common_rates.all():
             times = (
-                np.interp(np.arange(times.size), np.flatnonzero(known), times[known])
-                if known.any()
+                np.interp(np.arange(times.size), np.flatnonzero(common_rates), times[common_rates])
+                if common_rates.any()
                 else times
             )
         before = times[0] - self.clock.step if self._last is None else self._last
@@ -165,24 +167,25 @@ class Filling:
             self.backwards = True
             return values
         strides = self.clock.strides(steps).astype(np.int64)
-        lost = int(np.sum(strides - 1))
-        if lost == 0:
+        missing = int(np.sum(strides - 1))
+        if missing == 0:
             return values
-        if lost > MOST_LOST * (times.size + WORTH):
+        if missing > LARGEST_MISSING_RATIO * (times.size + MISSING_FROM):
             raise UnreadableFile(
-                f"its times leave out {lost} samples in a block of {times.size}; split the recording at its gaps"
+                f"{missing} samples are missing in a block of {times.size} by its times; split the "
+                "recording at its gaps"
             )
         self.gaps += int(np.count_nonzero(strides > 1))
-        self.missing += lost
-        full = np.full(int(strides.sum()), np.nan)
-        full[np.cumsum(strides) - 1] = values
-        return full
+        self.missing += missing
+        filled = np.full(int(strides.sum()), np.nan)
+        filled[np.cumsum(strides) - 1] = values
+        return filled
 
     @property
     def note(self) -> str:
-        """What was found wrong, in a sentence; empty for nothing."""
+        """Problems found, in a sentence; empty for none."""
         if self.backwards:
-            return "its times go back or stand still; rows were taken in the order of the file"
+            return "its times do not increase; rows are used in the order of the file"
         several = "gap" if self.gaps == 1 else "gaps"
         return (
             f"{self.gaps} {several} in its times: {self.missing} samples are missing"

@@ -5,7 +5,7 @@ from typing import Any
 
 from asperity.core.errors import UnreadableFile
 from asperity.recording.model import Channel, Contents
-from asperity.recording.reader import parse_time, refused_as, sliced, whole_rate
+from asperity.recording.reader import parse_time, reject_as, rounded_rate, sliced_blocks
 
 TIME_RESPONSE = 1
 _FUNCTIONS = {
@@ -32,21 +32,21 @@ _FUNCTIONS = {
     21: "a partial coherence",
     27: "a shock response spectrum",
 }
-_ROUNDING = 5e-6  # of the first digit: the step is printed with six
+_ROUNDING = 5e-6  # relative to the first digit: the step is printed with six digits
 
 
 def is_uff(head: bytes) -> bool:
-    """Whether a file opens a data set: a line with -1, then a line with its number."""
+    """Return whether a file starts with a data set: a line with -1, then a line with its number."""
     lines = head[:400].lstrip(b"\r\n").splitlines()
     return len(lines) > 1 and lines[0].strip() == b"-1" and lines[1].strip()[:2].isdigit()
 
 
 def read(path: Path) -> Contents:
-    """Time records, named by their response; anything else is refused in words."""
+    """Read time records, named by their response; other functions are refused with a reason."""
     import pyuff
 
     notes: list[str] = []
-    with refused_as(path, "no readable universal file"):
+    with reject_as(path, "not a readable universal file"):
         file = pyuff.UFF(str(path))
         kinds = [int(kind) for kind in file.get_set_types()]
         sets = [file.read_sets(number) for number, kind in enumerate(kinds) if kind == 58]
@@ -56,7 +56,7 @@ def read(path: Path) -> Contents:
         )
     channels: list[Channel] = []
     others: list[str] = []
-    with refused_as(path, "a damaged universal file"):
+    with reject_as(path, "a damaged universal file"):
         for record in sets:
             if int(record["func_type"]) != TIME_RESPONSE:
                 others.append(
@@ -72,7 +72,7 @@ def read(path: Path) -> Contents:
             "export the time response itself (data set 58, function type 1)"
         )
     if others:
-        notes.append(f"left out {' and '.join(dict.fromkeys(others))}: no time record")
+        notes.append(f"left out {' and '.join(dict.fromkeys(others))}: not time records")
     return Contents(format="uff 58", channels=channels, notes=notes)
 
 
@@ -91,16 +91,16 @@ def _channel(path: Path, record: dict[str, Any], notes: list[str], taken: list[s
     unit = str(record.get("ordinate_axis_units_lab", "")).strip()
     samples, promised = int(values.size), int(record["num_pts"])
     if samples < promised:
-        notes.append(f"cut short: {samples} of {promised} samples are there")
+        notes.append(f"cut short: {samples} of {promised} samples present")
     started = next(
         (time for key in ("id3", "id2", "id4", "id5") if (time := parse_time(record.get(key, "")))),
         None,
     )
     return Channel(
         name=name,
-        blocks=sliced(lambda i, j: values[i:j], samples, notes, name),
+        blocks=sliced_blocks(lambda i, j: values[i:j], samples, notes, name),
         samples=samples,
-        rate_hz=whole_rate(1.0 / step, _ROUNDING / float(f"{step:e}".split("e")[0]))
+        rate_hz=rounded_rate(1.0 / step, _ROUNDING / float(f"{step:e}".split("e")[0]))
         if 0.0 < step < 1e9
         else None,
         rate_source=f"file (abscissa step {step:g} s)",

@@ -1,4 +1,4 @@
-"""Units of acceleration as files write them, and names under which files keep a rate, a unit or a step.
+"""Units of acceleration as written in files, and names under which files state rate, unit or step.
 
 A table on purpose: to a general unit library, "g" is a gram.
 """
@@ -124,24 +124,24 @@ START_NAMES = {
 
 
 def acceleration_scale(unit: str) -> float | None:
-    """Metres per second squared in one `unit`; None for a unit of anything else."""
+    """Return metres per second squared in one `unit`; None for other units."""
     return _ACCELERATIONS.get(_plain(unit))
 
 
 def time_scale(unit: str) -> float | None:
-    """Seconds in one `unit`; None for a unit of anything else."""
+    """Return seconds in one `unit`; None for other units."""
     return _TIMES.get(_plain(unit))
 
 
 def known_unit(text: str) -> bool:
-    """Whether the text is a unit that files use, so that it may be told from the end of a name."""
+    """Return whether the text is a unit, as opposed to the end of a name."""
     return bool(text) and (
         _plain(text) in _ACCELERATIONS or _plain(text) in _TIMES or _plain(text) in _OTHERS
     )
 
 
 def _plain(unit: str) -> str:
-    """One spelling for m/s², m/s2, m/s**2, m·s⁻², m s-2, (m/s^2), G."""
+    """Return one spelling for m/s², m/s2, m/s**2, m·s⁻², m s-2, (m/s^2), G."""
     text = unit.strip().strip("()[]{}").strip().lower()
     text = (
         text.replace("²", "^2")
@@ -154,7 +154,7 @@ def _plain(unit: str) -> str:
 
 
 def name_and_unit(label: str) -> tuple[str, str | None]:
-    """The name and the unit in a column's label: acc [g], Time (ms), acc_g; None where it names no unit."""
+    """Return name and unit of a column's label (acc [g], Time (ms), acc_g); None for no unit."""
     label = label.strip().strip('"').strip()
     bracketed = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]", label)
     if bracketed and known_unit(bracketed[2]):
@@ -166,7 +166,7 @@ def name_and_unit(label: str) -> tuple[str, str | None]:
 
 
 def stated(attributes: Iterable[tuple[str, Any]], names: set[str]) -> list[tuple[str, Any]]:
-    """Those of the attributes whose name, whatever its case and blanks, is one of `names`."""
+    """Return the attributes whose name is one of `names`, ignoring case and blanks."""
     return [
         (key, value)
         for key, value in attributes

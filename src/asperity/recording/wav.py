@@ -1,4 +1,4 @@
-"""WAV and its kin, by soundfile (libsndfile)."""
+"""WAV and related files, by soundfile (libsndfile)."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -10,22 +10,22 @@ from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.third_party import first_line
 from asperity.recording.model import Channel, Contents
-from asperity.recording.reader import REMEDY, refused_as
+from asperity.recording.reader import REMEDY, reject_as
 
 
 def is_wav(head: bytes) -> bool:
-    """RIFF, RF64 or big-endian RIFX, holding WAVE; FLAC."""
+    """Return whether a file is RIFF, RF64 or big-endian RIFX with WAVE, or FLAC."""
     return (head[:4] in (b"RIFF", b"RF64", b"RIFX") and head[8:12] == b"WAVE") or head[
         :4
     ] == b"fLaC"
 
 
 def read(path: Path) -> Contents:
-    """Channels "1", "2" ...; integer samples are shares of full scale, as the format gives them no unit."""
+    """Read channels "1", "2" ...; integer samples are shares of full scale, without a unit."""
     import soundfile
 
     notes: list[str] = []
-    with refused_as(path, "no readable sound file"), soundfile.SoundFile(path) as opened:
+    with reject_as(path, "not a readable sound file"), soundfile.SoundFile(path) as opened:
         rate, count, frames, kind = (
             opened.samplerate,
             opened.channels,
@@ -34,11 +34,11 @@ def read(path: Path) -> Contents:
         )
     if rate <= 0 or not 0 < count <= 64:
         raise UnreadableFile(
-            f"{path.name} states {rate} Hz and {count} channels, which cannot be; {REMEDY}"
+            f"{path.name} states {rate} Hz and {count} channels, which is impossible; {REMEDY}"
         )
     whole = _stated_frames(path)
     if whole is not None and frames < whole:
-        notes.append(f"cut short: {frames} of {whole} samples are there")
+        notes.append(f"cut short: {frames} of {whole} samples present")
 
     def blocks(number: int, size: int) -> Iterator[Field]:
         done = 0
@@ -52,7 +52,7 @@ def read(path: Path) -> Contents:
                 raise UnreadableFile(
                     f"{path.name} cannot be read ({first_line(error)}); {REMEDY}"
                 ) from error
-            notes.append(f"damaged after sample {done} of {frames}; what comes before was read")
+            notes.append(f"damaged after sample {done} of {frames}; samples before that were read")
 
     channels = [
         Channel(
@@ -69,7 +69,10 @@ def read(path: Path) -> Contents:
 
 
 def _stated_frames(path: Path) -> int | None:
-    """How many samples the header of a plain RIFF file promises; None where it does not say (streams, RF64)."""
+    """Return the number of samples in the header of a plain RIFF file; None if not stated.
+
+    Streams and RF64 do not state it.
+    """
     with path.open("rb") as file:
         if file.read(4) != b"RIFF":
             return None

@@ -1,7 +1,7 @@
-"""Damped Fisher scoring: the one loop behind every likelihood fit, and the fit of one spectrum by it.
+"""Damped Fisher scoring, used by every likelihood fit, and the fit of a single spectrum.
 
-The Fisher information stands in for the curvature, with Marquardt's damping. Sources: Whittle
-(1953); Levin, IEEE Trans. Inf. Theory 11 (1965).
+The Fisher information replaces the Hessian, with Marquardt's damping. Sources: Whittle (1953);
+Levin, IEEE Trans. Inf. Theory 11 (1965).
 """
 
 from collections.abc import Callable
@@ -13,32 +13,35 @@ import numpy as np
 from asperity.core.arrays import Field, Mask
 
 State = TypeVar("State")
-Model = Callable[
-    [Field], tuple[Field, Field]
-]  # parameters -> expected density (lines,), slopes (lines, parameters)
+# parameters -> expected density (lines,), slopes (lines, parameters)
+DensityModel = Callable[[Field], tuple[Field, Field]]
 
 FIRST_DAMPING = 1e-3
 MOST_STEPS = 200
-LEAST_GAIN = 1e-8  # in units of ln likelihood, whatever the damping
+SMALLEST_GAIN = 1e-8  # expected gain of ln likelihood below which the fit has converged
 
 
-def damped_scoring(
+def fisher_scoring(
     start: State,
     propose: Callable[[State, Field], tuple[Mask, Callable[[Mask], State]] | None],
     *,
     steps: int,
-    least: float,
-    most: float,
+    least_damping: float,
+    most_damping: float,
     fits: int = 1,
 ) -> tuple[State, bool]:
-    """Where scoring ends, and whether it settled there: no step promises anything, or none helps at `most` damping.
+    """Iterate damped scoring steps; return the final state and whether it converged.
+
+    Converged: no step promises a gain, or none helps at the largest damping.
 
     Parameters
     ----------
-    propose : from a state and dampings (fits,), which of the fits a step makes likelier, and the state with those
-        steps taken; None where no step promises anything
-    least, most : bounds of the damping: a fifth of it after a step that helped, four times as much after one that did
-        not
+    propose : from a state and dampings (fits,), the mask of the fits that a step improves and a
+        function that returns the state with those steps taken; None where no step promises a gain
+    steps : maximum number of steps
+    least_damping, most_damping : bounds of the damping, which is divided by 5 after a successful
+        step and multiplied by 4 after a rejected one
+    fits : number of independent fits
     """
     state, damping = start, np.full(fits, FIRST_DAMPING)
     for _ in range(steps):
@@ -48,40 +51,40 @@ def damped_scoring(
         better, accept = proposal
         if np.any(better):
             state = accept(better)
-        elif np.all(damping > most):
+        elif np.all(damping > most_damping):
             return state, True
-        damping = np.where(better, np.maximum(damping / 5.0, least), damping * 4.0)
+        damping = np.where(better, np.maximum(damping / 5.0, least_damping), damping * 4.0)
     return state, False
 
 
 @dataclass(frozen=True, slots=True)
 class Data:
-    """Ordinates (lines,) and how many independent ones each is worth."""
+    """Periodogram ordinates (lines,), and the number of independent ones that each stands for."""
 
     density: Field
     weight: float
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
-    """Least and greatest of each parameter."""
+class ParameterBounds:
+    """Lower and upper bounds of the parameters."""
 
     lower: Field
     upper: Field
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
-    """Where the scoring ended: parameters, their standard deviations, -log likelihood (up to a constant), settled."""
+class SpectrumFit:
+    """Fitted parameters, their standard deviations, and -ln likelihood up to a constant."""
 
     parameters: Field
     std: Field
     cost: float
-    settled: bool
+    converged: bool
 
 
-class _Point(NamedTuple):
-    """Parameters with cost and score; the information of those that are free, and what damps it."""
+class _ScoringPoint(NamedTuple):
+    """Parameters with cost and score; information and damping diagonal of the free parameters."""
 
     theta: Field
     cost: float
@@ -91,13 +94,15 @@ class _Point(NamedTuple):
     diagonal: Field
 
 
-def fit_spectrum(model: Model, start: Field, bounds: Bounds, data: Data) -> Fit:
+def fit_spectrum(
+    model: DensityModel, start: Field, bounds: ParameterBounds, data: Data
+) -> SpectrumFit:
     """Minimise sum w (ln P + I/P) of exponential ordinates within bounds, F = sum w dP dPᵀ/P^2.
 
-    A parameter that pushes against its bound rests there.
+    A parameter whose score points beyond its bound is held there.
     """
 
-    def point(theta: Field, expected: Field, slopes: Field, cost: float) -> _Point:
+    def point(theta: Field, expected: Field, slopes: Field, cost: float) -> _ScoringPoint:
         relative = slopes / expected[:, None]
         score = data.weight * relative.T @ (data.density / expected - 1.0)
         information = data.weight * relative.T @ relative
@@ -105,31 +110,39 @@ def fit_spectrum(model: Model, start: Field, bounds: Bounds, data: Data) -> Fit:
             ((theta <= bounds.lower) & (score <= 0.0)) | ((theta >= bounds.upper) & (score >= 0.0))
         )
         inner = information[np.ix_(free, free)]
-        return _Point(
+        return _ScoringPoint(
             theta, cost, score[free], free, inner, np.diag(inner) + 1e-12 * np.trace(inner)
         )
 
-    def propose(at: _Point, damping: Field) -> tuple[Mask, Callable[[Mask], _Point]] | None:
-        if np.sum(at.score**2 / at.diagonal) < LEAST_GAIN:
+    def propose(
+        current: _ScoringPoint, damping: Field
+    ) -> tuple[Mask, Callable[[Mask], _ScoringPoint]] | None:
+        if np.sum(current.score**2 / current.diagonal) < SMALLEST_GAIN:
             return None
-        step = np.zeros_like(at.theta)
-        step[at.free] = np.linalg.solve(at.information + damping * np.diag(at.diagonal), at.score)
-        trial = np.clip(at.theta + step, bounds.lower, bounds.upper)
+        step = np.zeros_like(current.theta)
+        step[current.free] = np.linalg.solve(
+            current.information + damping * np.diag(current.diagonal), current.score
+        )
+        trial = np.clip(current.theta + step, bounds.lower, bounds.upper)
         expected, slopes = model(trial)
         cost = whittle_cost(expected, data)
-        return np.array([cost < at.cost]), lambda _: point(trial, expected, slopes, cost)
+        return np.array([cost < current.cost]), lambda _: point(trial, expected, slopes, cost)
 
     first = np.clip(start, bounds.lower, bounds.upper)
     expected, slopes = model(first)
-    at = point(first, expected, slopes, whittle_cost(expected, data))
-    at, settled = damped_scoring(at, propose, steps=MOST_STEPS, least=1e-9, most=1e8)
-    std = np.zeros_like(at.theta)
-    std[at.free] = np.sqrt(np.abs(np.diag(np.linalg.pinv(at.information, hermitian=True))))
-    return Fit(at.theta, std, at.cost, settled)
+    current = point(first, expected, slopes, whittle_cost(expected, data))
+    current, converged = fisher_scoring(
+        current, propose, steps=MOST_STEPS, least_damping=1e-9, most_damping=1e8
+    )
+    std = np.zeros_like(current.theta)
+    std[current.free] = np.sqrt(
+        np.abs(np.diag(np.linalg.pinv(current.information, hermitian=True)))
+    )
+    return SpectrumFit(current.theta, std, current.cost, converged)
 
 
 def whittle_cost(expected: Field, data: Data) -> float:
-    """-ln likelihood of exponential ordinates, up to a constant."""
+    """Return -ln likelihood of exponential ordinates, up to a constant."""
     if not np.all(expected > 0.0):
         return float("inf")
     return float(data.weight * np.sum(np.log(expected) + data.density / expected))

@@ -1,7 +1,7 @@
-"""Lines of shafts and mains in a spectrum: found, named, and taken out before anything is fitted.
+"""Detection, identification and removal of tones (shaft and mains harmonics) in a spectrum.
 
-A tone is a few lines wide and stands above its neighbours by more than chance; a resonance is
-many. Whose tone it is follows from speeds, which are given or found in the tones themselves.
+A tone is a few lines wide and exceeds its neighbours by more than chance; a resonance is wider. Its
+source follows from speeds, which are stated or found from the tones themselves.
 """
 
 from collections.abc import Sequence
@@ -15,24 +15,25 @@ from asperity.core.errors import BadInput, require_positive
 from asperity.core.signals import Spectrum
 
 MAINS_HZ = (50.0, 60.0)
-# false tones in the whole spectrum; at the harmonics of a known speed the same in each comb of them
+# expected false tones in the whole spectrum, and among the harmonics of each known speed
 CHANCE = 1e-2
-NEIGHBOURS = 20  # lines to either side whose median is the level below a tone
-REACH = 8  # lines to either side that a tone may smear over; what is wider is left standing
-CORE = 3  # lines to either side that a Hann taper spreads any tone over
-SPEED_ERROR = 2e-3  # relative, of a given speed: it is put right by the tones themselves
+NEIGHBOURS = 20  # lines on either side whose median is the level under a tone
+LARGEST_TONE_HALF_WIDTH = 8  # lines on either side; wider peaks are kept
+TONE_HALF_WIDTH = 3  # lines on either side that a Hann taper spreads any tone over
+SPEED_ERROR = 2e-3  # relative, of a stated speed, which the tones correct
 FEWEST_HARMONICS = 5  # tones that a speed must explain to be found
-SLOWEST_HZ, FASTEST_HZ = 4.0, 500.0  # shafts looked for
-SEPARATE = (
-    5.0  # spectral lines between neighbouring harmonics, below which a comb explains anything
-)
-MOST_PROMISING = 40  # speeds of all that pairs of tones suggest
-SURE = 1e-6  # chance of as many tones on a comb that is not there, all combs tried counted
+SLOWEST_HZ, FASTEST_HZ = 4.0, 500.0  # range of the shaft speeds searched
+SMALLEST_SPACING = 5.0  # lines between harmonics; a denser comb would explain anything
+CANDIDATES = 40  # speeds tested in detail, of all that pairs of tones suggest
+COMB_CHANCE = 1e-6  # chance of a false comb, all combs tried included
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
-    """A tone taken out: its frequency [Hz], its mean square [unit^2], and whose it is: "57 x 56.25 Hz" or "unknown"."""
+class RemovedTone:
+    """A removed tone: frequency [Hz], mean square [unit^2], and source.
+
+    `source` is such as "57 x 56.25 Hz", or "unknown".
+    """
 
     frequency_hz: float
     mean_square: float
@@ -41,16 +42,16 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CleanSpectrum:
-    """A spectrum without its tones.
+    """A spectrum with its tones removed.
 
-    `spectrum` has the level beside them in their place; `kept`, shape (lines,), the lines that
-    were left alone; `removed` what was taken out, by frequency; `speeds_hz` the shafts and the
-    mains that explain tones, put right by them.
+    `spectrum` holds the level of the neighbours in their place; `kept`, shape (lines,), marks the
+    unchanged lines; `removed` lists the tones by frequency; `speeds_hz` the shafts and mains that
+    explain tones, corrected by them.
     """
 
     spectrum: Spectrum
     kept: Mask
-    removed: tuple[Line, ...]
+    removed: tuple[RemovedTone, ...]
     speeds_hz: tuple[float, ...]
 
 
@@ -60,64 +61,48 @@ def remove_lines(
     shaft_hz: Sequence[float] | None = None,
     band_hz: tuple[float, float] | None = None,
 ) -> CleanSpectrum:
-    """Take the tones out of a spectrum.
+    """Remove the tones from a spectrum.
 
     Parameters
     ----------
-    shaft_hz : speeds of the shafts [Hz], to name tones by and to find weak ones at their harmonics; None finds them
-        in the tones. The mains, 50 or 60 Hz, are looked for in any case. No tone is
-        found among the first and last 20 lines
-    band_hz : take tones out of this band only; speeds are judged by the tones of the whole spectrum all the same
+    shaft_hz : speeds of the shafts [Hz], used to identify tones and to find weak ones at their
+        harmonics; None finds them from the tones. The mains, 50 or 60 Hz, are always included. The
+        first and last 20 lines are not searched
+    band_hz : remove tones from this band only; speeds still follow from the tones of the whole
+        spectrum
 
     Raises
     ------
     BadInput
-        for a speed that is not positive, a smoothed spectrum, one of fewer than 50 lines or with values that are not
-        finite.
+        for a speed that is not positive, a smoothed spectrum, one of fewer than 50 lines or with
+        values that are not finite.
     """
-    for speed in shaft_hz or ():
-        require_positive("shaft speed", speed, "Hz")
-    if spectrum.smoothing_passes:
-        raise BadInput(
-            f"lines are taken out of an unsmoothed spectrum, got one smoothed {spectrum.smoothing_passes} times"
-        )
-    if spectrum.density.size <= 2 * NEIGHBOURS + 10:
-        raise BadInput(
-            f"a spectrum of {spectrum.density.size} lines is too short to tell tones; lengthen the spectrum's segment"
-        )
-    if not np.isfinite(spectrum.density).all():
-        raise BadInput(
-            "a spectrum must be finite to take lines out of it, got some that is not; repair the record"
-        )
+    _require_removable(spectrum, shaft_hz)
     level = _level(spectrum)
-    rise = spectrum.density / np.maximum(level, np.finfo(float).tiny)
-    bound = _bound(spectrum, CHANCE / rise.size)
-    peaks = _peaks(rise, bound)
-    tones = _centre(spectrum, rise, peaks)
-    combs = _combs(tones, spectrum, shaft_hz)
-    weak = _weak_harmonics(spectrum, rise, combs, peaks)
+    relative_density = spectrum.density / np.maximum(level, np.finfo(float).tiny)
+    bound = _threshold(spectrum, CHANCE / relative_density.size)
+    peaks = _find_peaks(relative_density, bound)
+    tones = _tone_frequencies(spectrum, relative_density, peaks)
+    combs = _find_combs(tones, spectrum, shaft_hz)
+    weak = _weak_harmonics(spectrum, relative_density, combs, peaks)
     peaks = np.union1d(peaks, weak)
     low, high = band_hz if band_hz is not None else (0.0, np.inf)
     inside = (spectrum.frequency_hz[peaks] >= low) & (spectrum.frequency_hz[peaks] <= high)
     peaks = peaks[inside]
-    tones = _centre(spectrum, rise, peaks)
+    tones = _tone_frequencies(spectrum, relative_density, peaks)
 
-    kept = np.ones(rise.size, dtype=bool)
-    usual = 1.0 + 2.0 / np.sqrt(_shape(spectrum))
+    kept = np.ones(relative_density.size, dtype=bool)
     removed = []
     for peak, tone in zip(peaks, tones, strict=True):
-        first, last = max(peak - CORE, 0), min(peak + CORE, rise.size - 1)
-        while first > max(peak - REACH, 0) and rise[first - 1] > usual:
-            first -= 1
-        while last < min(peak + REACH, rise.size - 1) and rise[last + 1] > usual:
-            last += 1
+        first, last = _tone_extent(
+            relative_density, int(peak), 1.0 + 2.0 / np.sqrt(_shape(spectrum))
+        )
         kept[first : last + 1] = False
         excess = spectrum.density[first : last + 1] - level[first : last + 1]
-        square = float(np.sum(excess)) * spectrum.spacing_hz
+        mean_square = float(np.sum(excess)) * spectrum.spacing_hz
+        source = _source(tone, combs, spectrum)
         removed.append(
-            Line(
-                frequency_hz=float(tone), mean_square=square, source=_source(tone, combs, spectrum)
-            )
+            RemovedTone(frequency_hz=float(tone), mean_square=mean_square, source=source)
         )
     density = spectrum.density.copy()
     density[~kept] = (
@@ -133,91 +118,140 @@ def remove_lines(
     )
 
 
+def _require_removable(spectrum: Spectrum, shaft_hz: Sequence[float] | None) -> None:
+    for speed in shaft_hz or ():
+        require_positive("shaft speed", speed, "Hz")
+    if spectrum.smoothing_passes:
+        raise BadInput(
+            "removing tones needs an unsmoothed spectrum, got one smoothed "
+            f"{spectrum.smoothing_passes} times"
+        )
+    if spectrum.density.size <= 2 * NEIGHBOURS + 10:
+        raise BadInput(
+            f"a spectrum of {spectrum.density.size} lines is too short to detect tones; "
+            f"lengthen its "
+            "segment"
+        )
+    if not np.isfinite(spectrum.density).all():
+        raise BadInput("removing tones needs a finite spectrum; repair the record")
+
+
+def _tone_extent(relative_density: Field, peak: int, upper: float) -> tuple[int, int]:
+    """Return the first and last line of a tone: its core, and neighbours that exceed `upper`."""
+    end = relative_density.size - 1
+    first, last = max(peak - TONE_HALF_WIDTH, 0), min(peak + TONE_HALF_WIDTH, end)
+    while first > max(peak - LARGEST_TONE_HALF_WIDTH, 0) and relative_density[first - 1] > upper:
+        first -= 1
+    while last < min(peak + LARGEST_TONE_HALF_WIDTH, end) and relative_density[last + 1] > upper:
+        last += 1
+    return first, last
+
+
 def _shape(spectrum: Spectrum) -> float:
-    """Shape of the gamma distribution of a line: one tapered periodogram is worth 1, by whatever `averages` says."""
+    """Return the shape of a line's gamma distribution; 1 for one tapered periodogram."""
     return max(spectrum.averages * (1.0 if spectrum.window == "boxcar" else 1.944), 1.0)
 
 
 def _level(spectrum: Spectrum) -> Field:
-    """Mean density beside each line: the running median, and what the median of a gamma distribution lacks."""
+    """Return the mean density around each line: the running median over the gamma median."""
     shape = _shape(spectrum)
     middle = scipy.ndimage.median_filter(spectrum.density, 2 * NEIGHBOURS + 1, mode="nearest")
     return np.asarray(middle / float(scipy.special.gammaincinv(shape, 0.5) / shape))
 
 
-def _bound(spectrum: Spectrum, chance: float) -> float:
-    """How far above its neighbours a line may stand by chance; the level itself is known to 1.25/sqrt(41) of that."""
+def _threshold(spectrum: Spectrum, chance: float) -> float:
+    """Return the relative density that a line exceeds by chance with this probability.
+
+    The level itself is known to 1.25/sqrt(41) of the scatter.
+    """
     shape = _shape(spectrum)
     return float(scipy.special.gammainccinv(shape, chance) / shape * (1.0 + 0.6 / np.sqrt(shape)))
 
 
-def _peaks(rise: Field, bound: float) -> Field:
-    """Lines that stand out, the highest of each group, where the group is no wider than a tone can be."""
-    above = rise > bound
-    above[:NEIGHBOURS] = above[-NEIGHBOURS:] = False  # too few neighbours to one side
+def _find_peaks(relative_density: Field, bound: float) -> Field:
+    """Return lines above the threshold, the highest of each group that is as narrow as a tone."""
+    excess = relative_density > bound
+    excess[:NEIGHBOURS] = excess[-NEIGHBOURS:] = False  # too few neighbours to one side
     peaks = []
-    for at in map(int, np.flatnonzero(above)):
-        first, last = max(at - CORE, 0), min(at + CORE, rise.size - 1)
-        if rise[at] >= np.max(rise[first : last + 1]):
-            wide = rise[max(at - 2 * REACH, 0) : at + 2 * REACH + 1]
-            if np.count_nonzero(wide > max(0.25 * rise[at], bound)) <= 2 * CORE + 1:
-                peaks.append(at)
+    for index in map(int, np.flatnonzero(excess)):
+        first, last = (
+            max(index - TONE_HALF_WIDTH, 0),
+            min(index + TONE_HALF_WIDTH, relative_density.size - 1),
+        )
+        if relative_density[index] >= np.max(relative_density[first : last + 1]):
+            surroundings = relative_density[
+                max(index - 2 * LARGEST_TONE_HALF_WIDTH, 0) : index
+                + 2 * LARGEST_TONE_HALF_WIDTH
+                + 1
+            ]
+            if (
+                np.count_nonzero(surroundings > max(0.25 * relative_density[index], bound))
+                <= 2 * TONE_HALF_WIDTH + 1
+            ):
+                peaks.append(index)
     return np.array(peaks, dtype=int)
 
 
-def _centre(spectrum: Spectrum, rise: Field, peaks: Field) -> Field:
-    """Frequencies of the tones [Hz], between lines: from the two highest lines of each, by the taper's own shape.
+def _tone_frequencies(spectrum: Spectrum, relative_density: Field, peaks: Field) -> Field:
+    """Return the frequencies of the tones [Hz], interpolated between the two highest lines of each.
 
     Their amplitudes are as (1 - δ)/(2 + δ) to 1 behind a Hann taper, as δ/(1 - δ) to 1 behind none.
     """
     if peaks.size == 0:
         return np.zeros(0)
-    above = np.sqrt(np.maximum(np.pad(rise, 1) - 1.0, 1e-12))
-    left, top, right = above[peaks], above[peaks + 1], above[peaks + 2]
-    ratio = np.maximum(left, right) / top
-    away = (
+    excess = np.sqrt(np.maximum(np.pad(relative_density, 1) - 1.0, 1e-12))
+    unexplained, top, right = excess[peaks], excess[peaks + 1], excess[peaks + 2]
+    ratio = np.maximum(unexplained, right) / top
+    offset = (
         ratio / (1.0 + ratio)
         if spectrum.window == "boxcar"
         else (2.0 * ratio - 1.0) / (1.0 + ratio)
     )
     return np.asarray(
-        (peaks + np.where(right > left, 1.0, -1.0) * np.clip(away, 0.0, 0.5)) * spectrum.spacing_hz
+        (peaks + np.where(right > unexplained, 1.0, -1.0) * np.clip(offset, 0.0, 0.5))
+        * spectrum.spacing_hz
     )
 
 
-def _combs(tones: Field, spectrum: Spectrum, shaft_hz: Sequence[float] | None) -> list[float]:
-    """Speeds that explain tones, put right by them: those given, or those found; and the mains."""
+def _find_combs(tones: Field, spectrum: Spectrum, shaft_hz: Sequence[float] | None) -> list[float]:
+    """Return the speeds that explain tones, corrected by them: stated or found, and the mains."""
     combs: list[float] = []
-    left = tones
-    mains = [(_evidence(left, speed, spectrum), speed) for speed in MAINS_HZ]
-    strongest = max(mains)
-    if strongest[0] > -np.log(CHANCE):
-        combs.append(strongest[1])
-        left = left[~_on_comb(left, strongest[1], spectrum)]
+    unexplained = tones
+    mains_evidence, mains_hz = max(
+        (_evidence(unexplained, speed, spectrum), speed) for speed in MAINS_HZ
+    )
+    if mains_evidence > -np.log(CHANCE):
+        combs.append(mains_hz)
+        unexplained = unexplained[~_on_comb(unexplained, mains_hz, spectrum)]
     if shaft_hz is not None:
-        return [_put_right(tones, speed, spectrum) for speed in shaft_hz] + combs
-    lowest = max(SLOWEST_HZ, SEPARATE * spectrum.spacing_hz)
-    while left.size >= FEWEST_HARMONICS:
-        differences = np.abs(left[:, None] - left[None, :])[np.triu_indices(left.size, 1)]
-        candidates = np.unique(np.concatenate([left, differences]).round(6))
+        return [_corrected_speed(tones, speed, spectrum) for speed in shaft_hz] + combs
+    lowest = max(SLOWEST_HZ, SMALLEST_SPACING * spectrum.spacing_hz)
+    while unexplained.size >= FEWEST_HARMONICS:
+        differences = np.abs(unexplained[:, None] - unexplained[None, :])[
+            np.triu_indices(unexplained.size, 1)
+        ]
+        candidates = np.unique(np.concatenate([unexplained, differences]).round(6))
         candidates = candidates[(candidates >= lowest) & (candidates <= FASTEST_HZ)]
         if candidates.size == 0:
             break
-        rough = np.array(
-            [np.count_nonzero(_on_comb(left, speed, spectrum)) for speed in candidates]
+        score = np.array(
+            [np.count_nonzero(_on_comb(unexplained, speed, spectrum)) for speed in candidates]
         )
-        rough = rough - left.size * 1.5 * spectrum.spacing_hz / candidates
-        promising = candidates[np.argsort(rough)[-MOST_PROMISING:]]
-        judged = [
-            (_evidence(left, _put_right(left, speed, spectrum), spectrum), speed)
+        score = score - unexplained.size * 1.5 * spectrum.spacing_hz / candidates
+        promising = candidates[np.argsort(score)[-CANDIDATES:]]
+        assessed = [
+            (
+                _evidence(unexplained, _corrected_speed(unexplained, speed, spectrum), spectrum),
+                speed,
+            )
             for speed in promising
         ]
-        evidence, speed = max(judged)
-        if evidence - np.log(candidates.size) < -np.log(SURE):
+        evidence, speed = max(assessed)
+        if evidence - np.log(candidates.size) < -np.log(COMB_CHANCE):
             break
-        speed = _put_right(left, speed, spectrum)
+        speed = _corrected_speed(unexplained, speed, spectrum)
         combs.insert(0, speed)
-        left = left[~_on_comb(left, speed, spectrum)]
+        unexplained = unexplained[~_on_comb(unexplained, speed, spectrum)]
     return combs
 
 
@@ -226,48 +260,50 @@ def _on_comb(tones: Field, speed: float, spectrum: Spectrum) -> Mask:
     return np.asarray(np.abs(tones - order * speed) < 0.75 * spectrum.spacing_hz)
 
 
-def _put_right(tones: Field, speed: float, spectrum: Spectrum) -> float:
-    """The speed that its harmonics among the tones have in common, from the low orders to the high."""
-    reach = SPEED_ERROR
+def _corrected_speed(tones: Field, speed: float, spectrum: Spectrum) -> float:
+    """Return the speed that fits its harmonics among the tones, from low orders to high."""
+    tolerance = SPEED_ERROR
     for _ in range(20):
         order = np.rint(tones / speed)
-        near = (order >= 1.0) & (
+        matching = (order >= 1.0) & (
             np.abs(tones - order * speed)
-            < np.minimum(reach * tones, 0.3 * speed) + spectrum.spacing_hz
+            < np.minimum(tolerance * tones, 0.3 * speed) + spectrum.spacing_hz
         )
-        if not np.any(near):
+        if not np.any(matching):
             return speed
-        lowest = np.argsort(order[near])[: 2 + int(1.5 * FEWEST_HARMONICS)]
-        use_order, use = order[near], tones[near]
-        if reach == SPEED_ERROR:
-            use_order, use = use_order[lowest], use[lowest]
-        speed = float(np.sum(use_order * use) / np.sum(use_order**2))
-        reach = 0.0
+        lowest = np.argsort(order[matching])[: 2 + int(1.5 * FEWEST_HARMONICS)]
+        used_orders, used_tones = order[matching], tones[matching]
+        if tolerance == SPEED_ERROR:
+            used_orders, used_tones = used_orders[lowest], used_tones[lowest]
+        speed = float(np.sum(used_orders * used_tones) / np.sum(used_orders**2))
+        tolerance = 0.0
     return speed
 
 
 def _evidence(tones: Field, speed: float, spectrum: Spectrum) -> float:
-    """-ln of the chance that so many of the tones would lie on a comb by themselves (binomial)."""
+    """Return -ln of the chance that as many tones lie on a comb by themselves (binomial)."""
     count = int(np.count_nonzero(_on_comb(tones, speed, spectrum)))
     if count < FEWEST_HARMONICS:
         return 0.0
-    by_chance = min(1.5 * spectrum.spacing_hz / speed, 1.0)
-    return float(-np.log(scipy.special.betainc(count, tones.size - count + 1, by_chance)))
+    probability = min(1.5 * spectrum.spacing_hz / speed, 1.0)
+    return float(-np.log(scipy.special.betainc(count, tones.size - count + 1, probability)))
 
 
-def _weak_harmonics(spectrum: Spectrum, rise: Field, combs: Sequence[float], peaks: Field) -> Field:
-    """Lines at harmonics of the speeds that stand out by less than a tone of unknown origin has to."""
+def _weak_harmonics(
+    spectrum: Spectrum, relative_density: Field, combs: Sequence[float], peaks: Field
+) -> Field:
+    """Return lines at harmonics of known speeds that a lower threshold detects."""
     weak = []
     for speed in combs:
         orders = np.arange(1, int(spectrum.frequency_hz[-1] / speed))
         if orders.size == 0:
             continue
-        bound = _bound(spectrum, CHANCE / orders.size)
-        for at in np.rint(orders * speed / spectrum.spacing_hz).astype(int):
-            first = max(at - 1, 0)
-            best = first + int(np.argmax(rise[first : at + 2]))
-            taken = peaks.size > 0 and np.min(np.abs(peaks - best)) <= CORE
-            if rise[best] > bound and not taken:
+        bound = _threshold(spectrum, CHANCE / orders.size)
+        for index in np.rint(orders * speed / spectrum.spacing_hz).astype(int):
+            first = max(index - 1, 0)
+            best = first + int(np.argmax(relative_density[first : index + 2]))
+            claimed = peaks.size > 0 and np.min(np.abs(peaks - best)) <= TONE_HALF_WIDTH
+            if relative_density[best] > bound and not claimed:
                 weak.append(best)
     return np.array(weak, dtype=int)
 

@@ -1,4 +1,4 @@
-"""What a contact resonance is: an oscillator's line in a spectrum with its deviations, or why there is none."""
+"""Contact resonance: an oscillator line in a spectrum and its errors, or why none was found."""
 
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -8,27 +8,27 @@ import numpy as np
 from asperity.core.arrays import Field
 
 
-class SeenLine(Protocol):
-    """What sampling makes of an oscillator's line."""
+class SamplingFactor(Protocol):
+    """Effect of sampling on an oscillator line."""
 
     def __call__(self, frequency_hz: Field, f0_hz: float, damping_ratio: float) -> Field:
-        """A factor on the line at each frequency [Hz], 1 at f0."""
+        """Return the factor on the line at each frequency [Hz], 1 at f0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resonance:
-    """A contact resonance, or the reason why there is none.
+    """A contact resonance, or the reason why none was found.
 
-    `crf_hz` is the oscillator's natural frequency f0 [Hz]; `crfa` the fitted line at f0 without
-    the floor below it [(m/s^2)^2/Hz]; `crf_std`, `crfa_std` their standard deviations from the
-    Fisher information. `damping_ratio` with its `damping_ratio_std`, and `floor`, the density at
-    the lower and upper end of `band_hz`, complete the fitted curve; where more than a floor was
-    fitted, `background` in its place: frequencies and densities. `evidence` is how much better, by
-    BIC, a line and the rest explain the band than the rest alone (found needs 10, very strong).
-    All of a line's figures are nan when it was not `found`; `reason` then says why. `seen` is how
-    the record's sampling bends that line, where that was known. `crf_shared_std` is the part of
-    `crf_std` that lines at this place have in common: what a structure brings does not average
-    away over repeats. The paper's peak has no standard deviation, damping, floor or evidence: nan.
+    `crf_hz` is the oscillator's natural frequency f0 [Hz]; `crfa` the fitted line at f0 without the
+    floor [(m/s^2)^2/Hz]; `crf_std`, `crfa_std` their standard deviations from the Fisher
+    information. `damping_ratio`, its `damping_ratio_std`, and `floor`, the density at the lower and
+    upper end of `band_hz`, complete the fitted curve; where more than a floor was fitted,
+    `background` (frequencies, densities) replaces it. `evidence` is the BIC difference between the
+    fits with and without the line (10, very strong, is required). All values of the line are nan
+    when it was not `found`; `reason` then states why. `sampling_factor` is the effect of sampling
+    on the line, where known. `crf_shared_std` is the part of `crf_std` that lines at the same place
+    have in common: errors caused by a structure do not average out over repeats. The paper's peak
+    has no standard deviation, damping, floor or evidence: nan.
     """
 
     found: bool
@@ -45,17 +45,17 @@ class Resonance:
     floor: tuple[float, float] = (np.nan, np.nan)
     evidence: float = np.nan
     background: tuple[Field, Field] | None = field(default=None, compare=False, repr=False)
-    seen: SeenLine | None = field(default=None, compare=False, repr=False)
+    sampling_factor: SamplingFactor | None = field(default=None, compare=False, repr=False)
 
     @property
     def crf_std_hz(self) -> float:
-        """`crf_std`, under the name that tables and JSON give it [Hz]."""
+        """`crf_std` under its name in tables and JSON [Hz]."""
         return self.crf_std
 
     def curve(self, frequency_hz: Field) -> Field:
-        """Fitted density at `frequency_hz` (any shape): line and floor; the floor alone when nothing was found.
+        """Return the fitted density at `frequency_hz` (any shape): line and floor.
 
-        nan everywhere for a method that fits no curve.
+        The floor alone when no line was found; nan for a method that fits no curve.
         """
         low, high = self.band_hz
         if self.background is None:
@@ -67,25 +67,27 @@ class Resonance:
             line = self.crfa * line_shape(frequency_hz, self.crf_hz, self.damping_ratio)
             curve = curve + (
                 line
-                if self.seen is None
-                else line * self.seen(frequency_hz, self.crf_hz, self.damping_ratio)
+                if self.sampling_factor is None
+                else line * self.sampling_factor(frequency_hz, self.crf_hz, self.damping_ratio)
             )
         return curve
 
 
-NARROWEST = 4.0  # resolutions: a Hann window widens such a line by 6 %
-MOST_TAKEN_OUT = 0.1
-# standard deviation of a damping ratio over itself: more says hardly its order of magnitude
-VAGUEST = 0.5
+FEWEST_RESOLUTIONS = 4.0  # that a line is wide: a Hann window then widens it by 6 %
+LARGEST_TONE_SHARE = 0.1
+
+LARGEST_RELATIVE_STD = 0.5
 
 
 def damping_objection(
     resonance: Resonance, resolution_hz: float, *, taken_out: float = 0.0
 ) -> str | None:
-    """Why a line's width is no damping ratio that one could follow; None where it is one.
+    """Return the reason why a line's width does not determine its damping ratio, or None.
 
-    `resolution_hz` is the equivalent noise bandwidth of the spectrum [Hz], `taken_out` the share
-    of the line's half-power width that was taken for tones and is missing from the spectrum.
+    Parameters
+    ----------
+    resolution_hz : equivalent noise bandwidth of the spectrum [Hz]
+    taken_out : share of the line's half-power width that was removed as tones
     """
     if not resonance.found:
         return resonance.reason
@@ -93,22 +95,24 @@ def damping_objection(
     if not np.isfinite(ratio):
         return f"the method {resonance.method} fits no width"
     if not np.isfinite(std):
-        return "its width was fitted without a deviation"
-    if std > VAGUEST * ratio:
-        return f"its damping ratio is not known to half of itself ({ratio:.3f} ± {std:.3f})"
+        return "its width was fitted without a standard deviation"
+    if std > LARGEST_RELATIVE_STD * ratio:
+        return f"its damping ratio is uncertain by more than half ({ratio:.3f} ± {std:.3f})"
     width = 2.0 * ratio * resonance.crf_hz
-    if width < NARROWEST * resolution_hz:
+    if width < FEWEST_RESOLUTIONS * resolution_hz:
         return (
-            f"a line {width:.1f} Hz wide is less than {NARROWEST:g} times the spectrum's resolution of "
-            f"{resolution_hz:.1f} Hz; record for longer"
+            f"a line {width:.1f} Hz wide is less than {FEWEST_RESOLUTIONS:g} times the spectrum's "
+            f"resolution of {resolution_hz:.1f} Hz; record for longer"
         )
-    if taken_out > MOST_TAKEN_OUT:
-        return f"{100 * taken_out:.0f} % of the line was taken out as tones, which leaves too wide a rest"
+    if taken_out > LARGEST_TONE_SHARE:
+        return (
+            f"{100 * taken_out:.0f} % of the line was removed as tones, so its width is too large"
+        )
     return None
 
 
 def line_shape(frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float) -> Field:
-    """Acceleration line of an oscillator that rides over white base acceleration, 1 at f = f0.
+    """Return the acceleration line of an oscillator on white base acceleration, 1 at f = f0.
 
     T(f)/T(f0) with T = (f0^4 + (2ζ f0 f)^2) / ((f0^2 - f^2)^2 + (2ζ f0 f)^2), T(f0) = (1 +
     4ζ^2)/(4ζ^2). Roughness whose spectrum falls as f^-4 (a second-order low pass, far above its
@@ -120,7 +124,7 @@ def line_shape(frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field |
 def line_and_slopes(
     frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float
 ) -> tuple[Field, Field, Field]:
-    """The line L, dL/d(ln f0) and dL/d(ln ζ); shapes broadcast."""
+    """Return the line L, dL/d(ln f0) and dL/d(ln ζ); shapes broadcast."""
     line, x2, squared, top, bottom = _line_and_parts(frequency_hz, f0_hz, damping_ratio)
     by_f0 = line * (
         (2.0 * squared * x2 - 4.0 * x2 * (1.0 - x2)) / bottom - 2.0 * squared * x2 / top
@@ -132,7 +136,7 @@ def line_and_slopes(
 def _line_and_parts(
     frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float
 ) -> tuple[Field, Field, Field | float, Field, Field]:
-    """The line L, (f/f0)^2, (2ζ)^2, and L's numerator and denominator."""
+    """Return the line L, (f/f0)^2, (2ζ)^2, and L's numerator and denominator."""
     x2 = (frequency_hz / f0_hz) ** 2
     squared = 4.0 * damping_ratio**2
     top, bottom = 1.0 + squared * x2, (1.0 - x2) ** 2 + squared * x2
@@ -140,12 +144,15 @@ def _line_and_parts(
 
 
 def no_resonance(reason: str, band_hz: tuple[float, float], method: str, **known: Any) -> Resonance:
-    """A resonance that is not there, or that could not even be looked for, and why; what is `known` by field."""
+    """Return a resonance that was not found, or not looked for; `known` sets further fields."""
     return Resonance(found=False, reason=reason, band_hz=band_hz, method=method, **known)
 
 
 def fitted_resonance(line: Field, std: Field, **known: Any) -> Resonance:
-    """The resonance of a fitted line: height, f0 and damping ratio with their deviations; the rest by field."""
+    """Return the resonance of a fitted line: height, f0, damping ratio, and their deviations.
+
+    `known` sets the other fields.
+    """
     names = ("crfa", "crf_hz", "damping_ratio", "crfa_std", "crf_std", "damping_ratio_std")
     known |= zip(names, map(float, (*line, *std)), strict=True)
     return Resonance(found=True, **known)

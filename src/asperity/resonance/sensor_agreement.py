@@ -1,85 +1,122 @@
-"""Whether lines on several sensors are one, and what the errors of sensors have in common.
-
-The lines are fitted by `separation`; what is made of them is left to `sensors`.
-"""
+"""Agreement of several sensors: which lines are the same, and which errors they have in common."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, Mask
+from asperity.core.signals import Spectrum
+from asperity.resonance.line_fit import CommonLines, JointFit, SensorData
 from asperity.resonance.resonance import Resonance
-from asperity.resonance.separation import Heard, Joint, Lines
-from asperity.resonance.spectrum_model import shares_of
+from asperity.resonance.series import has_no_vibration
+from asperity.resonance.spectrum_model import model_shares
 
-APART, APART_WIDTHS = (
-    3.0,
-    0.25,
-)  # deviations, and half-power widths, by both of which two lines are not one
+# two lines differ if their distance exceeds both so many standard deviations and so many widths
+DIFFERENT_DEVIATIONS, DIFFERENT_WIDTHS = 3.0, 0.25
+
+SpectraBySensor = Mapping[str, Sequence[Spectrum | None]]  # one per recording, None if missing
+MasksBySensor = Mapping[str, Sequence[Mask | None]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorLines:
+    """The contact resonance of each recording from several sensors.
+
+    `resonances` has one per recording, its height that on the first sensor, nan where that does not
+    detect it; `detected_on` the names of the sensors that detect its line; `alone` the results of
+    each sensor's own series, None where it has no spectrum. `common` is the share of the sensors'
+    errors that is common to them, nan where it cannot be estimated. `moved` lists recordings from
+    which a sensor's transfer differs, by number, and the sensor.
+    """
+
+    resonances: tuple[Resonance, ...]
+    detected_on: tuple[tuple[str, ...], ...]
+    alone: Mapping[str, tuple[Resonance | None, ...]]
+    common: float
+    moved: tuple[tuple[int, str], ...] = ()
 
 
 class Agreement(NamedTuple):
-    """How sensors agree, as a series has settled it.
+    """Agreement of sensors, estimated from a series.
 
-    `common` is the share of their errors that two have in common, `wider` by how much their lines
-    differ more than their deviations say, `established` who has mostly heard the line that others
-    hear too.
+    `common` is the share of errors that two sensors have in common, `widening` the factor by which
+    their lines differ more than their deviations state, `established` the sensors that mostly
+    detected the line of others.
     """
 
     common: Mapping[tuple[str, str], float]
-    wider: float
+    widening: float
     established: tuple[str, ...]
 
 
-class Fit(NamedTuple):
-    """Recordings fitted on the same sensors: what each hears of them, the lines, and how likely they are elsewhere."""
+class SensorFit(NamedTuple):
+    """Recordings fitted on the same sensors: data, common lines, costs of the templates."""
 
     names: list[str]
     numbers: list[int]
-    heard: list[Heard]
-    lines: Lines
-    elsewhere: Field  # -ln likelihood of a line at each template, all sensors together
+    sensors: list[SensorData]
+    lines: CommonLines
+    template_costs: Field  # -ln likelihood of a line at each template, all sensors together
 
-    def joint(self, sensor: int) -> Joint:
-        """The fit as one sensor has it."""
-        heard = self.heard[sensor]
+    def joint(self, sensor: int) -> JointFit:
+        """Return the fit of one sensor."""
+        data = self.sensors[sensor]
         own = self.lines.own[sensor]
-        return Joint(heard.at._replace(own=own), 0.0, np.full_like(own, np.nan), heard.doubt)
+        parameters = data.parameters._replace(own=own)
+        return JointFit(parameters, 0.0, np.full_like(own, np.nan), data.transfer_covariance)
 
 
-def differ(one: Resonance, other: Resonance) -> bool:
-    """Whether two lines are not one."""
-    apart = abs(one.crf_hz - other.crf_hz)
-    width = 2.0 * max(one.damping_ratio * one.crf_hz, other.damping_ratio * other.crf_hz)
-    return apart > max(APART * float(np.hypot(one.crf_std, other.crf_std)), APART_WIDTHS * width)
+def recordings_with_vibration(
+    spectra: SpectraBySensor, band_hz: tuple[float, float]
+) -> dict[str, list[int]]:
+    """Return the numbers of the recordings in which each sensor has vibration in the band."""
+    return {
+        name: [
+            number
+            for number, spectrum in enumerate(every)
+            if spectrum is not None and not has_no_vibration(spectrum, band_hz)
+        ]
+        for name, every in spectra.items()
+    }
 
 
-def shares_in_common(names: Sequence[str], common: Mapping[tuple[str, str], float]) -> Field:
-    """The share of their errors that sensors have in common, (sensors, sensors); 0 with themselves."""
+def lines_differ(line: Resonance, other: Resonance) -> bool:
+    """Return whether two lines are at different frequencies."""
+    distance = abs(line.crf_hz - other.crf_hz)
+    width = 2.0 * max(line.damping_ratio * line.crf_hz, other.damping_ratio * other.crf_hz)
+    return distance > max(
+        DIFFERENT_DEVIATIONS * float(np.hypot(line.crf_std, other.crf_std)),
+        DIFFERENT_WIDTHS * width,
+    )
+
+
+def common_error_matrix(names: Sequence[str], common: Mapping[tuple[str, str], float]) -> Field:
+    """Return the shares of common errors, (sensors, sensors), with a zero diagonal."""
     shares = np.zeros((len(names), len(names)))
     for (i, first), (j, second) in combinations(enumerate(names), 2):
         shares[i, j] = shares[j, i] = common.get((first, second), common.get((second, first), 1.0))
     return shares
 
 
-def in_common(pair: tuple[str, str], fits: Sequence[Fit]) -> float:
-    """The correlation of what is left of two sensors' spectra where it moves their line, and its own deviation."""
+def common_error_share(pair: tuple[str, str], fits: Sequence[SensorFit]) -> float:
+    """Return the correlation of two sensors' residuals near their line, plus its standard error."""
     product, weights, squares, powers = 0.0, 0.0, 0.0, np.zeros(2)
     for fit in fits:
         if not set(pair) <= set(fit.names):
             continue
-        felt, off = [], []
+        sensitivities, residuals = [], []
         for name in pair:
             sensor = fit.names.index(name)
-            blocks, joint = fit.heard[sensor].blocks, fit.joint(sensor)
-            relative, expected = shares_of(blocks, joint.parameters)
-            felt.append(np.sqrt(blocks.weight) * np.abs(relative[:, 1]))
-            off.append(np.sqrt(blocks.weight) * (blocks.density / expected - 1.0))
-        both = felt[0] * felt[1]
-        product += float(np.sum(both * off[0] * off[1]))
-        powers += [np.sum(both * one**2) for one in off]
+            blocks, joint = fit.sensors[sensor].blocks, fit.joint(sensor)
+            relative, expected = model_shares(blocks, joint.parameters)
+            sensitivities.append(np.sqrt(blocks.weight) * np.abs(relative[:, 1]))
+            residuals.append(np.sqrt(blocks.weight) * (blocks.density / expected - 1.0))
+        both = sensitivities[0] * sensitivities[1]
+        product += float(np.sum(both * residuals[0] * residuals[1]))
+        powers += [np.sum(both * residual**2) for residual in residuals]
         weights += float(np.sum(both))
         squares += float(np.sum(both**2))
     if not np.all(powers > 0.0):

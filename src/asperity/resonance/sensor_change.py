@@ -1,99 +1,109 @@
-"""Where a series' sensor was moved: what lies between contact and sensor is another from some recording on.
+"""Detection of a moved sensor: the transfer from contact to sensor changes at a recording.
 
-One transfer is fitted to all by `separation`; here is asked whether another one behind a recording
-would explain what that leaves. What is made of it is left to `series`. docs/theory/indicators.md
-has the equations.
+`separation` fits one transfer to all recordings; here the evidence for another one from some
+recording on is computed. docs/theory/indicators.md has the equations.
 """
 
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.resonance.separation import Joint
-from asperity.resonance.spectrum_model import LOOSE, Blocks, away, shares_of
+from asperity.resonance.line_fit import JointFit
+from asperity.resonance.spectrum_model import (
+    WEAK_INFORMATION,
+    SpectrumBlocks,
+    model_shares,
+    relative_columns,
+)
 
-LEAST_PART = 6  # recordings before a move and behind it
-PACES = (0.03, 0.1, 0.3, 1.0)  # of what a move changes, from spline to spline
-USUAL_PACE = 0.1  # of the transfer that all share, at least: what is held level may yet bend
-MOVED = 50.0  # ln evidence of a step, beyond that of a drift, from which a sensor was moved
-ASIDE, SHARP = (
-    20,
-    0.12,
-)  # a step this part of a series aside loses at least this share of the evidence
-DETERMINED = 1e-6  # of the greatest, information that counts
+FEWEST_RECORDINGS_PER_PART = 6  # before and after a move
+STEP_STDS = (0.03, 0.1, 0.3, 1.0)  # prior standard deviations of the change between splines
+LEAST_STEP_STD = 0.1  # of the common transfer, so that a flat one may still bend
+EVIDENCE_REQUIRED = 50.0  # ln evidence of a step beyond that of a drift
+# a step displaced by this part of the series must lose at least this share of the evidence
+ASIDE, SHARP = 20, 0.12
+SIGNIFICANT_INFORMATION = 1e-6  # relative to the largest eigenvalue
 
 
-def moved_at(blocks: Blocks, joint: Joint) -> int | None:
-    """The first recording behind a change of the transfer, None where one does for all.
+def first_moved_recording(blocks: SpectrumBlocks, joint: JointFit) -> int | None:
+    """Return the first recording after a change of the transfer, or None.
 
-    ln evidence of a change of its coefficients from some recording on, Gaussian with the likeliest
-    pace, over none: by score and information at the fit, each recording's own parameters and the
-    common transfer eliminated. Both are divided by what scatter is beyond chance, so that a
-    machine which does not repeat itself has not been moved. A step has to beat a drift, and to be
-    told from one elsewhere: so modes that drift, or misfit that goes with the line's place, are
-    none.
+    Computes the ln evidence of a change of its coefficients from some recording on, Gaussian with
+    the most likely step standard deviation, over no change: from score and information at the fit,
+    with each recording's own parameters and the common transfer eliminated. Both are divided by the
+    scatter beyond chance, so that a machine that does not repeat itself is not taken for a moved
+    sensor. A step must beat a drift, and steps nearby; this excludes drifting modes and misfit that
+    depends on the line's frequency.
     """
     count = blocks.density.shape[0]
-    passed = joint.parameters.transfer
-    if count < 2 * LEAST_PART or not passed.coefficients.size:
+    transfer = joint.parameters.transfer
+    if count < 2 * FEWEST_RECORDINGS_PER_PART or not transfer.coefficients.size:
         return None
     score, information = _by_recording(blocks, joint)
-    beyond = max(_dispersion(score, information), 1.0)
-    score, information = score / beyond, information / beyond
-    usual = passed.stiffness(max(USUAL_PACE, joint.pace))
-    looser = np.linalg.solve(information.sum(axis=0) + usual, np.eye(passed.coefficients.size))
-    drawn = score.sum(axis=0) - usual @ passed.coefficients
-    stiff = [passed.stiffness(pace) for pace in PACES]
+    dispersion = max(_dispersion(score, information), 1.0)
+    score, information = score / dispersion, information / dispersion
+    prior_information = transfer.stiffness(max(LEAST_STEP_STD, joint.step_std))
+    inverse = np.linalg.solve(
+        information.sum(axis=0) + prior_information, np.eye(transfer.coefficients.size)
+    )
+    total_score = score.sum(axis=0) - prior_information @ transfer.coefficients
+    priors = [transfer.stiffness(step_std) for step_std in STEP_STDS]
 
     def evidence(course: Field) -> float:
-        """Ln evidence of a change that goes with `course` (recordings,), over none."""
-        together = np.einsum("n,ncd->cd", course, information)
-        changed = course @ score - together @ looser @ drawn
-        told = np.einsum("n,ncd->cd", course**2, information) - together @ looser @ together
-        return max(_evidence(changed, told, before) for before in stiff)
+        """Return the ln evidence of a change proportional to `course` (recordings,)."""
+        total = np.einsum("n,ncd->cd", course, information)
+        changed_score = course @ score - total @ inverse @ total_score
+        changed_information = (
+            np.einsum("n,ncd->cd", course**2, information) - total @ inverse @ total
+        )
+        return max(_evidence(changed_score, changed_information, prior) for prior in priors)
 
     numbers = np.arange(count)
 
     def step(first: int) -> float:
         return evidence(1.0 * (numbers >= first))
 
-    best = max(range(LEAST_PART, count - LEAST_PART + 1), key=step)
-    along = np.linspace(-1.0, 1.0, count)
-    drift = max(evidence(along), evidence(along**2), 0.0)
-    aside = max(count // ASIDE, 1)
-    blunt = max(step(best - aside), step(best + aside))
-    reached = step(best)
-    return best if reached > MOVED + drift and blunt < (1.0 - SHARP) * reached else None
+    best = max(range(FEWEST_RECORDINGS_PER_PART, count - FEWEST_RECORDINGS_PER_PART + 1), key=step)
+    t = np.linspace(-1.0, 1.0, count)
+    drift = max(evidence(t), evidence(t**2), 0.0)
+    offset = max(count // ASIDE, 1)
+    neighbours = max(step(best - offset), step(best + offset))
+    evidence_of_step = step(best)
+    significant = evidence_of_step > EVIDENCE_REQUIRED + drift
+    sharp = neighbours < (1.0 - SHARP) * evidence_of_step
+    return best if significant and sharp else None
 
 
-def _by_recording(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
-    """Score and information of each recording in the transfer's coefficients, its own parameters eliminated."""
-    at = joint.parameters
-    relative, expected = shares_of(blocks, joint.parameters)
-    off = blocks.weight * (blocks.density / expected - 1.0)
-    size = at.transfer.coefficients.size
-    score, information = np.zeros((off.shape[0], size)), np.zeros((off.shape[0], size, size))
+def _by_recording(blocks: SpectrumBlocks, joint: JointFit) -> tuple[Field, Field]:
+    """Return each recording's score and information of the transfer, own parameters eliminated."""
+    parameters = joint.parameters
+    relative, expected = model_shares(blocks, joint.parameters)
+    weighted_residual = blocks.weight * (blocks.density / expected - 1.0)
+    size = parameters.transfer.coefficients.size
+    recordings = weighted_residual.shape[0]
+    score, information = np.zeros((recordings, size)), np.zeros((recordings, size, size))
     for row, (shares, weight) in enumerate(zip(relative, blocks.weight, strict=True)):
-        passed = shares[0][:, None] * away(blocks.centre, at._replace(own=at.own[[row]]))[0]
-        weighted = weight[:, None] * passed
+        single = parameters._replace(own=parameters.own[[row]])
+        transfer = shares[0][:, None] * relative_columns(blocks.centre, single)[0]
+        weighted = weight[:, None] * transfer
         coupling = shares @ weighted
-        own = (shares * weight) @ shares.T + LOOSE * np.eye(len(shares))
-        score[row] = off[row] @ passed
-        information[row] = passed.T @ weighted - coupling.T @ np.linalg.solve(own, coupling)
+        own = (shares * weight) @ shares.T + WEAK_INFORMATION * np.eye(len(shares))
+        score[row] = weighted_residual[row] @ transfer
+        information[row] = transfer.T @ weighted - coupling.T @ np.linalg.solve(own, coupling)
     return score, information
 
 
 def _dispersion(score: Field, information: Field) -> float:
-    """Variance of the scores over what chance brings, of the middle recording."""
-    found = []
-    for one, told in zip(score, information, strict=True):
-        values, vectors = np.linalg.eigh(told)
-        counts = values > DETERMINED * values[-1]
-        found.append(float(np.mean((one @ vectors[:, counts]) ** 2 / values[counts])))
-    return float(np.median(found))
+    """Return the median over recordings of the score's variance over its expectation."""
+    ratios = []
+    for own_score, own_information in zip(score, information, strict=True):
+        values, vectors = np.linalg.eigh(own_information)
+        counted = values > SIGNIFICANT_INFORMATION * values[-1]
+        ratios.append(float(np.mean((own_score @ vectors[:, counted]) ** 2 / values[counted])))
+    return float(np.median(ratios))
 
 
-def _evidence(score: Field, information: Field, stiff: Field) -> float:
-    """Ln evidence of a change over none (Laplace), whose information before the data is `stiff`."""
-    behind = information + stiff
-    gain = 0.5 * float(score @ np.linalg.solve(behind, score))
-    return gain + 0.5 * float(np.linalg.slogdet(stiff)[1] - np.linalg.slogdet(behind)[1])
+def _evidence(score: Field, information: Field, prior: Field) -> float:
+    """Return the ln evidence (Laplace) of a change with prior information `prior`."""
+    posterior = information + prior
+    gain = 0.5 * float(score @ np.linalg.solve(posterior, score))
+    return gain + 0.5 * float(np.linalg.slogdet(prior)[1] - np.linalg.slogdet(posterior)[1])

@@ -1,8 +1,8 @@
-"""The contact resonance in every recording of a series: what stays is the machine, what moves is the contact.
+"""The contact resonance in every recording of a series: what is constant belongs to the machine.
 
-One spectrum alone cannot tell a structural mode from the contact's; a series can. `separation`
-fits, and what it found is judged here. docs/theory/indicators.md has the equations and how often
-it is right.
+A single spectrum cannot tell a structural mode from the contact's line; a series can. `separation`
+fits, and the lines are judged here. docs/theory/indicators.md has the equations and the measured
+error rates.
 """
 
 from collections.abc import Sequence
@@ -16,53 +16,57 @@ import numpy.typing as npt
 from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
 from asperity.core.signals import Spectrum
+from asperity.resonance.band_fit import STRONG_EVIDENCE
 from asperity.resonance.indicators import (
-    STRONG_EVIDENCE,
     IndicatorMethod,
     contact_resonance,
     require_band,
 )
-from asperity.resonance.residuals import Witnesses, brought, left_over, witnesses_of
-from asperity.resonance.resonance import Resonance, fitted_resonance, no_resonance
-from asperity.resonance.sensor_change import moved_at
-from asperity.resonance.separation import (
-    Joint,
-    Model,
-    Templates,
-    beside,
-    coarser,
-    models,
-    separate,
-    templates_on,
+from asperity.resonance.line_fit import JointFit
+from asperity.resonance.line_judgement import JudgedLine, best_rival, line_gain, line_objection
+from asperity.resonance.residuals import (
+    ResidualStatistics,
+    relative_residual,
+    residual_statistics,
+    systematic_errors,
 )
-from asperity.resonance.spectrum_model import Blocks, expected_density, whittle_costs
+from asperity.resonance.resonance import Resonance, fitted_resonance, no_resonance
+from asperity.resonance.sensor_change import first_moved_recording
+from asperity.resonance.separation import fit_to_shared, separate
+from asperity.resonance.spectrum_model import SpectrumBlocks, expected_density
+from asperity.resonance.template_search import (
+    TemplateModel,
+    Templates,
+    coarser,
+    line_templates,
+    template_models,
+)
 from asperity.resonance.transfer import SPLINES, Transfer
 
 SeriesMethod = Literal["joint", IndicatorMethod]
 
 FEWEST_RECORDINGS = 6
 MOST_BLOCKS = 600
-LARGEST_MISFIT = 0.3  # rms, beyond chance, of what the model leaves of a spectrum
-HEAVIEST_DAMPING = (
-    0.1  # of a contact: 0.01 dry to 0.1 in boundary lubrication, the paper's section 2.1
+# standard deviation of a line's frequency over its width below which it does not move
+PLACE_SPREAD = 0.1
+LINE_MOVES = "moves relative to the shared spectrum"
+LINE_KEEPS_PLACE = (
+    "keeps its frequency and changes its height; CRFA is the changing part, a lower bound"
 )
-STANDING = 0.1  # standard deviation of a line's places over its width, below which it does not move
-MOVES = "moves against what all recordings share"
-STANDS = "keeps its place and changes its height; CRFA is the part that changes, a lower bound"
 SAME_SPACING = 1e-9
-TENFOLD = float(np.log(10.0))  # change of a line across the band that a structure has to make
-RIVAL = 10.0  # ln likelihood by which the place found must beat every other place in the band
+# change of ln T across the band above which the transfer shapes the line
+TRANSFER_CHANGE = float(np.log(10.0))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Shared:
-    """What all recordings of a series share, as some of them have settled it: enough to judge another beside them.
+    """Spectrum that all recordings of a series share, sufficient to judge further recordings.
 
-    `first`, `size` and `spacing_hz` say which lines stand in which blocks; `centre` [Hz] and
-    `base` (ln density) are of blocks, shape (blocks,); `reach` [Hz], `transfer` and `doubt` of
-    what the lines come through; `stands` and `shaped` as `Found` has them; `counts`, `change`,
-    `by_chance` how far the recordings that settled it are from it, shape (recordings, blocks);
-    `lacking` (blocks,) how far what was fitted to them.
+    `first`, `size` and `spacing_hz` define the lines of each block; `centre` [Hz] and `base` (ln
+    density) belong to the blocks, shape (blocks,); `reach` [Hz], `transfer` and `doubt`
+    (covariance) to the transfer; `stands` and `shaped` are as in `SeriesFit`; `counts`, `change`,
+    `by_chance`, shape (recordings, blocks), and `lacking`, shape (blocks,), are the
+    `ResidualStatistics` of the recordings fitted.
     """
 
     band_hz: tuple[float, float]
@@ -82,7 +86,7 @@ class Shared:
     lacking: Field
 
     def fits(self, spectrum: Spectrum) -> bool:
-        """Whether a spectrum has these lines."""
+        """Return whether a spectrum has these lines."""
         end = self.first + self.size * self.centre.size
         return (
             end <= spectrum.frequency_hz.size
@@ -90,25 +94,29 @@ class Shared:
         )
 
     @cached_property
-    def _search(self) -> tuple[Templates, list[Model]]:
-        """The search made ready; single precision, for it is some 30 MB and only begins the fit."""
+    def _search(self) -> tuple[Templates, list[TemplateModel]]:
+        """Prepared template search, in single precision (some 30 MB): it only starts the fit."""
         empty = np.ones((1, self.centre.size))
-        coarse = coarser(Blocks(self.centre, empty, empty)).centre
-        templates = templates_on(coarse)
-        ready = models(np.exp(np.interp(coarse, self.centre, self.base)), templates, coarse)
-        return templates, [Model(*(part.astype(np.float32) for part in model)) for model in ready]
+        coarse = coarser(SpectrumBlocks(self.centre, empty, empty)).centre
+        templates = line_templates(coarse)
+        prepared = template_models(
+            np.exp(np.interp(coarse, self.centre, self.base)), templates, coarse
+        )
+        return templates, [
+            TemplateModel(*(part.astype(np.float32) for part in model)) for model in prepared
+        ]
 
     def resonances(
         self, spectra: Sequence[Spectrum], kept: Sequence[Mask] | None = None
     ) -> tuple[Resonance, ...]:
-        """The contact resonance in each of further spectra, as `series_resonances` finds it.
+        """Find the contact resonance in each of further spectra, as `series_resonances` does.
 
         Raises
         ------
         BadInput
-            for spectra on other lines, or without any vibration.
+            for spectra on other lines, or without vibration.
         """
-        return separated_beside(self, spectra, kept).resonances
+        return separate_with_shared(self, spectra, kept).resonances
 
 
 def series_resonances(
@@ -122,16 +130,16 @@ def series_resonances(
 
     Parameters
     ----------
-    band_hz : where to look [Hz]
-    method : "joint" separates what is common to all spectra from a line that moves or changes its height between
-        them, and needs 6 of them; any method of `contact_resonance` takes each spectrum by itself
-    kept : masks (lines,) of the lines that count, such as `CleanSpectrum.kept`; all by default
+    band_hz : search band [Hz]
+    method : "joint" separates the spectrum common to all from a line that moves or changes its
+        height, and needs 6 spectra; any method of `contact_resonance` takes each spectrum alone
+    kept : masks (lines,) of the lines to use, such as `CleanSpectrum.kept`; all by default
 
     Raises
     ------
     BadInput
-        for an unknown method, too few spectra for "joint", spectra on different frequencies, a band that does not fit
-        them, values that are not finite.
+        for an unknown method, too few spectra for "joint", spectra on different frequencies, a band
+        that does not fit them, values that are not finite.
     """
     if method not in get_args(SeriesMethod):
         raise BadInput(
@@ -145,54 +153,54 @@ def series_resonances(
 
 
 class LearnedSeries(NamedTuple):
-    """The resonances of a series, what its last part shares, and with which recordings a new part begins."""
+    """Resonances of a series, the spectrum shared by its last part, and where new parts start."""
 
     resonances: tuple[Resonance, ...]
     shared: Shared
     moved: tuple[int, ...]
 
 
-class Separated(NamedTuple):
-    """A series separated: its spectra in blocks, the fit, the resonances in it, and what it learned.
+class SeparatedSeries(NamedTuple):
+    """A separated series: block averages, the fit, the resonances, and the shared spectrum.
 
-    `beside` says whether what it shares was known before.
+    `uses_shared` states whether the shared spectrum was known before.
     """
 
-    blocks: Blocks
-    found: "Found"
+    blocks: SpectrumBlocks
+    fit: "SeriesFit"
     resonances: tuple[Resonance, ...]
     shared: Shared
-    beside: bool = False
+    uses_shared: bool = False
 
 
 def learn_series(
     spectra: Sequence[Spectrum], *, band_hz: tuple[float, float], kept: Sequence[Mask] | None = None
 ) -> LearnedSeries:
-    """The joint separation of `series_resonances`, and what it learned, by which further spectra can be judged.
+    """Return the result of `series_resonances` and the shared spectrum for judging further spectra.
 
-    Where what lies between contact and sensor changes, the recordings behind it are a series of
-    their own.
+    Where the transfer from contact to sensor changes, the recordings from there on are treated as a
+    series of their own.
     """
-    whole = separated(spectra, band_hz=band_hz, kept=kept)
-    first = moved_at(whole.blocks, whole.found.joint)
+    whole = separate_series(spectra, band_hz=band_hz, kept=kept)
+    first = first_moved_recording(whole.blocks, whole.fit.joint)
     if first is None:
         return LearnedSeries(whole.resonances, whole.shared, ())
-    before, behind = (
+    before, after = (
         learn_series(spectra[part], band_hz=band_hz, kept=None if kept is None else kept[part])
         for part in (slice(first), slice(first, None))
     )
-    moved = (*before.moved, first, *(first + one for one in behind.moved))
-    return LearnedSeries(before.resonances + behind.resonances, behind.shared, moved)
+    moved = (*before.moved, first, *(first + number for number in after.moved))
+    return LearnedSeries(before.resonances + after.resonances, after.shared, moved)
 
 
-def separated(
+def separate_series(
     spectra: Sequence[Spectrum], *, band_hz: tuple[float, float], kept: Sequence[Mask] | None = None
-) -> Separated:
-    """The joint separation of `series_resonances`, with all that it rests on."""
+) -> SeparatedSeries:
+    """Return the joint separation of `series_resonances` with all its parts."""
     if len(spectra) < FEWEST_RECORDINGS:
         raise BadInput(
-            f"the joint separation needs at least {FEWEST_RECORDINGS} recordings to tell what stays from what moves, "
-            f"got {len(spectra)}; take method likelihood or modes"
+            f"the joint separation needs at least {FEWEST_RECORDINGS} recordings, got "
+            f"{len(spectra)}; use method likelihood or modes"
         )
     first = spectra[0]
     for spectrum in spectra:
@@ -201,9 +209,10 @@ def separated(
             or spectrum.spacing_hz != first.spacing_hz
         ):
             raise BadInput(
-                f"spectra of a series must have the same lines, got {spectrum.frequency_hz.size} every "
-                f"{spectrum.spacing_hz:g} Hz beside {first.frequency_hz.size} every {first.spacing_hz:g} Hz; take one "
-                "rate and one segment length for all"
+                "spectra of a series must have the same lines, got "
+                f"{spectrum.frequency_hz.size} every {spectrum.spacing_hz:g} Hz and "
+                f"{first.frequency_hz.size} every {first.spacing_hz:g} Hz; use one rate and one "
+                "segment length for all"
             )
         if spectrum.smoothing_passes:
             raise BadInput(
@@ -215,27 +224,25 @@ def separated(
     lines = np.flatnonzero(inside)
     size = -(-lines.size // MOST_BLOCKS)
     lines = lines[: lines.size // size * size]
-    blocks = _blocked(spectra, lines, size, kept)
-    silent = [is_silent(spectrum, band_hz) for spectrum in spectra]
-    if any(silent):
+    blocks = _block_average(spectra, lines, size, kept)
+    empty = [has_no_vibration(spectrum, band_hz) for spectrum in spectra]
+    if any(empty):
         raise BadInput(
-            f"recording {silent.index(True)} holds no vibration at all between {band_hz[0]:.0f} and "
+            f"recording {empty.index(True)} holds no vibration between {band_hz[0]:.0f} and "
             f"{band_hz[1]:.0f} Hz; leave it out"
         )
-    with threadpool_limits(
-        1, "blas"
-    ):  # matrices too small for two threads: they would wait for one another
+    with threadpool_limits(1, "blas"):  # the matrices are too small for several threads
         separation = separate(blocks)
         joint = separation.joint
-        witnesses = witnesses_of(blocks, joint, separation.witnesses)
-        stands = _stands(joint, _evidence(blocks, joint)[0] > STRONG_EVIDENCE)
-        found = Found(
-            joint, separation.templates, separation.elsewhere, witnesses, stands, shaped=False
+        statistics = residual_statistics(blocks, joint, separation.reference_rows)
+        stands = _keeps_place(joint, _line_evidence(blocks, joint)[0] > STRONG_EVIDENCE)
+        fit = SeriesFit(
+            joint, separation.templates, separation.template_costs, statistics, stands, shaped=False
         )
-        resonances = _judged(blocks, found, band_hz)
-        if _shaped(joint, np.array([one.found for one in resonances])):
-            found = found._replace(shaped=True)
-            resonances = _judged(blocks, found, band_hz)
+        resonances = _judge_lines(blocks, fit, band_hz)
+        if _shaped_by_transfer(joint, np.array([resonance.found for resonance in resonances])):
+            fit = fit._replace(shaped=True)
+            resonances = _judge_lines(blocks, fit, band_hz)
     shared = Shared(
         band_hz=band_hz,
         first=int(lines[0]),
@@ -245,133 +252,139 @@ def separated(
         base=joint.parameters.base,
         reach=joint.parameters.transfer[:2],
         transfer=joint.parameters.transfer.coefficients,
-        doubt=joint.doubt,
+        doubt=joint.transfer_covariance,
         stands=stands,
-        shaped=found.shaped,
-        counts=witnesses.counts,
-        change=witnesses.change,
-        by_chance=witnesses.by_chance,
-        lacking=witnesses.lacking,
+        shaped=fit.shaped,
+        counts=statistics.counted,
+        change=statistics.relative_change,
+        by_chance=statistics.chance_variance,
+        lacking=statistics.model_error,
     )
-    return Separated(blocks, found, resonances, shared)
+    return SeparatedSeries(blocks, fit, resonances, shared)
 
 
-def is_silent(spectrum: Spectrum, band_hz: tuple[float, float]) -> bool:
-    """Whether a spectrum holds no vibration at all in the band."""
+def has_no_vibration(spectrum: Spectrum, band_hz: tuple[float, float]) -> bool:
+    """Return whether a spectrum is zero in the whole band."""
     return not np.any(spectrum.density[require_band(spectrum, band_hz)] > 0.0)
 
 
-def separated_beside(
+def separate_with_shared(
     shared: Shared, spectra: Sequence[Spectrum], kept: Sequence[Mask] | None = None
-) -> Separated:
-    """Further spectra separated by what a series has settled; otherwise as `Shared.resonances`."""
+) -> SeparatedSeries:
+    """Separate further spectra with the shared spectrum held; otherwise as `Shared.resonances`."""
     for spectrum in spectra:
         if not shared.fits(spectrum):
             raise BadInput(
-                f"a spectrum of {spectrum.frequency_hz.size} lines every {spectrum.spacing_hz:g} Hz is not of this "
-                f"series, whose lines are {shared.spacing_hz:g} Hz apart; judge it by itself"
+                f"a spectrum of {spectrum.frequency_hz.size} lines every "
+                f"{spectrum.spacing_hz:g} Hz "
+                f"does not belong to this series, whose lines are {shared.spacing_hz:g} Hz apart; "
+                "judge it separately"
             )
     lines = shared.first + np.arange(shared.size * shared.centre.size)
-    blocks = _blocked(spectra, lines, shared.size, kept)
-    templates, ready = shared._search
-    passed = Transfer(*shared.reach, shared.transfer)
-    joint, elsewhere = beside(blocks, shared.base, passed, shared.doubt, templates, ready)
-    witnesses = Witnesses(shared.counts, shared.change, shared.by_chance, shared.lacking)
-    found = Found(joint, templates, elsewhere, witnesses, shared.stands, shared.shaped)
-    return Separated(blocks, found, _judged(blocks, found, shared.band_hz), shared, beside=True)
+    blocks = _block_average(spectra, lines, shared.size, kept)
+    templates, prepared = shared._search
+    transfer = Transfer(*shared.reach, shared.transfer)
+    joint, template_costs = fit_to_shared(
+        blocks, shared.base, transfer, shared.doubt, templates, prepared
+    )
+    statistics = ResidualStatistics(shared.counts, shared.change, shared.by_chance, shared.lacking)
+    fit = SeriesFit(joint, templates, template_costs, statistics, shared.stands, shared.shaped)
+    return SeparatedSeries(
+        blocks, fit, _judge_lines(blocks, fit, shared.band_hz), shared, uses_shared=True
+    )
 
 
-def _blocked(
+def _block_average(
     spectra: Sequence[Spectrum], lines: npt.NDArray[np.intp], size: int, kept: Sequence[Mask] | None
-) -> Blocks:
+) -> SpectrumBlocks:
     count = lines.size // size
     shape = (len(spectra), count, size)
     density = np.stack([spectrum.density[lines] for spectrum in spectra]).reshape(shape)
-    good = (
+    used = (
         np.ones(shape, dtype=bool)
         if kept is None
         else np.stack([mask[lines] for mask in kept]).reshape(shape)
     )
-    share = good.sum(axis=2)
+    used_lines = used.sum(axis=2)
     averages = np.array([spectrum.averages for spectrum in spectra])[:, None]
     mean = np.where(
-        share > 0, (density * good).sum(axis=2) / np.maximum(share, 1), density.mean(axis=2)
+        used_lines > 0,
+        (density * used).sum(axis=2) / np.maximum(used_lines, 1),
+        density.mean(axis=2),
     )
     centre = spectra[0].frequency_hz[lines].reshape(count, size).mean(axis=1)
-    return Blocks(centre, mean, averages * share)
+    return SpectrumBlocks(centre, mean, averages * used_lines)
 
 
-class Found(NamedTuple):
-    """A fit to be judged: lines and what they stand beside; -ln likelihood of a line at each template.
+class SeriesFit(NamedTuple):
+    """Fit of a series to be judged: joint fit, templates and their costs, residual statistics.
 
-    `stands` is whether the line keeps its place, `shaped` whether it does so and is one by what it
-    comes through alone.
+    `stands` states whether the line keeps its frequency, `shaped` whether it does and is a line
+    only through the fitted transfer.
     """
 
-    joint: Joint
+    joint: JointFit
     templates: Templates
-    elsewhere: Field
-    witnesses: Witnesses
+    template_costs: Field
+    statistics: ResidualStatistics
     stands: bool
     shaped: bool
 
 
-def gain_of(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
-    """Twice by how much a line beside what all share makes each recording likelier (ln); what all share alone."""
-    bare = np.exp(joint.parameters.base)
-    relative = np.sum(blocks.weight * blocks.density / bare, axis=1) / blocks.weight.sum(axis=1)
-    alone = relative[:, None] * bare
-    with_line = whittle_costs(blocks, expected_density(blocks, joint.parameters))
-    return 2.0 * (whittle_costs(blocks, alone) - with_line), alone
+def _line_evidence(blocks: SpectrumBlocks, joint: JointFit) -> tuple[Field, Field]:
+    """Return the BIC gained by the line of each recording, and the density without it."""
+    gain, without_line = line_gain(blocks, joint)
+    return gain - 3.0 * np.log(blocks.weight.sum(axis=1)), without_line
 
 
-def _evidence(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
-    """By how much (BIC) a line beside what all share explains each recording better; what all share alone."""
-    gain, alone = gain_of(blocks, joint)
-    return gain - 3.0 * np.log(blocks.weight.sum(axis=1)), alone
-
-
-def _stands(joint: Joint, significant: Mask) -> bool:
-    """A line that keeps its place can lend any part of its height to what all recordings share."""
+def _keeps_place(joint: JointFit, significant: Mask) -> bool:
+    """Return whether the line keeps its frequency; the base can then absorb part of its height."""
     own = joint.parameters.own
-    places, widths = own[significant, 1], 2.0 * np.exp(own[significant, 2])
-    return places.size > 0 and float(np.std(places)) < STANDING * float(np.median(widths))
-
-
-def _shaped(joint: Joint, found: Mask) -> bool:
-    """Lines that keep their place cannot tell a structure that shapes them: any change of a spectrum would be one."""
-    passed = joint.parameters.transfer
-    if not found.any() or not passed.coefficients.size:
-        return False
-    bent = (
-        passed.columns(np.linspace(passed.low, passed.high, 10 * SPLINES))[:, 1:]
-        @ passed.coefficients[1:]
+    frequencies, widths = own[significant, 1], 2.0 * np.exp(own[significant, 2])
+    return frequencies.size > 0 and float(np.std(frequencies)) < PLACE_SPREAD * float(
+        np.median(widths)
     )
-    return _stands(joint, found) and float(np.ptp(bent)) > TENFOLD
 
 
-def _judged(blocks: Blocks, found: Found, band_hz: tuple[float, float]) -> tuple[Resonance, ...]:
-    """Which of the lines are there, each with its reason."""
-    joint = found.joint
+def _shaped_by_transfer(joint: JointFit, found: Mask) -> bool:
+    """Return whether a line that keeps its frequency is shaped by the transfer.
+
+    Any change of the machine's spectrum could then look like a line.
+    """
+    transfer = joint.parameters.transfer
+    if not found.any() or not transfer.coefficients.size:
+        return False
+    transfer_shape = (
+        transfer.columns(np.linspace(transfer.low, transfer.high, 10 * SPLINES))[:, 1:]
+        @ transfer.coefficients[1:]
+    )
+    return _keeps_place(joint, found) and float(np.ptp(transfer_shape)) > TRANSFER_CHANGE
+
+
+def _judge_lines(
+    blocks: SpectrumBlocks, fit: SeriesFit, band_hz: tuple[float, float]
+) -> tuple[Resonance, ...]:
+    """Return each recording's line, or the reason why it is not accepted."""
+    joint = fit.joint
     own, base, _ = joint.parameters
-    evidence, alone = _evidence(blocks, joint)
-    bare, expected = np.exp(base), expected_density(blocks, joint.parameters)
-    beyond = brought(blocks, joint, found.witnesses)
-    shared, std = beyond.lacking, np.hypot(joint.std, beyond.std)
-    misfit = left_over(blocks, expected)
-    way = STANDS if found.stands else MOVES
+    evidence, without_line = _line_evidence(blocks, joint)
+    shared_density, expected = np.exp(base), expected_density(blocks, joint.parameters)
+    errors = systematic_errors(blocks, joint, fit.statistics)
+    shared, std = errors.model_error, np.hypot(joint.std, errors.std)
+    misfit = relative_residual(blocks, expected)
+    way = LINE_KEEPS_PLACE if fit.stands else LINE_MOVES
     resonances = []
     for i in range(own.shape[0]):
         fitted = np.exp(own[i])
         deviations = std[i, :3] * fitted[:3]
         _, f0, zeta, gain = (float(value) for value in fitted)
-        rival = rival_of(f0, zeta, found.elsewhere[i], found.templates)
+        rival = best_rival(f0, zeta, fit.template_costs[i], fit.templates)
         line = JudgedLine(
             f0, float(deviations[1]), zeta, float(evidence[i]), float(misfit[i]), *rival
         )
-        objection = objection_to(line, band_hz) or (_of_shape(f0) if found.shaped else None)
+        objection = line_objection(line, band_hz) or (_shape_objection(f0) if fit.shaped else None)
         if objection is not None:
-            background = (blocks.centre, alone[i])
+            background = (blocks.centre, without_line[i])
             resonances.append(
                 no_resonance(
                     objection, band_hz, "joint", evidence=line.evidence, background=background
@@ -381,76 +394,20 @@ def _judged(blocks: Blocks, found: Found, band_hz: tuple[float, float]) -> tuple
         resonances.append(
             fitted_resonance(
                 fitted[:3],
-                np.where([found.stands, False, False], np.nan, deviations),
+                np.where([fit.stands, False, False], np.nan, deviations),
                 reason=f"a line {line.width:.0f} Hz wide {way} (BIC {line.evidence:+.0f})",
                 band_hz=band_hz,
                 method="joint",
                 evidence=line.evidence,
-                background=(blocks.centre, gain * bare),
+                background=(blocks.centre, gain * shared_density),
                 crf_shared_std=float(shared[i, 1] * f0),
             )
         )
     return tuple(resonances)
 
 
-def _of_shape(f0: float) -> str:
+def _shape_objection(f0: float) -> str:
     return (
-        f"what stands out at {f0:.0f} Hz keeps its place and is a line only behind a structure that changes it tenfold "
-        "across the band: the machine's own spectrum may change like that"
+        f"the peak at {f0:.0f} Hz keeps its frequency and is a line only if the transfer changes "
+        "tenfold across the band; the machine's own spectrum may change like that"
     )
-
-
-class JudgedLine(NamedTuple):
-    """A recording's line as it is judged; `lead` in ln likelihood over a line at `rival`, the best place elsewhere."""
-
-    f0: float
-    f0_std: float
-    damping: float
-    evidence: float
-    misfit: float
-    rival: float
-    lead: float
-
-    @property
-    def width(self) -> float:
-        """Half-power width [Hz]."""
-        return 2.0 * self.damping * self.f0
-
-
-def rival_of(f0: float, damping: float, cost: Field, templates: Templates) -> tuple[float, float]:
-    """The best place more than three widths away, and by how much the line's own is better."""
-    away = np.abs(templates.f0 - f0) > 6.0 * damping * f0
-    if np.all(away) or not np.any(away):
-        return np.nan, np.inf
-    return float(templates.f0[away][np.argmin(cost[away])]), float(
-        np.min(cost[away]) - np.min(cost[~away])
-    )
-
-
-def objection_to(line: JudgedLine, band_hz: tuple[float, float]) -> str | None:
-    """Why a line is not the contact's, or cannot be told to be."""
-    low, high = band_hz
-    if line.evidence < STRONG_EVIDENCE:
-        return (
-            f"nothing moves or changes height against what all recordings share between {low:.0f} and {high:.0f} Hz "
-            f"(BIC {line.evidence:+.1f})"
-        )
-    if line.misfit > LARGEST_MISFIT:
-        return (
-            f"the spectrum is not what all recordings share and one line beside it (off by {100 * line.misfit:.0f} % "
-            "beyond chance)"
-        )
-    if not low + 3.0 * line.f0_std < line.f0 < high - 3.0 * line.f0_std:
-        return f"what stands out peaks at or beyond the edge of the band {low:.0f} to {high:.0f} Hz"
-    if line.width > (high - low) / 2.0:
-        return f"the line at {line.f0:.0f} Hz is wider than half the band ({line.width:.0f} Hz): a slope, not a resonance"
-    if line.damping > HEAVIEST_DAMPING:
-        return (
-            f"the line at {line.f0:.0f} Hz is wider than a contact's damping makes one ({line.width:.0f} Hz, damping "
-            f"ratio {line.damping:.2g}; {HEAVIEST_DAMPING:g} is the most): a slope, or part of the machine"
-        )
-    if line.lead < RIVAL:
-        return f"a line at {line.rival:.0f} Hz would do as well as the one at {line.f0:.0f} Hz"
-    if line.f0_std > line.width:
-        return f"the line at {line.f0:.0f} Hz cannot be told from what all recordings share (± {line.f0_std:.0f} Hz)"
-    return None

@@ -1,7 +1,7 @@
-"""What lies between the contact and the sensor: how its line is changed on the way, alike in all recordings.
+"""Transfer from the contact to the sensor, common to all recordings of a series.
 
-A power of frequency for what excites the line, and a smooth curve for the structure that passes it
-on. How far it is fitted is left to `separation`; docs/theory/indicators.md has the equations.
+A power of frequency for the excitation of the line, and a smooth curve for the structure.
+`separation` fits it; docs/theory/indicators.md has the equations.
 """
 
 from functools import lru_cache
@@ -14,13 +14,18 @@ from asperity.core.arrays import Field
 
 SPLINES = 48  # cubic, across the band
 DEGREE = 3
-STEEPEST = 2.0  # deviation of the power of frequency
-LOOSE = 1e-2  # deviation 10: of what a line's own height takes up
-MANY = 32  # frequencies, from which on they are a series' blocks, and asked for in every step
+POWER_STD = 2.0  # prior standard deviation of the power of frequency
+LEVEL_INFORMATION = (
+    1e-2  # prior information of the splines' level, which the heights of the lines absorb
+)
+CACHED_FROM = 32  # frequencies: those of a series' blocks are needed in every step
 
 
 class Transfer(NamedTuple):
-    """ln T(f) = `coefficients` times ln f and splines from `low` to `high` [Hz], level beyond; empty for T = 1."""
+    """Transfer T(f): ln T is linear in `coefficients` of ln f and of splines from `low` to `high`.
+
+    `low` and `high` in Hz; constant beyond them. Without coefficients T = 1.
+    """
 
     low: float = 0.0
     high: float = 0.0
@@ -28,44 +33,47 @@ class Transfer(NamedTuple):
 
     @property
     def spacing_hz(self) -> float:
-        """From spline to spline: what is slower is followed."""
+        """Spacing of the splines [Hz]; slower changes are followed."""
         return (self.high - self.low) / (SPLINES - DEGREE)
 
     def columns(self, frequency_hz: Field) -> Field:
-        """What the coefficients stand at, (frequencies, coefficients)."""
+        """Return the columns that multiply the coefficients, (frequencies, coefficients)."""
         if not self.coefficients.size:
             return np.zeros((frequency_hz.size, 0))
-        if frequency_hz.size < MANY:
+        if frequency_hz.size < CACHED_FROM:
             return _columns(self.low, self.high, frequency_hz)
-        return _kept_columns(self.low, self.high, frequency_hz.tobytes())
+        return _cached_columns(self.low, self.high, frequency_hz.tobytes())
 
     def steepness(self, frequency_hz: Field) -> Field:
-        """The power of frequency that T goes with there, (frequencies,)."""
+        """Return d ln T / d ln f, (frequencies,)."""
         if not self.coefficients.size:
             return np.zeros(frequency_hz.size)
         inside = np.clip(frequency_hz, self.low, self.high)
-        bent = _slopes(self.low, self.high)(inside) @ self.coefficients[1:]
+        bend_slope = _slopes(self.low, self.high)(inside) @ self.coefficients[1:]
         return np.asarray(
-            self.coefficients[0] + np.where(inside == frequency_hz, frequency_hz * bent, 0.0)
+            self.coefficients[0] + np.where(inside == frequency_hz, frequency_hz * bend_slope, 0.0)
         )
 
-    def stiffness(self, pace: float) -> Field:
-        """Information before the data, where neighbouring splines differ by `pace`; (coefficients, coefficients)."""
+    def stiffness(self, step_std: float) -> Field:
+        """Return the prior information (coefficients, coefficients).
+
+        `step_std` is the prior standard deviation of the difference of neighbouring splines.
+        """
         count = self.coefficients.size
         if not count:
             return np.zeros((0, 0))
-        found = np.diag([STEEPEST**-2, *[LOOSE] * (count - 1)])
-        found[1:, 1:] += rises(count - 1).T @ rises(count - 1) / pace**2
-        return found
+        information = np.diag([POWER_STD**-2, *[LEVEL_INFORMATION] * (count - 1)])
+        information[1:, 1:] += differences(count - 1).T @ differences(count - 1) / step_std**2
+        return information
 
 
-def through(low: float, high: float) -> Transfer:
-    """T = 1 for the start, free to bend between two frequencies."""
+def unit_transfer(low: float, high: float) -> Transfer:
+    """Return T = 1 that is free to bend between two frequencies, as initial guess."""
     return Transfer(low, high, np.zeros(1 + SPLINES))
 
 
-def rises(count: int) -> Field:
-    """From each spline to the next, (count - 1, count)."""
+def differences(count: int) -> Field:
+    """Return the matrix of differences of neighbouring splines, (count - 1, count)."""
     return np.diff(np.eye(count), axis=0)
 
 
@@ -88,7 +96,7 @@ def _columns(low: float, high: float, frequency_hz: Field) -> Field:
 
 
 @lru_cache(maxsize=8)
-def _kept_columns(low: float, high: float, frequencies: bytes) -> Field:
+def _cached_columns(low: float, high: float, frequencies: bytes) -> Field:
     columns = _columns(low, high, np.frombuffer(frequencies))
     columns.flags.writeable = False
     return columns

@@ -16,7 +16,7 @@ from asperity.core.errors import BadInput, require_positive
 from asperity.study.evaluate import BOTH_PRESETS, DONE
 from asperity.study.execute import StudyProgress, StudyResult, run_study
 from asperity.study.plan import plan_points
-from asperity.trend import Stages, split_stages
+from asperity.trend import StageErrors, Stages, split_stages
 
 SQ_KEY = "surface.sq"
 MEAN_CONFIDENCE = 0.90  # of the intervals of means
@@ -116,7 +116,7 @@ class WearCurve:
                 keys = (SQ_KEY, f"crf_{preset}_hz", f"crfa_{preset}", f"crf_std_{preset}_hz")
                 sq, crf_hz, crfa, std = (rows[key].to_numpy(dtype=float) for key in keys)
                 stages[preset] = split_stages(
-                    1e6 * sq, crf_hz, crfa, crf_std_hz=np.nan_to_num(std), unit="um"
+                    1e6 * sq, crf_hz, crfa, errors=StageErrors(crf_hz=np.nan_to_num(std)), unit="um"
                 )
         return stages
 

@@ -42,7 +42,7 @@ from asperity.study.sensitivity_indices import (
     indices,
     sample_design,
 )
-from asperity.trend import FEWEST_PLACES, split_stages
+from asperity.trend import FEWEST_STAGE_POINTS, split_stages
 
 SQ_LEVELS = (0.5e-6, 1e-6, 2.5e-6, 4e-6)  # where the paper's curves are read [m]
 CURVE_LEVELS = 8  # Sq from the smallest to the largest, for the knee
@@ -395,7 +395,7 @@ def _outcomes(
         for level in sq:
             outcomes.append(SensitivityOutcome(f"{key} at {1e6 * level:g} um", key, level))
             columns.append(values[:, curve.index(float(f"{level:.6g}"))])
-    if "crf_hz" in curves and len(curve) >= FEWEST_PLACES:
+    if "crf_hz" in curves and len(curve) >= FEWEST_STAGE_POINTS:
         outcomes.append(SensitivityOutcome("knee", "knee_m", math.nan))
         columns.append(np.array([knee(np.array(curve), crf) for crf in curves["crf_hz"]]))
     return outcomes, columns
@@ -420,7 +420,7 @@ def knee(x: Field, y: Field) -> float:
 
 
 def _distinct(curves: dict[str, Field], curve: Sequence[float]) -> float:
-    if "crf_hz" not in curves or len(curve) < FEWEST_PLACES:
+    if "crf_hz" not in curves or len(curve) < FEWEST_STAGE_POINTS:
         return math.nan
     whole = [crf for crf in curves["crf_hz"] if np.isfinite(crf).all()]
     return float(np.mean([split_stages(curve, crf).found for crf in whole])) if whole else math.nan

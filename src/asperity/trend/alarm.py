@@ -1,127 +1,79 @@
-"""An alarm that judges once a recording, stays until it is acknowledged, and says how often it speaks without a cause.
+"""Sequential alarm: one decision per recording, latched until acknowledged, at a set error rate.
 
-What is watched comes in as `Watched` series; what a recording's state is without any change, as
-`Sight`.
+Monitored series come in as `MonitoredSeries`; what a recording shows apart from any change, as
+`RecordingStatus`. docs/theory/alarms.md has the equations and the measured error rates.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import Literal, NamedTuple, get_args
+from functools import partial
+from typing import NamedTuple, get_args
 
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
-from asperity.trend.regressors import BASELINE, NOTHING_EXPLAINED, Condition, Explained, explained
-from asperity.trend.sequential import FEWEST, Beside, Found, growth, knee, step, threshold
-
-AlarmState = Literal["none", "alert", "alarm", "blind", "cannot-tell"]
-ALARM_STATES: tuple[AlarmState, ...] = get_args(AlarmState)
-FALSE_ALARMS = 1e-3  # a recording
-ALERTS = 10.0  # false alerts for a false alarm
-LATELY = 3  # recordings whose median is where an indicator, or a condition, has come to
-AROUND, FEWEST_AROUND = (
-    12,
-    3,
-)  # places on either side of a jump, by which another indicator is seen to move with it
-MOVED, HEARD = 3.0, 0.1  # deviations of the difference, and 0.9 dB
-# of the least change: what conditions explain is said from there on, and may be off by this share
-SPOKEN = 0.4
-NO_KNEE = 5.0  # odds of something else before anything is heard, in place of a knee
-CONTACT_SHARE = (
-    0.8  # of the false alarms allowed, among the contact's indicators; the levels have the rest
+from asperity.trend.alarm_inputs import (
+    AlarmChecks,
+    AlarmHistory,
+    AlarmState,
+    MonitoredSeries,
+    RecordingStatus,
+)
+from asperity.trend.regressors import BASELINE_RECORDINGS, Condition
+from asperity.trend.sequential import (
+    BASELINE_POINTS,
+    ChangeTest,
+    ConditionRows,
+    growth_test,
+    knee_test,
+    step_test,
+    threshold,
 )
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Watched:
-    """A series that may raise the alarm.
-
-    Parameters
-    ----------
-    name : of the indicator, for sentences
-    values : shape (recordings,), nan where there is none
-    least : the change from which on it is worth acting, in units of `values`
-    contact : whether it is the contact's, whose severe stage is a rise that flattens; otherwise a level, which grows
-    in_words : a change of it, in words
-    loud : whether gain changes it
-    jumps : whether a jump upwards alarms, unless all that is loud on its sensor moves with it: then that may have been
-        moved
-    conditions : what it may follow without any wear; of the same recordings
-    relative : whether `values` are ratios, of which conditions change the logarithm
-    sensor : which of several heard it
-    """
-
-    name: str
-    values: Field
-    least: float
-    contact: bool
-    in_words: Callable[[float], str]
-    loud: bool = False
-    jumps: bool = False
-    sensor: str = ""
-    conditions: tuple[Condition, ...] = ()
-    relative: bool = False
-
-    def without_conditions(
-        self, first: int = 0, last: int | None = None
-    ) -> tuple[Field, Explained]:
-        """The values from one recording up to another as they would be at the baseline's conditions."""
-        part = slice(first, last)
-        values = self.values[part]
-        if not self.conditions:
-            return values, NOTHING_EXPLAINED
-        met = [replace(one, values=one.values[part]) for one in self.conditions]
-        told = explained(np.log(values) if self.relative else values, met, least=self.least)
-        return np.asarray(
-            values * np.exp(-told.effect) if self.relative else values - told.effect
-        ), told
+ALARM_STATES: tuple[AlarmState, ...] = get_args(AlarmState)
+FALSE_ALARM_RATE = 1e-3  # per recording
+ALERT_RATE_FACTOR = 10.0  # false-alert rate over false-alarm rate
+LATEST_RECORDINGS = 3  # the median of these is the present value of an indicator or condition
+# points on either side of a step that are compared to see whether another indicator moves with it
+STEP_WINDOW, STEP_WINDOW_MINIMUM = 12, 3
+# change of a level that counts as moving: standard errors of the difference, and 0.9 dB
+MOVE_DEVIATIONS, SMALLEST_MOVE = 3.0, 0.1
+# share of the smallest change: effects of conditions are reported from there on, to this accuracy
+REPORTED_SHARE = 0.4
+PRIOR_ODDS_AGAINST_KNEE = 5.0
+# share of the false-alarm rate given to indicators of the contact; levels share the rest
+CONTACT_SHARE = 0.8
 
 
-def knee_weight(x: Field, watched: Sequence[Watched]) -> float:
-    """The weight of a knee against all that is none (steps, cycles, bends, scatter that remembers), 0 to 1.
+def knee_weight(x: Field, monitored: Sequence[MonitoredSeries]) -> float:
+    """Return the probability of a knee against steps, cycles, bends and correlated scatter, 0 to 1.
 
-    By the indicator that shows it best; 1 where there are too few places to tell. The odds before
-    are measured so that probabilities come true as often as they say (docs/theory/alarms.md).
+    Uses the indicator with the clearest knee; 1 where there are too few points. The prior odds are
+    calibrated so that stated probabilities match observed frequencies (docs/theory/alarms.md).
     """
     ratios = [
-        looked.change.log_ratio
-        for one in watched
-        if (looked := _looked_at(one, x, 0, x.size - 1)).places >= FEWEST
+        assessed.change.log_ratio
+        for series in monitored
+        if (assessed := _assess(series, x, 0, x.size - 1)).points >= BASELINE_POINTS
     ]
-    return 1.0 / (1.0 + NO_KNEE * float(np.exp(-max(ratios)))) if ratios else 1.0
+    return 1.0 / (1.0 + PRIOR_ODDS_AGAINST_KNEE * float(np.exp(-max(ratios)))) if ratios else 1.0
 
 
-class Sight(NamedTuple):
-    """Whether a recording lets one see: state "none", "blind" or "cannot-tell", and why."""
-
-    state: AlarmState = "none"
-    reason: str = ""
+NO_HISTORY = AlarmHistory()
 
 
-class Said(NamedTuple):
-    """States that recordings had when they came, by their number; what stands, and who raised it, where an alarm does.
-
-    The last recording's is judged in any case.
-    """
-
-    states: Mapping[int, AlarmState] = MappingProxyType({})
-    reason: str = ""
-    raised_by: str = ""
-
-
-NOTHING_SAID = Said()
+NO_CHECKS = AlarmChecks()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alarm:
-    """Where an alarm stands at the end of a series.
+    """Alarm state at the end of a series.
 
     `states` are those after each recording; `since` is the index of the recording with which the
     present state began, None for "none". `raised_by` names the indicator behind an alert or alarm.
-    `reason` is a sentence without an end. `explained` says which changes load, speed or
-    temperature explain, and is empty where they explain none.
+    `reason` is a sentence without its full stop. `explained` states which changes load, speed or
+    temperature explain; empty where they explain none.
     """
 
     state: AlarmState
@@ -134,14 +86,14 @@ class Alarm:
 
     @property
     def verdict(self) -> str:
-        """The state with its reason, one sentence."""
-        said = {"none": "No alarm", "cannot-tell": "Cannot tell"}.get(
+        """State and reason in one sentence."""
+        label = {"none": "No alarm", "cannot-tell": "Cannot tell"}.get(
             self.state, self.state.capitalize()
         )
-        return f"{said}: {self.reason}."
+        return f"{label}: {self.reason}."
 
-    def alerted(self, reason: str, raised_by: str) -> "Alarm":
-        """The same with an alert at its end, where nothing graver stands there."""
+    def with_alert(self, reason: str, raised_by: str) -> "Alarm":
+        """Return the alarm with an alert at the last recording, unless its state is more severe."""
         if self.state not in ("none", "cannot-tell"):
             return self
         states: tuple[AlarmState, ...] = (*self.states[:-1], "alert")
@@ -154,8 +106,8 @@ class Alarm:
             raised_by=raised_by,
         )
 
-    def raised_from(self, number: int, reason: str, raised_by: str) -> "Alarm":
-        """An alarm from a recording on."""
+    def with_alarm_since(self, number: int, reason: str, raised_by: str) -> "Alarm":
+        """Return the alarm raised at recording `number` and latched from there."""
         alarms: list[AlarmState] = ["alarm"] * (len(self.states) - number)
         states = (*self.states[:number], *alarms)
         return replace(
@@ -165,225 +117,284 @@ class Alarm:
 
 def sequential_alarm(
     x: Field,
-    watched: Sequence[Watched],
-    sights: Sequence[Sight],
+    monitored: Sequence[MonitoredSeries],
+    statuses: Sequence[RecordingStatus],
     *,
-    false_alarm_rate: float = FALSE_ALARMS,
-    confirmed: Callable[[int], bool] = lambda _: True,
-    excused: Callable[[int, str], str] = lambda _number, _name: "",
+    false_alarm_rate: float = FALSE_ALARM_RATE,
+    checks: AlarmChecks = NO_CHECKS,
     acknowledged: int = 0,
     unit: str = "",
-    said: Said = NOTHING_SAID,
+    history: AlarmHistory = NO_HISTORY,
 ) -> Alarm:
-    """One decision a recording, each from what had been recorded by then.
+    """Judge a series after each recording, using only the recordings up to it.
 
     Parameters
     ----------
-    x : shape (recordings,), rising; recordings at one x are repeats of one test and are averaged
-    watched : what may raise the alarm; the rate is shared out among them
-    sights : one a recording
-    false_alarm_rate : alarms without wear, a recording
-    confirmed : whether the stage detector finds the severe stage in the recordings up to this one; asked before an
-        alarm by the contact
-    excused : what else than wear explains a change up to a recording by the indicator of a name, in words, or nothing;
-        asked before an alarm or alert
-    acknowledged : how many recordings somebody has looked at; what comes behind them is judged by itself
+    x : shape (recordings,), rising; recordings at one x are repeats and are averaged
+    monitored : series that may raise the alarm; the false-alarm rate is divided among them
+    statuses : one per recording
+    false_alarm_rate : alarms without wear, per recording
+    checks : confirmation by the stage detector, and explanations other than wear
+    acknowledged : number of acknowledged recordings; the baseline restarts after them
     unit : of x
-    said : what earlier judgements have said, which stays as it was said
+    history : earlier decisions, which stand
 
     Raises
     ------
     BadInput
-        for a rate that is none.
+        for a false-alarm rate outside 0 to 0.1.
     """
     if not 0.0 < false_alarm_rate < 0.1:
         raise BadInput(
-            f"the rate of false alarms must lie between 0 and 0.1 a recording, got {false_alarm_rate:g}; 0.001 is one "
-            "in 1000 recordings"
+            f"false-alarm rate must lie between 0 and 0.1 per recording, got {false_alarm_rate:g}; "
+            "0.001 means one in 1000 recordings"
         )
     states: list[AlarmState] = ["none"] * acknowledged
-    reason, raised_by = said.reason, said.raised_by
-    for number in range(acknowledged, len(sights)):
-        before = said.states.get(number) if number < len(sights) - 1 else None
-        if before is not None:
-            states.append(before)
+    reason, raised_by = history.reason, history.raised_by
+    for number in range(acknowledged, len(statuses)):
+        earlier = history.states.get(number) if number < len(statuses) - 1 else None
+        if earlier is not None:
+            states.append(earlier)
             continue
-        if states and states[-1] == "alarm" and number > acknowledged:
+        if states and states[-1] == "alarm" and number > acknowledged:  # latched
             states.append("alarm")
             continue
-        found = [_looked_at(one, x, acknowledged, number) for one in watched]
-        state, reason, raised_by = _decided(
-            watched, found, sights[number], false_alarm_rate, unit, number, confirmed
+        assessed = [_assess(series, x, acknowledged, number) for series in monitored]
+        state, reason, raised_by = _decide(
+            list(zip(monitored, assessed, strict=True)),
+            statuses[number],
+            false_alarm_rate,
+            unit,
+            partial(checks.confirmed, number),
         )
-        if state in ("alert", "alarm") and (shape := excused(number, raised_by)):
-            state, reason, raised_by = "none", shape, ""
+        if state in ("alert", "alarm") and (other := checks.explanation(number, raised_by)):
+            state, reason, raised_by = "none", other, ""
         states.append(state)
     state = states[-1] if len(states) > acknowledged else "none"
     if len(states) == acknowledged:
-        reason = f"all {acknowledged} recordings are acknowledged, and none has come since"
-    since = len(states)
-    while state != "none" and since > acknowledged and states[since - 1] == state:
-        since -= 1
+        reason = f"all {acknowledged} recordings are acknowledged and no newer one has arrived"
     return Alarm(
         state=state,
         states=tuple(states),
-        since=None if state == "none" else since,
+        since=None if state == "none" else _start_of_last_state(states, acknowledged),
         false_alarm_rate=false_alarm_rate,
         reason=reason,
         raised_by=raised_by,
-        explained="; ".join(filter(None, (_by_conditions(one, acknowledged) for one in watched))),
+        explained="; ".join(
+            filter(None, (_explained_by_conditions(series, acknowledged) for series in monitored))
+        ),
     )
 
 
-class _Looked(NamedTuple):
-    """What an indicator shows up to a recording; `places` where it is known, `x` and `values` there."""
+def _start_of_last_state(states: Sequence[AlarmState], acknowledged: int) -> int:
+    """Return the recording from which on all states equal the last one."""
+    since = len(states)
+    while since > acknowledged and states[since - 1] == states[-1]:
+        since -= 1
+    return since
 
-    change: Found
-    step: Found
-    places: int
+
+class _Assessment(NamedTuple):
+    """Tests of one indicator up to a recording, and its distinct points `x`, `values`."""
+
+    change: ChangeTest
+    step: ChangeTest
+    points: int
     x: Field
     values: Field
 
 
-def _looked_at(one: Watched, x: Field, first: int, last: int) -> _Looked:
-    values, told = one.without_conditions(first, last + 1)
-    at, (level, *rows) = _places(x[first : last + 1], values, told.rows)
-    beside = Beside(np.array(rows), told.scatter / told.widths) if rows else None
-    test = knee if one.contact else growth
-    change, stepped = (judge(at, level, least=one.least, beside=beside) for judge in (test, step))
-    return _Looked(change, stepped, at.size, at, level)
-
-
-def _moves_at(looked: _Looked, at: float) -> bool:
-    """Whether a logarithm of a level moves where an indicator has jumped, by more than its scatter."""
-    before, behind = looked.values[looked.x < at][-AROUND:], looked.values[looked.x >= at][:AROUND]
-    if min(before.size, behind.size) < FEWEST_AROUND:
-        return False
-    scatter = np.hypot(
-        before.std(ddof=1) / np.sqrt(before.size), behind.std(ddof=1) / np.sqrt(behind.size)
+def _assess(series: MonitoredSeries, x: Field, first: int, last: int) -> _Assessment:
+    values, fitted = series.at_baseline_conditions(first, last + 1)
+    point_x, (level, *rows) = _averaged_repeats(x[first : last + 1], values, fitted.rows)
+    conditions = ConditionRows(np.array(rows), fitted.scatter / fitted.widths) if rows else None
+    test = knee_test if series.contact else growth_test
+    change, stepped = (
+        run(point_x, level, smallest_change=series.smallest_change, conditions=conditions)
+        for run in (test, step_test)
     )
-    return bool(abs(behind.mean() - before.mean()) > max(MOVED * scatter, HEARD))
+    return _Assessment(change, stepped, point_x.size, point_x, level)
 
 
-def _places(x: Field, values: Field, rows: Field) -> tuple[Field, list[Field]]:
-    """Values and rows with repeats at one x averaged, and what is not known left out."""
+def _moves_at(assessed: _Assessment, x: float) -> bool:
+    """Return whether the mean of a logarithmic level changes at `x` by more than its scatter."""
+    before = assessed.values[assessed.x < x][-STEP_WINDOW:]
+    after = assessed.values[assessed.x >= x][:STEP_WINDOW]
+    if min(before.size, after.size) < STEP_WINDOW_MINIMUM:
+        return False
+    error = np.hypot(
+        before.std(ddof=1) / np.sqrt(before.size), after.std(ddof=1) / np.sqrt(after.size)
+    )
+    return bool(abs(after.mean() - before.mean()) > max(MOVE_DEVIATIONS * error, SMALLEST_MOVE))
+
+
+def _averaged_repeats(x: Field, values: Field, rows: Field) -> tuple[Field, list[Field]]:
+    """Average values and condition rows over repeats at one x; leave out unknown ones."""
     known = (
         np.isfinite(values) & np.isfinite(rows).all(axis=0) if len(rows) else np.isfinite(values)
     )
     if not known.any():
         return x[:0], [values[:0], *rows[:, :0]]
-    at, index = np.unique(x[known], return_inverse=True)
-    many = np.bincount(index)
-    return at, [np.bincount(index, one[known]) / many for one in (values, *rows)]
+    distinct, index = np.unique(x[known], return_inverse=True)
+    repeats = np.bincount(index)
+    return distinct, [np.bincount(index, row[known]) / repeats for row in (values, *rows)]
 
 
-def _by_conditions(one: Watched, first: int) -> str:
-    """That conditions explain how an indicator has changed, in words; nothing where they do not."""
-    _, told = one.without_conditions(first)
-    values = np.log(one.values[first:]) if one.relative else one.values[first:]
-    known = np.isfinite(values) & np.isfinite(told.rows).all(axis=0)
-    if not told.names or known.sum() < FEWEST:
+def _explained_by_conditions(series: MonitoredSeries, first: int) -> str:
+    """Describe a change that operating conditions explain; empty where they do not."""
+    _, fitted = series.at_baseline_conditions(first)
+    values = np.log(series.values[first:]) if series.relative else series.values[first:]
+    known = np.isfinite(values) & np.isfinite(fitted.rows).all(axis=0)
+    if not fitted.names or known.sum() < BASELINE_POINTS:
         return ""
     change, effect = (
-        float(np.median(part[known][-LATELY:]) - np.median(part[known][:BASELINE]))
-        for part in (values, told.effect)
+        float(
+            np.median(part[known][-LATEST_RECORDINGS:])
+            - np.median(part[known][:BASELINE_RECORDINGS])
+        )
+        for part in (values, fitted.effect)
     )
-    if abs(effect) < SPOKEN * one.least or abs(change - effect) > SPOKEN * max(
-        abs(change), one.least
-    ):
+    smallest = series.smallest_change
+    if abs(effect) < REPORTED_SHARE * smallest:
+        return ""
+    if abs(change - effect) > REPORTED_SHARE * max(abs(change), smallest):
         return ""
     words = " and ".join(
-        _went(met, first, known) for met in one.conditions if met.name in told.names
+        _condition_change(condition, first, known)
+        for condition in series.conditions
+        if condition.name in fitted.names
     )
-    by = np.expm1 if one.relative else float
-    return f"{one.name} {one.in_words(float(by(change)))}, and {words} explains it ({one.in_words(float(by(effect)))})"
+    as_ratio = np.expm1 if series.relative else float
+    return (
+        f"{series.name} {series.describe(float(as_ratio(change)))}, and {words} explains it "
+        f"({series.describe(float(as_ratio(effect)))})"
+    )
 
 
-def _went(met: Condition, first: int, known: Mask) -> str:
-    """From where to where a condition went."""
-    shown = met.shown[first:][known]
-    before, now = (float(np.median(part)) for part in (shown[:BASELINE], shown[-LATELY:]))
-    return f"{met.name} from {before:.4g} to {now:.4g} {met.unit}"
+def _condition_change(condition: Condition, first: int, known: Mask) -> str:
+    """Describe how a condition changed from the baseline to the latest recordings."""
+    shown = condition.shown[first:][known]
+    before, now = (
+        float(np.median(part)) for part in (shown[:BASELINE_RECORDINGS], shown[-LATEST_RECORDINGS:])
+    )
+    return f"{condition.name} from {before:.4g} to {now:.4g} {condition.unit}"
 
 
-def _shares(watched: Sequence[Watched], rate: float) -> list[float]:
-    """The rate of false alarms that each indicator has."""
-    many = sum(one.contact for one in watched)
-    kinds = {True: (CONTACT_SHARE, many), False: (1.0 - CONTACT_SHARE, len(watched) - many)}
-    alone = many in (0, len(watched))
+def _false_alarm_shares(monitored: Sequence[MonitoredSeries], rate: float) -> list[float]:
+    """Divide the false-alarm rate: `CONTACT_SHARE` to contact indicators, the rest to levels."""
+    of_contact = sum(series.contact for series in monitored)
+    kinds = {
+        True: (CONTACT_SHARE, of_contact),
+        False: (1.0 - CONTACT_SHARE, len(monitored) - of_contact),
+    }
+    single_kind = of_contact in (0, len(monitored))
     return [
-        rate * (1.0 if alone else kinds[one.contact][0]) / kinds[one.contact][1] for one in watched
+        rate * (1.0 if single_kind else kinds[series.contact][0]) / kinds[series.contact][1]
+        for series in monitored
     ]
 
 
-def _decided(
-    watched: Sequence[Watched],
-    found: Sequence[_Looked],
-    sight: Sight,
+_Decision = tuple[AlarmState, str, str]  # state, reason, indicator
+
+
+def _decide(
+    assessed: Sequence[tuple[MonitoredSeries, _Assessment]],
+    status: RecordingStatus,
     rate: float,
     unit: str,
-    number: int,
-    confirmed: Callable[[int], bool],
-) -> tuple[AlarmState, str, str]:
-    """State, reason, and who raised it."""
-    shares = _shares(watched, rate)
-    leaning = ("", "")
-    beside = list(zip(found, watched, strict=True))
-    for one, looked, share in zip(watched, found, shares, strict=True):
-        where = f"{looked.change.at:.4g} {unit}".rstrip()
-        if looked.change.log_ratio < threshold(ALERTS * share):
+    confirmed: Callable[[], bool],
+) -> _Decision:
+    """Decide the state after one recording, most severe first.
+
+    Order: alarm by a course (knee or growth), alarm by a step, blind, unexplained step
+    (cannot-tell), alert by a course, the recording's own status, incomplete baseline, none.
+    """
+    shares = _false_alarm_shares([series for series, _ in assessed], rate)
+    course = _course_decision(assessed, shares, rate, unit, confirmed)
+    if course is not None and course[0] == "alarm":
+        return course
+    if (step_alarm := _step_alarm(assessed, shares, unit)) is not None:
+        return step_alarm
+    if status.state == "blind":
+        return "blind", status.reason, ""
+    if (unexplained := _unexplained_step(assessed, shares, unit)) is not None:
+        return unexplained
+    if course is not None:
+        return course
+    if status.state != "none":
+        return status.state, status.reason, ""
+    points = min((assessment.points for _, assessment in assessed), default=0)
+    if points < BASELINE_POINTS:
+        return "cannot-tell", f"baseline incomplete: {points} of {BASELINE_POINTS} points", ""
+    return "none", f"no significant change at the set false-alarm rate ({_one_in(rate)})", ""
+
+
+def _course_decision(
+    assessed: Sequence[tuple[MonitoredSeries, _Assessment]],
+    shares: Sequence[float],
+    rate: float,
+    unit: str,
+    confirmed: Callable[[], bool],
+) -> _Decision | None:
+    """Return the first alarm by a knee or growth, else the last alert by one, else None."""
+    alert: _Decision | None = None
+    for (series, assessment), share in zip(assessed, shares, strict=True):
+        change = assessment.change
+        if change.log_ratio < threshold(ALERT_RATE_FACTOR * share):
             continue
-        way = f"{one.name} {one.in_words(looked.change.change)}"
-        course = (
-            f"{way} until {where} and has flattened since"
-            if one.contact
-            else f"{way} since {where}"
-        )
-        if looked.change.log_ratio >= threshold(share) and (not one.contact or confirmed(number)):
-            return "alarm", course, one.name
-        leaning = (course, one.name)
-    for one, looked, share in zip(watched, found, shares, strict=True):
-        upwards = (
-            one.jumps and looked.step.change > 0.0 and looked.step.log_ratio >= threshold(share)
-        )
-        loud = (
-            [other for other, heard in beside if heard.loud and heard.sensor == one.sensor]
-            if upwards
-            else []
-        )
-        if upwards and not (loud and all(_moves_at(other, looked.step.at) for other in loud)):
-            return "alarm", _jumped(one, looked, unit), one.name
-    if sight.state == "blind":
-        return "blind", sight.reason, ""
-    stepped = [
-        _jumped(one, looked, unit)
-        for one, looked, share in zip(watched, found, shares, strict=True)
-        if looked.step.log_ratio >= threshold(share)
-    ]
-    if stepped:
-        causes = "load, gain, a moved sensor or damage: what it was these recordings do not say"
-        return (
-            "cannot-tell",
-            f"{stepped[0]}, and holds since ({causes}; acknowledge it once it is known)",
-            "",
-        )
-    if leaning[0]:
-        return (
-            "alert",
-            f"{leaning[0]}, not yet beyond what chance does once in {1.0 / rate:.0f} recordings",
-            leaning[1],
-        )
-    if sight.state != "none":
-        return sight.state, sight.reason, ""
-    places = min((looked.places for looked in found), default=0)
-    if places < FEWEST:
-        return (
-            "cannot-tell",
-            f"the baseline is being learned, {places} of {FEWEST} places so far",
-            "",
-        )
-    return "none", f"nothing beyond what chance does once in {1.0 / rate:.0f} recordings", ""
+        where = f"{change.x:.4g} {unit}".rstrip()
+        words = f"{series.name} {series.describe(change.change)}"
+        words += f" until {where} and has flattened since" if series.contact else f" since {where}"
+        if change.log_ratio >= threshold(share) and (not series.contact or confirmed()):
+            return "alarm", words, series.name
+        pending = f"not yet significant at the set false-alarm rate ({_one_in(rate)})"
+        alert = "alert", f"{words}, {pending}", series.name
+    return alert
 
 
-def _jumped(one: Watched, looked: _Looked, unit: str) -> str:
-    return f"{one.name} {one.in_words(looked.step.change)} at once, at {looked.step.at:.4g} {unit}".rstrip()
+def _step_alarm(
+    assessed: Sequence[tuple[MonitoredSeries, _Assessment]], shares: Sequence[float], unit: str
+) -> _Decision | None:
+    """Return an alarm by an upward step that the sensor's gain-dependent series do not share."""
+    for (series, assessment), share in zip(assessed, shares, strict=True):
+        step = assessment.step
+        if not (series.step_alarms and step.change > 0.0 and step.log_ratio >= threshold(share)):
+            continue
+        gain_dependent = [
+            other_assessment
+            for other, other_assessment in assessed
+            if other.gain_dependent and other.sensor == series.sensor
+        ]
+        moved_together = all(_moves_at(other, step.x) for other in gain_dependent)
+        if not (gain_dependent and moved_together):
+            return "alarm", _describe_step(series, assessment, unit), series.name
+    return None
+
+
+def _unexplained_step(
+    assessed: Sequence[tuple[MonitoredSeries, _Assessment]], shares: Sequence[float], unit: str
+) -> _Decision | None:
+    """Return "cannot-tell" for the first significant step, whose cause recordings do not show."""
+    for (series, assessment), share in zip(assessed, shares, strict=True):
+        if assessment.step.log_ratio >= threshold(share):
+            return (
+                "cannot-tell",
+                f"{_describe_step(series, assessment, unit)} and has stayed there (load, gain, "
+                f"a moved "
+                "sensor or damage: the recordings do not show which; acknowledge it once the "
+                "cause is "
+                "known)",
+                "",
+            )
+    return None
+
+
+def _describe_step(series: MonitoredSeries, assessment: _Assessment, unit: str) -> str:
+    step = assessment.step
+    return (
+        f"{series.name} {series.describe(step.change)} in one step at {step.x:.4g} {unit}".rstrip()
+    )
+
+
+def _one_in(rate: float) -> str:
+    return f"1 in {1.0 / rate:.0f} recordings"

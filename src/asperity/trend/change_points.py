@@ -1,6 +1,6 @@
-"""Broken stick, smooth curves, straight line and constant fitted to one series: the likelihood of each, by Bayes.
+"""Bayesian fits of a broken stick, smooth curves, a straight line and a constant to one series.
 
-What they say of wear is left to `stages`; docs/theory/indicators.md has the equations.
+`stages` interprets them as wear; docs/theory/indicators.md has the equations.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,23 +11,21 @@ import scipy
 
 from asperity.core.arrays import Field
 
-FEWEST_PLACES = 7  # different x: three on either side of a break, and one to contradict
-MOST_PLACES = 240  # recordings of a long watch are averaged in neighbouring groups down to so many
-BREAKS, SCATTERS, CURVATURES = (
+FEWEST_STAGE_POINTS = 7  # distinct x: three on either side of a break, and one degree of freedom
+MOST_POINTS = 240  # longer series are averaged in groups of neighbours
+BREAK_POINTS, SCATTER_POINTS, CURVE_POINTS = (
     161,
     15,
     48,
-)  # grid points of break, scatter and bend of the smooth curves
-ROUNDS = 6  # of weights by the slope
-MEMORIES = (0.0, 0.4, 0.65, 0.85)  # correlation of neighbouring places' scatter
-ALIKE = np.array(
-    [0.7, 0.1, 0.1, 0.1]
-)  # how likely each of them is beforehand: mostly there is none
+)
+SLOPE_ITERATIONS = 6  # of the weights, which depend on the slope where x has errors
+CORRELATIONS = (0.0, 0.4, 0.65, 0.85)  # between the scatter of neighbouring points
+CORRELATION_PRIOR = np.array([0.7, 0.1, 0.1, 0.1])
 STICK, CONSTANT = "broken stick", "no change"
 
 
-class Places(NamedTuple):
-    """Means over the repeats at each place, ordered; shape (places,)."""
+class SeriesPoints(NamedTuple):
+    """Means over the repeats at each distinct x, in ascending order; shape (points,)."""
 
     x: Field
     x_std: Field
@@ -36,22 +34,22 @@ class Places(NamedTuple):
 
 
 class _Candidate(NamedTuple):
-    """A model with its one bend parameter k (break, or length of saturation) on a grid, linear in all else.
+    """Model with one nonlinear parameter k (break or length) on a grid, linear in the others.
 
-    `model(k, places)` gives the expected columns at the places, errors in x included, (grid,
-    places, linear parameters), and their derivatives by x.
+    `model(k, points)` returns the expected columns at the points, errors in x included, (grid,
+    points, linear parameters), and their derivatives with respect to x.
     """
 
     name: str
     bends: Field
-    model: Callable[[Field, Places], tuple[Field, Field]]
+    model: Callable[[Field, SeriesPoints], tuple[Field, Field]]
     parameters: int
 
 
-class Fitted(NamedTuple):
-    """Over the grid of bends and scatters: log likelihood, the same with linear parameters integrated out, those.
+class ModelFit(NamedTuple):
+    """Log likelihoods over the grid of bends and scatters, and the fitted linear parameters.
 
-    Scatters are of every size and memory, by memory first.
+    Scatters vary in size and correlation, correlation first.
     """
 
     best: Field  # (grid,), greatest log likelihood over the scatters
@@ -59,69 +57,69 @@ class Fitted(NamedTuple):
     linear: Field  # (grid, scatters, linear parameters)
 
 
-class Compared(NamedTuple):
-    """Candidates fitted to the places of one series; `bic` of each, `scatter` of the best in the series' unit."""
+class ModelComparison(NamedTuple):
+    """All candidates fitted to one series; `scatter` is that of the best, in the series' unit."""
 
-    places: Places
+    points: SeriesPoints
     breaks: Field
-    fits: dict[str, Fitted]
+    fits: dict[str, ModelFit]
     bic: dict[str, float]
     scatter: float
 
 
-def common_breaks(series: Sequence[Places]) -> Field:
-    """Where a break of all series may lie: between the third and the third last place of each."""
-    low, high = max(places.x[2] for places in series), min(places.x[-3] for places in series)
-    return np.linspace(low, high, BREAKS)
+def common_breaks(series: Sequence[SeriesPoints]) -> Field:
+    """Return possible common breaks, from the third to the third-last point of every series."""
+    low, high = max(points.x[2] for points in series), min(points.x[-3] for points in series)
+    return np.linspace(low, high, BREAK_POINTS)
 
 
-def compared(places: Places, breaks: Field) -> Compared:
-    """Every candidate fitted to the places."""
-    candidates, scatters = _candidates(places, breaks), _scatters(places)
-    fits = {candidate.name: _fit(candidate, places, scatters) for candidate in candidates}
+def compare_models(points: SeriesPoints, breaks: Field) -> ModelComparison:
+    """Fit every candidate to the points."""
+    candidates, scatters = _candidates(points, breaks), _scatters(points)
+    fits = {candidate.name: _fit(candidate, points, scatters) for candidate in candidates}
     bic = {
         candidate.name: -2.0 * float(np.max(fits[candidate.name].best))
-        + (candidate.parameters + 1) * float(np.log(places.x.size))
+        + (candidate.parameters + 1) * float(np.log(points.x.size))
         for candidate in candidates
     }
     best = fits[min(bic, key=lambda name: bic[name])]
     scatter = float(scatters[int(np.argmax(np.max(best.marginal, axis=0))) % scatters.size])
-    return Compared(places=places, breaks=breaks, fits=fits, bic=bic, scatter=scatter)
+    return ModelComparison(points=points, breaks=breaks, fits=fits, bic=bic, scatter=scatter)
 
 
-def places_of(x: Field, y: Field, y_std: Field, x_std: Field) -> Places:
-    """Repeats averaged; their own scatter, pooled, counts where it is larger than the deviations given."""
+def averaged_points(x: Field, y: Field, y_std: Field, x_std: Field) -> SeriesPoints:
+    """Average repeats; their pooled scatter is used where it exceeds the stated deviations."""
     if x.size == 0:
-        return Places(x, x_std, y, y)
-    at, index = np.unique(x, return_inverse=True)
-    if at.size > MOST_PLACES:  # neighbours in groups of equal number
-        index = index * MOST_PLACES // at.size
+        return SeriesPoints(x, x_std, y, y)
+    distinct, index = np.unique(x, return_inverse=True)
+    if distinct.size > MOST_POINTS:  # neighbours in groups of equal number
+        index = index * MOST_POINTS // distinct.size
     count = np.bincount(index).astype(float)
 
     def mean(values: Field) -> Field:
         return np.asarray(np.bincount(index, values) / count)
 
-    middle, centre = mean(y), mean(x)
+    means, centre = mean(y), mean(x)
     given = mean(y_std**2)
-    spare = y.size - count.size
-    if spare > 0:
+    degrees = y.size - count.size
+    if degrees > 0:
         excess = (
-            float(np.sum((y - middle[index]) ** 2)) / spare
-            - float(np.sum(given * (count - 1.0))) / spare
+            float(np.sum((y - means[index]) ** 2)) / degrees
+            - float(np.sum(given * (count - 1.0))) / degrees
         )
         given = given + max(excess, 0.0)
-    return Places(centre, mean(x_std), middle, given / count)
+    return SeriesPoints(centre, mean(x_std), means, given / count)
 
 
-def _scatters(places: Places) -> Field:
-    """Grid of standard deviations, beyond the errors given, of the places about a curve."""
-    span = max(float(np.ptp(places.y)), 1e-6 * float(np.max(np.abs(places.y))), 1e-9)
-    return np.concatenate([[span * 1e-4], span * np.geomspace(2e-3, 0.7, SCATTERS - 1)])
+def _scatters(points: SeriesPoints) -> Field:
+    """Return the grid of standard deviations beyond the stated errors."""
+    span = max(float(np.ptp(points.y)), 1e-6 * float(np.max(np.abs(points.y))), 1e-9)
+    return np.concatenate([[span * 1e-4], span * np.geomspace(2e-3, 0.7, SCATTER_POINTS - 1)])
 
 
-def _candidates(places: Places, breaks: Field) -> list[_Candidate]:
-    x = places.x
-    lengths = np.ptp(x) * np.geomspace(0.05, 5.0, CURVATURES)
+def _candidates(points: SeriesPoints, breaks: Field) -> list[_Candidate]:
+    x = points.x
+    lengths = np.ptp(x) * np.geomspace(0.05, 5.0, CURVE_POINTS)
     none = np.zeros(1)
     return [
         _Candidate(STICK, breaks, _stick, 4),
@@ -132,74 +130,82 @@ def _candidates(places: Places, breaks: Field) -> list[_Candidate]:
     ]
 
 
-def _beside_constant(column: Field, slope: Field) -> tuple[Field, Field]:
-    """A constant and one column, and their derivatives by x."""
+def _with_constant(column: Field, slope: Field) -> tuple[Field, Field]:
+    """Return a constant and one column, and their derivatives with respect to x."""
     return np.stack([np.ones_like(column), column], axis=-1), np.stack(
         [np.zeros_like(slope), slope], axis=-1
     )
 
 
-def _stick(k: Field, at: Places) -> tuple[Field, Field]:
-    """1, x and the hinge max(x - k, 0), in the mean over the error of x: (x - k) Φ(z) + s φ(z), z = (x - k)/s."""
-    ahead = at.x[None, :] - k[:, None]
-    blur = np.maximum(at.x_std, 1e-12)[None, :]
-    z = ahead / blur
-    over = scipy.special.ndtr(z)  # P(true x > k), shape (breaks, places)
-    bent = ahead * over + blur * np.exp(-0.5 * np.minimum(z**2, 1400.0)) / np.sqrt(2.0 * np.pi)
-    straight = np.broadcast_to(at.x - at.x[0], over.shape)
-    one = np.ones_like(over)
-    return np.stack([one, straight, bent], axis=-1), np.stack(
-        [np.zeros_like(over), one, over], axis=-1
+def _stick(k: Field, points: SeriesPoints) -> tuple[Field, Field]:
+    """Return 1, x and the expected hinge max(x - k, 0) over the error s of x.
+
+    E[max(x - k, 0)] = (x - k) Φ(z) + s φ(z), z = (x - k)/s.
+    """
+    distance = points.x[None, :] - k[:, None]
+    blur = np.maximum(points.x_std, 1e-12)[None, :]
+    z = distance / blur
+    probability_beyond = scipy.special.ndtr(z)  # P(true x > k), shape (breaks, points)
+    expected_hinge = distance * probability_beyond + blur * np.exp(
+        -0.5 * np.minimum(z**2, 1400.0)
+    ) / np.sqrt(2.0 * np.pi)
+    straight = np.broadcast_to(points.x - points.x[0], probability_beyond.shape)
+    constant = np.ones_like(probability_beyond)
+    return np.stack([constant, straight, expected_hinge], axis=-1), np.stack(
+        [np.zeros_like(probability_beyond), constant, probability_beyond], axis=-1
     )
 
 
-def _exponential(k: Field, at: Places) -> tuple[Field, Field]:
-    along = np.exp(-(at.x - at.x[0])[None, :] / k[:, None])
-    return _beside_constant(along, -along / k[:, None])
+def _exponential(k: Field, points: SeriesPoints) -> tuple[Field, Field]:
+    curve = np.exp(-(points.x - points.x[0])[None, :] / k[:, None])
+    return _with_constant(curve, -curve / k[:, None])
 
 
-def _hyperbola(k: Field, at: Places) -> tuple[Field, Field]:
-    along = 1.0 / (1.0 + (at.x - at.x[0])[None, :] / k[:, None])
-    return _beside_constant(along, -(along**2) / k[:, None])
+def _hyperbola(k: Field, points: SeriesPoints) -> tuple[Field, Field]:
+    curve = 1.0 / (1.0 + (points.x - points.x[0])[None, :] / k[:, None])
+    return _with_constant(curve, -(curve**2) / k[:, None])
 
 
-def _line(_: Field, at: Places) -> tuple[Field, Field]:
-    return _beside_constant((at.x - at.x[0])[None], np.ones_like(at.x)[None])
+def _line(_: Field, points: SeriesPoints) -> tuple[Field, Field]:
+    return _with_constant((points.x - points.x[0])[None], np.ones_like(points.x)[None])
 
 
-def _constant(_: Field, at: Places) -> tuple[Field, Field]:
-    return np.ones((1, at.x.size, 1)), np.zeros((1, at.x.size, 1))
+def _constant(_: Field, points: SeriesPoints) -> tuple[Field, Field]:
+    return np.ones((1, points.x.size, 1)), np.zeros((1, points.x.size, 1))
 
 
-def _fit(candidate: _Candidate, places: Places, scatters: Field) -> Fitted:
-    """Weighted least squares at every bend and scatter; the error of x counts with the slope there (iterated)."""
+def _fit(candidate: _Candidate, points: SeriesPoints, scatters: Field) -> ModelFit:
+    """Fit by weighted least squares at every bend and scatter.
+
+    The error of x counts through the local slope, which is iterated.
+    """
     columns, slopes = candidate.model(
-        candidate.bends, places
-    )  # (bends, places, linear), the first of them a constant
-    middle = float(np.mean(places.y))
-    products = _products(columns, places.y - middle)
+        candidate.bends, points
+    )  # (bends, points, linear), the first of them a constant
+    mean = float(np.mean(points.y))
+    products = _products(columns, points.y - mean)
     own = np.tile(
-        places.variance + scatters[:, None] ** 2, (len(MEMORIES), 1)
-    )  # (scatters, places)
-    memory = np.repeat(MEMORIES, scatters.size)
-    precision = _precision(own, memory)
+        points.variance + scatters[:, None] ** 2, (len(CORRELATIONS), 1)
+    )  # (scatters, points)
+    correlation = np.repeat(CORRELATIONS, scatters.size)
+    precision = _precision(own, correlation)
     linear, squares, determinant = _least_squares(precision, products, columns.shape[-1])
-    for _ in range(ROUNDS if np.any(places.x_std > 0.0) else 0):
+    for _ in range(SLOPE_ITERATIONS if np.any(points.x_std > 0.0) else 0):
         steepness = linear @ np.swapaxes(slopes, 1, 2)
-        precision = _precision(own + (steepness * places.x_std) ** 2, memory)
+        precision = _precision(own + (steepness * points.x_std) ** 2, correlation)
         linear, squares, determinant = _least_squares(precision, products, columns.shape[-1])
-    likelihood = np.log(np.repeat(ALIKE, scatters.size)) - 0.5 * (
+    likelihood = np.log(np.repeat(CORRELATION_PRIOR, scatters.size)) - 0.5 * (
         squares + precision.log_determinant
     )
-    linear[..., 0] += middle
-    return Fitted(np.max(likelihood, axis=1), likelihood - 0.5 * determinant, linear)
+    linear[..., 0] += mean
+    return ModelFit(np.max(likelihood, axis=1), likelihood - 0.5 * determinant, linear)
 
 
 class _Precision(NamedTuple):
-    """The inverse covariance of scatter that remembers the place before, and -ln of its determinant, with 2π.
+    """Inverse covariance of first-order autocorrelated scatter, and -ln of its determinant with 2π.
 
-    It has two diagonals: `own` and `next`, (..., scatters, places) each, the second that of a
-    place and the one before.
+    It is tridiagonal: `own` is the diagonal, `next` the one that couples a point with the previous
+    one, (..., scatters, points) each.
     """
 
     own: Field
@@ -207,47 +213,58 @@ class _Precision(NamedTuple):
     log_determinant: Field
 
 
-def _precision(variance: Field, memory: Field) -> _Precision:
-    """Of scatter of a variance (..., scatters, places), each with a memory (scatters,)."""
-    fresh = 1.0 - memory[:, None] ** 2
+def _precision(variance: Field, correlation: Field) -> _Precision:
+    """Return the precision for variances (..., scatters, points) and correlations (scatters,)."""
+    innovation = 1.0 - correlation[:, None] ** 2
     inside = np.ones(variance.shape[-1])
     inside[[0, -1]] = 0.0
-    own = (1.0 + memory[:, None] ** 2 * inside) / fresh / variance
-    following = -memory[:, None] / fresh / np.sqrt(variance * _before(variance, first=np.inf))
-    of_memory = (variance.shape[-1] - 1) * np.log(fresh[:, 0])
+    own = (1.0 + correlation[:, None] ** 2 * inside) / innovation / variance
+    following = (
+        -correlation[:, None] / innovation / np.sqrt(variance * _shifted(variance, first=np.inf))
+    )
+    of_memory = (variance.shape[-1] - 1) * np.log(innovation[:, 0])
     return _Precision(own, following, np.sum(np.log(2.0 * np.pi * variance), axis=-1) + of_memory)
 
 
-def _before(values: Field, first: float = 0.0) -> Field:
-    """At each place what is at the one before, along the last axis."""
+def _shifted(values: Field, first: float = 0.0) -> Field:
+    """Return each point's predecessor along the last axis."""
     shifted = np.roll(values, 1, axis=-1)
     shifted[..., 0] = first
     return shifted
 
 
 def _products(columns: Field, y: Field) -> Field:
-    """Of each column with each and with y, at a place and across to the one before; (bends, pairs, 2 places)."""
-    bends, places, size = columns.shape
-    whole = np.concatenate([np.moveaxis(columns, 2, 0), np.broadcast_to(y, (1, bends, places))])
-    behind = _before(whole)
+    """Return products of all pairs of columns and y, (bends, pairs, 2 points).
+
+    The first half holds products at one point, the second those across to the previous point.
+    """
+    bends, points, size = columns.shape
+    columns_and_y = np.concatenate(
+        [np.moveaxis(columns, 2, 0), np.broadcast_to(y, (1, bends, points))]
+    )
+    shifted = _shifted(columns_and_y)
     pairs = [*zip(*np.triu_indices(size + 1), strict=True)]
-    products = np.empty((bends, len(pairs), 2 * places))
-    for number, (one, other) in enumerate(pairs):
-        np.multiply(whole[one], whole[other], out=products[:, number, :places])
-        products[:, number, places:] = whole[one] * behind[other] + whole[other] * behind[one]
+    products = np.empty((bends, len(pairs), 2 * points))
+    for number, (first, second) in enumerate(pairs):
+        np.multiply(columns_and_y[first], columns_and_y[second], out=products[:, number, :points])
+        products[:, number, points:] = (
+            columns_and_y[first] * shifted[second] + columns_and_y[second] * shifted[first]
+        )
     return products
 
 
 def _least_squares(precision: _Precision, products: Field, size: int) -> tuple[Field, Field, Field]:
-    """What `size` columns fit best (bends, scatters, linear), the squares left, ln det of their information.
+    """Solve for `size` columns: coefficients, squared residual, ln det of the information.
 
-    By elimination in all normal equations together, y's row the last: LAPACK takes thousands of so
-    small ones in turn.
+    Coefficients have shape (bends, scatters, linear). Eliminates all normal equations at once, y's
+    row last: LAPACK would take thousands of such small systems one by one.
     """
-    found = products @ np.swapaxes(np.concatenate([precision.own, precision.next], axis=-1), -1, -2)
-    rows = np.empty((size + 1, size + 1, found.shape[0], found.shape[2]))
-    for number, (one, other) in enumerate(zip(*np.triu_indices(size + 1), strict=True)):
-        rows[one, other] = rows[other, one] = found[:, number]
+    equations = products @ np.swapaxes(
+        np.concatenate([precision.own, precision.next], axis=-1), -1, -2
+    )
+    rows = np.empty((size + 1, size + 1, equations.shape[0], equations.shape[2]))
+    for number, (first, second) in enumerate(zip(*np.triu_indices(size + 1), strict=True)):
+        rows[first, second] = rows[second, first] = equations[:, number]
     diagonal = np.arange(size)
     rows[diagonal, diagonal] += 1e-12 * np.sum(rows[diagonal, diagonal], axis=0)
     for i in range(size):
@@ -264,39 +281,44 @@ def _least_squares(precision: _Precision, products: Field, size: int) -> tuple[F
 
 
 def sudden_bend(x: Field, crfa: Field, x_std: Field, breaks: Field) -> Field:
-    """Logarithm of P(ln CRFA | break), but for a constant: a hinge over a parabola; smooth growth says nothing."""
+    """Return ln P(ln CRFA | break), up to a constant: a hinge over a parabola.
+
+    Smooth growth of CRFA carries no information about the break.
+    """
     known = np.isfinite(crfa) & (crfa > 0.0)
-    places = places_of(x[known], np.log(crfa[known]), np.zeros(int(np.sum(known))), x_std[known])
-    if places.x.size < FEWEST_PLACES:
+    points = averaged_points(
+        x[known], np.log(crfa[known]), np.zeros(int(np.sum(known))), x_std[known]
+    )
+    if points.x.size < FEWEST_STAGE_POINTS:
         return np.zeros(breaks.size)
 
-    def model(k: Field, at: Places) -> tuple[Field, Field]:
-        stick, sloped = _stick(k, at)
+    def model(k: Field, points: SeriesPoints) -> tuple[Field, Field]:
+        stick, sloped = _stick(k, points)
         x = stick[..., 1:2]
         return np.concatenate([stick, x**2], axis=-1), np.concatenate([sloped, 2.0 * x], axis=-1)
 
     candidate = _Candidate("ln CRFA", breaks, model, 5)
-    return log_sum(_fit(candidate, places, _scatters(places)).marginal)
+    return log_sum(_fit(candidate, points, _scatters(points)).marginal)
 
 
-def after_break(x: Field, x_std: Field, breaks: Field, density: Field) -> Field:
-    """Probability that each recording's true x lies beyond the break."""
+def probability_beyond_break(x: Field, x_std: Field, breaks: Field, density: Field) -> Field:
+    """Return the probability that each recording's true x lies beyond the break."""
     blur = np.maximum(x_std, 1e-12)
     return np.asarray(scipy.special.ndtr((x[:, None] - breaks[None, :]) / blur[:, None]) @ density)
 
 
 def log_sum(marginal: Field) -> Field:
-    """Over the scatters, all but the least of them evenly spaced in their logarithm, and their memories."""
+    """Return the log of the likelihood summed over scatters (log-spaced but for the first)."""
     top = np.max(marginal, axis=1, keepdims=True)
     return np.asarray(np.log(np.sum(np.exp(marginal - top), axis=1)) + top[:, 0])
 
 
 def quantiles(
-    breaks: Field, density: Field, wanted: tuple[float, float, float]
+    breaks: Field, density: Field, shares: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Breaks below which these shares of the density lie."""
+    """Return the breaks below which these shares of the density lie."""
     cumulative = np.concatenate([[0.0], np.cumsum(density)])
     step = breaks[1] - breaks[0]
     edges = np.concatenate([breaks - step / 2.0, [breaks[-1] + step / 2.0]])
-    low, middle, high = np.interp(wanted, cumulative, edges)
-    return float(low), float(middle), float(high)
+    low, means, high = np.interp(shares, cumulative, edges)
+    return float(low), float(means), float(high)

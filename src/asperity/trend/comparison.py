@@ -1,9 +1,9 @@
-"""A series of recordings as one: whether it is one at all, and what load share its CRF stands for.
+"""Comparability of the recordings of a series, and the asperity load share implied by CRF.
 
-Knows neither files nor machines: what is known of each recording comes in as `RecordingFacts`.
+Knows neither files nor machines: callers describe recordings as `RecordingFacts`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,15 +11,17 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_positive
 
-SAME = 0.01  # relative difference of rate, speed or load up to which recordings count as alike
-INTERVAL = 1.6449  # standard deviations to either side: 90 %
+SAME_WITHIN = (
+    0.01  # relative difference of rate, speed or load up to which recordings are comparable
+)
+INTERVAL_FACTOR = 1.6449  # standard deviations on either side of a 90 % interval
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoadShare:
-    """CLR read off CRFs: the model's reading, not a measurement; above 1 where the CRF lies above that of full load.
+    """Asperity load share derived from CRF by a model; above 1 where CRF exceeds that at full load.
 
-    `interval` is that of 90 %, lower and upper ends.
+    `interval` holds the lower and upper ends of the 90 % interval.
     """
 
     clr: Field
@@ -33,43 +35,46 @@ def asperity_load_share(
     *,
     full_load_std_hz: float = 0.0,
 ) -> LoadShare:
-    """CLR = (CRF / CRF_full)^6 of a Hertz point spring, with the interval that both frequencies' errors leave.
+    """Return CLR = (CRF / CRF_full)^6 of a Hertz point contact, with its 90 % interval.
+
+    The interval propagates the standard deviations of both frequencies.
 
     Parameters
     ----------
-    crf_hz, crf_std_hz : shape (recordings,) or one; nan stays nan
-    full_load_crf_hz, full_load_std_hz : resonance with all load on asperities, and how well it is known [Hz]
+    crf_hz, crf_std_hz : shape (recordings,) or scalars; nan stays nan
+    full_load_crf_hz, full_load_std_hz : resonance with all load on asperities, and its standard
+        deviation [Hz]
 
     Raises
     ------
     BadInput
-        for a full-load resonance that is not positive, or a negative deviation.
+        for a full-load resonance that is not positive, or a negative standard deviation.
     """
     require_positive("full-load resonance", full_load_crf_hz, "Hz")
     std = np.asarray(crf_std_hz, dtype=float)
     if full_load_std_hz < 0.0 or np.any(std < 0.0):
         raise BadInput(
-            "deviations of CRF and of the full-load resonance must be 0 or more; give standard deviations"
+            "standard deviations of CRF and of the full-load resonance must be 0 or more"
         )
     ratio = np.asarray(crf_hz, dtype=float) / full_load_crf_hz
-    spread = INTERVAL * np.hypot(
+    half_width = INTERVAL_FACTOR * np.hypot(
         std / full_load_crf_hz, ratio * full_load_std_hz / full_load_crf_hz
     )
     return LoadShare(
         clr=np.asarray(ratio**6),
         interval=(
-            np.asarray(np.maximum(ratio - spread, 0.0) ** 6),
-            np.asarray((ratio + spread) ** 6),
+            np.asarray(np.maximum(ratio - half_width, 0.0) ** 6),
+            np.asarray((ratio + half_width) ** 6),
         ),
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingFacts:
-    """What is known of a recording and its spectrum; None for what is not known.
+    """Known facts of a recording and its spectrum; None where not known.
 
-    `name` to speak of it, `rate_hz`, `segment` [samples], `window`, `unit`, `duration_s`;
-    `speed_hz` of the shaft and `load_n` of the contact.
+    `name` for messages, `rate_hz`, `segment` [samples], `window`, `unit`, `duration_s`; `speed_hz`
+    of the shaft and `load_n` of the contact.
     """
 
     name: str
@@ -83,35 +88,43 @@ class RecordingFacts:
 
 
 def comparability(series: Sequence[RecordingFacts]) -> tuple[str, ...]:
-    """What keeps recordings from being compared with one another, a sentence each; none when nothing does.
+    """Return the reasons why recordings cannot be compared, one sentence each; empty for none.
 
-    Rate, window, resolution and unit change CRFA, load and speed change CRF and CRFA themselves. A
-    record length that differs changes standard deviations only, and they say so.
+    Rate, window, resolution and unit change CRFA; load and speed change both CRF and CRFA. The
+    record length changes standard deviations only.
     """
-    problems = []
-    resolutions = [facts.rate_hz / facts.segment for facts in series]
+    return (*_differing_numbers(series), *_differing_words(series))
+
+
+def _differing_numbers(series: Sequence[RecordingFacts]) -> Iterator[str]:
+    """Yield a sentence for each number that differs between recordings, or is partly unknown."""
     numbers = (
         (
             "sampling rate",
             "Hz",
             [facts.rate_hz for facts in series],
-            "resample them, or track them apart",
+            "resample the recordings, or track them separately",
         ),
-        ("resolution", "Hz", resolutions, "take one segment length for all"),
+        (
+            "resolution",
+            "Hz",
+            [facts.rate_hz / facts.segment for facts in series],
+            "use one segment length for all",
+        ),
         (
             "load",
             "N",
             [facts.load_n for facts in series],
-            "CRF follows the load: track each load by itself",
+            "CRF depends on the load: track each load separately",
         ),
         (
             "speed",
             "Hz",
             [facts.speed_hz for facts in series],
-            "CRFA follows the speed: track each speed by itself",
+            "CRFA depends on the speed: track each speed separately",
         ),
     )
-    for thing, unit, values, remedy in numbers:
+    for quantity, unit, values, remedy in numbers:
         known = [
             (value, facts.name)
             for value, facts in zip(values, series, strict=True)
@@ -120,32 +133,36 @@ def comparability(series: Sequence[RecordingFacts]) -> tuple[str, ...]:
         if not known:
             continue
         low, high = min(known), max(known)
-        if high[0] - low[0] > SAME * abs(high[0]):
-            problems.append(
-                f"The {thing} differs between recordings, from {low[0]:g} {unit} ({low[1]}) to {high[0]:g} {unit} "
-                f"({high[1]}); {remedy}."
+        if high[0] - low[0] > SAME_WITHIN * abs(high[0]):
+            yield (
+                f"The {quantity} differs between recordings, from {low[0]:g} {unit} ({low[1]}) to "
+                f"{high[0]:g} {unit} ({high[1]}); {remedy}."
             )
         if len(known) < len(series):
-            silent = next(
+            unknown = next(
                 facts.name for value, facts in zip(values, series, strict=True) if value is None
             )
-            problems.append(
-                f"The {thing} is known of {len(known)} of {len(series)} recordings, not of {silent}."
+            yield (
+                f"The {quantity} is stated for {len(known)} of {len(series)} recordings, not for "
+                f"{unknown}."
             )
-    for thing, words, remedy in (
+
+
+def _differing_words(series: Sequence[RecordingFacts]) -> Iterator[str]:
+    """Yield a sentence where units or windows differ between recordings."""
+    for quantity, words, remedy in (
         (
             "unit",
             [facts.unit for facts in series],
-            "convert them; until then CRFA is not comparable, CRF is",
+            "convert them (until then CRF is comparable, CRFA is not)",
         ),
-        ("window", [facts.window for facts in series], "take one window for all"),
+        ("window", [facts.window for facts in series], "use one window for all"),
     ):
-        seen = {
+        examples = {
             word: facts.name for word, facts in zip(reversed(words), reversed(series), strict=True)
         }
-        if len(seen) > 1:
+        if len(examples) > 1:
             listed = ", ".join(
-                f"{word or 'none'} ({name})" for word, name in reversed(seen.items())
+                f"{word or 'none'} ({name})" for word, name in reversed(examples.items())
             )
-            problems.append(f"The {thing} differs between recordings: {listed}; {remedy}.")
-    return tuple(problems)
+            yield f"The {quantity} differs between recordings: {listed}; {remedy}."

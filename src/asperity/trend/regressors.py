@@ -1,7 +1,6 @@
-"""What load, speed and temperature explain of an indicator, learned from how both change from recording to recording.
+"""Effect of load, speed and temperature on an indicator, fitted to recording-to-recording changes.
 
-Which conditions there are, and how much of each an indicator may follow, is said by
-`asperity.monitoring`.
+`asperity.monitoring` chooses the conditions and the bounds of their coefficients.
 """
 
 from collections.abc import Sequence
@@ -13,21 +12,21 @@ import scipy
 
 from asperity.core.arrays import Field
 
-BASELINE = 8  # recordings whose median the conditions are counted from
-WORTH = 0.1  # of the least change: a condition that can explain no more of it is left out
-WIDTH = 0.25  # of the span of a coefficient, which it may still be off by
+BASELINE_RECORDINGS = 8  # conditions are relative to the median of these first recordings
+SMALLEST_SHARE = 0.1  # of the smallest change: a condition that cannot explain more is left out
+PRIOR_WIDTH = 0.25  # standard deviation of a coefficient over the span of its bounds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """A condition that an indicator may follow: indicator = course + coefficient times `values`.
+    """Operating condition that an indicator may follow: indicator = course + c · `values`.
 
     Parameters
     ----------
     name : such as "load"
-    values : shape (recordings,), such as the logarithm of the load; nan where it is not known
-    low, high : what the coefficient may be, by the contact's physics
-    shown, unit : the same as a person reads it, such as the load in N
+    values : shape (recordings,), such as the logarithm of the load; nan where not known
+    low, high : physical bounds of the coefficient
+    shown, unit : the condition as displayed, such as the load in N
     """
 
     name: str
@@ -38,13 +37,13 @@ class Condition:
     unit: str
 
 
-class Explained(NamedTuple):
-    """What conditions explain of an indicator.
+class ConditionEffect(NamedTuple):
+    """Part of an indicator that operating conditions explain.
 
-    `effect` is to be taken off, shape (recordings,), 0 at the baseline, nan where a condition is
-    not stated. `rows` are the conditions that count, counted from the baseline, (conditions,
-    recordings); `widths` by how much their `coefficients` may still be off; `scatter` is the
-    deviation of a recording.
+    `effect` (recordings,) is to be subtracted: 0 at the baseline, nan where a condition is not
+    stated. `rows` (conditions, recordings) are the conditions used, relative to the baseline;
+    `widths` the remaining uncertainty of their `coefficients`; `scatter` the standard deviation of
+    one recording.
     """
 
     effect: Field
@@ -55,44 +54,55 @@ class Explained(NamedTuple):
     scatter: float
 
 
-NOTHING_EXPLAINED = Explained(np.zeros(1), np.zeros((0, 1)), np.zeros(0), np.zeros(0), (), 0.0)
+NO_CONDITION_EFFECT = ConditionEffect(
+    np.zeros(1), np.zeros((0, 1)), np.zeros(0), np.zeros(0), (), 0.0
+)
 
 
-def explained(values: Field, conditions: Sequence[Condition], *, least: float) -> Explained:
-    """What conditions explain: bounded least squares on the differences of one recording to the next.
+def fit_conditions(
+    values: Field, conditions: Sequence[Condition], *, smallest_change: float
+) -> ConditionEffect:
+    """Fit the effect of conditions by bounded least squares on recording-to-recording differences.
 
-    Differences beside their mean, because wear and a condition may both drift: what goes slowly
-    says little of either.
+    The mean difference is removed: wear and a condition may both drift, so slow changes cannot be
+    attributed.
 
     Parameters
     ----------
-    values : the indicator, shape (recordings,); nan where there is none
+    values : the indicator, shape (recordings,); nan where not determined
     conditions : of the same recordings
-    least : the change of it that is worth acting on
+    smallest_change : change of the indicator worth acting on
     """
     known = np.isfinite(values)
-    for one in conditions:
-        known = known & np.isfinite(one.values)
+    for condition in conditions:
+        known = known & np.isfinite(condition.values)
     if known.sum() < 3:
-        return NOTHING_EXPLAINED
-    counted = [
-        one
-        for one in conditions
-        if max(-one.low, one.high) * np.ptp(one.values[known]) > WORTH * least
+        return NO_CONDITION_EFFECT
+    relevant = [
+        condition
+        for condition in conditions
+        if max(-condition.low, condition.high) * np.ptp(condition.values[known])
+        > SMALLEST_SHARE * smallest_change
     ]
-    if not counted:
-        return NOTHING_EXPLAINED
-    rows = np.array([one.values - np.median(one.values[known][:BASELINE]) for one in counted])
-    low, high = (np.array([getattr(one, end) for one in counted]) for end in ("low", "high"))
-    change, along = np.diff(values[known]), np.diff(rows[:, known], axis=1)
-    change, along = change - change.mean(), along - along.mean(axis=1, keepdims=True)
-    size = np.maximum(
-        np.abs(along).max(axis=1), 1e-12
-    )  # of one scale, so that the solver sees all of them
-    fitted = scipy.optimize.lsq_linear((along / size[:, None]).T, change, (low * size, high * size))
+    if not relevant:
+        return NO_CONDITION_EFFECT
+    rows = np.array(
+        [
+            condition.values - np.median(condition.values[known][:BASELINE_RECORDINGS])
+            for condition in relevant
+        ]
+    )
+    low = np.array([condition.low for condition in relevant])
+    high = np.array([condition.high for condition in relevant])
+    change, row_change = np.diff(values[known]), np.diff(rows[:, known], axis=1)
+    change, row_change = change - change.mean(), row_change - row_change.mean(axis=1, keepdims=True)
+    size = np.maximum(np.abs(row_change).max(axis=1), 1e-12)  # equal scales for the solver
+    fitted = scipy.optimize.lsq_linear(
+        (row_change / size[:, None]).T, change, (low * size, high * size)
+    )
     coefficients = fitted.x / size
-    left = change - coefficients @ along
-    scatter = float(np.sqrt(np.mean(left**2) / 2.0))  # of a difference twice that of one
+    residual = change - coefficients @ row_change
+    scatter = float(np.sqrt(np.mean(residual**2) / 2.0))  # a difference has twice the variance
     effect = coefficients @ rows  # nan where a condition is not stated
-    names = tuple(one.name for one in counted)
-    return Explained(effect, rows, WIDTH * (high - low), coefficients, names, scatter)
+    names = tuple(condition.name for condition in relevant)
+    return ConditionEffect(effect, rows, PRIOR_WIDTH * (high - low), coefficients, names, scatter)

@@ -1,8 +1,8 @@
-"""Whether one series has bent, grown or stepped, judged after each recording; and that nothing else explains it.
+"""Tests of one series for a knee, growth or a step, against all smooth explanations.
 
-Each question is a likelihood ratio of two families of courses, both with scatter that remembers
-the recording before (first order, up to 0.9). What a step means, and when to warn, is left to
-`alarm`; docs/theory/alarms.md has the equations and how often each speaks without a cause.
+Each test is the likelihood ratio of two families of courses, both with autocorrelated scatter
+(first order, correlation up to 0.9). `alarm` decides what follows from it; docs/theory/alarms.md
+has the equations and the measured false-alarm rates.
 """
 
 from functools import lru_cache
@@ -12,302 +12,335 @@ import numpy as np
 
 from asperity.core.arrays import Field, Mask
 
-FEWEST = 8  # places from which a course can be judged at all: the baseline
-MEMORY = np.array(
+BASELINE_POINTS = 8  # the fewest points that any test needs
+CORRELATIONS = np.array(
     [-0.3, 0.0, 0.3, 0.5, 0.7, 0.8, 0.9]
-)  # correlation of neighbouring recordings' scatter
-LONGEST_CYCLE = (
-    1.5  # of the length of the series: of a longer one not even a whole turn has been heard
-)
-SHORTEST_CYCLE = 3.0  # spacings
-BENDS, CYCLES = 20, 30  # grid points of saturating lengths and of periods
-RAMPS = (0, 1, 2, 3)  # recordings between the two levels of a step
-MOST_PLACES = 120  # the latest: what was before is the past of another baseline
-FEWEST_BEFORE, FEWEST_AFTER = 3, 2  # places on either side of a bend
-FLAT = 0.5  # slope after a knee over that before, at most
-FITTED = (
-    5  # numbers that a course takes from the places: level, slope, turn, where it turns, memory
-)
+)  # between the scatter of neighbouring points
+LONGEST_CYCLE = 1.5  # of the length of the series
+SHORTEST_CYCLE = 3.0  # mean spacings
+CURVE_LENGTHS, PERIODS = 20, 30  # grid points
+RAMP_LENGTHS = (0, 1, 2, 3)  # recordings between the two levels of a step
+MOST_POINTS = 120  # the latest ones: earlier ones belong to another baseline
+MIN_POINTS_BEFORE, MIN_POINTS_AFTER = 3, 2  # points on either side of a bend
+MOST_SLOPE_RATIO = 0.5  # of a knee: slope after it over slope before it
+FITTED_PARAMETERS = 5  # level, slope, change of slope, its location, correlation
 CALIBRATION = 0.12  # false alarms a recording times exp(log ratio): docs/theory/alarms.md
 TINY = 1e-12
 
 
-class Beside(NamedTuple):
-    """What conditions may still explain of a series: their rows, (conditions, places), and how little of each.
+class ConditionRows(NamedTuple):
+    """Condition rows (conditions, points) that every course may contain, within narrow priors.
 
-    `pull` is the series' scatter over the deviation of each coefficient, which a prior holds near
-    0.
+    `pull` is the scatter of the series over the standard deviation of each coefficient's zero-mean
+    prior.
     """
 
     rows: Field
     pull: Field
 
 
-class Found(NamedTuple):
-    """What speaks for a change: ln of the likelihood ratio, the place of it, by how much the series changed there."""
+class ChangeTest(NamedTuple):
+    """Result of a test: ln likelihood ratio, location of the change on x, and its size."""
 
     log_ratio: float
-    at: float
+    x: float
     change: float
 
 
-NOTHING = Found(-np.inf, np.nan, np.nan)
+NO_CHANGE = ChangeTest(-np.inf, np.nan, np.nan)
 
 
 def threshold(false_alarm_rate: float) -> float:
-    """The ln likelihood ratio that no wear reaches more often than this, per recording."""
+    """Return the ln likelihood ratio exceeded without wear at this rate per recording."""
     return float(np.log(CALIBRATION / false_alarm_rate))
 
 
-def knee(x: Field, y: Field, *, least: float, beside: Beside | None = None) -> Found:
-    """A rise by `least` or more that goes on at half its pace or less, against all that bends without a knee.
+def knee_test(
+    x: Field, y: Field, *, smallest_change: float, conditions: ConditionRows | None = None
+) -> ChangeTest:
+    """Test for a rise by `smallest_change` that continues at half its slope or less.
 
-    Against it stand a line, saturating curves, steps and short ramps, and cycles.
+    The alternatives are a line, saturating curves, steps, short ramps and cycles.
 
     Parameters
     ----------
-    x, y : shape (places,), x rising; y in units in which `least` is worth acting on
-    beside : what conditions may explain of it, of every course alike
+    x, y : shape (points,), x rising
+    smallest_change : dead band, in units of y
+    conditions : rows that every course may contain
     """
-    return _judged(x, y, least, beside, rises_first=True)
+    return _course_test(x, y, smallest_change, conditions, rises_first=True)
 
 
-def growth(x: Field, y: Field, *, least: float, beside: Beside | None = None) -> Found:
-    """A level that held and then grows, by `least` or more: against holding, saturating, stepping and cycling."""
-    return _judged(x, y, least, beside, rises_first=False)
+def growth_test(
+    x: Field, y: Field, *, smallest_change: float, conditions: ConditionRows | None = None
+) -> ChangeTest:
+    """Test for a constant level that then grows by `smallest_change`.
+
+    The alternatives are a constant, saturating curves, steps, short ramps and cycles; parameters as
+    in
+    `knee_test`.
+    """
+    return _course_test(x, y, smallest_change, conditions, rises_first=False)
 
 
-def step(x: Field, y: Field, *, least: float, beside: Beside | None = None) -> Found:
-    """A jump by `least` or more either way, within a few recordings, which holds: against all that goes smoothly."""
-    along, y, scale = _latest(x, y)
-    if along.size < FEWEST:
-        return NOTHING
-    whites = _whites_beside(along.size, beside)
-    jumps = _jumps(along.size)
-    levels = jumps @ y / jumps.sum(axis=1) - (1.0 - jumps) @ y / np.maximum(
-        (1.0 - jumps).sum(axis=1), TINY
+def step_test(
+    x: Field, y: Field, *, smallest_change: float, conditions: ConditionRows | None = None
+) -> ChangeTest:
+    """Test for a lasting step of `smallest_change` either way within a few recordings.
+
+    The alternatives are a line, saturating curves, cycles and a line with one break; parameters as
+    in
+    `knee_test`.
+    """
+    t, y, scale = _scaled_points(x, y)
+    if t.size < BASELINE_POINTS:
+        return NO_CHANGE
+    whiteners = _whiteners(t.size, conditions)
+    steps = _steps(t.size)
+    levels = steps @ y / steps.sum(axis=1) - (1.0 - steps) @ y / np.maximum(
+        (1.0 - steps).sum(axis=1), TINY
     )
-    settled = jumps.sum(axis=1) >= FEWEST_BEFORE
-    allowed = settled & (np.abs(levels) >= least)
+    settled = steps.sum(axis=1) >= MIN_POINTS_BEFORE
+    allowed = settled & (np.abs(levels) >= smallest_change)
     if not allowed.any():
-        return NOTHING
-    hinges = np.maximum(along - _breaks(along)[:, None], 0.0)
-    gains = _gains(y, jumps[allowed], whites=whites)
-    smooth = _profiled(
-        y, np.concatenate([along[None], _saturating(along)]), _cycles(along), hinges, whites=whites
+        return NO_CHANGE
+    hinges = np.maximum(t - _break_positions(t)[:, None], 0.0)
+    likelihoods = _log_likelihoods(y, steps[allowed], whiteners=whiteners)
+    against = _best_log_likelihood(
+        y,
+        np.concatenate([t[None], _saturating_curves(t)]),
+        _sinusoids(t),
+        hinges,
+        whiteners=whiteners,
     )
-    best = int(np.argmax(np.max(gains, axis=0)))
-    ratio = _counted(float(np.max(gains)) - smooth, along.size)
-    return Found(
+    best = int(np.argmax(np.max(likelihoods, axis=0)))
+    ratio = _corrected_ratio(float(np.max(likelihoods)) - against, t.size)
+    return ChangeTest(
         ratio,
-        scale.back(along[np.argmax(jumps[allowed][best] > 0.0)]),
+        scale.x_at(t[np.argmax(steps[allowed][best] > 0.0)]),
         float(levels[allowed][best]),
     )
 
 
-def _judged(x: Field, y: Field, least: float, beside: Beside | None, *, rises_first: bool) -> Found:
-    along, y, scale = _latest(x, y)
-    if along.size < FEWEST:
-        return NOTHING
-    whites = _whites_beside(along.size, beside)
-    places = _breaks(along)
-    hinges = np.maximum(along - places[:, None], 0.0)
+def _course_test(
+    x: Field,
+    y: Field,
+    smallest_change: float,
+    conditions: ConditionRows | None,
+    *,
+    rises_first: bool,
+) -> ChangeTest:
+    t, y, scale = _scaled_points(x, y)
+    if t.size < BASELINE_POINTS:
+        return NO_CHANGE
+    whiteners = _whiteners(t.size, conditions)
+    breaks = _break_positions(t)
+    hinges = np.maximum(t - breaks[:, None], 0.0)
     if rises_first:
-        change, allowed = _knees(along, y, places, hinges, least)
+        change, allowed = _knee_candidates(t, y, breaks, hinges, smallest_change)
     else:
-        change, allowed = _growths(y, hinges, least)
+        change, allowed = _growth_candidates(y, hinges, smallest_change)
     if not allowed.any():
-        return NOTHING
-    smooth = np.concatenate([_saturating(along), _jumps(along.size)])
+        return NO_CHANGE
+    smooth = np.concatenate([_saturating_curves(t), _steps(t.size)])
     if rises_first:
-        smooth = np.concatenate([along[None], smooth])
-    against = _profiled(y, smooth, _cycles(along), whites=whites)
-    gains = _gains(y, hinges[allowed], beside=along if rises_first else None, whites=whites)
-    best = int(np.argmax(np.max(gains, axis=0)))
-    ratio = _counted(float(np.max(gains)) - against, along.size)
-    return Found(ratio, scale.back(places[allowed][best]), float(change[allowed][best]))
+        smooth = np.concatenate([t[None], smooth])
+    against = _best_log_likelihood(y, smooth, _sinusoids(t), whiteners=whiteners)
+    likelihoods = _log_likelihoods(
+        y, hinges[allowed], companion=t if rises_first else None, whiteners=whiteners
+    )
+    best = int(np.argmax(np.max(likelihoods, axis=0)))
+    ratio = _corrected_ratio(float(np.max(likelihoods)) - against, t.size)
+    return ChangeTest(ratio, scale.x_at(breaks[allowed][best]), float(change[allowed][best]))
 
 
-def _counted(log_ratio: float, places: int) -> float:
-    """The ratio by as many places as are left when the course is fitted: few places flatter what is fitted to them."""
-    return log_ratio * (places - FITTED) / places
+def _corrected_ratio(log_ratio: float, points: int) -> float:
+    """Reduce the ratio for the fitted parameters: few points flatter the course fitted to them."""
+    return log_ratio * (points - FITTED_PARAMETERS) / points
 
 
 class _Scale(NamedTuple):
-    """Where x begins and its mean spacing."""
+    """Start and mean spacing of x."""
 
     start: float
     spacing: float
 
-    def back(self, along: float) -> float:
-        return float(self.start + self.spacing * along)
+    def x_at(self, t: float) -> float:
+        return float(self.start + self.spacing * t)
 
 
-def _latest(x: Field, y: Field) -> tuple[Field, Field, _Scale]:
-    """The latest places; x from their first, in units of their mean spacing."""
-    x, y = x[-MOST_PLACES:], y[-MOST_PLACES:]
+def _scaled_points(x: Field, y: Field) -> tuple[Field, Field, _Scale]:
+    """Return the latest points, x counted from the first in units of the mean spacing."""
+    x, y = x[-MOST_POINTS:], y[-MOST_POINTS:]
     scale = (
         _Scale(float(x[0]), float(x[-1] - x[0]) / (x.size - 1)) if x.size > 1 else _Scale(0.0, 1.0)
     )
     return np.asarray((x - scale.start) / scale.spacing), np.asarray(y), scale
 
 
-def _breaks(along: Field) -> Field:
-    """Where a course may break: at the places and midway between them, but for the first and the last few."""
-    inner = along[FEWEST_BEFORE - 1 : -FEWEST_AFTER]
+def _break_positions(t: Field) -> Field:
+    """Return possible breaks: the points and the midpoints between them, except near both ends."""
+    inner = t[MIN_POINTS_BEFORE - 1 : -MIN_POINTS_AFTER]
     return np.sort(np.concatenate([inner[1:], 0.5 * (inner[1:] + inner[:-1])]))
 
 
-def _knees(
-    along: Field, y: Field, places: Field, hinges: Field, least: float
+def _knee_candidates(
+    t: Field, y: Field, breaks: Field, hinges: Field, smallest_change: float
 ) -> tuple[Field, Mask]:
-    """How far each broken stick has risen at its break, and which of them are knees; by least squares."""
-    one, line, bent = (rows - rows.mean(axis=-1, keepdims=True) for rows in (y, along, hinges))
-    xx, xh, hh = line @ line, bent @ line, np.sum(bent**2, axis=1)
+    """Return each broken stick's rise at its break (least squares), and which of them are knees."""
+    centred, line, bend = (rows - rows.mean(axis=-1, keepdims=True) for rows in (y, t, hinges))
+    xx, xh, hh = line @ line, bend @ line, np.sum(bend**2, axis=1)
     determinant = np.maximum(xx * hh - xh**2, TINY)
-    before = (hh * (line @ one) - xh * (bent @ one)) / determinant
-    turn = (xx * (bent @ one) - xh * (line @ one)) / determinant
-    rise = before * places
-    return rise, (before > 0.0) & (before + turn < FLAT * before) & (rise >= least)
+    before = (hh * (line @ centred) - xh * (bend @ centred)) / determinant
+    turn = (xx * (bend @ centred) - xh * (line @ centred)) / determinant
+    rise = before * breaks
+    return rise, (before > 0.0) & (before + turn < MOST_SLOPE_RATIO * before) & (
+        rise >= smallest_change
+    )
 
 
-def _growths(y: Field, hinges: Field, least: float) -> tuple[Field, Mask]:
-    """How far each hinge has grown at the end, and which have grown enough."""
-    one, bent = (rows - rows.mean(axis=-1, keepdims=True) for rows in (y, hinges))
-    grown = (bent @ one) / np.sum(bent**2, axis=1) * hinges[:, -1]
-    return grown, grown >= least
+def _growth_candidates(y: Field, hinges: Field, smallest_change: float) -> tuple[Field, Mask]:
+    """Return each hinge's growth at the end (least squares), and which exceed the dead band."""
+    centred, bend = (rows - rows.mean(axis=-1, keepdims=True) for rows in (y, hinges))
+    grown = (bend @ centred) / np.sum(bend**2, axis=1) * hinges[:, -1]
+    return grown, grown >= smallest_change
 
 
-def _saturating(along: Field) -> Field:
-    """Exponentials and hyperbolas of all lengths, (curves, places)."""
-    lengths = along[-1] * np.geomspace(0.03, 5.0, BENDS)[:, None]
-    return np.concatenate([np.exp(-along / lengths), 1.0 / (1.0 + along / lengths)])
+def _saturating_curves(t: Field) -> Field:
+    """Return exponentials and hyperbolas of all lengths, (curves, points)."""
+    lengths = t[-1] * np.geomspace(0.03, 5.0, CURVE_LENGTHS)[:, None]
+    return np.concatenate([np.exp(-t / lengths), 1.0 / (1.0 + t / lengths)])
 
 
-@lru_cache(maxsize=2)  # a long series is judged by as many places each time
-def _jumps(places: int) -> Field:
-    """From one level to another, at once or over a few recordings, (steps, places)."""
-    number = np.arange(places)
+@lru_cache(maxsize=2)  # a long series has the same number of points each time
+def _steps(points: int) -> Field:
+    """Return steps and ramps over a few recordings from 0 to 1, (steps, points)."""
+    number = np.arange(points)
     ramps = [
-        np.clip((number - np.arange(1, places - width)[:, None] + 1.0) / (width + 1.0), 0.0, 1.0)
-        for width in RAMPS
+        np.clip((number - np.arange(1, points - width)[:, None] + 1.0) / (width + 1.0), 0.0, 1.0)
+        for width in RAMP_LENGTHS
     ]
     return np.concatenate(ramps)
 
 
-def _cycles(along: Field) -> tuple[Field, Field]:
-    """Sines and cosines of periods from a few recordings to what has been heard."""
-    phase = (
-        2.0
-        * np.pi
-        * along
-        / np.geomspace(SHORTEST_CYCLE, LONGEST_CYCLE * along[-1], CYCLES)[:, None]
-    )
+def _sinusoids(t: Field) -> tuple[Field, Field]:
+    """Return sines and cosines of periods from a few points to 1.5 times the series."""
+    phase = 2.0 * np.pi * t / np.geomspace(SHORTEST_CYCLE, LONGEST_CYCLE * t[-1], PERIODS)[:, None]
     return np.sin(phase), np.cos(phase)
 
 
-def _whitened(memory: float, rows: Field) -> Field:
-    """Rows whose scatter remembers the place before, made independent, (..., places)."""
+def _whitened(correlation: float, rows: Field) -> Field:
+    """Return rows (..., points) with their first-order autocorrelation removed."""
     white = rows.copy()
-    white[..., 1:] -= memory * rows[..., :-1]
-    white[..., 0] *= np.sqrt(1.0 - memory**2)
+    white[..., 1:] -= correlation * rows[..., :-1]
+    white[..., 0] *= np.sqrt(1.0 - correlation**2)
     return white
 
 
-class _White(NamedTuple):
-    """Independent rows beside a constant and conditions: `taken`, orthonormal, are taken out of each.
+class _Whitener(NamedTuple):
+    """Whitening and projection: independent rows without a constant and the conditions.
 
-    Behind the places stands what the prior of each condition's coefficient adds.
+    `removed` holds the orthonormal rows projected out. The columns after the points carry the
+    priors of the conditions' coefficients.
     """
 
-    taken: Field
-    memory: float
+    removed: Field
+    correlation: float
 
     def __call__(self, rows: Field) -> Field:
-        white = _whitened(self.memory, rows)
-        more = self.taken.shape[1] - white.shape[-1]
+        white = _whitened(self.correlation, rows)
+        more = self.removed.shape[1] - white.shape[-1]
         if more:
             white = np.concatenate([white, np.zeros((*white.shape[:-1], more))], axis=-1)
-        return np.asarray(white - (white @ self.taken.T) @ self.taken)
+        return np.asarray(white - (white @ self.removed.T) @ self.removed)
 
 
 @lru_cache(maxsize=2)
-def _whites(places: int) -> list[_White]:
-    ones = [_whitened(memory, np.ones(places)) for memory in MEMORY]
+def _plain_whiteners(points: int) -> list[_Whitener]:
+    constants = [_whitened(correlation, np.ones(points)) for correlation in CORRELATIONS]
     return [
-        _White((one / np.sqrt(one @ one))[None], float(memory))
-        for one, memory in zip(ones, MEMORY, strict=True)
+        _Whitener((row / np.sqrt(row @ row))[None], float(correlation))
+        for row, correlation in zip(constants, CORRELATIONS, strict=True)
     ]
 
 
-def _whites_beside(places: int, beside: Beside | None) -> list[_White]:
-    if beside is None or not len(beside.rows):
-        return _whites(places)
-    rows = np.concatenate([np.ones((1, places)), beside.rows[:, -places:]])
-    prior = np.concatenate([np.zeros((1, len(beside.pull))), np.diag(beside.pull)])
-    found = []
-    for memory in MEMORY:
-        steady = np.sqrt(1.0 - memory**2)  # what is fresh of the scatter
-        whole = np.concatenate([_whitened(memory, rows), steady * prior], axis=1)
-        found.append(_White(np.linalg.qr(whole.T)[0].T, float(memory)))
-    return found
+def _whiteners(points: int, conditions: ConditionRows | None) -> list[_Whitener]:
+    if conditions is None or not len(conditions.rows):
+        return _plain_whiteners(points)
+    rows = np.concatenate([np.ones((1, points)), conditions.rows[:, -points:]])
+    prior = np.concatenate([np.zeros((1, len(conditions.pull))), np.diag(conditions.pull)])
+    results = []
+    for correlation in CORRELATIONS:
+        innovation = np.sqrt(1.0 - correlation**2)  # uncorrelated part of the scatter
+        total = np.concatenate([_whitened(correlation, rows), innovation * prior], axis=1)
+        results.append(_Whitener(np.linalg.qr(total.T)[0].T, float(correlation)))
+    return results
 
 
-def _log_likelihood(memory: float, left: Field, whole: float, places: int) -> Field:
-    """Of Gaussian scatter about a course that leaves the squares `left`, its size the likeliest."""
+def _log_likelihood(correlation: float, residual: Field, total: float, points: int) -> Field:
+    """Return the profile ln likelihood of Gaussian scatter with the squared residual `residual`."""
     return np.asarray(
-        0.5 * np.log(1.0 - memory**2)
-        - 0.5 * places * np.log(np.maximum(left, TINY * max(whole, TINY)))
+        0.5 * np.log(1.0 - correlation**2)
+        - 0.5 * points * np.log(np.maximum(residual, TINY * max(total, TINY)))
     )
 
 
-def _gains(
-    y: Field, rows: Field, beside: Field | None = None, whites: list[_White] | None = None
+def _log_likelihoods(
+    y: Field, rows: Field, companion: Field | None = None, whiteners: list[_Whitener] | None = None
 ) -> Field:
-    """Log likelihood of a constant and each row (and one beside), (memories, rows)."""
-    found = []
-    for white in whites or _whites(y.size):
-        z, bent = white(y), white(rows)
-        whole = float(z @ z)
-        if beside is None:
-            left = whole - _one(bent, z)
+    """Return ln likelihoods of a constant with each row (and a companion), (correlations, rows)."""
+    results = []
+    for white in whiteners or _plain_whiteners(y.size):
+        z, bend = white(y), white(rows)
+        total = float(z @ z)
+        if companion is None:
+            residual = total - _explained_by_row(bend, z)
         else:
-            left = whole - _two(np.broadcast_to(white(beside), bent.shape), bent, z)
-        found.append(_log_likelihood(white.memory, left, whole, y.size))
-    return np.array(found)
+            residual = total - _explained_by_pair(
+                np.broadcast_to(white(companion), bend.shape), bend, z
+            )
+        results.append(_log_likelihood(white.correlation, residual, total, y.size))
+    return np.array(results)
 
 
-def _profiled(
+def _best_log_likelihood(
     y: Field,
     rows: Field,
-    cycles: tuple[Field, Field],
+    sinusoids: tuple[Field, Field],
     hinges: Field | None = None,
     *,
-    whites: list[_White],
+    whiteners: list[_Whitener],
 ) -> float:
-    """The greatest log likelihood of a constant with any row, any cycle, or a line and any hinge."""
+    """Return the best ln likelihood of a constant with a row, a cycle, or a line and a hinge."""
     best = []
-    for white in whites:
+    for white in whiteners:
         z = white(y)
-        taken = [_one(white(rows), z).max(), _two(white(cycles[0]), white(cycles[1]), z).max()]
+        removed = [
+            _explained_by_row(white(rows), z).max(),
+            _explained_by_pair(white(sinusoids[0]), white(sinusoids[1]), z).max(),
+        ]
         if hinges is not None:
-            bent = white(hinges)
-            taken.append(_two(np.broadcast_to(white(rows[0]), bent.shape), bent, z).max())
-        whole = float(z @ z)
+            bend = white(hinges)
+            removed.append(
+                _explained_by_pair(np.broadcast_to(white(rows[0]), bend.shape), bend, z).max()
+            )
+        total = float(z @ z)
         best.append(
-            float(_log_likelihood(white.memory, np.asarray(whole - max(taken)), whole, y.size))
+            float(
+                _log_likelihood(white.correlation, np.asarray(total - max(removed)), total, y.size)
+            )
         )
     return max(best)
 
 
-def _one(rows: Field, z: Field) -> Field:
-    """Squares that each row takes off z."""
+def _explained_by_row(rows: Field, z: Field) -> Field:
+    """Return the sum of squares of z that each row explains."""
     own = np.sum(rows**2, axis=-1)
     return np.where(own > TINY, (rows @ z) ** 2 / np.maximum(own, TINY), 0.0)
 
 
-def _two(first: Field, second: Field, z: Field) -> Field:
-    """Squares that each pair of rows takes off z together."""
+def _explained_by_pair(first: Field, second: Field, z: Field) -> Field:
+    """Return the sum of squares of z that each pair of rows explains."""
     aa, bb, ab = (
         np.sum(first**2, axis=-1),
         np.sum(second**2, axis=-1),

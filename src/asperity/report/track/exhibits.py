@@ -24,7 +24,7 @@ from asperity.report.drawing import (
     plain_powers,
 )
 from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREEN, GREY, VERMILION, Medium
-from asperity.trend import INTERVAL, Stages
+from asperity.trend import INTERVAL_FACTOR, Stages
 
 STEADIED = 1e-3  # of a CRF: what conditions explain of it is drawn from there on
 MARKS = "osv^Dp*hXP<>"
@@ -84,9 +84,9 @@ def _draw_crf(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> Non
     crf, crf_std = np.array(
         [(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in resonant]
     ).T
-    sideways: Any = {"xerr": INTERVAL * x_std} if x_std.any() else {}
+    sideways: Any = {"xerr": INTERVAL_FACTOR * x_std} if x_std.any() else {}
     style: Any = {"ecolor": GREY, "zorder": 1, "label": "90 % interval"}
-    draw_intervals(axes, x, crf, INTERVAL * crf_std, "none", **sideways, **style)
+    draw_intervals(axes, x, crf, INTERVAL_FACTOR * crf_std, "none", **sideways, **style)
     colours = SEVERITY(np.nan_to_num([recording.severe_probability for recording in resonant]))
     label = quantity("crf_hz").short
     axes.scatter(x, crf, c=colours, s=22, zorder=2, edgecolors="white", linewidths=0.4, label=label)
@@ -146,7 +146,9 @@ def amplitude(track: Track) -> Exhibit:
         crfa = np.array([recording.resonance.crfa for recording in resonant])
         std = np.array([recording.resonance.crfa_std for recording in resonant])
         factor = (
-            np.exp(INTERVAL * np.where(np.isfinite(std), std, 0.0) / crfa) if resonant else crfa
+            np.exp(INTERVAL_FACTOR * np.where(np.isfinite(std), std, 0.0) / crfa)
+            if resonant
+            else crfa
         )
         ends = [crfa - crfa / factor, crfa * factor - crfa]
         x = [recording.x for recording in resonant]
@@ -174,7 +176,7 @@ def damping(track: Track) -> Exhibit:
             display("damping_ratio", np.array(part))
             for part in zip(*[one.damping for one in known], strict=True)
         )
-        factor = np.exp(INTERVAL * std / ratio)
+        factor = np.exp(INTERVAL_FACTOR * std / ratio)
         ends = [ratio - ratio / factor, ratio * factor - ratio]
         x = [recording.x for recording in known]
         _draw_intervals(

@@ -11,7 +11,7 @@ from asperity.monitoring import FORECAST, Track, TrackedRecording
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, render, write_page
 from asperity.report.forecast import ahead
 from asperity.report.track import exhibits
-from asperity.trend import ALERTS, IN_WORDS
+from asperity.trend import ALERT_RATE_FACTOR, SOURCE_NAMES
 
 METHODS = {
     "joint": "All spectra are fitted together: a background common to the series, of any shape, each recording with "
@@ -85,7 +85,7 @@ def render_track_page(track: Track) -> str:
         evidence=_evidence(track),
         ways=_ways(track),
         x_label=exhibits.x_label(track),
-        decides=capitalised(IN_WORDS["crf" if track.stages is None else track.stages.source]),
+        decides=capitalised(SOURCE_NAMES["crf" if track.stages is None else track.stages.source]),
         method_in_words=METHODS[track.method],
         resolution=_resolution(track),
         false_alarms=f"{1.0 / track.alarm.false_alarm_rate:.0f}",
@@ -157,7 +157,7 @@ def _how_sure(track: Track) -> str:
     said = (
         said
         if alarm.state == "alarm"
-        else f"Not sure: chance does it {ALERTS:.0f} times as often as it alarms"
+        else f"Not sure: chance does it {ALERT_RATE_FACTOR:.0f} times as often as it alarms"
     )
     if np.isfinite(last.severe_probability) and alarm.raised_by in ("CRF", "damping"):
         said += f"; probability of the severe stage {_likely(last.severe_probability)}, if the line is the contact's"
@@ -360,7 +360,7 @@ def _ways(track: Track) -> list[_Way]:
         ]
         others = [value for name, value in stages.evidence.items() if name in NO_BREAK]
         margin = f"{min(others) - min(breaks):+.1f}" if breaks and others else NO_VALUE
-        name = capitalised(IN_WORDS[source]) + (" (decides)" if stages is track.stages else "")
+        name = capitalised(SOURCE_NAMES[source]) + (" (decides)" if stages is track.stages else "")
         split = f"{stages.split:.3g} ({low:.3g} to {high:.3g})" if stages.found else NO_VALUE
         kind = "not determined" if stages.kind == "too few" else stages.kind
         ways.append(_Way(name, kind, split, margin, in_print(stages.verdict)))

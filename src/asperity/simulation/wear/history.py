@@ -23,7 +23,7 @@ from asperity.simulation.wear.notes import told
 from asperity.simulation.wear.rows import RESONANCE, of_body, state_of_row
 from asperity.simulation.wear.state import Worn
 from asperity.surface import MovingSurfaces
-from asperity.trend import Stages, split_stages
+from asperity.trend import StageErrors, Stages, split_stages
 
 HOUR = 3600.0
 FEWEST_ROWS = 4  # that a drift is read from
@@ -263,7 +263,11 @@ class WearHistory:
         chosen = rows.iloc[places]
         off = chosen["crf_std_hz"] if bool(chosen["crf_std_hz"].notna().all()) else None
         return split_stages(
-            chosen["hours"], chosen["crf_hz"], chosen["crfa"], crf_std_hz=off, unit="h"
+            chosen["hours"],
+            chosen["crf_hz"],
+            chosen["crfa"],
+            errors=StageErrors(crf_hz=off),
+            unit="h",
         )
 
     def scalars(self) -> dict[str, Any]:

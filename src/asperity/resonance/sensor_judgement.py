@@ -1,0 +1,393 @@
+"""Joint judgement of recordings of several sensors whose series have been separated."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.core.arrays import Field, Mask
+from asperity.core.signals import Spectrum
+from asperity.resonance.band_fit import STRONG_EVIDENCE
+from asperity.resonance.line_fit import (
+    CommonLines,
+    SensorData,
+    fit_common_lines,
+    fit_lines,
+    parameter_indices,
+)
+from asperity.resonance.line_judgement import (
+    LARGEST_MISFIT,
+    JudgedLine,
+    best_rival,
+    line_gain,
+    line_objection,
+)
+from asperity.resonance.residuals import SystematicErrors, relative_residual, systematic_errors
+from asperity.resonance.resonance import Resonance, fitted_resonance, no_resonance
+from asperity.resonance.sensor_agreement import (
+    Agreement,
+    SensorFit,
+    SensorLines,
+    SpectraBySensor,
+    common_error_matrix,
+    common_error_share,
+    lines_differ,
+    recordings_with_vibration,
+)
+from asperity.resonance.series import FEWEST_RECORDINGS, SeparatedSeries
+from asperity.resonance.spectrum_model import SpectrumBlocks, expected_density, model_shares
+from asperity.resonance.template_search import coarser, lines_at_templates
+
+# share and number of recordings in which a sensor must have detected the line of others
+ESTABLISHED_SHARE, FEWEST_AGREEMENTS = 0.5, 3
+SENSORS_DISAGREE = "the sensors disagree"
+LARGEST_COMMON_SHARE = 0.9  # of the errors of two sensors, where their lines are compared
+
+
+class _Evidence(NamedTuple):
+    """Evidence for the lines of a joint fit, (recordings,), and the sensors that detect them."""
+
+    detects: Mask  # (sensors, recordings)
+    bic: Field
+    misfit: Field  # smallest over the sensors
+    effective_sensors: float  # a sensor and its copy count once
+    std: Field  # (sensors, recordings, 4)
+    shared_std: Field  # relative; part common to lines at the same place
+
+
+class JointJudgement:
+    """Recordings of several sensors, each with its separated series, to be judged together."""
+
+    def __init__(
+        self,
+        by_sensor: Mapping[str, SeparatedSeries],
+        spectra: SpectraBySensor,
+        band_hz: tuple[float, float],
+    ) -> None:
+        self.by_sensor, self.band_hz = by_sensor, band_hz
+        self.rows = recordings_with_vibration(spectra, band_hz)
+        self.count = len(next(iter(spectra.values())))
+        self.alone = {name: self._single_sensor(name, every) for name, every in spectra.items()}
+
+    def judge(self, agreement: Agreement | None = None) -> tuple[SensorLines, Agreement]:
+        """Judge every recording; estimate the agreement of the sensors unless it is given."""
+        by_names: dict[tuple[str, ...], list[int]] = {}
+        for number in range(self.count):
+            names = tuple(name for name in self.by_sensor if number in self.rows[name])
+            by_names.setdefault(names, []).append(number)
+        fits = [
+            self._fit([*names], numbers) for names, numbers in by_names.items() if len(names) > 1
+        ]
+        common = self._common_shares(fits) if agreement is None else agreement.common
+        widening = self._widening(common) if agreement is None else agreement.widening
+        detected_on: list[tuple[str, ...]] = [()] * self.count
+        no_spectrum = no_resonance(
+            "no sensor has a spectrum of this recording", self.band_hz, "joint"
+        )
+        lines = [
+            next(filter(None, candidates), no_spectrum)
+            for candidates in zip(*self.alone.values(), strict=True)
+        ]
+        for fit in fits:
+            for number, (line, names) in zip(
+                fit.numbers, self._common_lines(fit, common, widening), strict=True
+            ):
+                lines[number], detected_on[number] = line, names
+        established = self._established(detected_on) if agreement is None else agreement.established
+        for number in range(self.count):
+            if not detected_on[number] and not self.disagreement(number):
+                lines[number], detected_on[number] = self._line_of_one_sensor(
+                    number, lines[number], established, widening
+                )
+        shares = [*common.values()]
+        judged = SensorLines(
+            resonances=tuple(lines),
+            detected_on=tuple(detected_on),
+            alone=self.alone,
+            common=float(np.mean(shares)) if shares else np.nan,
+        )
+        return judged, Agreement(common, widening, established)
+
+    def disagreement(self, number: int) -> str:
+        """Describe the different lines that two sensors detect in a recording; empty for none."""
+        found = [
+            (name, line)
+            for name, every in self.alone.items()
+            if (line := every[number]) is not None and line.found
+        ]
+        for (name, line), (other_name, other) in combinations(found, 2):
+            if lines_differ(line, other):
+                return (
+                    f"{SENSORS_DISAGREE}: a line at {line.crf_hz:.0f} ± {line.crf_std:.0f} Hz on "
+                    f"{name}, at {other.crf_hz:.0f} ± {other.crf_std:.0f} Hz on {other_name}"
+                )
+        return ""
+
+    def _single_sensor(
+        self, name: str, spectra: Sequence[Spectrum | None]
+    ) -> tuple[Resonance | None, ...]:
+        """Return the resonances of a sensor's own series; None where it has no spectrum."""
+        own = self.by_sensor.get(name)
+        too_few = no_resonance(
+            f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor; this one has "
+            "fewer",
+            self.band_hz,
+            "joint",
+        )
+        low, high = self.band_hz
+        no_vibration = no_resonance(
+            f"the spectrum holds no vibration between {low:.0f} and {high:.0f} Hz",
+            self.band_hz,
+            "joint",
+        )
+        lines = [None if spectrum is None else no_vibration for spectrum in spectra]
+        for row, number in enumerate(self.rows[name]):
+            lines[number] = too_few if own is None else own.resonances[row]
+        return tuple(lines)
+
+    def _common_shares(self, fits: Sequence[SensorFit]) -> dict[tuple[str, str], float]:
+        """Return the share of common errors of each pair of sensors, where it can be estimated."""
+        pairs = combinations(self.by_sensor, 2)
+        return {
+            pair: share for pair in pairs if np.isfinite(share := common_error_share(pair, fits))
+        }
+
+    def _established(self, detected_on: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+        """Return the sensors whose lines were mostly those of other sensors too."""
+        if len(self.by_sensor) == 1:
+            return (*self.by_sensor,)
+        established = []
+        for name, every in self.alone.items():
+            together = sum(name in names and len(names) > 1 for names in detected_on)
+            detected = sum(line is not None and line.found for line in every)
+            if together >= max(FEWEST_AGREEMENTS, ESTABLISHED_SHARE * detected):
+                established.append(name)
+        return tuple(established)
+
+    def _fit(self, names: list[str], numbers: list[int]) -> SensorFit:
+        """Fit one line per recording to all sensors, their shared spectra held."""
+        sensors, templates = [], self.by_sensor[names[0]].fit.templates
+        rows = {name: [self.rows[name].index(number) for number in numbers] for name in names}
+        total = np.sum(
+            [self.by_sensor[name].fit.template_costs[rows[name]] for name in names], axis=0
+        )
+        best = np.argmin(total, axis=1)
+        for name in names:
+            series, joint = self.by_sensor[name], self.by_sensor[name].fit.joint
+            blocks = SpectrumBlocks(
+                series.blocks.centre,
+                series.blocks.density[rows[name]],
+                series.blocks.weight[rows[name]],
+            )
+            coarse = coarser(blocks)
+            base = np.exp(np.interp(coarse.centre, blocks.centre, joint.parameters.base))
+            own = lines_at_templates(coarse, base, templates, best)
+            parameters = joint.parameters._replace(own=own)
+            sensors.append(SensorData(blocks, parameters, joint.transfer_covariance))
+        return SensorFit(names, numbers, sensors, fit_common_lines(sensors), total)
+
+    def _widening(self, common: Mapping[tuple[str, str], float]) -> float:
+        """Return the factor by which lines of sensors differ more than their deviations state.
+
+        The path to each sensor shifts its line, too.
+        """
+        squares = []
+        for first, second in combinations(self.by_sensor, 2):
+            share = min(common.get((first, second), 0.0), LARGEST_COMMON_SHARE)
+            for line, other in zip(self.alone[first], self.alone[second], strict=True):
+                if line is None or other is None or not line.found or not other.found:
+                    continue
+                if lines_differ(line, other):
+                    continue
+                variance = (
+                    line.crf_std**2 + other.crf_std**2 - 2.0 * share * line.crf_std * other.crf_std
+                )
+                squares.append((line.crf_hz - other.crf_hz) ** 2 / variance)
+        if len(squares) < FEWEST_AGREEMENTS:
+            return 1.0
+        return float(np.sqrt(max(float(np.mean(squares)), 1.0)))
+
+    def _common_lines(
+        self, fit: SensorFit, common: Mapping[tuple[str, str], float], widening: float
+    ) -> list[tuple[Resonance, tuple[str, ...]]]:
+        """Return the lines that two sensors detect, and the sensors; else why there is none."""
+        evidence = self._evidence(fit, common, widening)
+        return [self._common_line(fit, row, evidence) for row in range(len(fit.numbers))]
+
+    def _evidence(
+        self, fit: SensorFit, common: Mapping[tuple[str, str], float], widening: float
+    ) -> _Evidence:
+        shares = common_error_matrix(fit.names, common)
+        effective = 1.0 + np.sum(shares, axis=1).mean()
+        gains, misfits, weights = [], [], []
+        for sensor, data in enumerate(fit.sensors):
+            joint = fit.joint(sensor)
+            gains.append(line_gain(data.blocks, joint)[0])
+            misfits.append(
+                relative_residual(data.blocks, expected_density(data.blocks, joint.parameters))
+            )
+            weights.append(data.blocks.weight.sum(axis=1))
+        detects = (np.array(gains) - np.log(weights) > STRONG_EVIDENCE) & (
+            np.array(misfits) <= LARGEST_MISFIT
+        )
+        detects &= ~np.array([self.by_sensor[name].fit.shaped for name in fit.names])[:, None]
+        bic = np.sum(gains, axis=0) / effective - (2.0 + len(fit.names)) * np.log(
+            np.sum(weights, axis=0)
+        )
+        errors = [
+            systematic_errors(data.blocks, fit.joint(sensor), self.by_sensor[name].fit.statistics)
+            for sensor, (data, name) in enumerate(zip(fit.sensors, fit.names, strict=True))
+        ]
+        of_structures = sum(
+            part * error.model_error[:, 1]
+            for part, error in zip(_frequency_weights(fit.lines), errors, strict=True)
+        )
+        std = self._deviations(fit, shares, errors)
+        std[:, :, 1] *= widening
+        return _Evidence(
+            detects=detects,
+            bic=bic,
+            misfit=np.min(np.array(misfits), axis=0),
+            effective_sensors=float(effective),
+            std=std,
+            shared_std=widening * np.asarray(of_structures),
+        )
+
+    def _common_line(
+        self, fit: SensorFit, row: int, evidence: _Evidence
+    ) -> tuple[Resonance, tuple[str, ...]]:
+        """Return one recording's line and its sensors, if two sensors detect it."""
+        if disagreement := self.disagreement(fit.numbers[row]):
+            return no_resonance(disagreement, self.band_hz, "joint"), ()
+        names = [
+            name
+            for name, detects in zip(fit.names, evidence.detects[:, row], strict=True)
+            if detects
+        ]
+        bic = float(evidence.bic[row])
+        fitted = np.exp(fit.lines.own[0, row, :3])
+        deviations = evidence.std[0, row, :3] * fitted
+        f0, zeta = float(fitted[1]), float(fitted[2])
+        first_fit = self.by_sensor[fit.names[0]].fit
+        costs = fit.template_costs[row] / evidence.effective_sensors
+        rival = best_rival(f0, zeta, costs, first_fit.templates)
+        line = JudgedLine(f0, float(deviations[1]), zeta, bic, float(evidence.misfit[row]), *rival)
+        objection = line_objection(line, self.band_hz)
+        if objection is None and len(names) < 2:
+            objection = (
+                f"a line at {f0:.0f} Hz is detected on {names[0]} only"
+                if names
+                else "no two sensors detect a line"
+            )
+        if objection is not None:
+            return no_resonance(objection, self.band_hz, "joint", evidence=bic), ()
+        first = fit.sensors[0]
+        resonance = fitted_resonance(
+            fitted,
+            np.where([first_fit.stands, False, False], np.nan, deviations),
+            reason=f"a line {line.width:.0f} Hz wide on {' and '.join(names)} (BIC {bic:+.0f})",
+            band_hz=self.band_hz,
+            method="joint",
+            evidence=bic,
+            background=(
+                first.blocks.centre,
+                np.exp(fit.lines.own[0, row, 3] + first.parameters.base),
+            ),
+            crf_shared_std=float(evidence.shared_std[row]) * f0,
+        )
+        lead = next(iter(self.alone))
+        if fit.names[0] != lead or lead not in names:
+            resonance = replace(resonance, crfa=np.nan, crfa_std=np.nan)
+        return resonance, tuple(names)
+
+    def _line_of_one_sensor(
+        self, number: int, line: Resonance, established: Sequence[str], widening: float
+    ) -> tuple[Resonance, tuple[str, ...]]:
+        """Return the line of a single sensor, provided that the sensor is established."""
+        available = {
+            name: own for name, every in self.alone.items() if (own := every[number]) is not None
+        }
+        found = [(name, own) for name, own in available.items() if own.found]
+        if not found:
+            return line, ()
+        name, own = next((pair for pair in found if pair[0] in established), found[0])
+        if name not in established:
+            others = " and ".join(other for other in available if other != name)
+            only = (
+                f"only, not on {others}"
+                if others
+                else "only, and no other sensor has a spectrum of this recording"
+            )
+            reason = (
+                f"a line at {own.crf_hz:.0f} Hz is detected on {name} {only}: a structural mode "
+                "would look the same"
+            )
+            return no_resonance(reason, self.band_hz, "joint", evidence=own.evidence), ()
+        height = (own.crfa, own.crfa_std) if name == next(iter(self.alone)) else (np.nan, np.nan)
+        several = len(self.by_sensor) > 1
+        return replace(
+            own,
+            crf_std=own.crf_std * widening,
+            crf_shared_std=own.crf_shared_std * widening,
+            crfa=height[0],
+            crfa_std=height[1],
+            reason=f"{own.reason}, here on {name} only" if several else own.reason,
+        ), (name,)
+
+    def _deviations(
+        self, fit: SensorFit, shares: Field, errors: Sequence[SystematicErrors]
+    ) -> Field:
+        """Return standard deviations (sensors, recordings, 4): random, common and systematic."""
+        inverse, transfer_effect = fit.lines.inverse, fit.lines.transfer_effect
+        variance = np.einsum("npp->np", inverse).copy()
+        relative = [
+            model_shares(data.blocks, fit.joint(sensor).parameters)[0]
+            for sensor, data in enumerate(fit.sensors)
+        ]
+        weights = _frequency_weights(fit.lines)
+        systematic = np.zeros(inverse.shape[:2])
+        of_base = []
+        for sensor, data in enumerate(fit.sensors):
+            own = parameter_indices(sensor)
+            misfit = errors[sensor].std
+            systematic[:, [own[0], own[3]]] += misfit[:, [0, 3]]
+            systematic[:, [1, 2]] += weights[sensor][:, None] * misfit[:, [1, 2]]
+            base = self._base_std(fit, sensor)
+            variance[:, [own[0], own[3]]] += base[:, [0, 3]] ** 2
+            of_base.append(weights[sensor][:, None] * base[:, [1, 2]])
+            for other in range(len(fit.sensors)):
+                if other != sensor:
+                    weight = np.sqrt(data.blocks.weight * fit.sensors[other].blocks.weight)
+                    score = (relative[sensor] * weight[:, None]) @ relative[other].swapaxes(1, 2)
+                    both = inverse[:, :, own] @ score @ inverse[:, parameter_indices(other), :]
+                    variance += shares[sensor, other] * np.einsum("npp->np", both)
+        correlation = shares + np.eye(len(fit.sensors))
+        variance[:, [1, 2]] += np.einsum("snp,st,tnp->np", of_base, correlation, of_base)
+        of_transfer = [
+            np.sqrt(np.sum(effect @ data.transfer_covariance * effect, axis=2))
+            for effect, data in zip(transfer_effect, fit.sensors, strict=True)
+        ]
+        variance += np.einsum("snp,st,tnp->np", of_transfer, correlation, of_transfer)
+        std = np.hypot(np.sqrt(variance), systematic)
+        return np.stack([std[:, parameter_indices(sensor)] for sensor in range(len(fit.sensors))])
+
+    def _base_std(self, fit: SensorFit, sensor: int) -> Field:
+        """Return the deviations (recordings, 4) caused by the uncertainty of the shared base."""
+        name, data = fit.names[sensor], fit.sensors[sensor]
+        rows = [self.rows[name].index(number) for number in fit.numbers]
+        joint = self.by_sensor[name].fit.joint
+        if self.by_sensor[name].uses_shared:  # their deviations exclude that of the base
+            return np.zeros_like(joint.std[rows])
+        own = joint.parameters.own[rows]
+        base_held = fit_lines(
+            data.blocks, joint.parameters._replace(own=own), data.transfer_covariance
+        ).std
+        return np.asarray(np.sqrt(np.maximum(joint.std[rows] ** 2 - base_held**2, 0.0)))
+
+
+def _frequency_weights(lines: CommonLines) -> Field:
+    """Return the sensors' shares of the information on frequency, (sensors, recordings)."""
+    information = np.array([point.information[:, 1, 1] for point in lines.points])
+    return np.asarray(information / information.sum(axis=0))
