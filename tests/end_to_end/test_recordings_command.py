@@ -110,7 +110,7 @@ def test_damping_decides_where_it_is_asked_to(asp, rig):
 
 def test_a_long_series_is_separated_in_groups(asp, rig, monkeypatch):
     folder, truth = rig
-    monkeypatch.setattr("asperity.monitoring.track.MOST_TOGETHER", 12)
+    monkeypatch.setattr("asperity.monitoring.judgement.MAX_GROUP", 12)
     said = json.loads(asp("track", str(folder), "--case", "case.toml", "--json")[1])
     for row in said["recordings"]:
         assert row["crf_hz"] == pytest.approx(truth[Path(row["file"]).name], abs=50.0)

@@ -102,7 +102,7 @@ def test_what_a_rate_is_in_doubt_by_crf_is_too():
 
     from asperity.monitoring.reading import Reading
     from asperity.monitoring.target import search_target
-    from asperity.monitoring.track import judge
+    from asperity.monitoring.judgement import judge
     from asperity.paper import simulate_rig
 
     rig = simulate_rig(samples=6, repeats=1, duration_s=10.0)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.monitoring import track_recordings
+from asperity.monitoring import TrackSettings, track_recordings
 from asperity.report.style import ON_PAGE
 from asperity.report.track.exhibits import levels, trend
 from asperity.report.track.page import NEXT, render_track_page
@@ -24,7 +24,7 @@ def failing(tmp_path_factory):
         values = level * np.random.default_rng(number).standard_normal(2000)
         name = f"2024.01.{1 + number // 24:02}.{number % 24:02}.00.00.npz"
         np.savez(folder / name, acc=values, fs=20e3, unit="m/s^2")
-    return track_recordings([folder], band_hz=BAND)
+    return track_recordings([folder], TrackSettings(band_hz=BAND))
 
 
 def acted(track):

@@ -78,12 +78,12 @@ def test_what_a_warm_up_explains_is_excused_and_what_comes_on_top_is_not():
     crf = 1.0 - 0.1 * left + 0.002 * rng.standard_normal(NUMBER.size)
     level = -0.5 * left + 0.05 * rng.standard_normal(NUMBER.size)
     warming = Warming(NUMBER, [watched("CRF", crf, True)], [watched(RMS, level, False)], "h")
-    assert warming.said(39).startswith("this looks like a warm-up: CRF rose by 10")
-    assert warming.excuses(39, "CRF") == warming.excuses(39, RMS) == warming.said(39)
+    assert warming.explanation(39).startswith("this looks like a warm-up: CRF rose by 10")
+    assert warming.excuses(39, "CRF") == warming.excuses(39, RMS) == warming.explanation(39)
     assert warming.excuses(39, "kurtosis") == ""
     worn = crf + 0.04 * (NUMBER > 34)
     assert (
-        Warming(NUMBER, [watched("CRF", worn, True)], [watched(RMS, level, False)], "h").said(39)
+        Warming(NUMBER, [watched("CRF", worn, True)], [watched(RMS, level, False)], "h").explanation(39)
         == ""
     )
     assert judged(drawn_warm_up(np.random.default_rng([11, 1]))).state == "none"
