@@ -100,7 +100,10 @@ def test_a_call_that_fails_is_noted_and_made_again(asp, listener, tmp_path):
     (tmp_path / "listen.py").write_text("import sys\nsys.exit('nobody is at home')")
     code, out, err = watched(asp, "--on-alarm", command)
     assert (code, heard()) == (4, [])
-    assert "could not be called (exit code 1: nobody is at home); it is tried again" in err
+    assert (
+        "could not be notified (exit code 1: nobody is at home); the notification will be sent again"
+        in err
+    )
     assert kept("SELECT attempts, answered, failure FROM call") == [
         (1, None, "exit code 1: nobody is at home")
     ]
@@ -199,7 +202,9 @@ def test_what_waits_is_told_in_its_order(asp):
         watched(asp, "--webhook", url)
         sensor = Sensors(Store(STORE), SensorAddress("Pump 3", "DE", "sensor"), {})
         last = sensor.last_judgement()
-        sensor.queue_notifications([calls.Webhook(url).name], last | {"alarm": last["alarm"] | {"state": "alarm"}})
+        sensor.queue_notifications(
+            [calls.Webhook(url).name], last | {"alarm": last["alarm"] | {"state": "alarm"}}
+        )
         assert len(calls.deliver(sensor, [calls.Webhook(url)], now=True)) == 1
         assert calls.deliver(sensor, [calls.Webhook(url)], now=True) == ()
     states = [json.loads(body)["state"] for _, _, body in heard]
@@ -276,7 +281,7 @@ def test_an_mqtt_broker_holds_the_last_state(asp):
     assert kept("SELECT count(*) FROM call WHERE answered IS NULL") == [(0,)]
     code, _, err = watched(asp, "--mqtt", f"mqtt://somebody:secret@127.0.0.1:{port}/other")
     assert code == 4
-    assert f"mqtt mqtt://127.0.0.1:{port}/other could not be called" in err
+    assert f"mqtt mqtt://127.0.0.1:{port}/other could not be notified" in err
     assert "secret" not in Path(STORE).read_bytes().decode("latin-1")
 
 
@@ -285,7 +290,7 @@ def test_an_mqtt_broker_holds_the_last_state(asp):
     [
         ("--on-alarm", "no-such-program --now", "there is no program 'no-such-program' to call"),
         ("--on-alarm", "", "there is no program '' to call"),
-        ("--on-alarm", "echo 'open", "cannot be split"),
+        ("--on-alarm", "echo 'open", "cannot be parsed"),
         ("--webhook", "ftp://there/x", "it begins with http or https"),
         (
             "--webhook",

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from asperity.monitoring import WatchSettings, watch_folder
-from asperity.monitoring.overdue_reason import duration_text, overdue_reason
+from asperity.monitoring.silence import duration_text, overdue_reason
 
 NOON = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)
 LOOK = ("--once", "--settle", "0", "--store", "plant.db", "--machine", "Fan 1", "--point", "DE")
@@ -45,12 +45,20 @@ def test_what_is_usual_is_learned_from_when_recordings_came():
         said
         == "no recording has come for 51 min, since 2026-11-22T13:50:00+00:00; the usual interval is 10 min"
     )
-    assert overdue_reason(every_10_min[:5], None, NOON + timedelta(days=300)) == ""  # nobody knows yet
+    assert (
+        overdue_reason(every_10_min[:5], None, NOON + timedelta(days=300)) == ""
+    )  # nobody knows yet
     assert "for 2 h" in overdue_reason(every_10_min[:1], 3600.0, NOON + timedelta(hours=2))
-    assert [duration_text(120.0), duration_text(3600.0), duration_text(7 * 86400.0)] == ["2 min", "60 min", "7 days"]
+    assert [duration_text(120.0), duration_text(3600.0), duration_text(7 * 86400.0)] == [
+        "2 min",
+        "60 min",
+        "7 days",
+    ]
     assert overdue_reason([], 1.0, NOON) == ""
     fast = [NOON + timedelta(seconds=number) for number in range(12)]
-    assert overdue_reason(fast, None, fast[-1] + timedelta(seconds=59)) == ""  # never before a minute
+    assert (
+        overdue_reason(fast, None, fast[-1] + timedelta(seconds=59)) == ""
+    )  # never before a minute
 
 
 @pytest.mark.parametrize("time", ["nan", "0", "inf"])

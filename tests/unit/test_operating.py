@@ -108,13 +108,13 @@ def test_recordings_without_a_condition_are_left_out_where_most_state_it():
     assert judged(one).state == "none"
     met = [OperatingPoint(load_n=None if np.isnan(load) else load) for load in loads]
     assert unstated(met) == [
-        "The load is not stated for 2 of 40 recordings; these are left out of trend and alarm."
+        "The load is not stated for 2 of 40 recordings; these are excluded from trend and alarm."
     ]
     few = [replace(one, load_n=None) for one in met[5:]] + met[:5]
-    assert unstated(few)[0].endswith("36 of 40 recordings; it is not taken into account.")
+    assert unstated(few)[0].endswith("36 of 40 recordings; it is not used.")
     spun = [OperatingPoint(speed_hz=25.0)] * 30 + [OperatingPoint()] * 10
     assert unstated(spun) == [
-        "The speed is not stated for 10 of 40 recordings; these are left out of trend and alarm."
+        "The speed is not stated for 10 of 40 recordings; these are excluded from trend and alarm."
     ]
     assert conditions_of(few, CRF, ANY_CONTACT.oil) == ()
 
@@ -251,6 +251,6 @@ def test_a_case_that_is_not_solved_is_said(tmp_path, monkeypatch):
     coarse = load_case(SMALL.replace("40 um", "4 um") + OIL)
     assert operating_response(coarse, met).crf == CRF
     assert operating_response(coarse, met).note.startswith(
-        "How CRF follows load and speed is any contact's, as the case's is"
+        "The response of CRF to load and speed is that of any contact"
     )
     assert operating_response(coarse, steady).note == ""  # nothing to solve it for

@@ -111,8 +111,8 @@ def recordings(folder, velocities, depths, seconds=2.0, **stated):
             "alarm",
             "velocity 8 mm/s rms, 10 to 1000 Hz: zone D of ISO 20816-3 (large-rigid), severe enough",
         ),
-        (6e-3, "C", "cannot-tell", "These recordings cannot tell"),
-        (3e-3, "B", "cannot-tell", "These recordings cannot tell"),
+        (6e-3, "C", "cannot-tell", "Cannot tell: no contact"),
+        (3e-3, "B", "cannot-tell", "Cannot tell: no contact"),
     ],
 )
 def test_a_zone_raises_what_the_standard_says(tmp_path, velocity, zone, state, said):
@@ -145,7 +145,10 @@ def test_without_a_class_there_is_a_velocity_and_no_zone(tmp_path):
     track = track_recordings([folder], TrackSettings(band_hz=(2000.0, 4000.0)))
     assert track.recordings[-1].zone is None
     assert track.alarm.state != "alarm"
-    assert "zone of ISO 20816-3 not determined: no machine_class" in track.recordings[-1].severity()
+    assert (
+        "zone of ISO 20816-3 not determined: the sidecar states no machine_class"
+        in track.recordings[-1].severity()
+    )
 
 
 @pytest.mark.parametrize(

@@ -181,7 +181,8 @@ def test_few_recordings_are_taken_one_by_one_and_that_is_said(tmp_path):
     track = track_recordings([record(tmp_path / "a.npz", 1)], case=CASE)
     assert (track.method, track.resonance_count) == ("modes", 0)
     assert re.search(
-        r"a line at (2\d|30)\d\d Hz stands out, but one spectrum cannot tell", track.verdict()
+        r"a line at (2\d|30)\d\d Hz stands out, but a single spectrum cannot separate",
+        track.verdict(),
     )
     assert any("needs 6 recordings and has 1" in note for note in track.notes)
     trusted = (

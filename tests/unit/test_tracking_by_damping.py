@@ -69,7 +69,7 @@ def test_what_decides_has_labels_and_alarm(track, series):
     rows = dict(track.stage_rows())
     assert set(rows) == {
         "stage by CRF",
-        "stage by damping, which decides",
+        "stage by damping (deciding)",
         "stage by CRF and damping",
     }
 
@@ -112,13 +112,13 @@ def test_a_method_without_a_width_determines_no_damping(series):
     assert {one.damping_reason for one in track.recordings} == {"the method peak fits no width"}
     assert track.stages.kind == "too few"
     assert track.verdict().startswith(
-        "Cannot tell: none of the last 3 recordings show what decides"
+        "Cannot tell: no deciding indicator found in the last 3 recordings"
     )
     assert "Not determined: " in track.verdict()
     assert np.isnan([one.severe_probability for one in track.recordings]).all()
     assert track.alarm.state == "cannot-tell"
     assert any(
-        "not determined of 12 of 12 resonances: the method peak" in note for note in track.notes
+        "not determined for 12 of 12 resonances: the method peak" in note for note in track.notes
     )
     page = render_track_page(track)
     assert page.count("not determined</td>") >= 12

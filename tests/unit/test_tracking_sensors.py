@@ -31,7 +31,7 @@ def both(tmp_path_factory):
 def test_channels_of_one_file_are_sensors_of_one_machine(both, tmp_path):
     track = track_recordings([both / "whole"], TrackSettings(channel="a, b", band_hz=BAND))
     assert len(track.recordings) == TRUTH.size
-    assert "The line was heard on a and b in 8." in track.verdict()
+    assert "The line was detected on a and b in 8." in track.verdict()
     crf = [one.resonance.crf_hz for one in track.recordings]
     assert crf == pytest.approx(TRUTH, abs=12.0)
     row = json.loads(json.dumps(track.scalars()))["recordings"][0]
@@ -87,7 +87,7 @@ def test_a_sidecar_says_of_which_sensor_a_recording_is_and_when_it_began(both, t
 def test_a_dead_sensor_is_told_and_the_other_goes_on(both):
     track = track_recordings([both / "dead"], TrackSettings(channel="a,b", band_hz=BAND))
     alone = track_recordings([both / "dead"], TrackSettings(channel="a", band_hz=BAND))
-    assert "The line was heard on a in 8. Sensor b is of no use in 8 of 8:" in track.verdict()
+    assert "The line was detected on a in 8. Sensor b is not usable in 8 of 8:" in track.verdict()
     assert [one.resonance.crf_hz for one in track.recordings] == [
         one.resonance.crf_hz for one in alone.recordings
     ]
@@ -149,7 +149,7 @@ def test_sensors_are_laid_beside_one_another_by_number_where_there_are_as_many(b
     track = track_recordings([tmp_path], TrackSettings(band_hz=BAND))
     assert [one.x for one in track.recordings] == [1.0, 2.0, 3.0]
     assert [[*one.on_sensors] for one in track.recordings] == [["a", "b"]] * 3
-    assert "needs 6 recordings of a sensor, and has 3" in track.verdict()
+    assert "needs 6 recordings of a sensor and has 3" in track.verdict()
     (tmp_path / "b2.npz").unlink()
     with pytest.raises(BadInput, match="3 of a, 2 of b"):
         track_recordings([tmp_path], TrackSettings(band_hz=BAND))
@@ -170,7 +170,7 @@ def test_x_that_are_one_but_for_a_clock_or_rounding_are_one(both, tmp_path, x_na
         [both / "apart"], TrackSettings(band_hz=BAND), table=tmp_path / "table.csv"
     )
     assert sum(len(one.on_sensors) == 2 for one in track.recordings) == together
-    assert any("No recordings of two sensors stand at one x" in note for note in track.notes) == (
+    assert any("No recordings of two sensors have the same x" in note for note in track.notes) == (
         together == 0
     )
 

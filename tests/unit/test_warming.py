@@ -83,7 +83,9 @@ def test_what_a_warm_up_explains_is_excused_and_what_comes_on_top_is_not():
     assert warming.excuses(39, "kurtosis") == ""
     worn = crf + 0.04 * (NUMBER > 34)
     assert (
-        Warming(NUMBER, [watched("CRF", worn, True)], [watched(RMS, level, False)], "h").explanation(39)
+        Warming(
+            NUMBER, [watched("CRF", worn, True)], [watched(RMS, level, False)], "h"
+        ).explanation(39)
         == ""
     )
     assert judged(drawn_warm_up(np.random.default_rng([11, 1]))).state == "none"

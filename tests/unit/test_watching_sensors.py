@@ -97,7 +97,7 @@ def test_channels_are_judged_as_track_judges_them_and_kept_by_their_names(machin
     assert [reading.sensor for reading in last.new] == ["a", "b"]
     assert (len(first.track.recordings), crf(last.track)) == (8, crf(tracked))
     assert last.track.verdict() == tracked.verdict()
-    assert "The line was heard on a and b in 9." in last.track.verdict()
+    assert "The line was detected on a and b in 9." in last.track.verdict()
     assert held(tmp_path, PER_SENSOR) == [("a", 9), ("b", 9)]
     rms = held(tmp_path, "SELECT sensor, rms FROM trend WHERE file LIKE '%/0.npz' ORDER BY sensor")
     own = tracked.recordings[0].on_sensors
@@ -159,8 +159,8 @@ def test_a_recording_that_cannot_be_laid_beside_others_waits_and_is_told(machine
     update = next(looks)
     assert len(update.track.recordings) == 1
     assert [sentence.partition(";")[0] for sentence in update.failed] == [
-        "a1.npz waits: it does not say of which sensor it is, and others do",
-        "b1.npz waits: it does not say when it began, and sensors are laid beside one another by that",
+        "a1.npz waits: it does not name its sensor, and others do",
+        "b1.npz waits: it does not state its start, and sensors are matched by time",
     ]
     arrive(machine, tmp_path / "in", "a1", "b1")
     update = next(looks)
@@ -198,8 +198,8 @@ def test_a_sensor_of_which_nothing_comes_any_more_is_told(machine, tmp_path):
         *(f"b{number}" for number in range(6)),
     )
     update = next(looking(tmp_path))
-    assert "Of sensor b nothing has come with the last 3 recordings." in update.track.verdict()
-    assert "The line was heard on a and b in 6, on a in 3." in update.track.verdict()
+    assert "Sensor b has delivered nothing with the last 3 recordings." in update.track.verdict()
+    assert "The line was detected on a and b in 6, on a in 3." in update.track.verdict()
 
 
 def test_a_copy_does_not_end_a_watch(machine, tmp_path):
@@ -207,7 +207,8 @@ def test_a_copy_does_not_end_a_watch(machine, tmp_path):
     shutil.copy(tmp_path / "in" / "a1.npz", tmp_path / "in" / "b1.npz")
     update = next(looking(tmp_path))
     assert (
-        "Sensor b is of no use in 1 of 2: it holds the same samples as a." in update.track.verdict()
+        "Sensor b is not usable in 1 of 2: it holds the same samples as a."
+        in update.track.verdict()
     )
 
 

@@ -115,7 +115,7 @@ class Warming:
         self.known = crf is not None and level is not None and "temperature" not in " ".join(stated)
 
     def explanation(self, number: int) -> str:
-        """Return a sentence if the recordings up to `number` look like a warm-up, otherwise nothing."""
+        """Return a sentence if recordings up to `number` look like a warm-up, otherwise nothing."""
         if not self.known or self.crf is None or self.level is None:
             return ""
         upto = slice(number + 1)
@@ -129,8 +129,7 @@ class Warming:
         length = f"{found.length:.2g} {self.unit}".rstrip()
         return (
             f"this looks like a warm-up: CRF {_relative_change(found.crf)} and {self.level.name} "
-            f"{_ratio(found.level)}, with one time constant of {length} from the start; "
-            "state the oil temperature to confirm"
+            f"{_ratio(found.level)}, time constant {length}; state the oil temperature to confirm"
         )
 
     def excuses(self, number: int, name: str) -> str:

@@ -158,7 +158,7 @@ def lines(frequency_hz: Field, density: Field, rates_hz: Mapping[str, float]) ->
 
 
 def bands(opened: OpenRecording, frequency_hz: Field, density: Field) -> dict[str, float]:
-    """Return the rms in bands: of the sidecar, or three by default, as far as the sampling allows."""
+    """Return the rms in the bands of the sidecar, or three default bands, within the sampling."""
     stated = opened.facts["bands_hz"].value if "bands_hz" in opened.facts else DEFAULT_BANDS
     spacing, highest = float(frequency_hz[1]), USABLE_BANDWIDTH * opened.rate_hz
     found = {}

@@ -43,7 +43,8 @@ class DataSet:
     def verdict(self) -> str:
         """Return the result as one sentence."""
         if self.whole:
-            return f"{self.folder} is a complete data set: {self.recordings} recordings, {self.maps} maps."
+            content = f"{self.recordings} recordings, {self.maps} maps"
+            return f"{self.folder} is a complete data set: {content}."
         more = f", and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
         return f"{self.folder} is not a complete data set: {self.missing[0]}{more}."
 
@@ -172,7 +173,7 @@ def _missing_steps(rows: list[dict[str, str]]) -> Iterator[str]:
 
 
 def _recording_faults(folder: Path, rows: list[dict[str, str]], case: Case | None) -> Iterator[str]:
-    """Yield sentences on recordings that are missing, unusable, too slow or short, or in other units."""
+    """Yield sentences on recordings that are missing, unusable, slow, short or in other units."""
     for row in rows:
         try:
             path = _inside(folder, row["file"])

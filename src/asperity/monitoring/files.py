@@ -299,7 +299,8 @@ def _require_possible(values: Mapping[str, float | None], location: str) -> None
         value, least = values[column], ABSOLUTE_ZERO if column == "temperature_degc" else 0.0
         if value is not None and value <= least:
             raise BadInput(
-                f"{location}: {column} must be above {least:g}, got {value:g}; leave it empty if unknown"
+                f"{location}: {column} must be above {least:g}, got {value:g}; "
+                "leave it empty if unknown"
             )
 
 

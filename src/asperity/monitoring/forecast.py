@@ -70,7 +70,7 @@ class Forecaster(Protocol):
 class ForecastSchedule:
     """Schedule of the forecasts of a watched series.
 
-    `last` is the last forecast, made after the recording `acknowledged`; the next is due at `due_s`.
+    `last` is the last forecast, made after the recording `acknowledged`; `due_s` the next time.
     """
 
     forecaster: Forecaster | None

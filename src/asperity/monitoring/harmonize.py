@@ -41,8 +41,8 @@ def exclude_machine_off(series: list[Reading]) -> list[Reading]:
         ):
             share = 100.0 * quality.rms / usual[reading.sensor, reading.unit]
             reason = (
-                f"the machine was off, or the sensor disconnected: rms is {share:.1g} % of the first "
-                "recordings'"
+                f"the machine was off, or the sensor disconnected: rms is {share:.1g} % of that of "
+                "the first recordings"
             )
             reading = replace(reading, reason=reason, quality=replace(quality, off=True))
         judged.append(reading)

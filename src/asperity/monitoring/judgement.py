@@ -317,9 +317,9 @@ class _StagesBySource(Mapping[StageSource, Stages]):
 def _remounted(tracked: Sequence[TrackedRecording]) -> list[str]:
     """Return a sentence for each recording at which a sensor's mounting changed."""
     return [
-        f"{f'Sensor {recording.remounted}' if recording.remounted else 'The sensor'} or its mounting "
-        f"changed at x = {recording.x:g} ({Path(recording.file).name}). The parts before and after "
-        "were separated independently, and stages do not compare CRFA between them."
+        f"{f'Sensor {recording.remounted}' if recording.remounted else 'The sensor'} or its "
+        f"mounting changed at x = {recording.x:g} ({Path(recording.file).name}): the parts before "
+        "and after were separated independently, and their CRFA is not compared."
         for recording in tracked
         if recording.remounted is not None
     ]

@@ -131,7 +131,7 @@ class Topic:
         return f"mqtt {_without_credentials(urlsplit(self.url))}"
 
     def send(self, notification: dict[str, Any]) -> None:
-        """Publish the JSON; raise NotificationFailed without confirmation, OSError without a broker."""
+        """Publish the JSON; raise NotificationFailed unless confirmed, OSError without a broker."""
         from paho.mqtt import client as mqtt
         from paho.mqtt.enums import CallbackAPIVersion
 
@@ -184,7 +184,7 @@ def _without_credentials(parts: SplitResult) -> str:
 def notifiers(
     *, command: str | None = None, webhook: str | None = None, mqtt: str | None = None
 ) -> tuple[Notifier, ...]:
-    """Build the notifiers of a command line (run without a shell) and of http(s), mqtt(s) addresses.
+    """Build notifiers: a command line, run without a shell; an http(s) and an mqtt(s) address.
 
     Raises
     ------

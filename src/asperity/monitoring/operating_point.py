@@ -73,7 +73,7 @@ class ResponseExponents(NamedTuple):
     viscosity: tuple[float, float]
 
 
-# CRF ∝ (CLR F)^(1/6): the load share rises at most in proportion to the load, and falls with film
+# CRF ∝ (CLR F)^(1/6): CLR rises at most in proportion to the load, and falls with film
 CRF = ResponseExponents(load=(0.0, 1.0 / 3.0), speed=(-1.0 / 3.0, 0.0), viscosity=(-1.0 / 3.0, 0.0))
 DAMPING = ResponseExponents(load=(-1.0, 1.0), speed=(-1.0, 1.0), viscosity=(-1.0, 1.0))
 # a fault often warms the oil: temperature may explain little of a level, and nothing of pulses
@@ -154,7 +154,8 @@ def unstated(points: Sequence[OperatingPoint]) -> list[str]:
             used = any(_known(points, attrgetter(key)) is not None for key in keys)
             consequence = "these are excluded from trend and alarm" if used else "it is not used"
             notes.append(
-                f"The {words} is not stated for {missing} of {len(points)} recordings; {consequence}."
+                f"The {words} is not stated for {missing} of {len(points)} recordings; "
+                f"{consequence}."
             )
     return notes
 
@@ -171,7 +172,7 @@ def _viscosities(sheet: OilSheet) -> tuple[Field, Field]:
 
 
 def operating_response(case: Case | None, points: Sequence[OperatingPoint]) -> Response:
-    """Return the response of CRF to conditions: of the case's contact, solved, or of any contact."""
+    """Return the response of CRF to conditions, of the case's contact or of any contact."""
     if case is None:
         return ANY_CONTACT
     changed = any(

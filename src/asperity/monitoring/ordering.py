@@ -1,4 +1,4 @@
-"""Order in which recordings are judged, window of a long series, and recordings that have to wait."""
+"""Order of recordings for judgement, window of a long series, and recordings that must wait."""
 
 import os
 from collections.abc import Mapping, Sequence

@@ -136,14 +136,14 @@ def _table(store: Store) -> "pandas.DataFrame":
     return pandas.DataFrame(
         {
             **addresses[sensor]._asdict(),
-            "heard": heard,
+            "heard": arrived,
             **(
                 {"file": file, "started": started or None, "state": state}
                 if row is None
                 else flat(json.loads(row))
             ),
         }
-        for sensor, file, heard, started, state, row in rows
+        for sensor, file, arrived, started, state, row in rows
     )
 
 

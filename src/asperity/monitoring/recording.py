@@ -120,7 +120,7 @@ class TrackedRecording:
 
     @property
     def zone(self) -> str | None:
-        """Zone A to D of ISO 20816-3; None without machine class, acceleration or sufficient length."""
+        """Zone A to D of ISO 20816-3; None without machine class or velocity."""
         reading = self._most_severe
         if "machine_class" not in reading.facts or not np.isfinite(reading.velocity):
             return None
@@ -138,8 +138,8 @@ class TrackedRecording:
         velocity = reading.velocity
         if not np.isfinite(velocity):
             return (
-                "velocity not determined: it needs an acceleration in a known unit, sampled at 2.5 kHz "
-                "or more for 3.2 s or more"
+                "velocity not determined: it needs an acceleration in a known unit, "
+                "sampled at 2.5 kHz or more for 3.2 s or more"
             )
         on = f" on {reading.sensor}" if self.on_sensors else ""
         level = f"velocity {quantity('velocity_rms').text(velocity)} rms, 10 to 1000 Hz{on}"

@@ -123,7 +123,8 @@ class Sensor:
         )
         with self.store.transaction() as run:
             run(
-                "INSERT INTO recording (sensor, file, version, heard, started, refused, duration, reading) "
+                "INSERT INTO recording "
+                "(sensor, file, version, heard, started, refused, duration, reading) "
                 "VALUES (?, ?, ?, ?, ?, ?, ?, ?) "
                 # by another watch
                 "ON CONFLICT (sensor, file, version) DO UPDATE SET reading = excluded.reading",

@@ -152,7 +152,7 @@ class SeriesMemory:
 
     @property
     def lead(self) -> str:
-        """Sensor whose amplitudes a line has, as in earlier rows; empty before the first judgement."""
+        """Sensor whose amplitudes a line has, as in earlier rows; empty at first."""
         return next(iter(self.shared.by_sensor)) if isinstance(self.shared, SharedBySensors) else ""
 
     @property
@@ -219,7 +219,7 @@ def pack_shared(shared: Shared | SharedBySensors) -> bytes:
 
 
 def unpack_shared(content: bytes, since: int) -> SeriesMemory:
-    """Unpack the result of `pack_shared`, made `since` recordings ago; an empty memory if damaged."""
+    """Unpack the result of `pack_shared`, `since` recordings old; empty if damaged."""
     try:
         with np.load(
             BytesIO(unsealed(content, "the memory of a series", "it is learned again"))

@@ -24,28 +24,31 @@ LEARNED = "CREATE TABLE learned (sensor INTEGER PRIMARY KEY REFERENCES sensor, b
 SCHEMA = f"""
 CREATE TABLE machine (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE point (
-    id INTEGER PRIMARY KEY, machine INTEGER NOT NULL REFERENCES machine, name TEXT NOT NULL, UNIQUE (machine, name));
+    id INTEGER PRIMARY KEY, machine INTEGER NOT NULL REFERENCES machine, name TEXT NOT NULL,
+    UNIQUE (machine, name));
 CREATE TABLE sensor (
-    id INTEGER PRIMARY KEY, point INTEGER NOT NULL REFERENCES point, name TEXT NOT NULL, settings TEXT NOT NULL,
-    asked TEXT, said TEXT, since INTEGER, UNIQUE (point, name));
+    id INTEGER PRIMARY KEY, point INTEGER NOT NULL REFERENCES point, name TEXT NOT NULL,
+    settings TEXT NOT NULL, asked TEXT, said TEXT, since INTEGER, UNIQUE (point, name));
 {LEARNED};
 CREATE TABLE recording (
-    id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL, version TEXT NOT NULL,
-    heard TEXT NOT NULL, started TEXT, duration REAL, refused INTEGER NOT NULL, state TEXT, row TEXT,
-    reading BLOB NOT NULL,
+    id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL,
+    version TEXT NOT NULL, heard TEXT NOT NULL, started TEXT, duration REAL,
+    refused INTEGER NOT NULL, state TEXT, row TEXT, reading BLOB NOT NULL,
     UNIQUE (sensor, file, version));
 CREATE TABLE judgement (
-    id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, time TEXT NOT NULL, state TEXT NOT NULL,
-    since TEXT, reason TEXT, raised_by TEXT, false_alarm_rate REAL, verdict TEXT, recordings INTEGER, new INTEGER);
+    id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, time TEXT NOT NULL,
+    state TEXT NOT NULL, since TEXT, reason TEXT, raised_by TEXT, false_alarm_rate REAL,
+    verdict TEXT, recordings INTEGER, new INTEGER);
 CREATE TABLE call (
-    id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, who TEXT NOT NULL, state TEXT NOT NULL,
-    said TEXT NOT NULL, time TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, due REAL NOT NULL DEFAULT 0,
-    failure TEXT, answered TEXT);
+    id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, who TEXT NOT NULL,
+    state TEXT NOT NULL, said TEXT NOT NULL, time TEXT NOT NULL,
+    attempts INTEGER NOT NULL DEFAULT 0, due REAL NOT NULL DEFAULT 0, failure TEXT, answered TEXT);
 CREATE INDEX calls ON call (sensor, who);
 CREATE INDEX judgements ON judgement (sensor, state);
 CREATE VIEW trend AS
-    SELECT machine.name AS machine, point.name AS point, sensor.name AS sensor, recording.file, recording.heard,
-        recording.started, recording.state, json_extract(row, '$.x') AS x, json_extract(row, '$.crf_hz') AS crf_hz,
+    SELECT machine.name AS machine, point.name AS point, sensor.name AS sensor, recording.file,
+        recording.heard, recording.started, recording.state, json_extract(row, '$.x') AS x,
+        json_extract(row, '$.crf_hz') AS crf_hz,
         json_extract(row, '$.crf_std_hz') AS crf_std_hz, json_extract(row, '$.rms') AS rms,
         json_extract(row, '$.kurtosis') AS kurtosis,
         json_extract(row, '$.velocity_rms') AS velocity_rms, json_extract(row, '$.zone') AS zone,

@@ -76,8 +76,8 @@ def search_target(
         source = f"{searched[0]:.0f} to {searched[1]:.0f} Hz, from the contact of {case.source}"
     else:
         source = (
-            f"{searched[0]:.0f} to {searched[1]:.0f} Hz, that of the paper's contact, because neither "
-            "a case nor a band was given; give case or band_hz"
+            f"{searched[0]:.0f} to {searched[1]:.0f} Hz, that of the paper's contact, because "
+            "neither a case nor a band was given; give case or band_hz"
         )
     return Target(
         band_hz=searched,

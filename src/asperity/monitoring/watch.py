@@ -1,4 +1,4 @@
-"""Monitoring of a folder: each recording is read once as it arrives, and the series is judged again.
+"""Monitoring of a folder: each recording is read once, and the series is judged again.
 
 Readings and judgements are kept in a store, so that a watch can stop at any moment and continue
 later. Of a long series the first and the latest recordings are judged; the others keep their
