@@ -12,6 +12,7 @@ from asperity.core.errors import BadInput, UnreadableFile
 from asperity.coupling import search_band
 from asperity.monitoring import TrackSettings, recordings_in, search_target, track_recordings
 from asperity.monitoring.files import read_table
+from asperity.monitoring.judgement import judge
 from asperity.monitoring.reading import (
     common_spacing,
     pack_reading,
@@ -19,7 +20,6 @@ from asperity.monitoring.reading import (
     segment_length,
     unpack_reading,
 )
-from asperity.monitoring.judgement import judge
 from asperity.recording import ReadOptions
 
 RATE = 20e3

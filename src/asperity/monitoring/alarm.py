@@ -265,24 +265,7 @@ def _levels_on_sensor(
     )
     if not units:
         return []
-    (usual, _), *_ = units.most_common(1)
-
-    def logarithms(value: Callable[[Reading], float]) -> Field:
-        values = np.full(len(readings), np.nan)
-        for number, reading in enumerate(readings):
-            quality = None if reading is None else reading.quality
-            if (
-                reading is not None
-                and quality is not None
-                and not quality.dead
-                and reading.unit == usual
-                and value(reading) > 0.0
-            ):
-                values[number] = np.log(value(reading))
-        return values
-
-    def quality_of(name: str) -> Callable[[Reading], float]:
-        return lambda reading: float(getattr(reading.quality, name))
+    (unit, _), *_ = units.most_common(1)
 
     def named(field: str, words: str) -> dict[str, Callable[[Reading], float]]:
         names = dict.fromkeys(
@@ -291,8 +274,8 @@ def _levels_on_sensor(
         return {f"{words} {name}": _getter(field, name) for name in names}
 
     levels = {
-        RMS: quality_of("rms"),
-        KURTOSIS: quality_of("kurtosis"),
+        RMS: _quality_getter("rms"),
+        KURTOSIS: _quality_getter("kurtosis"),
         "velocity (rms)": lambda reading: reading.velocity,
     }
     lines, depths = named("lines", "the line at"), named("depths", "the envelope at")
@@ -300,7 +283,9 @@ def _levels_on_sensor(
     level_conditions, pulse_conditions = (
         _conditions(tracked, exponents, response) for exponents in (LEVEL, PULSES)
     )
-    values_by_name = {words: logarithms(value) for words, value in (levels | depths).items()}
+    values_by_name = {
+        words: _logarithms(readings, unit, value) for words, value in (levels | depths).items()
+    }
     return [
         Watched(
             name=f"{words} on {sensor}" if sensor else words,
@@ -318,6 +303,28 @@ def _levels_on_sensor(
         for words, values in values_by_name.items()
         if np.isfinite(values).any()
     ]
+
+
+def _logarithms(
+    readings: Sequence[Reading | None], unit: str, value: Callable[[Reading], float]
+) -> Field:
+    """Return the logarithm of a value over the recordings; nan for dead sensors, other units."""
+    values = np.full(len(readings), np.nan)
+    for number, reading in enumerate(readings):
+        quality = None if reading is None else reading.quality
+        if (
+            reading is not None
+            and quality is not None
+            and not quality.dead
+            and reading.unit == unit
+            and value(reading) > 0.0
+        ):
+            values[number] = np.log(value(reading))
+    return values
+
+
+def _quality_getter(name: str) -> Callable[[Reading], float]:
+    return lambda reading: float(getattr(reading.quality, name))
 
 
 def _getter(field: str, name: str) -> Callable[[Reading], float]:

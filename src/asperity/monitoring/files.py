@@ -224,23 +224,7 @@ def read_table(path: str | Path) -> RecordingTable:
         if a number is missing, or two columns have the same name.
     """
     path = Path(path)
-    require_file(path)
-    try:
-        text = path.read_text("utf-8-sig")
-        delimiter = ";" if text.partition("\n")[0].count(";") else ","
-        reader = csv.DictReader(text.splitlines(), delimiter=delimiter)
-        columns = [(name or "").strip() for name in reader.fieldnames or []]
-        reader.fieldnames = columns
-        rows = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UnreadableFile(
-            f"{path} cannot be read as a table ({error}); give a csv with columns file, x"
-        ) from None
-    for name in columns:
-        if name and columns.count(name) > 1:
-            raise BadInput(
-                f"{path} has {columns.count(name)} columns {name}; leave all but one of them out"
-            )
+    columns, rows, delimiter = _read_csv(path)
     others = [
         name
         for name in columns
@@ -279,6 +263,28 @@ def read_table(path: str | Path) -> RecordingTable:
             x=x, x_std=x_std, sensor=(row.get(SENSOR) or "").strip() or None, **values
         )
     return RecordingTable(name=path.name, x_name=x_name, places=places)
+
+
+def _read_csv(path: Path) -> tuple[list[str], list[dict[str, str]], str]:
+    """Return columns, rows and delimiter of a csv file."""
+    require_file(path)
+    try:
+        text = path.read_text("utf-8-sig")
+        delimiter = ";" if text.partition("\n")[0].count(";") else ","
+        reader = csv.DictReader(text.splitlines(), delimiter=delimiter)
+        columns = [(name or "").strip() for name in reader.fieldnames or []]
+        reader.fieldnames = columns
+        rows = list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UnreadableFile(
+            f"{path} cannot be read as a table ({error}); give a csv with columns file, x"
+        ) from None
+    for name in columns:
+        if name and columns.count(name) > 1:
+            raise BadInput(
+                f"{path} has {columns.count(name)} columns {name}; leave all but one of them out"
+            )
+    return columns, rows, delimiter
 
 
 def _require_units(path: Path, columns: Sequence[str]) -> None:

@@ -120,17 +120,8 @@ def _single_sensor(
         for key, spectrum in zip(keys, spectra.values(), strict=True)
     ]
     method = settings.method or ("joint" if len(spectra) >= FEWEST_RECORDINGS else FALLBACK)
-    if settings.method is None and method != "joint" and spectra:
-        notes.append(
-            f"The joint separation of contact and structure needs {FEWEST_RECORDINGS} recordings "
-            f"and has {len(spectra)}; method {method} takes the most prominent line instead."
-        )
     groups = -(-len(spectra) // MAX_GROUP) if method == "joint" else 1
-    if groups > 1:
-        notes.append(
-            f"{len(spectra)} recordings were separated in {groups} groups, each spread over the "
-            "whole series."
-        )
+    notes += _method_notes(len(spectra), settings.method, method, groups)
     if memory is not None and method == "joint":
         resonances = memory.resonances(keys, cleaned, target.band_hz)
         moved = {keys.index(key) for key in memory.moved if key in keys}
@@ -149,6 +140,24 @@ def _single_sensor(
             tracked_recording(reading, places[reading.file], clean, resonance, remounted=remounted)
         )
     return _Series(tracked, x_name, method, notes)
+
+
+def _method_notes(
+    count: int, requested: SeriesMethod | None, method: SeriesMethod, groups: int
+) -> list[str]:
+    """Return notes on the method for `count` usable recordings."""
+    notes = []
+    if requested is None and method != "joint" and count:
+        notes.append(
+            f"The joint separation of contact and structure needs {FEWEST_RECORDINGS} recordings "
+            f"and has {count}; method {method} takes the most prominent line instead."
+        )
+    if groups > 1:
+        notes.append(
+            f"{count} recordings were separated in {groups} groups, each spread over the whole "
+            "series."
+        )
+    return notes
 
 
 def _staged(

@@ -143,20 +143,7 @@ def combine_sensors(
         )
         lines = [no_line] * len(instants)
     else:
-        keys = [
-            tuple((instant.readings[name].file, name) for name in clean)
-            for instant, clean in zip(instants, cleaned, strict=True)
-        ]
-        series = {name: [clean.get(name) for clean in cleaned] for name in names}
-        spectra = {
-            name: [None if clean is None else clean.spectrum for clean in of_sensor]
-            for name, of_sensor in series.items()
-        }
-        kept = {
-            name: [None if clean is None else clean.kept for clean in of_sensor]
-            for name, of_sensor in series.items()
-        }
-        lines = state.lines(keys, spectra, kept, target.band_hz)
+        lines = _joint_lines(instants, cleaned, names, state, target.band_hz)
         if np.isfinite(state.common):
             notes.append(
                 f"Sensors share {100 * state.common:.0f} % of the error of a line; intervals "
@@ -167,6 +154,30 @@ def combine_sensors(
         for instant, clean, line in zip(instants, cleaned, lines, strict=True)
     ]
     return tracked, x_name, notes
+
+
+def _joint_lines(
+    instants: Sequence[Instant],
+    cleaned: Sequence[Mapping[str, CleanSpectrum]],
+    names: Sequence[str],
+    memory: SeriesMemory,
+    band_hz: tuple[float, float],
+) -> list[SensorLine]:
+    """Return the line of each instant by joint separation on all sensors."""
+    keys = [
+        tuple((instant.readings[name].file, name) for name in clean)
+        for instant, clean in zip(instants, cleaned, strict=True)
+    ]
+    series = {name: [clean.get(name) for clean in cleaned] for name in names}
+    spectra = {
+        name: [None if clean is None else clean.spectrum for clean in of_sensor]
+        for name, of_sensor in series.items()
+    }
+    kept = {
+        name: [None if clean is None else clean.kept for clean in of_sensor]
+        for name, of_sensor in series.items()
+    }
+    return memory.lines(keys, spectra, kept, band_hz)
 
 
 def _harmonized(

@@ -10,6 +10,7 @@ from asperity.monitoring.files import RecordingPlace, RecordingTable, place_at, 
 from asperity.monitoring.sensors import Sensors
 from asperity.monitoring.simultaneous import (
     PlacedRecording,
+    Slot,
     TimedRecording,
     match_places,
     match_times,
@@ -87,48 +88,64 @@ def _match_sensors(
     waits: tuple[str, ...],
 ) -> Order:
     """Match the files of several sensors by stated x, or else by time."""
-    slots: dict[FileVersion, tuple[float, ...]] = {}
     if x_name and places is not None:
-        readable = {
-            name
-            for by_sensor in stored.values()
-            for name, recording in by_sensor.items()
-            if not recording.refused
-        }
-        placed = [
-            PlacedRecording(
-                name if (name := next(iter(by_sensor))) in readable else "",
-                places[key.file].x,
-                _first(by_sensor).duration_s,
-            )
-            for key, by_sensor in stored.items()
-        ]
-        slots |= zip(stored, match_places(placed, x_name), strict=True)
+        slots = _match_by_place(stored, places, x_name)
     else:
         x_name = "time_h"
-        untimed = [
+        untimed = {
             key
             for key, by_sensor in stored.items()
             if not _refused(by_sensor) and _first(by_sensor).time is None
-        ]
+        }
         waits += _wait_notes(
-            untimed,
+            [key for key in stored if key in untimed],
             "does not state its start, and sensors are matched by time",
             "state `started` in a sidecar, or x in a table",
         )
-        stored = {key: by_sensor for key, by_sensor in stored.items() if key not in {*untimed}}
-        parts = [
-            (key, TimedRecording(key.file, name, recording.time, recording.duration_s))
-            for key, by_sensor in stored.items()
-            for name, recording in by_sensor.items()
-        ]
-        matched = match_times([recording for _, recording in parts])
-        slots |= {key: slot for (key, _), slot in zip(parts, matched, strict=True)}
-    instants: dict[tuple[float, ...], list[FileVersion]] = {}
+        slots = _match_by_time(
+            {key: by_sensor for key, by_sensor in stored.items() if key not in untimed}
+        )
+    instants: dict[Slot, list[FileVersion]] = {}
     for key, slot in slots.items():
         instants.setdefault(slot, []).append(key)
-    x = {key.file: slot[0] for key, slot in slots.items()}
+    x = {key.file: slot.x for key, slot in slots.items()}
     return Order([tuple(instants[slot]) for slot in sorted(instants)], x_name, x, places, waits)
+
+
+def _match_by_place(
+    stored: Mapping[FileVersion, Mapping[str, StoredRecording]],
+    places: Mapping[str, RecordingPlace],
+    x_name: str,
+) -> dict[FileVersion, Slot]:
+    """Match files by their stated x."""
+    readable = {
+        name
+        for by_sensor in stored.values()
+        for name, recording in by_sensor.items()
+        if not recording.refused
+    }
+    placed = [
+        PlacedRecording(
+            name if (name := next(iter(by_sensor))) in readable else "",
+            places[key.file].x,
+            _first(by_sensor).duration_s,
+        )
+        for key, by_sensor in stored.items()
+    ]
+    return dict(zip(stored, match_places(placed, x_name), strict=True))
+
+
+def _match_by_time(
+    stored: Mapping[FileVersion, Mapping[str, StoredRecording]],
+) -> dict[FileVersion, Slot]:
+    """Match files by the time of their start."""
+    parts = [
+        (key, TimedRecording(key.file, name, recording.time, recording.duration_s))
+        for key, by_sensor in stored.items()
+        for name, recording in by_sensor.items()
+    ]
+    matched = match_times([recording for _, recording in parts])
+    return {key: slot for (key, _), slot in zip(parts, matched, strict=True)}
 
 
 def _first(by_sensor: Mapping[str, StoredRecording]) -> StoredRecording:
