@@ -112,11 +112,11 @@ def coarse_map(folder):
 
 SPOILT = {
     "set.toml does not state sensor": without("sensor"),
-    "its licence all rights reserved is none of": replaced("CC-BY-4.0", "all rights reserved"),
+    "its licence all rights reserved is not one of": replaced("CC-BY-4.0", "all rights reserved"),
     "maps before and after are not of the same number": replaced(', "maps/roller-after.x3p"', ""),
     "is outside the set": replaced("maps/ring-after.x3p", "../../ring-after.x3p"),
     "load_n has 2 steps, at least 3": steps((200, 1.0), (200, 1.5), (500, 2.0), (500, 2.0)),
-    "speed_m_s has 1 steps where 3": steps((200, 1.0), (300, 1.0), (500, 1.0), (500, 1.0)),
+    "speed_m_s has 1 steps, at least 3": steps((200, 1.0), (300, 1.0), (500, 1.0), (500, 1.0)),
     "no combination of load and speed was recorded twice": steps(
         (200, 1.0), (300, 1.5), (500, 2.0), (600, 2.0)
     ),
@@ -155,7 +155,7 @@ def test_what_is_missing_is_said(copy, says, spoil):
 def test_the_command_refuses_what_is_no_set(copy, tmp_path, capsys):
     without("case")(copy)
     for arguments, says in (
-        (["--set", str(copy)], "no such set yet: set.toml does not state case"),
+        (["--set", str(copy)], "not a complete data set: set.toml does not state case"),
         (["--set", str(tmp_path / "absent")], "is not a folder"),
         (["--set", str(copy / "maps")], "has no set.toml"),
         (["--set", str(copy), "run-0.csv"], "takes no other recordings"),
