@@ -106,7 +106,7 @@ def test_a_level_that_grows_on_the_other_sensor_is_heard(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("channel", "named"), [("a,c", "channel c cannot be read"), ("a,a", "names one twice")]
+    ("channel", "named"), [("a,c", "channel c cannot be read"), ("a,a", "names a channel twice")]
 )
 def test_channels_that_are_none_are_refused(both, channel, named):
     with pytest.raises(BadInput, match=named):

@@ -105,7 +105,7 @@ def test_channels_are_judged_as_track_judges_them_and_kept_by_their_names(machin
     again = next(looking(tmp_path, channel="a,b", once=True, reuse_judgement=True))
     assert (again.track, again.judgement) == (
         None,
-        json.loads(json.dumps(last.track.scalars(every_way=False))),
+        json.loads(json.dumps(last.track.scalars(all_sources=False))),
     )
     kept = keep_track(
         tracked,
