@@ -65,4 +65,4 @@ def test_a_load_by_another_name_or_unit_is_refused(asp):
         Path("other.csv").write_text(f"file,{name}\ns-000.npz,1500\ns-001.npz,1500\n")
         code, _, err = asp("track", "in", "--table", "other.csv")
         assert code == 2
-        assert f"has a column {name}; take {meant}, by that name" in err
+        assert f"has a column {name}; use {meant} with that unit" in err
