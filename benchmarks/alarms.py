@@ -17,7 +17,7 @@ import numpy as np
 
 import asperity
 from asperity.monitoring.alarm import CRF_LEAST, LEVEL_LEAST, RMS, Warming
-from asperity.monitoring.operating_point import ANY_CONTACT, LEVEL, Operating, conditions_of
+from asperity.monitoring.operating_point import ANY_CONTACT, LEVEL, OperatingPoint, conditions_of
 from asperity.trend import (
     FALSE_ALARM_RATE,
     Alarm,
@@ -287,7 +287,7 @@ CHANNELS = (RMS, "velocity", "band 1", "band 2", "depth")
 def judged(one: Drawn) -> Alarm:
     """The alarm as `track` raises it, its stage asked for before an alarm by CRF."""
     met = [
-        Operating(load_n=load, temperature_degc=warm)
+        OperatingPoint(load_n=load, temperature_degc=warm)
         for load, warm in zip(_stated(one.load), _stated(one.temperature), strict=True)
     ]
     of_crf, of_level = (

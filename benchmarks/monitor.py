@@ -18,12 +18,12 @@ from time import process_time
 import numpy as np
 import scipy
 
-from asperity.monitoring import watch as watching
+from asperity.monitoring import TrackSettings, Update, WatchSettings, watch_folder
 from asperity.monitoring.reading import read_channels
-from asperity.monitoring.sensors import opened
+from asperity.monitoring.sensor_lookup import open_sensors
 from asperity.monitoring.store import STORE
 from asperity.monitoring.target import search_target
-from asperity.monitoring.watch import Update, version_of, watch_folder
+from asperity.monitoring.watch_state import WatchState, version_of
 from asperity.recording import ReadOptions
 
 RATE, SAMPLES, BAND = 12e3, 12_000, (2000.0, 4000.0)
@@ -70,8 +70,8 @@ def filled(folder: Path, store: Path, many: int, sensors: int) -> None:
         search_target(None, BAND),
         ReadOptions(channel=channel(sensors)),
     )
-    keeping = opened(store, folder.resolve(), (None, None, None), target, options)
-    keeping.settle_spacing(SPACING)
+    sensors_in_store = open_sensors(store, folder.resolve(), (None, None, None), target, options)
+    sensors_in_store.set_spacing(SPACING)
     one = folder.parent / "one.npz"
     readings = []
     for _ in range(200):
@@ -82,8 +82,8 @@ def filled(folder: Path, store: Path, many: int, sensors: int) -> None:
         path.write_bytes(b"P")
         key = version_of(path.resolve())
         for reading in readings[number % 200]:
-            keeping.keep(key, replace(reading, file=key.file))
-    with closing(keeping.store), keeping.store.transaction() as run:
+            sensors_in_store.add(key, replace(reading, file=key.file))
+    with closing(sensors_in_store.store), sensors_in_store.store.transaction() as run:
         run("UPDATE recording SET state = 'none'")  # as if each had been judged when it came
 
 
@@ -91,7 +91,7 @@ def one_more(folder: Path, out: Path, many: int, sensors: int) -> tuple[list[flo
     """Processor time [s] of judging one more recording, and of all that a look at the folder takes."""
     rng = np.random.default_rng(2)
     judged: list[float] = []
-    plain = watching._Memory.judged
+    plain = WatchState.judge
 
     def timed(*arguments: object, **named: object) -> object:
         began = process_time()
@@ -99,9 +99,12 @@ def one_more(folder: Path, out: Path, many: int, sensors: int) -> tuple[list[flo
         judged.append(process_time() - began)
         return track
 
-    watching._Memory.judged = timed  # type: ignore[assignment,method-assign]
+    WatchState.judge = timed  # type: ignore[assignment,method-assign]
     looks = watch_folder(
-        folder, out, band_hz=BAND, channel=channel(sensors), every_s=0.05, settle_s=0.0
+        folder,
+        out,
+        TrackSettings(band_hz=BAND, channel=channel(sensors)),
+        WatchSettings(poll_interval_s=0.05, settle_time_s=0.0),
     )
     _require_known(next(looks))
     judged.clear()
@@ -111,7 +114,7 @@ def one_more(folder: Path, out: Path, many: int, sensors: int) -> tuple[list[flo
         began = process_time()
         next(looks)
         whole.append(process_time() - began)
-    watching._Memory.judged = plain  # type: ignore[method-assign]
+    WatchState.judge = plain  # type: ignore[method-assign]
     return judged, whole
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from asperity.case import load_case
 from asperity.core.errors import BadInput
-from asperity.monitoring import search_target, track_recordings
+from asperity.monitoring import TrackSettings, search_target, track_recordings
 from asperity.monitoring.reading import FINEST_HZ, read_spectrum
 from asperity.paper import RigSettings, simulate_rig, write_rig
 from asperity.recording import ReadOptions, check_recording, open_channels, read_recording
@@ -197,7 +197,10 @@ def false_finds() -> Iterator[str]:
             (path, given | {"channel": one.channel.name}) for one in open_channels(path, **given)
         ]
     for name, method in alone.items():
-        tracks = [track_recordings([path], method=method, **given) for path, given in running]
+        tracks = [
+            track_recordings([path], TrackSettings(method=method, **given))
+            for path, given in running
+        ]
         usable = [track for track in tracks if track.recordings[0].reading.usable]
         found = sum(track.resonance_count for track in usable)
         yield f"| MFPT and IMS channels one by one (the machine runs) | {name} | {found} | {len(usable)} |"

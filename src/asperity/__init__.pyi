@@ -25,6 +25,7 @@ from .lubricant import Newtonian as Newtonian
 from .lubricant import OilSheet as OilSheet
 from .lubricant import ReeEyring as ReeEyring
 from .lubricant import Roelands as Roelands
+from .monitoring import TrackSettings as TrackSettings
 from .monitoring import track_recordings as track_recordings
 from .recording import read_recording as read_recording
 from .report import write_report as write_report

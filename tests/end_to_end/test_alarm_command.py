@@ -108,7 +108,7 @@ def test_an_empty_folder_is_not_healthy(asp):
     Path("in").mkdir()
     code, out, _ = asp("watch", "in", "--once")
     assert code == 4
-    assert out.startswith("Nothing to judge yet")
+    assert out.startswith("No recording has arrived yet")
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ import pytest
 
 from asperity.monitoring import notify as calls
 from asperity.monitoring.sensors import Sensors
-from asperity.monitoring.store import Place, Store
+from asperity.monitoring.store import SensorAddress, Store
 
 STORE = "in/asperity-watch/asperity.db"
 LISTENER = """
@@ -72,14 +72,14 @@ def listener(tmp_path):
 
 def test_a_command_is_called_once_a_change_of_state(asp, listener):
     command, heard = listener
-    call = ("--on-alarm", command)
+    send = ("--on-alarm", command)
     snapshots(np.ones(12))
     for _ in range(2):
-        assert watched(asp, *call)[0] == 4  # no resonance in snapshots
+        assert watched(asp, *send)[0] == 4  # no resonance in snapshots
     assert [(said["state"], said["before"]) for said in heard()] == [("cannot-tell", None)]
     snapshots(np.exp(np.log(20.0) * np.arange(24) / 23), first=12)
     for _ in range(2):
-        assert watched(asp, *call)[0] == 3
+        assert watched(asp, *send)[0] == 3
     assert [(said["state"], said["before"]) for said in heard()[1:]] == [("alarm", "cannot-tell")]
     said = heard()[1]
     assert (said["machine"], said["point"], said["sensor"]) == ("Pump 3", "DE", "sensor")
@@ -87,7 +87,7 @@ def test_a_command_is_called_once_a_change_of_state(asp, listener):
     assert said["verdict"].startswith("ALARM since s-")
     assert said["recording"].endswith("s-035.npz")
     assert said["since"] < said["recording"]
-    assert watched(asp, *call, "--acknowledge", "last")[0] == 0
+    assert watched(asp, *send, "--acknowledge", "last")[0] == 0
     assert [said["state"] for said in heard()] == ["cannot-tell", "alarm", "none"]
     assert len({said["id"] for said in heard()}) == 3
     assert not Path("never").exists()  # no shell took the name apart
@@ -100,7 +100,10 @@ def test_a_call_that_fails_is_noted_and_made_again(asp, listener, tmp_path):
     (tmp_path / "listen.py").write_text("import sys\nsys.exit('nobody is at home')")
     code, out, err = watched(asp, "--on-alarm", command)
     assert (code, heard()) == (4, [])
-    assert "could not be called (exit code 1: nobody is at home); it is tried again" in err
+    assert (
+        "could not be notified (exit code 1: nobody is at home); the notification will be sent again"
+        in err
+    )
     assert kept("SELECT attempts, answered, failure FROM call") == [
         (1, None, "exit code 1: nobody is at home")
     ]
@@ -119,8 +122,8 @@ def test_a_command_that_does_not_end_is_stopped_with_all_it_started(monkeypatch,
     child = f"import time; time.sleep(3); open({str(late)!r}, 'w')"
     parent = f"import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', {child!r}]); time.sleep(60)"
     began = time.monotonic()
-    with pytest.raises(calls.Refused, match="did not end within 1 s"):
-        calls.Command((sys.executable, "-c", parent)).call({"state": "alarm"})
+    with pytest.raises(calls.NotificationFailed, match="did not end within 1 s"):
+        calls.Command((sys.executable, "-c", parent)).send({"state": "alarm"})
     assert time.monotonic() - began < 20.0
     time.sleep(3.5)
     assert not late.exists()
@@ -188,7 +191,7 @@ def test_passwords_and_tokens_are_used_and_not_kept(asp):
 
 def test_an_answer_that_drips_is_not_waited_for():
     began = time.monotonic()
-    with pytest.raises(calls.Refused, match=r"no whole answer within 0\.2 s"):
+    with pytest.raises(calls.NotificationFailed, match=r"no complete answer within 0\.2 s"):
         calls._within(0.2, partial(time.sleep, 5.0))
     assert time.monotonic() - began < 3.0
 
@@ -197,9 +200,11 @@ def test_what_waits_is_told_in_its_order(asp):
     snapshots(np.ones(3))
     with served([500, 500, 204]) as (url, heard):
         watched(asp, "--webhook", url)
-        sensor = Sensors(Store(STORE), Place("Pump 3", "DE", "sensor"), {})
-        last = sensor.said()
-        sensor.tell([calls.Webhook(url).name], last | {"alarm": last["alarm"] | {"state": "alarm"}})
+        sensor = Sensors(Store(STORE), SensorAddress("Pump 3", "DE", "sensor"), {})
+        last = sensor.last_judgement()
+        sensor.queue_notifications(
+            [calls.Webhook(url).name], last | {"alarm": last["alarm"] | {"state": "alarm"}}
+        )
         assert len(calls.deliver(sensor, [calls.Webhook(url)], now=True)) == 1
         assert calls.deliver(sensor, [calls.Webhook(url)], now=True) == ()
     states = [json.loads(body)["state"] for _, _, body in heard]
@@ -210,15 +215,15 @@ def test_a_call_that_keeps_failing_is_made_ever_more_seldom(asp):
     snapshots(np.ones(3))
     with served([500]) as (url, heard):
         watched(asp, "--webhook", url)
-        sensor = Sensors(Store(STORE), Place("Pump 3", "DE", "sensor"), {})
+        sensor = Sensors(Store(STORE), SensorAddress("Pump 3", "DE", "sensor"), {})
         assert calls.deliver(sensor, [calls.Webhook(url)]) == ()  # not due yet
         assert len(heard) == 1
         with sensor.store.transaction() as run:
             run("UPDATE call SET attempts = 5000")  # a month at every start of cron's
         calls.deliver(sensor, [calls.Webhook(url)], now=True)
-        ((_, attempts, due, _),) = sensor.waiting(calls.Webhook(url).name)
+        ((_, attempts, due, _),) = sensor.pending_notifications(calls.Webhook(url).name)
     assert attempts == 5001
-    assert 0.9 * calls.SELDOM_S < due - time.time() <= calls.SELDOM_S
+    assert 0.9 * calls.MAX_RETRY_S < due - time.time() <= calls.MAX_RETRY_S
 
 
 BROKER = """
@@ -276,16 +281,16 @@ def test_an_mqtt_broker_holds_the_last_state(asp):
     assert kept("SELECT count(*) FROM call WHERE answered IS NULL") == [(0,)]
     code, _, err = watched(asp, "--mqtt", f"mqtt://somebody:secret@127.0.0.1:{port}/other")
     assert code == 4
-    assert f"mqtt mqtt://127.0.0.1:{port}/other could not be called" in err
+    assert f"mqtt mqtt://127.0.0.1:{port}/other could not be notified" in err
     assert "secret" not in Path(STORE).read_bytes().decode("latin-1")
 
 
 @pytest.mark.parametrize(
     ("option", "value", "said"),
     [
-        ("--on-alarm", "no-such-program --now", "there is no program 'no-such-program' to call"),
-        ("--on-alarm", "", "there is no program '' to call"),
-        ("--on-alarm", "echo 'open", "cannot be split"),
+        ("--on-alarm", "no-such-program --now", "there is no program 'no-such-program' to run"),
+        ("--on-alarm", "", "there is no program '' to run"),
+        ("--on-alarm", "echo 'open", "cannot be parsed"),
         ("--webhook", "ftp://there/x", "it begins with http or https"),
         (
             "--webhook",

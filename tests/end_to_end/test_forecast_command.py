@@ -155,11 +155,11 @@ def test_infer_foretells_with_a_wear_history_and_a_measured_surface(asp, asked):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("track", "rising", *LIMIT), "--forecast needs the contact; give --case"),
-        (("track", "rising", "--worn", "d"), "give --forecast, too"),
+        (("track", "rising", *LIMIT), "--forecast needs a contact; give --case"),
+        (("track", "rising", "--worn", "d"), "add --forecast"),
         (
             ("watch", "rising", "--emulator", "d"),
-            "--emulator is what foretells a series; give --forecast, too",
+            "--emulator is used for forecasts; add --forecast",
         ),
         (
             ("watch", "rising", "--case", "infer.toml", "--forecast", "clr=2"),

@@ -182,7 +182,7 @@ def test_refusals_are_one_sentence(asp):
     for arguments, said in (
         (("a.wav",), "give --case"),
         (("--case", "infer.toml"), "asperity infer needs recordings"),
-        (("a.wav", "--case", "infer.toml", "--worn", "d"), "give --forecast, too"),
+        (("a.wav", "--case", "infer.toml", "--worn", "d"), "add --forecast"),
         (
             ("a.wav", "--case", "infer.toml", "--forecast", "crf=3 kHz"),
             "--forecast takes a limit such as clr=0.5",
@@ -203,7 +203,7 @@ def test_refusals_are_one_sentence(asp):
             ("--case", "infer.toml", "--design", "nan"),
             "--design must be a load share between 0 and 1",
         ),
-        (("empty", "--case", "infer.toml"), "holds no recordings"),
+        (("empty", "--case", "infer.toml"), "contains no recordings"),
         (
             ("a.wav", "--case", "infer.toml", "--table", "kilo.csv"),
             "has a column load_kn; take load_n",

@@ -92,7 +92,7 @@ def test_conditions_are_read_from_channels_in_their_units(asp):
         json.dumps({"channel": "acc", "condition_channels": {"load_n": "oil"}})
     )
     row = json.loads(asp("track", "in", *BAND, "--json")[1])["recordings"][0]
-    assert "channel oil is in degC, and load_n takes N, kN, mN, MN" in row["remarks"]
+    assert "channel oil is in degC, but load_n needs N, kN, mN, MN" in row["remarks"]
 
 
 def heard_beside(asp, stated, **channels):
@@ -113,7 +113,7 @@ def test_a_speed_channel_without_a_number_is_told_beside_its_recording(asp):
     row = heard_beside(
         asp, {"condition_channels": {"speed_hz": "shaft"}}, shaft=np.full(40_000, np.nan)
     )
-    assert "channel shaft has no number; leave it out" in row["remarks"]
+    assert "channel shaft contains no number; leave it out" in row["remarks"]
     assert row["speed_hz"] is None
     assert row["depths"] == {}
 

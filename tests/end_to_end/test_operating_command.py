@@ -57,7 +57,7 @@ def test_a_load_by_another_name_or_unit_is_refused(asp):
     Path("kilo.csv").write_text("file,x,load_kn\ns-000.npz,1,0.5\ns-001.npz,2,0.5\n")
     code, _, err = asp("track", "in", "--table", "kilo.csv")
     assert code == 2
-    assert "has a column load_kn; take load_n, by that name and in that unit" in err
+    assert "has a column load_kn; use load_n with that unit" in err
     for name, meant in (
         ("speed_rpm", "speed_hz or entrainment_m_s"),
         ("oil_temperature", "temperature_degc"),
@@ -65,4 +65,4 @@ def test_a_load_by_another_name_or_unit_is_refused(asp):
         Path("other.csv").write_text(f"file,{name}\ns-000.npz,1500\ns-001.npz,1500\n")
         code, _, err = asp("track", "in", "--table", "other.csv")
         assert code == 2
-        assert f"has a column {name}; take {meant}, by that name" in err
+        assert f"has a column {name}; use {meant} with that unit" in err

@@ -105,13 +105,13 @@ def test_damping_decides_where_it_is_asked_to(asp, rig):
     )  # of the rig's sphere
     assert by_damping["alarm"]["state"] == "none"
     out = asp("track", *series, "--stages-from", "both")[1]
-    assert "stage by CRF and damping, which decides" in out
+    assert "stage by CRF and damping (deciding)" in out
     assert "damping does not change" in out
 
 
 def test_a_long_series_is_separated_in_groups(asp, rig, monkeypatch):
     folder, truth = rig
-    monkeypatch.setattr("asperity.monitoring.track.MOST_TOGETHER", 12)
+    monkeypatch.setattr("asperity.monitoring.judgement.MAX_GROUP", 12)
     said = json.loads(asp("track", str(folder), "--case", "case.toml", "--json")[1])
     for row in said["recordings"]:
         assert row["crf_hz"] == pytest.approx(truth[Path(row["file"]).name], abs=50.0)
@@ -165,9 +165,7 @@ def test_recordings_without_a_resonance_cannot_tell(asp):
         "track", *(f"noise-{number}.npz" for number in range(7)), "--case", "case.toml"
     )
     assert code == 4
-    assert out.startswith(
-        "These recordings cannot tell: no contact resonance found in 7 recordings"
-    )
+    assert out.startswith("Cannot tell: no contact resonance found in 7 recordings")
 
 
 def test_check_shows_the_good_beside_the_bad(asp, rig):
@@ -228,7 +226,7 @@ def test_watch_waits_for_a_file_that_is_still_written(asp, rig):
     ("arguments", "said"),
     [
         (("track", "bare.npy"), "states no sampling rate"),
-        (("track", "empty"), "holds no recordings"),
+        (("track", "empty"), "contains no recordings"),
         (("track", "missing"), "missing does not exist"),
         (
             ("track", "bare.npy", "--rate", "20000", "--out", "t.txt"),

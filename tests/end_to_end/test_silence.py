@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.monitoring import watch_folder
-from asperity.monitoring.silence import silence, spoken
+from asperity.monitoring import WatchSettings, watch_folder
+from asperity.monitoring.silence import duration_text, overdue_reason
 
 NOON = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)
 LOOK = ("--once", "--settle", "0", "--store", "plant.db", "--machine", "Fan 1", "--point", "DE")
@@ -39,18 +39,26 @@ def judged(column):
 def test_what_is_usual_is_learned_from_when_recordings_came():
     every_10_min = [NOON + timedelta(minutes=10 * number) for number in range(12)]
     last = every_10_min[-1]
-    assert silence(every_10_min, None, last + timedelta(minutes=49)) == ""
-    said = silence(every_10_min, None, last + timedelta(minutes=51))
+    assert overdue_reason(every_10_min, None, last + timedelta(minutes=49)) == ""
+    said = overdue_reason(every_10_min, None, last + timedelta(minutes=51))
     assert (
         said
-        == "no recording has come for 51 min, since 2026-11-22T13:50:00+00:00; one comes every 10 min"
+        == "no recording has come for 51 min, since 2026-11-22T13:50:00+00:00; the usual interval is 10 min"
     )
-    assert silence(every_10_min[:5], None, NOON + timedelta(days=300)) == ""  # nobody knows yet
-    assert "for 2 h" in silence(every_10_min[:1], 3600.0, NOON + timedelta(hours=2))
-    assert [spoken(120.0), spoken(3600.0), spoken(7 * 86400.0)] == ["2 min", "60 min", "7 days"]
-    assert silence([], 1.0, NOON) == ""
+    assert (
+        overdue_reason(every_10_min[:5], None, NOON + timedelta(days=300)) == ""
+    )  # nobody knows yet
+    assert "for 2 h" in overdue_reason(every_10_min[:1], 3600.0, NOON + timedelta(hours=2))
+    assert [duration_text(120.0), duration_text(3600.0), duration_text(7 * 86400.0)] == [
+        "2 min",
+        "60 min",
+        "7 days",
+    ]
+    assert overdue_reason([], 1.0, NOON) == ""
     fast = [NOON + timedelta(seconds=number) for number in range(12)]
-    assert silence(fast, None, fast[-1] + timedelta(seconds=59)) == ""  # never before a minute
+    assert (
+        overdue_reason(fast, None, fast[-1] + timedelta(seconds=59)) == ""
+    )  # never before a minute
 
 
 @pytest.mark.parametrize("time", ["nan", "0", "inf"])
@@ -72,7 +80,7 @@ def test_a_sensor_that_delivers_nothing_is_blind_and_told_once(asp):
     said = json.loads(out)
     assert (code, said["alarm"]["state"], said["alarm"]["raised_by"]) == (5, "blind", "silence")
     assert said["verdict"].startswith("Blind: no recording has come for")
-    assert "0.5 s are allowed" in said["alarm"]["reason"]
+    assert "the limit is 0.5 s" in said["alarm"]["reason"]
     assert asp("store", "plant.db", "--quiet")[0] == 5
     page = Path(said["results"], "report.html").read_text("utf-8")
     assert "Blind: no recording has come for" in page
@@ -108,11 +116,13 @@ def test_an_alarm_stands_in_silence(asp):
 def test_a_watch_that_runs_says_so_by_itself(tmp_path):
     snapshots(tmp_path / "in", np.ones(8))
     looks = watch_folder(
-        tmp_path / "in", tmp_path / "out", every_s=0.05, settle_s=0.0, expect_s=0.6
+        tmp_path / "in",
+        tmp_path / "out",
+        watching=WatchSettings(poll_interval_s=0.05, settle_time_s=0.0, overdue_after_s=0.6),
     )
     assert next(looks).track is not None
     silent = next(looks)
-    assert silent.said["alarm"]["state"] == silent.track.alarm.state == "blind"
+    assert silent.judgement["alarm"]["state"] == silent.track.alarm.state == "blind"
     assert silent.track.alarm.since == 7
     snapshots(tmp_path / "in", [1.0], first=8)
     assert len(next(looks).new) == 1

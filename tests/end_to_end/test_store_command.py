@@ -16,7 +16,7 @@ import pandas
 import pytest
 
 from asperity.core.errors import AsperityError, UnreadableFile
-from asperity.monitoring import store_overview, watch_folder
+from asperity.monitoring import TrackSettings, WatchSettings, store_overview, watch_folder
 from asperity.monitoring.store import Store
 
 ONCE = ("--once", "--settle", "0", "--quiet")
@@ -98,7 +98,7 @@ def test_what_is_known_is_not_judged_again(asp, monkeypatch):
     snapshots("in", np.ones(10))
     first = asp("watch", "in", "--once", "--settle", "0", "--json")
     judged = []
-    monkeypatch.setattr("asperity.monitoring.watch.judge", lambda *_, **__: judged.append(1))
+    monkeypatch.setattr("asperity.monitoring.watch_state.judge", lambda *_, **__: judged.append(1))
     second = asp("watch", "in", "--once", "--settle", "0", "--json")
     assert (judged, second[0]) == ([], first[0])
     before, after = json.loads(first[1]), json.loads(second[1])
@@ -163,9 +163,11 @@ def _count(store):
 def test_many_that_arrive_at_once_are_judged_one_after_another(tmp_path, monkeypatch):
     """An alarm long before the latest recordings is not passed over, and stands."""
     monkeypatch.setattr("asperity.monitoring.ordering.LATEST", 16)
-    monkeypatch.setattr("asperity.monitoring.watch.STRIDE", 8)
+    monkeypatch.setattr("asperity.monitoring.watch_state.STRIDE", 8)
     snapshots(tmp_path / "in", [*failing(), *np.ones(30)])
-    (update,) = watch_folder(tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0)
+    (update,) = watch_folder(
+        tmp_path / "in", tmp_path / "out", watching=WatchSettings(once=True, settle_time_s=0.0)
+    )
     assert update.track.alarm.state == "alarm"
     since = Path(update.track.recordings[update.track.alarm.since].file).name
     assert "s-012.npz" < since < "s-036.npz"
@@ -176,32 +178,37 @@ def test_many_that_arrive_at_once_are_judged_one_after_another(tmp_path, monkeyp
     states = asked(tmp_path / "out/asperity.db", "SELECT state FROM recording ORDER BY file")
     assert all(state for (state,) in states)  # each was judged
     snapshots(tmp_path / "in", [1.0], first=66)
-    (update,) = watch_folder(tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0)
+    (update,) = watch_folder(
+        tmp_path / "in", tmp_path / "out", watching=WatchSettings(once=True, settle_time_s=0.0)
+    )
     assert update.track.alarm.state == "alarm"
     assert (
         "raised before and not acknowledged" not in update.track.alarm.reason
     )  # it is among those judged
     (update,) = watch_folder(
-        tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0, acknowledge="last"
+        tmp_path / "in",
+        tmp_path / "out",
+        TrackSettings(acknowledge="last"),
+        WatchSettings(once=True, settle_time_s=0.0),
     )
     assert update.track.alarm.state == "none"
 
 
 def test_a_file_that_is_no_store_is_refused(asp):
     Path("text.db").write_text("not a database, but long enough to be taken for one\n" * 100)
-    assert "is no store of asperity, or damaged" in asp("store", "text.db")[2]
+    assert "is not a store of asperity, or damaged" in asp("store", "text.db")[2]
     with closing(sqlite3.connect("other.db")) as connection:
         connection.execute("CREATE TABLE theirs (a)")
     before = Path("other.db").read_bytes()
     code, _, err = asp("store", "other.db")
     assert code == 2
-    assert "other.db is a database of something else" in err
+    assert "other.db is a database of another program" in err
     assert asked("other.db", "SELECT name FROM sqlite_master") == [("theirs",)]
     assert len(before) == Path("other.db").stat().st_size
     assert asp("store", "absent.db")[0] == 2
     snapshots("in", np.ones(3))
     assert asp("track", "in", "--store", "nowhere/plant.db")[0] == 2
-    assert "holds no recordings yet" in store_overview(_empty("empty.db")).verdict()
+    assert "contains no recordings yet" in store_overview(_empty("empty.db")).verdict()
     with closing(sqlite3.connect("empty.db")) as connection:
         connection.execute("PRAGMA user_version = 99")
     with pytest.raises(UnreadableFile, match="a store of version 99"):
@@ -217,38 +224,36 @@ def test_a_store_that_another_program_holds_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr("asperity.monitoring.store.BUSY_S", 0.05)
     snapshots(tmp_path / "in", [1.0])
     store = Store(tmp_path / "plant.db")
-    with store.transaction(), pytest.raises(AsperityError, match="another program holds it"):
+    with store.transaction(), pytest.raises(AsperityError, match="another program has locked it"):
         next(
             watch_folder(
                 tmp_path / "in",
                 tmp_path / "out",
-                store=tmp_path / "plant.db",
-                once=True,
-                settle_s=0.0,
+                watching=WatchSettings(store=tmp_path / "plant.db", once=True, settle_time_s=0.0),
             )
         )
 
 
 def test_a_damaged_recording_of_the_store_is_read_again(tmp_path):
     snapshots(tmp_path / "in", np.ones(8))
-    look = {"once": True, "settle_s": 0.0}
-    next(watch_folder(tmp_path / "in", tmp_path / "out", **look))
+    look = WatchSettings(once=True, settle_time_s=0.0)
+    next(watch_folder(tmp_path / "in", tmp_path / "out", watching=look))
     with closing(sqlite3.connect(tmp_path / "out/asperity.db")) as connection:
         connection.execute("UPDATE recording SET reading = x'00ff' WHERE file LIKE '%s-003.npz'")
         connection.commit()
-    next(watch_folder(tmp_path / "in", tmp_path / "out", **look))
-    update = next(watch_folder(tmp_path / "in", tmp_path / "out", **look))
+    next(watch_folder(tmp_path / "in", tmp_path / "out", watching=look))
+    update = next(watch_folder(tmp_path / "in", tmp_path / "out", watching=look))
     assert [Path(reading.file).name for reading in update.new] == ["s-003.npz"]
     assert len(update.track.recordings) == 8
 
 
 def test_a_file_that_changed_is_another_recording_and_its_past_is_kept(tmp_path):
     snapshots(tmp_path / "in", np.ones(8))
-    look = {"once": True, "settle_s": 0.0}
-    next(watch_folder(tmp_path / "in", tmp_path / "out", **look))
+    look = WatchSettings(once=True, settle_time_s=0.0)
+    next(watch_folder(tmp_path / "in", tmp_path / "out", watching=look))
     snapshots(tmp_path / "in", [2.0], first=3)
     os.utime(tmp_path / "in/s-003.npz", (1e9, 1e9))
-    update = next(watch_folder(tmp_path / "in", tmp_path / "out", **look))
+    update = next(watch_folder(tmp_path / "in", tmp_path / "out", watching=look))
     assert len(update.track.recordings) == 8
     assert update.track.recordings[3].reading.quality.rms == pytest.approx(2.0, rel=0.1)
     assert asked(tmp_path / "out/asperity.db", "SELECT count(*) FROM recording") == [(9,)]
@@ -286,7 +291,11 @@ def test_every_file_of_an_untidy_folder_is_accounted_for(asp):
 def test_lines_that_another_program_changed_are_written_again(tmp_path):
     """Lines that stand as they were judged are not written again, unless somebody else has written meanwhile."""
     snapshots(tmp_path / "in", np.ones(9))
-    looks = watch_folder(tmp_path / "in", tmp_path / "out", every_s=0.0, settle_s=0.0)
+    looks = watch_folder(
+        tmp_path / "in",
+        tmp_path / "out",
+        watching=WatchSettings(poll_interval_s=0.0, settle_time_s=0.0),
+    )
     next(looks)
     rows = "SELECT id, row FROM recording WHERE id <= 9 ORDER BY id"
     before = asked(tmp_path / "out/asperity.db", rows)
@@ -303,7 +312,11 @@ def test_lines_that_another_program_changed_are_written_again(tmp_path):
 def test_what_one_process_acknowledges_another_does_not_raise_again(asp):
     """A watch that runs for months, and a person who looks."""
     snapshots("in", failing())
-    looks = watch_folder("in", "out", every_s=0.0, settle_s=0.0, machine="Fan 1", point="DE")
+    looks = watch_folder(
+        "in",
+        "out",
+        watching=WatchSettings(poll_interval_s=0.0, settle_time_s=0.0, machine="Fan 1", point="DE"),
+    )
     assert next(looks).track.alarm.state == "alarm"
     assert asp("store", "out/asperity.db", "--quiet")[0] == 3
     assert (

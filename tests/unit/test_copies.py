@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from asperity.core.signals import power_spectrum
-from asperity.monitoring import track_recordings
+from asperity.monitoring import TrackSettings, track_recordings
 from asperity.paper import papers_case
 from asperity.recording import check_recording, open_recording, read_recording
 from asperity.resonance import contact_resonance
@@ -63,7 +63,7 @@ def told(tmp_path_factory):
         "spectrum": (spectrum, lambda spectrum: [spectrum.density, spectrum.unit]),
         "resonance": (contact_resonance(spectrum, band_hz=(1e3, 5e3)), lambda line: [line]),
         "track": (
-            track_recordings(paths, band_hz=(1e3, 5e3), rate_hz=2e4),
+            track_recordings(paths, TrackSettings(band_hz=(1e3, 5e3), rate_hz=2e4)),
             lambda track: [track.verdict(), track.scalars()],
         ),
         "surface": (

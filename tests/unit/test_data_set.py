@@ -112,12 +112,14 @@ def coarse_map(folder):
 
 SPOILT = {
     "set.toml does not state sensor": without("sensor"),
-    "its licence all rights reserved is none of": replaced("CC-BY-4.0", "all rights reserved"),
+    "its licence all rights reserved is not one of": replaced("CC-BY-4.0", "all rights reserved"),
     "maps before and after are not of the same number": replaced(', "maps/roller-after.x3p"', ""),
-    "lies outside the set": replaced("maps/ring-after.x3p", "../../ring-after.x3p"),
-    "load_n has 2 steps where 3": steps((200, 1.0), (200, 1.5), (500, 2.0), (500, 2.0)),
-    "speed_m_s has 1 steps where 3": steps((200, 1.0), (300, 1.0), (500, 1.0), (500, 1.0)),
-    "no load and speed were recorded twice": steps((200, 1.0), (300, 1.5), (500, 2.0), (600, 2.0)),
+    "is outside the set": replaced("maps/ring-after.x3p", "../../ring-after.x3p"),
+    "load_n has 2 steps, at least 3": steps((200, 1.0), (200, 1.5), (500, 2.0), (500, 2.0)),
+    "speed_m_s has 1 steps, at least 3": steps((200, 1.0), (300, 1.0), (500, 1.0), (500, 1.0)),
+    "no combination of load and speed was recorded twice": steps(
+        (200, 1.0), (300, 1.5), (500, 2.0), (600, 2.0)
+    ),
     "has no column oil_temperature_c": lambda folder: write_table(
         folder, [("run-0.csv", 0, 1, 1)], HEADS[:-1]
     ),
@@ -127,10 +129,10 @@ SPOILT = {
     "run-1.csv: sampled at 8000 Hz": lambda folder: write_recording(
         folder / "run-1.csv", rate=8000
     ),
-    "run-2.csv: 3 s long where 10": lambda folder: write_recording(
+    "run-2.csv: 3 s long, at least 10": lambda folder: write_recording(
         folder / "run-2.csv", seconds=3.0
     ),
-    "run-3.csv: no acceleration (unit V)": lambda folder: write_recording(
+    "run-3.csv: not an acceleration (unit V)": lambda folder: write_recording(
         folder / "run-3.csv", unit="V"
     ),
     "run-0.csv": lambda folder: (folder / "run-0.csv").unlink(),
@@ -147,17 +149,17 @@ def test_what_is_missing_is_said(copy, says, spoil):
     found = check_set(copy)
     assert not found.whole
     assert any(says in sentence for sentence in found.missing), found.missing
-    assert found.verdict().startswith(f"{copy} is no such set yet: ")
+    assert found.verdict().startswith(f"{copy} is not a complete data set: ")
 
 
 def test_the_command_refuses_what_is_no_set(copy, tmp_path, capsys):
     without("case")(copy)
     for arguments, says in (
-        (["--set", str(copy)], "no such set yet: set.toml does not state case"),
+        (["--set", str(copy)], "not a complete data set: set.toml does not state case"),
         (["--set", str(tmp_path / "absent")], "is not a folder"),
         (["--set", str(copy / "maps")], "has no set.toml"),
-        (["--set", str(copy), "run-0.csv"], "takes no recordings beside it"),
-        ([], "check takes recordings, or --set"),
+        (["--set", str(copy), "run-0.csv"], "takes no other recordings"),
+        ([], "check needs recordings, or --set"),
     ):
         with pytest.raises(SystemExit) as end:
             main(["check", *arguments])

@@ -14,10 +14,10 @@ from asperity.monitoring.operating_point import (
     CRF,
     LEVEL,
     PULSES,
-    Operating,
+    OperatingPoint,
     conditions_of,
-    contact_follows,
-    response_of,
+    contact_exponents,
+    operating_response,
     unstated,
 )
 from asperity.trend import Condition, MonitoredSeries, RecordingStatus, sequential, sequential_alarm
@@ -34,7 +34,7 @@ def scatter(seed, size=0.004):
 def crf(values, follows=CRF, **met):
     """The series as it is watched, beside what it was recorded at, by its keys; nan where nothing is stated."""
     rows = [
-        Operating(
+        OperatingPoint(
             **{key: None if np.isnan(value) else value for key, value in zip(met, row, strict=True)}
         )
         for row in zip(*met.values(), strict=True)
@@ -106,15 +106,15 @@ def test_recordings_without_a_condition_are_left_out_where_most_state_it():
     values[[3, 25]] = 7.0  # whatever they show
     one = crf(values, load_n=loads)
     assert judged(one).state == "none"
-    met = [Operating(load_n=None if np.isnan(load) else load) for load in loads]
+    met = [OperatingPoint(load_n=None if np.isnan(load) else load) for load in loads]
     assert unstated(met) == [
-        "The load is not stated for 2 of 40 recordings; these are left out of trend and alarm."
+        "The load is not stated for 2 of 40 recordings; these are excluded from trend and alarm."
     ]
     few = [replace(one, load_n=None) for one in met[5:]] + met[:5]
-    assert unstated(few)[0].endswith("36 of 40 recordings; it is not taken into account.")
-    spun = [Operating(speed_hz=25.0)] * 30 + [Operating()] * 10
+    assert unstated(few)[0].endswith("36 of 40 recordings; it is not used.")
+    spun = [OperatingPoint(speed_hz=25.0)] * 30 + [OperatingPoint()] * 10
     assert unstated(spun) == [
-        "The speed is not stated for 10 of 40 recordings; these are left out of trend and alarm."
+        "The speed is not stated for 10 of 40 recordings; these are excluded from trend and alarm."
     ]
     assert conditions_of(few, CRF, ANY_CONTACT.oil) == ()
 
@@ -122,7 +122,7 @@ def test_recordings_without_a_condition_are_left_out_where_most_state_it():
 def test_powers_are_found_exactly_where_nothing_scatters_and_held_within_their_bounds():
     speeds = np.random.default_rng(2).uniform(1.0, 3.0, 40)
     met = [
-        Operating(load_n=load, entrainment_m_s=speed)
+        OperatingPoint(load_n=load, entrainment_m_s=speed)
         for load, speed in zip(LOADS, speeds, strict=True)
     ]
     conditions = conditions_of(met, LEVEL, ANY_CONTACT.oil)
@@ -203,14 +203,14 @@ rheology = { law = "newtonian" }
 def test_a_dry_contact_follows_its_load_as_hertz_has_it_and_no_speed(tmp_path, monkeypatch):
     """All load on asperities: S ~ F^(1/3), so CRF ~ F^(1/6) whatever the speed. The doubt is never less than 0.05."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    follows = contact_follows(load_case('lubricant = "none"\n' + SMALL))
+    follows = contact_exponents(load_case('lubricant = "none"\n' + SMALL))
     assert follows.load == pytest.approx((1.0 / 12.0, 1.0 / 4.0), abs=1e-3)
     assert follows.viscosity == follows.speed == pytest.approx((-0.05, 0.05), abs=1e-3)
 
 
 def test_a_contact_that_follows_far_is_taken_at_its_word():
     """Clipped to what most contacts do, the span had no width and nothing could be fitted."""
-    follows = operating._about(0.9, -1.58)
+    follows = operating._with_uncertainty(0.9, -1.58)
     assert follows.load == pytest.approx((0.45, 1.35))
     assert follows.speed == pytest.approx((-2.37, -0.79))
     speeds = np.where(NUMBER < 18, 1.0, 1.1)
@@ -230,7 +230,7 @@ def test_a_fault_that_heats_its_oil_alarms_all_the_same():
     )
     assert (
         conditions_of(
-            [Operating(temperature_degc=value) for value in warm], PULSES, ANY_CONTACT.oil
+            [OperatingPoint(temperature_degc=value) for value in warm], PULSES, ANY_CONTACT.oil
         )
         == ()
     )
@@ -239,20 +239,20 @@ def test_a_fault_that_heats_its_oil_alarms_all_the_same():
 def test_the_contact_of_a_case_says_how_crf_follows_and_is_solved_once(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     case = load_case(SMALL + OIL)
-    follows = contact_follows(case)
+    follows = contact_exponents(case)
     assert 0.1 < sum(follows.load) / 2.0 < 0.3
     assert follows.speed[0] < -0.05  # a thicker film takes load off them
     monkeypatch.setattr(operating, "_resonance", None)
-    assert contact_follows(load_case(SMALL + OIL)) == follows
+    assert contact_exponents(load_case(SMALL + OIL)) == follows
 
 
 def test_a_case_that_is_not_solved_is_said(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    met = [Operating(load_n=load) for load in (500.0, 900.0)]
-    steady = [Operating(load_n=500.0)] * 2
+    met = [OperatingPoint(load_n=load) for load in (500.0, 900.0)]
+    steady = [OperatingPoint(load_n=500.0)] * 2
     coarse = load_case(SMALL.replace("40 um", "4 um") + OIL)
-    assert response_of(coarse, met).crf == CRF
-    assert response_of(coarse, met).said.startswith(
-        "How CRF follows load and speed is any contact's, as the case's is"
+    assert operating_response(coarse, met).crf == CRF
+    assert operating_response(coarse, met).note.startswith(
+        "The response of CRF to load and speed is that of any contact"
     )
-    assert response_of(coarse, steady).said == ""  # nothing to solve it for
+    assert operating_response(coarse, steady).note == ""  # nothing to solve it for

@@ -11,7 +11,7 @@ from asperity.app.folder_jobs import open_history, open_study, solve_row
 from asperity.app.opening import open_page
 from asperity.app.recording_jobs import Stated, hear_files, hear_folder
 from asperity.core.signals import Signal
-from asperity.monitoring import track_recordings
+from asperity.monitoring import TrackSettings, track_recordings
 from asperity.paper import papers_case
 from asperity.simulation import run_history, run_wear
 from asperity.study import load_study, plan_study, run_study
@@ -45,7 +45,7 @@ def recordings(folder):
 def test_dropped_recordings_are_heard_as_track_hears_them(rig):
     paths = sorted(rig.glob("*.npy"))
     heard = hear_files(NOBODY, paths, Stated(rate_hz=2e4, unit="m/s^2"), None)
-    track = track_recordings(paths, rate_hz=2e4, unit="m/s^2")
+    track = track_recordings(paths, TrackSettings(rate_hz=2e4, unit="m/s^2"))
     assert heard.verdict == track.verdict()
     assert [row["crf_hz"] for row in heard.rows] == [
         row.row()["crf_hz"] for row in track.recordings

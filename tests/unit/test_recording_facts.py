@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import BadInput, UnreadableFile
-from asperity.monitoring import track_recordings
+from asperity.monitoring import TrackSettings, track_recordings
 from asperity.monitoring.files import read_table
 from asperity.recording import check_recording, open_recording, read_recording
 from asperity.recording.reader import parse_time
@@ -54,14 +54,14 @@ def folders(tmp_path, rows):
 def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path):
     files, table = folders(tmp_path, "one/a.npz,1\ntwo\\a.npz,7\n")
     assert [table.place(file).x for file in files] == [1.0, 7.0]
-    track = track_recordings(files, table=tmp_path / "table.csv", band_hz=(2e3, 4e3))
+    track = track_recordings(files, TrackSettings(band_hz=(2e3, 4e3)), table=tmp_path / "table.csv")
     assert [one.x for one in track.recordings] == [1.0, 7.0]
 
 
 def test_one_row_for_two_files_is_refused(tmp_path):
     files, _ = folders(tmp_path, "a.npz,7\n")
     with pytest.raises(BadInput, match=r"one row a.npz for 2 recordings.*with their folders"):
-        track_recordings(files, table=tmp_path / "table.csv", band_hz=(2e3, 4e3))
+        track_recordings(files, TrackSettings(band_hz=(2e3, 4e3)), table=tmp_path / "table.csv")
 
 
 def test_a_file_with_two_rows_is_refused(tmp_path):

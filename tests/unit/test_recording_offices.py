@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import UnreadableFile
-from asperity.monitoring import recordings_in, search_target, track_recordings
+from asperity.monitoring import TrackSettings, recordings_in, search_target, track_recordings
 from asperity.monitoring.reading import read_spectrum
 from asperity.recording import ReadOptions, read_recording
 
@@ -109,7 +109,7 @@ def test_what_is_no_recording_takes_no_place(tmp_path):
     assert len(recordings_in([tmp_path])) == 4
     (tmp_path / "0-notes.txt").write_text("Sensor 3 was moved on Monday.\n")
     (tmp_path / "2024.01.31.01.30.00.npz").write_bytes(b"cut")
-    track = track_recordings([tmp_path], band_hz=(500.0, 1500.0))
+    track = track_recordings([tmp_path], TrackSettings(band_hz=(500.0, 1500.0)))
     assert track.x_name == "time_h"
     placed = {row["file"][-23:]: row["x"] for row in track.scalars()["recordings"]}
     assert sorted(x for x in placed.values() if x is not None) == [0.0, 1.0, 2.0, 3.0]

@@ -100,9 +100,9 @@ def test_a_gap_is_a_gap_in_every_file_with_times(tmp_path, monkeypatch, write, l
 def test_what_a_rate_is_in_doubt_by_crf_is_too():
     from dataclasses import replace
 
+    from asperity.monitoring.judgement import judge
     from asperity.monitoring.reading import Reading
     from asperity.monitoring.target import search_target
-    from asperity.monitoring.track import judge
     from asperity.paper import RigSettings, simulate_rig
 
     rig = simulate_rig(RigSettings(samples=6, repeats=1, duration_s=10.0))

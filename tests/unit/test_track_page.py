@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.monitoring import track_recordings
+from asperity.monitoring import TrackSettings, track_recordings
 from asperity.report.style import ON_PAGE
 from asperity.report.track.exhibits import levels, trend
 from asperity.report.track.page import NEXT, render_track_page
@@ -24,7 +24,7 @@ def failing(tmp_path_factory):
         values = level * np.random.default_rng(number).standard_normal(2000)
         name = f"2024.01.{1 + number // 24:02}.{number % 24:02}.00.00.npz"
         np.savez(folder / name, acc=values, fs=20e3, unit="m/s^2")
-    return track_recordings([folder], band_hz=BAND)
+    return track_recordings([folder], TrackSettings(band_hz=BAND))
 
 
 def acted(track):
@@ -38,7 +38,7 @@ def test_who_must_act_reads_what_since_when_how_sure_and_what_next(failing):
     said = acted(failing)
     assert list(said) == ["What", "Since", "Last heard", "Severity", "How sure", "What next"]
     assert re.fullmatch(
-        r"The level \(rms\) rose to [\d.]+ times what it was since [\d.]+ h\.", said["What"]
+        r"The level \(rms\) rose to [\d.]+ times its baseline since [\d.]+ h\.", said["What"]
     )
     first = failing.recordings[failing.alarm.since]
     assert first.reading.started.replace("T", " ") in said["Since"]

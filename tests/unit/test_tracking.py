@@ -10,16 +10,16 @@ import pytest
 from asperity.case import load_case
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.coupling import search_band
-from asperity.monitoring import recordings_in, search_target, track_recordings
+from asperity.monitoring import TrackSettings, recordings_in, search_target, track_recordings
 from asperity.monitoring.files import read_table
+from asperity.monitoring.judgement import judge
 from asperity.monitoring.reading import (
     common_spacing,
+    pack_reading,
     read_spectrum,
-    reading_bytes,
-    reading_from,
     segment_length,
+    unpack_reading,
 )
-from asperity.monitoring.track import judge
 from asperity.recording import ReadOptions
 
 RATE = 20e3
@@ -100,8 +100,8 @@ def test_lines_are_as_fine_as_the_records_are_long(tmp_path):
 
 def test_a_reading_is_kept_in_full(tmp_path):
     readings = read_spectrum(record(tmp_path / "a.npz", 1), ReadOptions(), TARGET, 4.0)
-    packed = reading_bytes(readings)
-    again = reading_from(packed, "kept")
+    packed = pack_reading(readings)
+    again = unpack_reading(packed, "kept")
     assert np.array_equal(again.spectrum.density, readings.spectrum.density)
     assert np.array_equal(again.spectrum.frequency_hz, readings.spectrum.frequency_hz)
     assert np.array_equal(again.velocity, readings.velocity, equal_nan=True)
@@ -109,22 +109,22 @@ def test_a_reading_is_kept_in_full(tmp_path):
         readings, spectrum=None, velocity=0.0
     )
     with pytest.raises(UnreadableFile, match="read again"):
-        reading_from(packed[:500], "kept")
+        unpack_reading(packed[:500], "kept")
     with pytest.raises(UnreadableFile, match="kept is damaged"):
-        reading_from(packed[:500] + b"x" + packed[501:], "kept")
+        unpack_reading(packed[:500] + b"x" + packed[501:], "kept")
 
 
 def test_processes_read_what_one_alone_reads(tmp_path, monkeypatch):
     files = [record(tmp_path / f"{k}.npz", k, f0=2500.0 + 100.0 * k) for k in range(7)]
     alone = track_recordings(files, case=CASE)
-    monkeypatch.setattr("asperity.monitoring.reading.WORTH_A_POOL", 0)
-    together = track_recordings(files, case=CASE, workers=2)
+    monkeypatch.setattr("asperity.monitoring.reading.MIN_POOL_BYTES", 0)
+    together = track_recordings(files, TrackSettings(workers=2), case=CASE)
     assert together.scalars() == alone.scalars()
 
 
 def test_recordings_far_quieter_than_the_series_are_off(tmp_path):
     files = [record(tmp_path / f"{k}.npz", k, level=0.02 if k == 3 else 1.0) for k in range(7)]
-    track = track_recordings(files, case=CASE, method="likelihood")
+    track = track_recordings(files, TrackSettings(method="likelihood"), case=CASE)
     reasons = [one.resonance.reason for one in track.recordings]
     assert "machine was off" in reasons[3]
     assert [one.resonance.found for one in track.recordings].count(False) == 1
@@ -132,7 +132,7 @@ def test_recordings_far_quieter_than_the_series_are_off(tmp_path):
 
 def test_another_sampling_rate_is_left_out_and_said(tmp_path):
     files = [record(tmp_path / f"{k}.npz", k, rate=25e3 if k == 2 else RATE) for k in range(7)]
-    track = track_recordings(files, case=CASE, method="likelihood")
+    track = track_recordings(files, TrackSettings(method="likelihood"), case=CASE)
     assert (
         "sampled at 25000 Hz where the series has 20000 Hz" in track.recordings[2].resonance.reason
     )
@@ -141,7 +141,7 @@ def test_another_sampling_rate_is_left_out_and_said(tmp_path):
 
 def test_rates_that_differ_by_a_clocks_drift_are_one_series(tmp_path):
     files = [record(tmp_path / f"{k}.npz", k, rate=RATE + 0.01 * k) for k in range(7)]
-    track = track_recordings(files, case=CASE, method="likelihood")
+    track = track_recordings(files, TrackSettings(method="likelihood"), case=CASE)
     assert track.resonance_count == 7
 
 
@@ -181,27 +181,28 @@ def test_few_recordings_are_taken_one_by_one_and_that_is_said(tmp_path):
     track = track_recordings([record(tmp_path / "a.npz", 1)], case=CASE)
     assert (track.method, track.resonance_count) == ("modes", 0)
     assert re.search(
-        r"a line at (2\d|30)\d\d Hz stands out, but one spectrum cannot tell", track.verdict()
+        r"a line at (2\d|30)\d\d Hz stands out, but a single spectrum cannot separate",
+        track.verdict(),
     )
     assert any("needs 6 recordings and has 1" in note for note in track.notes)
     trusted = (
-        track_recordings([tmp_path / "a.npz"], case=CASE, method="likelihood")
+        track_recordings([tmp_path / "a.npz"], TrackSettings(method="likelihood"), case=CASE)
         .recordings[0]
         .resonance
     )
     assert trusted.crf_hz == pytest.approx(3000.0, rel=0.01)
-    row = track_recordings([tmp_path / "a.npz"], case=CASE, method="likelihood").scalars()[
-        "recordings"
-    ][0]
+    row = track_recordings(
+        [tmp_path / "a.npz"], TrackSettings(method="likelihood"), case=CASE
+    ).scalars()["recordings"][0]
     assert (
         row["damping_ratio"]
         == trusted.damping_ratio
         == pytest.approx(0.02, abs=4.0 * row["damping_std"])
     )
     assert 0.0 < row["damping_std"] < 0.004
-    peak = track_recordings([tmp_path / "a.npz"], case=CASE, method="peak").scalars()["recordings"][
-        0
-    ]
+    peak = track_recordings(
+        [tmp_path / "a.npz"], TrackSettings(method="peak"), case=CASE
+    ).scalars()["recordings"][0]
     assert (peak["damping_ratio"], peak["damping_std"]) == (None, None)
     with pytest.raises(BadInput, match="x needs one value for each of 1"):
         track_recordings([tmp_path / "a.npz"], case=CASE, x=[1.0, 2.0])

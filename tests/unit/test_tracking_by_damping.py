@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from asperity.core.errors import BadInput
-from asperity.monitoring import track_recordings
+from asperity.monitoring import TrackSettings, track_recordings
 from asperity.report.track.page import render_track_page
 
 RATE, F0, SECONDS = 20e3, 3000.0, 8.0
@@ -38,7 +38,9 @@ def series(tmp_path_factory):
 @pytest.fixture(scope="module")
 def track(series):
     return track_recordings(
-        series, band_hz=(2e3, 4e3), x=PLACES, method="likelihood", stages_from="damping"
+        series,
+        TrackSettings(band_hz=(2e3, 4e3), method="likelihood", stages_from="damping"),
+        x=PLACES,
     )
 
 
@@ -58,14 +60,16 @@ def test_what_decides_has_labels_and_alarm(track, series):
     assert track.stages is track.stages_by["damping"]
     assert track.recordings[-1].label == "severe"
     assert track.alarm.state in ("alert", "alarm")
-    plain = track_recordings(series, band_hz=(2e3, 4e3), x=PLACES, method="likelihood")
+    plain = track_recordings(
+        series, TrackSettings(band_hz=(2e3, 4e3), method="likelihood"), x=PLACES
+    )
     assert plain.stages is plain.stages_by["crf"]
     assert plain.alarm.state == "none"
     assert {one.label for one in plain.recordings} == {"none"}
     rows = dict(track.stage_rows())
     assert set(rows) == {
         "stage by CRF",
-        "stage by damping, which decides",
+        "stage by damping (deciding)",
         "stage by CRF and damping",
     }
 
@@ -103,18 +107,18 @@ def test_the_trend_has_a_drawing_of_its_own_for_telephones(track):
 
 def test_a_method_without_a_width_determines_no_damping(series):
     track = track_recordings(
-        series, band_hz=(2e3, 4e3), x=PLACES, method="peak", stages_from="both"
+        series, TrackSettings(band_hz=(2e3, 4e3), method="peak", stages_from="both"), x=PLACES
     )
     assert {one.damping_reason for one in track.recordings} == {"the method peak fits no width"}
     assert track.stages.kind == "too few"
     assert track.verdict().startswith(
-        "Cannot tell: none of the last 3 recordings show what decides"
+        "Cannot tell: no deciding indicator found in the last 3 recordings"
     )
     assert "Too few points: " in track.verdict()
     assert np.isnan([one.severe_probability for one in track.recordings]).all()
     assert track.alarm.state == "cannot-tell"
     assert any(
-        "not determined of 12 of 12 resonances: the method peak" in note for note in track.notes
+        "not determined for 12 of 12 resonances: the method peak" in note for note in track.notes
     )
     page = render_track_page(track)
     assert page.count("not determined</td>") >= 12
@@ -130,7 +134,9 @@ def test_a_method_without_a_width_determines_no_damping(series):
 )
 def test_a_line_as_narrow_as_the_spectrum_is_not_taken_for_damping(tmp_path, ratio, said):
     path = record(tmp_path / "narrow.npz", 1, ratio, seconds=2.0)  # 18 and 3 Hz wide
-    one = track_recordings([path], band_hz=(2e3, 4e3), method="likelihood").recordings[0]
+    one = track_recordings(
+        [path], TrackSettings(band_hz=(2e3, 4e3), method="likelihood")
+    ).recordings[0]
     assert one.resonance.found
     assert said in one.damping_reason
     assert one.row()["damping_ratio"] is None
@@ -138,4 +144,4 @@ def test_a_line_as_narrow_as_the_spectrum_is_not_taken_for_damping(tmp_path, rat
 
 def test_an_unknown_source_is_refused(series):
     with pytest.raises(BadInput, match="crf, damping, both, got 'width'"):
-        track_recordings(series[:1], band_hz=(2e3, 4e3), stages_from="width")
+        track_recordings(series[:1], TrackSettings(band_hz=(2e3, 4e3), stages_from="width"))

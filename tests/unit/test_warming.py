@@ -15,7 +15,7 @@ from benchmarks.alarms import (
 from benchmarks.alarms import warm_up as drawn_warm_up
 
 from asperity.monitoring.alarm import Warming
-from asperity.trend import MonitoredSeries, warm_up, warming
+from asperity.trend import warm_up, warming
 
 
 def test_a_warm_up_is_measured_as_it_was_made():
@@ -84,12 +84,14 @@ def test_what_a_warm_up_explains_is_excused_and_what_comes_on_top_is_not():
     crf = 1.0 - 0.1 * left + 0.002 * rng.standard_normal(NUMBER.size)
     level = -0.5 * left + 0.05 * rng.standard_normal(NUMBER.size)
     warming = Warming(NUMBER, [watched("CRF", crf, True)], [watched(RMS, level, False)], "h")
-    assert warming.said(39).startswith("this looks like a warm-up: CRF rose by 10")
-    assert warming.excuses(39, "CRF") == warming.excuses(39, RMS) == warming.said(39)
+    assert warming.explanation(39).startswith("this looks like a warm-up: CRF rose by 10")
+    assert warming.excuses(39, "CRF") == warming.excuses(39, RMS) == warming.explanation(39)
     assert warming.excuses(39, "kurtosis") == ""
     worn = crf + 0.04 * (NUMBER > 34)
     assert (
-        Warming(NUMBER, [watched("CRF", worn, True)], [watched(RMS, level, False)], "h").said(39)
+        Warming(
+            NUMBER, [watched("CRF", worn, True)], [watched(RMS, level, False)], "h"
+        ).explanation(39)
         == ""
     )
     assert judged(drawn_warm_up(np.random.default_rng([11, 1]))).state == "none"

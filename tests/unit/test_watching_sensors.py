@@ -4,6 +4,7 @@ import json
 import shutil
 import sqlite3
 from contextlib import closing
+from dataclasses import fields
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -11,14 +12,16 @@ import pytest
 
 from asperity.core.errors import BadInput
 from asperity.monitoring import (
+    TrackSettings,
+    WatchSettings,
     acknowledge_in,
     keep_track,
     store_overview,
     track_recordings,
     watch_folder,
 )
-from asperity.monitoring.series_state import learned_bytes, learned_from
-from asperity.monitoring.simultaneous import Heard, by_time
+from asperity.monitoring.series_state import pack_shared, unpack_shared
+from asperity.monitoring.simultaneous import TimedRecording, match_times
 from asperity.recording import ReadOptions
 from support.heard import BAND, RATE, TRUTH, hears
 
@@ -53,15 +56,22 @@ def arrive(machine, folder, *names):
             shutil.copy(beside, folder)
 
 
-def looking(tmp_path, **asked):
-    asked = {
-        "band_hz": BAND,
-        "every_s": 0.0,
-        "settle_s": 0.0,
+def looking(tmp_path, table=None, **changes):
+    names = {field.name for field in fields(TrackSettings)}
+    tracking = {"band_hz": BAND} | {k: v for k, v in changes.items() if k in names}
+    watching = {
+        "poll_interval_s": 0.0,
+        "settle_time_s": 0.0,
         "machine": "rig",
         "point": "ring",
-    } | asked
-    return watch_folder(tmp_path / "in", tmp_path / "out", **asked)
+    } | {k: v for k, v in changes.items() if k not in names}
+    return watch_folder(
+        tmp_path / "in",
+        tmp_path / "out",
+        TrackSettings(**tracking),
+        WatchSettings(**watching),
+        table=table,
+    )
 
 
 def held(tmp_path, query):
@@ -83,19 +93,19 @@ def test_channels_are_judged_as_track_judges_them_and_kept_by_their_names(machin
     arrive(machine, tmp_path / "in", "8")
     last = next(looks)
     looks.close()
-    tracked = track_recordings([tmp_path / "in"], channel="a,b", band_hz=BAND)
+    tracked = track_recordings([tmp_path / "in"], TrackSettings(channel="a,b", band_hz=BAND))
     assert [reading.sensor for reading in last.new] == ["a", "b"]
     assert (len(first.track.recordings), crf(last.track)) == (8, crf(tracked))
     assert last.track.verdict() == tracked.verdict()
-    assert "The line was heard on a and b in 9." in last.track.verdict()
+    assert "The line was detected on a and b in 9." in last.track.verdict()
     assert held(tmp_path, PER_SENSOR) == [("a", 9), ("b", 9)]
     rms = held(tmp_path, "SELECT sensor, rms FROM trend WHERE file LIKE '%/0.npz' ORDER BY sensor")
     own = tracked.recordings[0].on_sensors
     assert rms == [(name, pytest.approx(own[name].reading.quality.rms)) for name in "ab"]
-    again = next(looking(tmp_path, channel="a,b", once=True, recall=True))
-    assert (again.track, again.said) == (
+    again = next(looking(tmp_path, channel="a,b", once=True, reuse_judgement=True))
+    assert (again.track, again.judgement) == (
         None,
-        json.loads(json.dumps(last.track.scalars(every_way=False))),
+        json.loads(json.dumps(last.track.scalars(all_sources=False))),
     )
     kept = keep_track(
         tracked,
@@ -119,7 +129,7 @@ def test_files_of_sensors_are_laid_beside_one_another_as_they_arrive(machine, tm
     next(looks)
     arrive(machine, tmp_path / "in", "b8", "b7")
     last = next(looks).track
-    tracked = track_recordings([tmp_path / "in"], band_hz=BAND)
+    tracked = track_recordings([tmp_path / "in"], TrackSettings(band_hz=BAND))
     assert [one.x for one in last.recordings] == pytest.approx(
         [24.0 * number for number in range(9)]
     )
@@ -149,8 +159,8 @@ def test_a_recording_that_cannot_be_laid_beside_others_waits_and_is_told(machine
     update = next(looks)
     assert len(update.track.recordings) == 1
     assert [sentence.partition(";")[0] for sentence in update.failed] == [
-        "a1.npz waits: it does not say of which sensor it is, and others do",
-        "b1.npz waits: it does not say when it began, and sensors are laid beside one another by that",
+        "a1.npz waits: it does not name its sensor, and others do",
+        "b1.npz waits: it does not state its start, and sensors are matched by time",
     ]
     arrive(machine, tmp_path / "in", "a1", "b1")
     update = next(looks)
@@ -188,8 +198,8 @@ def test_a_sensor_of_which_nothing_comes_any_more_is_told(machine, tmp_path):
         *(f"b{number}" for number in range(6)),
     )
     update = next(looking(tmp_path))
-    assert "Of sensor b nothing has come with the last 3 recordings." in update.track.verdict()
-    assert "The line was heard on a and b in 6, on a in 3." in update.track.verdict()
+    assert "Sensor b has delivered nothing with the last 3 recordings." in update.track.verdict()
+    assert "The line was detected on a and b in 6, on a in 3." in update.track.verdict()
 
 
 def test_a_copy_does_not_end_a_watch(machine, tmp_path):
@@ -197,7 +207,8 @@ def test_a_copy_does_not_end_a_watch(machine, tmp_path):
     shutil.copy(tmp_path / "in" / "a1.npz", tmp_path / "in" / "b1.npz")
     update = next(looking(tmp_path))
     assert (
-        "Sensor b is of no use in 1 of 2: it holds the same samples as a." in update.track.verdict()
+        "Sensor b is not usable in 1 of 2: it holds the same samples as a."
+        in update.track.verdict()
     )
 
 
@@ -221,11 +232,11 @@ def test_an_alarm_is_that_of_all_told_once_and_acknowledged_once(tmp_path):
     class Somebody:
         name = "somebody"
 
-        def call(self, said):
+        def send(self, said):
             told.append((said["state"], said["sensor"], said["raised_by"]))
 
     louder(tmp_path / "in", 0, 20, 0.3)
-    looks = looking(tmp_path, channel="a,b", call=[Somebody()])
+    looks = looking(tmp_path, channel="a,b", notifiers=[Somebody()])
     assert next(looks).track.alarm.state == "alarm"
     assert told == [("alarm", "a, b", "the level (rms) on b")]
     store = tmp_path / "out" / "asperity.db"
@@ -242,58 +253,58 @@ def test_an_alarm_is_that_of_all_told_once_and_acknowledged_once(tmp_path):
 def test_further_recordings_are_judged_beside_what_the_series_has_shown(
     machine, tmp_path, monkeypatch
 ):
-    from asperity.monitoring import series_state as learned
+    from asperity.monitoring import series_state
 
-    monkeypatch.setattr(learned, "WHOLE", 6)
+    monkeypatch.setattr(series_state, "ALWAYS_RELEARNED", 6)
     arrive(machine, tmp_path / "in", *"01234567")
     looks = looking(tmp_path, channel="a,b")
     next(looks)
-    monkeypatch.setattr(learned, "learn_sensors", lambda *_, **__: pytest.fail("learned anew"))
+    monkeypatch.setattr(series_state, "learn_sensors", lambda *_, **__: pytest.fail("learned anew"))
     arrive(machine, tmp_path / "in", "8")
     beside = next(looks).track
     looks.close()
     resumed = next(looking(tmp_path, channel="a,b", once=True)).track  # by what the store holds
     monkeypatch.undo()
-    tracked = track_recordings([tmp_path / "in"], channel="a,b", band_hz=BAND)
+    tracked = track_recordings([tmp_path / "in"], TrackSettings(channel="a,b", band_hz=BAND))
     std = [one.resonance.crf_std for one in tracked.recordings]
     assert np.max(np.abs(np.subtract(crf(beside), crf(tracked))) / std) < 0.5
     assert crf(resumed) == pytest.approx(crf(beside), rel=1e-4)
     assert [[*one.on_sensors] for one in beside.recordings] == [["a", "b"]] * 9
-    assert all(one.on_sensors["b"].hears for one in beside.recordings)
+    assert all(one.on_sensors["b"].detects for one in beside.recordings)
 
 
 def test_what_was_learned_of_sensors_is_kept_whole(machine, tmp_path):
     arrive(machine, tmp_path / "in", *"01234567")
     next(looking(tmp_path, channel="a,b", once=True))
     ((body,),) = held(tmp_path, "SELECT body FROM learned")
-    back = learned_from(body, 3)
+    back = unpack_shared(body, 3)
     assert (back.since, [*back.shared.by_sensor]) == (3, ["a", "b"])
     assert back.shared.agreement.established == ("a", "b")
-    assert learned_bytes(back.shared) == body
-    assert learned_from(body[:-40], 3).shared is None
+    assert pack_shared(back.shared) == body
+    assert unpack_shared(body[:-40], 3).shared is None
 
 
 def test_a_sensor_that_somebody_named_has_no_others(machine, tmp_path):
     arrive(machine, tmp_path / "in", "a0", "b0")
     with pytest.raises(
-        BadInput, match="these recordings are of the sensors a, b, got sensor c; leave it out"
+        BadInput, match="these recordings belong to the sensors a, b, got sensor c; omit the sensor"
     ):
         next(looking(tmp_path, sensor="c"))
     with pytest.raises(
-        BadInput, match="channels are sensors of their own, got sensor c; leave it out"
+        BadInput, match="each channel is a sensor of its own, got sensor c; omit the sensor"
     ):
         looking(tmp_path, sensor="c", channel="a,b")
 
 
 def test_what_has_no_time_stands_where_the_one_before_does():
     hour = timedelta(hours=1)
-    laid = by_time(
+    laid = match_times(
         [
-            Heard("a0", "a", START, 60.0),
-            Heard("cut", "", None, np.nan),
-            Heard("a1", "a", START + hour, 60.0),
-            Heard("b0", "b", START + timedelta(seconds=29), 60.0),
-            Heard("b1", "b", START + hour + timedelta(seconds=31), 60.0),
+            TimedRecording("a0", "a", START, 60.0),
+            TimedRecording("cut", "", None, np.nan),
+            TimedRecording("a1", "a", START + hour, 60.0),
+            TimedRecording("b0", "b", START + timedelta(seconds=29), 60.0),
+            TimedRecording("b1", "b", START + hour + timedelta(seconds=31), 60.0),
         ]
     )
     assert [(one.x, one.number) for one in laid[:4]] == [(0.0, 0), (0.0, 0), (1.0, 1), (0.0, 0)]
@@ -304,16 +315,18 @@ def test_what_has_no_time_stands_where_the_one_before_does():
 
 def test_recordings_end_to_end_are_laid_beside_those_made_at_the_time():
     begin = [START + timedelta(seconds=10 * number) for number in range(8)]
-    a = [Heard(f"a{number}", "a", time, 10.0) for number, time in enumerate(begin)]
+    a = [TimedRecording(f"a{number}", "a", time, 10.0) for number, time in enumerate(begin)]
     b = [
-        Heard(f"b{number}", "b", time - timedelta(milliseconds=1), 10.0)
+        TimedRecording(f"b{number}", "b", time - timedelta(milliseconds=1), 10.0)
         for number, time in enumerate(begin)
     ][1:]
-    laid = by_time([*a, *b])
+    laid = match_times([*a, *b])
     assert [one.number for one in laid[:8]] == list(range(8))
     assert [one.number for one in laid[8:]] == list(range(1, 8))
 
 
 def test_what_begins_at_one_time_is_one_however_long_it_is():
-    laid = by_time([Heard("a", "a", START, np.nan), Heard("b", "b", START, np.nan)])
+    laid = match_times(
+        [TimedRecording("a", "a", START, np.nan), TimedRecording("b", "b", START, np.nan)]
+    )
     assert laid[0] == laid[1]

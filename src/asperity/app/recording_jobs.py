@@ -11,7 +11,14 @@ from asperity.app.contact_jobs import Ticket
 from asperity.case import Case
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.monitoring import Track, TrackedRecording, track_recordings, watch_folder
+from asperity.monitoring import (
+    Track,
+    TrackedRecording,
+    TrackSettings,
+    WatchSettings,
+    track_recordings,
+    watch_folder,
+)
 
 MOST_LINES = 600  # of a spectrum that is drawn
 MOST_ROWS = 400  # recordings of a waterfall
@@ -70,11 +77,8 @@ def hear_files(ticket: Ticket, paths: Sequence[Path], stated: Stated, case: Case
     try:
         track = track_recordings(
             paths,
+            TrackSettings(**stated._asdict()),
             case=case,
-            band_hz=stated.band_hz,
-            rate_hz=stated.rate_hz,
-            unit=stated.unit,
-            channel=stated.channel,
         )
     except BadInput as refusal:
         raise BadInput(_on_the_page(str(refusal))) from None
@@ -92,13 +96,9 @@ def hear_folder(
     looks = watch_folder(
         folder,
         memory,
+        TrackSettings(**stated._asdict()),
+        WatchSettings(once=True, settle_time_s=SETTLE_S),
         case=case,
-        band_hz=stated.band_hz,
-        rate_hz=stated.rate_hz,
-        unit=stated.unit,
-        channel=stated.channel,
-        once=True,
-        settle_s=SETTLE_S,
     )
     try:
         update = next(looks)

@@ -1,4 +1,4 @@
-"""What foretells a series: the emulator, built or taken, and who is asked with it."""
+"""Forecaster of a series for `track` and `watch`, and its emulator."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
     from asperity.inference import Emulator, Follower, Setting
     from asperity.study import StudyProgress
 
-EMULATING = "the emulator's contacts; once for a case, and kept ..."
+EMULATING = "solving contacts for the emulator; once per case ..."
 
 
 def require_forecast(forecast: str | None, **only_with: object) -> None:
-    """BadInput for what is only of use with a forecast, without one."""
-    reasons = {"worn": "says how Sq is expected to drift", "emulator": "is what foretells a series"}
+    """Raise BadInput for options that need `--forecast`."""
+    reasons = {"worn": "is the prior for the drift of Sq", "emulator": "is used for forecasts"}
     for name, given in only_with.items():
         if given is not None and forecast is None:
-            raise BadInput(f"--{name} {reasons[name]}; give --forecast, too")
+            raise BadInput(f"--{name} {reasons[name]}; add --forecast")
 
 
-def follower(
+def series_forecaster(
     forecast: str | None,
     case_file: Path | None,
     worn: Path | None,
@@ -34,13 +34,13 @@ def follower(
     workers: int,
     quiet: bool,
 ) -> "Follower | None":
-    """Who foretells a series that is tracked or watched; None where nobody asked."""
+    """Build the forecaster of a tracked or watched series; None without `--forecast`."""
     require_forecast(forecast, worn=worn, emulator=emulator)
     if forecast is None:
         return None
     contact = contact_at(case_file)
     if not isinstance(contact, case.Case):
-        raise BadInput("--forecast needs the contact; give --case CASE.toml of one contact")
+        raise BadInput("--forecast needs a contact; give --case CASE.toml of a single contact")
     setting = inference.setting_of(contact)
     limit = inference.read_limit(forecast, setting)
     inference.require_limit(setting, limit, worn=worn is not None)
@@ -51,21 +51,21 @@ def follower(
 
 
 def emulated(setting: "Setting", folder: Path | None, workers: int, *, quiet: bool) -> "Emulator":
-    """The emulator, and on a terminal how far it is."""
+    """Build or load the emulator, with progress on a terminal."""
     with contacts_solved(quiet=quiet) as step:
         return inference.build_emulator(setting, folder=folder, workers=workers, progress=step)
 
 
 @contextmanager
 def contacts_solved(*, quiet: bool) -> "Iterator[Callable[[StudyProgress], None]]":
-    """Count an emulator's contacts on a terminal as they are solved."""
+    """Show the count of an emulator's contacts on a terminal as they are solved."""
     with progress("emulator", EMULATING, quiet=quiet) as display:
 
         def step(state: "StudyProgress") -> None:
             left = state.seconds_left
-            rest = "" if left is None else f", {left:.0f} s left"
+            remaining = "" if left is None else f", {left:.0f} s left"
             display(
-                f"{state.kept + state.done} of {state.total} contacts{rest}",
+                f"{state.kept + state.done} of {state.total} contacts{remaining}",
                 state.kept + state.done,
                 state.total,
             )

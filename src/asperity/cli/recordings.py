@@ -1,7 +1,7 @@
 """`asperity check`, `track` and `watch`: measured recordings, from files to a verdict."""
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -11,7 +11,7 @@ import typer
 from asperity import monitoring, recording, report, trend
 from asperity.cli import options
 from asperity.cli.app import app
-from asperity.cli.forecast import follower
+from asperity.cli.forecast import series_forecaster
 from asperity.cli.options import AsJson, Quiet, contact_at, require_output
 from asperity.cli.output import Block, Row, columns, progress, show, span, table, text, written
 from asperity.core import files, processes
@@ -19,17 +19,21 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
-    from asperity.monitoring import CheckedRecording, Reading, RecordingChecks, Track, Update
+    from asperity.monitoring import (
+        CheckedRecording,
+        Reading,
+        RecordingChecks,
+        Track,
+        TrackSettings,
+        Update,
+    )
+    from asperity.recording import ReadOptions
     from asperity.resonance import SeriesMethod
     from asperity.trend import AlarmState, StageSource
 
-EXIT_CODES = {
-    "alarm": 3,
-    "cannot-tell": 4,
-    "blind": 5,
-}  # of the alarm's state; the others end with 0
+EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # by state of the alarm; otherwise 0
 PAGE = "report.html"
-IN_FULL = 4  # recordings that `check` shows with every fact
+MAX_DETAILED = 4  # recordings up to which `check` shows every fact
 
 
 @app.command()
@@ -42,7 +46,7 @@ def check(
         typer.Option(
             "--set",
             metavar="DIR",
-            help="Say whether a folder is a set of data that others can use.",
+            help="Check whether a folder is a complete data set for publication.",
         ),
     ] = None,
     rate: options.Rate = None,
@@ -54,16 +58,16 @@ def check(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Say what recordings hold: rate, unit, length, channels, gaps, clipping, offset, machine off, too short."""
+    """Check recordings: rate, unit, length, channels, gaps, clipping, offset, machine off."""
     if data_set is not None:
         if paths:
             raise BadInput(
-                f"--set {data_set} takes no recordings beside it; its {monitoring.STATED} names them"
+                f"--set {data_set} takes no other recordings; its {monitoring.STATED} names them"
             )
         _show_set(data_set, as_json=as_json, quiet=quiet)
         return
     if not paths:
-        raise BadInput("check takes recordings, or --set and the folder of a set of data; name one")
+        raise BadInput("check needs recordings, or --set and the folder of a data set")
     checks = monitoring.check_recordings(
         paths,
         case=contact_at(case_file),
@@ -74,18 +78,19 @@ def check(
         scale=scale,
     )
     if checks.checked or as_json:
-        in_full = (
-            [_in_full(checked) for checked in checks.checked]
-            if len(checks.checked) <= IN_FULL
+        detailed = (
+            [_details(checked) for checked in checks.checked]
+            if len(checks.checked) <= MAX_DETAILED
             else []
         )
         show(
             checks.verdict(),
             checks.scalars,
             [
-                f"  for a resonance {text('width_hz', checks.target.width_hz)} wide in {checks.target.source}"
+                f"  for a resonance {text('width_hz', checks.target.width_hz)} wide "
+                f"in {checks.target.source}"
             ],
-            *(in_full or [_in_lines(checks)]),
+            *(detailed or [_summary(checks)]),
             as_json=as_json,
             quiet=quiet,
         )
@@ -94,16 +99,16 @@ def check(
 
 
 def _show_set(folder: Path, *, as_json: bool, quiet: bool) -> None:
-    """What a folder lacks of a set, a line each; exit code 2 unless it is one."""
-    found = monitoring.check_set(folder)
-    lines = [f"  missing: {sentence}" for sentence in found.missing]
-    show(found.verdict(), lambda: found.scalars(), lines, as_json=as_json, quiet=quiet)
-    if not found.whole:
+    """Show what a data set lacks; exit code 2 unless it is complete."""
+    result = monitoring.check_set(folder)
+    lines = [f"  missing: {sentence}" for sentence in result.missing]
+    show(result.verdict(), lambda: result.scalars(), lines, as_json=as_json, quiet=quiet)
+    if not result.whole:
         raise typer.Exit(2)
 
 
-def _in_full(checked: "CheckedRecording") -> Block:
-    """Every fact of a recording, and who states it."""
+def _details(checked: "CheckedRecording") -> Block:
+    """Yield every fact of a recording with its source."""
     recording, quality = checked
     facts, state = recording.facts, "usable" if quality.usable else "NOT USABLE"
     values = checked.scalars()
@@ -130,8 +135,8 @@ def _in_full(checked: "CheckedRecording") -> Block:
     yield from (f"  fault: {fault}" for fault in quality.faults)
 
 
-def _in_lines(checks: "RecordingChecks") -> Block:
-    """A line a recording, and what was found wrong once."""
+def _summary(checks: "RecordingChecks") -> Block:
+    """Yield one row per recording, and each fault once."""
     selected = [quantity(key) for key in ("rate_hz", "duration_s", "rms")]
     rows: list[list[str]] = []
     holders: dict[str, list[str]] = {}
@@ -176,43 +181,53 @@ def track(
     page: options.Page = None,
     out: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="Write the table (.csv, .parquet) or all (.nc); repeat."),
+        typer.Option(
+            metavar="FILE", help="Write the table (.csv, .parquet) or all data (.nc); repeatable."
+        ),
     ] = None,
     workers: options.Workers = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Follow the contact resonance through a series of recordings: normal wear, severe wear, or no way to tell."""
+    """Track the contact resonance through recordings: stage of wear, alarm and forecast."""
     for path in (page, store):
         if path is not None:
             files.require_writable(path)
     for path in out or ():
         require_output(path, ".csv", ".parquet", ".nc")
-    count, stated = workers or processes.cores(), _as_read(rate, unit, channel, scale)
-    ahead = follower(forecast, case_file, worn, emulator, workers=count, quiet=quiet)
-    with _files_read("reading recordings ...", quiet=quiet) as step:
+    settings = _track_settings(
+        recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale),
+        workers,
+        band=band,
+        shaft=shaft,
+        method=method,
+        stages_from=stages_from,
+        false_alarms=false_alarms,
+        acknowledge=acknowledge,
+    )
+    forecaster = series_forecaster(
+        forecast, case_file, worn, emulator, workers=settings.workers, quiet=quiet
+    )
+    with _reading_progress("reading recordings ...", quiet=quiet) as step:
         tracked = monitoring.track_recordings(
             paths,
+            settings,
             case=contact_at(case_file),
-            band_hz=band,
-            **stated,
             table=table_file,
-            shaft_hz=shaft or None,
-            method=cast("SeriesMethod | None", method),
-            stages_from=cast("StageSource", stages_from),
-            false_alarm_rate=false_alarms,
-            acknowledge=acknowledge,
-            foreteller=ahead,
-            workers=count,
+            forecaster=forecaster,
             progress=step,
         )
     if store is not None:
-        read, names = (
-            recording.ReadOptions(**stated),
-            {"machine": machine, "point": point, "sensor": sensor},
+        tracked = monitoring.keep_track(
+            tracked,
+            store,
+            settings.read_options,
+            machine=machine,
+            point=point,
+            sensor=sensor,
+            acknowledge=acknowledge,
         )
-        tracked = monitoring.keep_track(tracked, store, read, acknowledge=acknowledge, **names)
-    kept = [*_write(tracked, out or (), page), *([] if store is None else [store])]
+    files_written = [*_write(tracked, out or (), page), *([] if store is None else [store])]
     hint = ["  Add --report track.html for the page, --out track.csv for the table."]
     show(
         tracked.verdict(),
@@ -220,12 +235,12 @@ def track(
             tracked.scalars()
             | {
                 "report": None if page is None else str(page),
-                "written": [str(path) for path in kept],
+                "written": [str(path) for path in files_written],
             }
         ),
         _series(tracked),
         _searched(tracked),
-        written("  Written", *kept) if kept else hint,
+        written("  Written", *files_written) if files_written else hint,
         as_json=as_json,
         quiet=quiet,
     )
@@ -236,24 +251,26 @@ def track(
 def watch(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder where recordings arrive.")],
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of results, else DIR/asperity-watch.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of results; default: DIR/asperity-watch."),
     ] = None,
     once: Annotated[
-        bool, typer.Option("--once", help="Take what is there, and end: for cron.")
+        bool, typer.Option("--once", help="Process the present recordings and end, for cron.")
     ] = False,
     every: Annotated[
-        float, typer.Option(metavar="SECONDS", min=0.05, help="Time between two looks.")
+        float,
+        typer.Option(metavar="SECONDS", min=0.05, help="Time between two looks into the folder."),
     ] = 5.0,
     settle: Annotated[
         float,
-        typer.Option(metavar="SECONDS", min=0.0, help="How long a file must have stayed as it is."),
+        typer.Option(metavar="SECONDS", min=0.0, help="Time for which a file must be unchanged."),
     ] = 2.0,
     expect: Annotated[
         float | None,
         typer.Option(
             metavar="SECONDS",
             min=0.0,
-            help="Blind, if none comes for so long; else 5 times the usual.",
+            help="Report blind without a recording for this time; default: 5 usual intervals.",
         ),
     ] = None,
     workers: options.Workers = None,
@@ -283,112 +300,137 @@ def watch(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Track recordings as they arrive in a folder, each read once; goes on where it was stopped. Ctrl-C ends it."""
-    kept = out if out is not None else folder / "asperity-watch"
-    count, stated = workers or processes.cores(), _as_read(rate, unit, channel, scale)
-    names: dict[str, Any] = {"store": store, "machine": machine, "point": point, "sensor": sensor}
-    pace: dict[str, Any] = {"once": once, "every_s": every, "settle_s": settle, "expect_s": expect}
-    ahead = follower(forecast, case_file, worn, emulator, workers=count, quiet=quiet)
-    with _files_read("watching ...", quiet=quiet) as step:
+    """Track recordings as they arrive in a folder, until Ctrl-C; a later watch continues it."""
+    results = out if out is not None else folder / "asperity-watch"
+    settings = _track_settings(
+        recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale),
+        workers,
+        band=band,
+        shaft=shaft,
+        method=method,
+        stages_from=stages_from,
+        false_alarms=false_alarms,
+        acknowledge=acknowledge,
+    )
+    watching = monitoring.WatchSettings(
+        store=store,
+        machine=machine,
+        point=point,
+        sensor=sensor,
+        notifiers=monitoring.notifiers(command=on_alarm, webhook=webhook, mqtt=mqtt),
+        notify_states=_states(tell),
+        reuse_judgement=(results / PAGE).is_file(),
+        once=once,
+        poll_interval_s=every,
+        settle_time_s=settle,
+        overdue_after_s=expect,
+    )
+    forecaster = series_forecaster(
+        forecast, case_file, worn, emulator, workers=settings.workers, quiet=quiet
+    )
+    with _reading_progress("watching ...", quiet=quiet) as step:
         updates = monitoring.watch_folder(
             folder,
-            kept,
+            results,
+            settings,
+            watching,
             case=contact_at(case_file),
-            band_hz=band,
-            **stated,
             table=table_file,
-            shaft_hz=shaft or None,
-            method=cast("SeriesMethod | None", method),
-            stages_from=cast("StageSource", stages_from),
-            false_alarm_rate=false_alarms,
-            acknowledge=acknowledge,
-            foreteller=ahead,
-            **names,
-            tell=_states(tell),
-            call=monitoring.callers(command=on_alarm, webhook=webhook, mqtt=mqtt),
-            recall=(kept / PAGE).is_file(),
-            **pace,
-            workers=count,
+            forecaster=forecaster,
             progress=step,
         )
-        state = _followed(updates, kept, once=once, as_json=as_json, quiet=quiet)
+        state = _show_updates(updates, results, once=once, as_json=as_json, quiet=quiet)
     _end(state)
 
 
-def _followed(
-    updates: "Iterator[Update]", kept: Path, *, once: bool, as_json: bool, quiet: bool
+def _track_settings(
+    read: "ReadOptions",
+    workers: int | None,
+    *,
+    band: tuple[float, float] | None,
+    shaft: list[float] | None,
+    method: str | None,
+    stages_from: str,
+    false_alarms: float,
+    acknowledge: str | None,
+) -> "TrackSettings":
+    """Build the settings of `track` and `watch` from the options that both commands share."""
+    return monitoring.TrackSettings(
+        rate_hz=read.rate_hz,
+        unit=read.unit,
+        channel=read.channel,
+        scale=read.scale,
+        band_hz=band,
+        shaft_hz=shaft or None,
+        method=cast("SeriesMethod | None", method),
+        stages_from=cast("StageSource", stages_from),
+        false_alarm_rate=false_alarms,
+        acknowledge=acknowledge,
+        workers=workers or processes.cores(),
+    )
+
+
+def _show_updates(
+    updates: "Iterator[Update]", results: Path, *, once: bool, as_json: bool, quiet: bool
 ) -> str:
-    """Write and show every update until Ctrl-C; the state of the last."""
+    """Write and show every update until Ctrl-C; return the state of the last."""
     state = "cannot-tell"
     try:
         for update in updates:
-            state = _written_and_shown(update, kept, as_json=as_json, quiet=quiet) or state
+            state = _show_update(update, results, as_json=as_json, quiet=quiet) or state
     except KeyboardInterrupt:
         if once:
             raise
-        print(
-            f"stopped; what was heard is in {kept}, and the next watch goes on from there",
-            file=sys.stderr,
-        )
+        print(f"stopped; results are in {results}, and the next watch continues", file=sys.stderr)
     return state
 
 
-def _as_read(
-    rate: float | None, unit: str | None, channel: str | None, scale: float | None
-) -> dict[str, Any]:
-    """How recordings are read, by the names of the library."""
-    return {"rate_hz": rate, "unit": unit, "channel": channel, "scale": scale}
-
-
 def _states(tell: str | None) -> "Sequence[AlarmState]":
-    """States of which somebody is told."""
+    """Return the states of `--tell`, all by default."""
     return trend.ALARM_STATES if tell is None else cast("Sequence[AlarmState]", tell.split(","))
 
 
 def _end(state: str) -> None:
-    """End with the code that the alarm's state has."""
+    """End with the exit code of the alarm's state."""
     if state in EXIT_CODES:
         raise typer.Exit(EXIT_CODES[state])
 
 
-def _written_and_shown(update: "Update", kept: Path, *, as_json: bool, quiet: bool) -> str | None:
-    """Write and show what an update says; the alarm's state, None without any recording."""
-    said = update.said or (None if update.track is None else update.track.scalars())
+def _show_update(update: "Update", results: Path, *, as_json: bool, quiet: bool) -> str | None:
+    """Write and show an update; return the alarm's state, None without any recording.
+
+    With `--json` each update is one JSON object on one line.
+    """
+    judgement = update.judgement or (None if update.track is None else update.track.scalars())
     if update.track is not None:
-        _write(update.track, [kept / "track.csv", kept / "track.nc"], kept / PAGE)
-    _show_update(update.new, said, update.waiting, kept, as_json=as_json, quiet=quiet)
-    for sentence in update.failed:
-        print(sentence, file=sys.stderr)
-    return None if said is None else str(said["alarm"]["state"])
-
-
-def _show_update(
-    new: "Sequence[Reading]",
-    said: Mapping[str, Any] | None,
-    waiting: int,
-    results: Path,
-    *,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    """One update of a watch: a JSON object a line, or a verdict with what is new."""
-    verdict = "Nothing to judge yet: no recording has arrived." if said is None else said["verdict"]
-    if waiting:
-        verdict += f" {waiting} more wait for the next look: they may still be written, or are not in the table yet."
-    values: dict[str, Any] = {"verdict": verdict} if said is None else dict(said)
-    arrived = [*dict.fromkeys(recording.file for recording in new)]
+        _write(update.track, [results / "track.csv", results / "track.nc"], results / PAGE)
+    verdict = "No recording has arrived yet." if judgement is None else judgement["verdict"]
+    if update.waiting:
+        verdict += (
+            f" {update.waiting} more wait: they may still be written, or are not in the table yet."
+        )
+    values: dict[str, Any] = {"verdict": verdict} if judgement is None else dict(judgement)
+    arrived = [*dict.fromkeys(recording.file for recording in update.new)]
     show(
         verdict,
-        lambda: {**values, "new": arrived, "waiting": waiting, "results": str(results)},
-        [] if said is None else _arrived(new, values["recordings"], results),
+        lambda: {
+            **values,
+            "new": arrived,
+            "waiting": update.waiting,
+            "results": str(results),
+        },
+        [] if judgement is None else _arrived(update.new, values["recordings"], results),
         as_json=as_json,
         quiet=quiet,
         a_line=True,
     )
+    for sentence in update.failed:
+        print(sentence, file=sys.stderr)
+    return None if judgement is None else str(judgement["alarm"]["state"])
 
 
 def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results: Path) -> Block:
-    rows = {one["file"]: row for row in recordings for one in (row, *row["sensors"].values())}
+    rows = {part["file"]: row for row in recordings for part in (row, *row["sensors"].values())}
     selected = [quantity(key) for key in ("crf_hz", "severe_probability")]
     for arrived in {reading.file: reading for reading in new}.values():
         row = rows.get(arrived.file)
@@ -407,12 +449,12 @@ def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results
 
 
 def _write(tracked: "Track", out: Sequence[Path], page: Path | None) -> list[Path]:
-    kept = [tracked.save(path) for path in out]
-    return kept if page is None else [*kept, report.write_track_report(tracked, page)]
+    saved = [tracked.save(path) for path in out]
+    return saved if page is None else [*saved, report.write_track_report(tracked, page)]
 
 
 def _series(tracked: "Track") -> Block:
-    """A row a recording, in the order of x."""
+    """Yield one row per recording, in the order of x."""
     selected = [quantity(key) for key in ("crf_hz", "crfa", "damping_ratio", "severe_probability")]
     rows = [
         [
@@ -439,10 +481,10 @@ def _searched(tracked: "Track") -> Block:
 
 
 @contextmanager
-def _files_read(doing: str, *, quiet: bool) -> "Iterator[Callable[[Reading], None]]":
-    """Count files on a terminal as they are read."""
+def _reading_progress(activity: str, *, quiet: bool) -> "Iterator[Callable[[Reading], None]]":
+    """Show the count of files on a terminal as they are read."""
     count = 0
-    with progress("recordings", doing, quiet=quiet) as display:
+    with progress("recordings", activity, quiet=quiet) as display:
 
         def step(recording: "Reading") -> None:
             nonlocal count

@@ -1,4 +1,4 @@
-"""`asperity store`: what a store of monitored machines holds."""
+"""`asperity store`: overview, export and acknowledgement of a store of monitored machines."""
 
 from pathlib import Path
 from typing import Annotated
@@ -17,28 +17,28 @@ from asperity.core.quantities import NO_VALUE
 def store(
     file: Annotated[
         Path,
-        typer.Argument(metavar="DB", help="The store of a watch or a track, such as asperity.db."),
+        typer.Argument(metavar="DB", help="Store of watch or track, such as asperity.db."),
     ],
     out: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FILE", help="Write every recording as a row (.parquet, .csv); may be repeated."
+            metavar="FILE", help="Write all recordings as rows (.parquet, .csv); repeatable."
         ),
     ] = None,
     acknowledge: Annotated[
         str | None,
-        typer.Option(metavar="MACHINE/POINT/SENSOR", help="Somebody has looked at it, up to now."),
+        typer.Option(metavar="MACHINE/POINT/SENSOR", help="Acknowledge this sensor's alarm."),
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Say where every machine, point and sensor of a store stands; the gravest decides the exit code."""
+    """Show the state of every sensor in a store; the most severe sets the exit code."""
     for path in out or ():
         require_output(path, ".csv", ".parquet")
     if acknowledge is not None:
         monitoring.acknowledge_in(file, acknowledge)
     overview = monitoring.store_overview(file)
-    kept = [overview.export(path) for path in out or ()]
+    exported = [overview.export(path) for path in out or ()]
     rows = [
         [
             *(row[name] for name in ("machine", "point", "sensor")),
@@ -51,11 +51,13 @@ def store(
     ]
     show(
         overview.verdict(),
-        lambda: overview.scalars() | {"written": [str(path) for path in kept]},
-        columns(["machine", "point", "sensor", "recordings", "state", "since", "why"], rows, left=3)
+        lambda: overview.scalars() | {"written": [str(path) for path in exported]},
+        columns(
+            ["machine", "point", "sensor", "recordings", "state", "since", "reason"], rows, left=3
+        )
         if rows
         else [],
-        written("  Written", *kept),
+        written("  Written", *exported),
         as_json=as_json,
         quiet=quiet,
     )

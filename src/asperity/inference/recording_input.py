@@ -12,7 +12,14 @@ from asperity.case import Case
 from asperity.coupling import search_band
 from asperity.inference.observations import Observation
 from asperity.inference.settings import LOAD, Setting
-from asperity.monitoring import ZERO_CELSIUS, Reading, Track, read_table, track_recordings
+from asperity.monitoring import (
+    ZERO_CELSIUS,
+    Reading,
+    Track,
+    TrackSettings,
+    read_table,
+    track_recordings,
+)
 from asperity.resonance import SeriesMethod
 from asperity.study import overrides_at
 
@@ -64,16 +71,18 @@ def listen(
     places = None if table is None else read_table(table)
     tracked = track_recordings(
         paths,
+        TrackSettings(
+            rate_hz=rate_hz,
+            unit=unit,
+            channel=channel,
+            scale=scale,
+            band_hz=band_hz or band_of(setting),
+            shaft_hz=shaft_hz,
+            method=method,
+            workers=workers,
+        ),
         case=setting.case,
-        band_hz=band_hz or band_of(setting),
-        rate_hz=rate_hz,
-        unit=unit,
-        channel=channel,
-        scale=scale,
         table=places,
-        shaft_hz=shaft_hz,
-        method=method,
-        workers=workers,
         progress=progress,
     )
     return observed(tracked, setting.case)

@@ -1,7 +1,6 @@
-"""What of a series is watched, and what a recording lets one see: from tracked recordings to their alarm.
+"""Alarm of a series: indicators, their relevant changes, and states between recordings.
 
-The test is left to `asperity.wear`; which indicators it is given, and from which change on it
-counts, is said here.
+`asperity.trend` holds the test; this module chooses the indicators and the least change of each.
 """
 
 from collections import Counter
@@ -19,13 +18,14 @@ from asperity.monitoring.operating_point import (
     DAMPING,
     LEVEL,
     PULSES,
-    Follows,
     Response,
+    ResponseExponents,
     conditions_of,
 )
 from asperity.monitoring.reading import Reading
 from asperity.monitoring.recording import TrackedRecording
-from asperity.monitoring.series_state import Before
+from asperity.monitoring.series_state import PreviousStates
+from asperity.monitoring.settings import TrackSettings
 from asperity.trend import (
     Alarm,
     AlarmChecks,
@@ -40,46 +40,48 @@ from asperity.trend import (
     warm_up,
 )
 
-CRF_LEAST = 0.05  # of itself: the asperities' load share up by a third, (1.05)^6
-DAMPING_LEAST = 0.2  # of its logarithm
-LEVEL_LEAST = float(np.log(2.0))  # 6 dB, which ISO 13373-1 takes for a change worth looking into
-BASELINE = 8  # recordings by which a CRF is counted from 1
-UNSEEN = 3  # recordings without a resonance, from which on nobody sees the contact
+CRF_LEAST = 0.05  # relative change of CRF: the asperities' load share up by a third, (1.05)^6
+DAMPING_LEAST = 0.2  # change of the logarithm of damping
+LEVEL_LEAST = float(np.log(2.0))  # 6 dB, a significant change according to ISO 13373-1
+BASELINE = 8  # recordings whose median CRF is the reference
+UNSEEN = 3  # consecutive recordings without a resonance from which the contact is not observed
 LAST = "last"
 KURTOSIS, CRF, RMS = "kurtosis", "CRF", "the level (rms)"
-LEFT = 0.4  # of the least change, which a warm-up may leave unexplained
+MAX_RESIDUAL = 0.4  # of the least change, that a warm-up may leave unexplained
 
 
 def raise_alarm(
     tracked: Sequence[TrackedRecording],
-    source: StageSource,
+    settings: TrackSettings,
     stages: Stages | None,
     stages_of: Callable[[Sequence[TrackedRecording]], Stages | None],
     *,
-    false_alarm_rate: float,
-    acknowledge: str | None = None,
-    before: Before | None = None,
+    previous: PreviousStates | None = None,
     unit: str = "",
     response: Response = ANY_CONTACT,
 ) -> Alarm:
-    """The alarm of a series, in agreement with its stages.
+    """Compute the alarm of a series, consistent with its stages.
 
     Parameters
     ----------
-    source : which indicators of the contact decide
-    stages, stages_of : of the whole series, and how to have them of a part
-    false_alarm_rate : alarms without wear, a recording
-    acknowledge : the recording up to which somebody has looked, by its name; "last" for all
-    before : what was said of these recordings before
-    response : how CRF may follow load, speed and temperature
+    settings : deciding indicator, false-alarm rate and acknowledged recording
+    stages, stages_of : stages of the whole series, and a function for a part of it
+    previous : states of these recordings from the judgement before
+    unit : unit of x
+    response : response of CRF to load, speed and temperature
 
     Raises
     ------
     BadInput
-        for a recording that is not there, or a rate that is none.
+        if the acknowledged recording does not exist, or the rate is invalid.
     """
-    contact, levels = _of_the_contact(tracked, source, response), _levels(tracked, response)
-    x = np.array([one.x for one in tracked])
+    source, acknowledge = settings.stages_from, settings.acknowledge
+    false_alarm_rate = settings.false_alarm_rate
+    contact, levels = (
+        _contact_indicators(tracked, source, response),
+        _level_indicators(tracked, response),
+    )
+    x = np.array([recording.x for recording in tracked])
     warming = Warming(x, contact, levels, unit)
     alarm = sequential_alarm(
         x,
@@ -92,21 +94,20 @@ def raise_alarm(
         ),
         acknowledged=_acknowledged(tracked, acknowledge),
         unit=unit,
-        history=_said(tracked, before),
+        history=_previous_states(tracked, previous),
     )
-    if (said_of := warming.said(len(tracked) - 1)) and acknowledge is None:
-        alarm = replace(alarm, explained="; ".join(filter(None, [alarm.explained, said_of])))
+    if (warm_up_note := warming.explanation(len(tracked) - 1)) and acknowledge is None:
+        alarm = replace(alarm, explained="; ".join(filter(None, [alarm.explained, warm_up_note])))
     elif stages is not None and stages.kind == "severe" and acknowledge is None:
+        rate = f"the set false-alarm rate (1 in {1.0 / false_alarm_rate:.0f})"
         alarm = alarm.with_alert(
-            "a severe stage is indicated, not yet significant at the set false-alarm rate "
-            f"(1 in {1.0 / false_alarm_rate:.0f} recordings)",
-            source,
+            f"a severe stage is indicated, not yet significant at {rate}", source
         )
     return _by_zone(tracked, _acknowledged(tracked, acknowledge), alarm)
 
 
 class Warming:
-    """A warm-up known by its shape, where nobody states the temperature that would tell it."""
+    """Detection of a warm-up by its shape, where the temperature is not stated."""
 
     def __init__(
         self,
@@ -115,45 +116,47 @@ class Warming:
         levels: Sequence[MonitoredSeries],
         unit: str,
     ) -> None:
-        crf = next((one for one in contact if one.name == CRF), None)
-        level = next((one for one in levels if one.name.startswith(RMS)), None)
+        crf = next((indicator for indicator in contact if indicator.name == CRF), None)
+        level = next((indicator for indicator in levels if indicator.name.startswith(RMS)), None)
         self.x, self.unit, self.crf, self.level = x, unit, crf, level
-        self.names = {CRF, *(one.name for one in levels if one.gain_dependent)}
-        stated = [] if crf is None else [one.name for one in crf.conditions]
+        self.names = {CRF, *(indicator.name for indicator in levels if indicator.gain_dependent)}
+        stated = [] if crf is None else [condition.name for condition in crf.conditions]
         self.known = crf is not None and level is not None and "temperature" not in " ".join(stated)
 
-    def said(self, number: int) -> str:
-        """That recordings up to one look like a warm-up; nothing where they do not."""
+    def explanation(self, number: int) -> str:
+        """Return a sentence if recordings up to `number` look like a warm-up, otherwise nothing."""
         if not self.known or self.crf is None or self.level is None:
             return ""
         upto = slice(number + 1)
         found = warm_up(self.x[upto], self.crf.values[upto], self.level.values[upto])
         if (
             found is None
-            or abs(found.residual[0]) > LEFT * CRF_LEAST
-            or abs(found.residual[1]) > LEFT * LEVEL_LEAST
+            or abs(found.residual[0]) > MAX_RESIDUAL * CRF_LEAST
+            or abs(found.residual[1]) > MAX_RESIDUAL * LEVEL_LEAST
         ):
             return ""
         length = f"{found.time_constant:.2g} {self.unit}".rstrip()
         return (
-            f"this looks like a warm-up: CRF {_moved(found.crf)} and {self.level.name} {_times(found.level)}, both by "
-            f"one exponential of length {length} from the beginning; state the oil's temperature to be sure"
+            f"this looks like a warm-up: CRF {_relative_change(found.crf)} and {self.level.name} "
+            f"{_ratio(found.level)}, time constant {length}; state the oil temperature to confirm"
         )
 
     def excuses(self, number: int, name: str) -> str:
-        """The same, of a change that it explains."""
-        return self.said(number) if name in self.names else ""
+        """Return the explanation of a change in an indicator that a warm-up affects."""
+        return self.explanation(number) if name in self.names else ""
 
 
-def _said(tracked: Sequence[TrackedRecording], before: Before | None) -> AlarmHistory:
-    if before is None:
+def _previous_states(
+    tracked: Sequence[TrackedRecording], previous: PreviousStates | None
+) -> AlarmHistory:
+    if previous is None:
         return AlarmHistory()
     states = {}
-    for number, one in enumerate(tracked):
-        for file in one.files:
-            if file in before.states:
-                states[number] = before.states[file]
-    return AlarmHistory(states, before.reason, before.raised_by)
+    for number, recording in enumerate(tracked):
+        for file in recording.files:
+            if file in previous.states:
+                states[number] = previous.states[file]
+    return AlarmHistory(states, previous.reason, previous.raised_by)
 
 
 def _severe(stages: Stages | None) -> bool:
@@ -161,12 +164,12 @@ def _severe(stages: Stages | None) -> bool:
 
 
 def at_reference(tracked: Sequence[TrackedRecording], response: Response) -> list[TrackedRecording]:
-    """Recordings with CRF and damping ratio as they would be at the load, speed and temperature of the first ones."""
+    """Reduce CRF and damping ratio to load, speed and temperature of the first recordings."""
     crf, damping = _crf(tracked, response), _damping(tracked, response)
     frequency = (
         np.full(len(tracked), np.nan)
         if crf is None
-        else _usual(tracked) * crf.at_baseline_conditions()[0]
+        else _reference_crf(tracked) * crf.at_baseline_conditions()[0]
     )
     ratio = (
         np.full(len(tracked), np.nan)
@@ -174,46 +177,49 @@ def at_reference(tracked: Sequence[TrackedRecording], response: Response) -> lis
         else np.exp(-damping.at_baseline_conditions()[0])
     )
     return [
-        replace(one, crf_reference_hz=float(hertz), damping_reference=float(share))
-        for one, hertz, share in zip(tracked, frequency, ratio, strict=True)
+        replace(recording, crf_reference_hz=float(hertz), damping_reference=float(share))
+        for recording, hertz, share in zip(tracked, frequency, ratio, strict=True)
     ]
 
 
-def weighed(tracked: Sequence[TrackedRecording], source: StageSource, response: Response) -> float:
-    """The weight of a severe stage against steps, cycles and scatter that remembers, which stages do not look at."""
+def severe_stage_weight(
+    tracked: Sequence[TrackedRecording], source: StageSource, response: Response
+) -> float:
+    """Weigh a severe stage against steps, cycles and correlated scatter, which stages neglect."""
     return knee_weight(
-        np.array([one.x for one in tracked]), _of_the_contact(tracked, source, response)
+        np.array([recording.x for recording in tracked]),
+        _contact_indicators(tracked, source, response),
     )
 
 
-def _usual(tracked: Sequence[TrackedRecording]) -> float:
-    crf = np.array([one.resonance.crf_hz for one in tracked])
+def _reference_crf(tracked: Sequence[TrackedRecording]) -> float:
+    crf = np.array([recording.resonance.crf_hz for recording in tracked])
     return float(np.median(crf[np.isfinite(crf)][:BASELINE]))
 
 
 def _conditions(
-    tracked: Sequence[TrackedRecording], follows: Follows, response: Response
+    tracked: Sequence[TrackedRecording], exponents: ResponseExponents, response: Response
 ) -> tuple[Condition, ...]:
-    return conditions_of([one.operating for one in tracked], follows, response.oil)
+    return conditions_of([recording.operating for recording in tracked], exponents, response.oil)
 
 
 def _crf(tracked: Sequence[TrackedRecording], response: Response) -> MonitoredSeries | None:
-    crf = np.array([one.resonance.crf_hz for one in tracked])
+    crf = np.array([recording.resonance.crf_hz for recording in tracked])
     if not np.isfinite(crf).any():
         return None
     return MonitoredSeries(
         name=CRF,
-        values=crf / _usual(tracked),
+        values=crf / _reference_crf(tracked),
         smallest_change=CRF_LEAST,
         contact=True,
-        describe=_moved,
+        describe=_relative_change,
         conditions=_conditions(tracked, response.crf, response),
         relative=True,
     )
 
 
 def _damping(tracked: Sequence[TrackedRecording], response: Response) -> MonitoredSeries | None:
-    ratio = np.array([one.damping[0] for one in tracked])
+    ratio = np.array([recording.damping[0] for recording in tracked])
     if not np.isfinite(ratio).any():
         return None
     return MonitoredSeries(
@@ -221,141 +227,163 @@ def _damping(tracked: Sequence[TrackedRecording], response: Response) -> Monitor
         values=-np.log(ratio),
         smallest_change=DAMPING_LEAST,
         contact=True,
-        describe=lambda by: _times(-by),
+        describe=lambda by: _ratio(-by),
         conditions=_conditions(tracked, DAMPING, response),
     )
 
 
-def _of_the_contact(
+def _contact_indicators(
     tracked: Sequence[TrackedRecording], source: StageSource, response: Response
 ) -> list[MonitoredSeries]:
     crf, damping = _crf(tracked, response), _damping(tracked, response)
     if source == "both" and (crf is None or damping is None):
         return []
     return [
-        one
-        for one in (crf if source != "damping" else None, damping if source != "crf" else None)
-        if one
+        indicator
+        for indicator in (
+            crf if source != "damping" else None,
+            damping if source != "crf" else None,
+        )
+        if indicator
     ]
 
 
-def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[MonitoredSeries]:
-    """Level and kurtosis of every recording of a running machine, on each sensor."""
-    sensors = dict.fromkeys(name for one in tracked for name in one.readings)
+def _level_indicators(
+    tracked: Sequence[TrackedRecording], response: Response
+) -> list[MonitoredSeries]:
+    """Return level and kurtosis of a running machine on each sensor, over the recordings."""
+    sensors = dict.fromkeys(name for recording in tracked for name in recording.readings)
     several = len(sensors) > 1
     return [
         level
         for sensor in sensors
-        for level in _levels_on(
+        for level in _levels_on_sensor(
             sensor if several else "",
-            [one.readings.get(sensor) for one in tracked],
+            [recording.readings.get(sensor) for recording in tracked],
             tracked,
             response,
         )
     ]
 
 
-def _levels_on(
+def _levels_on_sensor(
     sensor: str,
     readings: Sequence[Reading | None],
     tracked: Sequence[TrackedRecording],
     response: Response,
 ) -> list[MonitoredSeries]:
-    """What one sensor heard, in the unit that most of its recordings have; None where it has none."""
-    units = Counter(one.unit for one in readings if one is not None and one.quality is not None)
+    """Return the indicators of a sensor, from recordings in its most frequent unit."""
+    units = Counter(
+        reading.unit for reading in readings if reading is not None and reading.quality is not None
+    )
     if not units:
         return []
-    (usual, _), *_ = units.most_common(1)
+    (unit, _), *_ = units.most_common(1)
 
-    def logarithms(value: Callable[[Reading], float]) -> Field:
-        values = np.full(len(readings), np.nan)
-        for number, one in enumerate(readings):
-            quality = None if one is None else one.quality
-            if (
-                one is not None
-                and quality is not None
-                and not quality.dead
-                and one.unit == usual
-                and value(one) > 0.0
-            ):
-                values[number] = np.log(value(one))
-        return values
-
-    def quality_of(name: str) -> Callable[[Reading], float]:
-        return lambda one: float(getattr(one.quality, name))
-
-    def named(several: str, words: str) -> dict[str, Callable[[Reading], float]]:
+    def named(field: str, words: str) -> dict[str, Callable[[Reading], float]]:
         names = dict.fromkeys(
-            name for one in readings if one is not None for name in getattr(one, several)
+            name for reading in readings if reading is not None for name in getattr(reading, field)
         )
-        return {f"{words} {name}": _getter(several, name) for name in names}
+        return {f"{words} {name}": _getter(field, name) for name in names}
 
-    heard = {
-        RMS: quality_of("rms"),
-        KURTOSIS: quality_of("kurtosis"),
-        "velocity (rms)": lambda one: one.velocity,
+    levels = {
+        RMS: _quality_getter("rms"),
+        KURTOSIS: _quality_getter("kurtosis"),
+        "velocity (rms)": lambda reading: reading.velocity,
     }
-    lines, deep = named("lines", "the line at"), named("depths", "the envelope at")
-    heard |= named("bands", "the level") | lines
-    met, of_pulses = (_conditions(tracked, follows, response) for follows in (LEVEL, PULSES))
-    every = {words: logarithms(value) for words, value in (heard | deep).items()}
+    lines, depths = named("lines", "the line at"), named("depths", "the envelope at")
+    levels |= named("bands", "the level") | lines
+    level_conditions, pulse_conditions = (
+        _conditions(tracked, exponents, response) for exponents in (LEVEL, PULSES)
+    )
+    values_by_name = {
+        words: _logarithms(readings, unit, value) for words, value in (levels | depths).items()
+    }
     return [
         MonitoredSeries(
             name=f"{words} on {sensor}" if sensor else words,
             values=values,
             smallest_change=LEVEL_LEAST,
             contact=False,
-            describe=_times,
-            gain_dependent=words not in deep and words != KURTOSIS,
-            step_alarms=words in deep,
+            describe=_ratio,
+            gain_dependent=words not in depths and words != KURTOSIS,
+            step_alarms=words in depths,
             sensor=sensor,
-            conditions=of_pulses if words in deep or words in lines or words == KURTOSIS else met,
+            conditions=pulse_conditions
+            if words in depths or words in lines or words == KURTOSIS
+            else level_conditions,
         )
-        for words, values in every.items()
+        for words, values in values_by_name.items()
         if np.isfinite(values).any()
     ]
 
 
-def _getter(several: str, name: str) -> Callable[[Reading], float]:
-    return lambda one: getattr(one, several).get(name, np.nan)
+def _logarithms(
+    readings: Sequence[Reading | None], unit: str, value: Callable[[Reading], float]
+) -> Field:
+    """Return the logarithm of a value over the recordings; nan for dead sensors, other units."""
+    values = np.full(len(readings), np.nan)
+    for number, reading in enumerate(readings):
+        quality = None if reading is None else reading.quality
+        if (
+            reading is not None
+            and quality is not None
+            and not quality.dead
+            and reading.unit == unit
+            and value(reading) > 0.0
+        ):
+            values[number] = np.log(value(reading))
+    return values
+
+
+def _quality_getter(name: str) -> Callable[[Reading], float]:
+    return lambda reading: float(getattr(reading.quality, name))
+
+
+def _getter(field: str, name: str) -> Callable[[Reading], float]:
+    return lambda reading: getattr(reading, field).get(name, np.nan)
 
 
 def _by_zone(tracked: Sequence[TrackedRecording], first: int, alarm: Alarm) -> Alarm:
-    """What ISO 20816-3 says: zone D twice running alarms, and stands as any alarm does; C at the end alerts."""
+    """Add the zones of ISO 20816-3: zone D twice in succession alarms, C at the end alerts."""
     zones = [
         (number, zone)
-        for number, one in enumerate(tracked)
-        if number >= first and (zone := one.zone) is not None
+        for number, recording in enumerate(tracked)
+        if number >= first and (zone := recording.zone) is not None
     ]
-    for (_, before), (number, zone) in pairwise(zones):
-        if before == zone == "D":
-            sooner = alarm.state == "alarm" and alarm.since is not None and alarm.since <= number
+    for (_, previous), (number, zone) in pairwise(zones):
+        if previous == zone == "D":
+            raised = alarm.state == "alarm" and alarm.since is not None and alarm.since <= number
             return (
                 alarm
-                if sooner
+                if raised
                 else alarm.with_alarm_since(number, tracked[number].severity(), "zone")
             )
-    lately = zones[-2:]
-    known = len(lately) == 2 and lately[-1][0] == len(tracked) - 1
-    if known and min(zone for _, zone in lately) == "C" and alarm.state == "none":
+    latest = zones[-2:]
+    known = len(latest) == 2 and latest[-1][0] == len(tracked) - 1
+    if known and min(zone for _, zone in latest) == "C" and alarm.state == "none":
         return alarm.with_alert(tracked[-1].severity(), "zone")
     return alarm
 
 
-def _moved(by: float) -> str:
+def _relative_change(by: float) -> str:
     return f"{'rose' if by > 0.0 else 'fell'} by {abs(100.0 * by):.3g} %"
 
 
-def _times(by: float) -> str:
-    return f"{'rose' if by > 0.0 else 'fell'} to {np.exp(by):.3g} times what it was"
+def _ratio(by: float) -> str:
+    return f"{'rose' if by > 0.0 else 'fell'} to {np.exp(by):.3g} times its baseline"
 
 
 def _sights(
     tracked: Sequence[TrackedRecording], contact: Sequence[MonitoredSeries]
 ) -> list[RecordingStatus]:
-    """What each recording lets one see of the machine."""
+    """Return what each recording shows of the machine: contact, nothing, or a dead sensor."""
     seen = np.any(
-        [np.zeros(len(tracked), dtype=bool), *(np.isfinite(one.values) for one in contact)], axis=0
+        [
+            np.zeros(len(tracked), dtype=bool),
+            *(np.isfinite(indicator.values) for indicator in contact),
+        ],
+        axis=0,
     )
     sights = []
     for number, recording in enumerate(tracked):
@@ -366,24 +394,26 @@ def _sights(
         elif seen[max(number - UNSEEN + 1, 0) : number + 1].any():
             sights.append(RecordingStatus())
         else:
-            why = recording.resonance.reason or "not determined"
+            reason = recording.resonance.reason or "not determined"
             last = (
-                "recording shows" if number == 0 else f"{min(number + 1, UNSEEN)} recordings show"
+                "first recording" if number == 0 else f"last {min(number + 1, UNSEEN)} recordings"
             )
             sights.append(
-                RecordingStatus("cannot-tell", f"none of the last {last} what decides ({why})")
+                RecordingStatus(
+                    "cannot-tell", f"no deciding indicator found in the {last} ({reason})"
+                )
             )
     return sights
 
 
 def _acknowledged(tracked: Sequence[TrackedRecording], name: str | None) -> int:
-    """How many recordings, from the first on, somebody has looked at."""
+    """Return the number of acknowledged recordings."""
     if name is None:
         return 0
     if name == LAST:
         return len(tracked)
-    for number, one in enumerate(tracked, 1):
-        if any(name in (file, Path(file).name) for file in one.files):
+    for number, recording in enumerate(tracked, 1):
+        if any(name in (file, Path(file).name) for file in recording.files):
             return number
     raise BadInput(
         f"{name} is not among the {len(tracked)} recordings; acknowledge one of them, or {LAST}"

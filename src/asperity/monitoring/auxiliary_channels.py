@@ -1,20 +1,18 @@
-"""What a recording's file tells beside its vibration: load, speed and temperature in other channels, a tacho.
+"""Auxiliary channels of a recording: load, speed, temperature and tacho; rates of the machine.
 
-And what the machine's rates are at the speed that is found. What a sidecar may name is said by
-`asperity.recording`.
+`asperity.recording` defines which channels a sidecar may name.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.core.signals import averaged_spectrum
-from asperity.monitoring.files import Place
+from asperity.monitoring.files import RecordingPlace
 from asperity.monitoring.target import Target
 from asperity.recording import OPERATING_KEYS, OpenRecording, raw_channel
 from asperity.vibration import (
@@ -25,11 +23,11 @@ from asperity.vibration import (
     turning_by_speed,
 )
 
-MOST = 1 << 21  # samples of which orders are followed: they are in memory at once
+MAX_SAMPLES = 1 << 21  # for order tracking, which holds them in memory
 HARMONICS = 3
-NEAR = 0.015  # of a rate, either way: rolling elements slip
-FEWEST_LINES = 4  # of the spectrum below a rate, for its line to be told from the others
-UNITS: dict[str, dict[str, float]] = {  # of channels, as factors to the unit of a key
+RATE_TOLERANCE = 0.015  # relative, either way: rolling elements slip
+MIN_LINES = 4  # spectral lines below a rate for its line to be resolved
+UNITS: dict[str, dict[str, float]] = {  # factors from the unit of a channel to that of a key
     "load_n": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "MN": 1e6},
     "entrainment_m_s": {"m/s": 1.0, "mm/s": 1e-3},
     "speed_hz": {
@@ -42,21 +40,21 @@ UNITS: dict[str, dict[str, float]] = {  # of channels, as factors to the unit of
     },
     "temperature_degc": {"degC": 1.0, "°C": 1.0, "C": 1.0},
 }
-OWN_BANDS = {
+DEFAULT_BANDS = {
     "10 to 1000 Hz": (10.0, 1000.0),
     "1 to 5 kHz": (1000.0, 5000.0),
     "above 5 kHz": (5000.0, np.inf),
 }
-SAME = 1e-6  # of a rate, within which two are one
-USABLE = 0.4  # of the sampling rate: above, the anti-alias filter has cut
+CLOCK_TOLERANCE = 1e-6  # relative difference of equal rates
+USABLE_BANDWIDTH = 0.4  # of the sampling rate; the anti-alias filter cuts above it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Beside:
-    """What a file tells beside its vibration.
+class AuxiliaryData:
+    """Auxiliary data of a recording.
 
-    `facts` as `Reading` has them; `turning` the shaft's angle, None where no channel tells it;
-    `remarks` say in a sentence each what of it could not be used.
+    `facts` as in `Reading`; `turning` is the shaft's angle, None without a channel for it;
+    `remarks` are sentences on data that could not be used.
     """
 
     facts: dict[str, tuple[str, str]]
@@ -64,7 +62,7 @@ class Beside:
     remarks: tuple[str, ...]
 
 
-def beside(opened: OpenRecording, place: Place | None) -> Beside:
+def read_auxiliary(opened: OpenRecording, place: RecordingPlace | None) -> AuxiliaryData:
     """Read the channels that a sidecar names for load, speed, temperature and tacho."""
     facts: dict[str, tuple[str, str]] = {}
     remarks: list[str] = []
@@ -76,10 +74,10 @@ def beside(opened: OpenRecording, place: Place | None) -> Beside:
         try:
             values = _channel_in(opened.path, key, name)
             if not np.isfinite(values).any():
-                raise BadInput(f"{opened.path}: channel {name} has no number; leave it out")
+                raise BadInput(f"{opened.path}: channel {name} contains no number; leave it out")
             facts[key] = (f"{np.nanmean(values):.10g}", f"file (channel {name})")
             if key == "speed_hz" and values.size == opened.samples:
-                turning = turning_by_speed(values[:MOST], opened.rate_hz)
+                turning = turning_by_speed(values[:MAX_SAMPLES], opened.rate_hz)
         except BadInput as refusal:
             remarks.append(str(refusal))
     if "tacho" in opened.facts:
@@ -88,8 +86,8 @@ def beside(opened: OpenRecording, place: Place | None) -> Beside:
             opened.facts["pulses_per_turn"].value if "pulses_per_turn" in opened.facts else 1.0
         )
         try:
-            _require_beside(opened, name)
-            pulses = _values(opened.path, name, MOST)
+            _require_same_clock(opened, name)
+            pulses = _values(opened.path, name, MAX_SAMPLES)
             turning = turning_by_pulses(pulses, opened.rate_hz, per_turn)
             facts["speed_hz"] = (f"{turning.speed_hz:.10g}", f"file (tacho, channel {name})")
         except BadInput as refusal:
@@ -99,49 +97,51 @@ def beside(opened: OpenRecording, place: Place | None) -> Beside:
         for key in OPERATING_KEYS
         if (value := getattr(place, key, None)) is not None
     }
-    return Beside(facts=facts | stated, turning=turning, remarks=tuple(remarks))
+    return AuxiliaryData(facts=facts | stated, turning=turning, remarks=tuple(remarks))
 
 
-def rates(opened: OpenRecording, told: Beside, target: Target) -> dict[str, float]:
-    """The rates of faults and meshes at the speed of a recording, by name [Hz]."""
-    said = opened.facts.get("speed_hz")
+def fault_rates(
+    opened: OpenRecording, auxiliary: AuxiliaryData, target: Target
+) -> dict[str, float]:
+    """Return the rates [Hz] of faults and meshes at the speed of a recording, by name."""
+    stated = opened.facts.get("speed_hz")
     speed = (
-        float(told.facts["speed_hz"][0])
-        if "speed_hz" in told.facts
+        float(auxiliary.facts["speed_hz"][0])
+        if "speed_hz" in auxiliary.facts
         else None
-        if said is None
-        else float(said.value)
+        if stated is None
+        else float(stated.value)
     )
     per_turn = dict(target.rates_per_turn)
     if "faults_per_turn" in opened.facts:
         per_turn |= opened.facts["faults_per_turn"].value
-    if told.turning is not None:
-        speed = told.turning.speed_hz  # what the vibration is steadied to
+    if auxiliary.turning is not None:
+        speed = auxiliary.turning.speed_hz  # speed to which the vibration is resampled
     speed = speed or target.shaft_hz
     found = {} if speed is None else {name: times * speed for name, times in per_turn.items()}
     return found | (opened.facts["faults_hz"].value if "faults_hz" in opened.facts else {})
 
 
-def steady(opened: OpenRecording, told: Beside) -> tuple[Field, float] | None:
-    """The vibration as if the shaft had turned evenly, and its rate; None where no channel tells the angle."""
-    if told.turning is None:
+def order_tracked(opened: OpenRecording, auxiliary: AuxiliaryData) -> tuple[Field, float] | None:
+    """Return the vibration resampled to constant speed, and its rate; None without an angle."""
+    if auxiliary.turning is None:
         return None
-    held, many = [], 0
+    blocks, count = [], 0
     for block in opened.blocks():
-        held.append(block)
-        many += block.size
-        if many >= MOST:
+        blocks.append(block)
+        count += block.size
+        if count >= MAX_SAMPLES:
             break
-    values = np.concatenate(held)[: told.turning.turns.size]
+    values = np.concatenate(blocks)[: auxiliary.turning.turns.size]
     if not np.isfinite(values).all():
-        raise BadInput("samples are missing, so that the shaft's orders are not followed")
-    return resample_to_constant_speed(values, told.turning, opened.rate_hz)
+        raise BadInput("samples are missing, so that order tracking is not possible")
+    return resample_to_constant_speed(values, auxiliary.turning, opened.rate_hz)
 
 
-def heard_at(
+def envelope_and_lines(
     rates_hz: Mapping[str, float], values: Field, rate_hz: float, unit: str, segment: int
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Depths of the envelope and rms of the lines at rates, of a vibration that is in memory."""
+    """Return envelope depths and rms of the lines at rates, of a vibration in memory."""
     envelope = Envelope(rate_hz)
     for _ in envelope.watch([values]):
         pass
@@ -150,23 +150,23 @@ def heard_at(
 
 
 def lines(frequency_hz: Field, density: Field, rates_hz: Mapping[str, float]) -> dict[str, float]:
-    """Rms at each rate and its next two harmonics; nan where lines are too far apart, or too few, to tell."""
+    """Return the rms at each rate and its next two harmonics; nan if they are not resolved."""
     spacing = float(frequency_hz[1])
     found = {}
     for name, rate in rates_hz.items():
         total = 0.0
         for number in range(1, HARMONICS + 1):
-            reach = max(NEAR * number * rate, 1.5 * spacing)
+            reach = max(RATE_TOLERANCE * number * rate, 1.5 * spacing)
             total += float(density[np.abs(frequency_hz - number * rate) <= reach].sum())
-        told = rate >= FEWEST_LINES * spacing and rate < frequency_hz[-1]
-        found[name] = float(np.sqrt(total * spacing)) if told else float("nan")
+        resolved = rate >= MIN_LINES * spacing and rate < frequency_hz[-1]
+        found[name] = float(np.sqrt(total * spacing)) if resolved else float("nan")
     return found
 
 
 def bands(opened: OpenRecording, frequency_hz: Field, density: Field) -> dict[str, float]:
-    """Rms in bands: those that a sidecar states, else three; only those that the sampling reaches."""
-    stated = opened.facts["bands_hz"].value if "bands_hz" in opened.facts else OWN_BANDS
-    spacing, highest = float(frequency_hz[1]), USABLE * opened.rate_hz
+    """Return the rms in the bands of the sidecar, or three default bands, within the sampling."""
+    stated = opened.facts["bands_hz"].value if "bands_hz" in opened.facts else DEFAULT_BANDS
+    spacing, highest = float(frequency_hz[1]), USABLE_BANDWIDTH * opened.rate_hz
     found = {}
     for name, (low, high) in stated.items():
         high = min(high, highest) if high == np.inf else high
@@ -177,7 +177,7 @@ def bands(opened: OpenRecording, frequency_hz: Field, density: Field) -> dict[st
 
 
 def _channel_in(path: Path, key: str, name: str) -> Field:
-    """The values of a channel in the unit of a condition's key."""
+    """Return the values of a channel in the unit of a condition's key."""
     channel = raw_channel(path, name)
     return _values(path, name, None) * (
         _factor(channel.unit.strip(), key, path, name) if channel.unit else 1.0
@@ -185,34 +185,40 @@ def _channel_in(path: Path, key: str, name: str) -> Field:
 
 
 def _factor(unit: str, key: str, path: Path, name: str) -> float:
-    """What a unit is of that of a key: as it is written, or in another case where that leaves no doubt."""
+    """Return the factor of a unit to that of a key; upper or lower case only if unambiguous."""
     factors = UNITS[key]
-    alike = [unit] if unit in factors else [one for one in factors if one.lower() == unit.lower()]
+    alike = (
+        [unit] if unit in factors else [known for known in factors if known.lower() == unit.lower()]
+    )
     if len(alike) != 1:
         raise BadInput(
-            f"{path.name}: channel {name} is in {unit}, and {key} takes {', '.join(factors)}"
+            f"{path.name}: channel {name} is in {unit}, but {key} needs {', '.join(factors)}"
         )
     return factors[alike[0]]
 
 
-def _require_beside(opened: OpenRecording, name: str) -> None:
-    """BadInput for a tacho whose samples are not those of the vibration."""
+def _require_same_clock(opened: OpenRecording, name: str) -> None:
+    """Raise BadInput unless tacho and vibration have the same rate and number of samples."""
     tacho = raw_channel(opened.path, name)
-    for what, its, vibrations in (
+    for quantity, own, expected in (
         ("Hz", tacho.rate_hz, opened.channel.rate_hz),
         ("samples", tacho.samples, opened.samples),
     ):
-        if its is not None and vibrations is not None and abs(its - vibrations) > SAME * vibrations:
+        if (
+            own is not None
+            and expected is not None
+            and abs(own - expected) > CLOCK_TOLERANCE * expected
+        ):
             raise BadInput(
-                f"the tacho in channel {name} has {its:.10g} {what} and the vibration {vibrations:.10g}; record both "
-                "with the same clock, or state speed_hz"
+                f"the tacho in channel {name} has {own:.10g} {quantity} and the vibration "
+                f"{expected:.10g}; record both with the same clock, or state speed_hz"
             )
 
 
-def _values(path: Path, name: str, most: int | None) -> Field:
-    held: list[Any] = []
+def _values(path: Path, name: str, max_samples: int | None) -> Field:
+    blocks: list[Field] = []
     for block in raw_channel(path, name).blocks(1 << 18):
-        held.append(np.asarray(block, dtype=float))
-        if most is not None and sum(part.size for part in held) >= most:
+        blocks.append(np.asarray(block, dtype=float))
+        if max_samples is not None and sum(part.size for part in blocks) >= max_samples:
             break
-    return np.concatenate(held)[:most]
+    return np.concatenate(blocks)[:max_samples]

@@ -1,4 +1,4 @@
-"""What many recordings hold and whether they can be used, before anything is tracked."""
+"""Check of recordings before tracking: content and usability."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ class CheckedRecording(NamedTuple):
     quality: Quality
 
     def scalars(self) -> dict[str, Any]:
-        """Its line of `asperity check --json`."""
+        """Return its row of `asperity check --json`."""
         recording, quality = self
         numbers = (
             "samples",
@@ -53,28 +53,28 @@ class CheckedRecording(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingChecks:
-    """Recordings judged for a resonance that is looked for; `refused` are files that could not be read, and why."""
+    """Recordings checked for a search target; `refused` are unreadable files with the reason."""
 
     checked: tuple[CheckedRecording, ...]
     refused: tuple[tuple[Path, str], ...]
     target: Target
 
     def verdict(self) -> str:
-        """How many can be used, and what is wrong with the others."""
+        """Return how many are usable, and the faults of the others."""
         total = len(self.checked) + len(self.refused)
         if total == 1 and self.checked:
             recording, quality = self.checked[0]
             judged = "can be used." if quality.usable else f"cannot be used: {quality.faults[0]}."
             return f"{recording.path.name}: {judged}"
         files = {checked.recording.path for checked in self.checked}
-        things = "channels" if len(files) < len(self.checked) else "recordings"
+        noun = "channels" if len(files) < len(self.checked) else "recordings"
         bad = [checked.quality for checked in self.checked if not checked.quality.usable]
         reasons = dict.fromkeys(quality.faults[0].partition(":")[0] for quality in bad)
-        sentence = f"{len(self.checked) - len(bad)} of {total} {things} can be used"
+        sentence = f"{len(self.checked) - len(bad)} of {total} {noun} can be used"
         return f"{sentence}{': ' if reasons else ''}{'; '.join(reasons)}."
 
     def scalars(self) -> dict[str, Any]:
-        """What `asperity check --json` prints."""
+        """Return the JSON of `asperity check`."""
         return {
             "verdict": self.verdict(),
             "recordings": [checked.scalars() for checked in self.checked],
@@ -94,14 +94,14 @@ def check_recordings(
     channel: str | None = None,
     scale: float | None = None,
 ) -> RecordingChecks:
-    """Read recordings to their end and judge them for the resonance of a case, in a band, or of the paper's contact.
+    """Read recordings to their end and check whether the search target can be found in them.
 
     Parameters
     ----------
-    files : recordings, or folders of them; what cannot be read is in `refused`
-    case, band_hz : as for `search_target`
-    rate_hz, unit, channel, scale : as for `read_recording`, several channels with commas between them; without
-        `channel` every one is checked
+    files : recordings, or folders of them; unreadable files are in `refused`
+    case, band_hz : as in `search_target`
+    rate_hz, unit, channel, scale : as in `read_recording`, several channels separated by commas;
+        without `channel` all channels are checked
 
     Raises
     ------
@@ -109,13 +109,13 @@ def check_recordings(
         as `search_target`, or for a folder without recordings.
     """
     target = search_target(case, band_hz)
-    there, absent = (
+    present, absent = (
         [file for file in files if file.exists()],
         [file for file in files if not file.exists()],
     )
     checked: list[CheckedRecording] = []
     refused: list[tuple[Path, str]] = []
-    for path in [*(recordings_in(there) if there else []), *absent]:
+    for path in [*(recordings_in(present) if present else []), *absent]:
         try:
             for name in channels_in(channel):
                 for opened in open_channels(

@@ -1,7 +1,6 @@
-"""Whether a folder is a set of data that others can use: recordings of a contact with its surfaces before and after.
+"""Check of a data set for publication: recordings of a contact, and its surfaces before and after.
 
-The layout is that of docs/project/call-for-data.md. Recordings, maps and the case are read by
-those who read them everywhere; nothing is computed of them here.
+The layout is that of docs/project/call-for-data.md.
 """
 
 import csv
@@ -20,15 +19,15 @@ from asperity.surface import read_surface
 STATED = "set.toml"
 KEYS = ("title", "authors", "licence", "case", "recordings", "sensor", "maps_before", "maps_after")
 COLUMNS = ("file", "time_h", "load_n", "speed_m_s", "oil_temperature_c")
-OPEN = ("CC0-1.0", "CC-BY-4.0", "CC-BY-SA-4.0", "ODbL-1.0", "PDDL-1.0", "ODC-By-1.0")
-LEAST_RATE, LEAST_S = 20_000.0, 10.0  # Hz, s
-LEAST_STEPS = 3  # of load, and of speed
-PIXELS = 10  # of a map across the contact, at least
+OPEN_LICENCES = ("CC0-1.0", "CC-BY-4.0", "CC-BY-SA-4.0", "ODbL-1.0", "PDDL-1.0", "ODC-By-1.0")
+MIN_RATE_HZ, MIN_DURATION_S = 20_000.0, 10.0
+MIN_STEPS = 3  # of load, and of speed
+MIN_PIXELS = 10  # of a map across the contact
 
 
 @dataclass(frozen=True)
 class DataSet:
-    """What a folder holds of a set, and what is missing: a sentence each."""
+    """Content of a folder as a data set; `missing` are sentences on what it lacks."""
 
     folder: Path
     title: str
@@ -38,18 +37,19 @@ class DataSet:
 
     @property
     def whole(self) -> bool:
-        """Whether it is such a set."""
+        """True if nothing is missing."""
         return not self.missing
 
     def verdict(self) -> str:
-        """In one sentence."""
+        """Return the result as one sentence."""
         if self.whole:
-            return f"{self.folder} is a set that others can use: {self.recordings} recordings, {self.maps} maps."
+            content = f"{self.recordings} recordings, {self.maps} maps"
+            return f"{self.folder} is a complete data set: {content}."
         more = f", and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
-        return f"{self.folder} is no such set yet: {self.missing[0]}{more}."
+        return f"{self.folder} is not a complete data set: {self.missing[0]}{more}."
 
     def scalars(self) -> dict[str, Any]:
-        """As `check --set DIR --json` gives it."""
+        """Return the JSON of `asperity check --set`."""
         return {
             "verdict": self.verdict(),
             "whole": self.whole,
@@ -61,17 +61,17 @@ class DataSet:
 
 
 def check_set(folder: Path) -> DataSet:
-    """Read everything that a folder's set.toml names, and say what is missing.
+    """Read everything that a folder's set.toml names, and list what is missing.
 
     Raises
     ------
     BadInput
-        for what is no folder, and for one without a set.toml that can be read.
+        if there is no folder, or no readable set.toml in it.
     """
     stated = _stated(folder)
     missing = [f"{STATED} does not state {key}" for key in KEYS if key not in stated]
-    if stated.get("licence") not in (None, *OPEN):
-        missing.append(f"its licence {stated['licence']} is none of {', '.join(OPEN)}")
+    if stated.get("licence") not in (None, *OPEN_LICENCES):
+        missing.append(f"its licence {stated['licence']} is not one of {', '.join(OPEN_LICENCES)}")
     case = _case(folder, stated, missing)
     rows = _table(folder, stated, missing)
     maps = [
@@ -79,10 +79,10 @@ def check_set(folder: Path) -> DataSet:
         for key in ("maps_before", "maps_after")
         for name in _names(stated, key, missing)
     ]
-    missing += _of_steps(rows)
-    missing += _of_recordings(folder, rows, case)
+    missing += _missing_steps(rows)
+    missing += _recording_faults(folder, rows, case)
     for _, name in maps:
-        missing += _of_map(folder, name, case)
+        missing += _map_faults(folder, name, case)
     bodies = Counter(key for key, _ in maps)
     if maps and bodies["maps_before"] != bodies["maps_after"]:
         missing.append("maps before and after are not of the same number of bodies")
@@ -103,10 +103,10 @@ def _stated(folder: Path) -> dict[str, Any]:
 
 
 def _inside(folder: Path, name: object) -> Path:
-    """A file that the set names; one outside the folder would be missing for everybody else."""
+    """Return the path of a file named in the set, which must be inside the folder."""
     path = (folder / str(name)).resolve()
     if not path.is_relative_to(folder.resolve()):
-        raise BadInput(f"{name} lies outside the set; put it into the folder")
+        raise BadInput(f"{name} is outside the set; put it into the folder")
     return path
 
 
@@ -129,7 +129,7 @@ def _names(stated: dict[str, Any], key: str, missing: list[str]) -> list[str]:
 
 
 def _table(folder: Path, stated: dict[str, Any], missing: list[str]) -> list[dict[str, str]]:
-    """Rows of the table of recordings; none where it cannot be used."""
+    """Return the rows of the table of recordings; empty if it cannot be used."""
     if "recordings" not in stated:
         return []
     try:
@@ -146,7 +146,8 @@ def _table(folder: Path, stated: dict[str, Any], missing: list[str]) -> list[dic
         for name in COLUMNS[1:]:
             if not _is_number(row[name]):
                 missing.append(
-                    f"line {number} of {stated['recordings']}: {name} must be a number, got {row[name]!r}"
+                    f"line {number} of {stated['recordings']}: {name} must be a number, "
+                    f"got {row[name]!r}"
                 )
                 return []
     return rows
@@ -159,20 +160,20 @@ def _is_number(text: str | None) -> bool:
         return False
 
 
-def _of_steps(rows: list[dict[str, str]]) -> Iterator[str]:
-    """Too few steps of load and speed, and nothing repeated."""
+def _missing_steps(rows: list[dict[str, str]]) -> Iterator[str]:
+    """Yield sentences on too few steps of load or speed, and missing repeats."""
     if not rows:
         return
     for name in ("load_n", "speed_m_s"):
         steps = {float(row[name]) for row in rows}
-        if len(steps) < LEAST_STEPS:
-            yield f"{name} has {len(steps)} steps where {LEAST_STEPS} are asked for"
+        if len(steps) < MIN_STEPS:
+            yield f"{name} has {len(steps)} steps, at least {MIN_STEPS} are required"
     if max(Counter((float(row["load_n"]), float(row["speed_m_s"])) for row in rows).values()) < 2:
-        yield "no load and speed were recorded twice"
+        yield "no combination of load and speed was recorded twice"
 
 
-def _of_recordings(folder: Path, rows: list[dict[str, str]], case: Case | None) -> Iterator[str]:
-    """Files that are not there, cannot be read or used, are too slow or too short, or are no accelerations."""
+def _recording_faults(folder: Path, rows: list[dict[str, str]], case: Case | None) -> Iterator[str]:
+    """Yield sentences on recordings that are missing, unusable, slow, short or in other units."""
     for row in rows:
         try:
             path = _inside(folder, row["file"])
@@ -182,29 +183,38 @@ def _of_recordings(folder: Path, rows: list[dict[str, str]], case: Case | None) 
         checks = check_recordings([path], case=case)
         yield from (reason for _, reason in checks.refused)
         for recording, quality in checks.checked:
-            if recording.rate_hz < LEAST_RATE:
-                yield f"{row['file']}: sampled at {recording.rate_hz:g} Hz where {LEAST_RATE:g} are asked for"
-            if quality.duration_s < LEAST_S:
-                yield f"{row['file']}: {quality.duration_s:.3g} s long where {LEAST_S:g} are asked for"
+            if recording.rate_hz < MIN_RATE_HZ:
+                yield (
+                    f"{row['file']}: sampled at {recording.rate_hz:g} Hz, "
+                    f"at least {MIN_RATE_HZ:g} Hz are required"
+                )
+            if quality.duration_s < MIN_DURATION_S:
+                yield (
+                    f"{row['file']}: {quality.duration_s:.3g} s long, "
+                    f"at least {MIN_DURATION_S:g} s are required"
+                )
             if not recording.comparable:
-                yield f"{row['file']}: no acceleration (unit {recording.unit or 'not stated'})"
+                yield f"{row['file']}: not an acceleration (unit {recording.unit or 'not stated'})"
             yield from (f"{row['file']}: {fault}" for fault in quality.faults)
 
 
-def _of_map(folder: Path, name: str, case: Case | None) -> Iterator[str]:
-    """A map that cannot be read, is a profile, too coarse or too small for the contact."""
+def _map_faults(folder: Path, name: str, case: Case | None) -> Iterator[str]:
+    """Yield sentences on a map that is unreadable, a profile, or too coarse or small."""
     try:
         measured = read_surface(_inside(folder, name))
     except BadInput as error:
         yield str(error)
         return
     if measured.uniform is not None:
-        yield f"{name} is a profile; an areal map is asked for"
+        yield f"{name} is a profile; an areal map is required"
     if case is None:
         return
     width = 2.0 * case.conditions.hertz.half_widths[0]
     pixel, size = max(measured.grid.spacing), min(measured.grid.extent)
-    if pixel > width / PIXELS:
-        yield f"{name}: pixels of {1e6 * pixel:.3g} um, coarser than a tenth of the contact's {1e6 * width:.3g} um"
+    if pixel > width / MIN_PIXELS:
+        yield (
+            f"{name}: pixels of {1e6 * pixel:.3g} um, coarser than a tenth of the contact's "
+            f"{1e6 * width:.3g} um"
+        )
     if size < width:
-        yield f"{name}: {1e6 * size:.3g} um wide, less than the contact's {1e6 * width:.3g} um"
+        yield (f"{name}: {1e6 * size:.3g} um wide, less than the contact's {1e6 * width:.3g} um")

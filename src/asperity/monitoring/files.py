@@ -1,4 +1,4 @@
-"""Which files are recordings, in what order, and the table that says where each belongs."""
+"""Files of recordings, their order, and the table of their places and conditions."""
 
 import csv
 import math
@@ -13,7 +13,7 @@ from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import require_file
 from asperity.recording import OPERATING_KEYS, is_sidecar
 
-_NO_RECORDINGS = {
+_OTHER_SUFFIXES = {
     ".html",
     ".htm",
     ".nc",
@@ -41,25 +41,19 @@ _NO_RECORDINGS = {
     ".rar",
 }
 ABSOLUTE_ZERO = -273.15  # degC
-SENSOR = "sensor"  # heading of the column that says which of several sensors a recording is of
-_CONDITION_WORDS = {  # in headings of what recordings were made at
+SENSOR = "sensor"  # heading of the column with the name of the sensor
+_CONDITION_WORDS = {  # words in headings of operating conditions
     "load_n": {"load", "force", "kraft"},
     "speed_hz": {"speed", "rpm", "drehzahl"},
     "entrainment_m_s": {"speed", "entrainment"},
     "temperature_degc": {"temperature", "temp", "temperatur", "degc"},
 }
-_ABOUT = {
-    "readme",
-    "liesmich",
-    "license",
-    "licence",
-    "changelog",
-}  # names of files that are about others
+_DOCUMENTATION = {"readme", "liesmich", "license", "licence", "changelog"}  # names of text files
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Where a recording stands in the series, and whose it is, as a table says it; None for what it does not say."""
+class RecordingPlace:
+    """Place, conditions and sensor of a recording, as a table states them; None if not stated."""
 
     x: float
     x_std: float | None = None
@@ -71,20 +65,20 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
-    """A table of places by file, as it names them, with or without folders; `x_name` heads its column of x, if any."""
+class RecordingTable:
+    """Table of places by file name, with or without folders; `x_name` heads the column of x."""
 
     name: str
     x_name: str
-    places: dict[str, Place]
+    places: dict[str, RecordingPlace]
 
-    def place(self, path: Path) -> Place:
-        """Where a recording stands.
+    def place(self, path: Path) -> RecordingPlace:
+        """Return the place of a recording.
 
         Raises
         ------
         BadInput
-            for a recording that is not in the table.
+            if the recording is not in the table.
         """
         row = self.row(path)
         if row is None:
@@ -94,7 +88,7 @@ class Table:
         return self.places[row]
 
     def row(self, path: Path) -> str | None:
-        """How the table names a recording: by the most of its path; None where it does not."""
+        """Return the name of a recording in the table, by the longest part of its path, or None."""
         parts = path.absolute().parts
         for last in (path.name, path.stem):
             for first in range(len(parts)):
@@ -103,13 +97,13 @@ class Table:
                     return name
         return None
 
-    def placed(self, paths: Sequence[Path]) -> dict[str, Place]:
-        """Where each recording stands, by its path.
+    def places_of(self, paths: Sequence[Path]) -> dict[str, RecordingPlace]:
+        """Return the place of each recording, by its path.
 
         Raises
         ------
         BadInput
-            as `place`, and where one row is that of several recordings.
+            if a recording is not in the table, or one row belongs to several recordings.
         """
         by_row: dict[str, list[Path]] = {}
         for path in paths:
@@ -117,19 +111,20 @@ class Table:
         for row, several in by_row.items():
             if row and len(several) > 1:
                 raise BadInput(
-                    f"{self.name} has one row {row} for {len(several)} recordings, {several[0]} and {several[1]} among "
-                    "them; name them there with their folders"
+                    f"{self.name} has one row {row} for {len(several)} recordings, such as "
+                    f"{several[0]} and {several[1]}; name them with their folders"
                 )
         return {str(path): self.place(path) for path in paths}
 
 
-def in_time(times: Sequence[datetime | None], heard: Sequence[bool]) -> tuple[list[float], str]:
-    """Hours since the first recording, where all say when they began and not all at once; their number otherwise.
+def x_by_time(
+    times: Sequence[datetime | None], readable: Sequence[bool]
+) -> tuple[list[float], str]:
+    """Return hours since the first recording and their name, or numbers if starts are unknown.
 
-    What was not heard, no recording or a damaged one, takes no place: it stands at that of the one
-    before.
+    An unreadable file takes no place of its own: it gets that of the recording before.
     """
-    known = [time for time, there in zip(times, heard, strict=True) if there]
+    known = [time for time, usable in zip(times, readable, strict=True) if usable]
     stated = [time for time in known if time is not None]
     if len(stated) == len(known) and any(time != stated[0] for time in stated):
         first = min(stated)
@@ -137,63 +132,62 @@ def in_time(times: Sequence[datetime | None], heard: Sequence[bool]) -> tuple[li
         x_name = "time_h"
     else:
         x, x_name = iter([float(number) for number in range(1, len(known) + 1)]), "recording"
-    at = 0.0 if x_name == "time_h" else 1.0
+    place = 0.0 if x_name == "time_h" else 1.0
     places = []
-    for there in heard:
-        at = next(x) if there else at
-        places.append(at)
+    for usable in readable:
+        place = next(x) if usable else place
+        places.append(place)
     return places, x_name
 
 
-def in_their_places(
+def locate_recordings(
     files: Sequence[str],
     times: Sequence[datetime | None],
-    heard: Sequence[bool],
-    places: Mapping[str, Place] | None,
+    readable: Sequence[bool],
+    places: Mapping[str, RecordingPlace] | None,
     x_name: str,
-) -> tuple[dict[str, Place], str]:
-    """Where each recording stands, and what x is, by `where`."""
-    x, x_name = where(files, times, heard, places, x_name)
-    return {file: placed_at(at, (places or {}).get(file)) for file, at in x.items()}, x_name
+) -> tuple[dict[str, RecordingPlace], str]:
+    """Return the place of each recording and the name of x, by `x_of_recordings`."""
+    x, x_name = x_of_recordings(files, times, readable, places, x_name)
+    return {file: place_at(value, (places or {}).get(file)) for file, value in x.items()}, x_name
 
 
-def where(
+def x_of_recordings(
     files: Sequence[str],
     times: Sequence[datetime | None],
-    heard: Sequence[bool],
-    places: Mapping[str, Place] | None,
+    readable: Sequence[bool],
+    places: Mapping[str, RecordingPlace] | None,
     x_name: str,
 ) -> tuple[dict[str, float], str]:
-    """The x of each recording, and what x is: as a table says it, or by `in_time` where none does."""
+    """Return the x of each recording and its name, from the table or else by `x_by_time`."""
     if x_name and places is not None:
         return {file: places[file].x for file in files}, x_name
-    x, x_name = in_time(times, heard)
+    x, x_name = x_by_time(times, readable)
     return dict(zip(files, x, strict=True)), x_name
 
 
-def placed_at(x: float, stated: Place | None) -> Place:
-    """A place at x, with what else is stated of it."""
-    return Place(x=x) if stated is None else replace(stated, x=x)
+def place_at(x: float, stated: RecordingPlace | None) -> RecordingPlace:
+    """Return a place at x, with the stated conditions."""
+    return RecordingPlace(x=x) if stated is None else replace(stated, x=x)
 
 
 def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
-    """The files named, and those in the folders named, by name with numbers in their order.
+    """Return the given files and those in the given folders, in natural order of names.
 
-    Left out of a folder: folders in it, hidden files, sidecars, tables with a column `file`,
-    results.
+    Subfolders, hidden files, sidecars, tables with a column `file`, and results are excluded.
 
     Raises
     ------
     BadInput
-        for a path that does not exist, or a folder with nothing left.
+        if a path does not exist, or a folder contains no recordings.
     """
     recordings: list[Path] = []
     for path in map(Path, paths):
         if path.is_dir():
             inside = [file for file in path.iterdir() if may_be_recording(file)]
             if not inside:
-                raise BadInput(f"{path} holds no recordings; name files, or the folder they lie in")
-            recordings += sorted(inside, key=lambda file: natural(file.name))
+                raise BadInput(f"{path} contains no recordings; name files, or their folder")
+            recordings += sorted(inside, key=lambda file: natural_order(file.name))
         elif path.exists():
             recordings.append(path)
         else:
@@ -202,35 +196,77 @@ def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
 
 
 def may_be_recording(path: Path) -> bool:
-    """Whether a file in a folder is taken for a recording."""
+    """Tell whether a file in a folder is taken for a recording."""
     if (
         not path.is_file()
         or path.name.startswith(".")
         or is_sidecar(path)
-        or path.suffix.lower() in _NO_RECORDINGS
+        or path.suffix.lower() in _OTHER_SUFFIXES
     ):
         return False
-    if path.stem.lower() in _ABOUT and path.suffix.lower() in ("", ".txt"):
+    if path.stem.lower() in _DOCUMENTATION and path.suffix.lower() in ("", ".txt"):
         return False
     return path.suffix.lower() not in (".csv", ".tsv", ".txt") or "file" not in _heading(path)
 
 
-def read_table(path: str | Path) -> Table:
-    """Read a table (csv) of file, x and its deviation, what recordings were made at, and by which sensor.
+def read_table(path: str | Path) -> RecordingTable:
+    """Read a csv table of recordings: file, x, operating conditions and sensor.
 
-    The latter are load_n, speed_hz (of the shaft), entrainment_m_s, temperature_degc (of the oil).
-    The column of x is the first that is none of these; its heading names it, such as sq_um. A
-    column of that heading with _std behind is its standard deviation. A table without x says what
-    recordings were made at, and their time or name where they stand.
+    Conditions are load_n, speed_hz (shaft), entrainment_m_s and temperature_degc (oil). The first
+    other column is x, named by its heading, such as sq_um; a column with the suffix _std is its
+    standard deviation. Without x, time or name give the places of recordings.
 
     Raises
     ------
     UnreadableFile
-        for a file that is missing, no csv, or without the columns.
+        if the file is missing, not a csv file, or lacks the columns.
     BadInput
-        for a row without a number where one is due, and two columns of one name.
+        if a number is missing, or two columns have the same name.
     """
     path = Path(path)
+    columns, rows, delimiter = _read_csv(path)
+    others = [
+        name
+        for name in columns
+        if name not in ("file", SENSOR, *OPERATING_KEYS) and not name.endswith("_std")
+    ]
+    _require_units(path, others)
+    if "file" not in columns or not (others or set(columns) & {SENSOR, *OPERATING_KEYS}):
+        raise UnreadableFile(
+            f"{path} needs a column file and one of x, such as sq_um; "
+            f"got {', '.join(columns) or 'none'}"
+        )
+    x_name = "x" if "x" in others else next(iter(others), "")
+    places = {}
+    for number, row in enumerate(rows, 2):
+        name = (row["file"] or "").strip()
+        if not name:
+            continue
+        values = {
+            column: _number(
+                (row.get(column) or "").strip(), delimiter, f"{path}, line {number}: {column}"
+            )
+            for column in (x_name, f"{x_name}_std", *OPERATING_KEYS)
+        }
+        _require_possible(values, f"{path}, line {number}")
+        x, x_std = values.pop(x_name), values.pop(f"{x_name}_std")
+        if not x_name:
+            x = float(number - 1)
+        if x is None:
+            raise BadInput(f"{path}, line {number}: {x_name} of {name} is missing; fill it in")
+        key = Path(name.replace("\\", "/")).as_posix()
+        if key in places:
+            raise BadInput(
+                f"{path}, line {number}: {name} has a row already; leave one of the two out"
+            )
+        places[key] = RecordingPlace(
+            x=x, x_std=x_std, sensor=(row.get(SENSOR) or "").strip() or None, **values
+        )
+    return RecordingTable(name=path.name, x_name=x_name, places=places)
+
+
+def _read_csv(path: Path) -> tuple[list[str], list[dict[str, str]], str]:
+    """Return columns, rows and delimiter of a csv file."""
     require_file(path)
     try:
         text = path.read_text("utf-8-sig")
@@ -248,68 +284,33 @@ def read_table(path: str | Path) -> Table:
             raise BadInput(
                 f"{path} has {columns.count(name)} columns {name}; leave all but one of them out"
             )
-    others = [
-        name
-        for name in columns
-        if name not in ("file", SENSOR, *OPERATING_KEYS) and not name.endswith("_std")
-    ]
-    _require_units(path, others)
-    if "file" not in columns or not (others or set(columns) & {SENSOR, *OPERATING_KEYS}):
-        raise UnreadableFile(
-            f"{path} needs a column file and one of x, such as sq_um; got {', '.join(columns) or 'none'}"
-        )
-    x_name = "x" if "x" in others else next(iter(others), "")
-    places = {}
-    for number, row in enumerate(rows, 2):
-        name = (row["file"] or "").strip()
-        if not name:
-            continue
-        said = {
-            column: _number(
-                (row.get(column) or "").strip(), delimiter, f"{path}, line {number}: {column}"
-            )
-            for column in (x_name, f"{x_name}_std", *OPERATING_KEYS)
-        }
-        _require_possible(said, f"{path}, line {number}")
-        x, x_std = said.pop(x_name), said.pop(f"{x_name}_std")
-        if not x_name:
-            x = float(number - 1)
-        if x is None:
-            raise BadInput(f"{path}, line {number}: {x_name} of {name} is missing; fill it in")
-        key = Path(name.replace("\\", "/")).as_posix()
-        if key in places:
-            raise BadInput(
-                f"{path}, line {number}: {name} has a row already; leave one of the two out"
-            )
-        places[key] = Place(
-            x=x, x_std=x_std, sensor=(row.get(SENSOR) or "").strip() or None, **said
-        )
-    return Table(name=path.name, x_name=x_name, places=places)
+    return columns, rows, delimiter
 
 
 def _require_units(path: Path, columns: Sequence[str]) -> None:
-    """BadInput for a load, speed or temperature by another name, perhaps in another unit."""
+    """Raise BadInput for a load, speed or temperature by another name, perhaps in another unit."""
     for name in columns:
         words = set(re.split(r"[\W_]+", name.lower()))
-        meant = [key for key, said in _CONDITION_WORDS.items() if words & said]
+        meant = [key for key, known in _CONDITION_WORDS.items() if words & known]
         if meant:
             raise BadInput(
-                f"{path} has a column {name}; take {' or '.join(meant)}, by that name and in that unit, or another "
-                "name if it is where recordings stand"
+                f"{path} has a column {name}; use {' or '.join(meant)} with that unit, or another "
+                "name if the column is x"
             )
 
 
-def _require_possible(said: Mapping[str, float | None], where: str) -> None:
-    """BadInput for a load or speed that is not positive, and a temperature below absolute zero."""
+def _require_possible(values: Mapping[str, float | None], location: str) -> None:
+    """Raise BadInput for a load or speed not above 0, or a temperature below absolute zero."""
     for column in OPERATING_KEYS:
-        value, least = said[column], ABSOLUTE_ZERO if column == "temperature_degc" else 0.0
+        value, least = values[column], ABSOLUTE_ZERO if column == "temperature_degc" else 0.0
         if value is not None and value <= least:
             raise BadInput(
-                f"{where}: {column} must be above {least:g}, got {value:g}; leave it empty if it is not known"
+                f"{location}: {column} must be above {least:g}, got {value:g}; "
+                "leave it empty if unknown"
             )
 
 
-def _number(text: str, delimiter: str, where: str) -> float | None:
+def _number(text: str, delimiter: str, location: str) -> float | None:
     if not text:
         return None
     try:
@@ -317,12 +318,12 @@ def _number(text: str, delimiter: str, where: str) -> float | None:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise BadInput(f"{where} must be a number, got {text!r}")
+        raise BadInput(f"{location} must be a number, got {text!r}")
     return number
 
 
 def _heading(path: Path) -> list[str]:
-    """The fields of a file's first line."""
+    """Return the fields of a file's first line."""
     try:
         with path.open("rb") as file:
             first = file.readline(1 << 12).decode("utf-8-sig", errors="replace")
@@ -332,8 +333,8 @@ def _heading(path: Path) -> list[str]:
 
 
 @lru_cache(maxsize=1 << 16)
-def natural(name: str) -> tuple[tuple[int, int | str], ...]:
-    """By what names are sorted so that their numbers stand in order."""
+def natural_order(name: str) -> tuple[tuple[int, int | str], ...]:
+    """Return the key for sorting names with their numbers in numerical order."""
     return tuple(
         (0, int(part)) if part.isdecimal() else (1, part)
         for part in re.split(r"(\d+)", name)
@@ -341,8 +342,8 @@ def natural(name: str) -> tuple[tuple[int, int | str], ...]:
     )
 
 
-def utf8(name: str) -> bool:
-    """Whether a file's name can be written down."""
+def is_utf8(name: str) -> bool:
+    """Tell whether a file name can be stored as UTF-8."""
     try:
         name.encode()
     except UnicodeEncodeError:

@@ -1,7 +1,7 @@
-"""What is foretold of a series: who foretells it is asked with its rows, and may raise the alarm.
+"""Forecast of a series: its protocols, and the schedule of forecasts of a watch.
 
-What it is foretold by is left to others; a watch gives it a share of its time and goes on judging
-meanwhile.
+The forecasting method is given by the caller; a forecast may raise the alarm. A watch spends a
+limited share of its time on forecasts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,19 +12,20 @@ from typing import Any, Protocol
 
 from asperity.core.arrays import Field
 
-SHARE = 0.1  # of a watch's time, which forecasts may take
-FORECAST = "forecast"  # raises the alarm
+MAX_TIME_SHARE = 0.1  # of a watch's time
+FORECAST = "forecast"  # `raised_by` of an alarm
 
 
 @dataclass(frozen=True)
 class Bands:
-    """A quantity over a series and ahead of it, SI.
+    """A quantity over a series and its forecast, in SI units.
 
     Parameters
     ----------
-    key, limit : which quantity, and what it is not to cross
-    x, last : of the visits and of times behind them; the last visit's
-    ends : ends of 90 % with the median between them, (3, times): as each visit was known then, and what is foretold
+    key, limit : quantity, and the limit that it should not cross
+    x, last : visits and later times; the last visit
+    ends : 90 % interval with the median in between, shape (3, times): at each visit as known then,
+        and of the forecast
     """
 
     key: str
@@ -34,58 +35,61 @@ class Bands:
     ends: Field
 
 
-class Foretold(Protocol):
-    """A forecast, or why there is none; `alarm` is whether somebody is to act on it."""
+class ForecastResult(Protocol):
+    """A forecast, or the reason why there is none; `alarm` calls for action."""
 
     @property
     def bands(self) -> Bands | None:
-        """What can be drawn of it; None where there is no forecast."""
+        """Data of the figure; None without a forecast."""
 
     @property
     def alarm(self) -> bool:
-        """Whether somebody is to act on it."""
+        """True if somebody has to act."""
 
     def sentence(self) -> str:
-        """In words."""
+        """Return the forecast as a sentence."""
 
     def scalars(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """Return the forecast as in JSON."""
 
 
-class Foreteller(Protocol):
-    """Who foretells a series by its rows, as `asperity track --json` has them; `question` is what is asked."""
+class Forecaster(Protocol):
+    """Forecaster of a series from its rows, as in `asperity track --json`."""
 
     @property
     def question(self) -> str:
-        """What is asked: another question is answered anew."""
+        """Text that identifies the forecast; a forecast of another question is made again."""
 
     def __call__(
         self, rows: Sequence[Mapping[str, Any]], x_name: str, *, comparable: bool
-    ) -> Foretold:
-        """The forecast of a series; `comparable` is whether the heights of its lines can be compared."""
+    ) -> ForecastResult:
+        """Forecast a series; `comparable` if the amplitudes of its lines can be compared."""
 
 
 @dataclass
-class Ahead:
-    """Forecasts of one watched series: the last one, up to where somebody had looked, and when the next is due [s]."""
+class ForecastSchedule:
+    """Schedule of the forecasts of a watched series.
 
-    foreteller: Foreteller | None
-    last: Foretold | None = None
+    `last` is the last forecast, made after the recording `acknowledged`; `due_s` the next time.
+    """
+
+    forecaster: Forecaster | None
+    last: ForecastResult | None = None
     acknowledged: str | None = None
     due_s: float = -inf
 
     @property
-    def asked(self) -> dict[str, str]:
-        """What is asked beside the judgement; empty where nothing is."""
-        return {} if self.foreteller is None else {FORECAST: self.foreteller.question}
+    def question(self) -> dict[str, str]:
+        """Part of a judgement's question; empty without a forecaster."""
+        return {} if self.forecaster is None else {FORECAST: self.forecaster.question}
 
     @property
     def due(self) -> bool:
-        """Whether a forecast may be made now."""
-        return self.foreteller is not None and monotonic() >= self.due_s
+        """True if a forecast may be made now."""
+        return self.forecaster is not None and monotonic() >= self.due_s
 
-    def standing(self, acknowledged: str | None) -> Foretold | None:
-        """The last forecast, unless somebody has looked since."""
+    def standing(self, acknowledged: str | None) -> ForecastResult | None:
+        """Return the last forecast, unless alarms have been acknowledged since."""
         return self.last if self.acknowledged == acknowledged else None
 
     def make(
@@ -95,13 +99,13 @@ class Ahead:
         *,
         comparable: bool,
         acknowledged: str | None,
-    ) -> Foretold:
-        """A forecast of the series as it is; the next one is due when this one has taken no more than its share."""
-        assert self.foreteller is not None
-        began = monotonic()
+    ) -> ForecastResult:
+        """Make a forecast and schedule the next one."""
+        assert self.forecaster is not None
+        start = monotonic()
         self.last, self.acknowledged = (
-            self.foreteller(rows, x_name, comparable=comparable),
+            self.forecaster(rows, x_name, comparable=comparable),
             acknowledged,
         )
-        self.due_s = began + (monotonic() - began) / SHARE
+        self.due_s = start + (monotonic() - start) / MAX_TIME_SHARE
         return self.last

@@ -1,7 +1,6 @@
-"""What was heard becomes the recordings of a track: on one sensor, or on several at one time.
+"""Recordings of a track, from readings of one sensor or of several sensors at one time.
 
-Which line is the contact's is said by `asperity.wear`; what the recordings say together, by
-`track`.
+`asperity.resonance` attributes a line to the contact; `judgement` judges the series.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,13 +14,23 @@ import numpy as np
 
 from asperity.core.errors import BadInput
 from asperity.core.signals import Spectrum
-from asperity.monitoring.files import Place, in_their_places
-from asperity.monitoring.harmonize import COPIED, on_one_grid, spectrum_of, without_silence
-from asperity.monitoring.operating_point import operating_of
+from asperity.monitoring.files import RecordingPlace, locate_recordings
+from asperity.monitoring.harmonize import (
+    COPY_TOLERANCE,
+    exclude_machine_off,
+    on_common_grid,
+    spectrum_of,
+)
+from asperity.monitoring.operating_point import operating_point
 from asperity.monitoring.reading import Reading
 from asperity.monitoring.recording import OnSensor, TrackedRecording
-from asperity.monitoring.series_state import Learned, Together
-from asperity.monitoring.simultaneous import Heard, Placed, by_place, by_time
+from asperity.monitoring.series_state import SensorLine, SeriesMemory
+from asperity.monitoring.simultaneous import (
+    PlacedRecording,
+    TimedRecording,
+    match_places,
+    match_times,
+)
 from asperity.monitoring.target import Target
 from asperity.resonance import (
     FEWEST_RECORDINGS,
@@ -32,20 +41,21 @@ from asperity.resonance import (
 )
 
 
-def recording_of(
+def tracked_recording(
     reading: Reading,
-    place: Place,
+    place: RecordingPlace,
     clean: CleanSpectrum | None,
     resonance: Resonance,
     *,
     on_sensors: Mapping[str, OnSensor] | None = None,
     remounted: str | None = None,
 ) -> TrackedRecording:
-    """A recording of a track; how far its clock may be off widens the interval of its CRF, and repeats share it."""
-    clock = reading.rate_doubt * resonance.crf_hz  # a rate off is a CRF off
-    if resonance.found and clock > 0.0:
+    """Build a recording of a track; the uncertainty of its clock widens the interval of CRF."""
+    clock_std = reading.rate_doubt * resonance.crf_hz  # relative errors of rate and CRF are equal
+    if resonance.found and clock_std > 0.0:
+        # repeats share the error of the clock
         whole, shared = (
-            float(np.hypot(std, clock)) for std in (resonance.crf_std, resonance.crf_shared_std)
+            float(np.hypot(std, clock_std)) for std in (resonance.crf_std, resonance.crf_shared_std)
         )
         resonance = replace(resonance, crf_std=whole, crf_shared_std=shared)
     return TrackedRecording(
@@ -56,16 +66,16 @@ def recording_of(
         clean=clean,
         resonance=resonance,
         damping_reason=resonance.reason if clean is None else _damping_reason(resonance, clean),
-        operating=operating_of(reading, place),
+        operating=operating_point(reading, place),
         on_sensors=on_sensors or {},
         remounted=remounted,
     )
 
 
 def _damping_reason(resonance: Resonance, clean: CleanSpectrum) -> str:
-    """Why its damping is not determined, or nothing. The joint separation knows which lines are missing."""
+    """Return why damping is not determined, or nothing."""
     spectrum, missing = clean.spectrum, 0.0
-    if resonance.method != "joint":
+    if resonance.method != "joint":  # the joint separation takes removed lines into account
         within = (
             np.abs(spectrum.frequency_hz - resonance.crf_hz)
             <= resonance.damping_ratio * resonance.crf_hz
@@ -75,192 +85,282 @@ def _damping_reason(resonance: Resonance, clean: CleanSpectrum) -> str:
 
 
 class Instant(NamedTuple):
-    """What several sensors heard at one time, by sensor, and where that stands."""
+    """Simultaneous readings by sensor, and their place in the series."""
 
-    place: Place
+    place: RecordingPlace
     readings: dict[str, Reading]
 
-    def holds(self, file: str, sensor: str) -> bool:
-        """Whether a sensor's recording is of it."""
+    def contains(self, file: str, sensor: str) -> bool:
+        """Tell whether a sensor's recording is part of it."""
         return sensor in self.readings and self.readings[sensor].file == file
 
 
-def heard_together(
+def combine_sensors(
     readings: Sequence[Reading],
     target: Target,
-    places: Mapping[str, Place] | None,
-    x_name: str,
     shaft_hz: Sequence[float] | None,
-    learned: Learned | None = None,
+    *,
+    places: Mapping[str, RecordingPlace] | None,
+    x_name: str,
+    memory: SeriesMemory | None = None,
 ) -> tuple[list[TrackedRecording], str, list[str]]:
-    """Recordings of several sensors as those of one machine, by x; what x is; and what has to be said of them.
-
-    With `learned`, further recordings are judged beside what it holds.
+    """Combine recordings of several sensors; return them by x, the name of x, and notes.
 
     Raises
     ------
     BadInput
-        where recordings of different sensors cannot be laid beside one another, or are copies.
+        if recordings of different sensors cannot be matched, or are copies.
     """
-    found, x_name = _instants(readings, places, x_name)
+    instants, x_name = _match_instants(readings, places, x_name)
     names = list(dict.fromkeys(reading.sensor for reading in readings if reading.sensor))
-    made = without_silence(
-        [one.readings[name] for one in found for name in names if name in one.readings]
-    )
-    made, notes = on_one_grid(made)
-    notes += _apart(found, names)
-    by_key = {(reading.file, reading.sensor): reading for reading in made}
-    found = [
-        Instant(one.place, {name: by_key[old.file, name] for name, old in one.readings.items()})
-        for one in found
-    ]
+    instants, notes = _harmonized(instants, names)
     usable = {
-        name: sum(name in one.readings and one.readings[name].usable for one in found)
+        name: sum(
+            name in instant.readings and instant.readings[name].usable for instant in instants
+        )
         for name in names
     }
-    memory = Learned() if learned is None else learned
-    led = memory.lead if usable.get(memory.lead, 0) >= FEWEST_RECORDINGS else ""
-    names.sort(
-        key=lambda name: (name != led, -usable[name])
-    )  # stable: of equals the first named leads
-    found = _without_copies(names, found, refused=learned is None)
+    state = SeriesMemory() if memory is None else memory
+    lead = state.lead if usable.get(state.lead, 0) >= FEWEST_RECORDINGS else ""
+    # stable: of equals the first named leads
+    names.sort(key=lambda name: (name != lead, -usable[name]))
+    instants = _without_copies(names, instants, refused=memory is None)
     cleaned = [
         {
-            name: memory.clean((reading.file, name), spectrum_of(reading), shaft_hz)
-            for name, reading in one.readings.items()
+            name: state.clean((reading.file, name), spectrum_of(reading), shaft_hz)
+            for name, reading in instant.readings.items()
             if reading.usable
         }
-        for one in found
+        for instant in instants
     ]
     if usable[names[0]] < FEWEST_RECORDINGS:
-        reason = f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor, and has {usable[names[0]]}"
-        nothing = Together(no_resonance(reason, target.band_hz, "joint"), (), dict.fromkeys(names))
-        told = [nothing] * len(found)
+        reason = (
+            f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor and has "
+            f"{usable[names[0]]}"
+        )
+        no_line = SensorLine(
+            no_resonance(reason, target.band_hz, "joint"), (), dict.fromkeys(names)
+        )
+        lines = [no_line] * len(instants)
     else:
-        keys = [
-            tuple((one.readings[name].file, name) for name in clean)
-            for one, clean in zip(found, cleaned, strict=True)
-        ]
-        every = {name: [clean.get(name) for clean in cleaned] for name in names}
-        spectra = {
-            name: [None if one is None else one.spectrum for one in heard]
-            for name, heard in every.items()
-        }
-        kept = {
-            name: [None if one is None else one.kept for one in heard]
-            for name, heard in every.items()
-        }
-        told = memory.lines(keys, spectra, kept, target.band_hz)
-        if np.isfinite(memory.common):
+        lines = _joint_lines(instants, cleaned, names, state, target.band_hz)
+        if np.isfinite(state.common):
             notes.append(
-                f"Of the errors of a line, sensors have {100 * memory.common:.0f} % in common: intervals are no "
-                "narrower than the rest allows."
+                f"Sensors share {100 * state.common:.0f} % of the error of a line; intervals "
+                "include the shared part in full."
             )
     tracked = [
-        _together(one, clean, line, names, memory)
-        for one, clean, line in zip(found, cleaned, told, strict=True)
+        _combined(instant, clean, line, names, state)
+        for instant, clean, line in zip(instants, cleaned, lines, strict=True)
     ]
     return tracked, x_name, notes
 
 
-def _together(
-    one: Instant,
-    cleaned: Mapping[str, CleanSpectrum],
-    line: Together,
+def _joint_lines(
+    instants: Sequence[Instant],
+    cleaned: Sequence[Mapping[str, CleanSpectrum]],
     names: Sequence[str],
-    memory: Learned,
+    memory: SeriesMemory,
+    band_hz: tuple[float, float],
+) -> list[SensorLine]:
+    """Return the line of each instant by joint separation on all sensors."""
+    keys = [
+        tuple((instant.readings[name].file, name) for name in clean)
+        for instant, clean in zip(instants, cleaned, strict=True)
+    ]
+    series = {name: [clean.get(name) for clean in cleaned] for name in names}
+    spectra = {
+        name: [None if clean is None else clean.spectrum for clean in of_sensor]
+        for name, of_sensor in series.items()
+    }
+    kept = {
+        name: [None if clean is None else clean.kept for clean in of_sensor]
+        for name, of_sensor in series.items()
+    }
+    return memory.lines(keys, spectra, kept, band_hz)
+
+
+def _harmonized(
+    instants: Sequence[Instant], names: Sequence[str]
+) -> tuple[list[Instant], list[str]]:
+    """Bring readings to one grid, without those of a machine at rest; return notes too."""
+    readings, notes = on_common_grid(
+        exclude_machine_off(
+            [
+                instant.readings[name]
+                for instant in instants
+                for name in names
+                if name in instant.readings
+            ]
+        )
+    )
+    notes += _rarely_simultaneous(instants, names)
+    by_key = {(reading.file, reading.sensor): reading for reading in readings}
+    return [
+        Instant(
+            instant.place,
+            {name: by_key[old.file, name] for name, old in instant.readings.items()},
+        )
+        for instant in instants
+    ], notes
+
+
+def _combined(
+    instant: Instant,
+    cleaned: Mapping[str, CleanSpectrum],
+    line: SensorLine,
+    names: Sequence[str],
+    memory: SeriesMemory,
 ) -> TrackedRecording:
-    """What sensors heard at one time as one recording, with the reading of the first whose spectrum counts."""
-    first = next((name for name in names if name in cleaned), next(iter(one.readings)))
-    return recording_of(
-        one.readings[first],
-        one.place,
+    """Combine simultaneous readings, with the first usable sensor as the leading one."""
+    first = next((name for name in names if name in cleaned), next(iter(instant.readings)))
+    return tracked_recording(
+        instant.readings[first],
+        instant.place,
         cleaned.get(first),
         line.resonance,
         on_sensors={
             name: OnSensor(
-                reading=reading, alone=line.alone.get(name), hears=name in line.detected_on
+                reading=reading, alone=line.alone.get(name), detects=name in line.detected_by
             )
-            for name, reading in one.readings.items()
+            for name, reading in instant.readings.items()
         },
-        remounted=next((name for file, name in memory.moved if one.holds(file, name)), None),
+        remounted=next((name for file, name in memory.moved if instant.contains(file, name)), None),
     )
 
 
-def _instants(
-    readings: Sequence[Reading], places: Mapping[str, Place] | None, x_name: str
+def _match_instants(
+    readings: Sequence[Reading], places: Mapping[str, RecordingPlace] | None, x_name: str
 ) -> tuple[list[Instant], str]:
-    """Recordings laid beside one another: of one file, at one x, at one time, or each sensor's so-manieth."""
+    """Match recordings of several sensors by file, x, time or number; return the name of x too."""
     by_sensor: dict[str, list[Reading]] = {}
     for reading in readings:
         if reading.sensor:
             by_sensor.setdefault(reading.sensor, []).append(reading)
-    lead = next(iter(by_sensor))  # by which is shown what nobody knows the sensor of
-    keys: dict[tuple[str, str], tuple[float, ...]] = {}
+    lead = next(iter(by_sensor))  # recordings of an unknown sensor are shown under this name
     if (
         len({reading.file for reading in readings})
         == len(by_sensor[lead])
         == min(map(len, by_sensor.values()))
-    ):  # channels of the same files
-        files = [reading.file for reading in by_sensor[lead]]
-        times = [reading.time for reading in by_sensor[lead]]
-        heard = [
-            any(not one[number].refused for one in by_sensor.values())
-            for number in range(len(files))
-        ]
-        stand, x_name = in_their_places(files, times, heard, places, x_name)
-        keys = {
-            (one.file, one.sensor): (stand[one.file].x, files.index(one.file)) for one in readings
-        }
+    ):
+        keys, located, x_name = _match_channels(readings, by_sensor, places, x_name)
     elif x_name and places is not None:
-        stand = dict(places)
-        stated = [Placed(one.sensor, places[one.file].x, _duration(one)) for one in readings]
-        for one, there in zip(readings, by_place(stated, x_name), strict=True):
-            stand[one.file] = replace(places[one.file], x=there.x)
-            keys[one.file, one.sensor] = there
-    elif all(one.time is not None for one in readings if not one.refused):
-        x_name, stand = "time_h", {}
-        laid = [Heard(one.file, one.sensor, one.time, _duration(one)) for one in readings]
-        for (file, sensor, *_), there in zip(laid, by_time(laid), strict=True):
-            stand[file] = replace((places or {}).get(file, Place(x=there.x)), x=there.x)
-            keys[file, sensor] = there
+        keys, located = _match_stated(readings, places, x_name)
+    elif all(reading.time is not None for reading in readings if not reading.refused):
+        x_name = "time_h"
+        keys, located = _match_started(readings, places or {})
     else:
-        counts = {name: len(every) for name, every in by_sensor.items()}
-        if len({*counts.values()}) > 1:
-            said = ", ".join(f"{count} of {name}" for name, count in counts.items())
-            raise BadInput(
-                f"recordings of different sensors are laid beside one another by number, and there are {said}; say "
-                "when they began, or where they stand in a table"
-            )
-        stand, x_name = {}, "recording"
-        numbers = dict.fromkeys(by_sensor, 0)
-        for place, one in enumerate(readings, 1):
-            if one.sensor:
-                numbers[one.sensor] += 1
-            number = numbers.get(
-                one.sensor, numbers[lead]
-            )  # what nobody knows stands alone at that of the one before
-            stand[one.file] = replace(
-                (places or {}).get(one.file, Place(x=number)), x=float(number)
-            )
-            keys[one.file, one.sensor] = (float(number), 0 if one.sensor else place)
-    found: dict[tuple[float, ...], Instant] = {}
-    for one in readings:
-        instant = found.setdefault(keys[one.file, one.sensor], Instant(stand[one.file], {}))
-        instant.readings[one.sensor or lead] = one if one.sensor else replace(one, sensor=lead)
-    return [found[key] for key in sorted(found)], x_name
+        x_name = "recording"
+        keys, located = _match_numbers(readings, by_sensor, places or {})
+    instants: dict[_SlotKey, Instant] = {}
+    for reading in readings:
+        key = keys[reading.file, reading.sensor]
+        instant = instants.setdefault(key, Instant(located[reading.file], {}))
+        instant.readings[reading.sensor or lead] = (
+            reading if reading.sensor else replace(reading, sensor=lead)
+        )
+    return [instants[key] for key in sorted(instants)], x_name
 
 
-def _apart(found: Sequence[Instant], names: Sequence[str]) -> list[str]:
-    """A sentence where sensors that have recordings of their own were mostly not heard together."""
-    together = sum(len(one.readings) > 1 for one in found)
-    possible = sorted(sum(name in one.readings for one in found) for name in names)[-2]
+_SlotKey = tuple[float, ...]  # equal for simultaneous recordings
+_Keys = dict[tuple[str, str], _SlotKey]  # by file and sensor
+
+
+def _match_channels(
+    readings: Sequence[Reading],
+    by_sensor: Mapping[str, Sequence[Reading]],
+    places: Mapping[str, RecordingPlace] | None,
+    x_name: str,
+) -> tuple[_Keys, dict[str, RecordingPlace], str]:
+    """Match channels of the same files."""
+    leading = next(iter(by_sensor.values()))
+    files = [reading.file for reading in leading]
+    readable = [
+        any(not series[number].refused for series in by_sensor.values())
+        for number in range(len(files))
+    ]
+    located, x_name = locate_recordings(
+        files, [reading.time for reading in leading], readable, places, x_name
+    )
+    keys: _Keys = {
+        (reading.file, reading.sensor): (located[reading.file].x, files.index(reading.file))
+        for reading in readings
+    }
+    return keys, located, x_name
+
+
+def _match_stated(
+    readings: Sequence[Reading], places: Mapping[str, RecordingPlace], x_name: str
+) -> tuple[_Keys, dict[str, RecordingPlace]]:
+    """Match recordings by their stated x."""
+    keys: _Keys = {}
+    located = dict(places)
+    stated = [
+        PlacedRecording(reading.sensor, places[reading.file].x, _duration(reading))
+        for reading in readings
+    ]
+    for reading, slot in zip(readings, match_places(stated, x_name), strict=True):
+        located[reading.file] = replace(places[reading.file], x=slot.x)
+        keys[reading.file, reading.sensor] = slot
+    return keys, located
+
+
+def _match_started(
+    readings: Sequence[Reading], places: Mapping[str, RecordingPlace]
+) -> tuple[_Keys, dict[str, RecordingPlace]]:
+    """Match recordings by the time of their start."""
+    keys: _Keys = {}
+    located: dict[str, RecordingPlace] = {}
+    timed = [
+        TimedRecording(reading.file, reading.sensor, reading.time, _duration(reading))
+        for reading in readings
+    ]
+    for recording, slot in zip(timed, match_times(timed), strict=True):
+        place = places.get(recording.file, RecordingPlace(x=slot.x))
+        located[recording.file] = replace(place, x=slot.x)
+        keys[recording.file, recording.sensor] = slot
+    return keys, located
+
+
+def _match_numbers(
+    readings: Sequence[Reading],
+    by_sensor: Mapping[str, Sequence[Reading]],
+    places: Mapping[str, RecordingPlace],
+) -> tuple[_Keys, dict[str, RecordingPlace]]:
+    """Match the n-th recordings of all sensors."""
+    counts = {name: len(series) for name, series in by_sensor.items()}
+    if len({*counts.values()}) > 1:
+        listed = ", ".join(f"{count} of {name}" for name, count in counts.items())
+        raise BadInput(
+            f"recordings of different sensors are matched by number, but their numbers differ: "
+            f"{listed}; state their start, or their places in a table"
+        )
+    keys: _Keys = {}
+    located: dict[str, RecordingPlace] = {}
+    numbers, lead = dict.fromkeys(by_sensor, 0), next(iter(by_sensor))
+    for place, reading in enumerate(readings, 1):
+        if reading.sensor:
+            numbers[reading.sensor] += 1
+        # a recording of an unknown sensor stands alone at the place of the one before
+        number = numbers.get(reading.sensor, numbers[lead])
+        located[reading.file] = replace(
+            places.get(reading.file, RecordingPlace(x=number)), x=float(number)
+        )
+        keys[reading.file, reading.sensor] = (float(number), 0 if reading.sensor else place)
+    return keys, located
+
+
+def _rarely_simultaneous(instants: Sequence[Instant], names: Sequence[str]) -> list[str]:
+    """Return a note if few recordings of different sensors are simultaneous."""
+    together = sum(len(instant.readings) > 1 for instant in instants)
+    counts = sorted(sum(name in instant.readings for instant in instants) for name in names)
+    possible = counts[-2]
     if 2 * together >= possible:
         return []
     many = f"Only {together} of {possible}" if together else "No"
     return [
-        f"{many} recordings of two sensors stand at one x; elsewhere no other sensor confirms a line. Sensors are laid "
-        "beside one another where their x or times agree."
+        f"{many} recordings of two sensors have the same x; elsewhere no second sensor confirms a "
+        "line. Sensors are matched by x or time."
     ]
 
 
@@ -269,37 +369,39 @@ def _duration(reading: Reading) -> float:
 
 
 def _without_copies(
-    names: Sequence[str], found: Sequence[Instant], *, refused: bool
+    names: Sequence[str], instants: Sequence[Instant], *, refused: bool
 ) -> list[Instant]:
-    """Sensors that hold the same samples would agree on everything: BadInput, or the second of them does not count."""
-    told = []
-    for one in found:
-        readings = dict(one.readings)
+    """Exclude identical samples on two sensors, or raise BadInput if `refused`.
+
+    Copies would agree in everything and confirm each other.
+    """
+    distinct = []
+    for instant in instants:
+        readings = dict(instant.readings)
+        # sensors that are off are equal without being copies
         usable = [name for name in names if name in readings and readings[name].usable]
-        for first, second in combinations(
-            usable, 2
-        ):  # sensors that are off are alike, and no copies
-            here, there = (readings[name].spectrum for name in (first, second))
-            if here is None or there is None or not _alike(here, there):
+        for first, second in combinations(usable, 2):
+            spectrum, other = (readings[name].spectrum for name in (first, second))
+            if spectrum is None or other is None or not _equal(spectrum, other):
                 continue
             if refused:
                 name = Path(readings[first].file).name
                 raise BadInput(
-                    f"sensors {first} and {second} hold the same samples in {name}; leave one of them out"
+                    f"sensors {first} and {second} hold the same samples in {name}; "
+                    "leave one of them out"
                 )
             readings[second] = replace(
                 readings[second], reason=f"it holds the same samples as {first}"
             )
-        told.append(one._replace(readings=readings))
-    return told
+        distinct.append(instant._replace(readings=readings))
+    return distinct
 
 
-def _alike(one: Spectrum, other: Spectrum) -> bool:
-    if one.density.shape != other.density.shape:
+def _equal(spectrum: Spectrum, other: Spectrum) -> bool:
+    if spectrum.density.shape != other.density.shape:
         return False
-    last, of_other = float(one.density[-1]), float(other.density[-1])
-    if (
-        abs(last - of_other) > COPIED * of_other
-    ):  # nearly all that are not are told by one of their values
+    last, of_other = float(spectrum.density[-1]), float(other.density[-1])
+    if abs(last - of_other) > COPY_TOLERANCE * of_other:  # a single value excludes nearly all
         return False
-    return bool(np.all(np.abs(one.density - other.density)[1:] <= COPIED * other.density[1:]))
+    difference = np.abs(spectrum.density - other.density)
+    return bool(np.all(difference[1:] <= COPY_TOLERANCE * other.density[1:]))

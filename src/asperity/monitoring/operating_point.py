@@ -1,7 +1,7 @@
-"""What recordings were made at, and how an indicator may follow it without any wear: load, speed, oil temperature.
+"""Operating conditions of recordings, and the response of indicators to them without wear.
 
-How much a condition explains of a series is learned by `asperity.wear`; which way and how far it
-can, is said here: by the case's contact, solved, or by what any contact can do.
+`asperity.trend` fits how much load, speed and oil temperature explain. This module bounds the
+exponents: from the case's contact, solved, or for any contact.
 """
 
 import json
@@ -24,27 +24,26 @@ from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.files import make_folder, user_cache, write_text
 from asperity.lubricant import OilSheet
-from asperity.monitoring.files import Place
+from asperity.monitoring.files import RecordingPlace
 from asperity.monitoring.reading import Reading
 from asperity.recording import OPERATING_KEYS
 from asperity.trend import Condition
 
 ZERO_CELSIUS = 273.15
 TEMPERATURE = ("temperature_degc",)
-USUAL_OIL = OilSheet(
-    viscosity_40=1e-4, viscosity_100=1.11e-5
-)  # VG 100; over temperature oils differ by little but a factor
-COLDEST, HOTTEST = -20.0, 150.0  # degC, of the table of viscosities
-WORTH_SOLVING = 0.05  # of a condition: how it must differ for the case's contact to be solved
-MOSTLY = 0.5  # of the recordings, for which a condition must be known to be used
-STEP = 1.3  # of load and speed, either way, by which the contact's answer is found
-DOUBT = 0.5  # of that answer, either way: roughness is not the case's, and changes
-LEAST_SPAN = 0.05  # of a coefficient, below which it is not known
+# VG 100; viscosities of oils over temperature differ mainly by a factor
+USUAL_OIL = OilSheet(viscosity_40=1e-4, viscosity_100=1.11e-5)
+COLDEST, HOTTEST = -20.0, 150.0  # range of the table of viscosities [degC]
+MIN_VARIATION = 0.05  # relative variation of a condition from which the contact is solved
+MIN_STATED = 0.5  # share of recordings that must state a condition for it to be used
+STEP = 1.3  # factor on load and speed, up and down, for the contact's response
+EXPONENT_UNCERTAINTY = 0.5  # relative, either way: the roughness differs from the case and changes
+MIN_HALF_RANGE = 0.05  # least half-width of the range of an exponent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Operating:
-    """What a recording was made at; None for what nobody states.
+class OperatingPoint:
+    """Operating conditions of a recording; None if not stated.
 
     `load_n` of the contact [N], `speed_hz` of the shaft, `entrainment_m_s`, `temperature_degc` of
     the oil.
@@ -56,77 +55,75 @@ class Operating:
     speed_hz: float | None = None
 
 
-def operating_of(reading: Reading, place: Place | None) -> Operating:
-    """As the table says, or else a sidecar, or a channel of the recording."""
-    said: dict[str, float | None] = {}
+def operating_point(reading: Reading, place: RecordingPlace | None) -> OperatingPoint:
+    """Return the conditions from the table, or else from a sidecar or channel."""
+    values: dict[str, float | None] = {}
     for key in OPERATING_KEYS:
-        beside = reading.facts.get(key)
+        fact = reading.facts.get(key)
         stated = None if place is None else getattr(place, key)
-        said[key] = float(beside[0]) if stated is None and beside is not None else stated
-    return Operating(**said)
+        values[key] = float(fact[0]) if stated is None and fact is not None else stated
+    return OperatingPoint(**values)
 
 
-class Follows(NamedTuple):
-    """By which powers an indicator may follow load, speed and viscosity: the least and the most of each."""
+class ResponseExponents(NamedTuple):
+    """Least and greatest exponents of an indicator on load, speed and viscosity."""
 
     load: tuple[float, float]
     speed: tuple[float, float]
     viscosity: tuple[float, float]
 
 
-# CRF goes with (CLR F)^(1/6): a load share may rise with the load, as fast at most, and falls as
-# the film grows
-CRF = Follows(load=(0.0, 1.0 / 3.0), speed=(-1.0 / 3.0, 0.0), viscosity=(-1.0 / 3.0, 0.0))
-DAMPING = Follows(load=(-1.0, 1.0), speed=(-1.0, 1.0), viscosity=(-1.0, 1.0))
-# warm oil is often what a fault does, so that it explains little of a level, and nothing of what no
-# oil makes
-LEVEL = Follows(load=(-1.0, 2.0), speed=(-1.0, 4.0), viscosity=(-0.3, 0.3))
-PULSES = Follows(load=(-1.0, 2.0), speed=(-1.0, 4.0), viscosity=(0.0, 0.0))
+# CRF ∝ (CLR F)^(1/6): CLR rises at most in proportion to the load, and falls with film
+CRF = ResponseExponents(load=(0.0, 1.0 / 3.0), speed=(-1.0 / 3.0, 0.0), viscosity=(-1.0 / 3.0, 0.0))
+DAMPING = ResponseExponents(load=(-1.0, 1.0), speed=(-1.0, 1.0), viscosity=(-1.0, 1.0))
+# a fault often warms the oil: temperature may explain little of a level, and nothing of pulses
+LEVEL = ResponseExponents(load=(-1.0, 2.0), speed=(-1.0, 4.0), viscosity=(-0.3, 0.3))
+PULSES = ResponseExponents(load=(-1.0, 2.0), speed=(-1.0, 4.0), viscosity=(0.0, 0.0))
 
 
 class Response(NamedTuple):
-    """How CRF follows what a recording was made at, and which oil's viscosity goes with the temperature.
+    """Exponents of CRF on operating conditions, and the oil of the viscosity.
 
-    `said` is a sentence on whose word that is, empty where it has not mattered.
+    `note` states their source, empty if the conditions do not vary.
     """
 
-    crf: Follows
+    crf: ResponseExponents
     oil: OilSheet
-    said: str = ""
+    note: str = ""
 
 
 ANY_CONTACT = Response(CRF, USUAL_OIL)
 
 
 def conditions_of(
-    met: Sequence[Operating], follows: Follows, oil: OilSheet
+    points: Sequence[OperatingPoint], exponents: ResponseExponents, oil: OilSheet
 ) -> tuple[Condition, ...]:
-    """What an indicator of recordings may follow: conditions that most of them state."""
+    """Return the conditions that an indicator may respond to: those that most recordings state."""
     found: list[Condition] = []
-    for name, unit, powers, read in (
-        ("load", "N", follows.load, attrgetter("load_n")),
-        ("speed", "m/s", follows.speed, attrgetter("entrainment_m_s")),
-        ("speed", "Hz", follows.speed, attrgetter("speed_hz")),
+    for name, unit, limits, read in (
+        ("load", "N", exponents.load, attrgetter("load_n")),
+        ("speed", "m/s", exponents.speed, attrgetter("entrainment_m_s")),
+        ("speed", "Hz", exponents.speed, attrgetter("speed_hz")),
     ):
-        if name in {one.name for one in found}:
+        if name in {condition.name for condition in found}:
             continue
-        shown = _known(met, read)
+        shown = _known(points, read)
         if shown is not None and (shown[np.isfinite(shown)] > 0.0).all():
             found.append(
                 Condition(
                     name=name,
                     values=np.log(shown),
-                    low=powers[0],
-                    high=powers[1],
+                    low=limits[0],
+                    high=limits[1],
                     shown=shown,
                     unit=unit,
                 )
             )
-    shown = _known(met, attrgetter("temperature_degc"))
-    if shown is not None and follows.viscosity != (0.0, 0.0):
+    shown = _known(points, attrgetter("temperature_degc"))
+    if shown is not None and exponents.viscosity != (0.0, 0.0):
         degrees, logarithms = _viscosities(oil)
         values = np.interp(shown, degrees, logarithms)
-        low, high = follows.viscosity
+        low, high = exponents.viscosity
         found.append(
             Condition(
                 name="oil temperature", values=values, low=low, high=high, shown=shown, unit="degC"
@@ -135,14 +132,16 @@ def conditions_of(
     return tuple(found)
 
 
-def _known(met: Sequence[Operating], read: Callable[[Operating], float | None]) -> Field | None:
-    """A condition of all recordings, nan where it is not stated; None where most do not state it."""
-    values = np.array([math.nan if (value := read(one)) is None else value for one in met])
-    return values if values.size and np.isfinite(values).mean() > MOSTLY else None
+def _known(
+    points: Sequence[OperatingPoint], read: Callable[[OperatingPoint], float | None]
+) -> Field | None:
+    """Return a condition of all recordings, nan if not stated; None if most do not state it."""
+    values = np.array([math.nan if (value := read(point)) is None else value for point in points])
+    return values if values.size and np.isfinite(values).mean() > MIN_STATED else None
 
 
-def unstated(met: Sequence[Operating]) -> list[str]:
-    """A sentence on each condition that some recordings state and some do not."""
+def unstated(points: Sequence[OperatingPoint]) -> list[str]:
+    """Return a sentence on each condition that only some recordings state."""
     notes = []
     known_by = (
         ("load", ("load_n",)),
@@ -150,75 +149,77 @@ def unstated(met: Sequence[Operating]) -> list[str]:
         ("oil temperature", TEMPERATURE),
     )
     for words, keys in known_by:
-        missing = min(sum(getattr(one, key) is None for one in met) for key in keys)
-        if 0 < missing < len(met):
-            used = any(_known(met, attrgetter(key)) is not None for key in keys)
-            done = (
-                "these are left out of trend and alarm" if used else "it is not taken into account"
-            )
+        missing = min(sum(getattr(point, key) is None for point in points) for key in keys)
+        if 0 < missing < len(points):
+            used = any(_known(points, attrgetter(key)) is not None for key in keys)
+            consequence = "these are excluded from trend and alarm" if used else "it is not used"
             notes.append(
-                f"The {words} is not stated for {missing} of {len(met)} recordings; {done}."
+                f"The {words} is not stated for {missing} of {len(points)} recordings; "
+                f"{consequence}."
             )
     return notes
 
 
 @lru_cache(maxsize=8)
 def _viscosities(sheet: OilSheet) -> tuple[Field, Field]:
-    """Logarithm of an oil's viscosity over temperature [degC]."""
+    """Return the logarithm of an oil's viscosity over temperature [degC]."""
     known = []
     for degree in np.linspace(COLDEST, HOTTEST, 35):
-        with suppress(BadInput):  # beyond where the data sheet tells it
+        with suppress(BadInput):  # outside the range of the data sheet
             known.append((degree, math.log(sheet.viscosity(degree + ZERO_CELSIUS))))
     degrees, logarithms = np.array(known).T
     return degrees, logarithms
 
 
-def response_of(case: Case | None, met: Sequence[Operating]) -> Response:
-    """How CRF may follow what recordings were made at: as the case's contact does, solved, else as any contact may."""
+def operating_response(case: Case | None, points: Sequence[OperatingPoint]) -> Response:
+    """Return the response of CRF to conditions, of the case's contact or of any contact."""
     if case is None:
         return ANY_CONTACT
     changed = any(
         shown is not None
-        and np.nanmax(shown) - np.nanmin(shown) > WORTH_SOLVING * np.nanmax(np.abs(shown))
-        for shown in (_known(met, attrgetter(key)) for key in OPERATING_KEYS)
+        and np.nanmax(shown) - np.nanmin(shown) > MIN_VARIATION * np.nanmax(np.abs(shown))
+        for shown in (_known(points, attrgetter(key)) for key in OPERATING_KEYS)
     )
     oil = case.oil_sheet or USUAL_OIL
     if not changed:
         return Response(CRF, oil)
     try:
-        follows = contact_follows(case)
+        exponents = contact_exponents(case)
     except AsperityError as refusal:
         reason = str(refusal).rstrip(".")
         return Response(
             CRF,
             oil,
-            f"How CRF follows load and speed is any contact's, as the case's is not solved: {reason}.",
+            (
+                "The response of CRF to load and speed is that of any contact, because the case's "
+                f"contact could not be solved: {reason}."
+            ),
         )
-    (low, high), (thin, thick) = follows.load, follows.speed
+    load, speed = exponents.load, exponents.speed
     return Response(
-        follows,
+        exponents,
         oil,
-        f"By the contact of {case.source}, solved, CRF follows the load by its power of {low:.2g} to {high:.2g}, speed "
-        f"and viscosity by {thin:.2g} to {thick:.2g}.",
+        f"The contact of {case.source} gives CRF an exponent of {load[0]:.2g} to {load[1]:.2g} on "
+        f"load and of {speed[0]:.2g} to {speed[1]:.2g} on speed and viscosity.",
     )
 
 
-def contact_follows(case: Case) -> Follows:
-    """By which powers CRF follows load, speed and viscosity: of the case's contact, solved at others about its own.
+def contact_exponents(case: Case) -> ResponseExponents:
+    """Compute the exponents of CRF by solving the case's contact at other loads and speeds.
 
-    Speed and viscosity count alike, by their product. What was found is kept in the user's cache.
+    Speed and viscosity act by their product. Results are kept in the user's cache.
 
     Raises
     ------
     AsperityError
-        where a contact could not be solved, or has no resonance.
+        if a contact cannot be solved, or has no resonance.
     """
-    mark = sha256(f"{version('asperity')}\n{case.text}".encode()).hexdigest()[:32]
-    kept = user_cache() / "follows" / f"{mark}.json"
+    digest = sha256(f"{version('asperity')}\n{case.text}".encode()).hexdigest()[:32]
+    cached = user_cache() / "follows" / f"{digest}.json"
     with suppress(OSError, ValueError, TypeError):
-        return _about(*json.loads(kept.read_text()))
+        return _with_uncertainty(*json.loads(cached.read_text()))
     stated = case.conditions
-    powers = []
+    exponents = []
     for key, value, unit in (
         ("contact.load", stated.load, "N"),
         ("contact.entrainment_speed", stated.entrainment_speed, "m/s"),
@@ -227,24 +228,25 @@ def contact_follows(case: Case) -> Follows:
             _resonance(case.with_overrides({key: f"{value * by:.10g} {unit}"}))
             for by in (1.0 / STEP, STEP)
         ]
-        powers.append(math.log(ends[1] / ends[0]) / (2.0 * math.log(STEP)))
+        exponents.append(math.log(ends[1] / ends[0]) / (2.0 * math.log(STEP)))
     with suppress(AsperityError):
-        make_folder(kept.parent)
-        write_text(kept, json.dumps(powers))
-    return _about(*powers)
+        make_folder(cached.parent)
+        write_text(cached, json.dumps(exponents))
+    return _with_uncertainty(*exponents)
 
 
-def _about(load: float, film: float) -> Follows:
-    """The contact's powers, with the doubt about them."""
-    spans = [max(DOUBT * abs(power), LEAST_SPAN) for power in (load, film)]
-    loaded, filmed = (
-        (power - span, power + span) for power, span in zip((load, film), spans, strict=True)
+def _with_uncertainty(load: float, film: float) -> ResponseExponents:
+    """Return the ranges of the contact's exponents."""
+    of_load, of_film = (
+        (exponent - half_range, exponent + half_range)
+        for exponent in (load, film)
+        for half_range in [max(EXPONENT_UNCERTAINTY * abs(exponent), MIN_HALF_RANGE)]
     )
-    return Follows(load=loaded, speed=filmed, viscosity=filmed)
+    return ResponseExponents(load=of_load, speed=of_film, viscosity=of_film)
 
 
 def _resonance(case: Case) -> float:
-    assert case.vibration is not None  # asked by the target
+    assert case.vibration is not None  # required by the target
     solution = ehl.solve_contact(
         case.conditions, case.lubricant, case.surface(), options=case.options
     )

@@ -1,4 +1,4 @@
-"""In which order recordings are judged, which of a long series are, and which have to wait."""
+"""Order of recordings for judgement, window of a long series, and recordings that must wait."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -6,157 +6,192 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from asperity.monitoring.alarm import BASELINE, LAST
-from asperity.monitoring.files import Place, Table, placed_at, where
+from asperity.monitoring.files import RecordingPlace, RecordingTable, place_at, x_of_recordings
 from asperity.monitoring.sensors import Sensors
-from asperity.monitoring.simultaneous import Heard, Placed, by_place, by_time
-from asperity.monitoring.store import Kept, Version
+from asperity.monitoring.simultaneous import (
+    PlacedRecording,
+    Slot,
+    TimedRecording,
+    match_places,
+    match_times,
+)
+from asperity.monitoring.store import FileVersion, StoredRecording
 
-# recordings of a long series that are judged with the first BASELINE: as many as the alarm looks
-# back
-LATEST = 112
+LATEST = 112  # recordings judged with the first BASELINE of a long series: the alarm's memory
 
 
 class Order(NamedTuple):
-    """Recordings in the order in which they are judged, what x is, and the x of each, by its file.
+    """Recordings in the order in which they are judged, the name of x, and x by file.
 
-    What several sensors heard at one time, each in a file of its own, is one of `instants`.
-    `stated` is what a table says; `waits` are sentences on recordings that cannot be laid beside
-    the others yet.
+    Simultaneous recordings of several sensors, each in a file of its own, are one of `instants`.
+    `stated` is the content of a table; `waits` are sentences on recordings that cannot be matched
+    with the others yet.
     """
 
-    instants: list[tuple[Version, ...]]
+    instants: list[tuple[FileVersion, ...]]
     x_name: str
     x: Mapping[str, float]
-    stated: Mapping[str, Place] | None = None
+    stated: Mapping[str, RecordingPlace] | None = None
     waits: tuple[str, ...] = ()
 
     @property
-    def keys(self) -> list[Version]:
-        """All of them, one by one."""
+    def keys(self) -> list[FileVersion]:
+        """All files, in order."""
         return [key for instant in self.instants for key in instant]
 
-    def place(self, file: str) -> Place:
-        """Where a recording stands, and what else is stated of it."""
-        return placed_at(self.x[file], (self.stated or {}).get(file))
+    def place(self, file: str) -> RecordingPlace:
+        """Return the place of a recording and its stated conditions."""
+        return place_at(self.x[file], (self.stated or {}).get(file))
 
 
-def ordered(known: Sequence[Version], table: Table | None, sensors: Sensors) -> Order:
-    """The recordings that the table knows by now, or all, by x."""
+def order_recordings(
+    series: Sequence[FileVersion], table: RecordingTable | None, sensors: Sensors
+) -> Order:
+    """Order by x the recordings that the table contains, or all without a table."""
     places = None
     if table is not None:
-        places = table.placed(
-            [Path(key.file) for key in known if table.row(Path(key.file)) is not None]
+        places = table.places_of(
+            [Path(key.file) for key in series if table.row(Path(key.file)) is not None]
         )
-        known = [key for key in known if key.file in places]
-    names, own = sensors.heard(known), sensors.place.sensor
-    waits: list[Version] = []
-    if len(names) > sensors.channels and own in names:
-        waits = [key for key in known if _is_of(own, sensors.kept(key))]
-        names.discard(own)
-        waiting = {*waits}
-        known = [key for key in known if key not in waiting]
-    said = _said(
-        waits,
-        "does not say of which sensor it is, and others do",
-        "name it in a sidecar or a table",
+        series = [key for key in series if key.file in places]
+    names, common_name = sensors.readable_names(series), sensors.address.sensor
+    unnamed: list[FileVersion] = []
+    if len(names) > sensors.channels and common_name in names:
+        unnamed = [key for key in series if _belongs_to(common_name, sensors.stored(key))]
+        names.discard(common_name)
+        waiting = {*unnamed}
+        series = [key for key in series if key not in waiting]
+    waits = _wait_notes(
+        unnamed, "does not name its sensor, and others do", "name it in a sidecar or a table"
     )
     x_name = "" if table is None else table.x_name
     if len(names) > sensors.channels:
-        return _apart({key: sensors.kept(key) for key in known}, places, x_name, said)
-    first = [sensors.first(key) for key in known]
-    files, times, heard = (
-        [key.file for key in known],
-        [one.time for one in first],
-        [not one.refused for one in first],
+        stored = {key: sensors.stored(key) for key in series}
+        return _match_sensors(stored, places, x_name, waits)
+    first = [sensors.first_stored(key) for key in series]
+    x, x_name = x_of_recordings(
+        [key.file for key in series],
+        [recording.time for recording in first],
+        [not recording.refused for recording in first],
+        places,
+        x_name,
     )
-    x, x_name = where(files, times, heard, places, x_name)
     return Order(
-        [(key,) for key in sorted(known, key=lambda key: x[key.file])], x_name, x, places, said
+        [(key,) for key in sorted(series, key=lambda key: x[key.file])], x_name, x, places, waits
     )
 
 
-def _apart(
-    kept: Mapping[Version, Mapping[str, Kept]],
-    places: Mapping[str, Place] | None,
+def _match_sensors(
+    stored: Mapping[FileVersion, Mapping[str, StoredRecording]],
+    places: Mapping[str, RecordingPlace] | None,
     x_name: str,
-    said: tuple[str, ...],
+    waits: tuple[str, ...],
 ) -> Order:
-    """Recordings of sensors that have files of their own: what stands at one x, or was made at one time, is one."""
-    stands: dict[Version, tuple[float, ...]] = {}
+    """Match the files of several sensors by stated x, or else by time."""
     if x_name and places is not None:
-        known = {name for heard in kept.values() for name, one in heard.items() if not one.refused}
-        stated = [
-            Placed(
-                name if (name := next(iter(heard))) in known else "",
-                places[key.file].x,
-                _first(heard).duration_s,
-            )
-            for key, heard in kept.items()
-        ]
-        stands |= zip(kept, by_place(stated, x_name), strict=True)
+        slots = _match_by_place(stored, places, x_name)
     else:
         x_name = "time_h"
-        waits = [
-            key for key, heard in kept.items() if not _refused(heard) and _first(heard).time is None
-        ]
-        said += _said(
-            waits,
-            "does not say when it began, and sensors are laid beside one another by that",
-            "say so in a sidecar, or x in a table",
+        untimed = {
+            key
+            for key, by_sensor in stored.items()
+            if not _refused(by_sensor) and _first(by_sensor).time is None
+        }
+        waits += _wait_notes(
+            [key for key in stored if key in untimed],
+            "does not state its start, and sensors are matched by time",
+            "state `started` in a sidecar, or x in a table",
         )
-        kept = {key: heard for key, heard in kept.items() if key not in {*waits}}
-        parts = [(key, name, one) for key, heard in kept.items() for name, one in heard.items()]
-        laid = by_time(
-            [Heard(key.file, name, one.time, one.duration_s) for key, name, one in parts]
+        slots = _match_by_time(
+            {key: by_sensor for key, by_sensor in stored.items() if key not in untimed}
         )
-        stands |= {key: there for (key, *_), there in zip(parts, laid, strict=True)}
-    instants: dict[tuple[float, ...], list[Version]] = {}
-    for key, there in stands.items():
-        instants.setdefault(there, []).append(key)
-    x = {key.file: there[0] for key, there in stands.items()}
-    return Order([tuple(instants[there]) for there in sorted(instants)], x_name, x, places, said)
+    instants: dict[Slot, list[FileVersion]] = {}
+    for key, slot in slots.items():
+        instants.setdefault(slot, []).append(key)
+    x = {key.file: slot.x for key, slot in slots.items()}
+    return Order([tuple(instants[slot]) for slot in sorted(instants)], x_name, x, places, waits)
 
 
-def _first(heard: Mapping[str, Kept]) -> Kept:
-    return next(iter(heard.values()))
+def _match_by_place(
+    stored: Mapping[FileVersion, Mapping[str, StoredRecording]],
+    places: Mapping[str, RecordingPlace],
+    x_name: str,
+) -> dict[FileVersion, Slot]:
+    """Match files by their stated x."""
+    readable = {
+        name
+        for by_sensor in stored.values()
+        for name, recording in by_sensor.items()
+        if not recording.refused
+    }
+    placed = [
+        PlacedRecording(
+            name if (name := next(iter(by_sensor))) in readable else "",
+            places[key.file].x,
+            _first(by_sensor).duration_s,
+        )
+        for key, by_sensor in stored.items()
+    ]
+    return dict(zip(stored, match_places(placed, x_name), strict=True))
 
 
-def _refused(heard: Mapping[str, Kept]) -> bool:
-    return all(one.refused for one in heard.values())
+def _match_by_time(
+    stored: Mapping[FileVersion, Mapping[str, StoredRecording]],
+) -> dict[FileVersion, Slot]:
+    """Match files by the time of their start."""
+    parts = [
+        (key, TimedRecording(key.file, name, recording.time, recording.duration_s))
+        for key, by_sensor in stored.items()
+        for name, recording in by_sensor.items()
+    ]
+    matched = match_times([recording for _, recording in parts])
+    return {key: slot for (key, _), slot in zip(parts, matched, strict=True)}
 
 
-def _is_of(name: str, heard: Mapping[str, Kept]) -> bool:
-    return {*heard} == {name} and not heard[name].refused
+def _first(by_sensor: Mapping[str, StoredRecording]) -> StoredRecording:
+    return next(iter(by_sensor.values()))
 
 
-def _said(waits: Sequence[Version], why: str, remedy: str) -> tuple[str, ...]:
-    """A sentence on recordings that wait; none on none."""
+def _refused(by_sensor: Mapping[str, StoredRecording]) -> bool:
+    return all(recording.refused for recording in by_sensor.values())
+
+
+def _belongs_to(name: str, by_sensor: Mapping[str, StoredRecording]) -> bool:
+    return {*by_sensor} == {name} and not by_sensor[name].refused
+
+
+def _wait_notes(waits: Sequence[FileVersion], reason: str, remedy: str) -> tuple[str, ...]:
+    """Return a sentence on recordings that have to wait, if there are any."""
     if not waits:
         return ()
     more = f" (and {len(waits) - 1} more)" if len(waits) > 1 else ""
-    return (f"{file_name(waits[0])}{more} waits: it {why}; {remedy}",)
+    return (f"{file_name(waits[0])}{more} waits: it {reason}; {remedy}",)
 
 
-def longest() -> int:
-    """Recordings of a series that are all judged."""
+def max_window() -> int:
+    """Return the length up to which all recordings of a series are judged."""
     return BASELINE + LATEST
 
 
-def window(order: Order, end: int, sensors: Sensors) -> list[Version]:
-    """What is judged of a long series: the first ones nobody has acknowledged, the latest, and who raised the alarm."""
+def judged_window(order: Order, end: int, sensors: Sensors) -> list[FileVersion]:
+    """Return the files judged up to `end`.
+
+    Of a long series these are the first after the last acknowledgement, the latest, and the one
+    that raised the standing alarm.
+    """
     instants = order.instants[:end]
     chosen = {*range(end)}
-    if end > longest():
+    if end > max_window():
         acknowledged, standing = sensors.acknowledged, sensors.standing
-        behind = 0
+        start = 0
         if acknowledged is not None:
-            those = (
+            numbers = (
                 number
                 for number, keys in enumerate(instants, 1)
                 if acknowledged in map(file_name, keys)
             )
-            behind = next(those, 0)
-        chosen = {*range(behind, min(behind + BASELINE, end)), *range(end - LATEST, end)}
+            start = next(numbers, 0)
+        chosen = {*range(start, min(start + BASELINE, end)), *range(end - LATEST, end)}
         if standing is not None:
             chosen |= {
                 number
@@ -166,19 +201,19 @@ def window(order: Order, end: int, sensors: Sensors) -> list[Version]:
     return [key for number in sorted(chosen) for key in instants[number]]
 
 
-def file_name(key: Version) -> str:
-    """The name of its file, without folders."""
+def file_name(key: FileVersion) -> str:
+    """Return the name of a file without its folder."""
     return key.file.rpartition(os.sep)[2]
 
 
 def unacknowledged(
     rows: Sequence[Mapping[str, Any]], acknowledged: str | None
 ) -> Sequence[Mapping[str, Any]]:
-    """Rows behind the recording up to which somebody has looked: what came before may have been repaired."""
+    """Return the rows after the last acknowledged recording; the machine may have been repaired."""
     if acknowledged == LAST:
         return ()
     for number, row in enumerate(rows, 1):
-        files = [row["file"], *(one["file"] for one in row.get("sensors", {}).values())]
+        files = [row["file"], *(sensor["file"] for sensor in row.get("sensors", {}).values())]
         if acknowledged in [Path(file).name for file in files]:
             return rows[number:]
     return rows

@@ -1,4 +1,4 @@
-"""What a store holds, for who looks after many machines: a line a sensor, and the recordings as a table to export."""
+"""Overview of a store with many machines: one row per sensor, and export of all recordings."""
 
 import json
 from collections.abc import Mapping
@@ -11,65 +11,74 @@ from asperity.core.errors import BadInput
 from asperity.core.files import atomic_write, write_csv
 from asperity.monitoring.alarm import LAST
 from asperity.monitoring.sensor import ACKNOWLEDGED
-from asperity.monitoring.sensors import opened, those_of
-from asperity.monitoring.store import Place, Store
+from asperity.monitoring.sensor_lookup import open_sensors, sensors_judged_with
+from asperity.monitoring.store import SensorAddress, Store
 from asperity.monitoring.track_result import Track, flat
-from asperity.monitoring.watch import version_of
+from asperity.monitoring.watch_state import version_of
 from asperity.recording import ReadOptions
 
 if TYPE_CHECKING:
     import pandas
 
-GRAVEST = ("alarm", "blind", "cannot-tell", "alert", "none")
-IN_WORDS = {
+SEVERITY = (  # most severe first
+    "alarm",
+    "blind",
+    "cannot-tell",
+    "alert",
+    "none",
+)
+STATE_TEXTS = {
     "blind": "blind",
     "cannot-tell": "cannot tell",
     "alert": "alert",
     "none": "none",
     "alarm": "ALARM",
 }
-ENDINGS = (".csv", ".parquet")
+SUFFIXES = (".csv", ".parquet")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoreOverview:
-    """Where every sensor of a store stands; `rows` the gravest first, as `asperity store --json` has them."""
+    """State of every sensor of a store; `rows` as in `asperity store --json`, most severe first."""
 
     path: Path
     rows: tuple[dict[str, Any], ...]
 
     @property
     def state(self) -> str:
-        """The gravest state of all."""
-        return min((row["state"] for row in self.rows), key=GRAVEST.index, default="cannot-tell")
+        """Most severe state of all sensors."""
+        return min((row["state"] for row in self.rows), key=SEVERITY.index, default="cannot-tell")
 
     def verdict(self) -> str:
-        """One sentence: how many sensors, how many of them need somebody."""
+        """Return the numbers of sensors, recordings and states as one sentence."""
         if not self.rows:
-            return f"{self.path.name} holds no recordings yet."
+            return f"{self.path.name} contains no recordings yet."
         machines = len({row["machine"] for row in self.rows})
         held = sum(row["recordings"] for row in self.rows)
-        several = f"{len(self.rows)} sensor{'s' * (len(self.rows) > 1)} on {machines} machine{'s' * (machines > 1)}"
-        counts = {state: sum(row["state"] == state for row in self.rows) for state in GRAVEST[:-1]}
-        spoken = ", ".join(f"{IN_WORDS[state]} {count}" for state, count in counts.items() if count)
-        return f"{several}, {held} recordings: {spoken or 'no alarm'}."
+        sensors = f"{len(self.rows)} sensor{'s' * (len(self.rows) > 1)}"
+        places = f"{machines} machine{'s' * (machines > 1)}"
+        counts = {state: sum(row["state"] == state for row in self.rows) for state in SEVERITY[:-1]}
+        states = ", ".join(
+            f"{STATE_TEXTS[state]} {count}" for state, count in counts.items() if count
+        )
+        return f"{sensors} on {places}, {held} recordings: {states or 'no alarm'}."
 
     def scalars(self) -> dict[str, Any]:
-        """Everything that `asperity store --json` prints."""
+        """Return the JSON of `asperity store`."""
         return {"verdict": self.verdict(), "state": self.state, "sensors": list(self.rows)}
 
     def export(self, path: str | Path) -> Path:
-        """Write every recording of the store, a row each with machine, point and sensor, as .csv or .parquet.
+        """Write all recordings of the store as rows of a .csv or .parquet file.
 
         Raises
         ------
         BadInput
-            for another ending, or a path that cannot be written to.
+            for another suffix, or a path that is not writable.
         """
         path = Path(path)
-        if path.suffix.lower() not in ENDINGS:
+        if path.suffix.lower() not in SUFFIXES:
             raise BadInput(
-                f"a store is exported as .csv or .parquet, got {path.name}; change its ending"
+                f"a store is exported as .csv or .parquet, got {path.name}; change the suffix"
             )
         with closing(Store(self.path, make=False)) as store:
             table = _table(store)
@@ -82,21 +91,21 @@ class StoreOverview:
 
 
 def store_overview(path: str | Path) -> StoreOverview:
-    """Look into a store.
+    """Read the state of every sensor of a store.
 
     Raises
     ------
     UnreadableFile
-        for a file that is none.
+        if the file is not a store.
     """
     with closing(Store(path, make=False)) as store:
-        rows = [_standing(store, number, place) for number, place in store.places()]
-    rows.sort(key=lambda row: GRAVEST.index(row["state"]))
+        rows = [_sensor_row(store, number, address) for number, address in store.sensors()]
+    rows.sort(key=lambda row: SEVERITY.index(row["state"]))
     return StoreOverview(path=Path(path), rows=tuple(rows))
 
 
-def _standing(store: Store, number: int, place: Place) -> dict[str, Any]:
-    """A sensor's line."""
+def _sensor_row(store: Store, number: int, address: SensorAddress) -> dict[str, Any]:
+    """Return a sensor's row."""
     ((held, last),) = store.read(
         "SELECT count(*), max(heard) FROM recording WHERE sensor = ?", number
     )
@@ -105,16 +114,16 @@ def _standing(store: Store, number: int, place: Place) -> dict[str, Any]:
         "ORDER BY id DESC LIMIT 1",
         *(number, ACKNOWLEDGED),
     )
-    fallen = ("cannot-tell", None, "nothing judged yet", None, "Nothing judged yet.")
-    state, since, reason, judged_at, verdict = judged[0] if judged else fallen
-    told = {
+    missing = ("cannot-tell", None, "no judgement yet", None, "No judgement yet.")
+    state, since, reason, judged_at, verdict = judged[0] if judged else missing
+    values = {
         "recordings": held,
         "last_heard": last,
         "state": state,
         "since": since,
         "reason": reason,
     }
-    return place._asdict() | told | {"judged": judged_at, "verdict": verdict}
+    return address._asdict() | values | {"judged": judged_at, "verdict": verdict}
 
 
 def _table(store: Store) -> "pandas.DataFrame":
@@ -123,18 +132,18 @@ def _table(store: Store) -> "pandas.DataFrame":
     rows = store.read(
         "SELECT sensor, file, heard, started, state, row FROM recording ORDER BY sensor, id"
     )
-    places: Mapping[int, Place] = dict(store.places())
+    addresses: Mapping[int, SensorAddress] = dict(store.sensors())
     return pandas.DataFrame(
         {
-            **places[sensor]._asdict(),
-            "heard": heard,
+            **addresses[sensor]._asdict(),
+            "heard": arrived,
             **(
                 {"file": file, "started": started or None, "state": state}
                 if row is None
                 else flat(json.loads(row))
             ),
         }
-        for sensor, file, heard, started, state, row in rows
+        for sensor, file, arrived, started, state, row in rows
     )
 
 
@@ -148,37 +157,44 @@ def keep_track(
     sensor: str | None = None,
     acknowledge: str | None = None,
 ) -> Track:
-    """Append a track's recordings and its judgement to a store; the track with the alarm that stands there.
+    """Append a track to a store and return it, with the alarm that stands there.
 
     Parameters
     ----------
-    options : by which the recordings were read
-    machine, point, sensor, acknowledge : as `watch_folder` takes them
+    options : with which the recordings were read
+    machine, point, sensor : as in `WatchSettings`
+    acknowledge : as in `TrackSettings`
 
     Raises
     ------
     BadInput
-        for a sensor whose recordings were read otherwise before.
+        if recordings of the sensor were read with other settings before.
     """
-    at = {file: str(Path(file).resolve()) for one in track.recordings for file in one.files}
-    track = replace(track, recordings=tuple(one.moved(at) for one in track.recordings))
+    paths = {
+        file: str(Path(file).resolve())
+        for recording in track.recordings
+        for file in recording.files
+    }
+    track = replace(
+        track, recordings=tuple(recording.with_files(paths) for recording in track.recordings)
+    )
     folder = Path(track.recordings[0].file).parent
-    entered = opened(store, folder, (machine, point, sensor), track.target, options)
-    with closing(entered.store):
-        keys = {file: version_of(Path(file)) for file in at.values()}
+    sensors = open_sensors(store, folder, (machine, point, sensor), track.target, options)
+    with closing(sensors.store):
+        keys = {file: version_of(Path(file)) for file in paths.values()}
         for recording in track.recordings:
             for reading in recording.readings.values():
-                if not entered.holds(keys[reading.file], reading):
-                    entered.keep(keys[reading.file], reading)
+                if not sensors.holds(keys[reading.file], reading):
+                    sensors.add(keys[reading.file], reading)
         if acknowledge is not None:
-            entered.acknowledge(
+            sensors.acknowledge(
                 Path(track.recordings[-1].file if acknowledge == LAST else acknowledge).name
             )
-        return entered.judged(track, keys, len(keys), "", None)
+        return sensors.record_judgement(track, keys, len(keys), "", None)
 
 
 def acknowledge_in(store: str | Path, named: str) -> None:
-    """Somebody has looked at a sensor, and at those that it is judged with, up to the last recording.
+    """Acknowledge the alarm of a sensor and of those judged with it, up to the last recording.
 
     Parameters
     ----------
@@ -187,18 +203,16 @@ def acknowledge_in(store: str | Path, named: str) -> None:
     Raises
     ------
     BadInput
-        for a sensor that is not there, or has no recordings.
+        if the sensor does not exist, or has no judgement.
     """
-    with closing(Store(store, make=False)) as found:
-        places = {"/".join(place): place for _, place in found.places()}
-        if named not in places:
+    with closing(Store(store, make=False)) as opened:
+        addresses = {"/".join(address): address for _, address in opened.sensors()}
+        if named not in addresses:
             raise BadInput(
-                f"the store has no sensor {named!r}; it has {', '.join(places) or 'none'}"
+                f"the store has no sensor {named!r}; it has {', '.join(addresses) or 'none'}"
             )
-        entered = those_of(found, places[named])
-        told = entered.said()
-        if told is None:
-            raise BadInput(
-                f"nothing has been judged of {named} yet; there is nothing to acknowledge"
-            )
-        entered.acknowledge(Path(told["recordings"][-1]["file"]).name)
+        sensors = sensors_judged_with(opened, addresses[named])
+        judgement = sensors.last_judgement()
+        if judgement is None:
+            raise BadInput(f"{named} has not been judged yet; there is nothing to acknowledge")
+        sensors.acknowledge(Path(judgement["recordings"][-1]["file"]).name)

@@ -1,6 +1,6 @@
-"""From files to spectra: each is read once, checked and averaged on the way, several at a time.
+"""Reading of recordings: each file is read once, checked and averaged to a spectrum, in parallel.
 
-What the spectra mean together is left to `track`.
+`judgement` judges the spectra of a series.
 """
 
 import json
@@ -21,8 +21,15 @@ from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.processes import ignore_interrupts
 from asperity.core.signals import Spectrum, averaged_spectrum
 from asperity.core.storage import append_digest, strip_digest
-from asperity.monitoring.auxiliary_channels import bands, beside, heard_at, lines, rates, steady
-from asperity.monitoring.files import Place
+from asperity.monitoring.auxiliary_channels import (
+    bands,
+    envelope_and_lines,
+    fault_rates,
+    lines,
+    order_tracked,
+    read_auxiliary,
+)
+from asperity.monitoring.files import RecordingPlace
 from asperity.monitoring.target import Target
 from asperity.rating import velocity_rms
 from asperity.recording import (
@@ -36,23 +43,22 @@ from asperity.recording import (
 from asperity.vibration import Envelope
 
 WINDOW = "hann"
-FINEST_HZ = 0.5  # spacing of lines: shaft harmonics a few hertz apart stay apart
-# of a record, averaged, as long as lines stay LINES_IN_WIDTH times narrower than the resonance
+FINEST_HZ = 0.5  # least spacing of lines: resolves shaft harmonics a few hertz apart
+# averages of a record, while lines stay LINES_IN_WIDTH times narrower than the resonance
 PIECES = 8
 LINES_IN_WIDTH = 16
-WORTH_A_POOL = 32 << 20  # bytes in all; starting processes takes a second
+MIN_POOL_BYTES = 32 << 20  # total size from which parallel reading is worth a second of start-up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """What reading one file gave. Without a `spectrum`, `reason` says why; `quality` may still be known.
+    """Result of reading one file; without a `spectrum`, `reason` states why.
 
-    `sensor` says which of several heard it, where a table or sidecar does. `bands` are rms in
-    bands, and `lines` at the rates of faults and meshes, each with two harmonics. `rate_doubt` is
-    the relative standard deviation of the rate. `facts` are texts by name, each with its source;
-    `started` is in ISO form or empty. `depths` are how deep the envelope is modulated at the rates
-    of faults, where a sidecar states those; `velocity` is rms, 10 to 1000 Hz [m/s], nan of what is
-    no acceleration or too short to tell.
+    `sensor` is its name, empty if not stated. `bands` are rms in bands, `lines` rms at the rates of
+    faults and meshes with two harmonics. `rate_doubt` is the relative standard deviation of the
+    sampling rate. `facts` are texts by name with their sources; `started` is in ISO format or
+    empty. `depths` are the modulation depths of the envelope at the rates of faults; `velocity` is
+    rms from 10 to 1000 Hz [m/s], nan if the values are not accelerations or too short.
     """
 
     file: str
@@ -72,32 +78,36 @@ class Reading:
 
     @property
     def refused(self) -> bool:
-        """Whether it is no recording at all, or one that nothing could be read of."""
+        """True if nothing could be read."""
         return self.spectrum is None and self.quality is None
 
     @property
     def usable(self) -> bool:
-        """Whether its spectrum counts."""
+        """True if its spectrum can be used."""
         return self.spectrum is not None and not self.reason
 
     @property
     def time(self) -> datetime | None:
-        """When the recording began."""
+        """Start of the recording; None if unknown."""
         return datetime.fromisoformat(self.started) if self.started else None
 
 
 def channels_in(channel: str | None) -> list[str | None]:
-    """The channels that are asked for; one whose name has a comma in it goes by its number."""
+    """Return the requested channels; a name with a comma has to be given as a number."""
     names = [] if channel is None else [name.strip() for name in channel.split(",") if name.strip()]
     if len(set(names)) < len(names):
-        raise BadInput(f"channel {channel} names one twice; name each once")
+        raise BadInput(f"channel {channel} names a channel twice; name each once")
     return [*names] or [None]
 
 
 def read_spectrum(
-    path: Path, options: ReadOptions, target: Target, spacing_hz: float, place: Place | None = None
+    path: Path,
+    options: ReadOptions,
+    target: Target,
+    spacing_hz: float,
+    place: RecordingPlace | None = None,
 ) -> Reading:
-    """Read a file once: its facts, its quality, its averaged spectrum. What is wrong with it becomes the reason."""
+    """Read facts, quality and averaged spectrum of a file; faults become its `reason`."""
     try:
         opened = open_recording(path, **asdict(options))
     except BadInput as refusal:
@@ -111,8 +121,8 @@ def read_spectrum(
         started=opened.started.isoformat() if opened.started else "",
         sensor=_sensor(opened, place),
     )
-    told = beside(opened, place)
-    rates_hz = rates(opened, told, target)
+    auxiliary = read_auxiliary(opened, place)
+    rates_hz = fault_rates(opened, auxiliary, target)
     gauge, envelope = SampleStatistics(), Envelope(opened.rate_hz)
     blocks = gauge.without_stuck(gauge.pass_through(opened.blocks()))
     segment = segment_length(opened.rate_hz, spacing_hz)
@@ -130,21 +140,21 @@ def read_spectrum(
     except BadInput as refusal:
         spectrum, failed = None, str(refusal)
     quality = gauge.quality(opened, width_hz=target.width_hz, band_hz=target.band_hz)
-    depths, remarks = envelope.depths(rates_hz), [*quality.remarks, *told.remarks]
-    heard: dict[str, Any] = {}
+    depths, remarks = envelope.depths(rates_hz), [*quality.remarks, *auxiliary.remarks]
+    values: dict[str, Any] = {}
     if spectrum is not None:
         frequency_hz, density = spectrum.frequency_hz, spectrum.density
-        heard = {
+        values = {
             "bands": bands(opened, frequency_hz, density),
             "lines": lines(frequency_hz, density, rates_hz),
         }
         if opened.comparable:
-            heard["velocity"] = velocity_rms(frequency_hz, density)
+            values["velocity"] = velocity_rms(frequency_hz, density)
     try:
-        even = steady(opened, told) if rates_hz else None
-        if even is not None:
-            depths, heard["lines"] = heard_at(
-                rates_hz, *even, opened.unit, segment_length(even[1], spacing_hz)
+        tracked = order_tracked(opened, auxiliary) if rates_hz else None
+        if tracked is not None:
+            depths, values["lines"] = envelope_and_lines(
+                rates_hz, *tracked, opened.unit, segment_length(tracked[1], spacing_hz)
             )
     except BadInput as refusal:
         remarks.append(str(refusal))
@@ -152,22 +162,22 @@ def read_spectrum(
         known,
         spectrum=spectrum,
         quality=replace(quality, remarks=tuple(remarks)),
-        facts=known.facts | told.facts,
+        facts=known.facts | auxiliary.facts,
         depths=depths,
         reason="; ".join(quality.faults) or failed,
-        **heard,
+        **values,
     )
 
 
-def _sensor(opened: OpenRecording, place: Place | None) -> str:
-    """Who heard a recording, as the table says it or else what stands beside it."""
+def _sensor(opened: OpenRecording, place: RecordingPlace | None) -> str:
+    """Return the sensor of a recording, from the table or else the sidecar."""
     if place is not None and place.sensor is not None:
         return place.sensor
     return str(opened.facts["sensor"].value) if "sensor" in opened.facts else ""
 
 
-def _sensor_of_refused(path: Path, place: Place | None) -> str:
-    """Who heard what cannot be read, as far as table and sidecar say it."""
+def _sensor_of_refused(path: Path, place: RecordingPlace | None) -> str:
+    """Return the sensor of an unreadable file, from the table or else the sidecar."""
     if place is not None and place.sensor is not None:
         return place.sensor
     try:
@@ -181,12 +191,12 @@ def _text(value: object) -> str:
 
 
 def segment_length(rate_hz: float, spacing_hz: float) -> int:
-    """Samples of a piece whose lines are about `spacing_hz` apart, a length that transforms fast."""
+    """Return the samples per segment for lines about `spacing_hz` apart, fast to transform."""
     return int(scipy.fft.next_fast_len(max(8, round(rate_hz / spacing_hz)), real=True))
 
 
 def common_spacing(paths: Sequence[Path], options: ReadOptions, target: Target) -> float:
-    """Distance of the lines [Hz] that suits a whole series, from the length of its first, middle and last recording."""
+    """Return the line spacing [Hz] of a series, by length of first, middle and last recording."""
     lengths = []
     first = replace(options, channel=channels_in(options.channel)[0])
     for path in {paths[0], paths[len(paths) // 2], paths[-1]}:
@@ -207,27 +217,29 @@ def read_channels(
     target: Target,
     spacing_hz: float,
     *,
-    places: Mapping[str, Place] | None = None,
+    places: Mapping[str, RecordingPlace] | None = None,
     workers: int = 1,
     progress: Callable[[Reading], None] | None = None,
 ) -> Iterator[tuple[int, Reading]]:
-    """Number and result of each file on each channel that is asked for, in turn; of several each is a sensor.
+    """Yield number and reading of each file, channel by channel; several channels are sensors.
 
-    Files of a channel come in their order, however long each takes; in processes of their own
-    where that is worth it.
+    The order of files is kept. Large series are read in parallel processes.
     """
-    channels, told = channels_in(options.channel), progress or (lambda _: None)
-    workers = workers if sum(_size(path) for path in paths) >= WORTH_A_POOL else 1
+    channels, report = channels_in(options.channel), progress or (lambda _: None)
+    workers = workers if sum(_size(path) for path in paths) >= MIN_POOL_BYTES else 1
     for channel in channels:
-        of_one = replace(options, channel=channel)
-        jobs = [(path, of_one, target, spacing_hz, (places or {}).get(str(path))) for path in paths]
-        for number, reading in _done(jobs, workers):
-            told(reading)
-            of_several = replace(reading, sensor=f"{reading.sensor} {channel}".strip())
-            yield number, of_several if len(channels) > 1 else reading
+        of_channel = replace(options, channel=channel)
+        jobs = [
+            (path, of_channel, target, spacing_hz, (places or {}).get(str(path))) for path in paths
+        ]
+        for number, reading in _run(jobs, workers):
+            report(reading)
+            if len(channels) > 1:
+                reading = replace(reading, sensor=f"{reading.sensor} {channel}".strip())
+            yield number, reading
 
 
-def _done(jobs: Sequence[tuple[Any, ...]], workers: int) -> Iterator[tuple[int, Reading]]:
+def _run(jobs: Sequence[tuple[Any, ...]], workers: int) -> Iterator[tuple[int, Reading]]:
     if min(workers, len(jobs)) < 2:
         for number, job in enumerate(jobs):
             yield number, read_spectrum(*job)
@@ -243,12 +255,12 @@ def _size(path: Path) -> int:
     return path.stat().st_size if path.is_file() else 0
 
 
-# Kept between runs
-# ---------------------------------------------------------------------------------------------------
+# Storage
+# ----------------------------------------------------------------------------------------------
 
 
-def reading_bytes(reading: Reading) -> bytes:
-    """A reading as bytes with their digest, to be read by `reading_from`."""
+def pack_reading(reading: Reading) -> bytes:
+    """Pack a reading as bytes with a digest, for `unpack_reading`."""
     density = np.empty(0) if reading.spectrum is None else reading.spectrum.density
     content: dict[str, Any] = asdict(replace(reading, spectrum=None))
     if reading.spectrum is not None:
@@ -259,13 +271,13 @@ def reading_bytes(reading: Reading) -> bytes:
     return append_digest(packed.getvalue())
 
 
-def reading_from(packed: bytes, name: str) -> Reading:
-    """What `reading_bytes` made.
+def unpack_reading(packed: bytes, name: str) -> Reading:
+    """Unpack the result of `pack_reading`.
 
     Raises
     ------
     UnreadableFile
-        for anything else.
+        if the content is damaged.
     """
     remedy = "its recording is read again"
     body = BytesIO(strip_digest(packed, name, remedy))
@@ -286,12 +298,12 @@ def reading_from(packed: bytes, name: str) -> Reading:
             )
         return Reading(spectrum=spectrum, quality=quality, **content)
     except Exception as error:
-        raise UnreadableFile(f"{name} is no reading of a recording; {remedy}") from error
+        raise UnreadableFile(f"{name} is not a stored reading; {remedy}") from error
 
 
-def any_of(readings: list[Reading]) -> list[Reading]:
-    """The same; BadInput where nothing could be read of any."""
-    if all(reading.spectrum is None and reading.quality is None for reading in readings):
-        others = f" (and so on for {len(readings) - 1} more files)" if len(readings) > 1 else ""
+def require_readable(readings: list[Reading]) -> list[Reading]:
+    """Return the readings; raise BadInput if nothing could be read."""
+    if all(reading.refused for reading in readings):
+        others = f" (and {len(readings) - 1} more files)" if len(readings) > 1 else ""
         raise BadInput(f"{readings[0].reason}{others}")
     return readings

@@ -1,4 +1,4 @@
-"""One recording of a series, as it was heard on one sensor or on several at one time, and these in words."""
+"""One recording of a series, on one sensor or on several at one time."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -9,38 +9,36 @@ import numpy as np
 
 from asperity.core.arrays import finite_or_none
 from asperity.core.quantities import quantity
-from asperity.monitoring.operating_point import Operating
+from asperity.monitoring.operating_point import OperatingPoint
 from asperity.monitoring.reading import Reading
 from asperity.rating import ZONES, severity_zone
 from asperity.resonance import SENSORS_DISAGREE, CleanSpectrum, Resonance
 from asperity.trend import AlarmState
 
-MISSED = 3  # recordings without one of the sensors, from which on that is said
-NAMED = {
-    "depths": "depth",
-    "lines": "line",
-    "bands": "band",
-}  # of a row: several numbers, each by its own name
-STATED = tuple(one.name for one in fields(Operating))
+MISSING_RECORDINGS = 3  # last recordings without a sensor from which this is reported
+# fields of a row with several numbers by name, and the prefix of their columns
+NAMED = {"depths": "depth", "lines": "line", "bands": "band"}
+STATED = tuple(entry.name for entry in fields(OperatingPoint))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OnSensor:
-    """What one of several sensors says of a recording: `alone` by itself, None where it has no usable spectrum.
+    """Result of one of several sensors for a recording.
 
-    `hears` says whether it hears the line that is the contact's.
+    `alone` is the resonance of this sensor by itself, None without a usable spectrum; `detects` is
+    true if the sensor detects the contact's line.
     """
 
     reading: Reading
     alone: Resonance | None
-    hears: bool
+    detects: bool
 
     def row(self) -> dict[str, Any]:
-        """Its part of the recording's line."""
+        """Return its part of the recording's row."""
         quality, alone = self.reading.quality, self.alone
         return {
             "file": self.reading.file,
-            "hears": self.hears,
+            "hears": self.detects,
             "crf_hz": None if alone is None else finite_or_none(alone.crf_hz),
             "crf_std_hz": None if alone is None else finite_or_none(alone.crf_std_hz),
             "crfa": None if alone is None else finite_or_none(alone.crfa),
@@ -52,16 +50,15 @@ class OnSensor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackedRecording:
-    """One recording of a series; of several sensors what they heard at one time.
+    """One recording of a series, on one sensor or simultaneously on several.
 
-    `resonance` is not found, with its reason, for a recording that could not be used. `clr` and
-    its 90 % interval are the contact model's reading of the CRF, nan without one. `damping_reason`
-    says why the width of its line is no damping ratio that can be followed; empty where it is one.
-    `crf_reference_hz` and `damping_reference` are CRF and damping ratio as they would be at the
-    load, speed and temperature of the first recordings. `label` is the stage's name; `state` the
-    alarm's after it. Of several sensors `on_sensors` has what each says, by name, and `reading`
-    and `file` are those of the first whose spectrum counts. `remounted` names the sensor, empty of
-    the only one, that hears through another structure from this recording on.
+    `resonance` states the reason if none was found or the recording is not usable. `clr` and its
+    90 % interval follow from CRF by the contact model, nan without one. `damping_reason` states why
+    the width of the line is not a damping ratio; empty if it is. `crf_reference_hz` and
+    `damping_reference` are reduced to load, speed and temperature of the first recordings. `label`
+    is the stage, `state` the alarm's state after this recording. With several sensors `on_sensors`
+    has the result of each by name, and `reading` and `file` belong to the first usable one.
+    `remounted` names the sensor (empty for a single one) whose mounting changed at this recording.
     """
 
     file: str
@@ -71,7 +68,7 @@ class TrackedRecording:
     clean: CleanSpectrum | None
     resonance: Resonance
     damping_reason: str = ""
-    operating: Operating = field(default_factory=Operating)
+    operating: OperatingPoint = field(default_factory=OperatingPoint)
     crf_reference_hz: float = np.nan
     damping_reference: float = np.nan
     clr: float = np.nan
@@ -84,67 +81,78 @@ class TrackedRecording:
 
     @property
     def readings(self) -> dict[str, Reading]:
-        """What was read of it, by sensor."""
-        return {name: one.reading for name, one in self.on_sensors.items()} or {
+        """Readings by sensor."""
+        return {name: on_sensor.reading for name, on_sensor in self.on_sensors.items()} or {
             self.reading.sensor: self.reading
         }
 
     @property
     def files(self) -> list[str]:
-        """Files that hold it, its own first."""
+        """Its files, `file` first."""
         return [*dict.fromkeys([self.file, *(reading.file for reading in self.readings.values())])]
 
-    def moved(self, to: Mapping[str, str]) -> "TrackedRecording":
-        """The same, its files by other names."""
-        heard = {
-            name: replace(one, reading=replace(one.reading, file=to[one.reading.file]))
-            for name, one in self.on_sensors.items()
+    def with_files(self, names: Mapping[str, str]) -> "TrackedRecording":
+        """Return the recording with other names of its files."""
+        on_sensors = {
+            name: replace(
+                on_sensor,
+                reading=replace(on_sensor.reading, file=names[on_sensor.reading.file]),
+            )
+            for name, on_sensor in self.on_sensors.items()
         }
-        reading = replace(self.reading, file=to[self.reading.file])
-        return replace(self, file=to[self.file], reading=reading, on_sensors=heard)
+        reading = replace(self.reading, file=names[self.reading.file])
+        return replace(self, file=names[self.file], reading=reading, on_sensors=on_sensors)
 
     @property
     def dead(self) -> bool:
-        """Whether no sensor hears anything."""
-        qualities = [one.quality for one in self.readings.values() if one.quality is not None]
-        return bool(qualities) and all(one.dead for one in qualities)
+        """True if all sensors are dead."""
+        qualities = [
+            reading.quality for reading in self.readings.values() if reading.quality is not None
+        ]
+        return bool(qualities) and all(quality.dead for quality in qualities)
 
     @property
     def damping(self) -> tuple[float, float]:
-        """Damping ratio of its line and the standard deviation of that; nan where it is not determined."""
+        """Damping ratio and its standard deviation; nan if not determined."""
         if self.damping_reason:
             return np.nan, np.nan
         return self.resonance.damping_ratio, self.resonance.damping_ratio_std
 
     @property
     def zone(self) -> str | None:
-        """Its zone of ISO 20816-3, A to D; None without a machine class, an acceleration, or a long enough record."""
-        reading = self._gravest
+        """Zone A to D of ISO 20816-3; None without machine class or velocity."""
+        reading = self._most_severe
         if "machine_class" not in reading.facts or not np.isfinite(reading.velocity):
             return None
         return severity_zone(reading.velocity, reading.facts["machine_class"][0])
 
     @property
-    def _gravest(self) -> Reading:
-        """What the sensor of the greatest velocity heard."""
-        known = [one for one in self.readings.values() if np.isfinite(one.velocity)]
-        return max(known, key=lambda one: one.velocity, default=self.reading)
+    def _most_severe(self) -> Reading:
+        """Reading with the highest velocity."""
+        known = [reading for reading in self.readings.values() if np.isfinite(reading.velocity)]
+        return max(known, key=lambda reading: reading.velocity, default=self.reading)
 
     def severity(self) -> str:
-        """Its velocity and zone in words, or why they are not determined."""
-        reading, zone = self._gravest, self.zone
+        """Return velocity and zone as text, or why they are not determined."""
+        reading, zone = self._most_severe, self.zone
         velocity = reading.velocity
         if not np.isfinite(velocity):
-            return "velocity not determined: it takes an acceleration of known unit, at 2.5 kHz or more for 3.2 s or more"
+            return (
+                "velocity not determined: it needs an acceleration in a known unit, "
+                "sampled at 2.5 kHz or more for 3.2 s or more"
+            )
         on = f" on {reading.sensor}" if self.on_sensors else ""
-        said = f"velocity {quantity('velocity_rms').text(velocity)} rms, 10 to 1000 Hz{on}"
+        level = f"velocity {quantity('velocity_rms').text(velocity)} rms, 10 to 1000 Hz{on}"
         if zone is None:
-            return f"{said}; zone of ISO 20816-3 not determined: no machine_class is stated beside the recording"
-        return f"{said}: zone {zone} of ISO 20816-3 ({reading.facts['machine_class'][0]}), {ZONES[zone]}"
+            return (
+                f"{level}; zone of ISO 20816-3 not determined: the sidecar states no machine_class"
+            )
+        machine_class = reading.facts["machine_class"][0]
+        return f"{level}: zone {zone} of ISO 20816-3 ({machine_class}), {ZONES[zone]}"
 
     def row(self) -> dict[str, Any]:
-        """Its line of the table, by the names of `asperity track --json`; None where there is nothing."""
-        resonance, damping, read = self.resonance, self.damping, self._read(self.reading)
+        """Return its row of the table, as in `asperity track --json`; None for missing values."""
+        resonance, damping, read = self.resonance, self.damping, self._reading_row(self.reading)
         return {
             "file": read["file"],
             "x": read["x"],
@@ -171,15 +179,15 @@ class TrackedRecording:
             "zone": self.zone,
             "crf_reference_hz": finite_or_none(self.crf_reference_hz),
             **{name: getattr(self.operating, name) for name in STATED},
-            "sensors": {name: one.row() for name, one in self.on_sensors.items()},
+            "sensors": {name: on_sensor.row() for name, on_sensor in self.on_sensors.items()},
         }
 
     def row_on(self, sensor: str, row: Mapping[str, Any]) -> dict[str, Any]:
-        """Its line of the table, `row`, as one of its sensors has it."""
-        return {**row, **self._read(self.readings[sensor])}
+        """Return its row with the values of one of its sensors."""
+        return {**row, **self._reading_row(self.readings[sensor])}
 
-    def _read(self, reading: Reading) -> dict[str, Any]:
-        """What a line has of the reading itself."""
+    def _reading_row(self, reading: Reading) -> dict[str, Any]:
+        """Return the part of a row that depends on the reading."""
         quality = reading.quality
         return {
             "file": reading.file,
@@ -201,40 +209,52 @@ class TrackedRecording:
         }
 
 
-def heard_in_words(recordings: Sequence[TrackedRecording]) -> str:
-    """On which of several sensors the line was heard, where they disagree, and who is silent; empty of one sensor."""
-    names = list(dict.fromkeys(name for one in recordings for name in one.on_sensors))
+def sensor_summary(recordings: Sequence[TrackedRecording]) -> str:
+    """Return which sensors detect the line, disagree or fail; empty for a single sensor."""
+    names = list(dict.fromkeys(name for recording in recordings for name in recording.on_sensors))
     if not names:
         return ""
-    heard = Counter(
+    counts = Counter(
         " and ".join(
-            name for name in names if name in one.on_sensors and one.on_sensors[name].hears
+            name
+            for name in names
+            if name in recording.on_sensors and recording.on_sensors[name].detects
         )
-        for one in recordings
-        if one.resonance.found
+        for recording in recordings
+        if recording.resonance.found
     )
-    said = [f"on {who} in {count}" for who, count in heard.most_common()]
-    sentence = (
-        f"The line was heard {', '.join(said)}."
-        if said
-        else "No line was heard as one by two sensors."
-    )
-    apart = sum(one.resonance.reason.startswith(SENSORS_DISAGREE) for one in recordings)
+    detections = [f"on {sensors} in {count}" for sensors, count in counts.most_common()]
+    sentences = [
+        f"The line was detected {', '.join(detections)}."
+        if detections
+        else "No line was detected on two sensors."
+    ]
+    apart = sum(recording.resonance.reason.startswith(SENSORS_DISAGREE) for recording in recordings)
     if apart:
-        sentence += f" The sensors disagree in {apart}: that is no single claim."
+        sentences.append(f"The sensors disagree in {apart}; no line is claimed there.")
     for name in names:
-        silent = [
-            one.on_sensors[name].reading.reason
-            for one in recordings
-            if name in one.on_sensors
-            and not one.on_sensors[name].reading.usable
-            and any(other.reading.usable for other in one.on_sensors.values())
-        ]
-        if silent:
-            there = sum(name in one.on_sensors for one in recordings)
-            sentence += f" Sensor {name} is of no use in {len(silent)} of {there}: {silent[-1]}."
-        if len(recordings) >= MISSED and all(
-            name not in one.on_sensors for one in recordings[-MISSED:]
-        ):
-            sentence += f" Of sensor {name} nothing has come with the last {MISSED} recordings."
-    return sentence
+        sentences += _sensor_faults(recordings, name)
+    return " ".join(sentences)
+
+
+def _sensor_faults(recordings: Sequence[TrackedRecording], name: str) -> list[str]:
+    """Return sentences on a sensor that is unusable where others are not, or delivers nothing."""
+    sentences = []
+    held = [recording for recording in recordings if name in recording.on_sensors]
+    reasons = [
+        recording.on_sensors[name].reading.reason
+        for recording in held
+        if not recording.on_sensors[name].reading.usable
+        and any(other.reading.usable for other in recording.on_sensors.values())
+    ]
+    if reasons:
+        sentences.append(
+            f"Sensor {name} is not usable in {len(reasons)} of {len(held)}: {reasons[-1]}."
+        )
+    if len(recordings) >= MISSING_RECORDINGS and all(
+        name not in recording.on_sensors for recording in recordings[-MISSING_RECORDINGS:]
+    ):
+        sentences.append(
+            f"Sensor {name} has delivered nothing with the last {MISSING_RECORDINGS} recordings."
+        )
+    return sentences

@@ -1,100 +1,107 @@
-"""One sensor of a store: its recordings, how they are read, who has looked at them, and the alarm that stands.
+"""One sensor of a store: its recordings, settings of reading, acknowledgement and standing alarm.
 
-What is said of sensors that are judged together, and who is told, is left to `sensors`.
+`sensors` holds what concerns sensors that are judged together, and their notifications.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from math import nan
 from typing import Any
 
 from asperity.core.errors import BadInput, UnreadableFile
-from asperity.monitoring.reading import Reading, reading_bytes, reading_from
-from asperity.monitoring.store import Kept, Place, Standing, Store, Version
+from asperity.monitoring.reading import Reading, pack_reading, unpack_reading
+from asperity.monitoring.store import (
+    FileVersion,
+    SensorAddress,
+    StandingAlarm,
+    Store,
+    StoredRecording,
+)
 from asperity.trend import AlarmState
 
 ACKNOWLEDGED = "acknowledged"  # state of a judgement that a person has made
-# among the settings of a sensor that was not named: nobody else's recordings are to be taken for
-# its
+# setting of a sensor without machine and point: recordings of other folders do not belong to it
 FOLDER = "folder"
-TOGETHER = (
-    "together"  # among the settings of sensors that are judged as one: the name by which they go
-)
-LATER = (FOLDER, TOGETHER)  # settings that older stores lack
+TOGETHER = "together"  # setting of sensors that are judged together: their common name
+OPTIONAL = (FOLDER, TOGETHER)  # settings that older stores lack
 
 
 class Sensor:
-    """The recordings of one sensor.
+    """Recordings of one sensor.
 
-    `settings` are those by which its recordings are read, and those given with `begin` where it is
-    new. `recordings` are all that the store holds, `unjudged` those of which nothing was said yet;
-    `acknowledged` names the one up to which somebody has looked, None for none; `standing` is the
-    alarm that stands since.
+    `settings` are those with which its recordings are read; a new sensor also gets those of
+    `initial`. `recordings` are all that the store holds, `unjudged` those without a judgement;
+    `acknowledged` names the last acknowledged recording, None without one; `standing` is the alarm
+    raised since then.
 
     Raises
     ------
     BadInput
-        for other settings than those that it was begun with.
+        if its recordings were read with other settings before.
     """
 
     def __init__(
         self,
         store: Store,
-        place: Place,
+        address: SensorAddress,
         settings: Mapping[str, Any],
-        begin: Mapping[str, Any] | None = None,
+        initial: Mapping[str, Any] | None = None,
     ) -> None:
-        self.store, self.place = store, place
-        self.number, self.settings = store.entered(place, {**settings, **(begin or {})})
+        self.store, self.address = store, address
+        self.number, self.settings = store.register_sensor(address, {**settings, **(initial or {})})
         for name, value in settings.items():
             if self.settings.get(name) != value and not (
-                name in LATER and name not in self.settings
+                name in OPTIONAL and name not in self.settings
             ):
                 raise BadInput(
-                    f"{store.path} was begun with {name} {self.settings.get(name)}, now it is {value}; go on with the "
-                    "same, or choose another out or another sensor"
+                    f"{store.path} was begun with {name} {self.settings.get(name)}, got {value}; "
+                    "keep the former value, or choose another out or another sensor"
                 )
+        rows = store.read(
+            "SELECT id, file, version, started, state, refused, duration FROM recording "
+            "WHERE sensor = ? ORDER BY id",
+            self.number,
+        )
         self.recordings = {
-            Version(file, version): Kept(
-                row,
+            FileVersion(file, version): StoredRecording(
+                number,
                 datetime.fromisoformat(started) if started else None,
                 state,
                 bool(refused),
                 duration or nan,
             )
-            for row, file, version, started, state, refused, duration in store.read(
-                "SELECT id, file, version, started, state, refused, duration FROM recording WHERE sensor = ? "
-                "ORDER BY id",
-                self.number,
-            )
+            for number, file, version, started, state, refused, duration in rows
         }
-        self.unjudged = {key for key, kept in self.recordings.items() if kept.state is None}
+        self.unjudged = {
+            key for key, recording in self.recordings.items() if recording.state is None
+        }
         self.acknowledged: str | None = None
-        self.standing: Standing | None = None
-        self.look_up()
+        self.standing: StandingAlarm | None = None
+        self.refresh()
 
-    def look_up(self) -> None:
-        """What stands and up to where somebody has looked: another process may have acknowledged it."""
+    def refresh(self) -> None:
+        """Read standing alarm and acknowledgement, which another process may have changed."""
         last = self.store.read(
-            "SELECT id, since FROM judgement WHERE sensor = ? AND state = ? ORDER BY id DESC LIMIT 1",
+            "SELECT id, since FROM judgement WHERE sensor = ? AND state = ? "
+            "ORDER BY id DESC LIMIT 1",
             *(self.number, ACKNOWLEDGED),
         )
-        at, self.acknowledged = last[0] if last else (0, None)
+        number, self.acknowledged = last[0] if last else (0, None)
         raised = self.store.read(
-            "SELECT since, reason, raised_by FROM judgement WHERE sensor = ? AND state = 'alarm' AND id > ? "
-            "ORDER BY id LIMIT 1",
-            *(self.number, at),
+            "SELECT since, reason, raised_by FROM judgement "
+            "WHERE sensor = ? AND state = 'alarm' AND id > ? ORDER BY id LIMIT 1",
+            *(self.number, number),
         )
-        self.standing = Standing(*raised[0]) if raised else None
+        self.standing = StandingAlarm(*raised[0]) if raised else None
 
     @property
     def spacing_hz(self) -> float | None:
-        """Distance of the lines of its spectra; None before the first recording."""
+        """Spacing of the spectra's lines [Hz]; None before the first recording."""
         return self.settings.get("spacing_hz")
 
-    def settle_spacing(self, spacing_hz: float) -> None:
-        """Say how far apart lines are, once and for all."""
+    def set_spacing(self, spacing_hz: float) -> None:
+        """Set the spacing of lines [Hz] for all recordings."""
         self.settings["spacing_hz"] = spacing_hz
         with self.store.transaction() as run:
             run(
@@ -102,60 +109,62 @@ class Sensor:
                 (json.dumps(self.settings), self.number),
             )
 
-    def keep(self, key: Version, reading: Reading) -> None:
-        """Keep what reading a file gave."""
+    def add(self, key: FileVersion, reading: Reading) -> None:
+        """Store the reading of a file."""
         duration = None if reading.quality is None else reading.quality.duration_s
-        told = (
+        values = (
             self.number,
             *key,
             now(),
             reading.started,
             reading.refused,
             duration,
-            reading_bytes(reading),
+            pack_reading(reading),
         )
         with self.store.transaction() as run:
             run(
-                "INSERT INTO recording (sensor, file, version, heard, started, refused, duration, reading) "
+                "INSERT INTO recording "
+                "(sensor, file, version, heard, started, refused, duration, reading) "
                 "VALUES (?, ?, ?, ?, ?, ?, ?, ?) "
                 # by another watch
                 "ON CONFLICT (sensor, file, version) DO UPDATE SET reading = excluded.reading",
-                told,
+                values,
             )
-            found = run(
-                "SELECT id FROM recording WHERE sensor = ? AND file = ? AND version = ?", told[:3]
+            row = run(
+                "SELECT id FROM recording WHERE sensor = ? AND file = ? AND version = ?",
+                values[:3],
             )
-            (number,) = found.fetchone()
-        self.recordings[key] = Kept(
+            (number,) = row.fetchone()
+        self.recordings[key] = StoredRecording(
             number, reading.time, None, reading.refused, nan if duration is None else duration
         )
         self.unjudged.add(key)
 
-    def say(self, key: Version, state: AlarmState) -> None:
-        """What is said of a recording from now on."""
+    def set_state(self, key: FileVersion, state: AlarmState) -> None:
+        """Set the alarm state at a recording."""
         self.recordings[key] = self.recordings[key]._replace(state=state)
         self.unjudged.discard(key)
 
-    def reading(self, key: Version) -> Reading | None:
-        """What was kept; None, and forgotten, where it is damaged."""
+    def reading(self, key: FileVersion) -> Reading | None:
+        """Return a stored reading; None, and delete it, if it is damaged."""
         ((body,),) = self.store.read(
             "SELECT reading FROM recording WHERE id = ?", self.recordings[key].number
         )
         try:
-            return reading_from(body, f"a recording in {self.store.path}")
+            return unpack_reading(body, f"a recording in {self.store.path}")
         except UnreadableFile:
             with self.store.transaction() as run:
                 run("DELETE FROM recording WHERE id = ?", (self.recordings.pop(key).number,))
             self.unjudged.discard(key)
             return None
 
-    def enter(self, run: Any, judgement: Mapping[str, Any]) -> None:
-        """A line of all that was said of it, by the names of the columns, within a transaction."""
-        said = {"sensor": self.number, "time": now(), **judgement}
-        places = ", ".join("?" * len(said))
-        run(f"INSERT INTO judgement ({', '.join(said)}) VALUES ({places})", [*said.values()])
+    def insert_judgement(self, run: Callable[..., Any], judgement: Mapping[str, Any]) -> None:
+        """Insert a judgement, by names of columns, within a transaction."""
+        values = {"sensor": self.number, "time": now(), **judgement}
+        marks = ", ".join("?" * len(values))
+        run(f"INSERT INTO judgement ({', '.join(values)}) VALUES ({marks})", [*values.values()])
 
 
 def now() -> str:
-    """The time, as the store has it."""
+    """Return the present time (UTC) as the store writes it."""
     return datetime.now(UTC).isoformat(timespec="seconds")

@@ -1,7 +1,7 @@
-"""What a series has shown so far, so that a further recording is judged beside it instead of all of them anew.
+"""Memory of a series, so that a further recording is judged without separating all of them again.
 
-Resonances and cleaned spectra are kept at hand by file; what all recordings share is learned again
-as the series grows.
+Resonances and cleaned spectra are kept by file; what all recordings share is learned again as the
+series grows.
 """
 
 import json
@@ -30,48 +30,48 @@ from asperity.resonance import (
 )
 from asperity.trend import AlarmState
 
-WHOLE = 32  # recordings up to which all are separated together each time
-GROWTH = 0.25  # of a longer series, after which what all recordings share is learned anew
+ALWAYS_RELEARNED = 32  # recordings up to which all are separated together each time
+MAX_GROWTH = 0.25  # of a longer series, after which the shared part is learned again
 
 
-class Before(NamedTuple):
-    """What was said before: states by file, and why an alarm stands, by what."""
+class PreviousStates(NamedTuple):
+    """States by file from previous judgements; reason and indicator of a standing alarm."""
 
     states: Mapping[str, AlarmState]
     reason: str = ""
     raised_by: str = ""
 
 
-Key = tuple[str, str]  # of a recording: its file, and the sensor that heard it
+Key = tuple[str, str]  # of a recording: file and sensor
 
 
-class Together(NamedTuple):
-    """What sensors say of a recording: the line, who hears it, and each by itself."""
+class SensorLine(NamedTuple):
+    """Line of a recording on several sensors, the sensors that detect it, and their own results."""
 
     resonance: Resonance
-    detected_on: tuple[str, ...]
+    detected_by: tuple[str, ...]
     alone: Mapping[str, Resonance | None]
 
 
 @dataclass
-class Learned:
-    """The memory of one watched series, of one sensor or of several; empty at first.
+class SeriesMemory:
+    """Memory of a watched series of one or several sensors; empty at first.
 
-    `shared` is what the recordings behind the last of `moved` share, those with which a sensor was
-    moved.
+    `shared` is the shared part of the recordings after the last of `moved`, those at which a
+    sensor was moved.
     """
 
     shared: Shared | SharedBySensors | None = None
-    since: int = 0  # recordings heard since
+    since: int = 0  # recordings since the shared part was learned
     moved: tuple[Key, ...] = ()
     cleaned: dict[Key, tuple[Spectrum, CleanSpectrum]] = field(default_factory=dict)
     found: dict[Key, Resonance] = field(default_factory=dict)
-    together: dict[tuple[Key, ...], Together] = field(default_factory=dict)
+    together: dict[tuple[Key, ...], SensorLine] = field(default_factory=dict)
 
     def clean(
         self, key: Key, spectrum: Spectrum, shaft_hz: Sequence[float] | None
     ) -> CleanSpectrum:
-        """A spectrum without its tones, worked out once."""
+        """Return a spectrum without tones; computed once per spectrum."""
         held = self.cleaned.get(key)
         highest = spectrum.frequency_hz[-1]
         if (
@@ -88,8 +88,8 @@ class Learned:
     def resonances(
         self, keys: Sequence[Key], cleaned: Sequence[CleanSpectrum], band_hz: tuple[float, float]
     ) -> list[Resonance]:
-        """One a recording of one sensor, by the joint separation."""
-        self._forget_but(keys)
+        """Return the resonance of each recording of one sensor, by joint separation."""
+        self._keep_only(keys)
         self.found = {key: line for key, line in self.found.items() if key in self.cleaned}
         shared = self.shared
         new = [number for number, key in enumerate(keys) if key not in self.found]
@@ -98,18 +98,18 @@ class Learned:
             and shared.band_hz == band_hz
             and shared.fits(cleaned[0].spectrum)
         )
-        if not isinstance(shared, Shared) or not known or self._outgrown(len(keys), len(new)):
+        if not isinstance(shared, Shared) or not known or self._must_relearn(len(keys), len(new)):
             spectra, kept = [clean.spectrum for clean in cleaned], [clean.kept for clean in cleaned]
-            every, self.shared, moved = learn_series(spectra, band_hz=band_hz, kept=kept)
-            self.since, self.found = 0, dict(zip(keys, every, strict=True))
+            lines, self.shared, moved = learn_series(spectra, band_hz=band_hz, kept=kept)
+            self.since, self.found = 0, dict(zip(keys, lines, strict=True))
             self.moved = tuple(keys[number] for number in moved)
         elif new:
-            beside = [cleaned[number] for number in new]
+            added = [cleaned[number] for number in new]
             lines = shared.resonances(
-                [clean.spectrum for clean in beside], [clean.kept for clean in beside]
+                [clean.spectrum for clean in added], [clean.kept for clean in added]
             )
             self.found |= {keys[number]: line for number, line in zip(new, lines, strict=True)}
-            self._grown(len(keys), len(new))
+            self._count_new(len(keys), len(new))
         return [self.found[key] for key in keys]
 
     def lines(
@@ -118,9 +118,9 @@ class Learned:
         spectra: Mapping[str, Sequence[Spectrum | None]],
         kept: Mapping[str, Sequence[Mask | None]],
         band_hz: tuple[float, float],
-    ) -> list[Together]:
-        """One a recording of several sensors, whose keys are those of which it has spectra."""
-        self._forget_but([key for every in keys for key in every])
+    ) -> list[SensorLine]:
+        """Return the line of each recording of several sensors; `keys` are those with spectra."""
+        self._keep_only([key for of_recording in keys for key in of_recording])
         self.together = {
             key: line for key, line in self.together.items() if set(key) <= {*self.cleaned}
         }
@@ -130,33 +130,34 @@ class Learned:
         if (
             not isinstance(shared, SharedBySensors)
             or not known
-            or self._outgrown(len(keys), len(new))
+            or self._must_relearn(len(keys), len(new))
         ):
-            told, self.shared = learn_sensors(spectra, band_hz=band_hz, kept=kept)
-            self.since, self.together = 0, dict(zip(keys, _by_recording(told), strict=True))
+            sensor_lines, self.shared = learn_sensors(spectra, band_hz=band_hz, kept=kept)
+            self.since, self.together = 0, dict(zip(keys, _by_recording(sensor_lines), strict=True))
             self.moved = tuple(
                 next((key for key in keys[number] if key[1] == name), keys[number][0])
-                for number, name in told.moved
+                for number, name in sensor_lines.moved
             )
         elif new:
-            some = {name: [every[number] for number in new] for name, every in spectra.items()}
-            told = shared.lines(
-                some, {name: [every[number] for number in new] for name, every in kept.items()}
+            sensor_lines = shared.lines(
+                {name: [series[number] for number in new] for name, series in spectra.items()},
+                {name: [series[number] for number in new] for name, series in kept.items()},
             )
             self.together |= {
-                keys[number]: line for number, line in zip(new, _by_recording(told), strict=True)
+                keys[number]: line
+                for number, line in zip(new, _by_recording(sensor_lines), strict=True)
             }
-            self._grown(len(keys), len(new))
+            self._count_new(len(keys), len(new))
         return [self.together[key] for key in keys]
 
     @property
     def lead(self) -> str:
-        """The sensor whose heights a line has, as rows that were given have them; none before sensors were learned."""
+        """Sensor whose amplitudes a line has, as in earlier rows; empty at first."""
         return next(iter(self.shared.by_sensor)) if isinstance(self.shared, SharedBySensors) else ""
 
     @property
     def common(self) -> float:
-        """The share of their errors that sensors have in common; nan of one sensor, or where too little tells."""
+        """Share of the error that sensors have in common; nan for one sensor or too few data."""
         shares = (
             [*self.shared.agreement.common.values()]
             if isinstance(self.shared, SharedBySensors)
@@ -164,80 +165,87 @@ class Learned:
         )
         return sum(shares) / len(shares) if shares else nan
 
-    def _forget_but(self, keys: Sequence[Key]) -> None:
-        for gone in set(self.cleaned) - set(keys):
-            self.cleaned.pop(gone)
+    def _keep_only(self, keys: Sequence[Key]) -> None:
+        for key in set(self.cleaned) - set(keys):
+            self.cleaned.pop(key)
 
-    def _outgrown(self, count: int, new: int) -> bool:
-        """Whether what all recordings share is to be learned anew."""
-        return count <= WHOLE or self.since + (new if new < count else 0) > GROWTH * count
+    def _must_relearn(self, count: int, new: int) -> bool:
+        """Tell whether the shared part has to be learned again."""
+        return (
+            count <= ALWAYS_RELEARNED
+            or self.since + (new if new < count else 0) > MAX_GROWTH * count
+        )
 
-    def _grown(self, count: int, new: int) -> None:
+    def _count_new(self, count: int, new: int) -> None:
         self.since += new if new < count else 0
 
 
-def _by_recording(told: SensorLines) -> list[Together]:
+def _by_recording(lines: SensorLines) -> list[SensorLine]:
     return [
-        Together(
-            resonance, detected_on, {name: every[number] for name, every in told.alone.items()}
+        SensorLine(
+            resonance, detected_by, {name: series[number] for name, series in lines.alone.items()}
         )
-        for number, (resonance, detected_on) in enumerate(
-            zip(told.resonances, told.detected_on, strict=True)
+        for number, (resonance, detected_by) in enumerate(
+            zip(lines.resonances, lines.detected_on, strict=True)
         )
     ]
 
 
-def learned_bytes(shared: Shared | SharedBySensors) -> bytes:
-    """What all recordings share, as bytes, to be read by `learned_from`."""
+def pack_shared(shared: Shared | SharedBySensors) -> bytes:
+    """Pack the shared part of a series as bytes for `unpack_shared`."""
     arrays: dict[str, Any] = {}
     by_sensor = shared.by_sensor if isinstance(shared, SharedBySensors) else {"": shared}
-    told: dict[str, Any] = {"sensors": [*by_sensor], "of": []}
-    for number, one in enumerate(by_sensor.values()):
-        values = {part.name: getattr(one, part.name) for part in fields(Shared)}
+    content: dict[str, Any] = {"sensors": [*by_sensor], "of": []}
+    for number, of_sensor in enumerate(by_sensor.values()):
+        values = {part.name: getattr(of_sensor, part.name) for part in fields(Shared)}
         arrays |= {
             f"{number} {name}": value
             for name, value in values.items()
             if isinstance(value, np.ndarray)
         }
-        told["of"].append(
+        content["of"].append(
             {name: value for name, value in values.items() if not isinstance(value, np.ndarray)}
         )
     if isinstance(shared, SharedBySensors):
         common, wider, established = shared.agreement
-        told["agreement"] = [[[*pair, share] for pair, share in common.items()], wider, established]
+        content["agreement"] = [
+            [[*pair, share] for pair, share in common.items()],
+            wider,
+            established,
+        ]
     packed = BytesIO()
-    np.savez(packed, told=np.array(json.dumps(told)), **arrays)
+    np.savez(packed, told=np.array(json.dumps(content)), **arrays)
     return append_digest(packed.getvalue())
 
 
-def learned_from(content: bytes, since: int) -> Learned:
-    """What `learned_bytes` made, `since` recordings ago; nothing, where that is damaged: it is learned anew."""
+def unpack_shared(content: bytes, since: int) -> SeriesMemory:
+    """Unpack the result of `pack_shared`, `since` recordings old; empty if damaged."""
     try:
         with np.load(
-            BytesIO(strip_digest(content, "what was learned", "it is learned anew"))
+            BytesIO(strip_digest(content, "the memory of a series", "it is learned again"))
         ) as stored:
-            told = json.loads(str(stored["told"]))
+            state = json.loads(str(stored["told"]))
             arrays = {name: stored[name] for name in stored.files if name != "told"}
     except UnreadableFile:
-        return Learned()
+        return SeriesMemory()
     by_sensor = {}
-    for number, name in enumerate(told.get("sensors", [])):
-        values = told["of"][number] | {
+    for number, name in enumerate(state.get("sensors", [])):
+        values = state["of"][number] | {
             key.split()[1]: value for key, value in arrays.items() if key.split()[0] == str(number)
         }
-        if {*values} != {one.name for one in fields(Shared)}:
-            return Learned()  # of another version
+        if {*values} != {part.name for part in fields(Shared)}:
+            return SeriesMemory()  # of another version
         values |= {name: tuple(values[name]) for name in ("band_hz", "reach")}
         by_sensor[name] = Shared(**values)
     if not by_sensor:
-        return Learned()  # of another version
-    first = next(iter(by_sensor.values()))
-    if "agreement" not in told:
-        return Learned(first, since)
-    common, wider, established = told["agreement"]
+        return SeriesMemory()  # of another version
+    leading = next(iter(by_sensor.values()))
+    if "agreement" not in state:
+        return SeriesMemory(leading, since)
+    common, wider, established = state["agreement"]
     agreement = Agreement(
-        {(one, other): share for one, other, share in common}, wider, tuple(established)
+        {(first, second): share for first, second, share in common}, wider, tuple(established)
     )
-    return Learned(
-        SharedBySensors(by_sensor=by_sensor, agreement=agreement, band_hz=first.band_hz), since
+    return SeriesMemory(
+        SharedBySensors(by_sensor=by_sensor, agreement=agreement, band_hz=leading.band_hz), since
     )

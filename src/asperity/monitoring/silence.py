@@ -1,49 +1,47 @@
-"""Whether recordings have stopped coming: a sensor, a logger or a line that delivers nothing any more.
-
-What is kept and who is called is left to `store` and `watch`.
-"""
+"""Detection of overdue recordings: a sensor, logger or line that has stopped delivering."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from itertools import pairwise
 from statistics import median
 
-ENOUGH = 8  # times between arrivals, from which on one knows how often recordings come
-LONGER = 5.0  # than usual, before anybody is called
-LEAST_S = 60.0
-SILENCE = "silence"  # who raised a state: recordings that do not come
+MIN_INTERVALS = 8  # intervals between arrivals from which the usual one is known
+OVERDUE_FACTOR = 5.0  # usual intervals without a recording until it is overdue
+MIN_WAIT_S = 60.0
+SILENCE = "silence"  # `raised_by` of a state: overdue recordings
 
 
-def silence(
-    arrivals: Sequence[datetime], expected_s: float | None, now: datetime | None = None
+def overdue_reason(
+    arrivals: Sequence[datetime], limit_s: float | None, now: datetime | None = None
 ) -> str:
-    """Why recordings are overdue, a sentence without an end; empty where they are not, or nobody knows how often.
+    """Return why recordings are overdue, without a full stop; empty if they are not.
 
     Parameters
     ----------
-    arrivals : when recordings came, in order
-    expected_s : the longest time between two that is in order; None: five times what is usual, once that is known
+    arrivals : times at which recordings arrived, in order
+    limit_s : longest time between recordings [s]; None: five usual intervals, once these are known
     """
     if not arrivals:
         return ""
-    gaps = [(behind - before).total_seconds() for before, behind in pairwise(arrivals)]
-    usual = median(gaps) if len(gaps) >= ENOUGH else None
-    if expected_s is None and usual is None:
+    intervals = [(after - before).total_seconds() for before, after in pairwise(arrivals)]
+    usual = median(intervals) if len(intervals) >= MIN_INTERVALS else None
+    if limit_s is None and usual is None:
         return ""
-    longest = max(LONGER * (usual or 0.0), LEAST_S) if expected_s is None else expected_s
+    longest = max(OVERDUE_FACTOR * (usual or 0.0), MIN_WAIT_S) if limit_s is None else limit_s
     waited = ((now or datetime.now(UTC)) - arrivals[-1]).total_seconds()
     if waited <= longest:
         return ""
-    came = (
-        f"one comes every {spoken(usual)}"
-        if expected_s is None and usual
-        else f"{spoken(longest)} are allowed"
+    expected = (
+        f"the usual interval is {duration_text(usual)}"
+        if limit_s is None and usual
+        else f"the limit is {duration_text(longest)}"
     )
-    return f"no recording has come for {spoken(waited)}, since {arrivals[-1].isoformat(timespec='seconds')}; {came}"
+    last = arrivals[-1].isoformat(timespec="seconds")
+    return f"no recording has come for {duration_text(waited)}, since {last}; {expected}"
 
 
-def spoken(seconds: float) -> str:
-    """A time in the unit in which a person says it."""
+def duration_text(seconds: float) -> str:
+    """Return a duration in its natural unit."""
     for unit, size in (("days", 86_400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.3g} {unit}"

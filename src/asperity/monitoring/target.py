@@ -1,4 +1,4 @@
-"""Which resonance is looked for: a band, how wide its line is, where it ends with all load on asperities."""
+"""Search target: band and line width of the contact resonance, and its limit at full load share."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -8,24 +8,19 @@ from asperity.core.errors import BadInput, require_positive
 from asperity.coupling import BAND_MARGIN, search_band
 from asperity.paper import papers_case
 
-SHAFTS = (
-    "shaft_hz",
-    "pinion_hz",
-    "cam_hz",
-    "disc_1_hz",
-)  # of machines, whose speed the case states
-USUAL_DAMPING = 0.02  # the paper's, where no case states one
+SHAFTS = ("shaft_hz", "pinion_hz", "cam_hz", "disc_1_hz")  # shafts with a speed in the case
+USUAL_DAMPING = 0.02  # damping ratio of the paper, without a case
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """Where the contact resonance may lie.
+    """Search range of the contact resonance.
 
-    `band_hz` its ends; `width_hz` half-power width of a line at the lower end; `full_load_crf_hz`
-    the resonance with all load on asperities, None where no contact model is known; `source` a
-    sentence that says who chose the band; `assumed` whether that was nobody; `case` the contact
-    that was given. `rates_per_turn` are what of a machine turns, passes or meshes how often in a
-    turn of its shaft, by name, and `shaft_hz` how fast that turns, where nobody says otherwise.
+    `band_hz` are its ends; `width_hz` is the half-power width of a line at the lower end;
+    `full_load_crf_hz` the resonance with all load on asperities, None without a contact model.
+    `source` states the origin of the band; `assumed` is true if the user gave neither case nor
+    band; `case` is the contact. `rates_per_turn` are rates of a machine per turn of its shaft, by
+    name, and `shaft_hz` is the shaft's speed in the case.
     """
 
     band_hz: tuple[float, float]
@@ -41,14 +36,14 @@ class Target:
 def search_target(
     case: Case | MachineCase | None = None, band_hz: tuple[float, float] | None = None
 ) -> Target:
-    """The band of a case's contact model, or the one given; else that of the paper's contact, and it says so.
+    """Return the band given, of the case's contact model, or of the paper's contact.
 
-    Of a machine it is that of its most loaded contact, where the case has [vibration].
+    For a machine it is that of the most loaded contact, if the case has [vibration].
 
     Raises
     ------
     BadInput
-        for a case without [vibration], or a band that is none.
+        if the case has no [vibration], or the band is invalid.
     """
     if isinstance(case, MachineCase):
         per_turn, shaft = _rates(case)
@@ -70,7 +65,8 @@ def search_target(
     contact = case or papers_case()
     if contact.vibration is None:
         raise BadInput(
-            f"{contact.source}: vibration is left out; add [vibration] with mass and damping_ratio, or a band"
+            f"{contact.source}: [vibration] is missing; add it with mass and damping_ratio, "
+            "or give a band"
         )
     searched = search_band(contact.conditions, contact.vibration)
     full_load = None if case is None else searched[1] / (1.0 + BAND_MARGIN)
@@ -80,8 +76,8 @@ def search_target(
         source = f"{searched[0]:.0f} to {searched[1]:.0f} Hz, from the contact of {case.source}"
     else:
         source = (
-            f"{searched[0]:.0f} to {searched[1]:.0f} Hz, that of the paper's contact, because neither a case nor a "
-            "band was given; give case or band_hz"
+            f"{searched[0]:.0f} to {searched[1]:.0f} Hz, that of the paper's contact, because "
+            "neither a case nor a band was given; give case or band_hz"
         )
     return Target(
         band_hz=searched,
@@ -94,24 +90,27 @@ def search_target(
 
 
 def _contact(machine: MachineCase) -> Case | None:
-    """The contact of a machine that carries most; None where the case does not say how it vibrates."""
+    """Return the most loaded contact of a machine; None if the case states no vibration."""
     if not machine.complete or "vibration" not in machine.tables:
         return None
     return machine.case(
-        max((one for one in machine.contacts if not one.stands_still), key=lambda one: one.load)
+        max(
+            (contact for contact in machine.contacts if not contact.stands_still),
+            key=lambda contact: contact.load,
+        )
     )
 
 
 def _rates(machine: MachineCase) -> tuple[dict[str, float], float | None]:
-    """What passes how often in a turn, by name, and the shaft's speed [Hz]."""
-    every = machine.machine.frequencies
-    shaft = next((every[name] for name in SHAFTS if every.get(name, 0.0) > 0.0), None)
+    """Return rates per turn of the shaft, by name, and the shaft's speed [Hz]."""
+    rates = machine.machine.frequencies
+    shaft = next((rates[name] for name in SHAFTS if rates.get(name, 0.0) > 0.0), None)
     if shaft is None:
         return {}, None
-    return {_name(key): rate / shaft for key, rate in every.items()}, shaft
+    return {_name(key): rate / shaft for key, rate in rates.items()}, shaft
 
 
 def _name(key: str) -> str:
-    """Of a rate: BPFO as everybody writes it."""
+    """Return the label of a rate, such as BPFO."""
     bare = key.removesuffix("_hz")
     return bare.upper() if bare in ("bpfo", "bpfi", "bsf", "ftf") else bare.replace("_", " ")

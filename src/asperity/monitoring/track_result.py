@@ -1,4 +1,4 @@
-"""What a track is: recordings in their order with resonance, stage and alarm, as table, JSON and dataset."""
+"""Result of tracking: a series with resonances, stages and alarm, as table, JSON and dataset."""
 
 import json
 import re
@@ -16,8 +16,8 @@ from asperity.core.errors import BadInput
 from asperity.core.files import atomic_write, write_csv
 from asperity.core.quantities import quantity
 from asperity.core.storage import netcdf_bytes
-from asperity.monitoring.forecast import FORECAST, Foretold
-from asperity.monitoring.recording import NAMED, TrackedRecording, heard_in_words
+from asperity.monitoring.forecast import FORECAST, ForecastResult
+from asperity.monitoring.recording import NAMED, TrackedRecording, sensor_summary
 from asperity.monitoring.silence import SILENCE
 from asperity.monitoring.target import Target
 from asperity.trend import SOURCE_NAMES, Alarm, AlarmState, Stages, StageSource
@@ -45,18 +45,17 @@ NUMBERS = (
     "rate_hz",
 )
 TEXTS = ("file", "reason", "damping_reason", "label", "started")
-ENDINGS = (".csv", ".parquet", ".nc")
+SUFFIXES = (".csv", ".parquet", ".nc")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Track:
-    """A series of recordings, judged.
+    """A judged series of recordings.
 
-    `recordings` in the order of `x`; `x_name` says what that is. `stages` is read from CRF,
-    damping or both, as asked for, and decides labels, probabilities and alarm; `stages_by` has all
-    three. None and none where no resonance was found at all. `problems` are sentences for which
-    recordings should not be compared; `notes` say what was chosen for the user. `forecast` is what
-    is foretold of it, None where nothing was asked.
+    `recordings` are ordered by `x`, named `x_name`. `stages` follow from CRF, damping or both, as
+    requested, and decide labels, probabilities and alarm; `stages_by` has all three. Without any
+    resonance these are None and empty. `problems` are reasons not to compare recordings; `notes`
+    state choices made for the user. `forecast` is None unless requested.
     """
 
     recordings: tuple[TrackedRecording, ...]
@@ -69,26 +68,29 @@ class Track:
     comparable: bool
     problems: tuple[str, ...]
     notes: tuple[str, ...]
-    forecast: Foretold | None = None
+    forecast: ForecastResult | None = None
 
     @property
     def resonance_count(self) -> int:
-        """In how many recordings a contact resonance was found."""
+        """Number of recordings with a contact resonance."""
         return sum(recording.resonance.found for recording in self.recordings)
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of its sensors; none of one sensor."""
-        return tuple(dict.fromkeys(name for one in self.recordings for name in one.on_sensors))
-
-    def number_of(self, file: str) -> int | None:
-        """Which recording a file is of, None for none."""
-        return next(
-            (number for number, one in enumerate(self.recordings) if file in one.files), None
+        """Names of its sensors; empty for a single sensor."""
+        return tuple(
+            dict.fromkeys(name for recording in self.recordings for name in recording.on_sensors)
         )
 
-    def silent(self, reason: str) -> "Track":
-        """The same where no recording comes any more, for a `reason`: blind, unless an alarm stands."""
+    def number_of(self, file: str) -> int | None:
+        """Return the number of the recording that a file belongs to; None if unknown."""
+        return next(
+            (number for number, recording in enumerate(self.recordings) if file in recording.files),
+            None,
+        )
+
+    def overdue(self, reason: str) -> "Track":
+        """Return the track with recordings overdue: blind, unless an alarm stands."""
         noted = replace(self, notes=(*self.notes, f"{reason[:1].upper()}{reason[1:]}."))
         if self.alarm.state == "alarm":
             return noted
@@ -105,8 +107,8 @@ class Track:
         )
         return replace(noted, alarm=blind)
 
-    def foretold(self, forecast: Foretold) -> "Track":
-        """The same with a forecast, which raises the alarm with the last recording where it is one."""
+    def with_forecast(self, forecast: ForecastResult) -> "Track":
+        """Return the track with a forecast, which may raise the alarm at the last recording."""
         track = replace(self, forecast=forecast)
         if not forecast.alarm or self.alarm.state == "alarm":
             return track
@@ -116,19 +118,22 @@ class Track:
         )
 
     def verdict(self) -> str:
-        """The stage with its confidence, or that these recordings cannot tell, and why; and what is foretold."""
-        ahead = (
+        """Return alarm, stage with its confidence and forecast, or why there is no result."""
+        forecast = (
             "" if self.forecast is None or self.forecast.alarm else f" {self.forecast.sentence()}"
         )
-        return f"{self._verdict()}{ahead}"
+        return f"{self._judgement()}{forecast}"
 
-    def _verdict(self) -> str:
+    def _judgement(self) -> str:
         total = len(self.recordings)
         several = f"{total} recordings" if total != 1 else "1 recording"
         seen = self._without_resonance(several)
         if self.stages is not None:
-            seen = f"{self.stages.verdict.rstrip('.')}; contact resonance found in {self.resonance_count} of {several}."
-        seen = " ".join(filter(None, [seen, heard_in_words(self.recordings)]))
+            seen = (
+                f"{self.stages.verdict.rstrip('.')}; "
+                f"contact resonance found in {self.resonance_count} of {several}."
+            )
+        seen = " ".join(filter(None, [seen, sensor_summary(self.recordings)]))
         alarm = self.alarm
         if alarm.explained:
             seen = f"{seen} {alarm.explained[0].upper()}{alarm.explained[1:]}."
@@ -142,28 +147,30 @@ class Track:
         return seen
 
     def _without_resonance(self, several: str) -> str:
-        """That no contact resonance was found in several recordings, and the commonest reason."""
+        """Return the sentence without any resonance, with the most frequent reason."""
         reasons = [recording.resonance.reason for recording in self.recordings]
         (kind, count), *_ = Counter(map(_without_numbers, reasons)).most_common(1)
         reason = next(reason for reason in reasons if _without_numbers(reason) == kind)
         share = f"{count} of {len(reasons)}: " if count < len(reasons) else ""
-        return f"These recordings cannot tell: no contact resonance found in {several} ({share}{reason})."
+        return f"Cannot tell: no contact resonance found in {several} ({share}{reason})."
 
     def stage_rows(self) -> list[tuple[str, str]]:
-        """What CRF, damping and both say of the stage, the deciding one marked."""
+        """Return the stages by CRF, damping and both as rows, with the deciding one marked."""
         decides = None if self.stages is None else self.stages.source
         return [
             (
-                f"stage by {SOURCE_NAMES[source]}{', which decides' if source == decides else ''}",
+                f"stage by {SOURCE_NAMES[source]}{' (deciding)' if source == decides else ''}",
                 stages.verdict,
             )
             for source, stages in self.stages_by.items()
         ]
 
-    def scalars(self, *, every_way: bool = True) -> dict[str, Any]:
-        """Everything that `asperity track --json` prints; without `every_way` only the stage that decides."""
+    def scalars(self, *, all_sources: bool = True) -> dict[str, Any]:
+        """Return the JSON of `asperity track`; without `all_sources` only the deciding stages."""
         stages = self.stages
-        ways = self.stages_by if every_way else {} if stages is None else {stages.source: stages}
+        by_source = (
+            self.stages_by if all_sources else {} if stages is None else {stages.source: stages}
+        )
         return {
             "verdict": self.verdict(),
             "recordings": [recording.row() for recording in self.recordings],
@@ -180,8 +187,10 @@ class Track:
                 if stages is None
                 else {k: finite_or_none(v) for k, v in stages.evidence.items()},
             },
-            "stages_by": {source: _in_json(told) for source, told in ways.items()},
-            "alarm": self._alarm(),
+            "stages_by": {
+                source: _stages_row(of_source) for source, of_source in by_source.items()
+            },
+            "alarm": self._alarm_row(),
             "forecast": None if self.forecast is None else self.forecast.scalars(),
             "x": self.x_name,
             "band_hz": list(self.target.band_hz),
@@ -193,7 +202,7 @@ class Track:
             "notes": list(self.notes),
         }
 
-    def _alarm(self) -> dict[str, Any]:
+    def _alarm_row(self) -> dict[str, Any]:
         alarm = self.alarm
         return {
             "state": alarm.state,
@@ -207,13 +216,13 @@ class Track:
 
     @property
     def table(self) -> "pandas.DataFrame":
-        """One row a recording, in the order of x."""
+        """One row per recording, in the order of x."""
         import pandas
 
         return pandas.DataFrame([flat(recording.row()) for recording in self.recordings])
 
     def to_dataset(self) -> "xarray.Dataset":
-        """Indicators on (recording), spectra on (recording, frequency), with CF attributes."""
+        """Return indicators on (recording) and spectra on (recording, frequency), CF attributes."""
         import xarray
 
         rows = [recording.row() for recording in self.recordings]
@@ -248,7 +257,7 @@ class Track:
         return xarray.Dataset(variables | spectra, coordinates, attributes)
 
     def _spectra(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Variables and coordinates of the spectra; none where no recording has one."""
+        """Return variables and coordinates of the spectra; empty without spectra."""
         first = next(
             (recording.reading.spectrum for recording in self.recordings if recording.clean), None
         )
@@ -277,18 +286,18 @@ class Track:
         }
 
     def save(self, path: str | Path) -> Path:
-        """Write the series whole or not at all: .csv or .parquet the table, .nc the spectra too.
+        """Write the series atomically: the table as .csv or .parquet, with spectra as .nc.
 
         Raises
         ------
         BadInput
-            for another ending, or a path that cannot be written to.
+            for another suffix, or a path that is not writable.
         """
         path = Path(path)
         suffix = path.suffix.lower()
-        if suffix not in ENDINGS:
+        if suffix not in SUFFIXES:
             raise BadInput(
-                f"a track is kept as .csv, .parquet or .nc, got {path.name}; change its ending"
+                f"a track is saved as .csv, .parquet or .nc, got {path.name}; change the suffix"
             )
         if suffix == ".csv":
             write_csv(path, self.table)
@@ -309,23 +318,23 @@ class Track:
 
 
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A recording's line with a column for each fault's depth, each line and each band."""
+    """Return a recording's row with one column per fault depth, line and band."""
     rest = {name: value for name, value in row.items() if name not in (*NAMED, "sensors")}
-    heard = {
+    by_sensor = {
         f"{key}_{name}": value
-        for name, said in row.get("sensors", {}).items()
-        for key, value in said.items()
+        for name, values in row.get("sensors", {}).items()
+        for key, value in values.items()
     }
-    kinds = {
-        f"{kind}_{name}": value
-        for several, kind in NAMED.items()
-        for name, value in row.get(several, {}).items()
+    named = {
+        f"{prefix}_{name}": value
+        for field, prefix in NAMED.items()
+        for name, value in row.get(field, {}).items()
     }
-    return rest | kinds | heard
+    return rest | named | by_sensor
 
 
-def _in_json(stages: Stages) -> dict[str, Any]:
-    """What one way to read the stage says; the damping ratios are those at the first place, the break and the last."""
+def _stages_row(stages: Stages) -> dict[str, Any]:
+    """Return stages as JSON; damping ratios are those at the first x, the break and the last x."""
     return {
         "kind": stages.kind,
         "split": finite_or_none(stages.split),
@@ -338,5 +347,5 @@ def _in_json(stages: Stages) -> dict[str, Any]:
 
 
 def _without_numbers(reason: str) -> str:
-    """A reason without its numbers, so that equal ones can be counted."""
+    """Return a reason without numbers, so that equal reasons can be counted."""
     return re.sub(r"[-+]?\d[\d.]*", "#", reason)

@@ -1,0 +1,393 @@
+"""Judgement of a series of recordings: indicators, trend, stages and alarm.
+
+`asperity.resonance` and `asperity.trend` hold the methods; this module combines them.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple, get_args
+
+import numpy as np
+
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_choice
+from asperity.monitoring.alarm import at_reference, raise_alarm, severe_stage_weight
+from asperity.monitoring.files import RecordingPlace, locate_recordings
+from asperity.monitoring.harmonize import copies, exclude_machine_off, on_common_grid, spectrum_of
+from asperity.monitoring.observations import combine_sensors, tracked_recording
+from asperity.monitoring.operating_point import Response, operating_response, unstated
+from asperity.monitoring.reading import WINDOW, Reading
+from asperity.monitoring.recording import TrackedRecording
+from asperity.monitoring.series_state import PreviousStates, SeriesMemory
+from asperity.monitoring.settings import TrackSettings
+from asperity.monitoring.target import Target
+from asperity.monitoring.track_result import Track
+from asperity.recording import ACCELERATION
+from asperity.resonance import (
+    FEWEST_RECORDINGS,
+    CleanSpectrum,
+    Resonance,
+    SeriesMethod,
+    learn_series,
+    no_resonance,
+    series_resonances,
+)
+from asperity.trend import (
+    Detector,
+    RecordingFacts,
+    StageErrors,
+    Stages,
+    StageSource,
+    asperity_load_share,
+    comparability,
+    split_stages,
+)
+
+# largest group of the joint separation: memory grows with its square, time with its cube
+MAX_GROUP = 400
+FALLBACK: SeriesMethod = "modes"  # with too few recordings for the joint separation
+X_UNITS = ("um", "mm", "nm", "m", "h", "s", "min", "d", "km", "cycles")
+DEFAULTS = TrackSettings()
+
+
+def judge(
+    readings: Sequence[Reading],
+    target: Target,
+    settings: TrackSettings = DEFAULTS,
+    *,
+    places: Mapping[str, RecordingPlace] | None = None,
+    x_name: str = "",
+    memory: SeriesMemory | None = None,
+    previous: PreviousStates | None = None,
+) -> Track:
+    """Judge recordings that have been read; see `track_recordings`.
+
+    Parameters
+    ----------
+    memory : what the series has shown so far; further recordings are judged with it
+    previous : states of the alarm from the judgement before
+    """
+    require_choice("source of stages", settings.stages_from, get_args(StageSource))
+    sensors = list(
+        dict.fromkeys(
+            reading.sensor for reading in readings if reading.sensor or not reading.refused
+        )
+    )
+    if len(sensors) > 1:
+        _require_joint(sensors, settings.method)
+        tracked, x_name, notes = combine_sensors(
+            readings, target, settings.shaft_hz, places=places, x_name=x_name, memory=memory
+        )
+        series = _Series(tracked, x_name, "joint", notes)
+    else:
+        series = _single_sensor(readings, target, settings, places, x_name, memory)
+    if target.assumed:
+        series.notes.insert(0, f"The band is {target.source}.")
+    return _staged(series, target, settings, previous)
+
+
+class _Series(NamedTuple):
+    """Recordings with their resonances, before stages and alarm."""
+
+    tracked: list[TrackedRecording]
+    x_name: str
+    method: SeriesMethod
+    notes: list[str]
+
+
+def _single_sensor(
+    readings: Sequence[Reading],
+    target: Target,
+    settings: TrackSettings,
+    places: Mapping[str, RecordingPlace] | None,
+    x_name: str,
+    memory: SeriesMemory | None,
+) -> _Series:
+    """Find the resonances in the recordings of a single sensor."""
+    names, times = [reading.file for reading in readings], [reading.time for reading in readings]
+    places, x_name = locate_recordings(
+        names, times, [not reading.refused for reading in readings], places, x_name
+    )
+    order = np.argsort(np.array([places[reading.file].x for reading in readings]), kind="stable")
+    series, notes = on_common_grid(exclude_machine_off([readings[number] for number in order]))
+    spectra = {
+        number: spectrum_of(reading) for number, reading in enumerate(series) if reading.usable
+    }
+    keys = [(series[number].file, series[number].sensor) for number in spectra]
+    state = SeriesMemory() if memory is None else memory
+    cleaned = [
+        state.clean(key, spectrum, settings.shaft_hz)
+        for key, spectrum in zip(keys, spectra.values(), strict=True)
+    ]
+    method = settings.method or ("joint" if len(spectra) >= FEWEST_RECORDINGS else FALLBACK)
+    groups = -(-len(spectra) // MAX_GROUP) if method == "joint" else 1
+    notes += _method_notes(len(spectra), settings.method, method, groups)
+    if memory is not None and method == "joint":
+        resonances = memory.resonances(keys, cleaned, target.band_hz)
+        moved = {keys.index(key) for key in memory.moved if key in keys}
+    else:
+        resonances, moved = _resonances(cleaned, target, method, groups)
+    if settings.method is None and method == FALLBACK:
+        resonances = [_ambiguous(line) if line.found else line for line in resonances]
+    used = dict(zip(spectra, zip(cleaned, resonances, strict=True), strict=True))
+    moved_numbers = {number for place, number in enumerate(spectra) if place in moved}
+    tracked = []
+    for number, reading in enumerate(series):
+        clean, found = used.get(number, (None, None))
+        resonance = found or no_resonance(reading.reason, target.band_hz, method)
+        remounted = reading.sensor if number in moved_numbers else None
+        tracked.append(
+            tracked_recording(reading, places[reading.file], clean, resonance, remounted=remounted)
+        )
+    return _Series(tracked, x_name, method, notes)
+
+
+def _method_notes(
+    count: int, requested: SeriesMethod | None, method: SeriesMethod, groups: int
+) -> list[str]:
+    """Return notes on the method for `count` usable recordings."""
+    notes = []
+    if requested is None and method != "joint" and count:
+        notes.append(
+            f"The joint separation of contact and structure needs {FEWEST_RECORDINGS} recordings "
+            f"and has {count}; method {method} takes the most prominent line instead."
+        )
+    if groups > 1:
+        notes.append(
+            f"{count} recordings were separated in {groups} groups, each spread over the whole "
+            "series."
+        )
+    return notes
+
+
+def _staged(
+    series: _Series, target: Target, settings: TrackSettings, previous: PreviousStates | None
+) -> Track:
+    """Add stages, alarm and load share to the recordings of a series."""
+    tracked, x_name, method, notes = series
+    used = [recording for recording in tracked if recording.clean is not None]
+    comparable = bool(used) and all(recording.reading.unit == ACCELERATION for recording in used)
+    conditions = [recording.operating for recording in tracked]
+    response = operating_response(target.case, conditions)
+    tracked = at_reference(tracked, response)
+    remounted = _remounted(tracked)
+    heights = comparable and not remounted
+    source = settings.stages_from
+    stages_by = _StagesBySource(tracked, settings.detector, _unit_of(x_name), heights)
+    stages = stages_by.get(source)
+    severe, labels = _severity(tracked, stages, source, response)
+    alarm = raise_alarm(
+        tracked,
+        settings,
+        stages,
+        lambda part: _StagesBySource(part, settings.detector, "", heights).get(source),
+        previous=previous,
+        unit=_unit_of(x_name),
+        response=response,
+    )
+    if target.full_load_crf_hz is not None:
+        tracked = _with_load_share(tracked, target.full_load_crf_hz)
+    if not comparable and used:
+        units = ", ".join(sorted({recording.reading.unit for recording in used}))
+        notes.append(
+            f"CRFA cannot be compared with other series: its unit is {units}, not m/s^2. CRF can."
+        )
+    copied = copies([recording.reading for recording in tracked])
+    return Track(
+        recordings=tuple(
+            replace(recording, severe_probability=float(probability), label=label, state=state)
+            for recording, probability, label, state in zip(
+                tracked, severe, labels, alarm.states, strict=True
+            )
+        ),
+        x_name=x_name,
+        target=target,
+        method=method,
+        stages=stages,
+        stages_by=stages_by,
+        alarm=alarm,
+        comparable=comparable,
+        problems=comparability([_facts_of(recording) for recording in used]),
+        notes=(
+            *notes,
+            *filter(None, [response.note]),
+            *unstated(conditions),
+            *_without_damping(tracked),
+            *copied,
+            *remounted,
+        ),
+    )
+
+
+def _severity(
+    tracked: Sequence[TrackedRecording],
+    stages: Stages | None,
+    source: StageSource,
+    response: Response,
+) -> tuple[Field, tuple[str, ...]]:
+    """Return probability of severe wear (nan if unknown) and stage label of each recording."""
+    if stages is None:
+        return np.full(len(tracked), np.nan), ("none",) * len(tracked)
+    known = (
+        [np.isfinite(recording.damping_reference) for recording in tracked]
+        if source == "damping"
+        else [np.isfinite(recording.crf_reference_hz) for recording in tracked]
+    )
+    weight = severe_stage_weight(tracked, source, response)
+    return np.where(known, stages.probability * weight, np.nan), stages.labels
+
+
+def _with_load_share(
+    tracked: Sequence[TrackedRecording], full_load_crf_hz: float
+) -> list[TrackedRecording]:
+    """Add the asperities' load share and its 90 % interval, as the contact model reads CRF."""
+    crf, crf_std = np.array(
+        [(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in tracked]
+    ).T
+    share = asperity_load_share(crf, np.where(np.isfinite(crf_std), crf_std, 0.0), full_load_crf_hz)
+    return [
+        replace(recording, clr=float(clr), clr_interval=(float(low), float(high)))
+        for recording, clr, low, high in zip(tracked, share.clr, *share.interval, strict=True)
+    ]
+
+
+def _require_joint(sensors: Sequence[str], method: SeriesMethod | None) -> None:
+    """Raise BadInput for recordings without a sensor name, or a method for single sensors."""
+    if "" in sensors:
+        raise BadInput(
+            "some recordings name their sensor "
+            f"({', '.join(filter(None, sensors))}) and others do not; name the sensor of all"
+        )
+    if method not in (None, "joint"):
+        raise BadInput(
+            f"several sensors are judged together by method joint, got {method}; omit the method"
+        )
+
+
+def _facts_of(recording: TrackedRecording) -> RecordingFacts:
+    """Return the facts by which recordings are compared."""
+    spectrum = spectrum_of(recording.reading)
+    return RecordingFacts(
+        name=Path(recording.file).name,
+        rate_hz=recording.reading.rate_hz,
+        segment=spectrum.segment,
+        window=WINDOW,
+        unit=recording.reading.unit,
+        duration_s=spectrum.duration_s,
+        speed_hz=recording.operating.speed_hz,
+        load_n=recording.operating.load_n,
+    )
+
+
+class _StagesBySource(Mapping[StageSource, Stages]):
+    """Stages by CRF, damping and both, computed on access; empty without any resonance."""
+
+    def __init__(
+        self, tracked: Sequence[TrackedRecording], detector: Detector, unit: str, comparable: bool
+    ) -> None:
+        self.tracked, self.detector, self.unit, self.comparable = (
+            tracked,
+            detector,
+            unit,
+            comparable,
+        )
+        found = any(recording.resonance.found for recording in tracked)
+        self.sources: tuple[StageSource, ...] = get_args(StageSource) if found else ()
+        self.known: dict[StageSource, Stages] = {}
+
+    def __len__(self) -> int:
+        return len(self.sources)
+
+    def __iter__(self) -> Iterator[StageSource]:
+        return iter(self.sources)
+
+    def __getitem__(self, source: StageSource) -> Stages:
+        if source not in self.sources:
+            raise KeyError(source)
+        if source not in self.known:
+            resonances = [recording.resonance for recording in self.tracked]
+            damping = [recording.damping_reference for recording in self.tracked]
+            damping_std = [recording.damping[1] for recording in self.tracked]
+            self.known[source] = split_stages(
+                [recording.x for recording in self.tracked],
+                [recording.crf_reference_hz for recording in self.tracked],
+                [resonance.crfa for resonance in resonances] if self.comparable else None,
+                damping_ratio=damping,
+                errors=StageErrors(
+                    crf_hz=[resonance.crf_std for resonance in resonances],
+                    damping_ratio=damping_std,
+                    x=[recording.x_std for recording in self.tracked],
+                ),
+                source=source,
+                detector=self.detector,
+                unit=self.unit,
+            )
+        return self.known[source]
+
+
+def _remounted(tracked: Sequence[TrackedRecording]) -> list[str]:
+    """Return a sentence for each recording at which a sensor's mounting changed."""
+    return [
+        f"{f'Sensor {recording.remounted}' if recording.remounted else 'The sensor'} or its "
+        f"mounting changed at x = {recording.x:g} ({Path(recording.file).name}): the parts before "
+        "and after were separated independently, and their CRFA is not compared."
+        for recording in tracked
+        if recording.remounted is not None
+    ]
+
+
+def _without_damping(tracked: Sequence[TrackedRecording]) -> list[str]:
+    """Return a sentence on resonances whose damping is not determined."""
+    found = [recording for recording in tracked if recording.resonance.found]
+    reasons = [recording.damping_reason for recording in found if recording.damping_reason]
+    if not reasons:
+        return []
+    many = f"{len(reasons)} of {len(found)} resonances" if len(found) > 1 else "the resonance"
+    return [
+        f"Damping is not determined for {many}: {reasons[0]}"
+        f"{', and other reasons' if len({*reasons}) > 1 else ''}."
+    ]
+
+
+def _resonances(
+    cleaned: list[CleanSpectrum], target: Target, method: SeriesMethod, groups: int
+) -> tuple[list[Resonance], set[int]]:
+    """Return the resonance of each spectrum, and the numbers at which the sensor was moved.
+
+    Each group takes every n-th spectrum, so that all groups span the whole series.
+    """
+    resonances: dict[int, Resonance] = {}
+    moved: list[int] = []
+    for first in range(min(groups, len(cleaned))):
+        group = cleaned[first::groups]
+        spectra, kept = [clean.spectrum for clean in group], [clean.kept for clean in group]
+        if method == "joint":
+            found, _, changes = learn_series(spectra, band_hz=target.band_hz, kept=kept)
+            moved += [first + groups * number for number in changes]
+        else:
+            found = series_resonances(spectra, band_hz=target.band_hz, method=method, kept=kept)
+        resonances |= zip(range(first, len(cleaned), groups), found, strict=True)
+    moved.sort()  # groups find the same move within as many recordings as there are groups
+    distinct = {
+        number
+        for number, before in zip(moved, [-groups, *moved], strict=False)
+        if number - before >= groups
+    }
+    return [resonances[number] for number in range(len(cleaned))], distinct
+
+
+def _ambiguous(resonance: Resonance) -> Resonance:
+    """Reject a line of a single spectrum: on real bearings it is mostly a structural resonance."""
+    reason = (
+        f"a line at {resonance.crf_hz:.0f} Hz stands out, but a single spectrum cannot separate "
+        "contact from structure"
+    )
+    kept = {name: getattr(resonance, name) for name in ("floor", "evidence", "background")}
+    return no_resonance(reason, resonance.band_hz, resonance.method, **kept)
+
+
+def _unit_of(x_name: str) -> str:
+    """Return the unit at the end of a heading such as sq_um."""
+    name, _, unit = x_name.rpartition("_")
+    return unit if name and unit in X_UNITS else ""

@@ -1,0 +1,54 @@
+"""Lookup of sensors in a store: by folder and names, or by address."""
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from asperity.monitoring.reading import channels_in
+from asperity.monitoring.sensor import FOLDER, TOGETHER
+from asperity.monitoring.sensors import Sensors
+from asperity.monitoring.store import SensorAddress, Store
+from asperity.monitoring.target import Target
+from asperity.recording import ReadOptions
+
+
+def settings_of(target: Target, options: ReadOptions) -> dict[str, Any]:
+    """Return the settings of reading, equal for all recordings of a sensor."""
+    machine = {"rates_per_turn": dict(target.rates_per_turn)} if target.rates_per_turn else {}
+    return {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options) | machine
+
+
+def open_sensors(
+    store: str | Path,
+    folder: Path,
+    names: tuple[str | None, str | None, str | None],
+    target: Target,
+    options: ReadOptions,
+) -> Sensors:
+    """Open the sensors of the store whose recordings are in a folder.
+
+    Parameters
+    ----------
+    names : of machine, point and sensor; without machine and point, recordings of other folders
+        are refused
+    target, options : with which recordings are read
+    """
+    machine, point, sensor = names
+    channels = [channel for channel in channels_in(options.channel) if channel is not None]
+    channel = ",".join(channels) or None
+    address = SensorAddress(
+        machine or folder.parent.name or "machine",
+        point or folder.name or "point",
+        sensor or channel or "sensor",
+    )
+    settings = settings_of(target, replace(options, channel=channel))
+    settings |= {} if machine and point else {FOLDER: str(folder)}
+    return Sensors(
+        Store(store), address, settings, channels=max(len(channels), 1), stated=sensor is not None
+    )
+
+
+def sensors_judged_with(store: Store, address: SensorAddress) -> Sensors:
+    """Return a sensor of the store and those that are judged with it."""
+    stored = dict(store.sensors_at(address.machine, address.point))[address.sensor]
+    return Sensors(store, address._replace(sensor=stored.get(TOGETHER, address.sensor)), {})
