@@ -24,11 +24,18 @@ from asperity.case import Case
 from asperity.core.quantities import quantity
 from asperity.paper import CRF_ENDS_HZ
 from asperity.report.style import BLUE, DASHED, GREEN, ON_PAGE, VERMILION, write_figure
-from asperity.simulation import Ageing, Solved, WearHistory, WearProgress, load_wear, of_body
+from asperity.simulation import (
+    SolvedPosition,
+    WearHistory,
+    WearingContact,
+    WearProgress,
+    body_column,
+    load_wear,
+)
 from asperity.simulation.wear.rows import load_share
 from asperity.surface.read import surface_topography
-from asperity.wear import positions, seen
-from benchmarks.unfinished import stamp
+from asperity.wear import combined_roughness, positions
+from benchmarks.unfinished import add_mark
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "build" / "wearing"
@@ -93,7 +100,7 @@ class Shelf:
 
     def __init__(self, seconds: float) -> None:
         self.end = time.perf_counter() + ENOUGH * seconds
-        self.folder = KEPT / stamp(*WEARS, *(f"ageing/{name}" for name in DECIDE))
+        self.folder = KEPT / add_mark(*WEARS, *(f"ageing/{name}" for name in DECIDE))
         self.left: list[str] = []
         self.made = 0
 
@@ -154,14 +161,16 @@ def row(history: WearHistory, *keys: str) -> str:
     return " | ".join(f"{told(first, key)} to {told(last, key)}" for key in keys)
 
 
-def solved_at(history: WearHistory, count: int, seed: int) -> list[Solved]:
+def solved_at(history: WearHistory, count: int, seed: int) -> list[SolvedPosition]:
     """The contact at the history's end, at so many positions."""
-    ageing: Ageing = history.ageing
+    ageing: WearingContact = history.ageing
     surfaces = history.after
     cells = (surfaces.first.grid.cells[0], surfaces.second.grid.cells[0])
     places = positions(cells, ageing.surfaces.rough, count, 0, seed)
     return [
-        one for place in places if isinstance(one := ageing.solver(seen(surfaces, place)), Solved)
+        one
+        for place in places
+        if isinstance(one := ageing.solver(combined_roughness(surfaces, place)), SolvedPosition)
     ]
 
 
@@ -365,7 +374,7 @@ def measured(shelf: Shelf) -> Iterator[str]:
             heights = theirs.heights() - np.mean(theirs.heights())
             sq = float(theirs.rms_height_from_area())
             numbers = " | ".join(
-                f"{quantity(key).factor * line[of_body(key, 1)]:.6g}" for key in keys
+                f"{quantity(key).factor * line[body_column(key, 1)]:.6g}" for key in keys
             )
             yield f"| {when} | {numbers} | {1e6 * sq:.6g} | {np.mean(heights**3) / sq**3:.6g} |"
         yield f"\nIn {len(history.table) - 1} jumps.\n"

@@ -16,13 +16,13 @@ from asperity import read_surface, run_wear
 from asperity.core.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.core.storage import read_sealed, write_sealed
 from asperity.paper import simulate_rig, write_rig
-from asperity.simulation import WearHistory, WearProgress, load_wear, of_body
+from asperity.simulation import WearHistory, WearProgress, body_column, load_wear
 from asperity.simulation.wear import frames, store
 from asperity.simulation.wear.frames import is_kept
-from asperity.simulation.wear.state import Worn
+from asperity.simulation.wear.state import WearState
 from asperity.surface import height_parameters
 from asperity.surface.read import surface_topography
-from asperity.wear import seen
+from asperity.wear import combined_roughness
 from support.wearing import CASE, FEW, POINT, worn_case
 
 HOURS = 1.0
@@ -144,7 +144,7 @@ def test_surfaces_are_files_that_others_open(tmp_path):
             ("spk_m", parameters.spk),
             ("ssk", parameters.ssk),
         ):
-            assert row[of_body(key, 0)] == pytest.approx(value, rel=1e-9, abs=0.0)
+            assert row[body_column(key, 0)] == pytest.approx(value, rel=1e-9, abs=0.0)
 
 
 def test_a_moment_lies_between_its_rows(unbroken):
@@ -323,7 +323,7 @@ def test_a_folder_of_another_layout_is_refused_in_a_sentence(tmp_path, monkeypat
 
 def test_the_layout_has_a_number_of_its_own():
     """What is kept of a jump, by name; where this changes, store.FORMAT counts up."""
-    kept = Worn.begin(case().moving_surfaces()).arrays()
+    kept = WearState.begin(case().moving_surfaces()).arrays()
     names = {"worn", "flattened", "changed", "rates"}
     assert set(kept) == {f"{name}_{body}" for name in names for body in (0, 1)} | {"numbers"}
     assert (store.FORMAT, kept["numbers"].size) == (3, 9)
@@ -340,7 +340,7 @@ def test_frames_show_the_contact_spread_over_the_history(unbroken, tmp_path):
         unbroken.table["hours"][number] for number in numbers
     ]
     first = unbroken.frames[0]
-    seen_first = unbroken.ageing.solver(seen(unbroken.before, first.position))
+    seen_first = unbroken.ageing.solver(combined_roughness(unbroken.before, first.position))
     np.testing.assert_array_equal(first.pressure, seen_first.pressure.astype(np.float32))
     np.testing.assert_array_equal(first.in_contact, seen_first.asperity_pressure > 0.0)
     kept = run_wear(case(), hours=0.5, out=tmp_path / "worn")

@@ -9,15 +9,15 @@ import pytest
 
 from asperity import BadInput
 from asperity.ehl import ContactState
-from asperity.simulation.wear.contact import Solved
+from asperity.simulation.wear.contact import SolvedPosition
 from asperity.simulation.wear.history import WearHistory
-from asperity.simulation.wear.jump import Ageing
+from asperity.simulation.wear.jump import WearingContact
 from asperity.simulation.wear.notes import of_few_jumps, of_grooves, of_radii, of_standing
-from asperity.simulation.wear.rows import contact_row, of_body, roughness
+from asperity.simulation.wear.rows import body_column, contact_row, roughness
 from asperity.simulation.wear.run import _row
-from asperity.simulation.wear.state import Worn
+from asperity.simulation.wear.state import WearState
 from asperity.surface import Surface
-from asperity.wear import Position
+from asperity.wear import TrackPosition
 from asperity.wear.laws import GAS_CONSTANT
 from support.wearing import DRY, FEW, POINT, worn_case
 
@@ -39,21 +39,21 @@ STATE = ContactState(
 )
 
 
-def ageing(overrides: dict[str, object] | None = None) -> Ageing:
+def ageing(overrides: dict[str, object] | None = None) -> WearingContact:
     case = worn_case({**FEW, "wear.k": "1e-14 1/Pa", **(overrides or {})})
     assert case.wear is not None
-    return Ageing(case, case.wear, case.moving_surfaces())
+    return WearingContact(case, case.wear, case.moving_surfaces())
 
 
 def rubbed(
-    model: Ageing, rise: float = 0.0, touching: float = 1.0
-) -> list[tuple[Position, Solved]]:
+    model: WearingContact, rise: float = 0.0, touching: float = 1.0
+) -> list[tuple[TrackPosition, SolvedPosition]]:
     """Hertz's pressure at one position, borne by asperities to a share, on surfaces hotter than ambient by `rise`."""
     grid, hertz = model.case.grid, model.case.conditions.hertz
     half_widths = [*hertz.half_widths, math.inf][:2]
     off = (grid.x[:, None] / half_widths[0]) ** 2 + (grid.y / half_widths[1]) ** 2
     pressure = hertz.p_max * np.sqrt(np.maximum(1.0 - off, 0.0))
-    solved = Solved(
+    solved = SolvedPosition(
         pressure=pressure,
         asperity_pressure=touching * pressure,
         shear=model.case.boundary_friction * pressure,
@@ -65,14 +65,14 @@ def rubbed(
         flash_temperature=rise,
         at_edge=False,
     )
-    return [(Position(0, 0), solved)]
+    return [(TrackPosition(0, 0), solved)]
 
 
 def test_a_jump_is_as_long_as_the_coefficient_that_acts_allows():
     """Bare metal all over wears as by Archard; with a share ψ of defects all takes 1/ψ as long."""
     defects = {"wear.law": {"law": "film-defect", "heat": "49 kJ/mol"}}
     archard, film = ageing(), ageing(defects)
-    new = Worn.begin(film.surfaces)
+    new = WearState.begin(film.surfaces)
     bare = archard.seconds(new, rubbed(archard))
     assert film.seconds(new, rubbed(film, rise=1e9)) == pytest.approx(bare, rel=1e-9, abs=0.0)
     conditions = film.case.conditions
@@ -89,7 +89,7 @@ def test_a_jump_is_as_long_as_the_coefficient_that_acts_allows():
 def test_what_a_jump_takes_off_is_spread_by_the_coefficient_that_acts():
     """A cold film wears a hundred thousandth, and z with it: next to nothing is spread, where bare metal would be."""
     film = ageing({"wear.law": {"law": "film-defect", "heat": "49 kJ/mol"}})
-    new, at = Worn.begin(film.surfaces), rubbed(film, 0.0)
+    new, at = WearState.begin(film.surfaces), rubbed(film, 0.0)
     seconds = 1e-3 * film.seconds(new, at)
     lost = film.jumped(new, at, seconds).worn[0]
     np.testing.assert_allclose(
@@ -100,11 +100,11 @@ def test_what_a_jump_takes_off_is_spread_by_the_coefficient_that_acts():
 BALL = {**DRY, "contact.load": "10 N", "wear.k": "1e-14 1/Pa", "wear.patches": 1}
 
 
-def ball(overrides: dict[str, object], wide: float = 1.8, cells: int = 24) -> Ageing:
+def ball(overrides: dict[str, object], wide: float = 1.8, cells: int = 24) -> WearingContact:
     grid = {"grid.x": [-1.8, 1.8], "grid.y": [-wide, wide], "grid.cells": [24, cells]}
     case = worn_case(BALL | grid | overrides, POINT)
     assert case.wear is not None
-    return Ageing(case, case.wear, case.moving_surfaces())
+    return WearingContact(case, case.wear, case.moving_surfaces())
 
 
 def test_a_balls_track_is_as_wide_as_its_contact_whatever_the_grid():
@@ -112,13 +112,13 @@ def test_a_balls_track_is_as_wide_as_its_contact_whatever_the_grid():
     rows = []
     for wide, cells in ((1.8, 24), (3.6, 48)):
         model = ball({"surface": "flat"}, wide, cells)
-        new, at = Worn.begin(model.surfaces), rubbed(model)
+        new, at = WearState.begin(model.surfaces), rubbed(model)
         worn = model.jumped(new, at, model.seconds(new, at))
         rows.append(_row(model, worn, rubbed(model), 0))
         for body in (0, 1):
             width = 2.0 * model.case.conditions.hertz.half_widths[1]
             over_all = model.volume(worn.worn[body], body) / model.perimeter(body) / width
-            assert rows[-1][of_body("worn_depth_m", body)] == pytest.approx(
+            assert rows[-1][body_column("worn_depth_m", body)] == pytest.approx(
                 over_all, rel=0.15, abs=0.0
             )
             assert model.levelled(worn)[body].grid.extent[1] == pytest.approx(
@@ -132,7 +132,7 @@ def test_a_balls_track_is_as_wide_as_its_contact_whatever_the_grid():
 
 def test_a_track_that_has_grown_beyond_the_hertz_zone_counts_whole():
     model = ball({"surface": "flat"}, 3.6, 48)
-    new = Worn.begin(model.surfaces)
+    new = WearState.begin(model.surfaces)
     y, a = model.surfaces.grid.y, model.case.conditions.hertz.half_widths[1]
     groove = np.broadcast_to(
         1e-6 * np.maximum(1.0 - (y / (2.0 * a)) ** 2, 0.0), model.surfaces.first.grid.cells
@@ -153,16 +153,16 @@ def test_a_standing_bodys_scar_is_no_roughness():
     """A smooth ball at rest, worn to a flat: its Sq is 0; its mean depth is the cap's over the square about it."""
     model = ball({"surface": "flat", "contact.slip": 2.0})
     (still,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
-    new, grid = Worn.begin(model.surfaces), model.surfaces.grid
+    new, grid = WearState.begin(model.surfaces), model.surfaces.grid
     a = model.case.conditions.hertz.half_widths[0]
     cap = 2e-6 * np.maximum(1.0 - (grid.x[:, None] / a) ** 2 - (grid.y / a) ** 2, 0.0)
     maps = [0.0 * cap, 0.0 * cap]
     maps[still] = cap
     worn = replace(new, worn=(maps[0], maps[1]))
     row = _row(model, worn, rubbed(model), 0)
-    assert row[of_body("sq_m", still)] == 0.0
+    assert row[body_column("sq_m", still)] == 0.0
     assert row["sq_m"] == 0.0
-    assert row[of_body("worn_depth_m", still)] == pytest.approx(
+    assert row[body_column("worn_depth_m", still)] == pytest.approx(
         2e-6 * math.pi / 8.0, rel=0.1, abs=0.0
     )
 
@@ -174,7 +174,7 @@ def test_a_rough_standing_body_keeps_its_sq_below_a_scar_many_times_deeper(geome
     (still,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
     assert model.surfaces.rough[still]
     new, grid, half_widths = (
-        Worn.begin(model.surfaces),
+        WearState.begin(model.surfaces),
         model.surfaces.grid,
         model.case.conditions.hertz.half_widths,
     )
@@ -197,7 +197,7 @@ def test_the_energy_law_counts_the_friction_work_where_bodies_touch(touching):
     load = solved.pressure.sum() * dx * dy * model.width / model.surfaces.grid.extent[1]
     assert load == pytest.approx(500.0, rel=0.02)
     expected = 1e-13 * 0.15 * touching * load * conditions.sliding_speed
-    new = Worn.begin(model.surfaces)
+    new = WearState.begin(model.surfaces)
     assert model.booked(at, 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
     assert model.volume(model.rate(new, at, 0), 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
 
@@ -251,7 +251,7 @@ def test_a_standing_body_is_said_to_be_spared():
 
 def test_few_jumps_are_said():
     model = ageing()
-    new = Worn.begin(model.surfaces)
+    new = WearState.begin(model.surfaces)
     assert of_few_jumps(model, 5, new) is None
     said = of_few_jumps(model, 4, new)
     assert said is not None
@@ -272,12 +272,12 @@ def test_what_is_smooth_to_rounding_has_no_shape():
 def test_a_jump_that_differs_too_much_from_the_one_before_going_on_is_shortened():
     """Of rates that jump from one place to another, Sq of two jumps and of one of both together differ."""
     model = ageing({"wear.step": 0.5})
-    new = Worn.begin(model.surfaces)
+    new = WearState.begin(model.surfaces)
     at = rubbed(model)
     assert model.seconds(new, at) == pytest.approx(
         0.5 * 10.0 * ageing().seconds(new, at) / 0.5, rel=1e-9, abs=0.0
     )
-    other = [(Position(20, 20), at[0][1])]
+    other = [(TrackPosition(20, 20), at[0][1])]
     free = model.seconds(replace(new, number=1), other) / 0.5
     after = model.jumped(new, at, model.seconds(new, at))
     longest = model.seconds(after, other)
@@ -305,7 +305,7 @@ def fallen(
         + scatter * np.random.default_rng(seed).standard_normal(hours.size)
     )
     table = pandas.DataFrame({"hours": hours, "clr": clr})
-    return WearHistory(ageing=model, table=table, worn=Worn.begin(model.surfaces))
+    return WearHistory(ageing=model, table=table, worn=WearState.begin(model.surfaces))
 
 
 def test_the_drift_of_a_line_is_its_slope_with_the_interval_of_k():

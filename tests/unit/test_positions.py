@@ -9,11 +9,11 @@ from asperity import ehl, solution
 from asperity.case import Case
 from asperity.ehl import grid_design as gridding
 from asperity.simulation.wear import contact
-from asperity.simulation.wear.contact import PositionSolver, Solved
-from asperity.simulation.wear.jump import Ageing
+from asperity.simulation.wear.contact import PositionSolver, SolvedPosition
+from asperity.simulation.wear.jump import WearingContact
 from asperity.simulation.wear.notes import ENOUGH, WANTED, of_cells
 from asperity.surface import correlation_lengths
-from asperity.wear import Position, seen
+from asperity.wear import TrackPosition, combined_roughness
 from support.wearing import worn_case
 
 ROUGH: dict[str, object] = {
@@ -27,9 +27,9 @@ def solver_of(case: Case) -> PositionSolver:
     return PositionSolver.of(case, flattening=False)
 
 
-def solved(case: Case) -> Solved:
+def solved(case: Case) -> SolvedPosition:
     found = solver_of(case)(case.surface())
-    assert isinstance(found, Solved)
+    assert isinstance(found, SolvedPosition)
     return found
 
 
@@ -75,17 +75,17 @@ def test_what_wears_is_the_load_of_touching_cells():
     np.testing.assert_array_equal(found.asperity_pressure[~parted], found.pressure[~parted])
 
 
-def of(overrides: dict[str, object]) -> Ageing:
+def of(overrides: dict[str, object]) -> WearingContact:
     case = worn_case(overrides)
     assert case.wear is not None
-    return Ageing(case, case.wear, case.moving_surfaces())
+    return WearingContact(case, case.wear, case.moving_surfaces())
 
 
 @pytest.mark.parametrize(("cells", "told"), [([64, 64], True), ([160, 64], False)])
 def test_too_few_cells_of_the_roughness_are_said_with_as_many_as_do(cells, told):
     fine = {"surface.correlation_length": "20 um", "grid.y": [-1.0, 1.0]}
     model = of({**fine, "grid.cells": cells})
-    composite = seen(model.surfaces, Position(0, 0))
+    composite = combined_roughness(model.surfaces, TrackPosition(0, 0))
     lengths, grid = correlation_lengths(composite), composite.grid
     along = [length / step for length, step in zip(lengths, grid.spacing, strict=True)]
     said = of_cells(model)

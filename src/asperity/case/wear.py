@@ -14,8 +14,8 @@ from asperity.wear import (
     REMOVAL_LAWS,
     SCATTER,
     SEVERITIES,
-    Coefficient,
     RemovalLaw,
+    WearCoefficient,
     WearModel,
 )
 
@@ -61,16 +61,16 @@ class WearSection(_Mechanisms):  # type: ignore[misc]  # the keys of what roughe
         """How the bodies of a contact wear."""
         law = cast(RemovalLaw, _made(self.law, REMOVAL_LAWS))
 
-        def coefficient(stated: Any) -> Coefficient:
+        def coefficient(stated: Any) -> WearCoefficient:
             if not isinstance(stated, str):
-                known = Coefficient.stated(plain(stated), self.scatter)
-                law.equal_to_archard(
+                known = WearCoefficient.from_value(plain(stated), self.scatter)
+                law.equivalent_coefficient(
                     known.k, boundary_friction if known.k else 1.0
                 )  # which refuses what cannot wear
                 return known
-            middle = Coefficient.of_class(stated, conditions.hardness)  # type: ignore[arg-type]
-            return Coefficient(
-                law.equal_to_archard(middle.k, boundary_friction), middle.low, middle.high
+            middle = WearCoefficient.from_severity(stated, conditions.hardness)  # type: ignore[arg-type]
+            return WearCoefficient(
+                law.equivalent_coefficient(middle.k, boundary_friction), middle.low, middle.high
             )
 
         first, second = map(coefficient, self.k)

@@ -43,8 +43,8 @@ def report_command(
         raise BadInput(
             f"a study's page holds nothing else, got {len(paths)} paths; name {folders[0]} alone"
         )
-    of_wear = bool(folders) and simulation.is_wear(folders[0])
-    of_study = bool(folders) and not of_wear and not simulation.is_history(folders[0])
+    of_wear = bool(folders) and simulation.is_wear_folder(folders[0])
+    of_study = bool(folders) and not of_wear and not simulation.is_history_folder(folders[0])
     if not of_study and (figures is not None or anchors is not None):
         option = "--figures" if figures is not None else "--anchors"
         raise BadInput(f"{option} is for a study's folder, got {paths[0]}; name the folder")

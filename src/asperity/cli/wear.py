@@ -30,7 +30,7 @@ from asperity.wear import fit_wear_coefficient, read_friction_trace
 if TYPE_CHECKING:
     from asperity.simulation import WearHistory, WearProgress
     from asperity.surface import MeasuredSurface
-    from asperity.wear import FittedWear
+    from asperity.wear import WearFit
 
 STARTS = "the start; after installation the first solve compiles the solver, up to a minute ..."
 CONTACT = (
@@ -159,14 +159,14 @@ def _fit(
     track_radius: float | None,
     second_load: float | None,
     second_distance: float | None,
-) -> "FittedWear":
+) -> "WearFit":
     trace = read_friction_trace(record, load=load, track_radius=track_radius)
     return fit_wear_coefficient(
         trace, profile, second_load=second_load, second_distance=second_distance
     )
 
 
-def _fitted(fitted: "FittedWear") -> Block:
+def _fitted(fitted: "WearFit") -> Block:
     """What was read from a test, and what follows."""
     trace, scar = fitted.trace, fitted.scar
     estimates = {
@@ -224,6 +224,6 @@ def _bodies(worn: "WearHistory") -> Block:
     rows = []
     for key in OF_BODIES:
         entry = quantity(key)
-        ends = [entry.number(last[simulation.of_body(key, body)]) for body in (0, 1)]
+        ends = [entry.number(last[simulation.body_column(key, body)]) for body in (0, 1)]
         rows.append((entry.title, *ends, entry.display))
     return columns(["", "body 1", "body 2", ""], rows, left=1)

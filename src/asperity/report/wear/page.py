@@ -8,7 +8,7 @@ from asperity.paper import is_papers_contact
 from asperity.report import animated_maps as moving
 from asperity.report.base import heading, render, tile, write_page
 from asperity.report.wear import exhibits
-from asperity.simulation import WearFrame, WearHistory, of_body
+from asperity.simulation import WearFrame, WearHistory, body_column
 
 TILES = ("sq_m", "clr", "friction_coefficient", "flash_temperature_max_k", "crf_hz")
 CONTACT = (
@@ -80,7 +80,9 @@ def render_wear_page(history: WearHistory) -> str:
         surfaces=[exhibits.surfaces(body).picture() for body in bodies],
         profiles=exhibits.profiles(bodies).picture() if bodies else None,
         contact=[_line(key, first[key], last[key]) for key in CONTACT],
-        bodies=[_line(key, last[of_body(key, 0)], last[of_body(key, 1)]) for key in OF_BODIES],
+        bodies=[
+            _line(key, last[body_column(key, 0)], last[body_column(key, 1)]) for key in OF_BODIES
+        ],
         volumes=_volumes(history),
         law=(type(history.ageing.model.law).__doc__ or "").split("\n")[0],
         coefficients=[f"{one.k:.3g}" for one in history.ageing.model.coefficients],

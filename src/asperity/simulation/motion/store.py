@@ -77,7 +77,7 @@ def load_history(folder: str | Path) -> History:
     )
 
 
-def is_history(folder: Path) -> bool:
+def is_history_folder(folder: Path) -> bool:
     """Whether a folder says of itself that it holds a history."""
     path = folder / MANIFEST
     try:

@@ -42,7 +42,7 @@ NEARLY, AT_ONCE = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Solved:
+class SolvedPosition:
     """A contact at one position, on its own grid; or `failure`, why there is none.
 
     Maps: `pressure`, `asperity_pressure` (that of touching cells, what the oil there bears
@@ -64,7 +64,7 @@ class Solved:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Failed:
+class FailedPosition:
     """A position that could not be solved, and why."""
 
     reason: str
@@ -93,13 +93,13 @@ class PositionSolver:
             flattening=flattening,
         )
 
-    def __call__(self, surface: Surface) -> Solved | Failed:
+    def __call__(self, surface: Surface) -> SolvedPosition | FailedPosition:
         """The contact there; one thread does the algebra, as two would sum in another order."""
         with threadpool_limits(1):
             try:
                 solution = self._solved(surface)
             except AsperityError as refusal:
-                return Failed(reason=str(refusal).rstrip("."))
+                return FailedPosition(reason=str(refusal).rstrip("."))
             return self._read(solution)
 
     def _solved(self, surface: Surface) -> ContactSolution:
@@ -144,7 +144,7 @@ class PositionSolver:
             strict=strict,
         )
 
-    def _read(self, solution: ContactSolution) -> Solved:
+    def _read(self, solution: ContactSolution) -> SolvedPosition:
         borne = np.where(solution.in_contact, np.maximum(solution.pressure, 0.0), 0.0)
         rubbing: Friction | None = None
         temperatures, flash = None, np.nan
@@ -156,7 +156,7 @@ class PositionSolver:
         except AsperityError:  # the contact is as good without its heat
             rubbing = rubbing or friction(solution, boundary_friction=self.boundary_friction)
         endless = self.conditions.endless
-        return Solved(
+        return SolvedPosition(
             pressure=solution.pressure,
             asperity_pressure=borne,
             shear=rubbing.shear,
@@ -176,7 +176,7 @@ class PositionSolver:
 class Crew(Protocol):
     """What solves several positions at once."""
 
-    def __call__(self, surfaces: Sequence[Surface]) -> list[Solved | Failed]:
+    def __call__(self, surfaces: Sequence[Surface]) -> list[SolvedPosition | FailedPosition]:
         """In their order."""
         ...
 
@@ -189,7 +189,7 @@ def crew(solver: PositionSolver, workers: int) -> Iterator[Crew]:
         return
     pool = ProcessPoolExecutor(min(workers, cores()), get_context("spawn"), set_up_worker)
 
-    def solve(surfaces: Sequence[Surface]) -> list[Solved | Failed]:
+    def solve(surfaces: Sequence[Surface]) -> list[SolvedPosition | FailedPosition]:
         try:
             return list(pool.map(solver, surfaces))
         except BrokenExecutor:

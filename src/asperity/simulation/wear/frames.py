@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from asperity.core.arrays import Field, Mask
-from asperity.simulation.wear.contact import Solved
-from asperity.wear import Position
+from asperity.simulation.wear.contact import SolvedPosition
+from asperity.wear import TrackPosition
 
 MOST = 24  # frames of a history, besides its end
 
@@ -26,13 +26,15 @@ class WearFrame(NamedTuple):
 
     number: int
     hours: float
-    position: Position
+    position: TrackPosition
     gap: Field
     pressure: Field
     in_contact: Mask
 
     @classmethod
-    def of(cls, number: int, hours: float, at: Sequence[tuple[Position, Solved]]) -> "WearFrame":
+    def of(
+        cls, number: int, hours: float, at: Sequence[tuple[TrackPosition, SolvedPosition]]
+    ) -> "WearFrame":
         """The first position of a jump; single precision is enough for the eye."""
         place, solved = at[0]
         gap, pressure = (
@@ -54,7 +56,7 @@ class WearFrame(NamedTuple):
     def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "WearFrame":
         """What `arrays` made."""
         number, hours, first, second = map(float, arrays["told"])
-        place = Position(int(first), int(second))
+        place = TrackPosition(int(first), int(second))
         return cls(
             int(number), hours, place, arrays["gap"], arrays["pressure"], arrays["in_contact"]
         )

@@ -18,10 +18,10 @@ from asperity.core.quantities import quantity
 from asperity.ehl import ContactState
 from asperity.paper import Moment
 from asperity.simulation.wear.frames import WearFrame
-from asperity.simulation.wear.jump import BODIES, Ageing
+from asperity.simulation.wear.jump import BODIES, WearingContact
 from asperity.simulation.wear.notes import told
-from asperity.simulation.wear.rows import RESONANCE, of_body, state_of_row
-from asperity.simulation.wear.state import Worn
+from asperity.simulation.wear.rows import RESONANCE, body_column, state_of_row
+from asperity.simulation.wear.state import WearState
 from asperity.surface import MovingSurfaces
 from asperity.trend import Stages, split_stages
 
@@ -36,7 +36,7 @@ class _Slope(NamedTuple):
     scatter: float
 
 
-class Drift(NamedTuple):
+class WearDrift(NamedTuple):
     """How fast a number changes as the contact wears, in its unit an hour, and the ends of its 90 % interval."""
 
     per_hour: float
@@ -56,9 +56,9 @@ class WearHistory:
     out of means; `folder` where it is kept, `path` of its table and `files` of its surfaces.
     """
 
-    ageing: Ageing
+    ageing: WearingContact
     table: pandas.DataFrame
-    worn: Worn
+    worn: WearState
     frames: tuple[WearFrame, ...] = ()
     folder: Path | None = None
     path: Path | None = None
@@ -140,7 +140,7 @@ class WearHistory:
             or second.k == 0.0
             or (first.low, first.high) == (second.low, second.high)
         )
-        if not self.ageing.model.removal_alone or not same:
+        if not self.ageing.model.only_removal or not same:
             return None
         known = second if first.k == 0.0 else first
         return known.low, known.high
@@ -197,7 +197,7 @@ class WearHistory:
         low, high = np.array(ends).T
         return pandas.DataFrame({"hours": hours, "low": low, "high": high})
 
-    def drift(self, key: str, since: float = 0.0, until: float | None = None) -> Drift:
+    def drift(self, key: str, since: float = 0.0, until: float | None = None) -> WearDrift:
         """How fast a number of the table changes between two moments [h], by the line nearest to its rows there.
 
         The interval is Student's of the line's slope, as rows scatter with the positions that they
@@ -226,7 +226,7 @@ class WearHistory:
         for factor in self.scaled_by or ():
             there = self._slope(key, factor * moments[0], min(factor * moments[1], end)) or here
             ends += [factor * (there.slope + sign * there.scatter) for sign in (-1.0, 1.0)]
-        return Drift(here.slope, min(ends), max(ends))
+        return WearDrift(here.slope, min(ends), max(ends))
 
     def _slope(self, key: str, since: float, until: float) -> "_Slope | None":
         """Of the line nearest to the rows between, with half of its 90 % interval; None of too few rows."""
@@ -246,7 +246,7 @@ class WearHistory:
         if self.scaled_by is None:
             return None
         hours = self.table["hours"].to_numpy(float)
-        volume = self.table[of_body("worn_volume_m3", body)].to_numpy(float)
+        volume = self.table[body_column("worn_volume_m3", body)].to_numpy(float)
         slow, fast = (end * hours[-1] for end in self.scaled_by)
         rate = (volume[-1] - volume[-2]) / (hours[-1] - hours[-2]) if len(hours) > 1 else 0.0
         return float(np.interp(slow, hours, volume)), float(volume[-1] + rate * (fast - hours[-1]))
@@ -275,7 +275,7 @@ class WearHistory:
             "overrollings": list(self.overrollings),
             "worn_volume_m3": list(self.worn_volume),
             "worn_volume_interval_m3": [self.volume_interval(body) for body in BODIES],
-            "worn_depth_m": [float(last[of_body("worn_depth_m", body)]) for body in BODIES],
+            "worn_depth_m": [float(last[body_column("worn_depth_m", body)]) for body in BODIES],
             "volume_error": self.volume_error,
             "jump_error": self.worn.error,
             "jumps": len(self.table) - 1,
@@ -299,7 +299,8 @@ class WearHistory:
         """One sentence: what wear did to the contact."""
         first, last = self.table.iloc[0], self.table.iloc[-1]
         depths = " and ".join(
-            quantity("worn_depth_m").text(last[of_body("worn_depth_m", body)]) for body in BODIES
+            quantity("worn_depth_m").text(last[body_column("worn_depth_m", body)])
+            for body in BODIES
         )
         changes = ", ".join(
             f"{quantity(key).short} {quantity(key).number(first[key])} to {quantity(key).text(last[key])}"

@@ -16,26 +16,26 @@ import scipy
 from asperity.case import Case
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.simulation.wear.contact import PositionSolver, Solved
+from asperity.simulation.wear.contact import PositionSolver, SolvedPosition
 from asperity.simulation.wear.reach import part_of, reached
-from asperity.simulation.wear.state import Worn
+from asperity.simulation.wear.state import WearState
 from asperity.surface import MovingSurfaces, Surface
 from asperity.wear import (
     Body,
     Change,
     Exposure,
+    MechanismState,
     Passage,
     Patch,
-    Position,
-    Rubbing,
-    State,
+    RubbingConditions,
+    TrackPosition,
     WearModel,
-    across,
-    is_even,
+    is_uniform_along,
     longest_jump,
-    on_track,
+    map_to_track,
     positions,
-    taken_off,
+    removed_depth,
+    to_other_track,
 )
 
 FEWEST_PATCHES = 4
@@ -56,7 +56,7 @@ BODIES = (0, 1)
 
 
 @dataclass(frozen=True)
-class Ageing:
+class WearingContact:
     """A case's contact as it wears: what stays the same from jump to jump."""
 
     case: Case
@@ -101,7 +101,9 @@ class Ageing:
         )
         return first, second
 
-    def exposures(self, at: Sequence[tuple[Position, Solved]] = ()) -> tuple[Exposure, Exposure]:
+    def exposures(
+        self, at: Sequence[tuple[TrackPosition, SolvedPosition]] = ()
+    ) -> tuple[Exposure, Exposure]:
         """How each body meets the contact, solved at those positions; none: one as cold as its surroundings."""
         conditions = self.case.conditions
         first, second = (
@@ -118,9 +120,9 @@ class Ageing:
         )
         return first, second
 
-    def _acting(self, at: Sequence[tuple[Position, Solved]], body: int) -> float:
+    def _acting(self, at: Sequence[tuple[TrackPosition, SolvedPosition]], body: int) -> float:
         """What the law makes of pressure times sliding, at most: 1 by Archard's, the share of defects by theirs."""
-        cold = Rubbing(
+        cold = RubbingConditions(
             pressure=np.ones(1),
             shear=np.full(1, self.case.boundary_friction),
             sliding_speed=self.case.conditions.sliding_speed,
@@ -168,25 +170,25 @@ class Ageing:
     # Where bodies are
     # ------------------------------------------------------------------------------------------------
 
-    def worn_surfaces(self, worn: Worn) -> MovingSurfaces:
+    def worn_surfaces(self, worn: WearState) -> MovingSurfaces:
         """Both tracks as they are now."""
         return self.surfaces.lowered(worn.lowered(0), worn.lowered(1))
 
-    def track(self, worn: Worn, body: int) -> tuple[slice, slice]:
+    def track(self, worn: WearState, body: int) -> tuple[slice, slice]:
         """Cells of a body's track that the contact reaches: the Hertz zone, or more where the scar has grown beyond.
 
         All along rolling of a body that moves, and all across of an endless contact.
         """
-        along = across = slice(None)
+        along = transverse = slice(None)
         grid, half_widths = self.surfaces.grid, self.case.conditions.hertz.half_widths
         if self.bodies[body].speed == 0.0:
             along = reached(worn.worn[body].mean(axis=1), grid.x, half_widths[0])
         if not self.case.conditions.endless:
             both = worn.worn[0].mean(axis=0) + worn.worn[1].mean(axis=0)[::-1]
-            across = reached(both + both[::-1], 0.5 * (grid.y - grid.y[::-1]), half_widths[1])
-        return along, across
+            transverse = reached(both + both[::-1], 0.5 * (grid.y - grid.y[::-1]), half_widths[1])
+        return along, transverse
 
-    def levelled(self, worn: Worn) -> tuple[Surface, Surface]:
+    def levelled(self, worn: WearState) -> tuple[Surface, Surface]:
         """Both tracks' roughness where the contact reaches them, without the form that wear has given them."""
         now = self.worn_surfaces(worn)
         first, second = (
@@ -198,7 +200,7 @@ class Ageing:
         )
         return first, second
 
-    def _form(self, worn: Worn, body: int) -> Field:
+    def _form(self, worn: WearState, body: int) -> Field:
         """Of a groove its mean profile, along what is alike; of a standing body's bounded scar its long waves.
 
         Where no body was rough all of such a scar is form.
@@ -221,18 +223,19 @@ class Ageing:
             )
         )
 
-    def positions(self, worn: Worn) -> tuple[Position, ...]:
+    def positions(self, worn: WearState) -> tuple[TrackPosition, ...]:
         """Where the contact is solved in this jump."""
         now = self.worn_surfaces(worn)
         tracks = (now.first, now.second)
         first, second = (
-            self.bodies[body].speed != 0.0 and not is_even(tracks[body].heights) for body in BODIES
+            self.bodies[body].speed != 0.0 and not is_uniform_along(tracks[body].heights)
+            for body in BODIES
         )  # one that is the same all along need go nowhere
         cells = (now.first.grid.cells[0], now.second.grid.cells[0])
         count = self.patches if first or second else 1
         return positions(cells, (first, second), count, worn.number, self.seed)
 
-    def height(self, worn: Worn) -> float:
+    def height(self, worn: WearState) -> float:
         """What steps and errors are counted against [m]: Sq; of smooth bodies their scars', or a share of the approach.
 
         Of rough ones the scar's form is left out.
@@ -245,7 +248,7 @@ class Ageing:
     # What is taken off
     # -----------------------------------------------------------------------------------------------
 
-    def rubbing(self, solved: Solved, body: int) -> Rubbing:
+    def rubbing(self, solved: SolvedPosition, body: int) -> RubbingConditions:
         """What the law of removal is told of a body at a position."""
         needed = self.model.law.needs_temperature
         if needed and solved.temperatures is None:
@@ -255,29 +258,35 @@ class Ageing:
         temperature = None
         if needed and solved.temperatures is not None:
             temperature = self.case.thermal.ambient + solved.temperatures[body]
-        return Rubbing(
+        return RubbingConditions(
             pressure=solved.asperity_pressure,
             shear=self.case.boundary_friction * solved.asperity_pressure,
             sliding_speed=self.case.conditions.sliding_speed,
             temperature=temperature,
         )
 
-    def rate(self, worn: Worn, at: Sequence[tuple[Position, Solved]], body: int) -> Field:
+    def rate(
+        self, worn: WearState, at: Sequence[tuple[TrackPosition, SolvedPosition]], body: int
+    ) -> Field:
         """Depth that a body's track loses [m/s]."""
         surface = (self.surfaces.first, self.surfaces.second)[body]
         laid = [
-            on_track(self.model.law(self.rubbing(solved, body)), surface.grid.cells, position, body)
+            map_to_track(
+                self.model.law(self.rubbing(solved, body)), surface.grid.cells, position, body
+            )
             for position, solved in at
         ]
-        passages = self.exposures()[body].passages(surface.grid.extent[0])
-        rate = self.model.coefficients[body].k * passages * np.mean(laid, axis=0)
-        if self.bodies[body].speed != 0.0 and is_even(surface.heights - worn.lowered(body)):
+        depth_rate_factor = self.exposures()[body].depth_rate_factor(surface.grid.extent[0])
+        rate = self.model.coefficients[body].k * depth_rate_factor * np.mean(laid, axis=0)
+        if self.bodies[body].speed != 0.0 and is_uniform_along(
+            surface.heights - worn.lowered(body)
+        ):
             rate = np.broadcast_to(
                 rate.mean(axis=0), rate.shape
             ).copy()  # each point of it meets every position
         return np.asarray(rate)
 
-    def booked(self, at: Sequence[tuple[Position, Solved]], body: int) -> float:
+    def booked(self, at: Sequence[tuple[TrackPosition, SolvedPosition]], body: int) -> float:
         """Volume that a body loses by law [m^3/s]: its k times the law's sum over the contact, on average."""
         (dx, dy), grid = self.surfaces.grid.spacing, self.surfaces.grid
         sums = [float(self.model.law(self.rubbing(solved, body)).sum()) for _, solved in at]
@@ -290,7 +299,7 @@ class Ageing:
             / grid.extent[1]
         )
 
-    def seconds(self, worn: Worn, at: Sequence[tuple[Position, Solved]]) -> float:
+    def seconds(self, worn: WearState, at: Sequence[tuple[TrackPosition, SolvedPosition]]) -> float:
         """How long the jump from the contacts at those positions may be."""
         rates = self.rate(worn, at, 0), self.rate(worn, at, 1)
         exposures, spacing = self.exposures(at), self.surfaces.grid.spacing
@@ -307,7 +316,7 @@ class Ageing:
 
     def _within_error(
         self,
-        worn: Worn,
+        worn: WearState,
         rates: tuple[Field, Field],
         exposures: tuple[Exposure, Exposure],
         longest: float,
@@ -327,7 +336,9 @@ class Ageing:
             seconds *= SHORTER
         return seconds
 
-    def jumped(self, worn: Worn, at: Sequence[tuple[Position, Solved]], seconds: float) -> Worn:
+    def jumped(
+        self, worn: WearState, at: Sequence[tuple[TrackPosition, SolvedPosition]], seconds: float
+    ) -> WearState:
         """Both bodies after a jump of so many seconds from the contacts at those positions."""
         rates = self.rate(worn, at, 0), self.rate(worn, at, 1)
         exposures = self.exposures(at)
@@ -360,12 +371,14 @@ class Ageing:
             (self.surfaces.first, self.surfaces.second),
         )
         first, second = (
-            taken_off(rates[body], seconds, exposures[body], tracks[body].grid, modulus)
+            removed_depth(rates[body], seconds, exposures[body], tracks[body].grid, modulus)
             for body in BODIES
         )
         return first, second
 
-    def _flattened(self, worn: Worn, at: Sequence[tuple[Position, Solved]]) -> tuple[Field, Field]:
+    def _flattened(
+        self, worn: WearState, at: Sequence[tuple[TrackPosition, SolvedPosition]]
+    ) -> tuple[Field, Field]:
         """What the cap has pressed flat: of each point the deepest overlap at any position, by halves on two rough."""
         if not self.model.flattening:
             return worn.flattened
@@ -378,7 +391,7 @@ class Ageing:
             * rough[body]
             * np.max(
                 [
-                    on_track(solved.overlap, tracks[body].grid.cells, position, body)
+                    map_to_track(solved.overlap, tracks[body].grid.cells, position, body)
                     for position, solved in at
                     if solved.overlap is not None
                 ],
@@ -390,7 +403,7 @@ class Ageing:
 
     def _error(
         self,
-        worn: Worn,
+        worn: WearState,
         removed: tuple[Field, Field],
         exposures: tuple[Exposure, Exposure],
         seconds: float,
@@ -423,13 +436,13 @@ class Ageing:
 
     def _roughened(
         self,
-        worn: Worn,
-        after: Worn,
-        at: Sequence[tuple[Position, Solved]],
+        worn: WearState,
+        after: WearState,
+        at: Sequence[tuple[TrackPosition, SolvedPosition]],
         removed: Field,
         name: str,
         which: tuple[int, int],
-    ) -> Worn:
+    ) -> WearState:
         """One mechanism, asked of one body."""
         body, _ = which
         now = self.worn_surfaces(after)
@@ -454,8 +467,13 @@ class Ageing:
         return self._booked_change(after, change, body, label, [place for place, _ in at])
 
     def _booked_change(
-        self, after: Worn, change: Change, body: int, label: str, places: Sequence[Position]
-    ) -> Worn:
+        self,
+        after: WearState,
+        change: Change,
+        body: int,
+        label: str,
+        places: Sequence[TrackPosition],
+    ) -> WearState:
         changed, mechanical = list(after.changed), list(after.mechanical)
         changed[body] = changed[body] + change.heights_change
         mechanical[body] -= self.volume(change.heights_change, body)
@@ -463,11 +481,11 @@ class Ageing:
             other = 1 - body
             thinner = self.perimeter(body) / self.perimeter(other)
             given = thinner * np.mean(
-                [across(change.transferred, place, body) for place in places], axis=0
+                [to_other_track(change.transferred, place, body) for place in places], axis=0
             )
             changed[other] = changed[other] + given
             mechanical[other] -= self.volume(given, other)
-        states: dict[str, State] = {**after.states, label: change.state}
+        states: dict[str, MechanismState] = {**after.states, label: change.state}
         facts: Mapping[str, float] = {
             f"{label}.{key}": float(value) for key, value in change.facts.items()
         }
@@ -481,11 +499,11 @@ class Ageing:
             facts={**after.facts, **facts},
         )
 
-    def _patch(self, position: Position, solved: Solved, body: int) -> Patch:
+    def _patch(self, position: TrackPosition, solved: SolvedPosition, body: int) -> Patch:
         cells = (self.surfaces.first, self.surfaces.second)[body].grid.cells
 
         def laid(field: Field, beside: float = 0.0) -> Field:
-            return on_track(field, cells, position, body, beside)
+            return map_to_track(field, cells, position, body, beside)
 
         temperature = None
         if self.model.needs_temperature and solved.temperatures is not None:

@@ -4,10 +4,10 @@ import math
 
 import pandas
 
-from asperity.simulation.wear.jump import BODIES, Ageing
-from asperity.simulation.wear.state import Worn
+from asperity.simulation.wear.jump import BODIES, WearingContact
+from asperity.simulation.wear.state import WearState
 from asperity.surface import correlation_lengths
-from asperity.wear import Position, seen
+from asperity.wear import TrackPosition, combined_roughness
 
 NAMES = ("first", "second")
 FAR = 0.05  # relative, by which the bodies' radii may miss the contact's unsaid
@@ -16,18 +16,18 @@ ENOUGH = 0.8  # of them: a sample's correlation length scatters about that of it
 FEW = 5  # jumps, in which a point has met the contact at few places of it
 
 
-def told(ageing: Ageing, table: pandas.DataFrame, worn: Worn) -> list[str]:
+def told(ageing: WearingContact, table: pandas.DataFrame, worn: WearState) -> list[str]:
     """Those that apply to a history of that table that ended so."""
     every = (of_cells(ageing), of_grooves(ageing), of_radii(ageing), of_standing(ageing))
     return [one for one in (*every, of_few_jumps(ageing, len(table) - 1, worn)) if one is not None]
 
 
-def of_cells(ageing: Ageing) -> str | None:
+def of_cells(ageing: WearingContact) -> str | None:
     """That the roughness has too few cells for its load share and its wear, and how many it wants; None of enough."""
     grid = ageing.surfaces.grid
     if not any(ageing.surfaces.rough):
         return None
-    lengths = correlation_lengths(seen(ageing.surfaces, Position(0, 0)))
+    lengths = correlation_lengths(combined_roughness(ageing.surfaces, TrackPosition(0, 0)))
     along = [length / spacing for length, spacing in zip(lengths, grid.spacing, strict=True)]
     if not min((one for one in along if not math.isnan(one)), default=math.inf) < ENOUGH * WANTED:
         return None
@@ -43,7 +43,7 @@ def of_cells(ageing: Ageing) -> str | None:
     )
 
 
-def of_grooves(ageing: Ageing) -> str | None:
+def of_grooves(ageing: WearingContact) -> str | None:
     """How little of its partner a smooth moving body meets in an endless contact; None where that does no harm."""
     rough, speeds = ageing.surfaces.rough, ageing.case.conditions.surface_speeds
     if not ageing.case.conditions.endless or sum(rough) != 1 or 0.0 in speeds:
@@ -58,7 +58,7 @@ def of_grooves(ageing: Ageing) -> str | None:
     )
 
 
-def of_radii(ageing: Ageing) -> str | None:
+def of_radii(ageing: WearingContact) -> str | None:
     """How far speeds and stated over-rolling rates are from the contact's radius; None where they fit."""
     stated, conditions = ageing.model.overrolling, ageing.case.conditions
     if stated is None or 0.0 in conditions.surface_speeds:
@@ -77,7 +77,7 @@ def of_radii(ageing: Ageing) -> str | None:
     )
 
 
-def of_standing(ageing: Ageing) -> str | None:
+def of_standing(ageing: WearingContact) -> str | None:
     """That a body at rest gets no pits and no marks; None where that leaves nothing out."""
     still = [NAMES[body] for body in BODIES if ageing.bodies[body].speed == 0.0]
     passing = [name for name in ("fatigue", "ploughing") if name in ageing.model.mechanisms]
@@ -86,7 +86,7 @@ def of_standing(ageing: Ageing) -> str | None:
     return f"Nothing over-rolls the {still[0]} body, which stands still: {' and '.join(passing)} spare it."
 
 
-def of_few_jumps(ageing: Ageing, jumps: int, worn: Worn) -> str | None:
+def of_few_jumps(ageing: WearingContact, jumps: int, worn: WearState) -> str | None:
     """That few jumps sample a passage at few places; None of many, and where nothing is rough or moves."""
     if jumps >= FEW or len(ageing.positions(worn)) == 1:
         return None

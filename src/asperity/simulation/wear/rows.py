@@ -12,7 +12,7 @@ from asperity.core.errors import BadInput
 from asperity.coupling import excitation, oscillator, resonance_at
 from asperity.ehl import ContactState, Sides, Uncertainty
 from asperity.results import one_surface
-from asperity.simulation.wear.contact import Solved
+from asperity.simulation.wear.contact import SolvedPosition
 from asperity.surface import Surface, height_parameters
 
 Row = dict[str, float | int]
@@ -49,7 +49,7 @@ STATE = {  # field of ContactState: its column
 }
 
 
-def of_body(key: str, body: int) -> str:
+def body_column(key: str, body: int) -> str:
     """The column of one body's number: `sq_1_m` of `sq_m`."""
     stem, mark, unit = key.rpartition("_")
     return f"{stem}_{body + 1}_{unit}" if mark and unit in ("m", "m3") else f"{key}_{body + 1}"
@@ -73,13 +73,13 @@ def roughness(surfaces: tuple[Surface, Surface]) -> Row:
         rough = parameters.sq > LEAST_SQ
         for key, field in ROUGHNESS.items():
             known = rough or key not in ("ssk", "sku")
-            row[key if name is None else of_body(key, name)] = (
+            row[key if name is None else body_column(key, name)] = (
                 float(getattr(parameters, field)) if known else math.nan
             )
     return row
 
 
-def load_share(solved: Sequence[Solved]) -> Uncertainty:
+def load_share(solved: Sequence[SolvedPosition]) -> Uncertainty:
     """CLR over the positions: the cells' part, and how far a further position's may lie from the mean."""
     shares = [one.state.clr for one in solved]
     own = [one.state.error.clr for one in solved if one.state.error is not None]
@@ -101,7 +101,7 @@ def load_share(solved: Sequence[Solved]) -> Uncertainty:
     )
 
 
-def contact_row(case: Case, solved: Sequence[Solved], sq: float) -> Row:
+def contact_row(case: Case, solved: Sequence[SolvedPosition], sq: float) -> Row:
     """What the mean contact is like, with 90 % intervals of its load share and resonance: whole, and of the mean alone.
 
     `sq` [m] is that of the tracks, the form that wear gave them left out.

@@ -9,20 +9,20 @@ from typing import NamedTuple
 from asperity.case import Case
 from asperity.core.errors import AsperityError, BadInput, NotConverged, require_positive
 from asperity.core.limits import require_affordable
-from asperity.simulation.wear.contact import Crew, Failed, Solved, crew
+from asperity.simulation.wear.contact import Crew, FailedPosition, SolvedPosition, crew
 from asperity.simulation.wear.frames import WearFrame
 from asperity.simulation.wear.history import HOUR, WearHistory
-from asperity.simulation.wear.jump import BODIES, Ageing
-from asperity.simulation.wear.rows import Row, contact_row, of_body, roughness
-from asperity.simulation.wear.state import Worn
+from asperity.simulation.wear.jump import BODIES, WearingContact
+from asperity.simulation.wear.rows import Row, body_column, contact_row, roughness
+from asperity.simulation.wear.state import WearState
 from asperity.simulation.wear.store import Keeper, open_keeper
 from asperity.surface import MovingSurfaces
-from asperity.wear import Position, longest_jump, seen
+from asperity.wear import TrackPosition, combined_roughness, longest_jump
 
 CELL_S = 2e-5  # that a position takes, a cell
 SAME = 1e-12  # of a time, by which two are one
 
-At = list[tuple[Position, Solved]]
+At = list[tuple[TrackPosition, SolvedPosition]]
 
 
 class WearProgress(NamedTuple):
@@ -68,7 +68,7 @@ def run_wear(
             f"{case.source}: wear is left out; add [wear] with k, the wear coefficient of each body"
         )
     end = require_positive("hours of wear", hours, "h") * HOUR
-    ageing = Ageing(case, case.wear, surfaces or case.moving_surfaces())
+    ageing = WearingContact(case, case.wear, surfaces or case.moving_surfaces())
     _require_affordable(ageing, end)
     began = time.perf_counter()
     with open_keeper(ageing, out) as keeper, crew(ageing.solver, workers) as solve:
@@ -77,7 +77,7 @@ def run_wear(
 
 
 def _go_on(
-    ageing: Ageing,
+    ageing: WearingContact,
     keeper: Keeper,
     solve: Crew,
     end: float,
@@ -113,14 +113,16 @@ def _go_on(
             keeper.keep(worn)
 
 
-def look(ageing: Ageing, worn: Worn, solve: Crew) -> tuple[At, Row]:
+def look(ageing: WearingContact, worn: WearState, solve: Crew) -> tuple[At, Row]:
     """The contact as it is now, at every position of the jump, and its row."""
     surfaces, places = ageing.worn_surfaces(worn), ageing.positions(worn)
-    outcomes = solve([seen(surfaces, place) for place in places])
+    outcomes = solve([combined_roughness(surfaces, place) for place in places])
     at = [
-        (place, one) for place, one in zip(places, outcomes, strict=True) if isinstance(one, Solved)
+        (place, one)
+        for place, one in zip(places, outcomes, strict=True)
+        if isinstance(one, SolvedPosition)
     ]
-    failures = [one.reason for one in outcomes if isinstance(one, Failed)]
+    failures = [one.reason for one in outcomes if isinstance(one, FailedPosition)]
     if len(at) < max(1, (len(places) + 1) // 2):
         when = f"after {worn.time / HOUR:.4g} h"
         remedy = "raise solver.tolerance or solver.max_iterations"
@@ -138,17 +140,17 @@ def look(ageing: Ageing, worn: Worn, solve: Crew) -> tuple[At, Row]:
     return at, _row(ageing, worn, at, len(failures))
 
 
-def _row(ageing: Ageing, worn: Worn, at: At, failed: int) -> Row:
+def _row(ageing: WearingContact, worn: WearState, at: At, failed: int) -> Row:
     rough = roughness(ageing.levelled(worn))
     row: Row = {"jump": worn.number, "hours": worn.time / HOUR}
     for body in BODIES:
         depth, track = worn.worn[body] - worn.changed[body], ageing.track(worn, body)
         row |= {
-            of_body("overrollings", body): worn.time * ageing.overrolling[body],
-            of_body("worn_depth_m", body): float(depth[track].mean()),
-            of_body("worn_depth_max_m", body): float(depth.max()),
-            of_body("worn_volume_m3", body): ageing.volume(depth, body),
-            of_body("flattened_m", body): float(worn.flattened[body][track].mean()),
+            body_column("overrollings", body): worn.time * ageing.overrolling[body],
+            body_column("worn_depth_m", body): float(depth[track].mean()),
+            body_column("worn_depth_max_m", body): float(depth.max()),
+            body_column("worn_volume_m3", body): ageing.volume(depth, body),
+            body_column("flattened_m", body): float(worn.flattened[body][track].mean()),
         }
     row |= rough
     row |= contact_row(ageing.case, [one for _, one in at], float(rough["sq_m"]))
@@ -160,7 +162,7 @@ def _row(ageing: Ageing, worn: Worn, at: At, failed: int) -> Row:
     }
 
 
-def _require_affordable(ageing: Ageing, end: float) -> None:
+def _require_affordable(ageing: WearingContact, end: float) -> None:
     """Refuse wear so fast that its shortest waves ask for more jumps than anybody can wait for."""
     nothing, grid = (ageing.surfaces.first.heights * 0.0,) * 2, ageing.case.grid
     modulus = ageing.case.conditions.pair.reduced_modulus

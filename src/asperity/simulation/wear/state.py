@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from asperity.core.arrays import Field
 from asperity.surface import MovingSurfaces
-from asperity.wear import State
+from asperity.wear import MechanismState
 
 Arrays = dict[str, npt.NDArray[Any]]
 Both = tuple[Field, Field]
@@ -18,7 +18,7 @@ FIELDS = ("worn", "flattened", "changed", "rates")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Worn:
+class WearState:
     """Both bodies' tracks at the beginning of a jump; maps in each body's own frame [m].
 
     `number` of the jump and its `time` [s]; `worn` what the law of removal took off, `flattened`
@@ -42,10 +42,10 @@ class Worn:
     error: float = 0.0
     longest: float = math.inf
     facts: Mapping[str, float] = field(default_factory=dict)
-    states: Mapping[str, State] = field(default_factory=dict)
+    states: Mapping[str, MechanismState] = field(default_factory=dict)
 
     @classmethod
-    def begin(cls, surfaces: MovingSurfaces) -> "Worn":
+    def begin(cls, surfaces: MovingSurfaces) -> "WearState":
         """Nothing lost."""
         nothing = (np.zeros(surfaces.first.grid.cells), np.zeros(surfaces.second.grid.cells))
         return cls(worn=nothing, flattened=nothing, changed=nothing, rates=nothing)
@@ -76,7 +76,7 @@ class Worn:
         return arrays
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "Worn":
+    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "WearState":
         """What `arrays` made."""
         number, time, seconds, error, longest, *volumes = map(float, arrays["numbers"])
         states: dict[str, dict[str, npt.NDArray[Any]]] = {}

@@ -40,9 +40,9 @@ from asperity.core.storage import (
 )
 from asperity.simulation.wear.frames import WearFrame, is_kept
 from asperity.simulation.wear.history import WearHistory
-from asperity.simulation.wear.jump import Ageing
+from asperity.simulation.wear.jump import WearingContact
 from asperity.simulation.wear.rows import Row
-from asperity.simulation.wear.state import Worn
+from asperity.simulation.wear.state import WearState
 from asperity.surface import MovingSurfaces, write_surface
 
 FORMAT = 3  # counts up when a reader of the format before could not read the folder
@@ -59,7 +59,7 @@ Arrays = dict[str, npt.NDArray[Any]]
 class End(NamedTuple):
     """Where a history ends: what it has come to, its last row and its last frame."""
 
-    worn: Worn
+    worn: WearState
     row: Row
     frame: WearFrame
 
@@ -77,24 +77,24 @@ class End(NamedTuple):
             if name.startswith("frame:")
         }
         return cls(
-            Worn.of_arrays(arrays), json.loads(str(arrays["row"])), WearFrame.of_arrays(frame)
+            WearState.of_arrays(arrays), json.loads(str(arrays["row"])), WearFrame.of_arrays(frame)
         )
 
 
 class Keeper:
     """The rows of a wear history as they come, in memory and, with a folder, on disk."""
 
-    def __init__(self, ageing: Ageing, folder: Path | None, identity: str = "") -> None:
+    def __init__(self, ageing: WearingContact, folder: Path | None, identity: str = "") -> None:
         self.ageing, self.folder, self.identity = ageing, folder, identity
         self.rows: list[Row] = []
         self.frames: dict[int, WearFrame] = {}
-        self.worn = Worn.begin(ageing.surfaces)
+        self.worn = WearState.begin(ageing.surfaces)
         self.end: End | None = None
         self.kept_at = time.monotonic()
         if folder is None:
             return
         self.end = _read(folder / END, identity, End.of_arrays)
-        worn = _read(folder / MEMORY, identity, Worn.of_arrays)
+        worn = _read(folder / MEMORY, identity, WearState.of_arrays)
         if worn is not None:
             self.worn, self.rows = worn, _rows(folder, identity)
             if len(self.rows) < worn.number:
@@ -119,7 +119,7 @@ class Keeper:
                 _frame_file(self.folder, frame.number), _packed(frame.arrays(), self.identity)
             )
 
-    def keep(self, worn: Worn, *, at_once: bool = False) -> None:
+    def keep(self, worn: WearState, *, at_once: bool = False) -> None:
         """Keep what the next jump needs, from time to time."""
         self.worn = worn
         if self.folder is not None and (at_once or time.monotonic() - self.kept_at > KEPT_EVERY_S):
@@ -135,7 +135,7 @@ class Keeper:
             self.identity,
         )
 
-    def finish(self, worn: Worn, row: Row, frame: WearFrame) -> None:
+    def finish(self, worn: WearState, row: Row, frame: WearFrame) -> None:
         """Keep the end, and the surfaces as they are then."""
         self.end = End(worn, row, frame)
         self.rows = [*self.rows[: worn.number], row]
@@ -165,7 +165,7 @@ class Keeper:
 
 
 def _history(
-    ageing: Ageing,
+    ageing: WearingContact,
     end: End,
     rows: list[Row],
     frames: Mapping[int, WearFrame],
@@ -221,14 +221,14 @@ def load_wear(folder: str | Path) -> WearHistory:
             f"{folder} holds a wear history that has not come to its end; run asperity wear again"
         )
     assert case.wear is not None
-    ageing = Ageing(case, case.wear, case.moving_surfaces())
+    ageing = WearingContact(case, case.wear, case.moving_surfaces())
     rows, frames = _rows(folder, identity), _frames(folder, identity, end.worn.number)
     return _history(
         ageing, end, rows, frames, folder=folder, remarks=version_notes(manifest["versions"])
     )
 
 
-def is_wear(folder: Path) -> bool:
+def is_wear_folder(folder: Path) -> bool:
     """Whether a folder says of itself that it holds a wear history."""
     path = folder / MANIFEST
     try:
@@ -238,7 +238,7 @@ def is_wear(folder: Path) -> bool:
 
 
 @contextmanager
-def open_keeper(ageing: Ageing, folder: Path | None) -> Iterator[Keeper]:
+def open_keeper(ageing: WearingContact, folder: Path | None) -> Iterator[Keeper]:
     """A wear history's folder, made or found and held against others, or no folder.
 
     `BadInput` for a folder that cannot be written to, that holds something else, or that another
