@@ -69,7 +69,7 @@ ENDS = (
     14  # positions at which the end of a history is looked at, the same for all that are compared
 )
 SHORT_S = 240.0  # of a short run
-ENOUGH = 0.85  # of the time that a part has, that is spent on histories
+ENOUGH_CELLS = 0.85  # of the time that a part has, that is spent on histories
 MANY = 14  # positions whose mean stands for the mean
 SEEDS = 20
 RISEN = 12.0  # hours in which pits have made up for what removal smoothed
@@ -99,7 +99,7 @@ class Shelf:
     """Histories as they are kept, and time to go on with them."""
 
     def __init__(self, seconds: float) -> None:
-        self.end = time.perf_counter() + ENOUGH * seconds
+        self.end = time.perf_counter() + ENOUGH_CELLS * seconds
         self.folder = KEPT / add_mark(*WEARS, *(f"ageing/{name}" for name in DECIDE))
         self.left: list[str] = []
         self.made = 0
@@ -163,8 +163,8 @@ def row(history: WearHistory, *keys: str) -> str:
 
 def solved_at(history: WearHistory, count: int, seed: int) -> list[SolvedPosition]:
     """The contact at the history's end, at so many positions."""
-    ageing: WearingContact = history.ageing
-    surfaces = history.after
+    ageing: WearingContact = history.contact
+    surfaces = history.final_surfaces
     cells = (surfaces.first.grid.cells[0], surfaces.second.grid.cells[0])
     places = positions(cells, ageing.surfaces.rough, count, 0, seed)
     return [
@@ -190,7 +190,7 @@ def speed(shelf: Shelf) -> Iterator[str]:
     whole = 1e7 / 56.25 / 3600.0
     fast: Overrides = {"grid.cells": [128, 128], "wear.patches": 4, "wear.step": 0.1}
     for _, history, seconds in shelf.all([Plan("speed", whole, fast)]):
-        jumps, patches = len(history.table) - 1, history.ageing.patches
+        jumps, patches = len(history.table) - 1, history.contact.patches
         abreast = -(-patches // 2) / patches  # of a jump's positions, that the busier of two solves
         yield (
             f"| {history.hours:.1f} | {jumps} | {patches} | {seconds:.0f} | {seconds / jumps:.2f} | "
@@ -284,7 +284,7 @@ def intervals() -> Iterator[str]:
     one_more, mean, of_mean, widths, all_others = 0, 0, 0, [], 0
     for seed in range(SEEDS):
         new = run_wear(case({"surface.seed": seed, "grid.cells": [96, 32]}), hours=1e-9)
-        few, many = solved_at(new, new.ageing.patches, seed), solved_at(new, MANY, 1000 + seed)
+        few, many = solved_at(new, new.contact.patches, seed), solved_at(new, MANY, 1000 + seed)
         shares, others = ([one.state.clr for one in found] for found in (few, many))
         share = load_share(few)
         assert share.interval is not None  # these cells have coarser ones to be compared with
@@ -348,7 +348,7 @@ def plateau(shelf: Shelf) -> Iterator[str]:
             continue
         for turned in TIMES_K:
             if turned <= k * hours * (1.0 + 1e-9):
-                moment = history.at(min(turned / k, hours))
+                moment = history.values_at(min(turned / k, hours))
                 numbers = f"{turned / k:g} | {turned:g} | {told(moment, *keys)}"
                 yield f"| {sq} | {k:g} | {numbers} | {len(history.table) - 1} |"
     if done:
@@ -387,9 +387,9 @@ def rings(shelf: Shelf) -> Iterator[str]:
     yield "|---|---|---|---|---|"
     most = 1e-15
     for _, history, _ in shelf.all([Plan("ring", 1.0, {**PAPERS, "wear.k": coefficients(most)})]):
-        new = history.at(0.0)
+        new = history.values_at(0.0)
         for k in (1e-18, 1e-17, 1e-16):  # the same history, as k is its clock
-            then = history.at(10.0 * k / most)
+            then = history.values_at(10.0 * k / most)
             yield f"| {k:g} | {' | '.join(f'{told(new, key)} to {told(then, key)}' for key in keys)} |"
 
 
@@ -433,7 +433,7 @@ def falls_and_rises(shelf: Shelf) -> Iterator[str]:
     for _, history, _ in shelf.all([Plan("falls-and-rises", RISEN, overrides)]):
         for hours in (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0):
             if hours <= RISEN:
-                moment = history.at(hours)
+                moment = history.values_at(hours)
                 yield f"| {hours:g} | {told(moment, *keys)} |"
         draw_rise(history)
 

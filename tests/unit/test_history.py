@@ -263,9 +263,9 @@ def test_a_history_killed_at_any_moment_goes_on_bit_for_bit(history, tmp_path):
     folder = tmp_path / "killed"
     script = f"""
 from asperity.case import load_case
-from asperity.history import run_history, store
+from asperity.simulation import folder, run_history
 from pathlib import Path
-store.KEPT_EVERY_S = 0.0
+folder.SAVE_INTERVAL_S = 0.0
 case = load_case("examples/paper.toml").with_overrides({SMALL!r})
 run_history(case, steps=10000, every=5, out=Path({str(folder)!r}))
 """

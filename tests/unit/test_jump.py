@@ -12,7 +12,7 @@ from asperity.ehl import ContactState
 from asperity.simulation.wear.contact import SolvedPosition
 from asperity.simulation.wear.history import WearHistory
 from asperity.simulation.wear.jump import WearingContact
-from asperity.simulation.wear.notes import of_few_jumps, of_grooves, of_radii, of_standing
+from asperity.simulation.wear.notes import few_jumps_note, grooves_note, radii_note, standing_note
 from asperity.simulation.wear.rows import body_column, contact_row, roughness
 from asperity.simulation.wear.run import _row
 from asperity.simulation.wear.state import WearState
@@ -72,7 +72,7 @@ def test_a_jump_is_as_long_as_the_coefficient_that_acts_allows():
     """Bare metal all over wears as by Archard; with a share ψ of defects all takes 1/ψ as long."""
     defects = {"wear.law": {"law": "film-defect", "heat": "49 kJ/mol"}}
     archard, film = ageing(), ageing(defects)
-    new = WearState.begin(film.surfaces)
+    new = WearState.unworn(film.surfaces)
     bare = archard.seconds(new, rubbed(archard))
     assert film.seconds(new, rubbed(film, rise=1e9)) == pytest.approx(bare, rel=1e-9, abs=0.0)
     conditions = film.case.conditions
@@ -89,9 +89,9 @@ def test_a_jump_is_as_long_as_the_coefficient_that_acts_allows():
 def test_what_a_jump_takes_off_is_spread_by_the_coefficient_that_acts():
     """A cold film wears a hundred thousandth, and z with it: next to nothing is spread, where bare metal would be."""
     film = ageing({"wear.law": {"law": "film-defect", "heat": "49 kJ/mol"}})
-    new, at = WearState.begin(film.surfaces), rubbed(film, 0.0)
+    new, at = WearState.unworn(film.surfaces), rubbed(film, 0.0)
     seconds = 1e-3 * film.seconds(new, at)
-    lost = film.jumped(new, at, seconds).worn[0]
+    lost = film.after_jump(new, at, seconds).worn[0]
     np.testing.assert_allclose(
         lost, film.rate(new, at, 0) * seconds, rtol=0.0, atol=1e-3 * lost.max()
     )
@@ -112,8 +112,8 @@ def test_a_balls_track_is_as_wide_as_its_contact_whatever_the_grid():
     rows = []
     for wide, cells in ((1.8, 24), (3.6, 48)):
         model = ball({"surface": "flat"}, wide, cells)
-        new, at = WearState.begin(model.surfaces), rubbed(model)
-        worn = model.jumped(new, at, model.seconds(new, at))
+        new, at = WearState.unworn(model.surfaces), rubbed(model)
+        worn = model.after_jump(new, at, model.seconds(new, at))
         rows.append(_row(model, worn, rubbed(model), 0))
         for body in (0, 1):
             width = 2.0 * model.case.conditions.hertz.half_widths[1]
@@ -132,7 +132,7 @@ def test_a_balls_track_is_as_wide_as_its_contact_whatever_the_grid():
 
 def test_a_track_that_has_grown_beyond_the_hertz_zone_counts_whole():
     model = ball({"surface": "flat"}, 3.6, 48)
-    new = WearState.begin(model.surfaces)
+    new = WearState.unworn(model.surfaces)
     y, a = model.surfaces.grid.y, model.case.conditions.hertz.half_widths[1]
     groove = np.broadcast_to(
         1e-6 * np.maximum(1.0 - (y / (2.0 * a)) ** 2, 0.0), model.surfaces.first.grid.cells
@@ -153,7 +153,7 @@ def test_a_standing_bodys_scar_is_no_roughness():
     """A smooth ball at rest, worn to a flat: its Sq is 0; its mean depth is the cap's over the square about it."""
     model = ball({"surface": "flat", "contact.slip": 2.0})
     (still,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
-    new, grid = WearState.begin(model.surfaces), model.surfaces.grid
+    new, grid = WearState.unworn(model.surfaces), model.surfaces.grid
     a = model.case.conditions.hertz.half_widths[0]
     cap = 2e-6 * np.maximum(1.0 - (grid.x[:, None] / a) ** 2 - (grid.y / a) ** 2, 0.0)
     maps = [0.0 * cap, 0.0 * cap]
@@ -174,7 +174,7 @@ def test_a_rough_standing_body_keeps_its_sq_below_a_scar_many_times_deeper(geome
     (still,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
     assert model.surfaces.rough[still]
     new, grid, half_widths = (
-        WearState.begin(model.surfaces),
+        WearState.unworn(model.surfaces),
         model.surfaces.grid,
         model.case.conditions.hertz.half_widths,
     )
@@ -197,14 +197,14 @@ def test_the_energy_law_counts_the_friction_work_where_bodies_touch(touching):
     load = solved.pressure.sum() * dx * dy * model.width / model.surfaces.grid.extent[1]
     assert load == pytest.approx(500.0, rel=0.02)
     expected = 1e-13 * 0.15 * touching * load * conditions.sliding_speed
-    new = WearState.begin(model.surfaces)
-    assert model.booked(at, 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
+    new = WearState.unworn(model.surfaces)
+    assert model.booked_rate(at, 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
     assert model.volume(model.rate(new, at, 0), 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
 
 
 def test_a_smooth_bodys_grooves_are_said_to_be_the_tracks():
     model = ageing({"motion.rough": "second"})
-    said = of_grooves(model)
+    said = grooves_note(model)
     tracks = model.perimeter(1) / model.surfaces.second.grid.extent[0]
     assert tracks > 100.0
     assert said is not None
@@ -216,7 +216,7 @@ def test_a_smooth_bodys_grooves_are_said_to_be_the_tracks():
         ageing({"motion.rough": "second", "contact.slip": -2.0}),
         ball({"motion.rough": "second"}),
     ):
-        assert of_grooves(other) is None
+        assert grooves_note(other) is None
 
 
 def test_rates_that_make_other_bodies_than_the_contacts_are_said():
@@ -225,12 +225,12 @@ def test_rates_that_make_other_bodies_than_the_contacts_are_said():
     assert 1.0 / (1.0 / radii[0] + 1.0 / radii[1]) == pytest.approx(5.4e-3)
     rates = [speed / (2.0 * math.pi * radius) for speed, radius in zip(speeds, radii, strict=True)]
     right, wrong = ([f"{rate!r} Hz" for rate in order] for order in (rates, rates[::-1]))
-    assert of_radii(ageing({"wear.overrolling": right})) is None
-    said = of_radii(ageing({"wear.overrolling": wrong}))
+    assert radii_note(ageing({"wear.overrolling": right})) is None
+    said = radii_note(ageing({"wear.overrolling": wrong}))
     assert said is not None
     assert "which outside one another do not give the contact's 5.4 mm" in said
-    assert of_radii(ageing({"wear.overrolling": "none"})) is None
-    assert of_radii(ageing({"contact.slip": 2.0})) is None
+    assert radii_note(ageing({"wear.overrolling": "none"})) is None
+    assert radii_note(ageing({"contact.slip": 2.0})) is None
 
 
 def test_a_body_shorter_than_the_contact_is_refused():
@@ -242,21 +242,21 @@ def test_a_body_shorter_than_the_contact_is_refused():
 
 def test_a_standing_body_is_said_to_be_spared():
     pits = {"wear.fatigue": {"law": "von-mises", "limit": "700 MPa"}}
-    said = of_standing(ageing(pits | {"contact.slip": 2.0}))
+    said = standing_note(ageing(pits | {"contact.slip": 2.0}))
     assert said is not None
     assert said.endswith("stands still: fatigue spare it.")
-    assert of_standing(ageing(pits)) is None
-    assert of_standing(ageing({"contact.slip": 2.0})) is None
+    assert standing_note(ageing(pits)) is None
+    assert standing_note(ageing({"contact.slip": 2.0})) is None
 
 
 def test_few_jumps_are_said():
     model = ageing()
-    new = WearState.begin(model.surfaces)
-    assert of_few_jumps(model, 5, new) is None
-    said = of_few_jumps(model, 4, new)
+    new = WearState.unworn(model.surfaces)
+    assert few_jumps_note(model, 5, new) is None
+    said = few_jumps_note(model, 4, new)
     assert said is not None
     assert said.startswith("In 4 jumps of 4 positions")
-    assert of_few_jumps(ageing({"surface": "flat"}), 4, new) is None
+    assert few_jumps_note(ageing({"surface": "flat"}), 4, new) is None
 
 
 def test_what_is_smooth_to_rounding_has_no_shape():
@@ -272,18 +272,20 @@ def test_what_is_smooth_to_rounding_has_no_shape():
 def test_a_jump_that_differs_too_much_from_the_one_before_going_on_is_shortened():
     """Of rates that jump from one place to another, Sq of two jumps and of one of both together differ."""
     model = ageing({"wear.step": 0.5})
-    new = WearState.begin(model.surfaces)
+    new = WearState.unworn(model.surfaces)
     at = rubbed(model)
     assert model.seconds(new, at) == pytest.approx(
         0.5 * 10.0 * ageing().seconds(new, at) / 0.5, rel=1e-9, abs=0.0
     )
     other = [(TrackPosition(20, 20), at[0][1])]
     free = model.seconds(replace(new, number=1), other) / 0.5
-    after = model.jumped(new, at, model.seconds(new, at))
+    after = model.after_jump(new, at, model.seconds(new, at))
     longest = model.seconds(after, other)
     assert longest < 0.99 * free
     assert (
-        model.jumped(after, other, longest).error <= 1e-3 < model.jumped(after, other, free).error
+        model.after_jump(after, other, longest).error
+        <= 1e-3
+        < model.after_jump(after, other, free).error
     )
 
 
@@ -305,12 +307,12 @@ def fallen(
         + scatter * np.random.default_rng(seed).standard_normal(hours.size)
     )
     table = pandas.DataFrame({"hours": hours, "clr": clr})
-    return WearHistory(ageing=model, table=table, worn=WearState.begin(model.surfaces))
+    return WearHistory(contact=model, table=table, worn=WearState.unworn(model.surfaces))
 
 
 def test_the_drift_of_a_line_is_its_slope_with_the_interval_of_k():
     history = fallen(-0.01)
-    slow, fast = history.scaled_by
+    slow, fast = history.k_interval
     assert history.drift("clr") == pytest.approx((-0.01, -0.01 * fast, -0.01 * slow), rel=1e-9)
     assert fallen(-0.01, scaled=0.0).drift("clr", 2.0, 4.0) == pytest.approx(
         (-0.01, -0.01, -0.01), rel=1e-9
@@ -326,7 +328,7 @@ def test_the_drift_of_a_line_is_its_slope_with_the_interval_of_k():
 def test_the_drift_with_another_k_is_that_of_another_time():
     """Of a parabola, read from 2 to 4 h, k so much larger is the slope so much later, and so much faster."""
     history = fallen(-0.01, 0.0005)
-    slow, fast = history.scaled_by
+    slow, fast = history.k_interval
     at = {factor: factor * (-0.01 + 0.001 * 3.0 * factor) for factor in (slow, 1.0, fast)}
     drift = history.drift("clr", 2.0, 4.0)
     assert drift.per_hour == pytest.approx(at[1.0], rel=1e-6)

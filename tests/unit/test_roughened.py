@@ -31,7 +31,7 @@ def ageing(*ways):
 def solved():
     """The contact at three positions of the new tracks, solved once for all."""
     new = ageing()
-    worn = WearState.begin(new.surfaces)
+    worn = WearState.unworn(new.surfaces)
     return [
         (place, new.solver(combined_roughness(new.worn_surfaces(worn), place)))
         for place in new.positions(worn)
@@ -39,9 +39,9 @@ def solved():
 
 
 def jumped(model, solved, jumps=1):
-    worn = WearState.begin(model.surfaces)
+    worn = WearState.unworn(model.surfaces)
     for _ in range(jumps):
-        worn = model.jumped(worn, solved, SECONDS)
+        worn = model.after_jump(worn, solved, SECONDS)
     return worn
 
 
@@ -76,7 +76,7 @@ def test_what_was_kept_goes_on_to_the_bit(solved):
     once = jumped(model, solved)
     again = WearState.of_arrays(once.arrays())
     assert again.longest == once.longest
-    one, other = (model.jumped(worn, solved, SECONDS) for worn in (once, again))
+    one, other = (model.after_jump(worn, solved, SECONDS) for worn in (once, again))
     for body in (0, 1):
         np.testing.assert_array_equal(one.changed[body], other.changed[body])
     np.testing.assert_array_equal(

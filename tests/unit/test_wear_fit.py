@@ -130,7 +130,7 @@ def test_a_trace_says_load_radius_and_energy(tmp_path):
     assert again.distance_error == pytest.approx(
         abs(0.025 / (2.0 * np.pi) / 4.1e-3 - 1.0), rel=1e-9, abs=0.0
     )
-    assert any("off the one given" in note for note in again.notes)
+    assert any("off the stated one" in note for note in again.notes)
 
 
 @pytest.mark.parametrize(

@@ -205,7 +205,7 @@ def _fitted(fitted: "WearFit") -> Block:
 
 def _contact(worn: "WearHistory") -> Block:
     """Both surfaces together, and the contact, at first and at the end."""
-    first, last = worn.table.iloc[0], worn.numbers_at_end
+    first, last = worn.table.iloc[0], worn.final_values
     rows = [
         (
             quantity(key).title,
