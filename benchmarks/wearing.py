@@ -207,7 +207,10 @@ def kills() -> Iterator[str]:
         with tempfile.TemporaryDirectory() as folder:
             times, whole, killed = _killed(Path(folder), hours, overrides)
         same = whole.table.equals(killed.table) and all(
-            np.array_equal(getattr(whole.after, body).heights, getattr(killed.after, body).heights)
+            np.array_equal(
+                getattr(whole.final_surfaces, body).heights,
+                getattr(killed.final_surfaces, body).heights,
+            )
             for body in ("first", "second")
         )
         outcome = "the same to the last bit" if same else "DIFFERENT"

@@ -156,13 +156,13 @@ def test_measured_surfaces_run_on_the_bodies_they_lie_on_their_ends_joined(measu
 
 def test_one_measured_surface_cannot_lie_on_both_bodies(measured):
     alone = measured.with_overrides({"surface": {"file": "ring.x3p"}, "motion.rough": "both"})
-    with pytest.raises(BadInput, match="name the other as second"):
+    with pytest.raises(BadInput, match="state the other as surface.second"):
         alone.moving_surfaces()
 
 
 def test_roughness_kept_in_a_run_has_no_track():
     kept = replace(case(), stored=case().surface())
-    with pytest.raises(BadInput, match="let the case file move"):
+    with pytest.raises(BadInput, match="use the case file"):
         run_history(kept, steps=1)
 
 

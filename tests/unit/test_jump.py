@@ -208,7 +208,7 @@ def test_a_smooth_bodys_grooves_are_said_to_be_the_tracks():
     tracks = model.perimeter(1) / model.surfaces.second.grid.extent[0]
     assert tracks > 100.0
     assert said is not None
-    assert f"one track of {tracks:.0f} all round" in said
+    assert f"one of {tracks:.0f} around its partner" in said
     for other in (
         ageing({"motion.rough": "both"}),
         ageing({"surface": "flat"}),
@@ -228,7 +228,7 @@ def test_rates_that_make_other_bodies_than_the_contacts_are_said():
     assert radii_note(ageing({"wear.overrolling": right})) is None
     said = radii_note(ageing({"wear.overrolling": wrong}))
     assert said is not None
-    assert "which outside one another do not give the contact's 5.4 mm" in said
+    assert "which do not give the contact's 5.4 mm" in said
     assert radii_note(ageing({"wear.overrolling": "none"})) is None
     assert radii_note(ageing({"contact.slip": 2.0})) is None
 
@@ -244,7 +244,7 @@ def test_a_standing_body_is_said_to_be_spared():
     pits = {"wear.fatigue": {"law": "von-mises", "limit": "700 MPa"}}
     said = standing_note(ageing(pits | {"contact.slip": 2.0}))
     assert said is not None
-    assert said.endswith("stands still: fatigue spare it.")
+    assert said.endswith("not over-rolled: no fatigue acts on it.")
     assert standing_note(ageing(pits)) is None
     assert standing_note(ageing({"contact.slip": 2.0})) is None
 
@@ -318,10 +318,10 @@ def test_the_drift_of_a_line_is_its_slope_with_the_interval_of_k():
         (-0.01, -0.01, -0.01), rel=1e-9
     )
     with pytest.raises(
-        BadInput, match=r"a drift of clr needs 4 rows that know it, got fewer from 3 to 3\.4 h"
+        BadInput, match=r"a drift of clr needs 4 rows with a value, got fewer from 3 to 3\.4 h"
     ):
         history.drift("clr", 3.0, 3.4)
-    with pytest.raises(BadInput, match="has no number clear; it has hours, clr"):
+    with pytest.raises(BadInput, match="has no column clear; it has hours, clr"):
         history.drift("clear")
 
 

@@ -122,7 +122,10 @@ REFUSED = [
     ({"sq": sq_range()}, "study.sq needs either step or count"),
     ({"sq": sq_range(step="0.1 um", count=3)}, "study.sq needs either step or count"),
     ({"sq": sq_range(step="0 um")}, "study.sq.step must be positive"),
-    ({"sq": sq_range(step="0.1 N")}, 'must be in um as the range\'s beginning is, got "0.1 N"'),
+    (
+        {"sq": sq_range(step="0.1 N")},
+        'must have the unit um, as the start of the range, got "0.1 N"',
+    ),
     ({"sq": {"from": "2 um", "to": "1 um", "step": "1 um"}}, "study.sq must go upwards"),
     ({"sq": ["1 N"]}, "surface.sq must be a length"),
     ({"sq": ["1 foobar"]}, 'got "1 foobar", whose unit is not known'),

@@ -152,7 +152,7 @@ def test_without_sliding_nothing_is_worn_off():
         history.final_surfaces.first.heights, history.initial_surfaces.first.heights
     )
     assert len(history.table) == 2
-    assert "Without sliding nothing is worn off." in history.notes
+    assert "There is no sliding, so nothing wears off." in history.notes
 
 
 def test_the_energy_law_is_archards_at_k_over_the_boundary_friction():

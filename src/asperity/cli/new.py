@@ -31,6 +31,6 @@ def new(
     path = out or Path(f"{kind}.toml")
     if path.exists():
         raise BadInput(f"{path} is there already; name another with --out")
-    files.write_text(path, case.beginning(kind))
+    files.write_text(path, case.case_template(kind))
     following = NEXT.get(kind, "solve {}").format(path)
     print(f"{path}: a case to start from. Try next: asperity {following}")

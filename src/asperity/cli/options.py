@@ -297,7 +297,7 @@ def contact_at(path: Path | None) -> "Case | MachineCase | None":
     """The case of a contact or a machine, if one was given."""
     if path is None:
         return None
-    return case.load_machine(path) if case.states_machine(path) else case.load_case(path)
+    return case.load_machine(path) if case.has_machine(path) else case.load_case(path)
 
 
 def lengths(option: str, texts: list[str] | None) -> list[float] | None:

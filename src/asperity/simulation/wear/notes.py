@@ -98,7 +98,7 @@ def standing_note(contact: WearingContact) -> str | None:
         return None
     return (
         f"The {still[0]} body stands still and is not over-rolled: "
-        f"{' and '.join(passing)} do not act on it."
+        f"no {' or '.join(passing)} acts on it."
     )
 
 
