@@ -195,7 +195,7 @@ def test_set_changes_the_case(asp):
         "run.nc",
     )
     assert code == 0
-    assert "Kept in run.nc" in out
+    assert "Saved in run.nc" in out
     run = load_run("run.nc")
     assert run.solution.conditions.load == 250.0
     assert run.case.contents.surface.seed == 3
@@ -308,5 +308,5 @@ def test_new_writes_a_case_once(asp):
     assert 'geometry = "point"' in Path("point.toml").read_text("utf-8")
     code, _, refused = asp("new", "point")
     assert code == 2
-    assert "is there already" in refused
+    assert "exists already" in refused
     assert asp("new", "sphere")[0] == 2

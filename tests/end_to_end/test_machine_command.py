@@ -215,7 +215,7 @@ def test_what_is_not_solved_is_loud(asp):
     [
         ("fzg-c", "machine.torqe=3 N m", "machine.torqe is not a known key; did you mean torque?"),
         ("fzg-c", "machine.kind=spur", 'did you mean "spur-gear"?'),
-        ("fzg-c", "machine.kind=", "--set takes KEY=VALUE"),
+        ("fzg-c", "machine.kind=", "--set must be KEY=VALUE"),
         ("fzg-c", "machine=7", "machine must be a table with the key kind, got 7"),
         ("fzg-c", "machine.speed=50 Hz", "not in r/min or rad/s"),
         ("fzg-c", "machine.speed=50 1/s", "not in r/min or rad/s"),

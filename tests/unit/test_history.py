@@ -156,7 +156,7 @@ def test_measured_surfaces_run_on_the_bodies_they_lie_on_their_ends_joined(measu
 
 def test_one_measured_surface_cannot_lie_on_both_bodies(measured):
     alone = measured.with_overrides({"surface": {"file": "ring.x3p"}, "motion.rough": "both"})
-    with pytest.raises(BadInput, match="state the other as surface.second"):
+    with pytest.raises(BadInput, match=r"state the other as surface\.second"):
         alone.moving_surfaces()
 
 

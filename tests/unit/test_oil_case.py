@@ -160,7 +160,7 @@ def test_a_mistake_is_one_sentence(change, says):
 
 def test_a_sheet_beside_laws_is_refused():
     with pytest.raises(
-        BadInput, match="has both viscosity \(a law\) and grade \(of a data sheet\)"
+        BadInput, match=r"has both viscosity \(a law\) and grade \(of a data sheet\)"
     ):
         PAPER.with_overrides({"lubricant.grade": "VG 100"})
 

@@ -1,4 +1,4 @@
-"""`asperity wear`: a case let wear for hours; goes on where it was stopped."""
+"""`asperity wear`: simulate wear over hours, resumable; or fit a wear coefficient to a test."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -46,7 +46,7 @@ CONTACT = (
     "crf_hz",
     "crfa",
 )
-OF_BODIES = (
+BODY_COLUMNS = (
     "overrollings",
     "worn_depth_m",
     "worn_depth_max_m",
@@ -61,7 +61,7 @@ OF_BODIES = (
 def wear(
     path: Annotated[
         Path | None,
-        typer.Argument(metavar="[CASE.toml]", help="A case; its [wear] says how it wears."),
+        typer.Argument(metavar="[CASE.toml]", help="Case, with [wear] for how it wears."),
     ] = None,
     hours: Annotated[float | None, typer.Option(metavar="H", help="Hours of running.")] = None,
     surface: SurfaceFile = None,
@@ -72,34 +72,39 @@ def wear(
     fit: Annotated[
         Path | None,
         typer.Option(
-            metavar="TRACE", help="In place of a case: k from a test's friction record ..."
+            metavar="TRACE", help="Fit k to a test, instead of a case: its friction record."
         ),
     ] = None,
     scar: Annotated[
-        Path | None, typer.Option(metavar="PROFILE", help="... and a profile across its track.")
+        Path | None, typer.Option(metavar="PROFILE", help="With --fit: a profile across the track.")
     ] = None,
     unit: Unit = None,
     lateral_unit: LateralUnit = None,
     load: Annotated[
-        str | None, typer.Option(metavar="FORCE", help="Of the test, if its record has it not.")
+        str | None,
+        typer.Option(metavar="FORCE", help="Load of the test, if its record does not state it."),
     ] = None,
     track_radius: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Of the test, if its record has it not.")
+        str | None,
+        typer.Option(
+            metavar="LENGTH", help="Track radius of the test, if its record does not state it."
+        ),
     ] = None,
     second_load: Annotated[
-        str | None, typer.Option(metavar="FORCE", help="Of a second test, to predict.")
+        str | None, typer.Option(metavar="FORCE", help="Load of a second test to predict.")
     ] = None,
     second_distance: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Of a second test, to predict.")
+        str | None, typer.Option(metavar="LENGTH", help="Sliding distance of a second test.")
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Let the contact wear: surfaces, load sharing, film and resonance over hours. Or fit k to a test, with --fit."""
+    """Simulate wear over hours: surfaces, load sharing, film, resonance; or fit k to a test."""
     if fit is not None or scar is not None:
         if fit is None or scar is None or path is not None or hours is not None:
             raise BadInput(
-                "--fit TRACE and --scar PROFILE go together, without a case or --hours; give those two"
+                "--fit TRACE and --scar PROFILE go together, without a case or --hours; state "
+                "only these two"
             )
         amounts = {
             "load": _stated("--load", "N", load),
@@ -114,7 +119,8 @@ def wear(
         return
     if path is None or hours is None:
         raise BadInput(
-            "asperity wear takes a case and --hours, or --fit TRACE and --scar PROFILE; give either pair"
+            "asperity wear needs a case and --hours, or --fit TRACE and --scar PROFILE; state "
+            "either pair"
         )
     require_output(page, ".html", option="--report")
     chosen = chosen_case(path, overrides, surface)
@@ -122,9 +128,9 @@ def wear(
 
         def jump(taken: "WearProgress") -> None:
             row = taken.row
-            told = ", ".join(quantity(key).named(row[key]) for key in ("sq_m", "clr"))
+            values = ", ".join(quantity(key).named(row[key]) for key in ("sq_m", "clr"))
             display(
-                f"{taken.hours:.4g} of {taken.of_hours:.4g} h, {told}",
+                f"{taken.hours:.4g} of {taken.of_hours:.4g} h, {values}",
                 round(1000.0 * taken.hours / taken.of_hours),
                 1000,
             )
@@ -140,7 +146,7 @@ def wear(
         _contact(worn),
         _bodies(worn),
         table([], worn.notes),
-        written("kept in", worn.folder),
+        written("saved in", worn.folder),
         written("report", page),
         as_json=as_json,
         quiet=quiet,
@@ -167,7 +173,7 @@ def _fit(
 
 
 def _fitted(fitted: "WearFit") -> Block:
-    """What was read from a test, and what follows."""
+    """Return the rows of a fit."""
     trace, scar = fitted.trace, fitted.scar
     estimates = {
         "wear_coefficient": fitted.k,
@@ -178,21 +184,22 @@ def _fitted(fitted: "WearFit") -> Block:
     rows = [
         (
             quantity(key).title,
-            f"{quantity(key).number(one.median)}, {span(key, (one.low, one.high))}",
+            f"{quantity(key).number(estimate.median)}, {span(key, (estimate.low, estimate.high))}",
         )
-        for key, one in estimates.items()
+        for key, estimate in estimates.items()
     ]
     bounds = quantity("wear_coefficient")
     rows += [
-        ("k if what is piled up is foreign", bounds.text(fitted.k_all_lost)),
+        ("k if piled-up material is foreign", bounds.text(fitted.k_all_lost)),
         (
             "k if it is the disc's own",
-            bounds.text(fitted.k_none_lost) if fitted.k_none_lost else "0, nothing is lost",
+            bounds.text(fitted.k_none_lost) if fitted.k_none_lost else "0, no loss",
         ),
-        ("load, way, laps", f"{trace.load:.4g} N, {trace.distance:.4g} m, {trace.laps:.4g}"),
+        ("load, distance, laps", f"{trace.load:.4g} N, {trace.distance:.4g} m, {trace.laps:.4g}"),
         (
             "track",
-            f"radius {surfaces.length_text(trace.track_radius)}, width {surfaces.length_text(scar.width)}",
+            f"radius {surfaces.length_text(trace.track_radius)}, "
+            f"width {surfaces.length_text(scar.width)}",
         ),
         ("missing, piled up", f"{scar.missing * 1e12:.3g}, {scar.piled * 1e12:.3g} µm²"),
         (
@@ -204,7 +211,7 @@ def _fitted(fitted: "WearFit") -> Block:
 
 
 def _contact(worn: "WearHistory") -> Block:
-    """Both surfaces together, and the contact, at first and at the end."""
+    """Return the initial and final values of the composite surface and the contact."""
     first, last = worn.table.iloc[0], worn.final_values
     rows = [
         (
@@ -219,10 +226,10 @@ def _contact(worn: "WearHistory") -> Block:
 
 
 def _bodies(worn: "WearHistory") -> Block:
-    """What each body has come to."""
+    """Return the final values of each body."""
     last = worn.table.iloc[-1]
     rows = []
-    for key in OF_BODIES:
+    for key in BODY_COLUMNS:
         entry = quantity(key)
         ends = [entry.number(last[simulation.body_column(key, body)]) for body in (0, 1)]
         rows.append((entry.title, *ends, entry.display))
