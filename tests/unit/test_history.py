@@ -355,7 +355,7 @@ def test_bad_steps_are_marked_where_it_shall_go_on():
 def test_a_model_without_steps_in_time_is_refused(monkeypatch):
     monkeypatch.delitem(MODELS, "mixed")
     monkeypatch.setitem(MODELS, "another", moving_contact)
-    with pytest.raises(BadInput, match="take one of unified, paper, conserving, another"):
+    with pytest.raises(BadInput, match="choose one of unified, paper, conserving, another"):
         run_history(case(), steps=1)
 
 

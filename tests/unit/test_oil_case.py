@@ -108,11 +108,11 @@ def test_a_measured_oil_by_name():
     [
         (
             {"lubricant.viscosity": "barus"},
-            "lubricant has both viscosity (a law) and grade (of a data sheet); keep",
+            r"lubricant has both viscosity \(a law\) and grade \(of a data sheet\); keep",
         ),
         (
             {"lubricant.density": {"law": "incompressible", "rho0": "1 g/cm^3"}},
-            "has both density (a law) and",
+            r"has both density \(a law\) and",
         ),
         ({"lubricant": {"grade": "VG 100"}}, "lubricant.temperature is missing; add it"),
         (

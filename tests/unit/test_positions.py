@@ -59,7 +59,7 @@ def test_what_leads_nowhere_at_once_is_solved_from_afar(monkeypatch):
         asked.append((how["options"], how["start"] is None))
         return thermal(*arguments, **how)
 
-    monkeypatch.setattr(ehl, "solve_thermal_contact", counted)
+    monkeypatch.setattr(contact, "solve_thermal_contact", counted)
     np.testing.assert_array_equal(solved(case).pressure, alone.pressure)
     few = replace(case.options, max_iterations=1)
     assert asked == [(few, False), (few, False), (case.options, True)]

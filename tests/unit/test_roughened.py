@@ -74,7 +74,7 @@ def test_what_scuffing_hands_over_is_what_the_other_gains(solved):
 def test_what_was_kept_goes_on_to_the_bit(solved):
     model = ageing("fatigue", "ploughing")
     once = jumped(model, solved)
-    again = WearState.of_arrays(once.arrays())
+    again = WearState.from_arrays(once.arrays())
     assert again.longest == once.longest
     one, other = (model.after_jump(worn, solved, SECONDS) for worn in (once, again))
     for body in (0, 1):
