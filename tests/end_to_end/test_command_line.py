@@ -248,7 +248,7 @@ def test_ctrl_c_leaves_nothing(asp, monkeypatch, tmp_path):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(asperity.ehl, "solve_thermal_contact", interrupted)
+    monkeypatch.setattr("asperity.results.solve.solve_thermal_contact", interrupted)
     code, out, err = asp("solve", "case.toml", "--out", "run.nc")
     assert (code, out) == (1, "")
     assert err.startswith("error: interrupted")

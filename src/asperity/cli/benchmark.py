@@ -51,15 +51,15 @@ def benchmark(
         result = certified.run_benchmark(
             chosen, folder=cases, cells=cells or (64, 128), progress=display
         )
-    kept = [] if out is None else [result.save(out)]
+    saved = [] if out is None else [result.save(out)]
     if figure is not None:
-        kept.append(report.write_figure(report.benchmark_figure(result), figure))
+        saved.append(report.write_figure(report.benchmark_figure(result), figure))
     show(
         result.verdict(),
-        lambda: result.scalars() | {"written": [str(path) for path in kept]},
+        lambda: result.scalars() | {"written": [str(path) for path in saved]},
         _rows(result),
         [f"  left out: {case}: {reason}" for case, reason in result.left_out],
-        written("  Written", *kept) if kept else [],
+        written("  Written", *saved) if saved else [],
         as_json=as_json,
         quiet=quiet,
     )

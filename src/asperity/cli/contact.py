@@ -106,8 +106,8 @@ def solve(
     run = _solve(chosen, label=path.name, quiet=quiet, surfaces=None, groups=groups)
     if out is not None:
         run.save(out)
-    kept = [] if out is None else [f"Saved in {out}; asperity report {out} writes a page of it"]
-    show(run.verdict(), run.summary, run_table(run), kept, as_json=as_json, quiet=quiet)
+    saved = [] if out is None else [f"Saved in {out}; asperity report {out} writes a page of it"]
+    show(run.verdict(), run.summary, run_table(run), saved, as_json=as_json, quiet=quiet)
     if not run.solution.convergence.converged:
         where = f"; the unfinished state is in {out}" if out is not None else ""
         raise AsperityError(f"not converged: {run.solution.convergence.explain()}{where}")

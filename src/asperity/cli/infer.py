@@ -124,14 +124,14 @@ def infer(
         found = inference.with_further(found, extend, sampler=by, workers=count, progress=step)
     if found.emulator is not answering:
         ahead = _forecast(setting, found.emulator, observations, limit, history, seed)
-    kept = (
+    designed = (
         None
         if design is None
         else inference.design_contact(found.forward, found.draws.z, clr=design)
     )
     if page is not None:
-        report.write_inference_report(found, page, forecast=ahead, design=kept)
-    _show(found, ahead, kept, page, as_json=as_json, quiet=quiet)
+        report.write_inference_report(found, page, forecast=ahead, design=designed)
+    _show(found, ahead, designed, page, as_json=as_json, quiet=quiet)
 
 
 def _required(
@@ -183,17 +183,17 @@ def _setting(
 def _show(
     found: "Inference",
     ahead: "Forecast | None",
-    kept: "Design | None",
+    designed: "Design | None",
     page: Path | None,
     *,
     as_json: bool,
     quiet: bool,
 ) -> None:
     """Print verdicts and tables, or all as JSON; exit with the alarm's code if there is one."""
-    verdicts = [result.sentence() for result in (ahead, kept) if result is not None]
+    verdicts = [result.sentence() for result in (ahead, designed) if result is not None]
     further = {
         "forecast": None if ahead is None else ahead.scalars(),
-        "design": None if kept is None else kept.scalars(),
+        "design": None if designed is None else designed.scalars(),
         "report": None if page is None else str(page),
     }
     blocks = (

@@ -62,7 +62,7 @@ def machine_command(
         with study_progress(path.name, quiet=quiet) as step:
             result = machines.solve_machine(chosen, out=out, workers=workers, progress=step)
         if out is not None:
-            _keep(result, out, quiet=quiet)
+            _save(result, out, quiet=quiet)
     show(
         result.verdict(),
         result.scalars,
@@ -85,7 +85,7 @@ def machine_command(
         )
 
 
-def _keep(result: "MachineResult", out: Path, *, quiet: bool) -> None:
+def _save(result: "MachineResult", out: Path, *, quiet: bool) -> None:
     """Write the machine's numbers and page, and the page of its worst contact."""
     files.write_text(out / RESULT, json.dumps(result.scalars(), indent=2, allow_nan=False))
     with progress("the machine's page", quiet=quiet):
@@ -120,8 +120,8 @@ def _contacts(result: "MachineResult") -> Block:
     """Return a row per contact, including both sides of a load zone."""
     shown = [(key, quantity(name)) for key, name in CONDITIONS]
     if result.solved:
-        kept = [key for key in SOLVED if any(row[key] is not None for row in result.rows)]
-        shown += [(key, quantity(key)) for key in kept]
+        solved_keys = [key for key in SOLVED if any(row[key] is not None for row in result.rows)]
+        shown += [(key, quantity(key)) for key in solved_keys]
     return columns(
         ["contact", *(entry.label for _, entry in shown)],
         ([row["name"], *(_number(row, key, entry) for key, entry in shown)] for row in result.rows),

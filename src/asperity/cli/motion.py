@@ -99,7 +99,7 @@ def run(
         lambda: {**moved.scalars(), **added, "report": None if page is None else str(page)},
         _history_table(moved),
         [] if vibration is None else [vibration.verdict()],
-        _kept(moved, page),
+        _saved(moved, page),
         as_json=as_json,
         quiet=quiet,
     )
@@ -112,7 +112,7 @@ def _clr(step: "HistoryProgress") -> str:
     return f"{clr.short} {clr.text(step.row['clr'])}"
 
 
-def _kept(moved: "History", page: Path | None) -> Block:
+def _saved(moved: "History", page: Path | None) -> Block:
     if moved.folder is not None:
         yield f"Saved in {moved.folder}; asperity run with the same folder resumes it"
     yield from written("Report", page)

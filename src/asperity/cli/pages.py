@@ -75,11 +75,11 @@ def _report_runs(paths: list[Path], out: Path, *, as_json: bool, quiet: bool) ->
 
 
 def _report_history(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
-    kept = simulation.load_history(folder)
-    report.write_motion_report(kept, out)
+    history = simulation.load_history(folder)
+    report.write_motion_report(history, out)
     show(
-        kept.verdict(),
-        lambda: {"report": str(out), "history": kept.scalars()},
+        history.verdict(),
+        lambda: {"report": str(out), "history": history.scalars()},
         written("Report", out),
         as_json=as_json,
         quiet=quiet,
@@ -87,11 +87,11 @@ def _report_history(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> N
 
 
 def _report_wear(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
-    kept = simulation.load_wear(folder)
-    report.write_wear_report(kept, out)
+    history = simulation.load_wear(folder)
+    report.write_wear_report(history, out)
     show(
-        kept.verdict(),
-        lambda: {"report": str(out), "wear": kept.scalars()},
+        history.verdict(),
+        lambda: {"report": str(out), "wear": history.scalars()},
         written("Report", out),
         as_json=as_json,
         quiet=quiet,

@@ -105,18 +105,18 @@ def sensitivity(
             workers=workers,
             progress=step,
         )
-    kept: dict[str, str] = {}
+    saved: dict[str, str] = {}
     if out is not None:
-        kept["effects"] = str(out / "effects.csv")
+        saved["effects"] = str(out / "effects.csv")
         files.write_csv(out / "effects.csv", result.effects)
     if figure is not None:
-        kept["figure"] = str(report.write_figure(report.sensitivity_figure(result), figure))
+        saved["figure"] = str(report.write_figure(report.sensitivity_figure(result), figure))
     show(
         result.verdict(),
-        lambda: {**result.scalars(), **kept},
+        lambda: {**result.scalars(), **saved},
         _effects(result),
         _ranges(result),
-        table(kept.items()),
+        table(saved.items()),
         as_json=as_json,
         quiet=quiet,
     )
@@ -233,15 +233,15 @@ def calibrate(
             workers=workers,
             progress=step,
         )
-    kept = {} if out is None else _keep(result, out)
+    saved = {} if out is None else _save(result, out)
     after = (
-        [*kept.items(), ("try next", f"asperity study {kept['calibrated']} --out DIR")]
-        if kept
+        [*saved.items(), ("try next", f"asperity study {saved['calibrated']} --out DIR")]
+        if saved
         else []
     )
     show(
         result.verdict(),
-        lambda: {**result.scalars(), **kept},
+        lambda: {**result.scalars(), **saved},
         _parameters(result),
         _anchors(result),
         _directions(result),
@@ -255,7 +255,7 @@ def calibrate(
     )
 
 
-def _keep(result: "Calibration", out: Path) -> dict[str, str]:
+def _save(result: "Calibration", out: Path) -> dict[str, str]:
     """Write the case, the table and the figure."""
     paths = {"calibrated": out / "calibrated.toml", "anchors": out / "anchors.csv"}
     files.write_text(paths["calibrated"], study.calibrated_text(result, out))
@@ -263,7 +263,7 @@ def _keep(result: "Calibration", out: Path) -> dict[str, str]:
     paths["figure"] = report.write_figure(
         report.calibration_figure(result), out / "calibration.png"
     )
-    return {name: str(kept) for name, kept in paths.items()}
+    return {name: str(saved) for name, saved in paths.items()}
 
 
 def _parameters(result: "Calibration") -> Block:

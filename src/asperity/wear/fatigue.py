@@ -84,7 +84,7 @@ class Pits(Parametric):
         fullest = float(damage.max())
         failed = damage >= 1.0
         pits, damage = break_out_pits(damage, depths, failed, passage.grid, self.aspect)
-        kept = {"damage": damage} | ({"strength": strength} if self.scatter > 0.0 else {})
+        next_state = {"damage": damage} | ({"strength": strength} if self.scatter > 0.0 else {})
         dx, dy = passage.grid.spacing
         facts = {
             "measure_pa": self.reported_measure(stressed),
@@ -93,7 +93,10 @@ class Pits(Parametric):
             "volume_m3": float(pits.sum() * dx * dy),
         }
         return Change(
-            heights_change=-pits, state=kept, facts=facts, longest=overrollings_to_failures(left)
+            heights_change=-pits,
+            state=next_state,
+            facts=facts,
+            longest=overrollings_to_failures(left),
         )
 
     def stress_measure(self, path: Field) -> Field:
@@ -227,7 +230,7 @@ def break_out_pits(
     if not failed.any():
         return pits, damage
     deepest = np.where(failed.any(axis=0), depths.size - 1 - failed[::-1].argmax(axis=0), -1)
-    kept = damage.copy()
+    remaining = damage.copy()
     for layer in np.unique(deepest[deepest >= 0]):
         here = deepest == layer
         bowl, (half_x, half_y) = _bowl(float(depths[layer]), grid, aspect)
@@ -238,8 +241,8 @@ def break_out_pits(
             )
             inside = np.ix_(rows[0], columns[0])
             pits[inside] = np.maximum(pits[inside], bowl[np.ix_(rows[1], columns[1])])
-        kept[: layer + 1, here] = damage[layer + 1, here] if layer + 1 < depths.size else 0.0
-    return pits, shift_damage(kept, depths, pits)
+        remaining[: layer + 1, here] = damage[layer + 1, here] if layer + 1 < depths.size else 0.0
+    return pits, shift_damage(remaining, depths, pits)
 
 
 def _along_y(grid: Grid) -> tuple[int, bool]:

@@ -85,10 +85,10 @@ def find_scar(measured: MeasuredSurface) -> Scar:
     first, last = _track(x, off, roughness, measured.name)
     edges = float(x[first]), float(x[last])
     width = edges[1] - edges[0]
-    beside = (x < edges[0]) | (x > edges[1])
+    untouched = (x < edges[0]) | (x > edges[1])
     if (
         last - first < MIN_POINTS
-        or np.count_nonzero(beside) < 2 * MIN_POINTS
+        or np.count_nonzero(untouched) < 2 * MIN_POINTS
         or width > 0.5 * (x[-1] - x[0])
     ):
         raise BadInput(
@@ -106,15 +106,15 @@ def find_scar(measured: MeasuredSurface) -> Scar:
 
 def _off_the_bulk(x: Field, z: Field) -> tuple[Field, float]:
     """Return heights above a robust line fit, and their robust standard deviation."""
-    kept = np.ones(x.size, dtype=bool)
+    inliers = np.ones(x.size, dtype=bool)
     off, deviation = z, 0.0
     for _ in range(_ROUNDS):
-        off = z - np.polynomial.Polynomial.fit(x[kept], z[kept], 1)(x)
-        deviation = 1.4826 * float(np.median(np.abs(off[kept] - np.median(off[kept]))))
-        now = np.abs(off) <= OUTLIER_LEVEL * deviation
-        if np.array_equal(now, kept) or np.count_nonzero(now) < MIN_POINTS:
+        off = z - np.polynomial.Polynomial.fit(x[inliers], z[inliers], 1)(x)
+        deviation = 1.4826 * float(np.median(np.abs(off[inliers] - np.median(off[inliers]))))
+        selected = np.abs(off) <= OUTLIER_LEVEL * deviation
+        if np.array_equal(selected, inliers) or np.count_nonzero(selected) < MIN_POINTS:
             break
-        kept = now
+        inliers = selected
     return off, deviation
 
 
@@ -151,12 +151,12 @@ def _old_surface(
 ) -> Field:
     """Fit the old surface through points beside `edges`, without `spared`; return it at all x."""
     width = edges[1] - edges[0]
-    beside = ((x < edges[0]) & (x >= edges[0] - reach * width)) | (
+    untouched = ((x < edges[0]) & (x >= edges[0] - reach * width)) | (
         (x > edges[1]) & (x <= edges[1] + reach * width)
     )
     if spared is not None:
-        beside &= (x < spared[0]) | (x > spared[1])
-    return np.asarray(np.polynomial.Polynomial.fit(x[beside], z[beside], degree)(x))
+        untouched &= (x < spared[0]) | (x > spared[1])
+    return np.asarray(np.polynomial.Polynomial.fit(x[untouched], z[untouched], degree)(x))
 
 
 def _areas(
@@ -172,17 +172,17 @@ def _areas(
     widened = edges[0] - margin * width, edges[1] + margin * width
     off = z - _old_surface(x, z, widened, degree, reach)
     areas = _below_and_above(x, off, widened)
-    nothing = np.array(
+    unworn = np.array(
         [
             _below_and_above(x, z - _old_surface(x, z, window, degree, reach, widened), window)
             for window in _elsewhere(x, widened)
         ]
     ).reshape(-1, 2)
-    if not len(nothing):
+    if not len(unworn):
         return ScarAreas(*areas, 0.0, 0.0)
     share = float(np.mean(np.abs(off[(x >= widened[0]) & (x <= widened[1])]) < quiet))
-    missing, piled = np.maximum(np.array(areas) - share * nothing.mean(axis=0), 0.0)
-    return ScarAreas(float(missing), float(piled), *(float(std) for std in nothing.std(axis=0)))
+    missing, piled = np.maximum(np.array(areas) - share * unworn.mean(axis=0), 0.0)
+    return ScarAreas(float(missing), float(piled), *(float(std) for std in unworn.std(axis=0)))
 
 
 def _elsewhere(x: Field, edges: tuple[float, float]) -> list[tuple[float, float]]:

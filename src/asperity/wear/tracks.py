@@ -58,10 +58,10 @@ def combined_roughness(surfaces: MovingSurfaces, position: TrackPosition) -> Sur
 
 
 def map_to_track(
-    field: Field, cells: tuple[int, int], position: TrackPosition, body: int, beside: float = 0.0
+    field: Field, cells: tuple[int, int], position: TrackPosition, body: int, outside: float = 0.0
 ) -> Field:
-    """Place a contact field on a body's track of `cells`, in its own frame; `beside` elsewhere."""
-    track = np.full(cells, beside)
+    """Place a contact field on a body's track of `cells`, in its own frame; `outside` elsewhere."""
+    track = np.full(cells, outside)
     track[: field.shape[0]] = field if body == 0 else field[:, ::-1]
     return np.roll(track, position[body], axis=0)
 

@@ -37,10 +37,10 @@ def cropped(surface: Surface, cells: tuple[slice, slice]) -> Surface:
     repeats = [
         repeat and part == slice(None) for repeat, part in zip(grid.periodic, cells, strict=True)
     ]
-    kept = Grid(
+    part = Grid(
         (heights.shape[0], heights.shape[1]),
         (lower[0], lower[1]),
         (upper[0], upper[1]),
         (repeats[0], repeats[1]),
     )
-    return Surface(heights, kept)
+    return Surface(heights, part)
