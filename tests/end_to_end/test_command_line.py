@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import x3pio
 
-import asperity.ehl
 from asperity import NotConverged, load_case, load_run, solve_case
 from asperity.core.errors import BadInput
 from asperity.solution import OwnResonance, ShakenContact

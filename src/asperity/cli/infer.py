@@ -33,48 +33,56 @@ if TYPE_CHECKING:
     from asperity.simulation import WearHistory
 
 
+PathsArgument = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="[FILE...]", help="Recordings, or folders of recordings."),
+]
+CaseFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--case", metavar="CASE.toml", help="Case of the contact, with priors in [infer]."
+    ),
+]
+TableFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--table",
+        metavar="CSV",
+        help="Table with columns file, load_n, entrainment_m_s, temperature_degc.",
+    ),
+]
+ExtendOption = Annotated[
+    int,
+    typer.Option(
+        metavar="N",
+        min=0,
+        help="Refine the emulator with up to N contacts inside the posterior.",
+    ),
+]
+SamplerOption = Annotated[
+    str, typer.Option(help="Sampler: importance, or nested (dynesty; takes minutes).")
+]
+DesignOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="CLR", help="Find changes that keep CLR below this value; needs no recordings."
+    ),
+]
+
+
 @app.command()
 def infer(
-    paths: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="[FILE...]", help="Recordings, or folders of recordings."),
-    ] = None,
-    case_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--case", metavar="CASE.toml", help="Case of the contact, with priors in [infer]."
-        ),
-    ] = None,
+    paths: PathsArgument = None,
+    case_file: CaseFileOption = None,
     overrides: Overrides = None,
     surface: options.SurfaceFile = None,
-    table_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--table",
-            metavar="CSV",
-            help="Table with columns file, load_n, entrainment_m_s, temperature_degc.",
-        ),
-    ] = None,
+    table_file: TableFileOption = None,
     emulator: options.EmulatorFolder = None,
-    extend: Annotated[
-        int,
-        typer.Option(
-            metavar="N",
-            min=0,
-            help="Refine the emulator with up to N contacts inside the posterior.",
-        ),
-    ] = 0,
-    sampler: Annotated[
-        str, typer.Option(help="Sampler: importance, or nested (dynesty; takes minutes).")
-    ] = "importance",
+    extend: ExtendOption = 0,
+    sampler: SamplerOption = "importance",
     forecast: options.ForecastLimit = None,
     worn: options.Worn = None,
-    design: Annotated[
-        float | None,
-        typer.Option(
-            metavar="CLR", help="Find changes that keep CLR below this value; needs no recordings."
-        ),
-    ] = None,
+    design: DesignOption = None,
     seed: options.SampleSeed = 0,
     rate: options.Rate = None,
     unit: options.Unit = None,

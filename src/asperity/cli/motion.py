@@ -27,34 +27,42 @@ if TYPE_CHECKING:
 COMPILES = "the start; after installation the first solve compiles the solver, up to a minute ..."
 
 
+PathArgument = Annotated[
+    Path, typer.Argument(metavar="CASE.toml", help="Case, with [motion] for how it moves.")
+]
+StepsOption = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Number of the last step (default: the case's)."),
+]
+PassesOption = Annotated[
+    float | None,
+    typer.Option(metavar="P", help="Passes of the rough surface's track, instead of --steps."),
+]
+EveryOption = Annotated[
+    int | None,
+    typer.Option(metavar="K", help="Save maps every K steps (default: about 40 in all)."),
+]
+KeepGoingOption = Annotated[
+    bool,
+    typer.Option("--keep-going", help="Mark steps that do not converge, and continue."),
+]
+ListenOption = Annotated[
+    bool,
+    typer.Option("--listen", help="Integrate the vibrating mass over the stored history."),
+]
+
+
 @app.command()
 def run(
-    path: Annotated[
-        Path, typer.Argument(metavar="CASE.toml", help="Case, with [motion] for how it moves.")
-    ],
-    steps: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Number of the last step (default: the case's)."),
-    ] = None,
-    passes: Annotated[
-        float | None,
-        typer.Option(metavar="P", help="Passes of the rough surface's track, instead of --steps."),
-    ] = None,
+    path: PathArgument,
+    steps: StepsOption = None,
+    passes: PassesOption = None,
     surface: SurfaceFile = None,
     overrides: Overrides = None,
     out: OutFolder = None,
-    every: Annotated[
-        int | None,
-        typer.Option(metavar="K", help="Save maps every K steps (default: about 40 in all)."),
-    ] = None,
-    keep_going: Annotated[
-        bool,
-        typer.Option("--keep-going", help="Mark steps that do not converge, and continue."),
-    ] = False,
-    listen: Annotated[
-        bool,
-        typer.Option("--listen", help="Integrate the vibrating mass over the stored history."),
-    ] = False,
+    every: EveryOption = None,
+    keep_going: KeepGoingOption = False,
+    listen: ListenOption = False,
     page: Page = None,
     as_json: AsJson = False,
     quiet: Quiet = False,

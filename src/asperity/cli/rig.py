@@ -16,59 +16,70 @@ if TYPE_CHECKING:
     from asperity.simulation import WearHistory
 
 
+OutOption = Annotated[
+    Path,
+    typer.Option(metavar="DIR", help="New folder for recordings, table, true values and case."),
+]
+CaseFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--case",
+        metavar="CASE.toml",
+        help="Contact to solve at each roughness (default: the paper's trend).",
+    ),
+]
+WornOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--wear",
+        metavar="DIR",
+        help="Wear simulation (folder of asperity wear --out) to record.",
+    ),
+]
+HoursOption = Annotated[
+    list[float] | None,
+    typer.Option(
+        metavar="H",
+        help="Time of a recording of --wear (repeatable; default: --samples spread evenly).",
+    ),
+]
+SamplesOption = Annotated[int, typer.Option(help="Number of worn rings, from Sq 0.54 to 3.49 um.")]
+RepeatsOption = Annotated[int, typer.Option(help="Tests per ring.")]
+DurationOption = Annotated[
+    str, typer.Option(metavar="TIME", help="Duration of each recording (the paper's: 300 s).")
+]
+RateOption = Annotated[str, typer.Option(metavar="FREQUENCY", help="Sampling rate.")]
+SnrOption = Annotated[
+    float,
+    typer.Option(
+        metavar="DB", help="Signal-to-noise ratio of the contact's line in its band, in dB."
+    ),
+]
+ModesOption = Annotated[int, typer.Option(help="Number of structural modes in the contact's band.")]
+TrendOption = Annotated[
+    str, typer.Option(help="Trend of CRF over roughness: knee, smooth or constant.")
+]
+FileFormatOption = Annotated[
+    str, typer.Option("--format", help="File format: h5 (with rate and unit) or wav.")
+]
+SeedOption = Annotated[int, typer.Option(help="Random seed.")]
+
+
 @app.command()
 def rig(
-    out: Annotated[
-        Path,
-        typer.Option(metavar="DIR", help="New folder for recordings, table, true values and case."),
-    ],
-    case_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--case",
-            metavar="CASE.toml",
-            help="Contact to solve at each roughness (default: the paper's trend).",
-        ),
-    ] = None,
-    worn: Annotated[
-        Path | None,
-        typer.Option(
-            "--wear",
-            metavar="DIR",
-            help="Wear simulation (folder of asperity wear --out) to record.",
-        ),
-    ] = None,
-    hours: Annotated[
-        list[float] | None,
-        typer.Option(
-            metavar="H",
-            help="Time of a recording of --wear (repeatable; default: --samples spread evenly).",
-        ),
-    ] = None,
-    samples: Annotated[
-        int, typer.Option(help="Number of worn rings, from Sq 0.54 to 3.49 um.")
-    ] = 12,
-    repeats: Annotated[int, typer.Option(help="Tests per ring.")] = 5,
-    duration: Annotated[
-        str, typer.Option(metavar="TIME", help="Duration of each recording (the paper's: 300 s).")
-    ] = "10 s",
-    rate: Annotated[str, typer.Option(metavar="FREQUENCY", help="Sampling rate.")] = "20 kHz",
-    snr: Annotated[
-        float,
-        typer.Option(
-            metavar="DB", help="Signal-to-noise ratio of the contact's line in its band, in dB."
-        ),
-    ] = 10.0,
-    modes: Annotated[
-        int, typer.Option(help="Number of structural modes in the contact's band.")
-    ] = 4,
-    trend: Annotated[
-        str, typer.Option(help="Trend of CRF over roughness: knee, smooth or constant.")
-    ] = "knee",
-    file_format: Annotated[
-        str, typer.Option("--format", help="File format: h5 (with rate and unit) or wav.")
-    ] = "h5",
-    seed: Annotated[int, typer.Option(help="Random seed.")] = 7,
+    out: OutOption,
+    case_file: CaseFileOption = None,
+    worn: WornOption = None,
+    hours: HoursOption = None,
+    samples: SamplesOption = 12,
+    repeats: RepeatsOption = 5,
+    duration: DurationOption = "10 s",
+    rate: RateOption = "20 kHz",
+    snr: SnrOption = 10.0,
+    modes: ModesOption = 4,
+    trend: TrendOption = "knee",
+    file_format: FileFormatOption = "h5",
+    seed: SeedOption = 7,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:

@@ -41,46 +41,55 @@ SOBOL = (
 )
 
 
+MethodOption = Annotated[
+    str, typer.Option(help="morris (elementary effects) or sobol (shares of variance).")
+]
+VaryOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KEY=LOW..HIGH",
+        help="Range of a factor (repeatable; default: what the paper leaves open).",
+    ),
+]
+TrajectoriesOption = Annotated[
+    int | None, typer.Option(metavar="N", help="Trajectories for morris (default: 12).")
+]
+SamplesOption = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Samples for sobol, a power of two (default: 64)."),
+]
+SqOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="LENGTH",
+        help="Roughness at which outcomes are read (repeatable; default: 0.5, 1, 2.5, 4 um).",
+    ),
+]
+LevelsOption = Annotated[
+    int, typer.Option(metavar="N", min=0, help="Roughness levels, for the knee of CRF.")
+]
+FigureOption = Annotated[
+    Path | None,
+    typer.Option(metavar="PNG|PDF", help="Plot effects of the factors per outcome."),
+]
+
+
 @app.command()
 def sensitivity(
     path: CaseOrRun,
-    method: Annotated[
-        str, typer.Option(help="morris (elementary effects) or sobol (shares of variance).")
-    ] = "morris",
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KEY=LOW..HIGH",
-            help="Range of a factor (repeatable; default: what the paper leaves open).",
-        ),
-    ] = None,
-    trajectories: Annotated[
-        int | None, typer.Option(metavar="N", help="Trajectories for morris (default: 12).")
-    ] = None,
-    samples: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Samples for sobol, a power of two (default: 64)."),
-    ] = None,
-    sq: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="LENGTH",
-            help="Roughness at which outcomes are read (repeatable; default: 0.5, 1, 2.5, 4 um).",
-        ),
-    ] = None,
-    levels: Annotated[
-        int, typer.Option(metavar="N", min=0, help="Roughness levels, for the knee of CRF.")
-    ] = 8,
+    method: MethodOption = "morris",
+    vary: VaryOption = None,
+    trajectories: TrajectoriesOption = None,
+    samples: SamplesOption = None,
+    sq: SqOption = None,
+    levels: LevelsOption = 8,
     cells: Cells = 128,
     seeds: Seeds = 1,
     sample_seed: SampleSeed = 0,
     overrides: Overrides = None,
     workers: Workers = None,
     out: OutFolder = None,
-    figure: Annotated[
-        Path | None,
-        typer.Option(metavar="PNG|PDF", help="Plot effects of the factors per outcome."),
-    ] = None,
+    figure: FigureOption = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -179,33 +188,40 @@ def _ranges(result: "Sensitivity") -> Block:
     yield from table([*rows, ("contacts", f"{values['cases']}, {values['failed']} failed")], notes)
 
 
+AnchorsOption = Annotated[
+    Path | None,
+    typer.Option(metavar="ANCHORS.toml", help="Target values (default: the paper's)."),
+]
+FreeOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KEY=LOW..HIGH",
+        help="Search range of a free quantity (repeatable; default: see the docs).",
+    ),
+]
+LevelOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="LENGTH",
+        help="Roughness to solve at (repeatable; default: the anchors').",
+    ),
+]
+ScreenedOption = Annotated[
+    int, typer.Option(metavar="N", min=1, help="Parameter sets to screen for starting points.")
+]
+StartsOption = Annotated[int, typer.Option(metavar="N", min=1, help="Number of starting points.")]
+
+
 @app.command()
 def calibrate(
     path: CaseOrRun,
-    anchors: Annotated[
-        Path | None,
-        typer.Option(metavar="ANCHORS.toml", help="Target values (default: the paper's)."),
-    ] = None,
-    free: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KEY=LOW..HIGH",
-            help="Search range of a free quantity (repeatable; default: see the docs).",
-        ),
-    ] = None,
-    level: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="LENGTH",
-            help="Roughness to solve at (repeatable; default: the anchors').",
-        ),
-    ] = None,
+    anchors: AnchorsOption = None,
+    free: FreeOption = None,
+    level: LevelOption = None,
     cells: Cells = 128,
     seeds: Seeds = 3,
-    screened: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Parameter sets to screen for starting points.")
-    ] = 32,
-    starts: Annotated[int, typer.Option(metavar="N", min=1, help="Number of starting points.")] = 2,
+    screened: ScreenedOption = 32,
+    starts: StartsOption = 2,
     sample_seed: SampleSeed = 0,
     overrides: Overrides = None,
     workers: Workers = None,

@@ -16,38 +16,47 @@ if TYPE_CHECKING:
     from asperity.surface import SurfaceDescription
 
 
+FilesArgument = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Measured surfaces.")]
+PixelOption = Annotated[
+    str | None,
+    typer.Option(metavar="LENGTH", help="Sample spacing of a bare matrix, such as '1.6 um'."),
+]
+FormOption = Annotated[
+    str,
+    typer.Option(help="Form to remove: none, plane, quadratic, cubic, quartic or cylinder."),
+]
+TurnOption = Annotated[
+    bool, typer.Option("--turn", help="Rotate by 90 degrees: x of the file becomes y.")
+]
+OutliersOption = Annotated[
+    str, typer.Option(help="Heights far from their neighbours: keep or remove.")
+]
+SFilterOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH", help="Remove shorter waves (ISO 16610 Gaussian), such as '5 um'."
+    ),
+]
+LFilterOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH", help="Remove longer waves (ISO 16610 Gaussian), such as '0.25 mm'."
+    ),
+]
+
+
 @app.command("surface")
 def surface_command(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Measured surfaces.")],
+    files: FilesArgument,
     out: OutPicture = None,
     unit: Unit = None,
     lateral_unit: LateralUnit = None,
-    pixel: Annotated[
-        str | None,
-        typer.Option(metavar="LENGTH", help="Sample spacing of a bare matrix, such as '1.6 um'."),
-    ] = None,
-    form: Annotated[
-        str,
-        typer.Option(help="Form to remove: none, plane, quadratic, cubic, quartic or cylinder."),
-    ] = "quadratic",
-    turn: Annotated[
-        bool, typer.Option("--turn", help="Rotate by 90 degrees: x of the file becomes y.")
-    ] = False,
-    outliers: Annotated[
-        str, typer.Option(help="Heights far from their neighbours: keep or remove.")
-    ] = "keep",
-    s_filter: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LENGTH", help="Remove shorter waves (ISO 16610 Gaussian), such as '5 um'."
-        ),
-    ] = None,
-    l_filter: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LENGTH", help="Remove longer waves (ISO 16610 Gaussian), such as '0.25 mm'."
-        ),
-    ] = None,
+    pixel: PixelOption = None,
+    form: FormOption = "quadratic",
+    turn: TurnOption = False,
+    outliers: OutliersOption = "keep",
+    s_filter: SFilterOption = None,
+    l_filter: LFilterOption = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:

@@ -28,6 +28,7 @@ from asperity.core.quantities import quantity
 from asperity.wear import fit_wear_coefficient, read_friction_trace
 
 if TYPE_CHECKING:
+    from asperity.case import Case
     from asperity.simulation import WearHistory, WearProgress
     from asperity.surface import MeasuredSurface
     from asperity.wear import WearFit
@@ -57,45 +58,53 @@ BODY_COLUMNS = (
 )
 
 
+PathArgument = Annotated[
+    Path | None,
+    typer.Argument(metavar="[CASE.toml]", help="Case, with [wear] for how it wears."),
+]
+HoursOption = Annotated[float | None, typer.Option(metavar="H", help="Hours of running.")]
+FitOption = Annotated[
+    Path | None,
+    typer.Option(metavar="TRACE", help="Fit k to a test, instead of a case: its friction record."),
+]
+ScarOption = Annotated[
+    Path | None, typer.Option(metavar="PROFILE", help="With --fit: a profile across the track.")
+]
+LoadOption = Annotated[
+    str | None,
+    typer.Option(metavar="FORCE", help="Load of the test, if its record does not state it."),
+]
+TrackRadiusOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH", help="Track radius of the test, if its record does not state it."
+    ),
+]
+SecondLoadOption = Annotated[
+    str | None, typer.Option(metavar="FORCE", help="Load of a second test to predict.")
+]
+SecondDistanceOption = Annotated[
+    str | None, typer.Option(metavar="LENGTH", help="Sliding distance of a second test.")
+]
+
+
 @app.command()
 def wear(
-    path: Annotated[
-        Path | None,
-        typer.Argument(metavar="[CASE.toml]", help="Case, with [wear] for how it wears."),
-    ] = None,
-    hours: Annotated[float | None, typer.Option(metavar="H", help="Hours of running.")] = None,
+    path: PathArgument = None,
+    hours: HoursOption = None,
     surface: SurfaceFile = None,
     overrides: Overrides = None,
     out: OutFolder = None,
     workers: Workers = None,
     page: Page = None,
-    fit: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="TRACE", help="Fit k to a test, instead of a case: its friction record."
-        ),
-    ] = None,
-    scar: Annotated[
-        Path | None, typer.Option(metavar="PROFILE", help="With --fit: a profile across the track.")
-    ] = None,
+    fit: FitOption = None,
+    scar: ScarOption = None,
     unit: Unit = None,
     lateral_unit: LateralUnit = None,
-    load: Annotated[
-        str | None,
-        typer.Option(metavar="FORCE", help="Load of the test, if its record does not state it."),
-    ] = None,
-    track_radius: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LENGTH", help="Track radius of the test, if its record does not state it."
-        ),
-    ] = None,
-    second_load: Annotated[
-        str | None, typer.Option(metavar="FORCE", help="Load of a second test to predict.")
-    ] = None,
-    second_distance: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Sliding distance of a second test.")
-    ] = None,
+    load: LoadOption = None,
+    track_radius: TrackRadiusOption = None,
+    second_load: SecondLoadOption = None,
+    second_distance: SecondDistanceOption = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -124,20 +133,7 @@ def wear(
         )
     require_output(page, ".html", option="--report")
     chosen = chosen_case(path, overrides, surface)
-    with progress(path.name, STARTS, quiet=quiet) as display:
-
-        def jump(taken: "WearProgress") -> None:
-            row = taken.row
-            values = ", ".join(quantity(key).named(row[key]) for key in ("sq_m", "clr"))
-            display(
-                f"{taken.hours:.4g} of {taken.of_hours:.4g} h, {values}",
-                round(1000.0 * taken.hours / taken.of_hours),
-                1000,
-            )
-
-        worn = simulation.run_wear(
-            chosen, hours=hours, out=out, workers=workers or cores(), progress=jump
-        )
+    worn = _simulate(chosen, path.name, hours, out, workers or cores(), quiet=quiet)
     if page is not None:
         report.write_wear_report(worn, page)
     show(
@@ -151,6 +147,23 @@ def wear(
         as_json=as_json,
         quiet=quiet,
     )
+
+
+def _simulate(
+    chosen: "Case", label: str, hours: float, out: Path | None, workers: int, *, quiet: bool
+) -> "WearHistory":
+    with progress(label, STARTS, quiet=quiet) as display:
+
+        def jump(taken: "WearProgress") -> None:
+            row = taken.row
+            values = ", ".join(quantity(key).named(row[key]) for key in ("sq_m", "clr"))
+            display(
+                f"{taken.hours:.4g} of {taken.of_hours:.4g} h, {values}",
+                round(1000.0 * taken.hours / taken.of_hours),
+                1000,
+            )
+
+        return simulation.run_wear(chosen, hours=hours, out=out, workers=workers, progress=jump)
 
 
 def _stated(option: str, unit: str, text: str | None) -> float | None:
