@@ -105,7 +105,7 @@ def test_a_dry_run_needs_neither_oil_nor_roughness_and_solving_does(asp):
     assert asp("machine", "bare.toml", "--dry-run")[0] == 0
     code, out, err = asp("machine", "bare.toml", "--out", "kept")
     assert (code, out) == (2, "")
-    assert "add them, or take --dry-run" in err
+    assert "add them, or use --dry-run" in err
     assert not Path("kept").exists()
 
 
@@ -255,7 +255,7 @@ def test_what_is_not_solved_is_loud(asp):
         ),
         ("nu206", "machine.clearance=2 mm", "holds no roller in place"),
         ("nu206", "machine.radial_load=0 N", "unloads every roller"),
-        ("nu206", "machine.radial_load=-4 kN", "must be finite, and not negative"),
+        ("nu206", "machine.radial_load=-4 kN", "must be finite and not negative"),
         (
             "6206",
             "machine.contact_angle=20 deg",
@@ -319,7 +319,7 @@ def test_speeds_that_slip_backwards_are_said_or_refused(asp):
     for setting, words in (
         (
             'machine.speeds=["1000 r/min", "-500 r/min"]',
-            "machine.speeds[1] must be finite, and not negative",
+            "machine.speeds[1] must be finite and not negative",
         ),
         ("machine.slide_to_roll=0.1", "slide_to_roll is that of both speeds"),
         ("machine.entrainment_speed=2 m/s", "both are given; give one"),

@@ -128,7 +128,7 @@ REFUSED = [
     ),
     ({"sq": {"from": "2 um", "to": "1 um", "step": "1 um"}}, "study.sq must go upwards"),
     ({"sq": ["1 N"]}, "surface.sq must be a length"),
-    ({"sq": ["1 foobar"]}, 'got "1 foobar", whose unit is not known'),
+    ({"sq": ["1 foobar"]}, 'got "1 foobar", whose unit is unknown'),
     ({"sq": [1]}, "got the bare number 1"),
     ({"sq": []}, "study.sq must be a list of values or a range"),
     ({"sq": ["1 um"], "surface": {"sq": ["2 um"]}}, "sweeps one quantity twice"),
