@@ -235,7 +235,8 @@ def test_rates_that_make_other_bodies_than_the_contacts_are_said():
 
 def test_a_body_shorter_than_the_contact_is_refused():
     with pytest.raises(
-        BadInput, match=r"overrolling of 1e\+07 Hz at .* implies a circumference of .* less than the contact"
+        BadInput,
+        match=r"overrolling of 1e\+07 Hz at .* implies a circumference of .* less than the contact",
     ):
         ageing({"wear.overrolling": "1e7 Hz"})
 
