@@ -105,7 +105,7 @@ def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_pat
         ({"file": "ring.x3p", "pixel": "5"}, "without a unit"),
         (
             {"kind": "flat", "second": {"kind": "flat", "second": {"kind": "flat"}}},
-            "surface.second.second is a third",
+            "surface.second.second would be a third",
         ),
         ({"kind": "flat", "second": {"kind": "grund"}}, 'did you mean "ground"'),
         (
