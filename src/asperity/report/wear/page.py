@@ -70,7 +70,7 @@ def render_wear_page(history: WearHistory) -> str:
     papers = is_papers_contact(history.case)
     reach = moving.ranges(history.case, history.frames)
     return render(
-        "wearing/page.html.j2",
+        "wear/page.html.j2",
         title="A contact that wears",
         history=history,
         tiles=[tile(quantity(key), at_end) for key in TILES if last[key] == last[key]],
