@@ -24,11 +24,18 @@ from asperity.case import Case
 from asperity.core.quantities import quantity
 from asperity.paper import CRF_ENDS_HZ
 from asperity.report.style import BLUE, DASHED, GREEN, ON_PAGE, VERMILION, write_figure
-from asperity.simulation import Ageing, Solved, WearHistory, WearProgress, load_wear, of_body
+from asperity.simulation import (
+    SolvedPosition,
+    WearHistory,
+    WearingContact,
+    WearProgress,
+    body_column,
+    load_wear,
+)
 from asperity.simulation.wear.rows import load_share
 from asperity.surface.read import surface_topography
-from asperity.wear import positions, seen
-from benchmarks.unfinished import stamp
+from asperity.wear import combined_roughness, positions
+from benchmarks.unfinished import add_mark
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "build" / "wearing"
@@ -62,7 +69,7 @@ ENDS = (
     14  # positions at which the end of a history is looked at, the same for all that are compared
 )
 SHORT_S = 240.0  # of a short run
-ENOUGH = 0.85  # of the time that a part has, that is spent on histories
+ENOUGH_CELLS = 0.85  # of the time that a part has, that is spent on histories
 MANY = 14  # positions whose mean stands for the mean
 SEEDS = 20
 RISEN = 12.0  # hours in which pits have made up for what removal smoothed
@@ -92,8 +99,8 @@ class Shelf:
     """Histories as they are kept, and time to go on with them."""
 
     def __init__(self, seconds: float) -> None:
-        self.end = time.perf_counter() + ENOUGH * seconds
-        self.folder = KEPT / stamp(*WEARS, *(f"ageing/{name}" for name in DECIDE))
+        self.end = time.perf_counter() + ENOUGH_CELLS * seconds
+        self.folder = KEPT / add_mark(*WEARS, *(f"ageing/{name}" for name in DECIDE))
         self.left: list[str] = []
         self.made = 0
 
@@ -154,14 +161,16 @@ def row(history: WearHistory, *keys: str) -> str:
     return " | ".join(f"{told(first, key)} to {told(last, key)}" for key in keys)
 
 
-def solved_at(history: WearHistory, count: int, seed: int) -> list[Solved]:
+def solved_at(history: WearHistory, count: int, seed: int) -> list[SolvedPosition]:
     """The contact at the history's end, at so many positions."""
-    ageing: Ageing = history.ageing
-    surfaces = history.after
+    ageing: WearingContact = history.contact
+    surfaces = history.final_surfaces
     cells = (surfaces.first.grid.cells[0], surfaces.second.grid.cells[0])
     places = positions(cells, ageing.surfaces.rough, count, 0, seed)
     return [
-        one for place in places if isinstance(one := ageing.solver(seen(surfaces, place)), Solved)
+        one
+        for place in places
+        if isinstance(one := ageing.solver(combined_roughness(surfaces, place)), SolvedPosition)
     ]
 
 
@@ -181,7 +190,7 @@ def speed(shelf: Shelf) -> Iterator[str]:
     whole = 1e7 / 56.25 / 3600.0
     fast: Overrides = {"grid.cells": [128, 128], "wear.patches": 4, "wear.step": 0.1}
     for _, history, seconds in shelf.all([Plan("speed", whole, fast)]):
-        jumps, patches = len(history.table) - 1, history.ageing.patches
+        jumps, patches = len(history.table) - 1, history.contact.patches
         abreast = -(-patches // 2) / patches  # of a jump's positions, that the busier of two solves
         yield (
             f"| {history.hours:.1f} | {jumps} | {patches} | {seconds:.0f} | {seconds / jumps:.2f} | "
@@ -198,7 +207,10 @@ def kills() -> Iterator[str]:
         with tempfile.TemporaryDirectory() as folder:
             times, whole, killed = _killed(Path(folder), hours, overrides)
         same = whole.table.equals(killed.table) and all(
-            np.array_equal(getattr(whole.after, body).heights, getattr(killed.after, body).heights)
+            np.array_equal(
+                getattr(whole.final_surfaces, body).heights,
+                getattr(killed.final_surfaces, body).heights,
+            )
             for body in ("first", "second")
         )
         outcome = "the same to the last bit" if same else "DIFFERENT"
@@ -275,7 +287,7 @@ def intervals() -> Iterator[str]:
     one_more, mean, of_mean, widths, all_others = 0, 0, 0, [], 0
     for seed in range(SEEDS):
         new = run_wear(case({"surface.seed": seed, "grid.cells": [96, 32]}), hours=1e-9)
-        few, many = solved_at(new, new.ageing.patches, seed), solved_at(new, MANY, 1000 + seed)
+        few, many = solved_at(new, new.contact.patches, seed), solved_at(new, MANY, 1000 + seed)
         shares, others = ([one.state.clr for one in found] for found in (few, many))
         share = load_share(few)
         assert share.interval is not None  # these cells have coarser ones to be compared with
@@ -339,7 +351,7 @@ def plateau(shelf: Shelf) -> Iterator[str]:
             continue
         for turned in TIMES_K:
             if turned <= k * hours * (1.0 + 1e-9):
-                moment = history.at(min(turned / k, hours))
+                moment = history.values_at(min(turned / k, hours))
                 numbers = f"{turned / k:g} | {turned:g} | {told(moment, *keys)}"
                 yield f"| {sq} | {k:g} | {numbers} | {len(history.table) - 1} |"
     if done:
@@ -365,7 +377,7 @@ def measured(shelf: Shelf) -> Iterator[str]:
             heights = theirs.heights() - np.mean(theirs.heights())
             sq = float(theirs.rms_height_from_area())
             numbers = " | ".join(
-                f"{quantity(key).factor * line[of_body(key, 1)]:.6g}" for key in keys
+                f"{quantity(key).factor * line[body_column(key, 1)]:.6g}" for key in keys
             )
             yield f"| {when} | {numbers} | {1e6 * sq:.6g} | {np.mean(heights**3) / sq**3:.6g} |"
         yield f"\nIn {len(history.table) - 1} jumps.\n"
@@ -378,9 +390,9 @@ def rings(shelf: Shelf) -> Iterator[str]:
     yield "|---|---|---|---|---|"
     most = 1e-15
     for _, history, _ in shelf.all([Plan("ring", 1.0, {**PAPERS, "wear.k": coefficients(most)})]):
-        new = history.at(0.0)
+        new = history.values_at(0.0)
         for k in (1e-18, 1e-17, 1e-16):  # the same history, as k is its clock
-            then = history.at(10.0 * k / most)
+            then = history.values_at(10.0 * k / most)
             yield f"| {k:g} | {' | '.join(f'{told(new, key)} to {told(then, key)}' for key in keys)} |"
 
 
@@ -424,7 +436,7 @@ def falls_and_rises(shelf: Shelf) -> Iterator[str]:
     for _, history, _ in shelf.all([Plan("falls-and-rises", RISEN, overrides)]):
         for hours in (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0):
             if hours <= RISEN:
-                moment = history.at(hours)
+                moment = history.values_at(hours)
                 yield f"| {hours:g} | {told(moment, *keys)} |"
         draw_rise(history)
 

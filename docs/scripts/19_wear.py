@@ -9,9 +9,9 @@ grid, to be quick.
 import matplotlib.pyplot as plt
 
 from asperity import run_wear
-from asperity.case import beginning, load_case
+from asperity.case import case_template, load_case
 
-case = load_case(beginning("wear")).with_overrides(
+case = load_case(case_template("wear")).with_overrides(
     {
         "grid.cells": [64, 32],
         "surface.sq": "1 um",

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import x3pio
 
-import asperity.ehl
 from asperity import NotConverged, load_case, load_run, solve_case
 from asperity.core.errors import BadInput
 from asperity.solution import OscillatingContact, OwnResonance
@@ -195,7 +194,7 @@ def test_set_changes_the_case(asp):
         "run.nc",
     )
     assert code == 0
-    assert "Kept in run.nc" in out
+    assert "Saved in run.nc" in out
     run = load_run("run.nc")
     assert run.solution.conditions.load == 250.0
     assert run.case.contents.surface.seed == 3
@@ -248,7 +247,7 @@ def test_ctrl_c_leaves_nothing(asp, monkeypatch, tmp_path):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(asperity.ehl, "solve_thermal_contact", interrupted)
+    monkeypatch.setattr("asperity.results.solve.solve_thermal_contact", interrupted)
     code, out, err = asp("solve", "case.toml", "--out", "run.nc")
     assert (code, out) == (1, "")
     assert err.startswith("error: interrupted")
@@ -308,5 +307,5 @@ def test_new_writes_a_case_once(asp):
     assert 'geometry = "point"' in Path("point.toml").read_text("utf-8")
     code, _, refused = asp("new", "point")
     assert code == 2
-    assert "is there already" in refused
+    assert "exists already" in refused
     assert asp("new", "sphere")[0] == 2

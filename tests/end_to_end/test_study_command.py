@@ -236,4 +236,4 @@ def test_a_study_needs_a_folder_that_is_one(asp):
     assert refused == (2, "", "error: cannot write into file: it is a file; name a folder\n")
     code, _, err = asp("study", str(CASE))
     assert code == 2
-    assert "give --out DIR" in err
+    assert "state --out DIR" in err

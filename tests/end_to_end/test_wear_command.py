@@ -101,7 +101,7 @@ def test_the_verdict_comes_first_and_tables_follow(asp, worn_case):  # noqa: ARG
     assert first.startswith("After 0.5 h the bodies have worn by ")
     assert any(line.split() == ["new", "after", "0.5", "h"] for line in rest)
     assert any(line.strip().startswith("wear volume") for line in rest)
-    assert "  note: Nothing but removal acts." in rest
+    assert "  note: Only removal is modelled, no roughening." in rest
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_the_verdict_comes_first_and_tables_follow(asp, worn_case):  # noqa: ARG
         (("--hours", "1", "--set", "wear=none"), "wear is left out; add [wear] with k"),
         (
             ("--hours", "1", "--set", "wear.k=hard"),
-            'wear.k[0] must be such as "1e-18 1/Pa", or one of mild',
+            'wear.k[0] must be a coefficient such as "1e-18 1/Pa", or one of mild',
         ),
         (
             ("--hours", "1", "--set", "wear.k=mild", "--set", "material.hardness=none"),

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -16,13 +17,13 @@ from asperity import read_surface, run_wear
 from asperity.core.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.core.storage import read_with_digest, write_with_digest
 from asperity.paper import RigSettings, simulate_rig, write_rig
-from asperity.simulation import WearHistory, WearProgress, load_wear, of_body
+from asperity.simulation import WearHistory, WearProgress, body_column, folder, load_wear
 from asperity.simulation.wear import frames, store
 from asperity.simulation.wear.frames import is_kept
-from asperity.simulation.wear.state import Worn
+from asperity.simulation.wear.state import WearState
 from asperity.surface import height_parameters
 from asperity.surface.read import surface_topography
-from asperity.wear import seen
+from asperity.wear import combined_roughness
 from support.wearing import CASE, FEW, POINT, worn_case
 
 HOURS = 1.0
@@ -38,7 +39,10 @@ def case(overrides: dict[str, object] | None = None):
 
 def same(one: WearHistory, other: WearHistory) -> None:
     pandas.testing.assert_frame_equal(one.table, other.table, check_exact=True)
-    for a, b in ((one.after.first, other.after.first), (one.after.second, other.after.second)):
+    for a, b in (
+        (one.final_surfaces.first, other.final_surfaces.first),
+        (one.final_surfaces.second, other.final_surfaces.second),
+    ):
         np.testing.assert_array_equal(a.heights, b.heights)
     assert one.worn_volume == other.worn_volume
 
@@ -51,7 +55,7 @@ def unbroken() -> WearHistory:
 def test_stopped_at_any_jump_it_goes_on_to_the_same_to_the_last_bit(
     unbroken, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(store, "KEPT_EVERY_S", 0.0)
+    monkeypatch.setattr(folder, "SAVE_INTERVAL_S", 0.0)
     jumps = len(unbroken.table) - 1
     assert jumps >= 10
     rng = np.random.default_rng(3)
@@ -108,7 +112,7 @@ def test_fewer_hours_than_are_kept_are_refused_and_nothing_is_lost(tmp_path):
     files = [
         path
         for path in (tmp_path / "worn").rglob("*")
-        if path.is_file() and path.name != store.LOCK
+        if path.is_file() and path.name != folder.LOCK
     ]
     before = [path.read_bytes() for path in files]
     last = float(kept.table["hours"].iloc[-2])
@@ -130,7 +134,9 @@ def test_surfaces_are_files_that_others_open(tmp_path):
         "second-before.x3p",
         "second-after.x3p",
     ]
-    for path, surface in zip(worn.files[:2], (worn.before.first, worn.after.first), strict=True):
+    for path, surface in zip(
+        worn.files[:2], (worn.initial_surfaces.first, worn.final_surfaces.first), strict=True
+    ):
         theirs = surface_topography().open_topography(str(path)).topography()
         assert theirs.unit == "m"
         np.testing.assert_array_equal(theirs.heights(), surface.heights)
@@ -144,22 +150,22 @@ def test_surfaces_are_files_that_others_open(tmp_path):
             ("spk_m", parameters.spk),
             ("ssk", parameters.ssk),
         ):
-            assert row[of_body(key, 0)] == pytest.approx(value, rel=1e-9, abs=0.0)
+            assert row[body_column(key, 0)] == pytest.approx(value, rel=1e-9, abs=0.0)
 
 
 def test_a_moment_lies_between_its_rows(unbroken):
     table = unbroken.table
-    between = unbroken.at(0.5 * (table["hours"][3] + table["hours"][4]))
+    between = unbroken.values_at(0.5 * (table["hours"][3] + table["hours"][4]))
     assert between["clr"] == pytest.approx(0.5 * (table["clr"][3] + table["clr"][4]))
     assert unbroken.state(0.0).clr == table["clr"][0]
     with pytest.raises(BadInput, match=r"got 1\.5 h"):
-        unbroken.at(HOURS + 0.5)
+        unbroken.values_at(HOURS + 0.5)
 
 
 def test_the_interval_of_k_is_another_clock(unbroken):
     """What happens by the end with k at the ends of its interval, computed: it lies where the interval says."""
-    band = unbroken.with_k("sq_m")
-    slow, fast = unbroken.scaled_by
+    band = unbroken.interval_by_k("sq_m")
+    slow, fast = unbroken.k_interval
     assert (slow, fast) == pytest.approx((np.exp(-0.8224), np.exp(0.8224)), rel=1e-4, abs=0.0)
     known = band[band["low"].notna()].iloc[-1]
     faster = run_wear(case({"wear.k": f"{1e-16 * fast!r} 1/Pa"}), hours=float(known["hours"]))
@@ -168,7 +174,7 @@ def test_the_interval_of_k_is_another_clock(unbroken):
     assert low < unbroken.worn_volume[0] < high
     later = run_wear(case(), hours=HOURS * fast).worn_volume[0]
     assert later < high < 1.25 * later  # wear slows down, and the interval goes on as it last went
-    assert run_wear(case({"wear.flattening": True}), hours=1e-4).with_k("sq_m") is None
+    assert run_wear(case({"wear.flattening": True}), hours=1e-4).interval_by_k("sq_m") is None
 
 
 def test_a_law_of_film_defects_runs_with_its_own_values():
@@ -183,9 +189,9 @@ def test_flattening_is_kept_apart_from_what_is_lost():
     assert worn.worn_volume == (0.0, 0.0)
     assert worn.table["flattened_1_m"].iloc[-1] > 1e-9
     assert worn.table["clr"].iloc[-1] < worn.table["clr"].iloc[0]
-    assert worn.after.first.sq < worn.before.first.sq
+    assert worn.final_surfaces.first.sq < worn.initial_surfaces.first.sq
     np.testing.assert_array_equal(
-        worn.after.second.heights, worn.before.second.heights
+        worn.final_surfaces.second.heights, worn.initial_surfaces.second.heights
     )  # smooth, and lies below
 
 
@@ -207,9 +213,9 @@ def test_what_cannot_be_meant_is_refused_and_nothing_is_left(tmp_path):
 
 def test_a_folder_of_another_case_or_a_damaged_one_is_refused(tmp_path):
     run_wear(case(), hours=0.05, out=tmp_path / "worn")
-    with pytest.raises(BadInput, match="holds the wear of another case"):
+    with pytest.raises(BadInput, match="holds the wear history of another case"):
         run_wear(case({"contact.load": "400 N"}), hours=0.05, out=tmp_path / "worn")
-    for name in (store.END, store.TABLE, store.MEMORY):
+    for name in (store.END, store.LAYOUT.table, store.MEMORY):
         shutil.copytree(tmp_path / "worn", tmp_path / name)
         path: Path = tmp_path / name / name
         content = bytearray(path.read_bytes())
@@ -219,7 +225,7 @@ def test_a_folder_of_another_case_or_a_damaged_one_is_refused(tmp_path):
         with pytest.raises(UnreadableFile, match="damaged"):
             run_wear(case(), hours=0.1, out=tmp_path / name)
     (tmp_path / "worn" / store.END).unlink()
-    with pytest.raises(UnreadableFile, match="has not come to its end"):
+    with pytest.raises(UnreadableFile, match="holds an unfinished wear history"):
         load_wear(tmp_path / "worn")
 
 
@@ -262,7 +268,7 @@ def test_a_rig_records_a_contact_as_it_wears(unbroken, tmp_path):
     )
     assert [recording.sample for recording in rig.recordings] == [1, 1, 2, 2]
     for recording, hours in zip(rig.recordings[::2], (0.0, HOURS), strict=True):
-        moment = unbroken.at(hours)
+        moment = unbroken.values_at(hours)
         assert recording.clr == pytest.approx(moment["clr"])
         assert recording.crf_hz == pytest.approx(moment["crf_hz"], rel=1e-9, abs=0.0)
         assert recording.true_sq_m == pytest.approx(moment["sq_m"])
@@ -276,7 +282,7 @@ def test_a_rig_records_a_contact_as_it_wears(unbroken, tmp_path):
 
 def test_a_longer_run_that_is_killed_leaves_the_shorter_one_as_it_was(tmp_path, monkeypatch):
     """Its rows, its end and the surfaces' files hang together; the longer run's own rows are not among them."""
-    monkeypatch.setattr(store, "KEPT_EVERY_S", 0.0)
+    monkeypatch.setattr(folder, "SAVE_INTERVAL_S", 0.0)
     short = run_wear(case(), hours=0.5, out=tmp_path / "worn")
     last = int(short.table["jump"].iloc[-1])
     files = [path.read_bytes() for path in short.files]
@@ -296,7 +302,8 @@ def test_a_longer_run_that_is_killed_leaves_the_shorter_one_as_it_was(tmp_path, 
 def test_a_folder_of_another_layout_is_refused_in_a_sentence(tmp_path, monkeypatch):
     """By its number; and where that was forgotten, by what its files hold."""
     with monkeypatch.context() as before:
-        before.setattr(store, "FORMAT", store.FORMAT - 1)
+        older = replace(store.LAYOUT, version=store.LAYOUT.version - 1)
+        before.setattr(store, "LAYOUT", older)
         run_wear(case(), hours=0.05, out=tmp_path / "old")
     for opened in (
         lambda: load_wear(tmp_path / "old"),
@@ -318,17 +325,17 @@ def test_a_folder_of_another_layout_is_refused_in_a_sentence(tmp_path, monkeypat
         write_with_digest(tmp_path / name / name, shorter.getvalue())
         with pytest.raises(
             UnreadableFile,
-            match="is damaged, or of another asperity; wear the case in another folder",
+            match="is damaged or was written by another version; compute the case into another folder",
         ):
             run_wear(case(), hours=0.1, out=tmp_path / name)
 
 
 def test_the_layout_has_a_number_of_its_own():
-    """What is kept of a jump, by name; where this changes, store.FORMAT counts up."""
-    kept = Worn.begin(case().moving_surfaces()).arrays()
+    """What is kept of a jump, by name; where this changes, store.LAYOUT.version counts up."""
+    kept = WearState.unworn(case().moving_surfaces()).arrays()
     names = {"worn", "flattened", "changed", "rates"}
     assert set(kept) == {f"{name}_{body}" for name in names for body in (0, 1)} | {"numbers"}
-    assert (store.FORMAT, kept["numbers"].size) == (3, 9)
+    assert (store.LAYOUT.version, kept["numbers"].size) == (3, 9)
 
 
 def test_frames_show_the_contact_spread_over_the_history(unbroken, tmp_path):
@@ -336,13 +343,15 @@ def test_frames_show_the_contact_spread_over_the_history(unbroken, tmp_path):
     numbers = [frame.number for frame in unbroken.frames]
     assert numbers[0] == 0
     assert numbers[-1] == jumps
-    assert len(numbers) <= frames.MOST + 1
+    assert len(numbers) <= frames.MAX_FRAMES + 1
     assert all(is_kept(number, jumps) for number in numbers[:-1])
     assert [frame.hours for frame in unbroken.frames] == [
         unbroken.table["hours"][number] for number in numbers
     ]
     first = unbroken.frames[0]
-    seen_first = unbroken.ageing.solver(seen(unbroken.before, first.position))
+    seen_first = unbroken.contact.solver(
+        combined_roughness(unbroken.initial_surfaces, first.position)
+    )
     np.testing.assert_array_equal(first.pressure, seen_first.pressure.astype(np.float32))
     np.testing.assert_array_equal(first.in_contact, seen_first.asperity_pressure > 0.0)
     kept = run_wear(case(), hours=0.5, out=tmp_path / "worn")
@@ -355,7 +364,9 @@ def test_frames_are_few_however_many_jumps_there_are():
     for latest in (0, 23, 24, 47, 48, 1000):
         kept = [number for number in range(latest + 1) if is_kept(number, latest)]
         assert kept[0] == 0
-        assert frames.MOST // 2 <= len(kept) <= frames.MOST or latest < frames.MOST
+        assert (
+            frames.MAX_FRAMES // 2 <= len(kept) <= frames.MAX_FRAMES or latest < frames.MAX_FRAMES
+        )
         assert set(kept) <= {
             number for number in range(latest + 1) if is_kept(number, max(0, latest - 1))
         } | {latest}

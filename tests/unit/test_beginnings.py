@@ -1,11 +1,11 @@
 import pytest
 
-from asperity.case import KINDS, beginning, load_case
+from asperity.case import KINDS, case_template, load_case
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_case_to_start_from_is_a_case(kind):
-    case = load_case(beginning(kind), name=kind)
+    case = load_case(case_template(kind), name=kind)
     assert case.conditions.geometry == (kind if kind in ("point", "elliptic", "roller") else "line")
     assert (case.lubricant is None) == (kind == "dry")
     assert (case.contents.study is not None) == (kind == "study")
@@ -15,6 +15,8 @@ def test_a_case_to_start_from_is_a_case(kind):
 
 def test_every_quantity_is_explained():
     lines = [
-        line for line in beginning("line").splitlines() if "=" in line and not line.startswith("#")
+        line
+        for line in case_template("line").splitlines()
+        if "=" in line and not line.startswith("#")
     ]
     assert sum("#" in line for line in lines) > len(lines) / 2

@@ -71,7 +71,7 @@ def test_what_is_given_is_obeyed():
     [
         (
             "cells = [64, 64]\nx = [-4.5, 1.9]\ny = [-1, 1]\naccuracy = 0.01",
-            "accuracy chooses a grid",
+            "accuracy determines a grid",
         ),
         ("accuracy = 0.9", "grid.accuracy must be less than or equal to 0.2, got 0.9"),
         ('cells = "fine"', 'grid.cells must be a list of two such as [256, 128], or "auto", got'),

@@ -7,7 +7,7 @@ import pytest
 
 from asperity import BadInput
 from asperity.contact.grid import Grid
-from asperity.wear.debris import Mark, Ploughing, dragged, stamp
+from asperity.wear.debris import Ploughing, WearMark, add_mark, drag_length
 from support.passages import hertz_patches, passage, track
 
 FINE = Grid((800, 400), (-100e-6, -50e-6), (100e-6, 50e-6), (False, True))
@@ -16,7 +16,7 @@ FINE = Grid((800, 400), (-100e-6, -50e-6), (100e-6, 50e-6), (False, True))
 @pytest.mark.parametrize("length", [0.0, 60e-6])
 @pytest.mark.parametrize("cutting", [0.0, 0.3, 1.0])
 def test_volume_and_square_of_a_mark_are_the_closed_forms(length, cutting):
-    mark = Mark.of(length, 12e-6, 1e-6, cutting)
+    mark = WearMark.with_ridge(length, 12e-6, 1e-6, cutting)
     groove, ridge = mark.heights(FINE.x[:, None], FINE.y[None, :])
     cell = float(np.prod(FINE.spacing))
     assert groove.sum() * cell == pytest.approx(mark.dug, rel=2e-3, abs=0.0)
@@ -26,7 +26,7 @@ def test_volume_and_square_of_a_mark_are_the_closed_forms(length, cutting):
 
 
 def test_a_groove_is_two_thirds_of_width_times_depth_across():
-    mark = Mark.of(60e-6, 12e-6, 1e-6, 1.0)
+    mark = WearMark.with_ridge(60e-6, 12e-6, 1e-6, 1.0)
     across, _ = mark.heights(np.zeros(1), FINE.y)
     assert np.trapezoid(across, FINE.y) == pytest.approx(
         2.0 / 3.0 * 12e-6 * 1e-6, rel=1e-3, abs=0.0
@@ -37,11 +37,11 @@ def test_a_groove_is_two_thirds_of_width_times_depth_across():
 def test_a_mark_lies_on_a_coarse_grid_as_on_a_fine_one():
     """Cells hold their mean of it: its volume does not hang on where it lies, though it is a cell wide; ends meet."""
     grid = track((64, 32))
-    mark = Mark.of(30e-6, 6e-6, 0.5e-6, 0.3)
+    mark = WearMark.with_ridge(30e-6, 6e-6, 0.5e-6, 0.3)
     rng = np.random.default_rng(2)
     for _ in range(20):
         dug, piled = np.zeros(grid.cells), np.zeros(grid.cells)
-        stamp(dug, piled, mark, tuple(rng.uniform(grid.lower, grid.upper)), grid)
+        add_mark(dug, piled, mark, tuple(rng.uniform(grid.lower, grid.upper)), grid)
         assert dug.sum() * np.prod(grid.spacing) == pytest.approx(mark.dug, rel=0.1, abs=0.0)
         assert piled.sum() * np.prod(grid.spacing) == pytest.approx(mark.piled, rel=0.1, abs=0.0)
 
@@ -68,7 +68,7 @@ def test_what_is_not_cut_off_stands_beside_to_rounding(cutting):
 
 def test_as_many_particles_come_as_the_oil_holds():
     _, jump, _ = ploughed(0.3)
-    film = jump.film_inside
+    film = jump.loaded_film
     assert film == pytest.approx(0.5e-6, rel=1e-9, abs=0.0)
     expected = 1e14 * film * 20.0 * 400e-6 * 200e-6
     counts = [ploughed(0.3, seed)[2].facts["marks"] for seed in range(40)]
@@ -133,13 +133,13 @@ def test_roughness_of_many_marks_is_campbells():
     """Mean and variance of shot noise: density times the integral of a mark, and of its square. All marks alike."""
     grid = track((128, 64))
     cutting, density = 0.4, 60.0 / float(np.prod(grid.extent))
-    mark = Mark.of(25e-6, 20e-6, 1e-6, cutting)
+    mark = WearMark.with_ridge(25e-6, 20e-6, 1e-6, cutting)
     rng = np.random.default_rng(7)
     means, squares = [], []
     for _ in range(150):
         dug, piled = np.zeros(grid.cells), np.zeros(grid.cells)
         for place in rng.uniform(grid.lower, grid.upper, size=(rng.poisson(60.0), 2)):
-            stamp(dug, piled, mark, tuple(place), grid)
+            add_mark(dug, piled, mark, tuple(place), grid)
         heights = piled - dug
         means.append(heights.mean())
         squares.append(np.mean(np.square(heights)))
@@ -174,8 +174,8 @@ def test_the_next_jump_ends_before_sq_has_risen_much():
 def test_without_sliding_a_mark_is_a_dent():
     grid = track()
     patches = hertz_patches(grid, 50e-6, 1e9, 2)
-    assert dragged(passage(grid, patches, sliding_speed=0.0)) == 0.0
-    assert dragged(passage(grid, patches, sliding_speed=0.4)) == pytest.approx(
+    assert drag_length(passage(grid, patches, sliding_speed=0.0)) == 0.0
+    assert drag_length(passage(grid, patches, sliding_speed=0.4)) == pytest.approx(
         2 * 50e-6 * 0.4 / 1.6, rel=1e-9, abs=0.0
     )
 

@@ -162,13 +162,13 @@ def test_measured_surfaces_run_on_the_bodies_they_lie_on_their_ends_joined(measu
 
 def test_one_measured_surface_cannot_lie_on_both_bodies(measured):
     alone = measured.with_overrides({"surface": {"file": "ring.x3p"}, "motion.rough": "both"})
-    with pytest.raises(BadInput, match="name the other as second"):
+    with pytest.raises(BadInput, match=r"state the other as surface\.second"):
         alone.moving_surfaces()
 
 
 def test_roughness_kept_in_a_run_has_no_track():
     kept = replace(case(), stored=case().surface())
-    with pytest.raises(BadInput, match="let the case file move"):
+    with pytest.raises(BadInput, match="use the case file"):
         run_history(kept, steps=1)
 
 
@@ -269,9 +269,9 @@ def test_a_history_killed_at_any_moment_goes_on_bit_for_bit(history, tmp_path):
     folder = tmp_path / "killed"
     script = f"""
 from asperity.case import load_case
-from asperity.history import run_history, store
+from asperity.simulation import folder, run_history
 from pathlib import Path
-store.KEPT_EVERY_S = 0.0
+folder.SAVE_INTERVAL_S = 0.0
 case = load_case("examples/paper.toml").with_overrides({SMALL!r})
 run_history(case, steps=10000, every=5, out=Path({str(folder)!r}))
 """
@@ -361,7 +361,7 @@ def test_bad_steps_are_marked_where_it_shall_go_on():
 def test_a_model_without_steps_in_time_is_refused(monkeypatch):
     monkeypatch.delitem(MODELS, "mixed")
     monkeypatch.setitem(MODELS, "another", moving_contact)
-    with pytest.raises(BadInput, match="take one of unified, paper, conserving, another"):
+    with pytest.raises(BadInput, match="choose one of unified, paper, conserving, another"):
         run_history(case(), steps=1)
 
 

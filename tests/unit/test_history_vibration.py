@@ -73,7 +73,7 @@ def test_what_does_not_repeat_is_said():
 def test_less_than_a_passage_says_how_many_steps_are_missing():
     profile, _, objection = repeating(np.arange(30) * 1e-6, np.zeros(30), 41.5e-6)
     assert profile is None
-    assert "12 steps more" in objection
+    assert "by 12 steps" in objection
 
 
 def test_a_finer_rate_keeps_the_waves():
@@ -203,7 +203,7 @@ def test_its_damping_is_that_of_its_moments_solved_apart(history, vibration):
     assert scalars["history_damping_ratio"] == pytest.approx(np.mean(vibration.damping))
     assert scalars["history_damping_std"] == pytest.approx(np.std(vibration.damping))
     assert scalars["dynamic_stiffness_n_per_m"] == pytest.approx(np.mean(vibration.dynamic))
-    assert "its oil damps with a ratio of" in vibration.verdict()
+    assert "damping ratio of the oil film" in vibration.verdict()
 
 
 def test_where_the_model_cannot_be_shaken_the_damping_is_not_determined():
@@ -211,7 +211,7 @@ def test_where_the_model_cannot_be_shaken_the_damping_is_not_determined():
     vibration = history_vibration(conserving, moments=1)
     assert np.isfinite(vibration.stiffness).all()
     assert np.isnan(vibration.damping).all()
-    assert "damping is not determined (dynamic stiffness needs the model" in vibration.verdict()
+    assert "damping not determined (a dynamic stiffness needs the model" in vibration.verdict()
     assert vibration.scalars()["history_damping_ratio"] is None
 
 
@@ -240,14 +240,14 @@ def test_a_smooth_contact_hears_nothing():
     flat = case(**{"surface": {"kind": "flat"}})
     vibration = history_vibration(run_history(flat, steps=3), moments=1)
     assert vibration.profile is None
-    assert "flat" in vibration.resonance.reason
+    assert "smooth" in vibration.resonance.reason
     assert vibration.coupled.oscillator is None
     assert vibration.oscillator.natural_frequency_hz > 5000.0
 
 
 def test_two_rough_surfaces_that_slide_do_not_repeat():
     both = run_history(case(**{"motion.rough": "both"}), steps=2)
-    assert "do not meet alike again" in history_vibration(both, moments=1).resonance.reason
+    assert "move at different speeds" in history_vibration(both, moments=1).resonance.reason
 
 
 def test_what_is_pressed_flat_is_heard_flat():
@@ -255,14 +255,14 @@ def test_what_is_pressed_flat_is_heard_flat():
     history = run_history(chosen, steps=4)
     first = history.surfaces().first
     assert first.heights.mean() == pytest.approx(-history.table["flattened_m"].iloc[-1], abs=1e-15)
-    assert "steps more" in history_vibration(history, moments=1).resonance.reason
+    assert "extend the history by" in history_vibration(history, moments=1).resonance.reason
 
 
 def test_without_a_model_or_moments_it_is_refused(history):
-    with pytest.raises(BadInput, match="1 moment"):
+    with pytest.raises(BadInput, match="moments must be 1 or more"):
         history_vibration(history, moments=0)
     mute = run_history(case(vibration="none"), steps=1)
-    with pytest.raises(BadInput, match="vibration is left out"):
+    with pytest.raises(BadInput, match="vibration is missing"):
         history_vibration(mute)
 
 

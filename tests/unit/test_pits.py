@@ -12,11 +12,11 @@ from asperity.solution import stress_below
 from asperity.wear.fatigue import (
     DangVanPits,
     VonMisesPits,
-    broken_out,
-    layers,
-    soon,
+    break_out_pits,
+    layer_depths,
+    overrollings_to_failures,
+    shift_damage,
     stress_path,
-    sunk,
 )
 from support.passages import hertz_patches, passage, track
 
@@ -122,8 +122,8 @@ def test_the_next_jump_ends_before_many_cells_fail():
     lives = np.full((3, 20, 10), np.inf)
     lives[1] = 50.0 + np.arange(200.0).reshape(20, 10)
     lives[2, 0, 5] = 7.0
-    assert soon(lives) == 51.0  # 7, 50, 51: two of 200 have failed before
-    assert soon(np.full((3, 20, 10), np.inf)) == np.inf
+    assert overrollings_to_failures(lives) == 51.0  # 7, 50, 51: two of 200 have failed before
+    assert overrollings_to_failures(np.full((3, 20, 10), np.inf)) == np.inf
     measure = miner(1, 1.0)[0].facts["measure_pa"]
     life = 1e7 * (150e6 / measure) ** 9.0
     first, second = miner(2, 0.25 * life)
@@ -143,11 +143,11 @@ def test_below_the_limit_nothing_is_ever_damaged():
 def test_a_pit_of_any_layer_has_the_volume_of_its_bowl_whatever_the_cells(shape):
     """The shallowest too, whose bowl is narrower than a cell is long."""
     grid = Grid((40, 40), (0.0, 0.0), (40e-6 * shape[0], 40e-6 * shape[1]), (True, True))
-    depths = layers(grid, 8e-6)
+    depths = layer_depths(grid, 8e-6)
     for layer, depth in enumerate(depths):
         failed = np.zeros((depths.size, *grid.cells), dtype=bool)
         failed[layer, 20, 20] = True
-        pits, _ = broken_out(np.zeros(failed.shape), depths, failed, grid, 3.0)
+        pits, _ = break_out_pits(np.zeros(failed.shape), depths, failed, grid, 3.0)
         volume = float(pits.sum() * np.prod(grid.spacing))
         assert volume == pytest.approx(np.pi / 8.0 * (3.0 * depth) ** 2 * depth, rel=1e-9, abs=0.0)
 
@@ -155,11 +155,11 @@ def test_a_pit_of_any_layer_has_the_volume_of_its_bowl_whatever_the_cells(shape)
 def test_a_pit_has_the_volume_of_its_bowl_and_is_booked():
     """π/8 W² D, on a grid that shows it; what the heights lose is what the facts say."""
     grid = track((400, 400), (200e-6, 200e-6))
-    depths = layers(grid, WIDTH)
+    depths = layer_depths(grid, WIDTH)
     failed = np.zeros((depths.size, *grid.cells), dtype=bool)
     failed[6, 200, 3] = True  # across the side that repeats
     damage = np.where(failed, 1.5, 0.2)
-    pits, left = broken_out(damage, depths, failed, grid, 3.0)
+    pits, left = break_out_pits(damage, depths, failed, grid, 3.0)
     deep = depths[6]
     assert pits.max() == pytest.approx(deep, rel=1e-3, abs=0.0)
     assert pits.sum() * 0.5e-6**2 == pytest.approx(
@@ -175,7 +175,7 @@ def test_layers_that_failed_are_gone_and_the_ones_below_come_up():
     grid = track((16, 16), (0.8e-6, 0.8e-6))  # cells that are far smaller than a pit
     depths = np.array([1e-6, 2e-6, 4e-6])
     damage = np.broadcast_to(np.array([1.2, 0.4, 0.1])[:, None, None], (3, 16, 16)).copy()
-    pits, left = broken_out(damage, depths, damage >= 1.0, grid, 3.0)
+    pits, left = break_out_pits(damage, depths, damage >= 1.0, grid, 3.0)
     np.testing.assert_allclose(pits, 1e-6, rtol=1e-3)
     np.testing.assert_allclose(
         left[:, 0, 0], [0.4, 0.25, 0.075], rtol=1e-3
@@ -186,7 +186,7 @@ def test_what_is_worn_off_brings_up_what_lay_deeper():
     depths = np.array([1e-6, 2e-6, 4e-6])
     damage = np.array([0.8, 0.4, 0.2])[:, None, None] * np.ones((3, 2, 2))
     removed = np.array([[0.0, 0.5e-6], [1e-6, 9e-6]])
-    after = sunk(damage, depths, removed)
+    after = shift_damage(damage, depths, removed)
     np.testing.assert_allclose(after[:, 0, 0], [0.8, 0.4, 0.2])
     np.testing.assert_allclose(after[:, 0, 1], [0.6, 0.35, 0.175])
     np.testing.assert_allclose(after[:, 1, 0], [0.4, 0.3, 0.15])
@@ -211,7 +211,7 @@ def test_wear_that_is_fast_enough_leaves_no_pits():
             state, taken = one.state, taken + one.facts["volume_m3"]
         return taken, float(state["damage"].max())
 
-    reach = float(layers(grid, WIDTH)[-1])
+    reach = float(layer_depths(grid, WIDTH)[-1])
     assert pitted(0.0)[0] > 0.0
     volume, largest = pitted(2.0 * 0.05 * reach)
     assert volume == 0.0

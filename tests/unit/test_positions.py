@@ -9,11 +9,11 @@ from asperity import ehl, solution
 from asperity.case import Case
 from asperity.ehl import grid_design as gridding
 from asperity.simulation.wear import contact
-from asperity.simulation.wear.contact import PositionSolver, Solved
-from asperity.simulation.wear.jump import Ageing
-from asperity.simulation.wear.notes import ENOUGH, WANTED, of_cells
+from asperity.simulation.wear.contact import PositionSolver, SolvedPosition
+from asperity.simulation.wear.jump import WearingContact
+from asperity.simulation.wear.notes import ENOUGH_CELLS, RECOMMENDED_CELLS, cells_note
 from asperity.surface import correlation_lengths
-from asperity.wear import Position, seen
+from asperity.wear import TrackPosition, combined_roughness
 from support.wearing import worn_case
 
 ROUGH: dict[str, object] = {
@@ -24,12 +24,12 @@ ROUGH: dict[str, object] = {
 
 
 def solver_of(case: Case) -> PositionSolver:
-    return PositionSolver.of(case, flattening=False)
+    return PositionSolver.from_case(case, flattening=False)
 
 
-def solved(case: Case) -> Solved:
+def solved(case: Case) -> SolvedPosition:
     found = solver_of(case)(case.surface())
-    assert isinstance(found, Solved)
+    assert isinstance(found, SolvedPosition)
     return found
 
 
@@ -52,7 +52,7 @@ def test_a_position_is_the_contact_itself_with_its_interval():
 def test_what_leads_nowhere_at_once_is_solved_from_afar(monkeypatch):
     case, asked = worn_case(ROUGH), []
     alone = ehl.solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
-    monkeypatch.setattr(contact, "AT_ONCE", 1)
+    monkeypatch.setattr(contact, "START_ITERATIONS", 1)
     thermal = solution.solve_thermal_contact
 
     def counted(*arguments, **how):
@@ -75,21 +75,21 @@ def test_what_wears_is_the_load_of_touching_cells():
     np.testing.assert_array_equal(found.asperity_pressure[~parted], found.pressure[~parted])
 
 
-def of(overrides: dict[str, object]) -> Ageing:
+def of(overrides: dict[str, object]) -> WearingContact:
     case = worn_case(overrides)
     assert case.wear is not None
-    return Ageing(case, case.wear, case.moving_surfaces())
+    return WearingContact(case, case.wear, case.moving_surfaces())
 
 
 @pytest.mark.parametrize(("cells", "told"), [([64, 64], True), ([160, 64], False)])
 def test_too_few_cells_of_the_roughness_are_said_with_as_many_as_do(cells, told):
     fine = {"surface.correlation_length": "20 um", "grid.y": [-1.0, 1.0]}
     model = of({**fine, "grid.cells": cells})
-    composite = seen(model.surfaces, Position(0, 0))
+    composite = combined_roughness(model.surfaces, TrackPosition(0, 0))
     lengths, grid = correlation_lengths(composite), composite.grid
     along = [length / step for length, step in zip(lengths, grid.spacing, strict=True)]
-    said = of_cells(model)
-    assert (said is not None) is told is (min(along) < ENOUGH * WANTED)
+    said = cells_note(model)
+    assert (said is not None) is told is (min(along) < ENOUGH_CELLS * RECOMMENDED_CELLS)
     if said is not None:
         assert said.startswith(
             f"The roughness has {along[0]:.2g} by {along[1]:.2g} cells along its correlation"
@@ -98,12 +98,12 @@ def test_too_few_cells_of_the_roughness_are_said_with_as_many_as_do(cells, told)
             int(number) for number in said.split("grid.cells = [")[1].split("]")[0].split(", ")
         ]
         assert wanted[0] > cells[0]
-        assert of_cells(of({**fine, "grid.cells": wanted})) is None
+        assert cells_note(of({**fine, "grid.cells": wanted})) is None
 
 
 def test_smooth_bodies_want_no_cells():
-    assert of_cells(of({"surface": "flat"})) is None
+    assert cells_note(of({"surface": "flat"})) is None
 
 
 def test_cells_that_are_wanted_are_those_of_a_chosen_grid():
-    assert WANTED == gridding.CELLS_IN_CORRELATION
+    assert RECOMMENDED_CELLS == gridding.CELLS_IN_CORRELATION

@@ -13,7 +13,7 @@ from asperity.ehl import Iteration
 
 @pytest.mark.parametrize(("number", "announced"), [(0, True), (1, False)])
 def test_the_first_step_ends_the_wait_not_the_start(monkeypatch, capsys, number, announced):
-    monkeypatch.setattr(output, "SILENT_FOR", 0.05)
+    monkeypatch.setattr(output, "NOTICE_DELAY_S", 0.05)
     with output.solver_progress("case", quiet=False) as step:
         step(Iteration((8, 8), number, 1.0, 1.0, float("inf")))
         sleep(0.3)

@@ -244,7 +244,7 @@ def test_other_contacts_say_nothing_of_ends():
     [
         (
             '{ design_load = "1 N", amplitude = "1 um" }',
-            "contact.shape has design_load and amplitude, which both make",
+            "contact.shape has design_load and amplitude, which both define",
         ),
         ('{ end_drop = "1 um" }', "contact.shape has an end_drop without an amplitude"),
         (

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from asperity import BadInput
-from asperity.simulation.wear.jump import Ageing
-from asperity.simulation.wear.state import Worn
-from asperity.wear import seen
+from asperity.simulation.wear.jump import WearingContact
+from asperity.simulation.wear.state import WearState
+from asperity.wear import combined_roughness
 from support.wearing import worn_case
 
 GENTLE = {"motion.rough": "second", "wear.k": "1e-17 1/Pa", "wear.patches": 3}
@@ -24,23 +24,24 @@ SECONDS = 100.0
 def ageing(*ways):
     case = worn_case(GENTLE | {f"wear.{way}": WAYS[way] for way in ways})
     assert case.wear is not None
-    return Ageing(case, case.wear, case.moving_surfaces())
+    return WearingContact(case, case.wear, case.moving_surfaces())
 
 
 @pytest.fixture(scope="module")
 def solved():
     """The contact at three positions of the new tracks, solved once for all."""
     new = ageing()
-    worn = Worn.begin(new.surfaces)
+    worn = WearState.unworn(new.surfaces)
     return [
-        (place, new.solver(seen(new.worn_surfaces(worn), place))) for place in new.positions(worn)
+        (place, new.solver(combined_roughness(new.worn_surfaces(worn), place)))
+        for place in new.positions(worn)
     ]
 
 
 def jumped(model, solved, jumps=1):
-    worn = Worn.begin(model.surfaces)
+    worn = WearState.unworn(model.surfaces)
     for _ in range(jumps):
-        worn = model.jumped(worn, solved, SECONDS)
+        worn = model.after_jump(worn, solved, SECONDS)
     return worn
 
 
@@ -73,9 +74,9 @@ def test_what_scuffing_hands_over_is_what_the_other_gains(solved):
 def test_what_was_kept_goes_on_to_the_bit(solved):
     model = ageing("fatigue", "ploughing")
     once = jumped(model, solved)
-    again = Worn.of_arrays(once.arrays())
+    again = WearState.from_arrays(once.arrays())
     assert again.longest == once.longest
-    one, other = (model.jumped(worn, solved, SECONDS) for worn in (once, again))
+    one, other = (model.after_jump(worn, solved, SECONDS) for worn in (once, again))
     for body in (0, 1):
         np.testing.assert_array_equal(one.changed[body], other.changed[body])
     np.testing.assert_array_equal(

@@ -7,7 +7,7 @@ import pytest
 
 from asperity import BadInput
 from asperity.rating import flash_rise
-from asperity.wear.scuffing import HotScuffing, LoadedScuffing
+from asperity.wear.scuffing import PressureShearScuffing, TemperatureScuffing
 from support.passages import hertz_patches, passage, track
 
 P_MAX, MU = 1e9, 0.1
@@ -25,7 +25,7 @@ def rubbed(**given):
 
 
 def test_below_the_limit_is_exactly_nothing():
-    change = LoadedScuffing(limit=1.0001 * MU * P_MAX**2)(rubbed())
+    change = PressureShearScuffing(limit=1.0001 * MU * P_MAX**2)(rubbed())
     assert not change.heights_change.any()
     assert not change.transferred.any()
     assert change.facts["load_share"] == 0.0
@@ -35,14 +35,14 @@ def test_a_cell_scuffs_where_pressure_times_shear_passes_the_limit():
     """μ p² > limit: of a Hertz pressure within x² < a² (1 - limit/(μ p_max²))."""
     grid = track((400, 8))
     (patch,) = hertz_patches(grid, 50e-6, P_MAX, 1, friction=MU, asperities=1.0)
-    passed = LoadedScuffing(limit=0.36 * MU * P_MAX**2).passed(patch)
-    assert np.array_equal(passed[:, 0], np.abs(grid.x) < 0.8 * 50e-6)
+    exceeds_limit = PressureShearScuffing(limit=0.36 * MU * P_MAX**2).exceeds_limit(patch)
+    assert np.array_equal(exceeds_limit[:, 0], np.abs(grid.x) < 0.8 * 50e-6)
 
 
 def test_removal_jumps_by_the_factor_and_the_volume_is_shared():
     """A load share s of a cell scuffs: (factor - 1) s of what the law removed; of it `transfer` goes over."""
     jump = rubbed()
-    change = LoadedScuffing(limit=0.25 * MU * P_MAX**2, factor=1000.0, transfer=0.3)(jump)
+    change = PressureShearScuffing(limit=0.25 * MU * P_MAX**2, factor=1000.0, transfer=0.3)(jump)
     load = sum(patch.asperity_pressure for patch in jump.patches)
     hot = sum(
         np.where(patch.pressure > 0.5 * P_MAX, patch.asperity_pressure, 0.0)
@@ -57,7 +57,7 @@ def test_removal_jumps_by_the_factor_and_the_volume_is_shared():
 
 
 def test_scuffing_takes_a_tenth_of_sq_and_then_the_contact_is_asked_again():
-    scuffing = LoadedScuffing(limit=0.25 * MU * P_MAX**2)
+    scuffing = PressureShearScuffing(limit=0.25 * MU * P_MAX**2)
     slow, fast = (scuffing(rubbed(removed=np.full((64, 32), depth))) for depth in (1e-9, 1e-6))
     sq = float(np.std(rubbed().heights))
     assert -slow.heights_change.min() < 0.1 * sq
@@ -66,12 +66,12 @@ def test_scuffing_takes_a_tenth_of_sq_and_then_the_contact_is_asked_again():
     assert fast.longest / 1e5 == pytest.approx(
         0.1 * sq / (-slow.heights_change.min() * 1000.0), rel=1e-9
     )
-    assert LoadedScuffing(limit=1e30)(rubbed()).longest == np.inf
+    assert PressureShearScuffing(limit=1e30)(rubbed()).longest == np.inf
 
 
 def test_a_smooth_bodys_jumps_are_counted_against_the_film():
     """It has no Sq of its own, but is as far from its partner as the film is thick; where there is none, 10 nm."""
-    scuffing = LoadedScuffing(limit=0.25 * MU * P_MAX**2)
+    scuffing = PressureShearScuffing(limit=0.25 * MU * P_MAX**2)
     smooth = rubbed(heights=np.zeros(track().cells), removed=np.full(track().cells, 1e-6))
     assert -scuffing(smooth).heights_change.min() == pytest.approx(0.1 * 0.5e-6, rel=1e-9, abs=0.0)
     dry = replace(
@@ -85,22 +85,22 @@ def test_the_threshold_of_temperature_is_bloks():
     """A friction just above the one at which Blok's rise is the limit scuffs, one just below does not."""
     line_load, width, speeds = 0.5 * np.pi * 50e-6 * P_MAX, 50e-6, (2.0, 1.5)
     threshold = 100.0 / flash_rise(1.0, line_load, width, speeds)
-    scuffing = HotScuffing(limit=100.0)
+    scuffing = TemperatureScuffing(limit=100.0)
     for friction, share in ((0.999 * threshold, False), (1.001 * threshold, True)):
         rise = flash_rise(friction, line_load, width, speeds)
         hot = [
             replace(patch, temperature=rise * patch.pressure / patch.pressure.max())
             for patch in hertz_patches(track((65, 8)), width, P_MAX, 1, asperities=1.0)
         ]
-        assert scuffing.passed(hot[0]).any() == share
+        assert scuffing.exceeds_limit(hot[0]).any() == share
 
 
 def test_only_what_touches_scuffs():
     grid = track()
     (patch,) = hertz_patches(grid, 50e-6, P_MAX, 1, friction=MU, asperities=0.0)
     hot = replace(patch, temperature=np.full(grid.cells, 1e3))
-    assert not HotScuffing(limit=100.0).passed(hot).any()
-    assert not LoadedScuffing(limit=1.0).passed(hot).any()
+    assert not TemperatureScuffing(limit=100.0).exceeds_limit(hot).any()
+    assert not PressureShearScuffing(limit=1.0).exceeds_limit(hot).any()
 
 
 @pytest.mark.parametrize(
@@ -113,9 +113,9 @@ def test_only_what_touches_scuffs():
 )
 def test_what_scuffing_refuses(wrong, said):
     with pytest.raises(BadInput, match=said):
-        HotScuffing(**wrong)
+        TemperatureScuffing(**wrong)
 
 
 def test_a_temperature_that_nobody_worked_out_is_asked_for():
     with pytest.raises(BadInput, match="needs the flash temperature"):
-        HotScuffing(limit=100.0)(rubbed())
+        TemperatureScuffing(limit=100.0)(rubbed())

@@ -371,7 +371,7 @@ def test_the_command_prints_its_verdict_first_and_draws(tmp_path, monkeypatch, c
     ("arguments", "said"),
     [
         (["--figure", "effects.svg"], ".png or .pdf"),
-        (["--samples", "64"], "--samples does not go with --method morris"),
+        (["--samples", "64"], "--samples does not apply to --method morris"),
         (["--method", "guess"], "--method must be morris or sobol"),
         (["--sq", "2 N"], "--sq must be a length"),
     ],

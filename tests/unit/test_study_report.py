@@ -599,9 +599,9 @@ def test_a_place_that_cannot_be_written_to_is_refused_before_anything_is_drawn(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["STUDY", "STUDY"], "a study's page holds nothing else"),
+        (["STUDY", "STUDY"], "a folder's page has no other contents"),
         (["STUDY", "--anchors", "none.toml"], "none.toml cannot be read"),
-        (["run.nc", "--figures", "DIR"], "--figures is for a study's folder"),
+        (["run.nc", "--figures", "DIR"], "--figures applies to a study's folder"),
         (["EMPTY"], "holds no study"),
         (["STUDY", "--out", "page.pdf"], "--out must be a file that ends in .html"),
     ],

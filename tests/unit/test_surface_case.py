@@ -51,7 +51,7 @@ def test_every_kind_of_surface_is_made_and_restated(paper, kind):
 def test_a_sample_that_strays_from_its_correlation_lengths_says_so(paper):
     notes = paper.with_overrides({"surface.correlation_length": ["150 um", "60 um"]}).surface_notes
     assert len(notes) == 1
-    assert "150 x 60 um was asked for" in notes[0]
+    assert "150 x 60 um were requested" in notes[0]
 
 
 def test_two_measured_surfaces_keep_their_speeds(paper, tmp_path):
@@ -105,7 +105,7 @@ def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_pat
         ({"file": "ring.x3p", "pixel": "5"}, "without a unit"),
         (
             {"kind": "flat", "second": {"kind": "flat", "second": {"kind": "flat"}}},
-            "surface.second.second is a third",
+            "surface.second.second would be a third",
         ),
         ({"kind": "flat", "second": {"kind": "grund"}}, 'did you mean "ground"'),
         (

@@ -62,19 +62,19 @@ def test_what_is_said_arrives_in_si_and_comes_back():
         (
             "thermal.ambient",
             "40 C",
-            'got "40 C", which is something else; degrees Celsius are written degC or °C',
+            'got "40 C", which is another quantity; degrees Celsius are written degC or °C',
         ),
         (
             "thermal.ambient",
             "40 cSt",
-            'must be a temperature such as "40 degC", got "40 cSt", which is something else$',
+            'must be a temperature such as "40 degC", got "40 cSt", which is another quantity$',
         ),
         ("surface.sq", "5 %", 'surface.sq must be a length such as "5.4 mm", got "5 %"$'),
-        ("contact.slip", "20 %", 'got "20 %"; write a share, 0.05 for 5 %'),
+        ("contact.slip", "20 %", 'got "20 %"; write a fraction, 0.05 for 5 %'),
         (
             "lubricant.viscosity.eta0",
             "100 cSt",
-            "something else; a kinematic viscosity times the density is one",
+            "another quantity; multiply a kinematic viscosity by the density",
         ),
         ("thermal.warmth", "exponentiel", 'did you mean "exponential"'),
         ("thermal.feedbck", True, "did you mean feedback"),

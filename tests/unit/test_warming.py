@@ -15,7 +15,7 @@ from benchmarks.alarms import (
 from benchmarks.alarms import warm_up as drawn_warm_up
 
 from asperity.monitoring.alarm import Warming
-from asperity.trend import warm_up, warming
+from asperity.trend import MonitoredSeries, warm_up, warming
 
 
 def test_a_warm_up_is_measured_as_it_was_made():

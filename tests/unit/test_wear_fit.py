@@ -91,7 +91,7 @@ def test_what_is_piled_up_may_be_the_discs_own(tmp_path, ridge, lowest):
     assert fitted.k.low == pytest.approx(lowest * K, abs=0.03 * K)
     assert fitted.k.median == pytest.approx((1.0 - 0.5 * ridge) * K, rel=0.05, abs=0.0)
     said = any(
-        "stands beside it" in note or "stands above the old surface" in note
+        "beside it; the profile" in note or "area above the old surface" in note
         for note in fitted.notes
     )
     assert said == (ridge > 0.0)
@@ -130,17 +130,17 @@ def test_a_trace_says_load_radius_and_energy(tmp_path):
     assert again.distance_error == pytest.approx(
         abs(0.025 / (2.0 * np.pi) / 4.1e-3 - 1.0), rel=1e-9, abs=0.0
     )
-    assert any("off the one given" in note for note in again.notes)
+    assert any("off the stated one" in note for note in again.notes)
 
 
 @pytest.mark.parametrize(
     ("header", "said"),
     [
-        ("Time;Distance;Laps;mu", "give the load"),
-        ("Time;Laps;mu;FrictionForce", "no column of distance; give the track radius"),
-        ("Time;Distance;mu;FrictionForce", "no column of laps; give the track radius"),
+        ("Time;Distance;Laps;mu", "state the load"),
+        ("Time;Laps;mu;FrictionForce", "no column of distance; state the track radius"),
+        ("Time;Distance;mu;FrictionForce", "no column of laps; state the track radius"),
         ("Time;mu;FrictionForce", "no column of distance or laps"),
-        ("Time;Distance;Laps", "give the load"),
+        ("Time;Distance;Laps", "state the load"),
     ],
 )
 def test_what_a_trace_lacks_is_named(tmp_path, header, said):

@@ -12,19 +12,19 @@ from asperity.wear import (
     PRIORS,
     Archard,
     Body,
-    Coefficient,
     DissipatedEnergy,
     Exposure,
     FilmDefect,
-    Position,
-    Rubbing,
-    across,
-    is_even,
+    RubbingConditions,
+    TrackPosition,
+    WearCoefficient,
+    combined_roughness,
+    is_uniform_along,
     longest_jump,
-    on_track,
+    map_to_track,
     positions,
-    seen,
-    taken_off,
+    removed_depth,
+    to_other_track,
 )
 
 STEEL = Body(youngs_modulus=2e11, poisson_ratio=0.3, hardness=2e9, speed=2.0)
@@ -37,17 +37,17 @@ def exposure(k: float = 1e-17, speed: float = 2.0, overrolling: float = 50.0) ->
 
 
 def test_a_flat_pin_wears_by_k_p_v_t():
-    rubbing = Rubbing(pressure=np.array([1e6]), shear=np.array([1e5]), sliding_speed=0.1)
+    rubbing = RubbingConditions(pressure=np.array([1e6]), shear=np.array([1e5]), sliding_speed=0.1)
     assert 1e-16 * Archard()(rubbing)[0] * 3600.0 == pytest.approx(
         36e-9, rel=1e-12, abs=0.0
     )  # machines.md 5.3
     assert DissipatedEnergy()(rubbing)[0] == pytest.approx(1e4)
-    k = DissipatedEnergy().equal_to_archard(1e-16, 0.1)
+    k = DissipatedEnergy().equivalent_coefficient(1e-16, 0.1)
     assert k * DissipatedEnergy()(rubbing)[0] == pytest.approx(
         1e-16 * Archard()(rubbing)[0], abs=0.0
     )
     with pytest.raises(BadInput, match="boundary friction of 0"):
-        DissipatedEnergy().equal_to_archard(1e-16, 0.0)
+        DissipatedEnergy().equivalent_coefficient(1e-16, 0.0)
 
 
 def test_a_cold_film_has_no_defects_and_a_hot_one_nothing_else():
@@ -63,7 +63,7 @@ def test_a_cold_film_has_no_defects_and_a_hot_one_nothing_else():
     assert law.defects(np.array([at]), speed)[0] == pytest.approx(
         1.0 - math.exp(-1.0), rel=1e-12, abs=0.0
     )
-    still = Rubbing(
+    still = RubbingConditions(
         pressure=np.ones(3), shear=np.ones(3), sliding_speed=0.0, temperature=np.full(3, 400.0)
     )
     assert not law(still).any()
@@ -71,13 +71,13 @@ def test_a_cold_film_has_no_defects_and_a_hot_one_nothing_else():
 
 def test_a_class_of_wear_is_an_interval_of_k_times_the_hardness():
     for name, (low, high) in PRIORS.items():
-        known = Coefficient.of_class(name, 2e9)
+        known = WearCoefficient.from_severity(name, 2e9)
         assert known.k * known.low * 2e9 == pytest.approx(low, rel=1e-12, abs=0.0)
         assert known.k * known.high * 2e9 == pytest.approx(high, rel=1e-12, abs=0.0)
         assert known.low * known.high == pytest.approx(1.0)  # of which k is the geometric middle
     with pytest.raises(BadInput, match="hardness"):
-        Coefficient.of_class("mild", None)
-    stated = Coefficient.stated(1e-17, 0.5)
+        WearCoefficient.from_severity("mild", None)
+    stated = WearCoefficient.from_value(1e-17, 0.5)
     assert stated.high == pytest.approx(math.exp(1.6449 * 0.5), rel=1e-4, abs=0.0)
     assert stated.low * stated.high == pytest.approx(1.0)
 
@@ -95,19 +95,19 @@ def test_a_jump_takes_off_the_mean_and_adds_nothing():
         1e6,
     ):  # at 1e3 s the spike's spectrum, cut off by the cells, dips below 0
         for any_rate in (rate, spike):
-            depth = taken_off(any_rate, seconds, exposure(), grid, MODULUS)
+            depth = removed_depth(any_rate, seconds, exposure(), grid, MODULUS)
             assert depth.mean() == pytest.approx(any_rate.mean() * seconds, rel=1e-12, abs=0.0)
             assert depth.min() >= 0.0
     short = exposure()
-    steps = 1e-6 / short.decay(1e6, 1.0, MODULUS)  # so short that no wave decays
+    steps = 1e-6 / short.decay_exponent(1e6, 1.0, MODULUS)  # so short that no wave decays
     np.testing.assert_allclose(
-        taken_off(rate, steps, short, grid, MODULUS),
+        removed_depth(rate, steps, short, grid, MODULUS),
         rate * steps,
         rtol=0,
         atol=3e-6 * rate.max() * steps,
     )
     even = np.broadcast_to(rate[:1], rate.shape)
-    assert is_even(taken_off(even, 1.0, exposure(), grid, MODULUS))
+    assert is_uniform_along(removed_depth(even, 1.0, exposure(), grid, MODULUS))
 
 
 @pytest.mark.parametrize("jumps", [1, 7])
@@ -119,15 +119,15 @@ def test_a_wave_in_full_contact_decays_as_in_closed_form_whatever_the_jump(jumps
         exposure(k=1e-15),
         1e9,
     )
-    seconds = 2.0 / float(body.decay(wave, 1.0, MODULUS))  # two decay lengths in all
+    seconds = 2.0 / float(body.decay_exponent(wave, 1.0, MODULUS))  # two decay lengths in all
     now = heights
     for _ in range(jumps):
         pressure = mean + 0.5 * MODULUS * wave * (now - now.mean())
-        rate = body.k * pressure * body.sliding_speed * body.share
-        now = now - taken_off(rate, seconds / jumps, body, grid, MODULUS)
+        rate = body.k * pressure * body.sliding_speed * body.contact_time_share
+        now = now - removed_depth(rate, seconds / jumps, body, grid, MODULUS)
     swing = 2.0 * np.abs(np.fft.rfft(now[:, 0]))[4] / 64
     assert swing == pytest.approx(1e-8 * math.exp(-2.0), rel=1e-9, abs=0.0)
-    sliding = seconds * body.sliding_speed * body.share
+    sliding = seconds * body.sliding_speed * body.contact_time_share
     assert -now.mean() == pytest.approx(body.k * mean * sliding, rel=1e-9, abs=0.0)
 
 
@@ -141,7 +141,7 @@ def test_a_jump_is_no_longer_than_its_depth_and_its_shortest_wave_allow():
     steep = exposure(k=1e-15)
     longest = longest_jump((gentle, steep), (slow, slow), 1.0, 0.7, grid.spacing, MODULUS)
     shortest_wave = math.pi * math.hypot(*(1.0 / side for side in grid.spacing))
-    assert float(steep.decay(shortest_wave, longest, MODULUS)) == pytest.approx(0.7)
+    assert float(steep.decay_exponent(shortest_wave, longest, MODULUS)) == pytest.approx(0.7)
     still = exposure(k=0.0)
     assert (
         longest_jump((still, still), (0.0 * slow, 0.0 * slow), 1.0, 1.0, grid.spacing, MODULUS)
@@ -150,10 +150,10 @@ def test_a_jump_is_no_longer_than_its_depth_and_its_shortest_wave_allow():
 
 
 def test_what_passes_is_in_the_contact_for_its_width_over_its_speed():
-    assert exposure().share == pytest.approx(50.0 * 1e-4 / 2.0)
-    assert exposure(speed=0.0).share == 1.0
-    assert exposure(speed=-2.0).passages(3e-4) == pytest.approx(50.0 * 3e-4 / 2.0)
-    assert exposure(speed=0.0).passages(3e-4) == 1.0
+    assert exposure().contact_time_share == pytest.approx(50.0 * 1e-4 / 2.0)
+    assert exposure(speed=0.0).contact_time_share == 1.0
+    assert exposure(speed=-2.0).depth_rate_factor(3e-4) == pytest.approx(50.0 * 3e-4 / 2.0)
+    assert exposure(speed=0.0).depth_rate_factor(3e-4) == 1.0
 
 
 def test_maps_come_back_onto_the_cells_that_they_were_seen_on():
@@ -162,18 +162,20 @@ def test_maps_come_back_onto_the_cells_that_they_were_seen_on():
     track = Grid((40, 12), (0.0, 0.0), (4.0, 1.2), periodic=(True, True))
     first, second = (Surface(rng.normal(size=track.cells), track) for _ in range(2))
     surfaces = MovingSurfaces(first, second, (2.0, 1.5), contact)
-    place = Position(33, 7)
-    there = seen(surfaces, place).heights
+    place = TrackPosition(33, 7)
+    there = combined_roughness(surfaces, place).heights
     i, j = 5, 3  # a cell of the contact, and where it is on either track
     assert there[i, j] == first.heights[(33 + i) % 40, j] + second.heights[(7 + i) % 40, 11 - j]
     marked = np.zeros(contact.cells)
     marked[i, j] = 1.0
-    assert on_track(marked, track.cells, place, 0)[(33 + i) % 40, j] == 1.0
-    assert on_track(marked, track.cells, place, 1)[(7 + i) % 40, 11 - j] == 1.0
-    assert on_track(marked, track.cells, place, 0, np.inf).min() == 0.0
-    moved = across(on_track(marked, track.cells, place, 0), place, 0)
-    np.testing.assert_array_equal(moved, on_track(marked, track.cells, place, 1))
-    np.testing.assert_array_equal(across(moved, place, 1), on_track(marked, track.cells, place, 0))
+    assert map_to_track(marked, track.cells, place, 0)[(33 + i) % 40, j] == 1.0
+    assert map_to_track(marked, track.cells, place, 1)[(7 + i) % 40, 11 - j] == 1.0
+    assert map_to_track(marked, track.cells, place, 0, np.inf).min() == 0.0
+    moved = to_other_track(map_to_track(marked, track.cells, place, 0), place, 0)
+    np.testing.assert_array_equal(moved, map_to_track(marked, track.cells, place, 1))
+    np.testing.assert_array_equal(
+        to_other_track(moved, place, 1), map_to_track(marked, track.cells, place, 0)
+    )
 
 
 def test_positions_lie_evenly_and_differ_from_jump_to_jump():

@@ -36,7 +36,7 @@ def jump_by_jump(history: WearHistory, body: int) -> float:
     """The sum of k times the load of touching cells times the sliding distance, from the table's own columns."""
     case, table = history.case, history.table
     load, sliding = case.conditions.load, case.conditions.sliding_speed
-    k, clr = history.ageing.model.coefficients[body].k, table["clr"].to_numpy()[:-1]
+    k, clr = history.contact.model.coefficients[body].k, table["clr"].to_numpy()[:-1]
     return float(np.sum(k * clr * load * sliding * 3600.0 * np.diff(table["hours"])))
 
 
@@ -46,8 +46,14 @@ def test_worn_volume_is_k_times_load_times_sliding_distance(rough):
     assert len(history.table) > 3
     assert history.volume_error < 1e-9
     for body in (0, 1):
-        lost = np.mean((history.before.first if body == 0 else history.before.second).heights)
-        lost -= np.mean((history.after.first if body == 0 else history.after.second).heights)
+        lost = np.mean(
+            (
+                history.initial_surfaces.first if body == 0 else history.initial_surfaces.second
+            ).heights
+        )
+        lost -= np.mean(
+            (history.final_surfaces.first if body == 0 else history.final_surfaces.second).heights
+        )
         speed, rate = history.case.conditions.surface_speeds[body], (56.25, 5.0)[body]
         assert lost * speed / rate * 10e-3 == pytest.approx(
             history.worn_volume[body], rel=1e-9, abs=0.0
@@ -90,7 +96,7 @@ def test_a_ball_wears_a_parabola_across_its_track(cells):
     history = run_wear(case, hours=1e-4)
     conditions, hertz = case.conditions, case.conditions.hertz
     a, p0 = hertz.half_widths[0], hertz.p_max
-    y = history.before.grid.y
+    y = history.initial_surfaces.grid.y
     for body, k in ((0, 1e-17), (1, 3e-17)):
         a_passage = (
             k * 0.5 * math.pi * p0 * a * conditions.sliding_speed / conditions.surface_speeds[body]
@@ -100,7 +106,7 @@ def test_a_ball_wears_a_parabola_across_its_track(cells):
         inner = np.abs(y) < 0.8 * a
         np.testing.assert_allclose(profile[inner], expected[inner], rtol=0.01)
         assert np.max(np.abs(profile - expected)) < 0.01 * a_passage * (64 / cells[0] + 1.0)
-        area = profile.sum() * history.before.grid.spacing[1]
+        area = profile.sum() * history.initial_surfaces.grid.spacing[1]
         assert area == pytest.approx(
             k * 20.0 * conditions.sliding_speed / conditions.surface_speeds[body], rel=3e-4, abs=0.0
         )
@@ -118,7 +124,7 @@ def decay_of_ridges(half_width: float, hours: float) -> tuple[float, float]:
     history = run_wear(
         case, hours=hours, surfaces=MovingSurfaces(track, flat.second, flat.speeds, flat.grid)
     )
-    left = history.after.first.heights[0]
+    left = history.final_surfaces.first.heights[0]
     swing = 2.0 * np.abs(np.fft.rfft(left))[1] / across.cells[1]
     speeds, sliding = case.conditions.surface_speeds, case.conditions.sliding_speed
     passages = history.overrollings[0]
@@ -142,9 +148,11 @@ def test_ridges_in_full_contact_decay_by_the_way_that_slides_past_them():
 def test_without_sliding_nothing_is_worn_off():
     history = worn(100.0, {"contact.slip": 0.0, "wear.k": "1e-12 1/Pa"})
     assert history.worn_volume == (0.0, 0.0)
-    np.testing.assert_array_equal(history.after.first.heights, history.before.first.heights)
+    np.testing.assert_array_equal(
+        history.final_surfaces.first.heights, history.initial_surfaces.first.heights
+    )
     assert len(history.table) == 2
-    assert "Without sliding nothing is worn off." in history.notes
+    assert "There is no sliding, so nothing wears off." in history.notes
 
 
 def test_the_energy_law_is_archards_at_k_over_the_boundary_friction():
@@ -165,7 +173,7 @@ def test_removal_alone_lowers_summits_and_leaves_pits():
     assert last["spk_m"] / first["spk_m"] < 0.8
     assert abs(last["svk_m"] / first["svk_m"] - 1.0) < 0.1
     assert last["clr"] < first["clr"]
-    assert np.all(history.after.first.heights <= history.before.first.heights)
+    assert np.all(history.final_surfaces.first.heights <= history.initial_surfaces.first.heights)
 
 
 def test_a_harder_wear_coefficient_is_a_faster_clock():

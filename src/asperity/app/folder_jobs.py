@@ -15,7 +15,7 @@ from asperity.simulation import (
     MotionFrame,
     WearFrame,
     WearHistory,
-    is_wear,
+    is_wear_folder,
     load_history,
     load_wear,
 )
@@ -133,7 +133,7 @@ class Moved:
 
 def open_history(ticket: Ticket, folder: Path) -> Moved:  # noqa: ARG001
     """A history's curves, and maps evenly over its steps; of a contact that wears, over its hours."""
-    if is_wear(folder):
+    if is_wear_folder(folder):
         return _worn(load_wear(folder))
     history = load_history(folder)
     every = -(-len(history.frames) // MOST_FRAMES) if history.frames else 1

@@ -10,7 +10,7 @@ from asperity.case import Case, load_case
 from asperity.core.errors import UnreadableFile
 from asperity.core.storage import MANIFEST
 from asperity.paper import papers_case
-from asperity.simulation import is_history, is_wear, load_history, load_wear
+from asperity.simulation import is_history_folder, is_wear_folder, load_history, load_wear
 from asperity.study import load_study
 
 FIRST = {
@@ -52,9 +52,9 @@ def open_page(what: Path | None) -> Opened:
     if what is None:
         return Opened(kind="contact", name="the paper's contact", case=paper())
     if what.is_dir():
-        if is_history(what):
+        if is_history_folder(what):
             return Opened(kind="history", name=what.name, case=load_history(what).case, path=what)
-        if is_wear(what):
+        if is_wear_folder(what):
             return Opened(kind="history", name=what.name, case=load_wear(what).case, path=what)
         if (what / MANIFEST).is_file():
             return Opened(kind="study", name=what.name, case=load_study(what).plan.case, path=what)

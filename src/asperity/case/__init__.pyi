@@ -8,8 +8,8 @@ from .laws import OilSupply as OilSupply
 from .laws import ThermalSection as ThermalSection
 from .lubricant import SheetSection as SheetSection
 from .machines import MachineCase as MachineCase
+from .machines import has_machine as has_machine
 from .machines import load_machine as load_machine
-from .machines import states_machine as states_machine
 from .messages import Section as Section
 from .messages import parse_section as parse_section
 from .ratings import RatingSection as RatingSection
@@ -26,7 +26,7 @@ from .study import StudyKind as StudyKind
 from .study import StudySection as StudySection
 from .surfaces import SurfaceSection as SurfaceSection
 from .templates import KINDS as KINDS
-from .templates import beginning as beginning
+from .templates import case_template as case_template
 from .text import relative_path as relative_path
 from .units import Length as Length
 from .units import read_amount as read_amount

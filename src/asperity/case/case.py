@@ -1,6 +1,6 @@
-"""A case: the contact that a case file states, turned into the objects that the solvers take.
+"""A case: the contact that a case file states, as the objects that the solvers take.
 
-Solving a case is left to `asperity.results`.
+`asperity.results` solves cases.
 """
 
 from collections.abc import Iterator, Mapping
@@ -29,19 +29,19 @@ from asperity.solution import inlet_notes, plausibility_notes
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
 from asperity.wear import WearModel
 
-# surfaces that a solution is the mean of, unless the case says: the wait is for as many solutions
+# default number of surfaces per solution on coarse and on fine grids, to limit computing time
 MANY_SURFACES, FEW_SURFACES = 5, 3
-MOST_SURFACES = 1000  # an interval of one further surface hardly narrows beyond a few dozen
-FINE_GRID = 256 * 256  # cells above which there are few
-CELL_BYTES, CELL_S = 800.0, 1e-4  # what a cell takes of memory and time while a contact is solved
+MOST_SURFACES = 1000  # a prediction interval hardly narrows beyond a few dozen
+FINE_GRID = 256 * 256  # cells above which a grid counts as fine
+CELL_BYTES, CELL_S = 800.0, 1e-4  # cost of a cell while a contact is solved
 
 
 @dataclass(frozen=True)
 class Case:
-    """A contact to solve, as its case file states it. Made by `load_case`.
+    """Contact to solve, as its case file states it; created by `load_case`.
 
-    `contents` are the file's tables, `folder` is where a surface file is looked for, `source` what
-    messages call the case, `stored` the roughness of the run that the case came from.
+    `contents` are the file's tables, `folder` is the base of surface files, `source` the name of
+    the case in messages, `stored` the roughness of the run that the case came from.
     """
 
     contents: CaseFile
@@ -50,13 +50,14 @@ class Case:
     stored: Surface | None = field(default=None, compare=False, repr=False)
     stored_notes: tuple[str, ...] = field(
         default=(), compare=False, repr=False
-    )  # what was done to make `stored`
+    )  # processing steps of `stored`
 
     def __post_init__(self) -> None:
-        # refuse now what would else be refused later, perhaps after a long wait
+        # report errors now rather than after a long computation
+        # an automatic grid of a measured surface would need its file
         measured = any(
             isinstance(part, FileSection) for part in self.contents.surface.parts.values()
-        )  # a grid chosen by it asks for the file
+        )
         for name in ("conditions", "lubricant", "grid", "options", "thermal", "vibration", "wear"):
             if name == "grid" and measured and self.contents.grid.chosen:
                 continue
@@ -65,15 +66,14 @@ class Case:
             ):
                 getattr(self, name)
 
-    def __reduce__(
-        self,
-    ) -> tuple[Any, ...]:  # the sections of laws are made at run time, which pickle cannot follow
+    # the sections of laws are created at run time, which pickle cannot import
+    def __reduce__(self) -> tuple[Any, ...]:
         again = partial(load_case, folder=self.folder, name=self.source, stored=self.stored)
         return again, (self.text,), {"stored_notes": self.stored_notes}
 
     @contextmanager
     def naming(self, part: str) -> Iterator[None]:
-        """Let what is refused inside say which case and which part of it is meant."""
+        """Prefix errors inside with the case and its part."""
         try:
             yield
         except BadInput as error:
@@ -103,7 +103,7 @@ class Case:
 
     @cached_property
     def lubricant(self) -> Lubricant | None:
-        """The oil, None for a dry contact."""
+        """Lubricant; None for a dry contact."""
         section = self.contents.lubricant
         return None if section is None else section.lubricant()
 
@@ -114,12 +114,12 @@ class Case:
 
     @property
     def oil_sheet(self) -> OilSheet | None:
-        """The oil's data sheet, which tells it at any temperature; None for one by laws, or none."""
+        """Data sheet of the oil, valid at any temperature; None for an oil by laws, or none."""
         return None if self._sheet is None else self._sheet.sheet
 
     @property
     def oil_facts(self) -> tuple[OilFact, ...]:
-        """What was given and what was estimated of an oil by its data sheet; of one by laws there is nothing to say."""
+        """Stated and estimated numbers of an oil's data sheet; empty for an oil by laws."""
         return () if self._sheet is None else self._sheet.facts()
 
     @property
@@ -129,15 +129,15 @@ class Case:
 
     @cached_property
     def thermal(self) -> Thermal:
-        """What takes up the heat of sliding."""
+        """Thermal model of the bodies and the oil."""
         return self.contents.thermal.thermal(None if self._sheet is None else self._sheet.supply())
 
     @cached_property
     def grid(self) -> Grid:
-        """The rectangle to compute on; half-widths turned into metres, along a line contact's length too.
+        """Computing grid [m]; `auto_grid` chooses what the case omits.
 
-        What the case leaves out of it is chosen (`auto_grid`); roughness kept in a run brings its
-        own.
+        Half-widths are converted to metres, also along the length of a line contact. Stored
+        roughness brings its own grid.
         """
         section, conditions = self.contents.grid, self.conditions
         line, (a, b) = conditions.endless, conditions.hertz.half_widths
@@ -165,7 +165,8 @@ class Case:
         for axis, ends in [("x", section.x)] if line else [("x", section.x), ("y", section.y)]:
             if ends is not None and not (ends[0] < -1.0 and ends[1] > 1.0):
                 raise BadInput(
-                    f"{axis} must reach beyond the contact on both sides, got {ends[0]:g} to {ends[1]:g} half-widths; "
+                    f"{axis} must reach beyond the contact on both sides, got {ends[0]:g} to "
+                    f"{ends[1]:g} half-widths; "
                     f"use {'-4.5 to 1.9' if axis == 'x' else '-3 to 3'}, or leave it out"
                 )
         _require_affordable(grid)
@@ -173,7 +174,7 @@ class Case:
 
     @cached_property
     def options(self) -> Options:
-        """How hard to solve."""
+        """Solver options."""
         solver = {
             name: plain(value)
             for name, value in self.contents.solver
@@ -183,12 +184,12 @@ class Case:
 
     @cached_property
     def vibration(self) -> VibrationModel | None:
-        """The vibration model; None when the case has no [vibration]."""
+        """Vibration model; None if the case has no [vibration]."""
         return vibration_model(self.contents.vibration)
 
     @cached_property
     def wear(self) -> WearModel | None:
-        """How the contact wears; None when the case has no [wear]."""
+        """Wear model; None if the case has no [wear]."""
         section = self.contents.wear
         return None if section is None else section.model(self.conditions, self.boundary_friction)
 
@@ -201,7 +202,7 @@ class Case:
         )
 
     def composite(self) -> CompositeSurface | None:
-        """Two measured surfaces apart, each with its speed; None when the case has no second one."""
+        """Return two measured surfaces with their speeds; None without a second one."""
         with self.naming("surface"):
             return two_bodies(
                 self.contents.surface, self.grid, self.folder, self.conditions.surface_speeds
@@ -209,17 +210,17 @@ class Case:
 
     @property
     def motion(self) -> MotionSection:
-        """How the roughness moves, where it is let."""
+        """Motion of the roughness."""
         return self.contents.motion or MotionSection()
 
     def moving_surfaces(self) -> MovingSurfaces:
-        """Both bodies' roughness on tracks that repeat along rolling, each at its own speed.
+        """Return both bodies' roughness on tracks that repeat along rolling, each at its own speed.
 
-        Roughness that is generated, or measured on one surface only, lies on the body that
-        `motion.rough` names; "both" bodies carry independent samples of Sq/√2 each, of which the
-        first has the case's seed. Two measured surfaces lie on one body each. A measured surface's
-        ends are joined. Raises BadInput for one measured surface that shall be on both bodies, a
-        track that it does not cover, or roughness kept in a run, which is on neither track.
+        Roughness that is generated, or measured on one surface only, is on the body that
+        `motion.rough` names; "both" bodies have independent samples of Sq/√2 each, the first with
+        the case's seed. Two measured surfaces are on one body each. The ends of a measured surface
+        are joined. Raises BadInput for one measured surface on both bodies, a track that it does
+        not cover, or the roughness of a run, which does not extend along the track.
         """
         section, rough, speeds = (
             self.contents.surface,
@@ -231,67 +232,72 @@ class Case:
         with self.naming("surface"):
             if self.stored is not None:
                 raise BadInput(
-                    "is kept in a run, and what it had beside the contact is not; let the case file move"
+                    "comes from a run, which stores the contact's part only; use the case file"
                 )
             return moving_roughness(section, rough, track, self.folder, speeds, self.grid)
 
     def surface(self) -> Surface:
-        """The composite roughness on the grid: generated, read and prepared, or as stored in the run.
+        """Return the composite roughness on the grid: generated, measured, or stored in the run.
 
-        Raises BadInput for a surface that the grid cannot carry or a measurement that does not
+        Raises BadInput for a surface that the grid cannot represent or a measurement that does not
         cover the contact, UnreadableFile for a surface file that cannot be read.
         """
         with self.naming("surface"):
             return self._roughness[0]
 
-    def surface_count(self, asked: int | None = None) -> int:
-        """How many surfaces to solve, where so many are `asked` for, or else as many as [solver] or the wait allows.
+    def surface_count(self, count: int | None = None) -> int:
+        """Return the number of surfaces to solve: `count`, that of [solver], or the default.
 
-        One where all surfaces of the case are the same. A measured map holds few that do not
-        overlap, a run only its own: BadInput where more are asked for.
+        One where all surfaces of the case are identical. A measured map contains few that do not
+        overlap, a run only its own: BadInput if more are requested.
         """
         with self.naming("surface"):
-            stated = self.contents.solver.surfaces if asked is None else asked
-            wanted = stated or (
+            stated = self.contents.solver.surfaces if count is None else count
+            number = stated or (
                 MANY_SURFACES
                 if self.grid.cells[0] * self.grid.cells[1] <= FINE_GRID
                 else FEW_SURFACES
             )
-            if not 1 <= wanted <= MOST_SURFACES:
+            if not 1 <= number <= MOST_SURFACES:
                 raise BadInput(
-                    f"surfaces must be 1 to {MOST_SURFACES}, got {wanted}; asperity study takes more"
+                    f"surfaces must be 1 to {MOST_SURFACES}, got {number}; use asperity study for "
+                    "more"
                 )
-            if wanted == 1 or self.surface().sq == 0.0:
+            if number == 1 or self.surface().sq == 0.0:
                 return 1
             try:
                 available = self.contents.surface.available(self.grid, self.folder)
             except UnreadableFile:
                 if self.stored is None or stated:
                     raise
-                # a run holds the surface that was solved, its measurement need not be at hand
+                # a run stores its surface; the measurement may be missing
                 available = 1
-            if available == 1 and all(part.fixed for part in self.contents.surface.parts.values()):
+            if available == 1 and all(
+                part.is_fixed for part in self.contents.surface.parts.values()
+            ):
                 return 1
             if available is not None and stated and stated > available:
                 raise BadInput(
-                    f"the measured map has room for {available} such contacts that do not overlap, got {stated} "
-                    "surfaces to solve; ask for fewer, or measure more"
+                    f"the measured map holds {available} non-overlapping contacts, got {stated} "
+                    "surfaces to solve; solve fewer, or measure a larger map"
                 )
-            return wanted if available is None else min(wanted, available)
+            return number if available is None else min(number, available)
 
     def on_surface(self, number: int) -> "Case":
-        """The case on another surface of its kind, with a later seed or at another place of the map; 0 is its own."""
-        return self.with_overrides(self.contents.surface.another(number)) if number else self
+        """Return the case on another surface: a later seed or map position; 0 is its own."""
+        return (
+            self.with_overrides(self.contents.surface.variant_overrides(number)) if number else self
+        )
 
     @property
     def surface_notes(self) -> tuple[str, ...]:
-        """What was done to a measured surface, and where a generated one strays from what was asked for."""
+        """Processing of a measured surface, and deviations of a generated one from its request."""
         self.surface()
         return self._roughness[1]
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader of the results has to know about the case, a sentence each."""
+        """Notes on the case for a reader of the results, one sentence each."""
         conditions, oil = self.conditions, self.lubricant
         of_oil = () if self._sheet is None else self._sheet.notes()
         return (
@@ -306,12 +312,11 @@ class Case:
         return restated(self.contents)
 
     def with_overrides(self, overrides: Mapping[str, object]) -> "Case":
-        """The case with values replaced, such as `{"contact.load": "400 N", "grid.cells": "[128, 128]"}`.
+        """Return the case with values replaced, such as `{"contact.load": "400 N"}`.
 
-        Text is read as a TOML value where it is one and taken as it stands where not. Stored
-        roughness is kept as long as neither the surface nor the grid changes. `vibration.preset`
-        replaces all that presets choose. Raises BadInput for a key or value that the case file
-        would be refused for.
+        Text is parsed as a TOML value if possible, and used as it is otherwise. Stored roughness
+        is kept as long as neither the surface nor the grid changes. `vibration.preset` replaces
+        all values that presets determine. Raises BadInput as for a case file.
         """
         tables = replaced(parse_toml(self.text, self.source), overrides, self.source)
         case = Case(parse_section(CaseFile, tables, self.source), self.folder, self.source)
@@ -339,16 +344,16 @@ def load_case(
     Parameters
     ----------
     source : path of a TOML file, or its text
-    folder : where the case's surface file is looked for; by default beside the case file, or the current folder
-    name : what messages call the case; by default the path
-    stored : roughness to use in place of the case's own, as kept in a run
+    folder : base of surface files; by default that of the case file, or the current one
+    name : name of the case in messages; by default the path
+    stored : roughness to use in place of the case's own, from a run
 
     Raises
     ------
     UnreadableFile
-        if the file is missing or no TOML.
+        if the file is missing or not TOML.
     BadInput
-        for a key, law, unit or value that cannot be meant; one sentence that says which.
+        for an invalid key, law, unit or value, in one sentence that names it.
     """
     if isinstance(source, str) and "\n" in source:
         text, name, folder = source, name or "case", folder or Path()
@@ -358,6 +363,6 @@ def load_case(
     tables = parse_toml(text, name)
     if "machine" in tables:
         raise BadInput(
-            f"{name}: states a [machine], which has several contacts; asperity machine solves them all"
+            f"{name}: has a [machine] with several contacts; solve them with asperity machine"
         )
     return Case(parse_section(CaseFile, tables, name), folder, name, stored)

@@ -1,4 +1,4 @@
-"""[infer] of a case file: what is not known of the contact and how far, and where it may be run."""
+"""[infer] of a case file: priors of unknown quantities, and feasible operating points."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
@@ -9,12 +9,12 @@ from asperity.case.messages import Section, quoted, validated, with_axes
 from asperity.case.units import Count, Seed
 from asperity.core.errors import BadInput
 
-LEAST_POINTS, MOST_POINTS = 16, 4096
+MIN_POINTS, MOST_POINTS = 16, 4096
 _ENDS = {"from", "to", "value", "std"}
 
 
 class PriorSection(Section):
-    """What is known of a quantity before any recording: `from` and `to`, or a `value` and its `std`."""
+    """Prior of a quantity: `from` and `to`, or a `value` and its `std`."""
 
     start: Any = Field(None, alias="from")
     to: Any = None
@@ -28,27 +28,31 @@ class PriorSection(Section):
         ]
         if stated not in (["start", "to"], ["value", "std"]):
             raise BadInput(
-                'must have from and to, or value and std, such as { value = "0.8 um", std = "0.1 um" }'
+                "must have from and to, or value and std, such as "
+                '{ value = "0.8 um", std = "0.1 um" }'
             )
         return self
 
 
 class InferSection(Section):
-    """[infer]: the emulator's size, and a prior for each quantity that is not known. Other keys name quantities."""
+    """[infer]: size of the emulator, and a prior per unknown quantity.
+
+    Other keys name quantities.
+    """
 
     axes: dict[str, PriorSection | Literal["known"]] = Field(
         default_factory=dict
     )  # as written: key -> prior
-    points: Annotated[int, Strict(), Field(ge=LEAST_POINTS, le=MOST_POINTS)] = (
+    points: Annotated[int, Strict(), Field(ge=MIN_POINTS, le=MOST_POINTS)] = (
         256  # contacts, of a Sobol sequence
     )
     surfaces: Count = 4  # surfaces a point
     cells: tuple[Count, Count] = (64, 64)
-    seed: Seed = 0  # of the sequence and of all that is drawn
+    seed: Seed = 0  # of the sequence and of all random numbers
 
 
 def parse_infer(value: object) -> InferSection | None:
-    """The priors; quantities stand beside the section's own keys."""
+    """Parse [infer]; quantities stand beside the section's own keys."""
     return with_axes(InferSection, value, _ENDS, _prior)
 
 
@@ -57,7 +61,7 @@ def _prior(value: object) -> object:
         return validated(PriorSection, value)
     if value != "known":
         raise BadInput(
-            'must be "known", or what is known of it such as { from = "0.5 um", to = "4 um" } or '
+            'must be "known", or a prior such as { from = "0.5 um", to = "4 um" } or '
             f'{{ value = "0.8 um", std = "0.1 um" }}, got {quoted(value)}'
         )
     return value

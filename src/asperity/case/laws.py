@@ -1,7 +1,7 @@
-"""Laws and sections: every law of a table becomes a section of the case file, and what a case chose becomes laws again.
+"""Sections of a case file for tables of laws, and their conversion to laws.
 
-A parameter is a quantity where its law gives it a unit, else a plain value. Sections follow the
-tables of laws, so that a law needs nothing here.
+A parameter is a quantity if its law gives it a unit, else a plain value. Sections follow the
+tables of laws, so a new law needs nothing here.
 """
 
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ from asperity.lubricant import (
 
 
 def section_field(kind: Any, default: Any, unit: str) -> tuple[Any, Any]:
-    """A parameter as a field of a section: a quantity where it has a unit, else as annotated; MISSING: required."""
+    """Return a parameter as a section's field: a quantity if it has a unit; MISSING is required."""
     kind = Annotated[float, amount_in(unit)] if unit else Annotated[kind, Strict()]
     if default is None:
         kind = Annotated[kind | None, OPTIONAL]
@@ -38,7 +38,7 @@ def section_field(kind: Any, default: Any, unit: str) -> tuple[Any, Any]:
 
 
 def section_fields(law: type) -> dict[str, Any]:
-    """A dataclass's fields as fields of a section."""
+    """Return the fields of a dataclass as fields of a section."""
     types, marks = get_type_hints(law), parameters(law)
     return {
         entry.name: section_field(types[entry.name], entry.default, marks[entry.name].unit)
@@ -51,13 +51,13 @@ def _law_section(name: str, law: type) -> type[Section]:
     return create_model(name, __base__=Section, law=(str, ...), **section_fields(law))
 
 
-def one_of(family: LawFamily) -> PlainValidator:
-    """What reads a section's field that is a law of a family."""
-    return one_of_table(LAWS[family])
+def law_of_family(family: LawFamily) -> PlainValidator:
+    """Return the validator of a field that is a law of a family."""
+    return law_from_table(LAWS[family])
 
 
-def one_of_table(table: Mapping[str, type]) -> PlainValidator:
-    """What reads a section's field that is a law of a table, by its name there."""
+def law_from_table(table: Mapping[str, type]) -> PlainValidator:
+    """Return the validator of a field that is a law of a table, by its name there."""
 
     def sections() -> dict[str, type[Section]]:
         return {name: _law_section(name, law) for name, law in table.items()}
@@ -66,22 +66,22 @@ def one_of_table(table: Mapping[str, type]) -> PlainValidator:
 
 
 def law_description(section: Section) -> dict[str, Any]:
-    """A law's section as `make_law` takes it."""
+    """Return a law's section as `make_law` takes it."""
     return {name: plain(getattr(section, name)) for name in type(section).model_fields}
 
 
 class LubricantSection(Section):
-    """[lubricant]: one law of each family."""
+    """[lubricant]: one law per family."""
 
-    viscosity: Annotated[Section, one_of("viscosity")]
-    density: Annotated[Section, one_of("density")]
-    rheology: Annotated[Section, one_of("rheology")]
-    friction: Annotated[Section, one_of("friction"), Field(validate_default=True)] = cast(
+    viscosity: Annotated[Section, law_of_family("viscosity")]
+    density: Annotated[Section, law_of_family("density")]
+    rheology: Annotated[Section, law_of_family("rheology")]
+    friction: Annotated[Section, law_of_family("friction"), Field(validate_default=True)] = cast(
         Section, "bair-winer"
     )
 
     def lubricant(self) -> Lubricant:
-        """The oil."""
+        """Return the lubricant."""
         return make_lubricant(
             {family: law_description(getattr(self, family)) for family in type(self).model_fields}
         )
@@ -105,45 +105,45 @@ _Numbers: Any = create_model("thermal", __base__=Section, **_NUMBERS)
 
 
 class OilSupply(NamedTuple):
-    """What an oil by its data sheet says to [thermal]: its temperature [K], and -d(ln ν)/dT there [1/K]."""
+    """Values of [thermal] from an oil's data sheet: temperature [K], -d(ln ν)/dT there [1/K]."""
 
     temperature: float
     thinning: float
 
 
-class ThermalSection(_Numbers):  # type: ignore[misc]  # its numbers are those of `Thermal` and of both its `Solid`s
-    """[thermal]: what takes up the heat of sliding, and whether the film feels it."""
+class ThermalSection(_Numbers):  # type: ignore[misc]  # fields of `Thermal` and `Solid`
+    """[thermal]: conduction of the heat of sliding, and thermal feedback on the film."""
 
-    warmth: Annotated[Section, one_of("warmth"), Field(validate_default=True)] = cast(
+    warmth: Annotated[Section, law_of_family("warmth"), Field(validate_default=True)] = cast(
         Section, "exponential"
     )
     feedback: Annotated[bool, Strict()] = Thermal().feedback
 
     @property
-    def tacit(self) -> tuple[str, ...]:
-        """Which of the keys that an oil by its data sheet can decide stand at their defaults."""
+    def defaulted(self) -> tuple[str, ...]:
+        """Keys that an oil's data sheet can determine and that have their default."""
         default = ThermalSection()
-        by_default = {
+        at_default = {
             "ambient": self.ambient.text == default.ambient.text,
             "warmth": self.warmth == default.warmth,
         }
-        return tuple(key for key, tacit in by_default.items() if tacit)
+        return tuple(key for key, unchanged in at_default.items() if unchanged)
 
     def thermal(self, oil: OilSupply | None = None) -> Thermal:
-        """The thermal side of the contact; an oil by its data sheet decides what is left at its default.
+        """Return the thermal model; an oil's data sheet determines defaulted values.
 
         Raises BadInput for an ambient temperature that is neither the default nor the oil's.
         """
-        tacit = () if oil is None else self.tacit
+        defaulted = () if oil is None else self.defaulted
         ambient, warmth = plain(self.ambient), make_law("warmth", law_description(self.warmth))
         if oil is not None:
-            if "ambient" not in tacit and ambient != oil.temperature:
+            if "ambient" not in defaulted and ambient != oil.temperature:
                 raise BadInput(
-                    f"ambient of {self.ambient.text} is not the {oil.temperature - ZERO_CELSIUS:.6g} degC of "
-                    "lubricant.temperature; leave ambient out"
+                    f"ambient is {self.ambient.text}, but lubricant.temperature is "
+                    f"{oil.temperature - ZERO_CELSIUS:.6g} degC; leave ambient out"
                 )
             ambient = oil.temperature
-            warmth = ExponentialWarmth(oil.thinning) if "warmth" in tacit else warmth
+            warmth = ExponentialWarmth(oil.thinning) if "warmth" in defaulted else warmth
         first, second = (
             Solid(**{name: plain(getattr(self, name))[body] for name in _SOLID}) for body in (0, 1)
         )

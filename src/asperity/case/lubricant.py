@@ -1,4 +1,4 @@
-"""[lubricant] of a case file: laws with their parameters, or an oil by its data sheet."""
+"""[lubricant] of a case file: laws with their parameters, or an oil's data sheet."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -6,7 +6,7 @@ from typing import Annotated, cast
 
 from pydantic import Field
 
-from asperity.case.laws import LubricantSection, OilSupply, law_description, one_of
+from asperity.case.laws import LubricantSection, OilSupply, law_description, law_of_family
 from asperity.case.messages import Section, validated
 from asperity.case.units import OPTIONAL, Number, amount_in, plain
 from asperity.core.errors import BadInput
@@ -22,7 +22,7 @@ from asperity.lubricant import (
     oil_notes,
 )
 
-_ON_A_SHEET = (
+_SHEET_KEYS = (
     "grade",
     "viscosity_40",
     "viscosity_100",
@@ -34,9 +34,9 @@ _ON_A_SHEET = (
 
 
 class SheetSection(Section):
-    """[lubricant]: an oil by its data sheet at a temperature, in place of laws."""
+    """[lubricant]: an oil's data sheet at a temperature, in place of laws."""
 
-    oil: Annotated[str | None, OPTIONAL] = None  # of the measured ones
+    oil: Annotated[str | None, OPTIONAL] = None  # name of a measured oil
     grade: Annotated[str | None, OPTIONAL] = None
     viscosity_40: Annotated[Annotated[float, amount_in("m^2/s")] | None, OPTIONAL] = None
     viscosity_100: Annotated[Annotated[float, amount_in("m^2/s")] | None, OPTIONAL] = None
@@ -47,23 +47,24 @@ class SheetSection(Section):
     alpha_estimate: Annotated[str | None, OPTIONAL] = None
     temperature: Annotated[float, amount_in("K")]
     thickening: Thickening = "roelands"
-    rheology: Annotated[Section, one_of("rheology"), Field(validate_default=True)] = cast(
+    rheology: Annotated[Section, law_of_family("rheology"), Field(validate_default=True)] = cast(
         Section, "newtonian"
     )
-    friction: Annotated[Section, one_of("friction"), Field(validate_default=True)] = cast(
+    friction: Annotated[Section, law_of_family("friction"), Field(validate_default=True)] = cast(
         Section, "bair-winer"
     )
 
     @cached_property
     def sheet(self) -> OilSheet:
-        """The data sheet; BadInput for one that cannot be."""
-        stated = {name: plain(getattr(self, name)) for name in _ON_A_SHEET}
+        """Data sheet; raises BadInput if it is inconsistent."""
+        stated = {name: plain(getattr(self, name)) for name in _SHEET_KEYS}
         if self.oil is None:
             return OilSheet(base=self.base, **stated)
         others = [name for name, value in stated.items() if value is not None]
         if others or self.base != "mineral":
             raise BadInput(
-                f"has both oil and {[*others, 'base'][0]}; keep oil for a measured one, or leave it out"
+                f"has both oil and {[*others, 'base'][0]}; use oil alone for a measured oil, "
+                "or leave oil out"
             )
         table = measured_oils()
         if self.oil not in table:
@@ -71,7 +72,7 @@ class SheetSection(Section):
         return table[self.oil].sheet(plain(self.temperature))
 
     def lubricant(self) -> Lubricant:
-        """The oil at its temperature."""
+        """Return the lubricant at its temperature."""
         return self.sheet.lubricant(
             plain(self.temperature),
             thickening=self.thickening,
@@ -80,21 +81,21 @@ class SheetSection(Section):
         )
 
     def supply(self) -> OilSupply:
-        """What [thermal] takes from it."""
+        """Return the values that [thermal] takes from it."""
         temperature = plain(self.temperature)
         return OilSupply(temperature, self.sheet.walther.thinning(temperature))
 
     def facts(self) -> tuple[OilFact, ...]:
-        """Its numbers, given and estimated."""
+        """Return its numbers, stated and estimated."""
         return oil_facts(self.sheet, plain(self.temperature))
 
     def notes(self) -> tuple[str, ...]:
-        """What a reader of the results has to know of it."""
+        """Return the notes for a reader of the results."""
         return oil_notes(self.sheet, plain(self.temperature))
 
 
 def parse_lubricant(value: object) -> LubricantSection | SheetSection | None:
-    """The oil's section; None for "none", a dry contact."""
+    """Parse [lubricant]; None for "none", a dry contact."""
     if value == "none":
         return None
     if not isinstance(value, Mapping) or {"viscosity", "density"}.isdisjoint(value):
@@ -107,7 +108,8 @@ def parse_lubricant(value: object) -> LubricantSection | SheetSection | None:
     if sheet:
         law = next(key for key in ("viscosity", "density") if key in value)
         raise BadInput(
-            f"has both {law}, a law, and {sheet[0]}, of a data sheet; keep the laws or the sheet, or give the whole "
-            'table anew: lubricant = { grade = "VG 100", temperature = "70 degC" }'
+            f"has both {law} (a law) and {sheet[0]} (of a data sheet); keep either laws or data "
+            'sheet, or replace the whole table: lubricant = { grade = "VG 100", '
+            'temperature = "70 degC" }'
         )
     return validated(LubricantSection, value)

@@ -1,4 +1,4 @@
-"""[machine] of a case file: a machine element as a catalogue has it, in place of the [contact] that it leads to."""
+"""[machine] of a case file: a machine element by catalogue data, in place of [contact]."""
 
 import math
 from collections.abc import Mapping
@@ -54,8 +54,8 @@ Tilt: TypeAlias = Annotated[
     Annotated[float, amount_in("rad", -math.inf)] | None,
     BeforeValidator(lambda value: None if value == "free" else value),
 ]
-OWN = ("machine", "rating")  # tables that no contact has
-FOUND = 10  # digits of what a contact is stated with
+MACHINE_TABLES = ("machine", "rating")  # not in the case of a contact
+DIGITS = 10  # of the values of a derived contact
 
 
 class SpurGearSection(Section):
@@ -152,11 +152,11 @@ def _sections() -> dict[str, type[Section]]:
     return {kind: section for kind, (section, _) in MACHINES.items()}
 
 
-STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3}  # where [material] is left out
+STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3}  # default of [material]
 
 
 class _MachineTables(Section):
-    """What a case file with a machine has of its own, and what the machine needs beside it."""
+    """Tables of a case file that the machine itself needs."""
 
     machine: Annotated[Any, PlainValidator(partial(choose, "kind", _sections))]
     material: MaterialSection
@@ -165,10 +165,10 @@ class _MachineTables(Section):
 
 @dataclass(frozen=True)
 class MachineCase:
-    """A machine as its case file states it. Made by `load_machine`.
+    """Machine as its case file states it; created by `load_machine`.
 
-    `tables` are the file's, `folder` is where a surface file is looked for, `source` what messages
-    call the case. `rating` has what standards ask for besides.
+    `tables` are the file's, `folder` is the base of surface files, `source` the name of the case in
+    messages. `rating` has further data for rating standards.
     """
 
     tables: Mapping[str, Any]
@@ -180,31 +180,31 @@ class MachineCase:
 
     @cached_property
     def contacts(self) -> tuple[MachineContact, ...]:
-        """Every contact that carries load."""
+        """Contacts that carry load."""
         return self.machine.contacts(self.pair)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader of the contacts has to know, a sentence each."""
-        taken = (
+        """Notes for a reader of the contacts, one sentence each."""
+        assumed = (
             ()
             if "material" in self.tables
-            else ("Both bodies are taken for steel, E 206 GPa and ν 0.3.",)
+            else ("Both bodies are assumed to be steel, E 206 GPa and ν 0.3.",)
         )
-        return (*self.machine.notes(self.pair), *taken)
+        return (*self.machine.notes(self.pair), *assumed)
 
     @property
     def text(self) -> str:
-        """The case as TOML, as it was stated."""
+        """Case as TOML, as it was written."""
         return tomli_w.dumps(dict(self.tables))
 
     @property
     def complete(self) -> bool:
-        """Whether all is stated that a contact needs to be solved."""
+        """True if the case states all that a contact needs to be solved."""
         return {"lubricant", "surface"} <= set(self.tables)
 
     def contact_table(self, contact: MachineContact) -> dict[str, Any]:
-        """[contact] of a case file for one of the contacts; BadInput where it draws no oil in."""
+        """Return the [contact] table of one of the contacts; BadInput without entrainment."""
         stated = contact.conditions(self.pair)
         radii = [
             _written(radius, "m")
@@ -217,12 +217,13 @@ class MachineCase:
             **length,
             "load": _written(stated.load, "N"),
             "entrainment_speed": _written(stated.entrainment_speed, "m/s"),
-            "slip": float(f"{contact.slide_to_roll or 0.0:.{FOUND}g}"),  # the same from either side
+            # symmetric in the two bodies
+            "slip": float(f"{contact.slide_to_roll or 0.0:.{DIGITS}g}"),
         }
 
     def case(self, contact: MachineContact) -> Case:
-        """One of the contacts, with all else that the file states; BadInput as `load_case` raises it."""
-        own = {key: table for key, table in self.tables.items() if key not in OWN}
+        """Return the case of one of the contacts; BadInput as `load_case`."""
+        own = {key: table for key, table in self.tables.items() if key not in MACHINE_TABLES}
         tables = {"material": STEEL, **own}
         stated = parse_section(
             CaseFile, {**tables, "contact": self.contact_table(contact)}, self.source
@@ -230,21 +231,21 @@ class MachineCase:
         return Case(stated, self.folder, self.source)
 
     def with_overrides(self, overrides: Mapping[str, object]) -> "MachineCase":
-        """The machine with values replaced, such as `{"machine.torque": "300 N m"}`."""
+        """Return the machine with values replaced, such as `{"machine.torque": "300 N m"}`."""
         return _machine_case(
             replaced(deepcopy(dict(self.tables)), overrides, self.source), self.folder, self.source
         )
 
 
 def load_machine(path: str | Path, overrides: Mapping[str, object] | None = None) -> MachineCase:
-    """Read a case file that states a machine, with values replaced, such as `{"machine.torque": "300 N m"}`.
+    """Read a case file with a machine; `overrides` replace values by dotted keys.
 
     Raises
     ------
     UnreadableFile
-        if the file is missing or no TOML.
+        if the file is missing or not TOML.
     BadInput
-        for a machine that cannot be, or a key, unit or value that cannot be meant; one sentence that says which.
+        for an impossible machine, or an invalid key, unit or value, in one sentence that names it.
     """
     path = Path(path)
     tables = parse_toml(read_text(path), str(path))
@@ -253,8 +254,8 @@ def load_machine(path: str | Path, overrides: Mapping[str, object] | None = None
     return _machine_case(tables, path.parent, str(path))
 
 
-def states_machine(path: str | Path) -> bool:
-    """Whether a case file states a [machine] in place of a [contact]; UnreadableFile as `load_machine`."""
+def has_machine(path: str | Path) -> bool:
+    """Return True if a case file has a [machine]; UnreadableFile as `load_machine`."""
     path = Path(path)
     return "machine" in parse_toml(read_text(path), str(path))
 
@@ -262,10 +263,10 @@ def states_machine(path: str | Path) -> bool:
 def _machine_case(tables: dict[str, Any], folder: Path, source: str) -> MachineCase:
     if "machine" not in tables:
         raise BadInput(
-            f"{source}: has no [machine]; add one, or solve its one contact by asperity solve"
+            f"{source}: has no [machine]; add one, or use asperity solve for a single contact"
         )
     if "contact" in tables:
-        raise BadInput(f"{source}: states a [machine] and a [contact]; leave one of them out")
+        raise BadInput(f"{source}: has a [machine] and a [contact]; leave one of them out")
     known = {key: tables[key] for key in _MachineTables.model_fields if key in tables}
     stated = parse_section(_MachineTables, {"material": STEEL, **known}, source)
     section, material = stated.machine, stated.material
@@ -275,15 +276,15 @@ def _machine_case(tables: dict[str, Any], folder: Path, source: str) -> MachineC
     }
     try:
         machine = MACHINES[section.kind][1](**given)
-        stated.rating.require_of(section.kind)
-        found = MachineCase(tables, machine, pair, stated.rating, folder, source)
-        drawn = [contact for contact in found.contacts if not contact.stands_still]
+        stated.rating.require_applicable(section.kind)
+        machine_case = MachineCase(tables, machine, pair, stated.rating, folder, source)
+        drawn = [contact for contact in machine_case.contacts if not contact.stands_still]
     except BadInput as refusal:
         raise BadInput(f"{source}: machine: {refusal}") from None
-    if found.complete and drawn:
-        found.case(drawn[0])  # refuses what else the file states
-    return found
+    if machine_case.complete and drawn:
+        machine_case.case(drawn[0])  # checks the remaining tables
+    return machine_case
 
 
 def _written(value: float, unit: str) -> str:
-    return f"{value:.{FOUND}g} {unit}"
+    return f"{value:.{DIGITS}g} {unit}"

@@ -1,4 +1,4 @@
-"""What is wrong with a table of a case file, said in one sentence that names the key, the value and the remedy."""
+"""Errors in a table of a case file, as one sentence with key, value and remedy."""
 
 from collections.abc import Callable, Iterator, Mapping, Set
 from difflib import get_close_matches
@@ -12,15 +12,15 @@ SIGNS = {
     "°C": "write degC for °C",
     "ºC": "write degC for °C",
     "°": "write deg",
-    "%": "write a share, 0.05 for 5 %",
+    "%": "write a fraction, 0.05 for 5 %",
 }
-LONGEST = 80  # characters of a value in a message
+MAX_QUOTED = 80  # characters of a value in a message
 
 S = TypeVar("S", bound="Section")
 
 
 class Section(BaseModel):
-    """A table of the case file; keys that are not fields are refused."""
+    """Table of a case file; unknown keys are refused."""
 
     model_config = ConfigDict(
         defer_build=True, extra="forbid", frozen=True, allow_inf_nan=False, serialize_by_alias=True
@@ -28,7 +28,7 @@ class Section(BaseModel):
 
 
 class LocatedError(BadInput):
-    """What is wrong, and the keys that lead to it."""
+    """Error in a table, with the keys that lead to it."""
 
     def __init__(self, keys: tuple[str | int, ...], message: str) -> None:
         super().__init__(message)
@@ -37,15 +37,15 @@ class LocatedError(BadInput):
 
 
 def quoted(value: object) -> str:
-    """A value as a message shows it: text in quotation marks, and of what is long its beginning."""
+    """Return a value as messages show it: text in quotation marks, long values truncated."""
     text = f'"{value}"' if isinstance(value, str) else str(value)
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}... ({len(text)} characters)"
+    return text if len(text) <= MAX_QUOTED else f"{text[:MAX_QUOTED]}... ({len(text)} characters)"
 
 
 def remedy_for(value: object, but: str = "") -> str:
-    """What to write instead of a sign that is none of ours, as the end of a sentence; nothing for most values.
+    """Return a remedy for an unknown sign in a value, as the end of a sentence; else "".
 
-    `but` is a sign that is none of the mistake's.
+    `but` is a sign that is not the cause of the error.
     """
     text = value if isinstance(value, str) else ""
     return next(
@@ -54,36 +54,37 @@ def remedy_for(value: object, but: str = "") -> str:
 
 
 def none_from_word(value: object) -> object:
-    """Let the word none leave an optional thing out: `--set material.hardness=none`."""
+    """Return None for "none", so that `--set material.hardness=none` omits an optional value."""
     return None if value == "none" else value
 
 
 def parse_section(model: type[S], table: object, source: str) -> S:
-    """A table with units, of a case or of another file, as the section that it is meant to be.
+    """Parse a table with units, of a case or of another file, as a section.
 
     Raises BadInput for what the section refuses; the sentence begins with `source` and names the
     key.
     """
     try:
         return validated(model, table)
-    except LocatedError as mistake:
-        raise BadInput(f"{source}: {_dotted(mistake.keys)} {mistake.message}") from None
+    except LocatedError as error:
+        raise BadInput(f"{source}: {_dotted(error.keys)} {error.message}") from None
 
 
 def validated(model: type[S], table: object) -> S:
-    """A table as a section; `LocatedError` for what it refuses."""
+    """Validate a table as a section; raises `LocatedError`."""
     try:
         return model.model_validate(table)
     except ValidationError as error:
-        raise _first_mistake(model, error) from None
+        raise _first_error(model, error) from None
 
 
 def with_axes(
     model: type[S], value: object, own: Set[str], read: Callable[[object], object]
 ) -> S | None:
-    """A section whose further keys name quantities, as tables (contact.load) or by their bare names; None for none.
+    """Parse a section whose further keys name quantities; None for "none".
 
-    `own` are keys of which a table that is read has at least one; any other leads on to quantities.
+    Quantities are nested tables (contact.load) or bare names. `own` are keys of which a table of
+    values has at least one; any other table leads on to quantities.
     """
     if value is None or value == "none":
         return None
@@ -110,46 +111,46 @@ def _axes(
             continue
         try:
             yield ".".join(keys), read(value)
-        except LocatedError as mistake:
-            raise LocatedError(keys + mistake.keys, mistake.message) from None
-        except BadInput as mistake:
-            raise LocatedError(keys, str(mistake)) from None
+        except LocatedError as error:
+            raise LocatedError(keys + error.keys, error.message) from None
+        except BadInput as error:
+            raise LocatedError(keys, str(error)) from None
 
 
 def choose(key: str, sections: Callable[[], Mapping[str, type[S]]], value: object) -> S:
-    """The section that value[key] names; a bare name stands for a table that holds nothing else."""
+    """Return the section that value[key] names; a bare name stands for a table with that key."""
     table = {key: value} if isinstance(value, str) else value
     if not isinstance(table, Mapping):
         raise BadInput(f"must be a table with the key {key}, got {quoted(value)}")
     known = sections()
     if key not in table:
-        raise LocatedError((key,), f"is missing; it is one of {', '.join(known)}")
+        raise LocatedError((key,), f"is missing; choose one of {', '.join(known)}")
     name = table[key]
     if not isinstance(name, str) or name not in known:
-        near = get_close_matches(str(name), known, n=1)
-        remedy = f'; did you mean "{near[0]}"?' if near else ""
+        matches = get_close_matches(str(name), known, n=1)
+        remedy = f'; did you mean "{matches[0]}"?' if matches else ""
         raise LocatedError((key,), f"must be one of {', '.join(known)}, got {quoted(name)}{remedy}")
     return validated(known[name], table)
 
 
-def _first_mistake(model: type[Section], error: ValidationError) -> LocatedError:
-    """The mistake to mend first, in a sentence: a mistyped key explains a missing one."""
-    mistakes = error.errors(include_url=False)
-    mistake = next((m for m in mistakes if m["type"] == "extra_forbidden"), mistakes[0])
-    keys, kind, given = mistake["loc"], mistake["type"], mistake["input"]
-    cause = mistake.get("ctx", {}).get("error")
+def _first_error(model: type[Section], error: ValidationError) -> LocatedError:
+    """Return the error to fix first: a mistyped key explains a missing one."""
+    errors = error.errors(include_url=False)
+    entry = next((m for m in errors if m["type"] == "extra_forbidden"), errors[0])
+    keys, kind, given = entry["loc"], entry["type"], entry["input"]
+    cause = entry.get("ctx", {}).get("error")
     if isinstance(cause, LocatedError):
         return LocatedError(keys + cause.keys, cause.message)
     if isinstance(cause, BadInput):
         return LocatedError(keys, str(cause))
     if kind == "extra_forbidden":
         known = _keys_of(model, keys[:-1])
-        near = get_close_matches(str(keys[-1]), known, n=1)
-        remedy = f"did you mean {near[0]}?" if near else f"known here: {', '.join(known)}"
+        matches = get_close_matches(str(keys[-1]), known, n=1)
+        remedy = f"did you mean {matches[0]}?" if matches else f"known here: {', '.join(known)}"
         return LocatedError(keys, f"is not a known key; {remedy}")
     if kind == "missing":
         return LocatedError(keys, "is missing; add it")
-    expected = mistake["msg"].removeprefix("Input ").removeprefix("should ")
+    expected = entry["msg"].removeprefix("Input ").removeprefix("should ")
     if expected.startswith("be a valid dictionary"):
         expected = "be a table"
     expected = expected.replace("'", '"').replace("a valid tuple", "a list")

@@ -1,4 +1,4 @@
-"""[rating] of a case file with a machine: what standards ask for beside the machine, its oil and its roughness."""
+"""[rating] of a case file with a machine: further data that rating standards need."""
 
 from typing import Annotated, Literal
 
@@ -31,14 +31,15 @@ class RatingSection(Section):
         None  # reversed torsion, reversed bending
     )
 
-    def require_of(self, machine: str) -> None:
-        """BadInput for keys that say nothing of this kind of machine."""
-        useless: tuple[str, ...] = () if machine == "spur-gear" else OF_GEARS
-        useless += () if machine.endswith("-bearing") else OF_BEARINGS
-        for key in useless:
+    def require_applicable(self, machine: str) -> None:
+        """Raise BadInput for keys that do not apply to this kind of machine."""
+        foreign: tuple[str, ...] = () if machine == "spur-gear" else OF_GEARS
+        foreign += () if machine.endswith("-bearing") else OF_BEARINGS
+        for key in foreign:
             if key in self.model_fields_set:
-                raise BadInput(f"rating.{key} says nothing of a {machine}; leave it out")
+                raise BadInput(f"rating.{key} does not apply to a {machine}; leave it out")
         if self.contamination is not None and not 0.0 <= self.contamination <= 1.0:
             raise BadInput(
-                f"rating.contamination must lie between 0 and 1, got {self.contamination:g}; correct it"
+                f"rating.contamination must lie between 0 and 1, got {self.contamination:g}; "
+                "correct it"
             )

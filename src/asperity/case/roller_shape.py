@@ -1,4 +1,4 @@
-"""contact.shape of a case file: a roller along its length."""
+"""contact.shape of a case file: the axial profile of a roller."""
 
 import math
 from dataclasses import replace
@@ -17,11 +17,9 @@ NONE = default_amount(0.0, "mm")
 
 
 class ShapeSection(Section):
-    """How far a roller falls back along its length; its logarithm by one of the first three keys."""
+    """Axial profile of a roller; its logarithm is set by one of the first three keys."""
 
-    design_load: Annotated[Force | None, OPTIONAL] = (
-        None  # under which the load lies evenly: Johns and Gohar's
-    )
+    design_load: Annotated[Force | None, OPTIONAL] = None  # with uniform pressure: Johns and Gohar
     iso_diameter: Annotated[Length | None, OPTIONAL] = None  # of the roller: ISO 16281's profile
     amplitude: Annotated[Length | None, OPTIONAL] = None
     end_drop: Annotated[Length | None, OPTIONAL] = None  # where the amplitude is given
@@ -36,37 +34,44 @@ class ShapeSection(Section):
         given = [key for key in LOGARITHMS if getattr(self, key) is not None]
         if len(given) > 1:
             raise BadInput(
-                f"has {given[0]} and {given[1]}, which both make the logarithm; leave one of them out"
+                f"has {given[0]} and {given[1]}, which both define the logarithmic profile; leave "
+                "one of them out"
             )
         if self.end_drop is not None and self.amplitude is None:
             raise BadInput(
-                "has an end_drop without an amplitude; give both, or a design_load, which makes both"
+                "has an end_drop without an amplitude; state both, or design_load, which defines "
+                "both"
             )
         if self.iso_diameter is not None and self.flat > 0.0:
             raise BadInput(
-                "has a flat and an iso_diameter, which both make the straight middle; leave one of them out"
+                "has a flat and an iso_diameter, which both define the straight middle; leave one "
+                "of them out"
             )
         return self
 
     def shape(self, length: float, radius: float, pair: ElasticPair) -> RollerShape:
-        """The shape of a roller of that length [m] and effective radius [m]."""
-        rest = RollerShape(
+        """Return the profile of a roller of that length [m] and effective radius [m]."""
+        base_shape = RollerShape(
             flat=plain(self.flat),
             crown_radius=plain(self.crown_radius),
             chamfer=plain(self.chamfer),
             chamfer_angle=plain(self.chamfer_angle),
             tilt=plain(self.tilt),
         )
-        between = rest.between_chamfers(length)
+        between = base_shape.between_chamfers(length)
         if self.design_load is not None:
-            made = RollerShape.johns_gohar(
+            logarithmic = RollerShape.johns_gohar(
                 plain(self.design_load), between, radius, pair.reduced_modulus
             )
         elif self.iso_diameter is not None:
-            made = RollerShape.iso(plain(self.iso_diameter), between)
+            logarithmic = RollerShape.iso(plain(self.iso_diameter), between)
         elif self.amplitude is not None:
-            made = RollerShape(amplitude=plain(self.amplitude), end_drop=plain(self.end_drop))
+            logarithmic = RollerShape(
+                amplitude=plain(self.amplitude), end_drop=plain(self.end_drop)
+            )
         else:
-            return rest
-        flat = made.flat or rest.flat
-        return replace(rest, amplitude=made.amplitude, end_drop=made.end_drop, flat=flat)
+            return base_shape
+        flat = logarithmic.flat or base_shape.flat
+        return replace(
+            base_shape, amplitude=logarithmic.amplitude, end_drop=logarithmic.end_drop, flat=flat
+        )

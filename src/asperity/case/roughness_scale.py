@@ -1,4 +1,4 @@
-"""What a grid has to know of a case's roughness before it can be made or put on one."""
+"""Length scales of a case's roughness, for automatic grids."""
 
 import math
 from collections.abc import Callable
@@ -13,13 +13,13 @@ from asperity.ehl import Texture
 from asperity.surface import condition_surface, correlation_lengths, read_surface
 
 Pair = tuple[float, float]
-BEYOND = 1.02  # of what a generator asks for at least
+SIZE_MARGIN = 1.02  # above the smallest domain that a generator accepts
 GROOVE = 0.45, 0.95  # correlation lengths of a ground surface over its grooves' length and width
-CRATER = 0.8  # of a sandblasted one over the craters' radius
+CRATER = 0.8  # correlation length of a sandblasted surface over the craters' radius
 
 
 def texture_of(section: SurfaceSection, folder: Path) -> Texture | None:
-    """Roughness of both bodies together; None for smooth ones.
+    """Return the composite roughness scales of both bodies; None for smooth ones.
 
     Raises UnreadableFile for a surface file that cannot be read, BadInput for one that cannot be
     conditioned.
@@ -34,9 +34,9 @@ def texture_of(section: SurfaceSection, folder: Path) -> Texture | None:
     first, second = bodies
     return Texture(
         sq=math.hypot(first.sq, second.sq),
-        lengths=_each(min, first.lengths, second.lengths),
-        least=_each(max, first.least, second.least),
-        most=_each(min, first.most, second.most),
+        lengths=_pairwise(min, first.lengths, second.lengths),
+        least=_pairwise(max, first.least, second.least),
+        most=_pairwise(min, first.most, second.most),
     )
 
 
@@ -57,7 +57,10 @@ def _ground(arguments: dict[str, Any]) -> Texture:
 
 
 def _turned(sq: float, sizes: Pair, direction: float, shares: Pair = (1.0, 1.0)) -> Texture:
-    """Sizes along and across a direction, of which the shares are correlation lengths; the domain holds two of each."""
+    """Return scales along a direction; `shares` of the sizes are correlation lengths.
+
+    The domain holds at least two of each size.
+    """
     cosine, sine = abs(math.cos(direction)), abs(math.sin(direction))
     first, second = sizes[0] * shares[0], sizes[1] * shares[1]
     return Texture(
@@ -67,22 +70,24 @@ def _turned(sq: float, sizes: Pair, direction: float, shares: Pair = (1.0, 1.0))
             1.0 / math.hypot(sine / first, cosine / second),
         ),
         least=(
-            2.0 * BEYOND * max(sizes[0] * cosine, sizes[1] * sine),
-            2.0 * BEYOND * max(sizes[0] * sine, sizes[1] * cosine),
+            2.0 * SIZE_MARGIN * max(sizes[0] * cosine, sizes[1] * sine),
+            2.0 * SIZE_MARGIN * max(sizes[0] * sine, sizes[1] * cosine),
         ),
     )
 
 
 def _self_affine(arguments: dict[str, Any]) -> Texture:
-    """Half the shortest wave counts as its correlation length: what has to be resolved."""
+    """Return half the shortest wavelength as correlation length: the scale to resolve."""
     shortest, longest = arguments["cutoffs"]
-    return Texture(sq=arguments["sq"], lengths=(shortest / 2.0,) * 2, least=(BEYOND * longest,) * 2)
+    return Texture(
+        sq=arguments["sq"], lengths=(shortest / 2.0,) * 2, least=(SIZE_MARGIN * longest,) * 2
+    )
 
 
 def _sandblasted(arguments: dict[str, Any]) -> Texture:
     radius = arguments["crater_radius"]
     return Texture(
-        sq=arguments["sq"], lengths=(CRATER * radius,) * 2, least=(8.0 * BEYOND * radius,) * 2
+        sq=arguments["sq"], lengths=(CRATER * radius,) * 2, least=(8.0 * SIZE_MARGIN * radius,) * 2
     )
 
 
@@ -98,7 +103,7 @@ _KINDS: dict[str, Callable[[dict[str, Any]], Texture | None]] = {
 
 
 def _measured(section: FileSection, folder: Path) -> Texture:
-    """Of the whole map, conditioned as it will be; where its autocorrelation never falls, it asks for nothing."""
+    """Return the scales of the conditioned map; infinite if its autocorrelation does not decay."""
     measured = read_surface(
         folder / section.file,
         unit=section.unit,
@@ -122,5 +127,5 @@ def _known(length: float) -> float:
     return math.inf if math.isnan(length) else length
 
 
-def _each(choose: Callable[[float, float], float], first: Pair, second: Pair) -> Pair:
+def _pairwise(choose: Callable[[float, float], float], first: Pair, second: Pair) -> Pair:
     return choose(first[0], second[0]), choose(first[1], second[1])

@@ -1,4 +1,4 @@
-"""The sections of a case file, in the order in which it has them."""
+"""Sections of a case file, in its order."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -31,11 +31,11 @@ from asperity.core.errors import BadInput
 from asperity.ehl import MAX_CELLS_PER_TIME_STEP, ContactModel, Options, Start
 from asperity.solution import BOUNDARY_FRICTION
 
-MOST_FREQUENCIES = 200  # at which a contact may be shaken
+MAX_FREQUENCIES = 200  # of the dynamic stiffness
 
 
 def _parse_radius(value: object) -> Amount | tuple[Amount, Amount]:
-    """One radius, or [Rx, Ry] of an elliptic contact."""
+    """Parse one radius, or [Rx, Ry] of an elliptic contact."""
     if not isinstance(value, list | tuple):
         return parse_amount("m", value)
     if len(value) != 2:
@@ -65,7 +65,7 @@ class MaterialSection(Section):
 
 
 def _parse_cells(value: object) -> Literal["auto"] | tuple[int, int]:
-    """[nx, ny], or "auto"."""
+    """Parse [nx, ny], or "auto"."""
     if value == "auto":
         return "auto"
     if not isinstance(value, list | tuple) or len(value) != 2:
@@ -77,7 +77,7 @@ def _parse_cells(value: object) -> Literal["auto"] | tuple[int, int]:
 
 
 class GridSection(Section):
-    """[grid]: cells, and corners in half-widths of the smooth dry line contact; what is left out is chosen."""
+    """[grid]: cells, and corners in Hertz half-widths; omitted values are chosen."""
 
     cells: Annotated[Literal["auto"] | tuple[int, int], PlainValidator(_parse_cells)] = "auto"
     x: tuple[Number, Number] | None = None
@@ -90,54 +90,53 @@ class GridSection(Section):
     def _accuracy_has_a_choice(self) -> Self:
         if self.accuracy is not None and not self.chosen:
             raise BadInput(
-                'accuracy chooses a grid, and cells, x and y are all given; leave it out or set cells = "auto"'
+                "accuracy determines a grid, but cells, x and y are all given; leave it out or set "
+                'cells = "auto"'
             )
         return self
 
     @property
     def chosen(self) -> bool:
-        """Whether anything of the grid is left to be chosen."""
+        """True if any part of the grid is chosen automatically."""
         return self.cells == "auto" or self.x is None or self.y is None
 
 
 class SolverSection(Section):
-    """[solver]: how hard to solve."""
+    """[solver]: numerical settings."""
 
     tolerance: Number = Options().tolerance
     max_iterations: Annotated[int, Strict()] = Options().max_iterations
     contact_film: Length = default_amount(Options().contact_film, "m")
     dynamic: Annotated[int, Strict()] = (
-        0  # frequencies at which the solved contact is shaken for k and c; 0: none
+        0  # frequencies of the dynamic stiffness and damping; 0: none
     )
-    surfaces: Count | None = (
-        None  # surfaces of one kind that a solution is the mean of; left out: as the wait allows
-    )
+    surfaces: Count | None = None  # surfaces per solution; omitted: by the size of the grid
 
     @field_validator("dynamic")
     @classmethod
-    def _a_curve_or_none(cls, count: int) -> int:
-        if count and not 3 <= count <= MOST_FREQUENCIES:
+    def _check_dynamic(cls, count: int) -> int:
+        if count and not 3 <= count <= MAX_FREQUENCIES:
             raise BadInput(
-                f"must be 0, for no curve over frequency, or 3 to {MOST_FREQUENCIES}, got {count}"
+                f"must be 0, for no curve over frequency, or 3 to {MAX_FREQUENCIES}, got {count}"
             )
         return count
 
 
 class MotionSection(Section):
-    """[motion]: how `asperity run` lets the roughness move."""
+    """[motion]: motion of the roughness in `asperity run`."""
 
     steps: Count = 200
     time_step: Annotated[float, Strict(), Field(gt=0.0, le=MAX_CELLS_PER_TIME_STEP)] = (
-        1.0  # cells that the oil travels in one
+        1.0  # cells that the oil travels per step
     )
-    rough: RoughBody = "first"  # which body carries a generated surface; both: a half each
+    rough: RoughBody = "first"  # body with the generated surface; both: half of the variance each
     start: Start = "steady"
     track: Count = 1  # lengths of the domain after which a surface repeats
-    flattening: Annotated[bool, Strict()] = False  # what is pressed flat stays flat: running-in
+    flattening: Annotated[bool, Strict()] = False  # keep plastic flattening: running-in
 
 
 class CaseFile(Section):
-    """A whole case file. `lubricant = "none"` is a dry contact: an oil is not something to forget."""
+    """Whole case file. `lubricant = "none"` is a dry contact; omitting it is an error."""
 
     model: ContactModel = "mixed"
     contact: ContactSection

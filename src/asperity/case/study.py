@@ -1,4 +1,4 @@
-"""[study] of a case file: its own keys, and the quantities that it varies, each over a list or a range."""
+"""[study] of a case file: its own keys, and the quantities to vary, each over a list or a range."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -11,7 +11,7 @@ from asperity.core.errors import BadInput
 
 
 def _parse_seeds(value: object) -> int | tuple[int, ...]:
-    """How many seeds, or the seeds themselves."""
+    """Parse the number of seeds, or a list of seeds."""
     if type(value) is int and value >= 1:
         return value
     if (
@@ -28,7 +28,7 @@ Seeding = Literal["independent", "common"]
 
 
 class RangeSection(Section):
-    """A range in [study]: `step` from one value to the next, or `count` of them; over samples, neither."""
+    """Range in [study]: `step` or `count` of values; neither for sampled studies."""
 
     start: Any = Field(alias="from")
     to: Any
@@ -38,20 +38,20 @@ class RangeSection(Section):
 
 
 class StudySection(Section):
-    """[study]: what a sweep varies. Every other key names a quantity of the case."""
+    """[study]: quantities that a sweep varies; every other key names a quantity of the case."""
 
     kind: StudyKind = "solve"
     axes: dict[str, tuple[Any, ...] | RangeSection]  # as written: key -> values
-    samples: Count | None = None  # a Latin hypercube of so many points in place of the product
+    samples: Count | None = None  # points of a Latin hypercube in place of the full product
     sample_seed: Seed = 0
     seeds: Annotated[int | tuple[int, ...], PlainValidator(_parse_seeds)] = (
-        1  # how many surfaces a point, or which
+        1  # surfaces per point, or their seeds
     )
     seeding: Seeding = "independent"
 
 
 def parse_study(value: object) -> StudySection | None:
-    """The plan of a study; quantities stand beside its own keys."""
+    """Parse [study]; quantities stand beside its own keys."""
     return with_axes(StudySection, value, {"from", "to", "step", "count"}, _values)
 
 
@@ -61,6 +61,7 @@ def _values(value: object) -> object:
     if isinstance(value, list) and value:
         return tuple(value)
     raise BadInput(
-        'must be a list of values or a range such as { from = "0.5 um", to = "4 um", step = "0.1 um" }, '
+        "must be a list of values or a range such as "
+        '{ from = "0.5 um", to = "4 um", step = "0.1 um" }, '
         f"got {quoted(value)}"
     )

@@ -1,6 +1,6 @@
-"""[surface] of a case file: roughness made from numbers or read from a file, at rest on the grid and on moving tracks.
+"""[surface] of a case file: generated or measured roughness, on the grid and on moving tracks.
 
-`KINDS` has a line for every generated surface: what makes it, and its keys.
+`KINDS` has an entry per generated surface: generator and keys.
 """
 
 import math
@@ -42,20 +42,18 @@ from asperity.surface import (
     self_affine_surface,
 )
 
-SAMPLE_DEVIATION = (
-    0.05  # of a generated surface's correlation lengths, beyond which the notes say so
-)
+SAMPLE_DEVIATION = 0.05  # of a sample's correlation lengths, above which a note is given
 
 RoughBody = Literal["first", "second", "both"]
 
 
 def _parse_second(value: object) -> "SurfaceSection | None":
-    """The other body's surface; without kind a measured one."""
+    """Parse the other body's surface; without kind a measured one."""
     if value is None or value == "none":
         return None
     if isinstance(value, Mapping) and "second" in value:
         raise LocatedError(
-            ("second",), "is a third surface where a contact has two bodies; leave it out"
+            ("second",), "would be a third surface, but a contact has two bodies; leave it out"
         )
     if isinstance(value, Mapping) and "kind" not in value:
         return validated(FileSection, value)
@@ -63,50 +61,57 @@ def _parse_second(value: object) -> "SurfaceSection | None":
 
 
 class SurfaceSection(Section, ABC):
-    """[surface]; `second` is that of the other body, where each has its own."""
+    """[surface]; `second` is that of the other body, if each has its own."""
 
     second: Annotated[Any, PlainValidator(_parse_second)] = None
 
     @property
     def parts(self) -> "dict[str, SurfaceSection]":
-        """Both bodies' surfaces by the key that each stands at; one where it is that of both together."""
+        """Surfaces of both bodies by key; a single one if it is the composite."""
         return {"surface": self, **({} if self.second is None else {"surface.second": self.second})}
 
     @property
     @abstractmethod
-    def fixed(self) -> bool:
-        """Whether there is no other surface like it."""
+    def is_fixed(self) -> bool:
+        """True if there is only one surface of this kind."""
 
     @abstractmethod
-    def room(self, grid: Grid, folder: Path) -> int | None:
-        """How many surfaces of its kind there are; None for as many as one likes."""
+    def variant_count(self, grid: Grid, folder: Path) -> int | None:
+        """Return the number of different surfaces of this kind; None if unlimited."""
 
     @abstractmethod
-    def numbered(self, number: int) -> dict[str, object]:
-        """The keys and values that make it the surface of that number; it is number 0 itself."""
+    def variant(self, number: int) -> dict[str, object]:
+        """Return the keys and values of the surface of that number; 0 is itself."""
 
     @abstractmethod
-    def made(self, grid: Grid, folder: Path, *stream: int) -> tuple[Surface, tuple[str, ...]]:
-        """The surface on a grid, and what was done to get it; of another `stream` an independent one, where drawn."""
+    def build(self, grid: Grid, folder: Path, *stream: int) -> tuple[Surface, tuple[str, ...]]:
+        """Return the surface on a grid, and its processing steps.
+
+        Another `stream` gives an independent random surface.
+        """
 
     @property
     @abstractmethod
     def name(self) -> str:
-        """Its file's, or its kind."""
+        """File name, or kind."""
 
     def available(self, grid: Grid, folder: Path) -> int | None:
-        """How many different surfaces both bodies can have together; None for as many as one likes."""
-        varied = [part for part in self.parts.values() if not part.fixed]
-        rooms = [room for part in varied if (room := part.room(grid, folder)) is not None]
-        return min(rooms) if rooms else None if varied else 1
+        """Return the number of different surfaces of both bodies together; None if unlimited."""
+        varied = [part for part in self.parts.values() if not part.is_fixed]
+        counts = [
+            variant_count
+            for part in varied
+            if (variant_count := part.variant_count(grid, folder)) is not None
+        ]
+        return min(counts) if counts else None if varied else 1
 
-    def another(self, number: int) -> dict[str, object]:
-        """The keys and values of the case that make both bodies' the surfaces of that number."""
+    def variant_overrides(self, number: int) -> dict[str, object]:
+        """Return the case keys and values of the surfaces of that number, for both bodies."""
         return {
             f"{key}.{name}": value
             for key, part in self.parts.items()
-            if not part.fixed
-            for name, value in part.numbered(number).items()
+            if not part.is_fixed
+            for name, value in part.variant(number).items()
         }
 
 
@@ -119,7 +124,7 @@ _SEED: Any = (Seed, 0)
 
 
 class _Kind(NamedTuple):
-    """A kind of generated surface: what makes it of the grid, the section's fields and an rng; and the fields."""
+    """Kind of generated surface: its generator, and the fields of the section."""
 
     generator: Callable[..., Surface]
     fields: dict[str, Any]
@@ -151,7 +156,7 @@ KINDS: dict[str, _Kind] = {
     "sandblasted": _Kind(
         sandblasted_surface, {"sq": _LENGTH, "crater_radius": _LENGTH, "seed": _SEED}
     ),
-    # plateau_roughness: Sq of the plateau over that of the surface before it was worn
+    # plateau_roughness: Sq of the plateau over that of the unworn surface
     "run-in": _Kind(
         run_in_surface,
         {
@@ -167,12 +172,12 @@ KINDS: dict[str, _Kind] = {
 
 
 class GeneratedSection(SurfaceSection):
-    """Roughness made from numbers: the fields are keywords of its generator; a `seed` draws it where it is random."""
+    """Generated roughness: fields are keywords of its generator, and a `seed` if random."""
 
     kind: str
 
     def arguments(self) -> dict[str, Any]:
-        """The fields as the generator takes them: SI, an angle in radians."""
+        """Return the generator's arguments: SI, angles in radians."""
         values = {
             name: plain(getattr(self, name)) for name in KINDS[self.kind].fields if name != "seed"
         }
@@ -180,37 +185,37 @@ class GeneratedSection(SurfaceSection):
             values["direction"] = math.radians(values.pop("direction_deg"))
         return values
 
-    def make(self, grid: Grid, *stream: int) -> Surface:
-        """The surface on a grid; another `stream` of the seed is an independent one."""
+    def generate(self, grid: Grid, *stream: int) -> Surface:
+        """Return the surface on a grid; another `stream` of the seed is independent."""
         seed: int = getattr(self, "seed", 0)
         rng = np.random.default_rng([seed, *stream] if stream else seed)
         return KINDS[self.kind].generator(grid, **self.arguments(), rng=rng)
 
     @property
     def name(self) -> str:
-        """Its kind."""
+        """Kind of the surface."""
         return self.kind
 
     @property
-    def fixed(self) -> bool:
-        """Where no seed draws it."""
+    def is_fixed(self) -> bool:
+        """True without a seed."""
         return "seed" not in KINDS[self.kind].fields
 
-    def room(self, grid: Grid, folder: Path) -> int | None:  # noqa: ARG002 - it needs none
-        """As many as there are seeds."""
+    def variant_count(self, grid: Grid, folder: Path) -> int | None:  # noqa: ARG002
+        """Return None: there are as many as seeds."""
         return None
 
-    def numbered(self, number: int) -> dict[str, object]:
-        """With a later seed."""
+    def variant(self, number: int) -> dict[str, object]:
+        """Return a later seed."""
         return {"seed": getattr(self, "seed", 0) + number}
 
-    def made(self, grid: Grid, folder: Path, *stream: int) -> tuple[Surface, tuple[str, ...]]:  # noqa: ARG002
-        """Drawn on the grid."""
-        surface = self.make(grid, *stream)
+    def build(self, grid: Grid, folder: Path, *stream: int) -> tuple[Surface, tuple[str, ...]]:  # noqa: ARG002
+        """Return the surface generated on the grid, and notes."""
+        surface = self.generate(grid, *stream)
         return surface, self.notes(surface)
 
     def notes(self, surface: Surface) -> tuple[str, ...]:
-        """How far the correlation lengths of a sample stray from those of a (non-)Gaussian section."""
+        """Return a note if a sample's correlation lengths deviate from the stated ones."""
         if self.kind not in ("gaussian", "non-gaussian"):
             return ()
         arguments = self.arguments()
@@ -224,8 +229,9 @@ class GeneratedSection(SurfaceSection):
         ):
             return ()
         return (
-            f"This sample's autocorrelation falls to 1/e over {area_text(lengths)}, where {area_text(stated)} "
-            "was asked for: the domain holds few correlation lengths, so seeds scatter.",
+            f"The correlation lengths of this sample are {area_text(lengths)}, "
+            f"{area_text(stated)} were requested: the domain holds few correlation lengths, so "
+            "samples scatter with the seed.",
         )
 
 
@@ -238,27 +244,25 @@ GENERATED_SECTIONS: dict[str, type[GeneratedSection]] = {
 
 
 class FileSection(SurfaceSection):
-    """A measured surface and what is done to it."""
+    """Measured surface and its processing."""
 
     file: str
-    sq: Annotated[Length | None, OPTIONAL] = None  # scale to this; left out: as measured
+    sq: Annotated[Length | None, OPTIONAL] = None  # scale to this; omitted: as measured
     form: Form = "quadratic"
     fit: FitMode = "crop"
-    turn: Annotated[bool, Strict()] = (
-        False  # by a quarter turn: what the file has along x runs along y
-    )
+    turn: Annotated[bool, Strict()] = False  # by 90 degrees: x of the file becomes y
     outliers: Outliers = "keep"
     s_filter: Annotated[Length | None, OPTIONAL] = None
     l_filter: Annotated[Length | None, OPTIONAL] = None
-    unit: str | None = None  # of the heights, where the file does not say
+    unit: str | None = None  # of the heights, if the file does not state it
     lateral_unit: str | None = None
     pixel: Annotated[tuple[Length, Length], PAIRED] | None = None  # of a matrix of bare heights
     place: Annotated[int, Strict(), Field(ge=0)] | None = (
-        None  # which part of the map; left out: its centre
+        None  # number of the part of the map; omitted: its centre
     )
 
     def measured(self, folder: Path) -> MeasuredSurface:
-        """The file's map; `folder` is where the file is looked for."""
+        """Return the map of the file; `folder` is the base of its path."""
         return read_surface(
             folder / self.file,
             unit=self.unit,
@@ -268,24 +272,24 @@ class FileSection(SurfaceSection):
 
     @property
     def name(self) -> str:
-        """Its file's."""
+        """Name of the file."""
         return self.file
 
     @property
-    def fixed(self) -> bool:
-        """A map has other places."""
+    def is_fixed(self) -> bool:
+        """False: a map has other positions."""
         return False
 
-    def room(self, grid: Grid, folder: Path) -> int | None:
-        """As many as the map holds side by side, from its own place on."""
+    def variant_count(self, grid: Grid, folder: Path) -> int | None:
+        """Return the number of non-overlapping positions on the map, from its own on."""
         return max(1, count_places(self.measured(folder), grid, turn=self.turn) - (self.place or 0))
 
-    def numbered(self, number: int) -> dict[str, object]:
-        """At the place so many places on."""
+    def variant(self, number: int) -> dict[str, object]:
+        """Return a later position on the map."""
         return {"place": (self.place or 0) + number}
 
-    def made(self, grid: Grid, folder: Path, *stream: int) -> tuple[Surface, tuple[str, ...]]:  # noqa: ARG002
-        """Prepared for the grid."""
+    def build(self, grid: Grid, folder: Path, *stream: int) -> tuple[Surface, tuple[str, ...]]:  # noqa: ARG002
+        """Return the surface prepared for the grid, and its processing steps."""
         prepared = self.prepare(grid, folder)
         return prepared.surface, prepared.steps
 
@@ -301,7 +305,7 @@ class FileSection(SurfaceSection):
         )
 
     def prepare(self, grid: Grid, folder: Path) -> PreparedSurface:
-        """The file's map on a grid; `folder` is where the file is looked for."""
+        """Return the file's map on a grid; `folder` is the base of its path."""
         measured = self.measured(folder)
         prepared = prepare_surface(
             measured,
@@ -315,11 +319,12 @@ class FileSection(SurfaceSection):
 
 
 def parse_surface(value: object) -> SurfaceSection:
-    """The section of a generated surface by its kind, or that of a measured one."""
+    """Parse the section of a generated surface by its kind, or of a measured one."""
     if isinstance(value, Mapping) and "file" in value:
         if "kind" in value:
             raise BadInput(
-                "has both kind and file; keep kind for a generated surface or file for a measured one"
+                "has both kind and file; keep kind for a generated surface or file for a measured "
+                "one"
             )
         return validated(FileSection, value)
     if isinstance(value, Mapping) and "kind" not in value:
@@ -332,7 +337,7 @@ def parse_surface(value: object) -> SurfaceSection:
 def two_bodies(
     section: SurfaceSection, grid: Grid, folder: Path, speeds: tuple[float, float]
 ) -> CompositeSurface | None:
-    """Both bodies' surfaces apart, each with its speed [m/s]; None where the section has no second one."""
+    """Return both bodies' surfaces separately, with speeds [m/s]; None without a second one."""
     if section.second is None:
         return None
     (first, _), (second, _) = _bodies(section, grid, folder)
@@ -342,25 +347,25 @@ def two_bodies(
 def composite_roughness(
     section: SurfaceSection, grid: Grid, folder: Path, speeds: tuple[float, float]
 ) -> tuple[Surface, tuple[str, ...]]:
-    """The roughness of both bodies together on the grid, and what was done to get it, a sentence each."""
+    """Return the composite roughness of both bodies on the grid, and its processing steps."""
     if section.second is None:
-        return section.made(grid, folder)
+        return section.build(grid, folder)
     (first, done), (second, done_to_second) = _bodies(section, grid, folder)
     combined = CompositeSurface(first, second, speeds).surface
     return combined, (
         *(f"{section.name}: {step}" for step in done),
         *(f"{section.second.name}: {step}" for step in done_to_second),
-        f"added {section.name} (moving at {speeds[0]:.4g} m/s) and {section.second.name} ({speeds[1]:.4g} m/s), "
-        f"the second face down; Sq {length_text(combined.sq)} together",
+        f"added {section.name} (moving at {speeds[0]:.4g} m/s) and {section.second.name} "
+        f"({speeds[1]:.4g} m/s), the second face down; composite Sq {length_text(combined.sq)}",
     )
 
 
 def _bodies(
     section: SurfaceSection, grid: Grid, folder: Path
 ) -> list[tuple[Surface, tuple[str, ...]]]:
-    """Both bodies' surfaces; a second one that is drawn depends on the first one's seed too, and is no copy of it."""
+    """Return both bodies' surfaces; the second's random stream depends on the first's seed, too."""
     drawn = int(getattr(section, "seed", 0) or getattr(section, "place", 0) or 0)
-    return [section.made(grid, folder), section.second.made(grid, folder, 2, drawn)]
+    return [section.build(grid, folder), section.second.build(grid, folder, 2, drawn)]
 
 
 def moving_roughness(
@@ -371,21 +376,25 @@ def moving_roughness(
     speeds: tuple[float, float],
     grid: Grid,
 ) -> MovingSurfaces:
-    """The roughness of both bodies on their tracks, seen through the contact's `grid`; see `Case.moving_surfaces`."""
+    """Return both bodies' roughness on their tracks, and the contact's `grid`.
+
+    See `Case.moving_surfaces`.
+    """
     apart = two_bodies(section, track, folder, speeds)
     if apart is not None:
         return MovingSurfaces(apart.first, apart.second, speeds, grid)
     if isinstance(section, FileSection):
         if rough == "both":
             raise BadInput(
-                f"{section.file} is one surface and motion.rough asks for two; name the other as second"
+                f'motion.rough = "both" needs two surfaces, got {section.file} only; state the '
+                "other as surface.second"
             )
         surface = section.prepare(track, folder).surface
     else:
         assert isinstance(section, GeneratedSection)
-        surface = section.make(track)
+        surface = section.generate(track)
         if rough == "both":
-            samples = (surface, section.make(track, 2))
+            samples = (surface, section.generate(track, 2))
             first, second = (Surface(sample.heights / math.sqrt(2.0), track) for sample in samples)
             return MovingSurfaces(first, second, speeds, grid)
     return MovingSurfaces.one_rough(surface, speeds, grid, first=rough == "first")

@@ -1,4 +1,4 @@
-"""A case as TOML text: read, restated with every default, and with values replaced."""
+"""Case as TOML text: read, write with all defaults, and replace values."""
 
 import copyreg
 import os
@@ -21,15 +21,15 @@ from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import require_file
 from asperity.core.third_party import first_line
 
-LONGEST = 4_000_000  # bytes of a case file
+MAX_BYTES = 4_000_000  # of a case file
 
 
 def read_text(path: Path) -> str:
-    """A case file's text; `UnreadableFile` if it is missing or no text."""
+    """Read a case file's text; `UnreadableFile` if it is missing or not text."""
     require_file(path)
-    if path.stat().st_size > LONGEST:
+    if path.stat().st_size > MAX_BYTES:
         raise UnreadableFile(
-            f"{path} has {path.stat().st_size} bytes, too many for a case; check its name"
+            f"{path} has {path.stat().st_size} bytes, too many for a case file; check its name"
         )
     try:
         return path.read_text("utf-8")
@@ -40,25 +40,20 @@ def read_text(path: Path) -> str:
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
-    """The tables of a text; `UnreadableFile` for what is no TOML."""
+    """Parse TOML text into tables; `UnreadableFile` if it is not valid."""
     try:
         return tomllib.loads(text)
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # no TOML, or numbers and brackets beyond what Python reads
+    except (ValueError, RecursionError) as error:  # also numbers and nesting beyond Python's limits
         raise UnreadableFile(f"{source} is not valid TOML: {first_line(error)}") from None
 
 
 def restated(contents: CaseFile) -> str:
-    """A case as TOML, every default written out, quantities as they were written."""
+    """Return a case as TOML with all defaults, quantities as they were written."""
     tables = _plain(contents)
     if contents.lubricant is None:
         tables["lubricant"] = "none"
-    if isinstance(
-        contents.lubricant, SheetSection
-    ):  # which decides these, and at another temperature otherwise
-        for key in contents.thermal.tacit:
+    if isinstance(contents.lubricant, SheetSection):  # determines these values
+        for key in contents.thermal.defaulted:
             del tables["thermal"][key]
     return tomli_w.dumps(tables)
 
@@ -71,40 +66,36 @@ def _as_text(contents: CaseFile) -> tuple[Callable[[str], CaseFile], tuple[str]]
     return _reread, (restated(contents),)
 
 
-copyreg.pickle(
-    CaseFile, _as_text
-)  # the sections of laws are made at run time, which pickle cannot follow
+# the sections of laws are created at run time, which pickle cannot import
+copyreg.pickle(CaseFile, _as_text)
 
 
 def replaced(
     tables: dict[str, Any], overrides: Mapping[str, object], source: str
 ) -> dict[str, Any]:
-    """The tables with values replaced by their dotted keys; text is read as TOML where it is TOML.
+    """Return the tables with values replaced by dotted keys; text is parsed as TOML if possible.
 
-    `vibration.preset` replaces all that presets choose. Raises BadInput for what is no dotted key.
+    `vibration.preset` replaces all keys that presets determine. Raises BadInput for an invalid key.
     """
-    if (
-        "vibration.preset" in overrides
-    ):  # what the old preset chose is written out, and would stand above the new
+    if "vibration.preset" in overrides:  # values of the old preset would override the new one
         for choice in preset_keys():
             tables.get("vibration", {}).pop(choice, None)
     for path, value in overrides.items():
         *parents, key = path.split(".")
         if not all((*parents, key)):
-            raise BadInput(f"{source}: {path} is not a key; name one such as contact.load")
+            raise BadInput(f"{source}: {path} is not a key; use one such as contact.load")
         table = tables
         for parent in parents:
             if not isinstance(table.get(parent), dict):
                 table[parent] = {}
             table = table[parent]
-        table[key] = (
-            _toml_value(value) if isinstance(value, str) else deepcopy(value)
-        )  # a later key may go into it
+        # a copy, because a later key may modify it
+        table[key] = _toml_value(value) if isinstance(value, str) else deepcopy(value)
     return tables
 
 
 def relative_path(file: str | Path, folder: Path) -> str:
-    """`file` as seen from `folder`, so that a case can be moved together with its surface."""
+    """Return `file` relative to `folder`, so that a case can be moved with its surface."""
     try:
         return Path(os.path.relpath(file, folder)).as_posix()
     except ValueError:  # on another drive
@@ -115,18 +106,17 @@ def _toml_value(text: str) -> object:
     try:
         read = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:
-        return text  # the shell took the quotes away
+        return text  # the shell removed the quotes
     except (ValueError, RecursionError) as error:
         raise BadInput(
             f"a value cannot be read ({first_line(error)}), got {quoted(text)}"
         ) from None
-    return (
-        read["value"] if len(read) == 1 else text
-    )  # a line of another key is no part of the value
+    # further keys on later lines are not part of the value
+    return read["value"] if len(read) == 1 else text
 
 
 def _plain(section: Section) -> dict[str, Any]:
-    """Tables of plain values, quantities as they were written; what is left out stays out."""
+    """Return tables of plain values, quantities as written; omitted values stay omitted."""
     values = {
         entry.alias or name: getattr(section, name)
         for name, entry in type(section).model_fields.items()

@@ -1,7 +1,7 @@
-"""Quantities with units, as a case file and the command line write them: read to SI, and written back as they stood.
+"""Quantities with units, as case files and the command line write them: conversion to SI and back.
 
-The only module that knows pint, which is loaded for a unit that is not in the table of common
-ones. Nothing deeper in the package has units other than SI.
+The only module that uses pint, which is loaded for units outside the table of common ones. All
+other modules use SI only.
 """
 
 import math
@@ -19,7 +19,7 @@ from asperity.core.errors import BadInput
 if TYPE_CHECKING:
     import pint
 
-_MEASURES = {  # SI unit -> what it measures, and how one is written
+_MEASURES = {  # SI unit -> quantity, and an example
     "m": ("a length", "5.4 mm"),
     "N": ("a force", "500 N"),
     "m/s": ("a speed", "2 m/s"),
@@ -44,8 +44,7 @@ _MEASURES = {  # SI unit -> what it measures, and how one is written
 }
 _TURN = Decimal("6.283185307179586476925286766559")  # 2 pi
 _PER_MINUTE = str(_TURN / 60)
-# unit -> its SI unit, and what one is worth in it: pint and its registry take longer to load than a
-# case
+# unit -> its SI unit and the conversion factor: pint and its registry load slower than a case
 _COMMON = {
     "m": ("m", "1"),
     "mm": ("m", "1e-3"),
@@ -89,76 +88,72 @@ _COMMON = {
     "rad/s": ("rad/s", "1"),
     "rpm": ("rad/s", _PER_MINUTE),
 }
-_OURS = {
+# units that pint does not know, or reads differently
+_CUSTOM = {
     "Nm": ("N m", "1"),
     "r/min": ("rad/s", _PER_MINUTE),
     "1/min": ("rad/s", _PER_MINUTE),
-}  # not pint's, or another
-_FREQUENCIES = {
-    "Hz": "in hertz",
-    "rad/s": "in r/min or rad/s",
-}  # one for the other would be a factor 2 pi off
-TINY = math.ulp(0.0)  # the least positive number
+}
+# confusing the two would be wrong by a factor of 2 pi
+_FREQUENCIES = {"Hz": "in hertz", "rad/s": "in r/min or rad/s"}
+TINY = math.ulp(0.0)  # the smallest positive number
 _WRITTEN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([\w\s.*/^()·⁻-]*)")
 
 
 class Amount(float):
-    """A quantity in SI that remembers how it was written, so that a case is restated in its author's units."""
+    """Quantity in SI that keeps its text, so that a case is written back in its author's units."""
 
     text: str
 
     def __new__(cls, value: float, text: str) -> "Amount":
-        """`value` in SI, `text` with its unit."""
+        """Create an amount of `value` in SI, written as `text` with its unit."""
         amount = super().__new__(cls, value)
         amount.text = text
         return amount
 
-    def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]  # or it could not be copied
+    def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]  # for copies
         return float(self), self.text
 
 
 def plain(value: Any) -> Any:
-    """Numbers in SI without the text that they were written in, of a pair both; anything else as it stands."""
+    """Return floats without the text they were written in, also in pairs."""
     if isinstance(value, tuple):
         return tuple(map(plain, value))
     return float(value) if isinstance(value, float) else value
 
 
-_KINEMATIC = "a kinematic viscosity times the density is one: 100 cSt of 0.88 g/cm^3 are 88 mPa s"
+_KINEMATIC = "multiply a kinematic viscosity by the density: 100 cSt at 0.88 g/cm^3 are 88 mPa s"
 
 
 class _UnusableUnit(ValueError):
-    """What is wrong with a unit, as the end of a sentence."""
+    """Problem with a unit, as the end of a sentence."""
 
 
 @cache
 def _units() -> "pint.UnitRegistry[Decimal]":
     from pint import UnitRegistry
 
-    return UnitRegistry(
-        non_int_type=Decimal
-    )  # decimal: 5.4 mm is the float nearest to 0.0054, not a product of floats
+    # decimal: 5.4 mm is the float nearest to 0.0054, not a product of floats
+    return UnitRegistry(non_int_type=Decimal)
 
 
 def _common(unit_text: str) -> tuple[str, str] | None:
-    return _COMMON.get(unit_text) or _OURS.get(unit_text)
+    return _COMMON.get(unit_text) or _CUSTOM.get(unit_text)
 
 
-@lru_cache(
-    4096
-)  # a case states forty quantities, and a study states most of them a thousand times over
+@lru_cache(4096)  # a case has forty quantities, and a study repeats most of them a thousand times
 def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
-    """A number of `unit_text` in `unit`; None is the SI unit of its kind."""
-    own, wanted = _common(unit_text), _common(unit_text if unit is None else unit)
-    if own is not None and wanted is not None and own[0] == wanted[0]:
-        return Decimal(number) * Decimal(own[1]) / (1 if unit is None else Decimal(wanted[1]))
+    """Convert a number of `unit_text` to `unit`; None is the SI unit of its kind."""
+    own, target = _common(unit_text), _common(unit_text if unit is None else unit)
+    if own is not None and target is not None and own[0] == target[0]:
+        return Decimal(number) * Decimal(own[1]) / (1 if unit is None else Decimal(target[1]))
     import pint
 
     try:
         quantity = _units().Quantity(Decimal(number), unit_text)
         return (quantity.to_base_units() if unit is None else quantity.to(unit)).magnitude
     except pint.UndefinedUnitError:
-        raise _UnusableUnit("whose unit is not known; capitals matter") from None
+        raise _UnusableUnit("whose unit is unknown; units are case-sensitive") from None
     except pint.DimensionalityError:
         kinematic = unit == "Pa s" and re.search(r"St\b|stokes|m(m)?(\^|\*\*)?2/s|m²/s", unit_text)
         celsius = unit == "K" and unit_text in ("C", "c", "degF", "F")
@@ -169,7 +164,7 @@ def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
             if celsius
             else ""
         )
-        raise _UnusableUnit(f"which is something else{remedy}") from None
+        raise _UnusableUnit(f"which is another quantity{remedy}") from None
     except (
         pint.PintError,
         ValueError,
@@ -183,22 +178,23 @@ def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
 
 
 def _split(value: object) -> tuple[str, str] | None:
-    """Number and unit of a text, the unit "" where there is none; None for what is no quantity."""
+    """Split a text into number and unit ("" without one); None if it is no quantity."""
     written = _WRITTEN.fullmatch(value.replace("°C", "degC")) if isinstance(value, str) else None
     return None if written is None else (written[1], " ".join(written[2].split()))
 
 
 def parse_amount(unit: str, value: object, least: float = TINY) -> Amount:
-    """A quantity of at least `least` in `unit`, an SI one: by default positive; 0, or minus infinity for any.
+    """Parse a quantity in the SI unit `unit`, of at least `least`: by default positive.
 
-    The BadInput it raises begins with what it must be.
+    `least` is 0, or minus infinity for any value. The message of BadInput starts with the expected
+    quantity.
     """
     measure, example = _MEASURES.get(unit, (f"a quantity in {unit}", f"1 {unit}"))
     expected = f'must be {measure} such as "{example}"'
     if isinstance(value, Amount):
         return value
     if isinstance(value, int | float) and not isinstance(value, bool):
-        raise BadInput(f"{expected}, got the bare number {value}; give it its unit")
+        raise BadInput(f"{expected}, got the bare number {value}; add its unit")
     parts = _split(value)
     if parts is None:
         raise BadInput(f"{expected}, got {quoted(value)}{remedy_for(value, but='%')}")
@@ -214,13 +210,16 @@ def parse_amount(unit: str, value: object, least: float = TINY) -> Amount:
     except _UnusableUnit as wrong:
         raise BadInput(f"{expected}, got {quoted(value)}, {wrong}") from None
     if not least <= si < math.inf:
-        allowed = "positive and finite" if least == TINY else "finite, and not negative"
+        allowed = "positive and finite" if least == TINY else "finite and not negative"
         raise BadInput(f"must be {allowed}, got {quoted(value)}; correct its sign or value")
     return Amount(si, f"{number} {unit_text}")
 
 
 def read_amount(name: str, unit: str, text: str) -> float:
-    """A positive quantity on the command line, such as "300 s", in `unit`, an SI one; BadInput begins with `name`."""
+    """Read a positive quantity from the command line, such as "300 s", in the SI unit `unit`.
+
+    The message of BadInput begins with `name`.
+    """
     try:
         return float(parse_amount(unit, text))
     except BadInput as error:
@@ -228,14 +227,14 @@ def read_amount(name: str, unit: str, text: str) -> float:
 
 
 def read_length(name: str, text: str) -> float:
-    """A length on the command line, such as "0.25 mm", in metres; raises what `read_amount` does."""
+    """Read a length from the command line, such as "0.25 mm", in m; raises as `read_amount`."""
     return read_amount(name, "m", text)
 
 
 def split_amount(value: object, unit: str | None = None) -> tuple[Decimal, str]:
-    """A number and its unit as written, or the number in `unit`; a bare number has the unit "".
+    """Split a quantity into number and unit as written, or convert the number to `unit`.
 
-    Raises BadInput for what is neither, or cannot be had in `unit`.
+    A bare number has the unit "". Raises BadInput for anything else, or if it cannot be converted.
     """
     bare = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     parts = (str(value), "") if bare else _split(value)
@@ -250,12 +249,13 @@ def split_amount(value: object, unit: str | None = None) -> tuple[Decimal, str]:
     except _UnusableUnit:
         pass
     raise BadInput(
-        f"must be in {unit or 'no unit'} as the range's beginning is, got {quoted(value)}"
+        f"must have {f'the unit {unit}' if unit else 'no unit'}, as the start of the range, "
+        f"got {quoted(value)}"
     )
 
 
 def to_si(value: object) -> Any:
-    """A value of a case file as a number in SI; two equal ones as one; what is no quantity as it stands."""
+    """Return a value of a case file in SI; two equal values as one; anything else unchanged."""
     if isinstance(value, list | tuple):
         entries = [to_si(entry) for entry in value]
         return entries[0] if len(entries) == 2 and entries[0] == entries[1] else entries
@@ -271,19 +271,19 @@ def to_si(value: object) -> Any:
 
 
 def default_amount(value: float, unit: str) -> Amount:
-    """A default of the library, written out with its unit."""
+    """Return a library default as an amount with its unit."""
     return Amount(
         value, f"{value:g} {unit}" if float(f"{value:g}") == value else f"{value!r} {unit}"
     )
 
 
 def amount_in(unit: str, least: float = TINY) -> PlainValidator:
-    """What reads a section's field that is a quantity in `unit`, of at least `least`."""
+    """Return the validator of a quantity in `unit`, of at least `least`."""
     return PlainValidator(partial(parse_amount, unit, least=least))
 
 
 def _paired(value: object) -> object:
-    """One value for both bodies or both directions."""
+    """Return a pair for one value that holds for both bodies or directions."""
     return value if value is None or isinstance(value, list | tuple) else (value, value)
 
 

@@ -1,4 +1,4 @@
-"""[vibration] of a case file: a preset's choices, and over them what the case says."""
+"""[vibration] of a case file: the values of a preset, overridden by the case."""
 
 import re
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from asperity.coupling import PRESETS, VibrationModel, preset_choices, vibration
 
 
 def _vibration_key(name: str) -> str:
-    """The key of a keyword of VibrationModel: in a case, the unit stands beside the value."""
+    """Return the case key of a keyword of VibrationModel: without the unit's suffix."""
     return re.sub("_(hz|s)$", "", name)
 
 
@@ -25,7 +25,7 @@ VibrationSection = create_model("vibration", __base__=Section, **_FIELDS)
 
 
 def parse_vibration(value: object) -> Any:
-    """A preset's choices, and over them what the case says; None for "none"."""
+    """Parse [vibration]: a preset's values, overridden by the case; None for "none"."""
     if value == "none":
         return None
     chosen = value.get("preset", "sound") if isinstance(value, Mapping) else "sound"
@@ -41,12 +41,12 @@ def parse_vibration(value: object) -> Any:
 
 
 def preset_keys() -> tuple[str, ...]:
-    """The keys that presets choose."""
+    """Return the keys that presets determine."""
     return tuple(map(_vibration_key, preset_choices("sound")))
 
 
 def vibration_model(section: Any) -> VibrationModel | None:
-    """The vibration model that a section states; None without one."""
+    """Return the vibration model of a section; None without one."""
     if section is None:
         return None
     return VibrationModel(

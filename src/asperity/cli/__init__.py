@@ -1,4 +1,4 @@
-"""The command line: parses, calls, prints. No physics. One module a group of commands.
+"""Command line: parses arguments, calls the library, prints. One module per group of commands.
 
 The first line of the output is the verdict; `--json` prints one object and nothing else; progress
 goes to stderr. Exit codes: 0 done, 2 bad input or usage, 1 anything else; of `track` and `watch` 3

@@ -1,11 +1,11 @@
-"""`asperity benchmark`: any solver held against cases with certified values."""
+"""`asperity benchmark`: compare a solver with certified values."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import benchmark as held
+from asperity import benchmark as certified
 from asperity import report
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, require_output
@@ -21,54 +21,52 @@ def benchmark(
     solver: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="asperity, tamaas, contactmechanics, or package.module:thing."
+            metavar="NAME", help="asperity, tamaas, contactmechanics, or package.module:object."
         ),
     ] = "asperity",
     cells: Annotated[
         list[int] | None,
-        typer.Option(metavar="N", help="Cells along x; repeat. By default 64 and 128."),
+        typer.Option(metavar="N", help="Cells along x (repeatable; default: 64 and 128)."),
     ] = None,
     cases: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR", help="Folder of cases, in place of those that come with asperity."
-        ),
+        typer.Option(metavar="DIR", help="Folder of cases (default: those of asperity)."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="CSV", help="Write every row.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="CSV", help="Write all rows.")] = None,
     figure: Annotated[
-        Path | None, typer.Option(metavar="PNG|PDF", help="Draw error over time.")
+        Path | None, typer.Option(metavar="PNG|PDF", help="Plot error over time.")
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Hold a solver against contacts with certified values: error and time of each."""
+    """Compare a solver with contacts of certified values: error and time of each."""
     if out is not None:
         require_output(out, ".csv")
     if figure is not None:
         files.require_writable(figure)
-    chosen = held.solver_named(solver)
+    chosen = certified.solver_named(solver)
     with progress(
         "benchmark", "solving ...", quiet=quiet, compiles=solver == "asperity"
     ) as display:
-        result = held.run_benchmark(
+        result = certified.run_benchmark(
             chosen, folder=cases, cells=cells or (64, 128), progress=display
         )
-    kept = [] if out is None else [result.save(out)]
+    saved = [] if out is None else [result.save(out)]
     if figure is not None:
-        kept.append(report.write_figure(report.benchmark_figure(result), figure))
+        saved.append(report.write_figure(report.benchmark_figure(result), figure))
     show(
         result.verdict(),
-        lambda: result.scalars() | {"written": [str(path) for path in kept]},
+        lambda: result.scalars() | {"written": [str(path) for path in saved]},
         _rows(result),
         [f"  left out: {case}: {reason}" for case, reason in result.left_out],
-        written("  Written", *kept) if kept else [],
+        written("  Written", *saved) if saved else [],
         as_json=as_json,
         quiet=quiet,
     )
 
 
 def _rows(result: "BenchmarkResult") -> Block:
-    """A line a value on the finest cells."""
+    """Return a row per value on the finest grid."""
     finest = max((row.cells for row in result.rows), default=0)
     rows = [
         [

@@ -1,4 +1,4 @@
-"""`asperity demo` and `asperity solve`: contacts from case file to numbers."""
+"""`asperity demo` and `asperity solve`: single contacts, from case file to numbers."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -77,7 +77,7 @@ def solve(
         typer.Option(
             metavar="N",
             min=1,
-            help="Surfaces of its kind to solve: the numbers are means; default 5, fine grids 3.",
+            help="Surfaces to solve and average (default: 5; fine grids: 3).",
         ),
     ] = None,
     accuracy: Accuracy = None,
@@ -85,16 +85,16 @@ def solve(
         bool,
         typer.Option(
             "--dynamic",
-            help="Shake the solved contact: stiffness and damping over frequency, k and c.",
+            help="Compute frequency-dependent stiffness and damping.",
         ),
     ] = False,
     out: Annotated[
-        Path | None, typer.Option(metavar="RUN.nc", help="Keep the run, with its case.")
+        Path | None, typer.Option(metavar="RUN.nc", help="Save the run, with its case.")
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Solve one contact on several surfaces of its kind: film, load sharing, contact resonance, and their scatter."""
+    """Solve one contact on several surfaces: film, load sharing, contact resonance, scatter."""
     require_output(out, ".nc")
     chosen = chosen_case(path, overrides, surface, accuracy)
     if surfaces is not None:
@@ -106,8 +106,8 @@ def solve(
     run = _solve(chosen, label=path.name, quiet=quiet, surfaces=None, groups=groups)
     if out is not None:
         run.save(out)
-    kept = [] if out is None else [f"Kept in {out}; asperity report {out} makes a page of it"]
-    show(run.verdict(), run.summary, run_table(run), kept, as_json=as_json, quiet=quiet)
+    saved = [] if out is None else [f"Saved in {out}; asperity report {out} writes a page of it"]
+    show(run.verdict(), run.summary, run_table(run), saved, as_json=as_json, quiet=quiet)
     if not run.solution.convergence.converged:
         where = f"; the unfinished state is in {out}" if out is not None else ""
         raise AsperityError(f"not converged: {run.solution.convergence.explain()}{where}")
@@ -121,8 +121,8 @@ def _solve(
     surfaces: int | None = 1,
     groups: tuple[str, ...] | None = None,
 ) -> "Run":
-    """A run, marked where it did not converge."""
-    chosen.surface()  # made or read here: it may take seconds, which are not the solver's
+    """Solve a case; the run is marked if it did not converge."""
+    chosen.surface()  # before the progress display of the solver
     with progress(label, "setting up ...", quiet=quiet, compiles=True) as display:
         steps = SolverSteps(display)
         return results.solve_case(
@@ -137,7 +137,7 @@ def _solve(
 
 
 def run_table(run: "Run") -> Block:
-    """Every number of a run that the catalogue has for a table, how the solver ended, and what to know of them."""
+    """Return the rows of a run: numbers of the catalogue, solver status, and notes."""
     touching = 0.0 if run.solution.lubricant is None else run.solution.options.contact_film
     rows = [
         *known(run.scalars()),

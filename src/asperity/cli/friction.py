@@ -1,4 +1,4 @@
-"""`asperity stribeck` and `asperity traction`: friction over speed and over the slide-to-roll ratio."""
+"""`asperity stribeck` and `asperity traction`: friction over speed and slide-to-roll ratio."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -34,7 +34,7 @@ def stribeck(
         list[float] | None,
         typer.Option(
             metavar="M/S",
-            help="An entrainment speed; may be repeated. By default 13 around the case's.",
+            help="Entrainment speed (repeatable; default: 13 around the case's).",
         ),
     ] = None,
     sq: Roughness = None,
@@ -43,7 +43,7 @@ def stribeck(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Friction over speed, from boundary lubrication to full film."""
+    """Compute friction over speed, from boundary lubrication to full film."""
 
     def curve(chosen: "Case", step: "SolverProgress") -> "FrictionCurve":
         return results.stribeck_curve(chosen, speeds=speed, progress=step)
@@ -58,7 +58,7 @@ def traction(
         list[float] | None,
         typer.Option(
             metavar="RATIO",
-            help="A slide-to-roll ratio; may be repeated. By default 15 from 0 to 0.5.",
+            help="Slide-to-roll ratio (repeatable; default: 15 from 0 to 0.5).",
         ),
     ] = None,
     sq: Roughness = None,
@@ -67,7 +67,7 @@ def traction(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Friction over the slide-to-roll ratio, from pure rolling on."""
+    """Compute friction over the slide-to-roll ratio, from pure rolling."""
 
     def curve(chosen: "Case", step: "SolverProgress") -> "FrictionCurve":
         return results.traction_curve(chosen, slips=slip, progress=step)
@@ -115,16 +115,14 @@ def _friction_command(
     )
     unfinished = sum(not point.converged for drawn in curves for point in drawn.points)
     if unfinished:
-        raise AsperityError(
-            f"not converged at {unfinished} points, which are marked; do not use them"
-        )
+        raise AsperityError(f"not converged at {unfinished} marked points; do not use them")
 
 
 def _points(curve: "FrictionCurve") -> Block:
-    """A row a point, in the catalogue's units."""
+    """Return a row per point, in the catalogue's units."""
     rows = curve.scalars()["points"]
     selected = [quantity(key) for key in rows[0] if key != "converged"]
-    yield f"  Sq {text('sq_m', curve.sq)}{', heat fed back' if curve.feedback else ''}"
+    yield f"  Sq {text('sq_m', curve.sq)}{', with thermal feedback' if curve.feedback else ''}"
     yield from columns(
         [*(entry.label for entry in selected), ""],
         (

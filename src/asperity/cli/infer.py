@@ -1,4 +1,4 @@
-"""`asperity infer`: what recordings say of a contact, and what to run next."""
+"""`asperity infer`: posterior of a contact from recordings, and the next operating point."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -33,46 +33,56 @@ if TYPE_CHECKING:
     from asperity.simulation import WearHistory
 
 
+PathsArgument = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="[FILE...]", help="Recordings, or folders of recordings."),
+]
+CaseFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--case", metavar="CASE.toml", help="Case of the contact, with priors in [infer]."
+    ),
+]
+TableFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--table",
+        metavar="CSV",
+        help="Table with columns file, load_n, entrainment_m_s, temperature_degc.",
+    ),
+]
+ExtendOption = Annotated[
+    int,
+    typer.Option(
+        metavar="N",
+        min=0,
+        help="Refine the emulator with up to N contacts inside the posterior.",
+    ),
+]
+SamplerOption = Annotated[
+    str, typer.Option(help="Sampler: importance, or nested (dynesty; takes minutes).")
+]
+DesignOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="CLR", help="Find changes that keep CLR below this value; needs no recordings."
+    ),
+]
+
+
 @app.command()
 def infer(
-    paths: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="[FILE...]", help="Recordings, or folders of them."),
-    ] = None,
-    case_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--case", metavar="CASE.toml", help="The contact; its [infer] says what is not known."
-        ),
-    ] = None,
+    paths: PathsArgument = None,
+    case_file: CaseFileOption = None,
     overrides: Overrides = None,
     surface: options.SurfaceFile = None,
-    table_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--table",
-            metavar="CSV",
-            help="Columns file, load_n, entrainment_m_s, temperature_degc.",
-        ),
-    ] = None,
+    table_file: TableFileOption = None,
     emulator: options.EmulatorFolder = None,
-    extend: Annotated[
-        int,
-        typer.Option(
-            metavar="N", min=0, help="Solve up to N further points where the posterior is; kept."
-        ),
-    ] = 0,
-    sampler: Annotated[
-        str, typer.Option(help="importance, or nested (dynesty), which takes minutes.")
-    ] = "importance",
+    extend: ExtendOption = 0,
+    sampler: SamplerOption = "importance",
     forecast: options.ForecastLimit = None,
     worn: options.Worn = None,
-    design: Annotated[
-        float | None,
-        typer.Option(
-            metavar="CLR", help="What keeps the load share below it, such as 0.3; alone, too."
-        ),
-    ] = None,
+    design: DesignOption = None,
     seed: options.SampleSeed = 0,
     rate: options.Rate = None,
     unit: options.Unit = None,
@@ -86,7 +96,7 @@ def infer(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Say what recordings tell of a contact, with intervals, what they cannot tell, and what to run next."""
+    """Infer the state of a contact from recordings, with intervals, and the next point to run."""
     case_file = _required(
         case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design
     )
@@ -96,10 +106,10 @@ def infer(
         inference.require_limit(setting, limit, worn=worn is not None)
     history = None if worn is None else simulation.load_wear(worn)
     require_output(page, ".html", option="--report")
-    count, heard = workers or processes.cores(), inference.Listened()
+    count, observations = workers or processes.cores(), inference.Listened()
     if paths:
         with progress("recordings", "reading recordings ...", quiet=quiet):
-            heard = inference.listen(
+            observations = inference.listen(
                 paths,
                 setting,
                 table=table_file,
@@ -113,23 +123,23 @@ def infer(
                 workers=count,
             )
     answering = emulated(setting, emulator, count, quiet=quiet)
-    ahead = _forecast(setting, answering, heard, limit, history, seed)
-    latest = inference.latest(heard) if ahead is not None and ahead.told else heard
+    ahead = _forecast(setting, answering, observations, limit, history, seed)
+    latest = inference.latest(observations) if ahead is not None and ahead.told else observations
     now = replace(latest, notes=(*latest.notes, *known))
     by = cast("Sampler", sampler)
     found = inference.infer_heard(setting, answering, now, sampler=by, seed=seed)
     with contacts_solved(quiet=quiet) as step:
         found = inference.with_further(found, extend, sampler=by, workers=count, progress=step)
     if found.emulator is not answering:
-        ahead = _forecast(setting, found.emulator, heard, limit, history, seed)
-    kept = (
+        ahead = _forecast(setting, found.emulator, observations, limit, history, seed)
+    designed = (
         None
         if design is None
         else inference.design_contact(found.forward, found.draws.z, clr=design)
     )
     if page is not None:
-        report.write_inference_report(found, page, forecast=ahead, design=kept)
-    _show(found, ahead, kept, page, as_json=as_json, quiet=quiet)
+        report.write_inference_report(found, page, forecast=ahead, design=designed)
+    _show(found, ahead, designed, page, as_json=as_json, quiet=quiet)
 
 
 def _required(
@@ -141,9 +151,9 @@ def _required(
     worn: Path | None,
     design: float | None,
 ) -> Path:
-    """The contact's file, where everything else that was asked for goes with it."""
+    """Check that the requested options go together; return the case file."""
     if case_file is None:
-        raise BadInput("asperity infer needs the contact; give --case CASE.toml")
+        raise BadInput("asperity infer needs a case; state --case CASE.toml")
     require_forecast(forecast, worn=worn)
     if not paths and (design is None or forecast is not None):
         raise BadInput("asperity infer needs recordings; name files, or their folder")
@@ -156,48 +166,54 @@ def _required(
 def _forecast(
     setting: "Setting",
     emulator: "Emulator",
-    heard: "Listened",
+    observations: "Listened",
     limit: "Limit | None",
     history: "WearHistory | None",
     seed: int,
 ) -> "Forecast | None":
-    """When the limit is crossed; None where nobody asked."""
+    """Forecast when the limit is crossed; None without a limit."""
     if limit is None:
         return None
-    return inference.forecast_heard(setting, emulator, heard, limit, worn=history, seed=seed)
+    return inference.forecast_heard(setting, emulator, observations, limit, worn=history, seed=seed)
 
 
 def _setting(
     path: Path, overrides: list[str] | None, surface: Path | None
 ) -> tuple["Setting", tuple[str, ...]]:
-    """What is to be inferred, Sq as a surface was measured where one is given, and a note of that."""
+    """Return the setting, with Sq as measured on a surface if one is given, and a note on it."""
     setting = inference.setting_of(chosen_case(path, overrides))
     if surface is None:
         return setting, ()
-    setting, said = inference.with_measured(setting, surfaces.read_surface(surface))
-    return setting, (said,)
+    setting, note = inference.with_measured(setting, surfaces.read_surface(surface))
+    return setting, (note,)
 
 
 def _show(
     found: "Inference",
     ahead: "Forecast | None",
-    kept: "Design | None",
+    designed: "Design | None",
     page: Path | None,
     *,
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """The verdict, first that of what was asked, and the tables; or all as JSON. An alarm decides the exit code."""
-    asked = [one.sentence() for one in (ahead, kept) if one is not None]
-    told = {
+    """Print verdicts and tables, or all as JSON; exit with the alarm's code if there is one."""
+    verdicts = [result.sentence() for result in (ahead, designed) if result is not None]
+    further = {
         "forecast": None if ahead is None else ahead.scalars(),
-        "design": None if kept is None else kept.scalars(),
+        "design": None if designed is None else designed.scalars(),
         "report": None if page is None else str(page),
     }
-    blocks = (_told(found), _points(found), _models(found), _notes(found), written("report", page))
+    blocks = (
+        _posterior(found),
+        _points(found),
+        _models(found),
+        _notes(found),
+        written("report", page),
+    )
     show(
-        [*asked, found.verdict()],
-        lambda: found.scalars() | told,
+        [*verdicts, found.verdict()],
+        lambda: found.scalars() | further,
         *blocks,
         as_json=as_json,
         quiet=quiet,
@@ -206,40 +222,51 @@ def _show(
         raise typer.Exit(EXIT_CODES["alarm"])
 
 
-def _told(found: "Inference") -> Block:
-    """A row a quantity: median, interval with and without the law's error, bits learned."""
+def _posterior(found: "Inference") -> Block:
+    """Return a row per quantity: median, interval with and without the law's error, information."""
     exact, rows = found.posterior(discrepancy=False), []
-    for key, one in found.posterior().items():
+    for key, estimate in found.posterior().items():
         entry = quantity(key)
         rows.append(
             [
                 entry.title,
-                entry.number(one.median),
-                entry.interval(one.low, one.high),
+                entry.number(estimate.median),
+                entry.interval(estimate.low, estimate.high),
                 entry.interval(exact[key].low, exact[key].high),
-                quantity("information_bits").number(one.information_bits),
-                "" if one.learnt else "as assumed",
+                quantity("information_bits").number(estimate.information_bits),
+                "" if estimate.learnt else "as assumed",
             ]
         )
     point = found.forward.points[0]
-    place = f"at {quantity('load_n').text(point.load_n)}, {quantity('entrainment_speed_m_s').text(point.entrainment_m_s)}"
-    yield from columns([place, "median", "90 %", "90 %, laws exact", "bits", ""], rows, left=1)
+    speed = quantity("entrainment_speed_m_s").text(point.entrainment_m_s)
+    yield from columns(
+        [
+            f"at {quantity('load_n').text(point.load_n)}, {speed}",
+            "median",
+            "90 %",
+            "90 %, laws exact",
+            "bits",
+            "",
+        ],
+        rows,
+        left=1,
+    )
 
 
 def _points(found: "Inference") -> Block:
-    """A row an operating point that was recorded."""
-    rows = [one.cells() for one in found.at_points()]
+    """Return a row per recorded operating point."""
+    rows = [point.cells() for point in found.at_points()]
     if rows:
         yield from columns(found.at_points()[0].HEADS, rows)
 
 
 def _notes(found: "Inference") -> Block:
-    """What makes intervals doubtful, what was taken for granted, how good the emulator is."""
+    """Return warnings, assumptions and the emulator's accuracy."""
     return table([], (*found.warnings(), *found.notes, found.emulator.sentence()))
 
 
 def _models(found: "Inference") -> Block:
-    """A row a model: law, with or without its error, evidence and probability."""
+    """Return a row per model: law, with or without its error, evidence and probability."""
     rows = [
         [
             model.law,

@@ -1,4 +1,4 @@
-"""`asperity machine`: gears, bearings, discs and cams to their contacts, each solved; goes on where it was stopped."""
+"""`asperity machine`: solve the contacts of gears, bearings, discs and cams; resumable."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from asperity.machines import MachineResult
 
 RESULT, PAGE, WORST_PAGE = "machine.json", "machine.html", "worst.html"
-CONDITIONS = (  # key of a row, and of the quantity that says how it is shown
+CONDITIONS = (  # key of a row, and of the quantity that formats it
     ("load_n", "load_n"),
     ("line_load_n_m", "line_load_n_per_m"),
     ("entrainment_m_s", "entrainment_speed_m_s"),
@@ -43,18 +43,18 @@ SOLVED = (
 def machine_command(
     path: Annotated[
         Path,
-        typer.Argument(metavar="CASE.toml", help="A case with a [machine] in place of [contact]."),
+        typer.Argument(metavar="CASE.toml", help="Case with a [machine] in place of [contact]."),
     ],
     out: OutFolder = None,
     workers: Workers = None,
     overrides: Overrides = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say the contacts' conditions; solve nothing.")
+        bool, typer.Option("--dry-run", help="Print the contacts' conditions without solving.")
     ] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Solve every contact of a machine: film, load sharing, friction, temperature, and which is worst."""
+    """Solve every contact of a machine: film, load sharing, friction, temperature."""
     chosen = case.load_machine(path, read_overrides(overrides))
     if dry_run:
         result = machines.machine_conditions(chosen)
@@ -62,7 +62,7 @@ def machine_command(
         with study_progress(path.name, quiet=quiet) as step:
             result = machines.solve_machine(chosen, out=out, workers=workers, progress=step)
         if out is not None:
-            _keep(result, out, quiet=quiet)
+            _save(result, out, quiet=quiet)
     show(
         result.verdict(),
         result.scalars,
@@ -73,7 +73,7 @@ def machine_command(
         if out is None or dry_run
         else [
             f"Report: {out / PAGE}",
-            f"Kept in {out}; the same command goes on where it was stopped",
+            f"Saved in {out}; the same command resumes it",
         ],
         as_json=as_json,
         quiet=quiet,
@@ -85,8 +85,8 @@ def machine_command(
         )
 
 
-def _keep(result: "MachineResult", out: Path, *, quiet: bool) -> None:
-    """The machine's numbers and page, and the page of its worst contact, in their folder."""
+def _save(result: "MachineResult", out: Path, *, quiet: bool) -> None:
+    """Write the machine's numbers and page, and the page of its worst contact."""
     files.write_text(out / RESULT, json.dumps(result.scalars(), indent=2, allow_nan=False))
     with progress("the machine's page", quiet=quiet):
         if result.run is not None:
@@ -99,7 +99,7 @@ def _keep(result: "MachineResult", out: Path, *, quiet: bool) -> None:
 
 
 def _ratings(result: "MachineResult") -> Iterator[Row]:
-    """Ratings of the whole machine, and of those along the path the range."""
+    """Return the ratings of the machine; ranges for those along the path of contact."""
     for rating in result.ratings:
         entry = quantity(rating.key)
         known = [value for value in rating.values.values() if value is not None]
@@ -111,16 +111,17 @@ def _ratings(result: "MachineResult") -> Iterator[Row]:
         else:
             yield (
                 entry.title,
-                f"{entry.number(min(known))} to {entry.text(max(known))}  ({rating.standard}{beyond})",
+                f"{entry.number(min(known))} to {entry.text(max(known))}  "
+                f"({rating.standard}{beyond})",
             )
 
 
 def _contacts(result: "MachineResult") -> Block:
-    """A row a contact; those of both sides of a load zone are all there."""
+    """Return a row per contact, including both sides of a load zone."""
     shown = [(key, quantity(name)) for key, name in CONDITIONS]
     if result.solved:
-        kept = [key for key in SOLVED if any(row[key] is not None for row in result.rows)]
-        shown += [(key, quantity(key)) for key in kept]
+        solved_keys = [key for key in SOLVED if any(row[key] is not None for row in result.rows)]
+        shown += [(key, quantity(key)) for key in solved_keys]
     return columns(
         ["contact", *(entry.label for _, entry in shown)],
         ([row["name"], *(_number(row, key, entry) for key, entry in shown)] for row in result.rows),
@@ -129,7 +130,7 @@ def _contacts(result: "MachineResult") -> Block:
 
 
 def _number(row: dict[str, Any], key: str, entry: "Quantity") -> str:
-    """With its interval where the row has one."""
+    """Return the number, with its interval if the row has one."""
     return entry.number_in(row) if key == entry.key else entry.number(row[key])
 
 

@@ -1,4 +1,4 @@
-"""`asperity run`: a case's roughness let move, step after step; goes on where it was stopped."""
+"""`asperity run`: simulate the moving roughness of a case; resumable."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,48 +27,52 @@ if TYPE_CHECKING:
 COMPILES = "the start; after installation the first solve compiles the solver, up to a minute ..."
 
 
+PathArgument = Annotated[
+    Path, typer.Argument(metavar="CASE.toml", help="Case, with [motion] for how it moves.")
+]
+StepsOption = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Number of the last step (default: the case's)."),
+]
+PassesOption = Annotated[
+    float | None,
+    typer.Option(metavar="P", help="Passes of the rough surface's track, instead of --steps."),
+]
+EveryOption = Annotated[
+    int | None,
+    typer.Option(metavar="K", help="Save maps every K steps (default: about 40 in all)."),
+]
+KeepGoingOption = Annotated[
+    bool,
+    typer.Option("--keep-going", help="Mark steps that do not converge, and continue."),
+]
+ListenOption = Annotated[
+    bool,
+    typer.Option("--listen", help="Integrate the vibrating mass over the stored history."),
+]
+
+
 @app.command()
 def run(
-    path: Annotated[
-        Path, typer.Argument(metavar="CASE.toml", help="A case; its [motion] says how it moves.")
-    ],
-    steps: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Number of the last step; by default the case's."),
-    ] = None,
-    passes: Annotated[
-        float | None,
-        typer.Option(
-            metavar="P", help="In place of --steps: how often the rough surface runs its track."
-        ),
-    ] = None,
+    path: PathArgument,
+    steps: StepsOption = None,
+    passes: PassesOption = None,
     surface: SurfaceFile = None,
     overrides: Overrides = None,
     out: OutFolder = None,
-    every: Annotated[
-        int | None,
-        typer.Option(metavar="K", help="Keep maps of every K steps; by default about 40 in all."),
-    ] = None,
-    keep_going: Annotated[
-        bool,
-        typer.Option("--keep-going", help="Mark a step that does not converge, and go on from it."),
-    ] = False,
-    listen: Annotated[
-        bool,
-        typer.Option(
-            "--listen", help="Let the mass ride on the history, by the contact's own stiffness."
-        ),
-    ] = False,
+    every: EveryOption = None,
+    keep_going: KeepGoingOption = False,
+    listen: ListenOption = False,
     page: Page = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Let the roughness move: film, load sharing, friction and resonance step after step."""
+    """Simulate the moving roughness: film, load sharing, friction and resonance, step by step."""
     require_output(page, ".html", option="--report")
     chosen = chosen_case(path, overrides, surface)
     if steps is not None and passes is not None:
         raise BadInput(
-            f"--steps {steps} and --passes {passes:g} both say how long to run; leave one out"
+            f"--steps {steps} and --passes {passes:g} both set the length; leave one out"
         )
     failure = None
     try:
@@ -91,9 +95,7 @@ def run(
                 progress=step,
             )
     except NotConverged as unfinished:
-        if not isinstance(
-            unfinished.solution, simulation.History
-        ):  # there was no snapshot to start from
+        if not isinstance(unfinished.solution, simulation.History):  # the start failed
             raise
         moved, failure = unfinished.solution, str(unfinished)
     vibration = simulation.history_vibration(moved) if listen and failure is None else None
@@ -105,7 +107,7 @@ def run(
         lambda: {**moved.scalars(), **added, "report": None if page is None else str(page)},
         _history_table(moved),
         [] if vibration is None else [vibration.verdict()],
-        _kept(moved, page),
+        _saved(moved, page),
         as_json=as_json,
         quiet=quiet,
     )
@@ -118,24 +120,24 @@ def _clr(step: "HistoryProgress") -> str:
     return f"{clr.short} {clr.text(step.row['clr'])}"
 
 
-def _kept(moved: "History", page: Path | None) -> Block:
+def _saved(moved: "History", page: Path | None) -> Block:
     if moved.folder is not None:
-        yield f"Kept in {moved.folder}; asperity run with the same folder and more steps goes on"
+        yield f"Saved in {moved.folder}; asperity run with the same folder resumes it"
     yield from written("Report", page)
 
 
 def _history_table(moved: "History") -> Block:
-    """Means over the settled steps with their deviations over time, and where they began."""
+    """Return means over the settled steps with their deviations, and initial values."""
     values, motion = moved.scalars(), moved.case.motion
     rows: list[Row] = [
         (
-            "steps, of which computed now",
+            "steps, computed now",
             f"{moved.steps}, {moved.computed} in {text('seconds', moved.seconds)}",
         ),
         (
             quantity("step_s").title,
-            f"{text('step_s', values['step_s'])}, {motion.time_step:g} of the oil's way from cell to cell; "
-            f"start {motion.start}",
+            f"{text('step_s', values['step_s'])}, {motion.time_step:g} of the oil's travel time "
+            f"per cell; start {motion.start}",
         ),
         (f"means and deviations, from step {values['settled_from_step']}", ""),
     ]

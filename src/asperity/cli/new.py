@@ -1,4 +1,4 @@
-"""`asperity new`: a commented case file to start from."""
+"""`asperity new`: write a commented template of a case file."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +10,7 @@ from asperity.cli.app import app
 from asperity.core import files
 from asperity.core.errors import BadInput, require_choice
 
-NEXT = {"wear": "wear {} --hours 1"}  # by kind of case, where it is not to solve it
+NEXT = {"wear": "wear {} --hours 1"}  # next command by kind of case; default: solve
 
 
 @app.command()
@@ -26,11 +26,11 @@ def new(
         Path | None, typer.Option(metavar="CASE.toml", help="File to write; default: KIND.toml.")
     ] = None,
 ) -> None:
-    """Write a commented case to start from."""
+    """Write a commented template of a case."""
     require_choice("kind of case", kind, case.KINDS)
     path = out or Path(f"{kind}.toml")
     if path.exists():
-        raise BadInput(f"{path} is there already; name another with --out")
-    files.write_text(path, case.beginning(kind))
+        raise BadInput(f"{path} exists already; name another file with --out")
+    files.write_text(path, case.case_template(kind))
     following = NEXT.get(kind, "solve {}").format(path)
-    print(f"{path}: a case to start from. Try next: asperity {following}")
+    print(f"{path}: template of a case. Try next: asperity {following}")

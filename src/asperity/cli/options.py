@@ -1,5 +1,6 @@
-"""The options that commands share, each declared once; and what is made of them before the work begins."""
+"""Options shared by commands, each declared once, and their evaluation before the work starts."""
 
+import re
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def _hertz(text: str) -> float:
-    """A frequency as a bare number of hertz, or with its unit."""
+    """Parse a frequency as a bare number of hertz, or with its unit."""
     try:
         return float(text)
     except ValueError:
@@ -23,13 +24,13 @@ def _hertz(text: str) -> float:
 
 
 def _stage_source(text: str) -> str:
-    """What stages are read from, refused before a file is."""
+    """Parse the indicators for stages; refuse unknown ones before reading files."""
     require_choice("--stages-from", text, get_args(trend.StageSource))
     return text
 
 
-def _rate_of_alarms(text: str) -> float:
-    """Alarms a recording: a share such as 0.001 or 1/1000, or recordings for one alarm."""
+def _false_alarm_rate(text: str) -> float:
+    """Parse false alarms per recording: 0.001 or 1/1000, or recordings per alarm."""
     try:
         rate = float(Fraction(str(text)))
     except (ValueError, ZeroDivisionError):
@@ -40,72 +41,62 @@ def _rate_of_alarms(text: str) -> float:
 
 
 CaseOrRun = Annotated[
-    Path, typer.Argument(metavar="CASE.toml|RUN.nc", help="A case file, or a kept run.")
+    Path, typer.Argument(metavar="CASE.toml|RUN.nc", help="Case file, or saved run.")
 ]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Replace a value of the case, contact.load='400 N'; repeat.",
+        help="Replace a value of the case, such as contact.load='400 N' (repeatable).",
     ),
 ]
 Accuracy = Annotated[
     float | None,
     typer.Option(
         metavar="SHARE",
-        help="Choose the cells for films this accurate, such as 0.01, whatever the case has.",
+        help="Relative accuracy of the film, such as 0.01; chooses the grid cells.",
     ),
 ]
 SurfaceFile = Annotated[
     Path | None,
-    typer.Option(
-        "--surface", metavar="FILE", help="A measured surface in place of the case's own."
-    ),
-]
-Preset = Annotated[
-    str | None,
-    typer.Option(help="sound or paper, in place of the case's; --table1 takes paper by default."),
+    typer.Option("--surface", metavar="FILE", help="Measured surface that replaces the case's."),
 ]
 
 OutFolder = Annotated[
     Path | None,
-    typer.Option(
-        "--out", metavar="DIR", help="Folder to keep everything in; goes on from what it holds."
-    ),
+    typer.Option("--out", metavar="DIR", help="Folder for results; resumes an interrupted run."),
 ]
-OutPicture = Annotated[Path | None, typer.Option("--out", metavar="PNG", help="Draw the result.")]
+OutPicture = Annotated[Path | None, typer.Option("--out", metavar="PNG", help="Write a figure.")]
 Page = Annotated[
     Path | None,
-    typer.Option("--report", metavar="OUT.html", help="Make one self-contained HTML page too."),
+    typer.Option("--report", metavar="OUT.html", help="Write a self-contained HTML report."),
 ]
 StudyFigures = Annotated[
     Path | None,
     typer.Option(
         "--figures",
         metavar="DIR",
-        help="Of a study: its figures as PDF and PNG, its tables as csv.",
+        help="Folder for a study's figures (PDF and PNG) and tables (csv).",
     ),
 ]
 
 Workers = Annotated[
     int | None,
-    typer.Option(metavar="N", min=1, help="Processes that work at once; default: all processors."),
+    typer.Option(metavar="N", min=1, help="Number of parallel processes (default: all cores)."),
 ]
 Roughness = Annotated[
     list[str] | None,
-    typer.Option("--sq", metavar="LENGTH", help="At this roughness; may be repeated."),
+    typer.Option("--sq", metavar="LENGTH", help="Roughness Sq (repeatable)."),
 ]
 Cells = Annotated[
-    int, typer.Option(metavar="N", min=8, help="Cells along each axis of the widest domain.")
+    int, typer.Option(metavar="N", min=8, help="Grid cells along each axis of the widest domain.")
 ]
-Seeds = Annotated[
-    int, typer.Option(metavar="N", min=1, help="Surfaces that each point is the mean of.")
-]
-SampleSeed = Annotated[int, typer.Option(metavar="SEED", min=0, help="Of all that is drawn.")]
+Seeds = Annotated[int, typer.Option(metavar="N", min=1, help="Surfaces averaged per point.")]
+SampleSeed = Annotated[int, typer.Option(metavar="SEED", min=0, help="Random seed.")]
 
 RecordingFiles = Annotated[
-    list[Path], typer.Argument(metavar="FILE...", help="Recordings, or folders of them.")
+    list[Path], typer.Argument(metavar="FILE...", help="Recordings, or folders of recordings.")
 ]
 Rate = Annotated[
     float | None,
@@ -116,65 +107,64 @@ Rate = Annotated[
 Unit = Annotated[
     str | None,
     typer.Option(
-        help="Unit of the values, such as g or, of heights, um, for files that do not state it."
+        help="Unit of the values (such as g) or heights (um), for files that do not state it."
     ),
 ]
 LateralUnit = Annotated[
-    str | None, typer.Option(help="Unit of x and y, for a file that names none.")
+    str | None, typer.Option(help="Unit of x and y, for files that do not state it.")
 ]
 Channel = Annotated[
     str | None,
-    typer.Option(help="Name or number of the channel, where files have several; a,b: two sensors."),
+    typer.Option(help="Name or number of the channel; a,b selects two sensors."),
 ]
 Scale = Annotated[
     float | None,
-    typer.Option(
-        help="What a stored 1 stands for, in the unit: g at full scale of a wav, g per volt."
-    ),
+    typer.Option(help="Value of a stored 1 in the unit, such as g at full scale or g per volt."),
 ]
 Contact = Annotated[
     Path | None,
     typer.Option(
-        "--case", metavar="CASE.toml", help="The contact: where to look, and load shares."
+        "--case", metavar="CASE.toml", help="Case of the contact, for the band and load shares."
     ),
 ]
 Band = Annotated[
     tuple[float, float] | None,
-    typer.Option(metavar="LOW HIGH", help="Where to look [Hz], instead of the case's band."),
+    typer.Option(metavar="LOW HIGH", help="Frequency band [Hz] (default: the case's)."),
 ]
 Table = Annotated[
     Path | None,
     typer.Option(
         "--table",
         metavar="CSV",
-        help="Columns file, x (such as sq_um), sq_um_std, load_n, speed_hz.",
+        help="Table with columns file, x (such as sq_um), sq_um_std, load_n, speed_hz.",
     ),
 ]
 Shaft = Annotated[
     list[float] | None,
-    typer.Option(metavar="HZ", help="Shaft speed whose harmonics to remove; found if not given."),
+    typer.Option(metavar="HZ", help="Shaft speed whose harmonics are removed (default: detected)."),
 ]
 StagesFrom = Annotated[
     str,
     typer.Option(
         metavar="INDICATOR",
         parser=_stage_source,
-        help="What decides stage and alarm: crf, damping or both; all are told.",
+        help="Indicator for stage and alarm: crf, damping or both (all are reported).",
     ),
 ]
 FalseAlarms = Annotated[
     float,
     typer.Option(
         metavar="RATE",
-        parser=_rate_of_alarms,
-        help="Alarms a recording without wear, such as 0.001 or 1/1000 (the same: 1000).",
+        parser=_false_alarm_rate,
+        help="False alarms per recording without wear, such as 0.001, 1/1000 or 1000.",
     ),
 ]
 Acknowledge = Annotated[
     str | None,
     typer.Option(
         metavar="RECORDING",
-        help="Somebody has looked, up to this recording or 'last': begin anew behind it.",
+        help="Acknowledge alarms up to this recording ('last': newest); the baseline "
+        "restarts after it.",
     ),
 ]
 StoreFile = Annotated[
@@ -182,21 +172,21 @@ StoreFile = Annotated[
     typer.Option(
         "--store",
         metavar="DB",
-        help="One SQLite file for recordings and judgements; several may share it.",
+        help="SQLite file for recordings and assessments; several processes may share it.",
     ),
 ]
 Machine = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Whose recordings these are, in the store.")
+    str | None, typer.Option(metavar="NAME", help="Machine, as named in the store.")
 ]
 Point = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Measuring point on it; by default the folder.")
+    str | None, typer.Option(metavar="NAME", help="Measuring point (default: folder name).")
 ]
 SensorName = Annotated[
     str | None,
     typer.Option(
         "--sensor",
         metavar="NAME",
-        help="Sensor there; by default as sidecar, table or channel names it.",
+        help="Sensor (default: from sidecar, table or channel).",
     ),
 ]
 OnAlarm = Annotated[
@@ -204,7 +194,7 @@ OnAlarm = Annotated[
     typer.Option(
         metavar="CMD",
         envvar="ASPERITY_ON_ALARM",
-        help="Run this at every change of state, without a shell; it gets JSON on its stdin.",
+        help="Command to run at every change of state, with JSON on stdin (no shell).",
     ),
 ]
 WebHook = Annotated[
@@ -213,7 +203,7 @@ WebHook = Annotated[
         "--webhook",
         metavar="URL",
         envvar="ASPERITY_WEBHOOK",
-        help="Post JSON there at every change of state.",
+        help="URL to post JSON to at every change of state.",
     ),
 ]
 Mqtt = Annotated[
@@ -221,39 +211,42 @@ Mqtt = Annotated[
     typer.Option(
         envvar="ASPERITY_MQTT",
         metavar="URL",
-        help="Publish JSON at mqtt://HOST/TOPIC at every change of state.",
+        help="Broker and topic (mqtt://HOST/TOPIC) to publish JSON to at every change of state.",
     ),
 ]
 Tell = Annotated[
     str | None,
     typer.Option(
         metavar="STATES",
-        help="Of which changes: such as alarm,blind, and their end; all of them, unless given.",
+        help="Notify only on entering or leaving these states (default: all).",
     ),
 ]
 ForecastLimit = Annotated[
     str | None,
     typer.Option(
-        "--forecast", metavar="LIMIT", help="When clr=0.5, or sq='2 um', is crossed; of a series."
+        "--forecast",
+        metavar="LIMIT",
+        help="Forecast when a limit such as clr=0.5 or sq='2 um' is crossed.",
     ),
 ]
 Worn = Annotated[
     Path | None,
-    typer.Option(
-        metavar="DIR", help="Folder of asperity wear: its drift of Sq is what is expected."
-    ),
+    typer.Option(metavar="DIR", help="Wear simulation used as prior for the drift of Sq."),
 ]
 EmulatorFolder = Annotated[
     Path | None,
     typer.Option(
-        "--emulator", metavar="DIR", help="Folder of the emulator; else one in the user's cache."
+        "--emulator", metavar="DIR", help="Folder of the emulator (default: in the user's cache)."
     ),
 ]
-Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
+Method = Annotated[
+    str | None,
+    typer.Option(help="Detection method: joint, modes, likelihood or peak (the paper's)."),
+]
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Print the verdict only, and no progress.")
+    bool, typer.Option("--quiet", "-q", help="Print the verdict only, without progress.")
 ]
 
 
@@ -263,7 +256,7 @@ def chosen_case(
     surface: Path | None = None,
     accuracy: float | None = None,
 ) -> "Case":
-    """The case of a case file or a run, with a measured surface, `--set KEY=VALUE` values and an accuracy put in."""
+    """Return the case of a file or run, with a surface, `--set` values and an accuracy applied."""
     chosen = results.load_run(path).case if path.suffix == ".nc" else case.load_case(path)
     if surface is not None:
         files.require_file(surface)
@@ -278,53 +271,56 @@ def chosen_case(
 
 
 def read_overrides(overrides: list[str] | None) -> dict[str, object]:
-    """Keys and values of `--set KEY=VALUE`."""
+    """Return keys and values of `--set KEY=VALUE`."""
     replaced: dict[str, object] = {}
     for override in overrides or []:
         key, equals, value = override.partition("=")
         if not (equals and key.strip() and value.strip()):
-            raise BadInput(f"--set takes KEY=VALUE such as contact.load='400 N', got {override!r}")
+            raise BadInput(
+                f"--set must be KEY=VALUE such as contact.load='400 N', got {override!r}"
+            )
         replaced[key.strip()] = value.strip()
     return replaced
 
 
 def case_at(path: Path | None) -> "Case | None":
-    """The case of a case file, if one was given."""
+    """Load a case file; None without one."""
     return None if path is None else case.load_case(path)
 
 
 def contact_at(path: Path | None) -> "Case | MachineCase | None":
-    """The case of a contact or a machine, if one was given."""
+    """Load the case of a contact or a machine; None without one."""
     if path is None:
         return None
-    return case.load_machine(path) if case.states_machine(path) else case.load_case(path)
+    return case.load_machine(path) if case.has_machine(path) else case.load_case(path)
 
 
 def lengths(option: str, texts: list[str] | None) -> list[float] | None:
-    """Lengths given as an option that may be repeated [m]; None where it was not given."""
+    """Return lengths of a repeatable option [m]; None without any."""
     return [case.read_length(option, text) for text in texts] if texts else None
 
 
-_FLAGS = {  # what a message of the library asks for, and the option that gives it
-    "give rate_hz": "give --rate",
-    "give scale": "give --scale",
-    "give case or band_hz": "give --case or --band",
-    "; method modes": "; --method modes",
-    "such as um and mm": "such as --unit um --lateral-unit mm",
-    "ask for a dry run": "take --dry-run",
-    "choose another out": "choose another --out",
+# remedies in messages of the library, and the option that applies on the command line
+_REMEDIES = {
+    r"\b(give|state|set|use) (case or )band_hz\b": r"\1 --case or --band",
+    r"\b(give|state|set|use) rate_hz\b": r"\1 --rate",
+    r"\b(give|state|set|use) scale\b": r"\1 --scale",
+    r"; method modes\b": "; --method modes",
+    r"\bsuch as um and mm\b": "such as --unit um --lateral-unit mm",
+    r"\b(ask for|request|use) a dry run\b": "use --dry-run",
+    r"\bchoose another out\b": "choose another --out",
 }
 
 
-def with_flags(message: str) -> str:
-    """A message of the library with options in place of the arguments that it names."""
-    for argument, option in _FLAGS.items():
-        message = message.replace(argument, option)
+def with_options(message: str) -> str:
+    """Return a message of the library with options in place of the arguments that it names."""
+    for remedy, option in _REMEDIES.items():
+        message = re.sub(remedy, option, message)
     return message
 
 
 def require_output(path: Path | None, *suffixes: str, option: str = "--out") -> None:
-    """BadInput unless a path that is given has a suffix and can be written to: asked before the work, not after."""
+    """Raise BadInput unless a path, if given, has a suffix and can be written to."""
     if path is None:
         return
     if path.suffix.lower() not in suffixes:

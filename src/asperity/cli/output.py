@@ -1,4 +1,4 @@
-"""What commands print: a verdict with its tables and notes, or one JSON object; and progress while they work."""
+"""Output of commands: a verdict with tables and notes, or one JSON object; and progress."""
 
 import json
 import sys
@@ -9,17 +9,17 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Protocol
 
-from asperity.cli.options import with_flags
+from asperity.cli.options import with_options
 from asperity.core.quantities import catalogue, quantity, select
 from asperity.core.third_party import printable
 
 if TYPE_CHECKING:
     from asperity.ehl import Iteration
 
-SILENT_FOR = 2.0  # seconds without a step of the solver, after which its compilation is announced
-TITLE = 12  # letters of a column's title, beyond which it is wrapped
+NOTICE_DELAY_S = 2.0  # without a solver step, after which compilation is announced
+TITLE = 12  # characters of a column's title, above which it is wrapped
 
-Block = Iterable[str]  # lines; worked out only where they are printed
+Block = Iterable[str]  # lines, evaluated only when printed
 Row = tuple[str, str]
 
 
@@ -31,25 +31,25 @@ def show(
     quiet: bool,
     a_line: bool = False,
 ) -> None:
-    """Print the values as the one JSON object, or the verdict (or several) and, unless quiet, blocks after empty lines.
+    """Print the values as one JSON object, or verdicts and, unless quiet, blocks after empty lines.
 
-    `a_line` keeps the object on one line and hands it on at once, for a command that prints one
-    after another. Nan or infinity in the object is a mistake of ours.
+    `a_line` prints the object on one line and flushes it, for a command that prints one after
+    another. Nan or infinity in the object is an internal error.
     """
     if as_json:
         print(json.dumps(values(), indent=None if a_line else 2, allow_nan=False), flush=a_line)
         return
     for sentence in [verdict] if isinstance(verdict, str) else verdict:
-        print(printable(with_flags(sentence)), flush=a_line)
+        print(printable(with_options(sentence)), flush=a_line)
     if quiet:
         return
     for block in blocks:
         for number, line in enumerate(block):
-            print("" if number else "\n", printable(with_flags(line)), sep="", flush=a_line)
+            print("" if number else "\n", printable(with_options(line)), sep="", flush=a_line)
 
 
 def table(rows: Iterable[Row], notes: Iterable[str] = ()) -> Block:
-    """Names and values in two columns, and notes below."""
+    """Format names and values in two columns, with notes below."""
     pairs = list(rows)
     width = max((len(name) for name, _ in pairs), default=0)
     yield from (f"  {name:{width}}  {value}" for name, value in pairs)
@@ -57,7 +57,7 @@ def table(rows: Iterable[Row], notes: Iterable[str] = ()) -> Block:
 
 
 def columns(titles: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 0) -> Block:
-    """A table, its first `left` columns and those without a title flush left; long titles are wrapped."""
+    """Format a table; the first `left` columns and untitled ones are flush left."""
     cells = [list(row) for row in rows]
     widths = [max(map(len, column), default=1) for column in zip(*cells, strict=True)] or [1] * len(
         titles
@@ -77,7 +77,7 @@ def columns(titles: Sequence[str], rows: Iterable[Sequence[str]], *, left: int =
 
 
 def known(values: Mapping[str, Any], *groups: str) -> list[Row]:
-    """The numbers that `values` have and the catalogue shows in a table, of these groups of it or of all."""
+    """Return the numbers of `values` that the catalogue shows, of some of its groups or of all."""
     groups = groups or tuple({entry.group for entry in catalogue().values()})
     return [
         (entry.title, entry.text_in(values)) for entry in select(*groups) if entry.key in values
@@ -85,45 +85,48 @@ def known(values: Mapping[str, Any], *groups: str) -> list[Row]:
 
 
 def text(key: str, value: Any) -> str:
-    """A value as the catalogue shows it, with its unit."""
+    """Return a value as the catalogue shows it, with its unit."""
     return quantity(key).text(value)
 
 
 def span(key: str, ends: Sequence[float]) -> str:
-    """From where to where a quantity goes, with its unit."""
+    """Return a range of a quantity, with its unit."""
     low, high = ends
     return f"{quantity(key).number(low)} to {text(key, high)}"
 
 
 def written(name: str, *paths: Path | None) -> Block:
-    """Where something was written, unless it was not."""
+    """Return the paths of written files by name; none for None."""
     return [f"{name}: {path}" for path in paths if path is not None]
 
 
 class Display(Protocol):
-    """Takes how far the work is: in words, and as a number of things done, of how many."""
+    """Progress display: a text, and a number of completed items of a total."""
 
     def __call__(self, doing: str, done: int | None = None, total: int | None = None) -> None:
-        """Show it."""
+        """Update the display."""
 
 
 @contextmanager
 def progress(
     label: str, doing: str = "", *, quiet: bool, compiles: bool = False
 ) -> Iterator[Display]:
-    """Show on a terminal how far the work is.
+    """Show progress on a terminal.
 
-    With `compiles`, the compilation that makes the first solve ever slow is announced after a
-    while without a report, in a file too.
+    With `compiles`, the compilation at the first solve after installation is announced after a
+    delay, also if stderr is not a terminal.
     """
     if quiet or not (compiles or sys.stderr.isatty()):
         yield _unseen
         return
     label = printable(label)
-    notice = f"{label}: no step yet; the first solve after installation compiles the solver, up to a minute ..."
+    notice = (
+        f"{label}: no step yet; the first solve after installation compiles the solver, "
+        "up to a minute ..."
+    )
     if not sys.stderr.isatty():
         announcement = threading.Timer(
-            SILENT_FOR, print, [notice], {"file": sys.stderr, "flush": True}
+            NOTICE_DELAY_S, print, [notice], {"file": sys.stderr, "flush": True}
         )
         with _announced(announcement):
             yield lambda *_, **__: announcement.cancel()
@@ -133,7 +136,7 @@ def progress(
 
     console = Console(stderr=True)
     announcement = threading.Timer(
-        SILENT_FOR, console.print, [notice], {"soft_wrap": True, "highlight": False}
+        NOTICE_DELAY_S, console.print, [notice], {"soft_wrap": True, "highlight": False}
     )
     label_column, doing_column = (
         TextColumn(f"{{task.{name}}}", markup=False) for name in ("description", "fields[doing]")
@@ -142,8 +145,8 @@ def progress(
         *(label_column, BarColumn(20), doing_column, TimeElapsedColumn()),
         console=console,
         transient=True,
-        disable=not console.is_terminal,  # as where TERM=dumb
-        redirect_stdout=sys.stdout.isatty(),  # what goes to a file must not end beside the bar
+        disable=not console.is_terminal,  # such as with TERM=dumb
+        redirect_stdout=sys.stdout.isatty(),  # output to a file must not be captured
     )
     with _announced(announcement) if compiles else nullcontext(), bar:
         task = bar.add_task(label, total=None, doing=doing)
@@ -157,7 +160,7 @@ def progress(
 
 @contextmanager
 def _announced(announcement: threading.Timer) -> Iterator[None]:
-    """Let it speak unless it is cancelled or what it is about has ended."""
+    """Run the announcement unless it is cancelled or the work ends."""
     announcement.daemon = True
     announcement.start()
     try:
@@ -167,11 +170,11 @@ def _announced(announcement: threading.Timer) -> Iterator[None]:
 
 
 def _unseen(doing: str, done: int | None = None, total: int | None = None) -> None:
-    """What a display does that nobody sees."""
+    """Ignore progress."""
 
 
 class SolverSteps:
-    """Shows the solver's steps, and the surfaces that are done where there are several."""
+    """Progress of the solver's iterations, and of completed surfaces."""
 
     def __init__(self, display: Display) -> None:
         self.display = display
@@ -179,20 +182,20 @@ class SolverSteps:
         self.total: int | None = None
 
     def step(self, iteration: "Iteration") -> None:
-        """After a Newton step; the start is known before all is compiled."""
+        """Show a Newton iteration; not the start, which precedes compilation."""
         if iteration.number > 0:
             nx, ny = iteration.cells
             words = f"{nx} x {ny} cells, step {iteration.number}, residual {iteration.residual:.1e}"
             self.display(words, self.done, self.total)
 
     def surface(self, done: int, total: int) -> None:
-        """After a surface."""
+        """Show a completed surface."""
         self.done, self.total = done, total
         self.display(f"{done} of {total} surfaces", done, total)
 
 
 @contextmanager
 def solver_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[Iteration], None]]":
-    """Show the solver's steps."""
+    """Show the solver's iterations."""
     with progress(label, "setting up ...", quiet=quiet, compiles=True) as display:
         yield SolverSteps(display).step

@@ -9,35 +9,35 @@ from asperity import report
 from asperity.cli.app import app
 from asperity.core.errors import BadInput
 
-What = Annotated[
+PageSource = Annotated[
     Path | None,
     typer.Argument(
         metavar="[CASE.toml|RUN.nc|STUDY|FOLDER]",
-        help="A case, a kept run, the folder of a study, a history or recordings; by default the paper's contact.",
+        help="Case, run, or folder of a study, history or recordings (default: paper's contact).",
     ),
 ]
 Port = Annotated[
     int,
-    typer.Option(
-        metavar="N", min=0, max=65535, help="Where the page is; 0 takes any that is free."
-    ),
+    typer.Option(metavar="N", min=0, max=65535, help="Port of the page; 0: any free port."),
 ]
 Listen = Annotated[
     str,
     typer.Option(
         metavar="ADDRESS",
-        help="Let others on the network in too; they need the password in ASPERITY_PAGE_PASSWORD.",
+        help="Address for other hosts, which need the password in ASPERITY_PAGE_PASSWORD.",
     ),
 ]
 
 
 @app.command("page")
-def page_command(what: What = None, port: Port = 5006, listen: Listen = "127.0.0.1") -> None:
-    """Open a page to turn a contact's knobs on, or to look at recordings, a study or a history."""
+def page_command(
+    source: PageSource = None, port: Port = 5006, listen: Listen = "127.0.0.1"
+) -> None:
+    """Serve a page to explore a contact, or to view recordings, a study or a history."""
     try:
         from asperity.app import open_page, serve_page
 
-        opened = open_page(what)
+        opened = open_page(source)
         serve_page(opened, port=port, listen=listen, ready=_ready, write_report=report.write_report)
     except ModuleNotFoundError as missing:
         if (missing.name or "").partition(".")[0] not in (

@@ -1,4 +1,4 @@
-"""`asperity report`: pages of what was kept, runs, a study, a history or wear."""
+"""`asperity report`: HTML pages of saved runs, studies, histories or wear."""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,36 +18,36 @@ def report_command(
         list[Path],
         typer.Argument(
             metavar="RUN...|DIR",
-            help="Runs kept by asperity solve --out, or the folder of a study, a history or of wear.",
+            help="Runs saved by asperity solve --out, or the folder of a study, history or wear.",
         ),
     ],
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="OUT.html", help="The page; by default beside the run, or in the folder."
+            metavar="OUT.html", help="Page to write (default: beside the run, or in the folder)."
         ),
     ] = None,
     figures: StudyFigures = None,
     anchors: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.toml", help="Of a study: numbers that it should meet, not the paper's."
+            metavar="FILE.toml", help="Reference values for a study (default: the paper's)."
         ),
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make one self-contained HTML page of one run, of several, of a study, of a history or of wear."""
+    """Write a self-contained HTML page of runs, a study, a history or wear."""
     folders = [path for path in paths if path.is_dir()]
     if folders and len(paths) > 1:
         raise BadInput(
-            f"a study's page holds nothing else, got {len(paths)} paths; name {folders[0]} alone"
+            f"a folder's page has no other contents, got {len(paths)} paths; name {folders[0]} only"
         )
-    of_wear = bool(folders) and simulation.is_wear(folders[0])
-    of_study = bool(folders) and not of_wear and not simulation.is_history(folders[0])
+    of_wear = bool(folders) and simulation.is_wear_folder(folders[0])
+    of_study = bool(folders) and not of_wear and not simulation.is_history_folder(folders[0])
     if not of_study and (figures is not None or anchors is not None):
         option = "--figures" if figures is not None else "--anchors"
-        raise BadInput(f"{option} is for a study's folder, got {paths[0]}; name the folder")
+        raise BadInput(f"{option} applies to a study's folder, got {paths[0]}; name that folder")
     if out is None:
         alone = paths[0].with_suffix(".html") if len(paths) == 1 else Path("report.html")
         out = folders[0] / "report.html" if folders else alone
@@ -75,11 +75,11 @@ def _report_runs(paths: list[Path], out: Path, *, as_json: bool, quiet: bool) ->
 
 
 def _report_history(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
-    kept = simulation.load_history(folder)
-    report.write_motion_report(kept, out)
+    history = simulation.load_history(folder)
+    report.write_motion_report(history, out)
     show(
-        kept.verdict(),
-        lambda: {"report": str(out), "history": kept.scalars()},
+        history.verdict(),
+        lambda: {"report": str(out), "history": history.scalars()},
         written("Report", out),
         as_json=as_json,
         quiet=quiet,
@@ -87,11 +87,11 @@ def _report_history(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> N
 
 
 def _report_wear(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
-    kept = simulation.load_wear(folder)
-    report.write_wear_report(kept, out)
+    history = simulation.load_wear(folder)
+    report.write_wear_report(history, out)
     show(
-        kept.verdict(),
-        lambda: {"report": str(out), "wear": kept.scalars()},
+        history.verdict(),
+        lambda: {"report": str(out), "wear": history.scalars()},
         written("Report", out),
         as_json=as_json,
         quiet=quiet,

@@ -1,4 +1,4 @@
-"""`asperity rig`: recordings of a simulated wear test, with the truth beside them."""
+"""`asperity rig`: recordings of a simulated wear test, with the true values."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,63 +16,79 @@ if TYPE_CHECKING:
     from asperity.simulation import WearHistory
 
 
+OutOption = Annotated[
+    Path,
+    typer.Option(metavar="DIR", help="New folder for recordings, table, true values and case."),
+]
+CaseFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--case",
+        metavar="CASE.toml",
+        help="Contact to solve at each roughness (default: the paper's trend).",
+    ),
+]
+WornOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--wear",
+        metavar="DIR",
+        help="Wear simulation (folder of asperity wear --out) to record.",
+    ),
+]
+HoursOption = Annotated[
+    list[float] | None,
+    typer.Option(
+        metavar="H",
+        help="Time of a recording of --wear (repeatable; default: --samples spread evenly).",
+    ),
+]
+SamplesOption = Annotated[int, typer.Option(help="Number of worn rings, from Sq 0.54 to 3.49 um.")]
+RepeatsOption = Annotated[int, typer.Option(help="Tests per ring.")]
+DurationOption = Annotated[
+    str, typer.Option(metavar="TIME", help="Duration of each recording (the paper's: 300 s).")
+]
+RateOption = Annotated[str, typer.Option(metavar="FREQUENCY", help="Sampling rate.")]
+SnrOption = Annotated[
+    float,
+    typer.Option(
+        metavar="DB", help="Signal-to-noise ratio of the contact's line in its band, in dB."
+    ),
+]
+ModesOption = Annotated[int, typer.Option(help="Number of structural modes in the contact's band.")]
+TrendOption = Annotated[
+    str, typer.Option(help="Trend of CRF over roughness: knee, smooth or constant.")
+]
+FileFormatOption = Annotated[
+    str, typer.Option("--format", help="File format: h5 (with rate and unit) or wav.")
+]
+SeedOption = Annotated[int, typer.Option(help="Random seed.")]
+
+
 @app.command()
 def rig(
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", help="New folder for recordings, table, truth and case.")
-    ],
-    case_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--case",
-            metavar="CASE.toml",
-            help="Solve this contact at each roughness, in place of the paper's trend.",
-        ),
-    ] = None,
-    worn: Annotated[
-        Path | None,
-        typer.Option(
-            "--wear",
-            metavar="DIR",
-            help="Record the contact that asperity wear --out kept, as it wears.",
-        ),
-    ] = None,
-    hours: Annotated[
-        list[float] | None,
-        typer.Option(
-            metavar="H",
-            help="With --wear: record it after so long; repeat. Else --samples over all of it.",
-        ),
-    ] = None,
-    samples: Annotated[int, typer.Option(help="Worn rings, from Sq 0.54 to 3.49 um.")] = 12,
-    repeats: Annotated[int, typer.Option(help="Tests of each ring.")] = 5,
-    duration: Annotated[
-        str, typer.Option(metavar="TIME", help="Of each recording; the paper's are 300 s.")
-    ] = "10 s",
-    rate: Annotated[str, typer.Option(metavar="FREQUENCY", help="Sampling rate.")] = "20 kHz",
-    snr: Annotated[
-        float,
-        typer.Option(
-            metavar="DB", help="Power of the contact's line over all else in its band, in dB."
-        ),
-    ] = 10.0,
-    modes: Annotated[int, typer.Option(help="Structural modes in the contact's band.")] = 4,
-    trend: Annotated[
-        str, typer.Option(help="CRF over roughness: knee, smooth or constant.")
-    ] = "knee",
-    file_format: Annotated[
-        str, typer.Option("--format", help="h5 (rate and unit in the file) or wav.")
-    ] = "h5",
-    seed: Annotated[int, typer.Option(help="Of everything drawn.")] = 7,
+    out: OutOption,
+    case_file: CaseFileOption = None,
+    worn: WornOption = None,
+    hours: HoursOption = None,
+    samples: SamplesOption = 12,
+    repeats: RepeatsOption = 5,
+    duration: DurationOption = "10 s",
+    rate: RateOption = "20 kHz",
+    snr: SnrOption = 10.0,
+    modes: ModesOption = 4,
+    trend: TrendOption = "knee",
+    file_format: FileFormatOption = "h5",
+    seed: SeedOption = 7,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate the paper's wear test: recordings to try asperity track on, and the truth to judge it by."""
+    """Simulate the paper's wear test: recordings for asperity track, and the true values."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise BadInput(f"--out {out} is there already and not an empty folder; name a new one")
+        raise BadInput(f"--out {out} exists and is not an empty folder; name a new one")
     history = _wear(worn, hours, case_file)
     with progress("rig", "simulating ...", quiet=quiet) as display:
-        made = paper.simulate_rig(
+        simulated = paper.simulate_rig(
             paper.RigSettings(
                 samples=samples,
                 repeats=repeats,
@@ -86,7 +102,7 @@ def rig(
             moments=None if history is None else history.moments(hours, samples),
         )
         paths = paper.write_rig(
-            made,
+            simulated,
             out,
             file_format=file_format,  # type: ignore[arg-type]
             progress=lambda done, total: display(
@@ -94,29 +110,32 @@ def rig(
             ),
         )
     show(
-        paper.rig_verdict(made),
+        paper.rig_verdict(simulated),
         lambda: {
-            **paper.rig_scalars(made),
+            **paper.rig_scalars(simulated),
             "folder": str(out),
             "recordings": [str(path) for path in paths],
             "table": str(out / "table.csv"),
             "truth": str(out / "truth.csv"),
             "case": str(out / "rig.toml"),
         },
-        table(_rows(made, out)),
+        table(_rows(simulated, out)),
         [f"Try next: asperity track {out} --table {out / 'table.csv'} --case {out / 'rig.toml'}"],
         as_json=as_json,
         quiet=quiet,
     )
 
 
-def _rows(made: "paper.Rig", out: Path) -> list[Row]:
-    shafts = " and ".join(f"{speed:g}" for speed in made.shaft_hz)
-    beside = f"{made.disturbance.snr_db:g} dB, {made.disturbance.modes} structural modes, shafts at {shafts} Hz, mains"
+def _rows(simulated: "paper.Rig", out: Path) -> list[Row]:
+    shafts = " and ".join(f"{speed:g}" for speed in simulated.shaft_hz)
+    noise = (
+        f"{simulated.disturbance.snr_db:g} dB, {simulated.disturbance.modes} structural modes, "
+        f"shafts at {shafts} Hz, mains"
+    )
     return [
-        (quantity("band_hz").title, span("band_hz", made.band_hz)),
-        *known({"full_load_crf_hz": made.full_load_crf_hz}),
-        ("SNR in that band", beside),
+        (quantity("band_hz").title, span("band_hz", simulated.band_hz)),
+        *known({"full_load_crf_hz": simulated.full_load_crf_hz}),
+        ("SNR in that band", noise),
         ("truth", str(out / "truth.csv")),
     ]
 
@@ -124,9 +143,9 @@ def _rows(made: "paper.Rig", out: Path) -> list[Row]:
 def _wear(
     worn: Path | None, hours: list[float] | None, case_file: Path | None
 ) -> "WearHistory | None":
-    """The wear history that is to be recorded, if any."""
+    """Load the wear history to record, if any."""
     if worn is None and hours:
-        raise BadInput(f"--hours {hours[0]:g} is a moment of a wear history; name one with --wear")
+        raise BadInput(f"--hours {hours[0]:g} applies to a wear history; name one with --wear")
     if worn is not None and case_file is not None:
-        raise BadInput(f"--wear {worn} brings its own case along; leave --case {case_file} out")
+        raise BadInput(f"--wear {worn} has a case of its own; leave --case {case_file} out")
     return None if worn is None else simulation.load_wear(worn)

@@ -1,4 +1,4 @@
-"""`asperity sensitivity` and `asperity calibrate`: what a wear study hangs on, and what would meet what is known."""
+"""`asperity sensitivity` and `asperity calibrate`: effect of open choices, and fit to anchors."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -30,59 +30,70 @@ from asperity.core.quantities import NO_VALUE
 if TYPE_CHECKING:
     from asperity.study import Calibration, Sensitivity
 
-WORTH_A_LINE = 0.5  # gain in misfit from which giving an anchor up is
-PART = 0.2  # weight from which a quantity has a part in a direction
+MIN_GAIN = 0.5  # in misfit without an anchor, for a row
+MIN_WEIGHT = 0.2  # of a quantity in a direction, to be shown
 MORRIS = (
-    "  mu*: mean size of the effect of crossing a factor's range, ± its 95 % half-width; mu: with its sign;",
-    "  sigma: how much it varies with the other factors. SI: CAR and CLR are shares.",
+    "  mu*: mean absolute effect over a factor's range, ± its 95 % half-width; mu: mean effect;",
+    "  sigma: its standard deviation over the other factors. SI units; CAR and CLR are fractions.",
 )
 SOBOL = (
-    "  S1: share of the variance that a factor has alone; ST: with all its interactions; ± 95 % half-widths.",
+    "  S1: first-order share of the variance; ST: total, with interactions; ± 95 % half-widths.",
 )
+
+
+MethodOption = Annotated[
+    str, typer.Option(help="morris (elementary effects) or sobol (shares of variance).")
+]
+VaryOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KEY=LOW..HIGH",
+        help="Range of a factor (repeatable; default: what the paper leaves open).",
+    ),
+]
+TrajectoriesOption = Annotated[
+    int | None, typer.Option(metavar="N", help="Trajectories for morris (default: 12).")
+]
+SamplesOption = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Samples for sobol, a power of two (default: 64)."),
+]
+SqOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="LENGTH",
+        help="Roughness at which outcomes are read (repeatable; default: 0.5, 1, 2.5, 4 um).",
+    ),
+]
+LevelsOption = Annotated[
+    int, typer.Option(metavar="N", min=0, help="Roughness levels, for the knee of CRF.")
+]
+FigureOption = Annotated[
+    Path | None,
+    typer.Option(metavar="PNG|PDF", help="Plot effects of the factors per outcome."),
+]
 
 
 @app.command()
 def sensitivity(
     path: CaseOrRun,
-    method: Annotated[
-        str, typer.Option(help="morris: elementary effects; sobol: shares of variance.")
-    ] = "morris",
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KEY=LOW..HIGH",
-            help="A range; may be repeated. By default what the paper leaves open.",
-        ),
-    ] = None,
-    trajectories: Annotated[
-        int | None, typer.Option(metavar="N", help="Of morris; default 12.")
-    ] = None,
-    samples: Annotated[
-        int | None, typer.Option(metavar="N", help="Of sobol, a power of two; default 64.")
-    ] = None,
-    sq: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="LENGTH",
-            help="Read the curves there; may be repeated. Default 0.5, 1, 2.5, 4 um.",
-        ),
-    ] = None,
-    levels: Annotated[
-        int, typer.Option(metavar="N", min=0, help="Roughness levels, for the knee of CRF.")
-    ] = 8,
+    method: MethodOption = "morris",
+    vary: VaryOption = None,
+    trajectories: TrajectoriesOption = None,
+    samples: SamplesOption = None,
+    sq: SqOption = None,
+    levels: LevelsOption = 8,
     cells: Cells = 128,
     seeds: Seeds = 1,
     sample_seed: SampleSeed = 0,
     overrides: Overrides = None,
     workers: Workers = None,
     out: OutFolder = None,
-    figure: Annotated[
-        Path | None, typer.Option(metavar="PNG|PDF", help="Draw factors over outcomes.")
-    ] = None,
+    figure: FigureOption = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find which open choices move CAR, CLR, CRF, CRFA and the knee of the curve over Sq most."""
+    """Find the open choices that affect CAR, CLR, CRF, CRFA and the knee of the curve most."""
     size = _sample_size(method, trajectories, samples)
     chosen = chosen_case(path, overrides)
     require_output(figure, ".png", ".pdf", option="--figure")
@@ -103,18 +114,18 @@ def sensitivity(
             workers=workers,
             progress=step,
         )
-    kept: dict[str, str] = {}
+    saved: dict[str, str] = {}
     if out is not None:
-        kept["effects"] = str(out / "effects.csv")
+        saved["effects"] = str(out / "effects.csv")
         files.write_csv(out / "effects.csv", result.effects)
     if figure is not None:
-        kept["figure"] = str(report.write_figure(report.sensitivity_figure(result), figure))
+        saved["figure"] = str(report.write_figure(report.sensitivity_figure(result), figure))
     show(
         result.verdict(),
-        lambda: {**result.scalars(), **kept},
+        lambda: {**result.scalars(), **saved},
         _effects(result),
         _ranges(result),
-        table(kept.items()),
+        table(saved.items()),
         as_json=as_json,
         quiet=quiet,
     )
@@ -130,12 +141,12 @@ def _sample_size(method: str, trajectories: int | None, samples: int | None) -> 
             if method == "morris"
             else ("--trajectories", "--samples")
         )
-        raise BadInput(f"{wrong} does not go with --method {method}; give {right}")
+        raise BadInput(f"{wrong} does not apply to --method {method}; use {right}")
     return size
 
 
 def _effects(result: "Sensitivity") -> Block:
-    """The factors of each outcome, what moves it most first."""
+    """Return the factors of each outcome, the largest effect first."""
     values = result.scalars()
     morris = values["method"] == "morris"
     yield from MORRIS if morris else SOBOL
@@ -150,12 +161,13 @@ def _effects(result: "Sensitivity") -> Block:
                 size = f"mu* {row['mu_star']:9.3g} ± {row['mu_star_conf']:<8.2g}"
                 line = f"{size} mu {row['mu']:+9.3g}  sigma {row['sigma']:.3g}"
             else:
-                line = f"S1 {row['s1']:6.3f} ± {row['s1_conf']:<6.2g} ST {row['st']:6.3f} ± {row['st_conf']:.2g}"
+                first = f"S1 {row['s1']:6.3f} ± {row['s1_conf']:<6.2g}"
+                line = f"{first} ST {row['st']:6.3f} ± {row['st_conf']:.2g}"
             yield f"    {row['factor']:{width}}  {line}"
 
 
 def _ranges(result: "Sensitivity") -> Block:
-    """What was varied, from where to where, and what to know of the effects."""
+    """Return the ranges of the factors, and notes on the effects."""
     values = result.scalars()
     rows = [
         (factor["key"], f"{factor['low']:g} to {factor['high']:g} {factor['unit']}".rstrip())
@@ -164,47 +176,52 @@ def _ranges(result: "Sensitivity") -> Block:
     notes = []
     if values["left_out"]:
         points = f"{values['left_out']} of {values['points']} points"
-        notes.append(f"{points} are left out of some outcome: a contact failed")
+        notes.append(f"{points} are missing from some outcomes: a contact failed")
     if values["silent"] > 0.0:
         notes.append(
-            f"{100 * values['silent']:.0f} % of the contacts run in full film, without a resonance; "
-            "their CRF counts as that of CLR 1 %, their CRFA as the least heard"
+            f"{100 * values['silent']:.0f} % of the contacts run in full film, without a "
+            "resonance; they count with the CRF of CLR 1 % and the smallest observed CRFA"
         )
     if values["distinct"] is not None:
         share = f"{100 * values['distinct']:.0f} %"
-        notes.append(f"{share} of the curves of CRF have a distinct stage; the knee is that of all")
+        notes.append(f"{share} of the curves of CRF have a distinct stage; the knee uses all")
     yield from table([*rows, ("contacts", f"{values['cases']}, {values['failed']} failed")], notes)
+
+
+AnchorsOption = Annotated[
+    Path | None,
+    typer.Option(metavar="ANCHORS.toml", help="Target values (default: the paper's)."),
+]
+FreeOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KEY=LOW..HIGH",
+        help="Search range of a free quantity (repeatable; default: see the docs).",
+    ),
+]
+LevelOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="LENGTH",
+        help="Roughness to solve at (repeatable; default: the anchors').",
+    ),
+]
+ScreenedOption = Annotated[
+    int, typer.Option(metavar="N", min=1, help="Parameter sets to screen for starting points.")
+]
+StartsOption = Annotated[int, typer.Option(metavar="N", min=1, help="Number of starting points.")]
 
 
 @app.command()
 def calibrate(
     path: CaseOrRun,
-    anchors: Annotated[
-        Path | None,
-        typer.Option(metavar="ANCHORS.toml", help="What to meet; by default the paper's numbers."),
-    ] = None,
-    free: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KEY=LOW..HIGH",
-            help="A range to search; may be repeated. Default: see the docs.",
-        ),
-    ] = None,
-    level: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="LENGTH",
-            help="A roughness to solve at; may be repeated. By default the anchors'.",
-        ),
-    ] = None,
+    anchors: AnchorsOption = None,
+    free: FreeOption = None,
+    level: LevelOption = None,
     cells: Cells = 128,
     seeds: Seeds = 3,
-    screened: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Sets of values tried to find starts.")
-    ] = 32,
-    starts: Annotated[
-        int, typer.Option(metavar="N", min=1, help="How many of the best to start from.")
-    ] = 2,
+    screened: ScreenedOption = 32,
+    starts: StartsOption = 2,
     sample_seed: SampleSeed = 0,
     overrides: Overrides = None,
     workers: Workers = None,
@@ -212,7 +229,7 @@ def calibrate(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find the free quantities with which the wear curve best meets anchors, and what that leaves open."""
+    """Fit free quantities so that the wear curve meets anchors, and report what stays open."""
     aims = paper.PAPER_ANCHORS if anchors is None else paper.load_anchors(anchors)
     chosen = chosen_case(path, overrides)
     if out is not None:
@@ -232,15 +249,15 @@ def calibrate(
             workers=workers,
             progress=step,
         )
-    kept = {} if out is None else _keep(result, out)
+    saved = {} if out is None else _save(result, out)
     after = (
-        [*kept.items(), ("try next", f"asperity study {kept['calibrated']} --out DIR")]
-        if kept
+        [*saved.items(), ("try next", f"asperity study {saved['calibrated']} --out DIR")]
+        if saved
         else []
     )
     show(
         result.verdict(),
-        lambda: {**result.scalars(), **kept},
+        lambda: {**result.scalars(), **saved},
         _parameters(result),
         _anchors(result),
         _directions(result),
@@ -248,13 +265,13 @@ def calibrate(
         _effort(result),
         table(after)
         if after
-        else ["  Nothing is kept; --out DIR keeps the calibrated case, tables and figure."],
+        else ["  Nothing is saved; --out DIR saves the calibrated case, tables and figure."],
         as_json=as_json,
         quiet=quiet,
     )
 
 
-def _keep(result: "Calibration", out: Path) -> dict[str, str]:
+def _save(result: "Calibration", out: Path) -> dict[str, str]:
     """Write the case, the table and the figure."""
     paths = {"calibrated": out / "calibrated.toml", "anchors": out / "anchors.csv"}
     files.write_text(paths["calibrated"], study.calibrated_text(result, out))
@@ -262,24 +279,31 @@ def _keep(result: "Calibration", out: Path) -> dict[str, str]:
     paths["figure"] = report.write_figure(
         report.calibration_figure(result), out / "calibration.png"
     )
-    return {name: str(kept) for name, kept in paths.items()}
+    return {name: str(saved) for name, saved in paths.items()}
 
 
 def _parameters(result: "Calibration") -> Block:
-    yield "  found, with one standard deviation; learnt: how much of the range's variance the anchors took away"
+    yield "  fitted, with one standard deviation; learnt: reduction of the range's variance"
     for row in result.scalars()["parameters"]:
         start = "none" if row["start"] is None else f"{row['start']:.4g}"
         value = f"{row['value']:.4g} {row['unit']}".rstrip()
-        known = f"({row['low']:.4g} to {row['high']:.4g}; was {start}), learnt {100 * row['learnt']:.0f} %"
-        yield f"    {row['key']:28}  {value} {known}{'' if row['identifiable'] else ', NOT DETERMINED'}"
+        known = (
+            f"({row['low']:.4g} to {row['high']:.4g}; was {start}), "
+            f"learnt {100 * row['learnt']:.0f} %"
+        )
+        undetermined = "" if row["identifiable"] else ", NOT DETERMINED"
+        yield f"    {row['key']:28}  {value} {known}{undetermined}"
 
 
 def _anchors(result: "Calibration") -> Block:
-    """What was wanted, and what the case as given, the fit and its check have."""
+    """Return target values, and those of the case as given, of the fit and of its check."""
     values = result.scalars()
     given, check = ({row["anchor"]: row for row in values[name]} for name in ("start", "check"))
     aimed = {anchor.name for anchor in result.aimed_at}
-    yield f"  misfit {values['misfit']:.3g} (was {values['start_misfit']:.3g}): sum of squared misses in tolerances"
+    yield (
+        f"  misfit {values['misfit']:.3g} (was {values['start_misfit']:.3g}): "
+        "sum of squared deviations in tolerances"
+    )
     rows = []
     for row in values["fit"]:
         name = row["anchor"]
@@ -289,9 +313,9 @@ def _anchors(result: "Calibration") -> Block:
                 _number(value) for value in (row["printed"], given[name]["ours"], row["ours"])
             ]
             rows.append(["*" if name in aimed else "", name, *numbers, f"{mean} ({low} to {high})"])
-    titles = ["", "", "wanted", "as given", "fitted", "checked (90 % over surfaces)"]
+    titles = ["", "", "target", "as given", "fitted", "checked (90 % over surfaces)"]
     yield from columns(titles, rows, left=2)
-    yield "  * aimed at; checked: on the case's own cells, on surfaces that the fit has not seen"
+    yield "  * fitted; checked: on the case's own grid, on surfaces not used in the fit"
 
 
 def _number(value: float | None) -> str:
@@ -299,28 +323,30 @@ def _number(value: float | None) -> str:
 
 
 def _directions(result: "Calibration") -> Block:
-    yield "  directions in the ranges (shares of them), the best determined first"
+    yield "  directions in parameter space (fractions of the ranges), best determined first"
     for direction in result.scalars()["directions"]:
         parts = [
             f"{weight:+.2f} {key}"
             for key, weight in direction["weights"].items()
-            if abs(weight) >= PART
+            if abs(weight) >= MIN_WEIGHT
         ]
         known = f"± {direction['std']:.2g} of a range" if direction["determined"] else "open"
         yield f"    {known:18}  {', '.join(parts)}"
 
 
 def _trade_offs(result: "Calibration") -> Block:
-    dearest = [trade for trade in result.trade_offs if trade.misfit - trade.without > WORTH_A_LINE]
+    dearest = [trade for trade in result.trade_offs if trade.misfit - trade.without > MIN_GAIN]
     if dearest:
-        yield "  what the others would gain without an anchor, by slopes"
+        yield "  improvement of the other anchors without one of them, linearised"
     for trade in dearest:
         yield (
-            f"    {trade.given_up}: misfit of the others {trade.misfit:.1f} to {trade.without:.1f}; "
-            f"most {trade.relieved}, {trade.miss:+.1f} to {trade.miss_without:+.1f} tolerances"
+            f"    {trade.given_up}: misfit of the others {trade.misfit:.1f} to "
+            f"{trade.without:.1f}; largest change in {trade.relieved}, {trade.miss:+.1f} to "
+            f"{trade.miss_without:+.1f} tolerances"
         )
 
 
 def _effort(result: "Calibration") -> Block:
     contacts = f"{result.cases} contacts, {result.failed} failed"
-    yield f"  {result.evaluations} sets of values, {contacts}, {study.duration_text(result.seconds)}"
+    duration = study.duration_text(result.seconds)
+    yield f"  {result.evaluations} parameter sets, {contacts}, {duration}"

@@ -1,4 +1,4 @@
-"""`asperity study`: sweeps a case, in processes here, on dask's workers, or shard by shard; resumes by itself."""
+"""`asperity study`: sweep a case, in local processes, on dask workers, or in shards; resumable."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -34,41 +34,43 @@ CURVE = ("car", "car_domain", "clr", "crf_sound_hz", "crfa_sound")
 
 @app.command("study")
 def study_command(
-    path: Annotated[Path, typer.Argument(metavar="CASE.toml", help="A case with a [study].")],
+    path: Annotated[Path, typer.Argument(metavar="CASE.toml", help="Case with a [study].")],
     out: OutFolder = None,
     workers: Workers = None,
     executor: Annotated[
         str | None,
-        typer.Option(metavar="dask:ADDRESS", help="Compute on a dask scheduler's workers."),
+        typer.Option(metavar="dask:ADDRESS", help="Compute on the workers of a dask scheduler."),
     ] = None,
     shard: Annotated[
         str, typer.Option(metavar="k/N", help="Compute the k-th of N equal shares.")
     ] = "1/1",
     retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Compute failed cases again.")
+        bool, typer.Option("--retry-failed", help="Repeat failed cases.")
     ] = False,
     merge: Annotated[
         list[Path] | None,
-        typer.Option(metavar="DIR", help="Take over the cases of another folder of this study."),
+        typer.Option(
+            metavar="DIR", help="Include the cases of another folder of this study (repeatable)."
+        ),
     ] = None,
     fields: Annotated[
         str | None,
-        typer.Option(metavar="NAMES", help="Maps to keep: pressure,gap,in_contact,surface_height."),
+        typer.Option(metavar="NAMES", help="Maps to save: pressure,gap,in_contact,surface_height."),
     ] = None,
     overrides: Overrides = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say what it would cost; keep nothing.")
+        bool, typer.Option("--dry-run", help="Estimate the cost without computing.")
     ] = False,
     page: Page = None,
     figures: StudyFigures = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Sweep a case: every point of its [study], several surfaces each; goes on where it was stopped."""
+    """Sweep a case: every point of its [study], on several surfaces each; resumable."""
     part = _shard(shard)
     if out is None and not dry_run:
-        raise BadInput("study needs a folder to keep its cases in; give --out DIR")
-    if page is not None and not _in_folder_to_come(page, out):
+        raise BadInput("asperity study needs a folder for its cases; state --out DIR")
+    if page is not None and not _in_new_folder(page, out):
         require_output(page, ".html", option="--report")
     plan = study.plan_study(chosen_case(path, overrides))
     if dry_run:
@@ -100,11 +102,11 @@ def study_command(
 
 
 def _require_whole(result: "StudyResult", part: tuple[int, int]) -> None:
-    """AsperityError where cases of this share failed or are missing."""
+    """Raise AsperityError if cases of this share failed or are missing."""
     if result.failed:
         raise AsperityError(
-            f"{result.failed} of {len(result.table)} cases failed; the first: {result.failures['reason'].iloc[0]}; "
-            "--retry-failed computes them again"
+            f"{result.failed} of {len(result.table)} cases failed; the first: "
+            f"{result.failures['reason'].iloc[0]}; --retry-failed repeats them"
         )
     missing = sum(case.number % part[1] == part[0] - 1 for case in result.plan.cases) - len(
         result.table
@@ -115,7 +117,7 @@ def _require_whole(result: "StudyResult", part: tuple[int, int]) -> None:
 
 @contextmanager
 def study_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[StudyProgress], None]]":
-    """Show cases done, rate, failures and time left on a terminal."""
+    """Show completed cases, rate, failures and remaining time on a terminal."""
     with progress(label, "starting workers ...", quiet=quiet) as display:
 
         def step(state: "StudyProgress") -> None:
@@ -149,8 +151,8 @@ def _shard(text: str) -> tuple[int, int]:
     return int(parts[1]), int(parts[2])
 
 
-def _in_folder_to_come(page: Path, out: Path | None) -> bool:
-    """Whether a page is to lie in the study's folder, which the study makes."""
+def _in_new_folder(page: Path, out: Path | None) -> bool:
+    """Return True if the page goes into the study's folder, which does not exist yet."""
     return (
         out is not None
         and not out.exists()
@@ -172,7 +174,7 @@ def _make_page(
 
 
 def _curve(curve: "WearCurve | None") -> Block:
-    """A row a level: means over its surfaces, with their deviations."""
+    """Return a row per level: means over its surfaces, with their deviations."""
     if curve is None:
         return
     sq, selected = quantity("sq_m"), [quantity(key) for key in CURVE if key in curve.table]
@@ -182,9 +184,9 @@ def _curve(curve: "WearCurve | None") -> Block:
         (
             [
                 sq.number(level),
-                *(entry.number(mean[at], deviation[at]) for entry, mean, deviation in means),
+                *(entry.number(mean[index], deviation[index]) for entry, mean, deviation in means),
             ]
-            for at, level in enumerate(curve.sq)
+            for index, level in enumerate(curve.sq)
         ),
     )
     yield "  mean ± standard deviation over the surfaces of a level"
@@ -202,7 +204,7 @@ def _failures_and_files(result: "StudyResult", made: dict[str, str]) -> Block:
     yield from table(
         [
             ("table", str(result.path)),
-            *(made or {"its page": f"asperity report {result.folder}"}).items(),
+            *(made or {"report": f"asperity report {result.folder}"}).items(),
         ]
     )
 
@@ -210,10 +212,10 @@ def _failures_and_files(result: "StudyResult", made: dict[str, str]) -> Block:
 def _show_estimate(plan: "StudyPlan", cost: "StudyCost", *, as_json: bool, quiet: bool) -> None:
     rows = [
         ("points", f"{len(plan.points)}, over {', '.join(plan.axes) or 'seeds alone'}"),
-        ("surfaces a point", str(plan.realisations)),
+        ("surfaces per point", str(plan.realisations)),
         (
-            "a case takes",
-            f"{text('seconds', cost.case_s)} on one worker, mean of {cost.tried} tried",
+            "time per case",
+            f"{text('seconds', cost.case_s)} on one worker, mean of {cost.tried} samples",
         ),
     ]
     show(

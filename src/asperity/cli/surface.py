@@ -1,4 +1,4 @@
-"""`asperity surface`: what a measured surface holds."""
+"""`asperity surface`: contents and parameters of measured surfaces."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -16,41 +16,55 @@ if TYPE_CHECKING:
     from asperity.surface import SurfaceDescription
 
 
+FilesArgument = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Measured surfaces.")]
+PixelOption = Annotated[
+    str | None,
+    typer.Option(metavar="LENGTH", help="Sample spacing of a bare matrix, such as '1.6 um'."),
+]
+FormOption = Annotated[
+    str,
+    typer.Option(help="Form to remove: none, plane, quadratic, cubic, quartic or cylinder."),
+]
+TurnOption = Annotated[
+    bool, typer.Option("--turn", help="Rotate by 90 degrees: x of the file becomes y.")
+]
+OutliersOption = Annotated[
+    str, typer.Option(help="Heights far from their neighbours: keep or remove.")
+]
+SFilterOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH", help="Remove shorter waves (ISO 16610 Gaussian), such as '5 um'."
+    ),
+]
+LFilterOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH", help="Remove longer waves (ISO 16610 Gaussian), such as '0.25 mm'."
+    ),
+]
+
+
 @app.command("surface")
 def surface_command(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Measured surfaces.")],
+    files: FilesArgument,
     out: OutPicture = None,
     unit: Unit = None,
     lateral_unit: LateralUnit = None,
-    pixel: Annotated[
-        str | None,
-        typer.Option(metavar="LENGTH", help="Distance of the heights of a bare matrix: '1.6 um'."),
-    ] = None,
-    form: Annotated[
-        str, typer.Option(help="Remove none, a plane, quadratic, cubic, quartic or cylinder form.")
-    ] = "quadratic",
-    turn: Annotated[
-        bool, typer.Option("--turn", help="Turn by 90 degrees: x of the file becomes y.")
-    ] = False,
-    outliers: Annotated[
-        str, typer.Option(help="Keep or remove heights far off their neighbours.")
-    ] = "keep",
-    s_filter: Annotated[
-        str | None,
-        typer.Option(metavar="LENGTH", help="Remove shorter waves (ISO 16610 Gaussian): '5 um'."),
-    ] = None,
-    l_filter: Annotated[
-        str | None,
-        typer.Option(metavar="LENGTH", help="Remove longer waves (ISO 16610 Gaussian): '0.25 mm'."),
-    ] = None,
+    pixel: PixelOption = None,
+    form: FormOption = "quadratic",
+    turn: TurnOption = False,
+    outliers: OutliersOption = "keep",
+    s_filter: SFilterOption = None,
+    l_filter: LFilterOption = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Say what a surface file holds: size, pixel, missing data, what was done to it, parameters."""
+    """Describe a surface file: size, pixel, missing data, processing, parameters."""
     require_output(out, ".png")
     if out is not None and len(files) > 1:
         raise BadInput(
-            f"--out {out} holds one map, got {len(files)} surfaces; draw them one by one"
+            f"--out {out} holds one map, got {len(files)} surfaces; plot them one at a time"
         )
     lengths = {"pixel": pixel, "s_filter": s_filter, "l_filter": l_filter}
     given = {name: text for name, text in lengths.items() if text is not None}
@@ -94,7 +108,7 @@ def surface_command(
 
 
 def _parameters(description: "SurfaceDescription", *, named: bool) -> Block:
-    """The parameters of a map, or those of a profile, and what was done to it."""
+    """Return the parameters of a map or profile, and its processing steps."""
     if named:
         yield str(description.path)
     values, measured, of_map = (
@@ -114,6 +128,6 @@ def _parameters(description: "SurfaceDescription", *, named: bool) -> Block:
         if of_map
         else [(entry.title, entry.text_in(values["profile"])) for entry in profile]
     )
-    bound = "Str is an upper bound: the lay outlasts half the map"
+    bound = "Str is an upper bound: the lay extends over half the map"
     bounded = [bound] if of_map and description.parameters.str_bounded else []
     yield from table(rows, (*bounded, *description.steps, *measured.notes))

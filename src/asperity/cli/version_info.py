@@ -1,10 +1,10 @@
-"""What a bug report needs to know of this installation, and nothing of who or where: `asperity --version --verbose`."""
+"""Details of this installation for bug reports, without user names or paths."""
 
 from collections.abc import Iterator
 
 
 def about() -> Iterator[str]:
-    """Lines: platform, processors, threads of libraries that compute, versions of what asperity needs and can use."""
+    """Return lines: platform, processors, threads of numerical libraries, and package versions."""
     import os
     import platform
     import re
@@ -13,7 +13,8 @@ def about() -> Iterator[str]:
     from asperity.core import processes
 
     yield f"Python {platform.python_version()} ({platform.python_implementation()})"
-    yield f"{platform.system()} {platform.release()}, {platform.machine()}, {platform.libc_ver()[0] or 'no libc'}"
+    libc = platform.libc_ver()[0] or "no libc"
+    yield f"{platform.system()} {platform.release()}, {platform.machine()}, {libc}"
     yield f"{os.cpu_count()} processors, {processes.cores()} of them for asperity"
     yield from _threads()
     for requirement in requires("asperity") or ():
@@ -27,9 +28,10 @@ def about() -> Iterator[str]:
 
 
 def _threads() -> Iterator[str]:
-    """A line for each pool of threads that numpy brings."""
-    import numpy as np  # noqa: F401 - so that its library is there to be asked
+    """Return a line per thread pool that numpy loads."""
+    import numpy as np  # noqa: F401 - loads its thread pools
     from threadpoolctl import threadpool_info
 
     for pool in threadpool_info():
-        yield f"{pool['internal_api']} {pool['version'] or 'of unknown version'}, {pool['num_threads']} threads"
+        pool_version = pool["version"] or "of unknown version"
+        yield f"{pool['internal_api']} {pool_version}, {pool['num_threads']} threads"

@@ -47,36 +47,38 @@ def vibrate(
     path: Annotated[
         Path | None,
         typer.Argument(
-            metavar="CASE.toml", help="A case file with [vibration]; --table1 needs none."
+            metavar="CASE.toml", help="Case file with [vibration]; not needed for --table1."
         ),
     ] = None,
     preset: Annotated[
         str | None,
-        typer.Option(
-            help="sound or paper, in place of the case's; --table1 takes paper by default."
-        ),
+        typer.Option(help="sound or paper (default: the case's; paper for --table1)."),
     ] = None,
     table1: Annotated[
-        bool, typer.Option("--table1", help="The paper's Table 1, printed and ours.")
+        bool, typer.Option("--table1", help="Reproduce the paper's Table 1.")
     ] = False,
     records: Annotated[
-        int | None, typer.Option(help="Records behind each row of the table.")
+        int | None, typer.Option(help="Simulated records per row of the table.")
     ] = None,
     overrides: Overrides = None,
     figures: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Draw the paper's Figs 3 and 4, or the table, as PNG."),
+        typer.Option(
+            metavar="DIR", help="Folder for the paper's Figs 3 and 4, or the table, as PNG."
+        ),
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run the vibration model alone: dry, all load on asperities; or make the paper's Table 1."""
+    """Run the vibration model alone, dry with all load on asperities, or the paper's Table 1."""
     if path is None and not table1:
         raise BadInput(
             "a case is missing; asperity vibrate CASE.toml, or asperity vibrate --table1"
         )
     if records is not None and not table1:
-        raise BadInput(f"--records {records} belongs to --table1; add it, or leave --records out")
+        raise BadInput(
+            f"--records {records} applies to --table1 only; add it, or leave --records out"
+        )
     first = [f"vibration.preset={preset}"] if preset is not None else []
     chosen = chosen_case(path, [*first, *(overrides or [])]) if path is not None else None
     if figures is not None:
@@ -119,7 +121,7 @@ def _vibrate(chosen: "Case", figures: Path | None, *, as_json: bool, quiet: bool
 def _table1(
     preset: str, records: int | None, figures: Path | None, *, as_json: bool, quiet: bool
 ) -> None:
-    with progress("Table 1", "riding over the records ...", quiet=quiet):
+    with progress("Table 1", "simulating the records ...", quiet=quiet):
         rows = paper.reproduce_table1(preset=preset, records=records)
     drawn: list[Path] = []
     if figures is not None:
@@ -152,4 +154,4 @@ def _printed_and_ours(rows: "Sequence[Table1Row]") -> Block:
         [entry.label for entry in selected],
         ([entry.number_in(row) for entry in selected] for row in values),
     )
-    yield "  medians of single records; E 207 GPa, R 5.4 mm, m 0.1 kg, not the case's"
+    yield "  medians over records; E 207 GPa, R 5.4 mm, m 0.1 kg, independent of the case"

@@ -1,4 +1,4 @@
-"""`asperity wear`: a case let wear for hours; goes on where it was stopped."""
+"""`asperity wear`: simulate wear over hours, resumable; or fit a wear coefficient to a test."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,9 +28,10 @@ from asperity.core.processes import cores
 from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
+    from asperity.case import Case
     from asperity.simulation import WearHistory, WearProgress
     from asperity.surface import MeasuredSurface
-    from asperity.wear import FittedWear
+    from asperity.wear import WearFit
 
 STARTS = "the start; after installation the first solve compiles the solver, up to a minute ..."
 CONTACT = (
@@ -46,7 +47,7 @@ CONTACT = (
     "crf_hz",
     "crfa",
 )
-OF_BODIES = (
+BODY_COLUMNS = (
     "overrollings",
     "worn_depth_m",
     "worn_depth_max_m",
@@ -57,49 +58,62 @@ OF_BODIES = (
 )
 
 
+PathArgument = Annotated[
+    Path | None,
+    typer.Argument(metavar="[CASE.toml]", help="Case, with [wear] for how it wears."),
+]
+HoursOption = Annotated[float | None, typer.Option(metavar="H", help="Hours of running.")]
+FitOption = Annotated[
+    Path | None,
+    typer.Option(metavar="TRACE", help="Fit k to a test, instead of a case: its friction record."),
+]
+ScarOption = Annotated[
+    Path | None, typer.Option(metavar="PROFILE", help="With --fit: a profile across the track.")
+]
+LoadOption = Annotated[
+    str | None,
+    typer.Option(metavar="FORCE", help="Load of the test, if its record does not state it."),
+]
+TrackRadiusOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH", help="Track radius of the test, if its record does not state it."
+    ),
+]
+SecondLoadOption = Annotated[
+    str | None, typer.Option(metavar="FORCE", help="Load of a second test to predict.")
+]
+SecondDistanceOption = Annotated[
+    str | None, typer.Option(metavar="LENGTH", help="Sliding distance of a second test.")
+]
+
+
 @app.command()
 def wear(
-    path: Annotated[
-        Path | None,
-        typer.Argument(metavar="[CASE.toml]", help="A case; its [wear] says how it wears."),
-    ] = None,
-    hours: Annotated[float | None, typer.Option(metavar="H", help="Hours of running.")] = None,
+    path: PathArgument = None,
+    hours: HoursOption = None,
     surface: SurfaceFile = None,
     overrides: Overrides = None,
     out: OutFolder = None,
     workers: Workers = None,
     page: Page = None,
-    fit: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="TRACE", help="In place of a case: k from a test's friction record ..."
-        ),
-    ] = None,
-    scar: Annotated[
-        Path | None, typer.Option(metavar="PROFILE", help="... and a profile across its track.")
-    ] = None,
+    fit: FitOption = None,
+    scar: ScarOption = None,
     unit: Unit = None,
     lateral_unit: LateralUnit = None,
-    load: Annotated[
-        str | None, typer.Option(metavar="FORCE", help="Of the test, if its record has it not.")
-    ] = None,
-    track_radius: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Of the test, if its record has it not.")
-    ] = None,
-    second_load: Annotated[
-        str | None, typer.Option(metavar="FORCE", help="Of a second test, to predict.")
-    ] = None,
-    second_distance: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Of a second test, to predict.")
-    ] = None,
+    load: LoadOption = None,
+    track_radius: TrackRadiusOption = None,
+    second_load: SecondLoadOption = None,
+    second_distance: SecondDistanceOption = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Let the contact wear: surfaces, load sharing, film and resonance over hours. Or fit k to a test, with --fit."""
+    """Simulate wear over hours: surfaces, load sharing, film, resonance; or fit k to a test."""
     if fit is not None or scar is not None:
         if fit is None or scar is None or path is not None or hours is not None:
             raise BadInput(
-                "--fit TRACE and --scar PROFILE go together, without a case or --hours; give those two"
+                "--fit TRACE and --scar PROFILE go together, without a case or --hours; state "
+                "only these two"
             )
         amounts = {
             "load": _stated("--load", "N", load),
@@ -114,24 +128,12 @@ def wear(
         return
     if path is None or hours is None:
         raise BadInput(
-            "asperity wear takes a case and --hours, or --fit TRACE and --scar PROFILE; give either pair"
+            "asperity wear needs a case and --hours, or --fit TRACE and --scar PROFILE; state "
+            "either pair"
         )
     require_output(page, ".html", option="--report")
     chosen = chosen_case(path, overrides, surface)
-    with progress(path.name, STARTS, quiet=quiet) as display:
-
-        def jump(taken: "WearProgress") -> None:
-            row = taken.row
-            told = ", ".join(quantity(key).named(row[key]) for key in ("sq_m", "clr"))
-            display(
-                f"{taken.hours:.4g} of {taken.of_hours:.4g} h, {told}",
-                round(1000.0 * taken.hours / taken.of_hours),
-                1000,
-            )
-
-        worn = simulation.run_wear(
-            chosen, hours=hours, out=out, workers=workers or cores(), progress=jump
-        )
+    worn = _simulate(chosen, path.name, hours, out, workers or cores(), quiet=quiet)
     if page is not None:
         report.write_wear_report(worn, page)
     show(
@@ -140,11 +142,28 @@ def wear(
         _contact(worn),
         _bodies(worn),
         table([], worn.notes),
-        written("kept in", worn.folder),
+        written("saved in", worn.folder),
         written("report", page),
         as_json=as_json,
         quiet=quiet,
     )
+
+
+def _simulate(
+    chosen: "Case", label: str, hours: float, out: Path | None, workers: int, *, quiet: bool
+) -> "WearHistory":
+    with progress(label, STARTS, quiet=quiet) as display:
+
+        def jump(taken: "WearProgress") -> None:
+            row = taken.row
+            values = ", ".join(quantity(key).named(row[key]) for key in ("sq_m", "clr"))
+            display(
+                f"{taken.hours:.4g} of {taken.of_hours:.4g} h, {values}",
+                round(1000.0 * taken.hours / taken.of_hours),
+                1000,
+            )
+
+        return simulation.run_wear(chosen, hours=hours, out=out, workers=workers, progress=jump)
 
 
 def _stated(option: str, unit: str, text: str | None) -> float | None:
@@ -159,15 +178,15 @@ def _fit(
     track_radius: float | None,
     second_load: float | None,
     second_distance: float | None,
-) -> "FittedWear":
+) -> "WearFit":
     trace = wear_laws.read_friction_trace(record, load=load, track_radius=track_radius)
     return wear_laws.fit_wear_coefficient(
         trace, profile, second_load=second_load, second_distance=second_distance
     )
 
 
-def _fitted(fitted: "FittedWear") -> Block:
-    """What was read from a test, and what follows."""
+def _fitted(fitted: "WearFit") -> Block:
+    """Return the rows of a fit."""
     trace, scar = fitted.trace, fitted.scar
     estimates = {
         "wear_coefficient": fitted.k,
@@ -178,21 +197,22 @@ def _fitted(fitted: "FittedWear") -> Block:
     rows = [
         (
             quantity(key).title,
-            f"{quantity(key).number(one.median)}, {span(key, (one.low, one.high))}",
+            f"{quantity(key).number(estimate.median)}, {span(key, (estimate.low, estimate.high))}",
         )
-        for key, one in estimates.items()
+        for key, estimate in estimates.items()
     ]
     bounds = quantity("wear_coefficient")
     rows += [
-        ("k if what is piled up is foreign", bounds.text(fitted.k_all_lost)),
+        ("k if piled-up material is foreign", bounds.text(fitted.k_all_lost)),
         (
             "k if it is the disc's own",
-            bounds.text(fitted.k_none_lost) if fitted.k_none_lost else "0, nothing is lost",
+            bounds.text(fitted.k_none_lost) if fitted.k_none_lost else "0, no loss",
         ),
-        ("load, way, laps", f"{trace.load:.4g} N, {trace.distance:.4g} m, {trace.laps:.4g}"),
+        ("load, distance, laps", f"{trace.load:.4g} N, {trace.distance:.4g} m, {trace.laps:.4g}"),
         (
             "track",
-            f"radius {surfaces.length_text(trace.track_radius)}, width {surfaces.length_text(scar.width)}",
+            f"radius {surfaces.length_text(trace.track_radius)}, "
+            f"width {surfaces.length_text(scar.width)}",
         ),
         ("missing, piled up", f"{scar.missing * 1e12:.3g}, {scar.piled * 1e12:.3g} µm²"),
         (
@@ -204,8 +224,8 @@ def _fitted(fitted: "FittedWear") -> Block:
 
 
 def _contact(worn: "WearHistory") -> Block:
-    """Both surfaces together, and the contact, at first and at the end."""
-    first, last = worn.table.iloc[0], worn.numbers_at_end
+    """Return the initial and final values of the composite surface and the contact."""
+    first, last = worn.table.iloc[0], worn.final_values
     rows = [
         (
             quantity(key).title,
@@ -219,11 +239,11 @@ def _contact(worn: "WearHistory") -> Block:
 
 
 def _bodies(worn: "WearHistory") -> Block:
-    """What each body has come to."""
+    """Return the final values of each body."""
     last = worn.table.iloc[-1]
     rows = []
-    for key in OF_BODIES:
+    for key in BODY_COLUMNS:
         entry = quantity(key)
-        ends = [entry.number(last[simulation.of_body(key, body)]) for body in (0, 1)]
+        ends = [entry.number(last[simulation.body_column(key, body)]) for body in (0, 1)]
         rows.append((entry.title, *ends, entry.display))
     return columns(["", "body 1", "body 2", ""], rows, left=1)

@@ -207,7 +207,7 @@ def wear_drift(setting: Setting, history: WearHistory, hours: float) -> tuple[fl
             "the wear history has no hours, and says nothing of a drift; leave --worn out"
         )
     first, last = (
-        float(share_of(unknown.range, unknown.from_si(history.at(time)["sq_m"])))
+        float(share_of(unknown.range, unknown.from_si(history.values_at(time)["sq_m"])))
         for time in (0.0, end)
     )
     mean = (last - first) * hours / end

@@ -1,11 +1,12 @@
-"""Grooves and dents by hard particles in the oil: a part of each is cut off, the rest stands beside it.
+"""Grooves and dents by hard particles in the oil: part of each is cut off, the rest is piled up.
 
 A particle larger than the film is pressed into the surface while it passes the contact and is
-dragged along by the other body: a dent without sliding, a groove with it. Marks are independent of
-one another and of what they fall on, Poisson's in number; the mean and variance that they bring
-are Campbell's: density times the integrals of a mark and of its square. Sources: abrasion by a
-sphere and its cutting efficiency, K.-H. Zum Gahr (1987); N. R. Campbell (1909). Ours: that a
-particle sinks in by a set share of what the film leaves of it, whatever load that takes.
+dragged along by the other body: a dent without sliding, a groove with it. Marks are independent
+of one another and of the surface, and their number is Poisson distributed; mean and variance
+follow Campbell's theorem: density times the integrals of a mark and of its square. Sources:
+abrasion by a sphere and its cutting efficiency, K.-H. Zum Gahr (1987); N. R. Campbell (1909).
+Assumption of this implementation: a particle is pressed in by a set share of its excess over the
+film, whatever load that takes.
 """
 
 from dataclasses import dataclass
@@ -19,21 +20,21 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import Parameter, Parametric
 from asperity.wear.mechanism import Change, Passage
 
-RIDGE = 0.5  # width of the ridge on either side over the groove's own
-FINE = 4.0  # points across a groove, at least: cells are divided for it
-FINEST = 16
-MOST_MARKS = 200_000  # in a jump
-RISE = 0.1  # of Sq squared, or of the film squared where that is more, in a jump
-TRACE = 0.01  # of the largest load on a line along rolling: what lies beyond is beside the track
-SHARES = 50  # of sizes, for their mean
+RIDGE_WIDTH = 0.5  # width of the ridge on either side, relative to the groove
+MIN_POINTS = 4.0  # points across a groove, at least: cells are subdivided to reach it
+MAX_SUBDIVISION = 16
+MAX_MARKS = 200_000  # in a jump
+MAX_VARIANCE_RISE = 0.1  # in a jump, relative to Sq squared, or the film squared if larger
+LOADED_SHARE = 0.01  # of the largest load on a line along rolling: lines below it are unloaded
+SIZE_CLASSES = 50  # for means over particle sizes
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
-    """A groove along x with round ends, [m]; with no `length`, a dent.
+class WearMark:
+    """Groove along x with round ends, lengths in m; a dent if `length` is 0.
 
-    Across, a parabola of `depth` and `width`; on either side a ridge, a parabola too, half as wide
-    and `ridge` high.
+    Across, a parabola of `depth` and `width`; on either side a parabolic ridge, half as wide and
+    `ridge` high.
     """
 
     length: float
@@ -42,8 +43,8 @@ class Mark:
     ridge: float
 
     @classmethod
-    def of(cls, length: float, width: float, depth: float, cutting: float) -> "Mark":
-        """A mark whose ridge holds what is not cut off, (1 - cutting) of its volume."""
+    def with_ridge(cls, length: float, width: float, depth: float, cutting: float) -> "WearMark":
+        """Create a mark whose ridge holds the volume not cut off, (1 - cutting) of the groove."""
         dug = cls(length, width, depth, 0.0)
         return cls(
             length, width, depth, (1.0 - cutting) * dug.dug / cls(length, width, depth, 1.0).piled
@@ -51,8 +52,8 @@ class Mark:
 
     @property
     def reach(self) -> float:
-        """Of the ridge's outer edge from the middle line [m]."""
-        return (0.5 + RIDGE) * self.width
+        """Distance of the ridge's outer edge from the centre line [m]."""
+        return (0.5 + RIDGE_WIDTH) * self.width
 
     @property
     def dug(self) -> float:
@@ -61,23 +62,23 @@ class Mark:
 
     @property
     def piled(self) -> float:
-        """Volume of the ridge [m^3]: 2/3 of its height and width along its middle line."""
-        return 2.0 / 3.0 * self.ridge * RIDGE * self.width * self._along_ridge
+        """Volume of the ridge [m^3]: 2/3 of its height and width along its centre line."""
+        return 2.0 / 3.0 * self.ridge * RIDGE_WIDTH * self.width * self._along_ridge
 
     @property
     def square(self) -> float:
         """Integral of the squared height [m^4]."""
         groove = self.depth**2 * self.width * (8.0 / 15.0 * self.length + np.pi / 12.0 * self.width)
-        return groove + 8.0 / 15.0 * self.ridge**2 * RIDGE * self.width * self._along_ridge
+        return groove + 8.0 / 15.0 * self.ridge**2 * RIDGE_WIDTH * self.width * self._along_ridge
 
     @property
     def _along_ridge(self) -> float:
-        return 2.0 * self.length + np.pi * (1.0 + RIDGE) * self.width
+        return 2.0 * self.length + np.pi * (1.0 + RIDGE_WIDTH) * self.width
 
     def heights(self, x: Field, y: Field) -> tuple[Field, Field]:
-        """Groove and ridge, both 0 or more [m], at places about the middle."""
+        """Return groove depth and ridge height, both 0 or more [m], at points about the centre."""
         off = np.hypot(np.maximum(np.abs(x) - 0.5 * self.length, 0.0), y) / (0.5 * self.width)
-        beyond = (off - 1.0 - RIDGE) / RIDGE
+        beyond = (off - 1.0 - RIDGE_WIDTH) / RIDGE_WIDTH
         return self.depth * np.maximum(1.0 - off**2, 0.0), self.ridge * np.maximum(
             1.0 - beyond**2, 0.0
         )
@@ -85,12 +86,12 @@ class Mark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ploughing(Parametric):
-    """Marks of debris.
+    """Marks of debris particles.
 
-    `concentration` of particles larger than `smallest` in the oil (1e9 1/m^3 is 1000 in a
-    millilitre), up to `largest`, of which a share d^-exponent is larger than d; `sinking` is the
-    share of what of a particle is thicker than the film that is pressed into this surface,
-    `cutting` that of a mark's volume that is cut off: the rest is piled up beside.
+    `concentration` of particles larger than `smallest` in the oil (1e9 1/m^3 is 1000 per
+    millilitre), up to `largest`; the share larger than d is d^-exponent. `sinking` is the share of
+    a particle's excess over the film that is pressed into this surface, `cutting` the share of a
+    mark's volume that is cut off: the rest is piled up in ridges.
     """
 
     needs_temperature: ClassVar[bool] = False
@@ -106,7 +107,8 @@ class Ploughing(Parametric):
         Parametric.__post_init__(self)
         if not self.smallest < self.largest:
             raise BadInput(
-                f"ploughing largest must exceed smallest, got {self.largest:g} and {self.smallest:g} m"
+                f"ploughing largest must exceed smallest, got {self.largest:g} and "
+                f"{self.smallest:g} m"
             )
         if not 0.0 < self.sinking <= 0.5:
             raise BadInput(
@@ -118,15 +120,15 @@ class Ploughing(Parametric):
             )
 
     def __call__(self, passage: Passage) -> Change:
-        """The marks of the jump."""
-        film = passage.film_inside
-        on_track = track(passage)
-        lower, upper = ends(passage.grid, on_track)
+        """Return the marks of the jump."""
+        film = passage.loaded_film
+        track_cells = loaded_columns(passage)
+        lower, upper = track_bounds(passage.grid, track_cells)
         expected = self.density(film) * passage.jump * float(np.prod(np.subtract(upper, lower)))
-        if expected > MOST_MARKS:
+        if expected > MAX_MARKS:
             raise BadInput(
                 f"ploughing would make {expected:.3g} marks in one jump, got a concentration of "
-                f"{self.concentration:g} /m^3; take fewer particles, larger ones or shorter jumps"
+                f"{self.concentration:g} /m^3; use fewer or larger particles, or shorter jumps"
             )
         dug, piled = np.zeros(passage.grid.cells), np.zeros(passage.grid.cells)
         rng = passage.rng
@@ -136,7 +138,7 @@ class Ploughing(Parametric):
         made = 0
         for size, (x, y) in zip(sizes, places, strict=True):
             if size > film:
-                stamp(
+                add_mark(
                     dug,
                     piled,
                     self.mark(float(size), film, passage),
@@ -147,7 +149,7 @@ class Ploughing(Parametric):
         cell = float(np.prod(passage.grid.spacing))
         loose, stays = float(piled.sum()), (1.0 - self.cutting) * float(dug.sum())
         if loose > 0.0:
-            piled *= stays / loose  # cells cut ridges a little differently from grooves
+            piled *= stays / loose  # the grid discretises ridges and grooves differently
         elif stays > 0.0:
             dug *= self.cutting
         facts = {"marks": float(made), "volume_m3": float(dug.sum()) * cell}
@@ -155,73 +157,85 @@ class Ploughing(Parametric):
         return Change(
             heights_change=change,
             facts=facts,
-            longest=self._longest(passage, film, change[:, on_track]),
+            longest=self._longest(passage, film, change[:, track_cells]),
         )
 
     def _longest(self, passage: Passage, film: float, change: Field) -> float:
-        """Over-rollings that raise Sq squared by a set share, the film's where that is more; one mark at least."""
-        sizes = self.sizes((np.arange(SHARES) + 0.5) / SHARES)
+        """Return the over-rollings for MAX_VARIANCE_RISE; at least one mark."""
+        sizes = self.sizes((np.arange(SIZE_CLASSES) + 0.5) / SIZE_CLASSES)
         squares = [self.mark(float(size), film, passage).square for size in sizes if size > film]
-        rise = self.density(film) * sum(squares) / SHARES
+        rise = self.density(film) * sum(squares) / SIZE_CLASSES
         if rise <= 0.0:
             return np.inf
-        lower, upper = ends(passage.grid, track(passage))
-        one = 1.0 / (
-            self.density(film) * float(np.prod(np.subtract(upper, lower))) * len(squares) / SHARES
+        lower, upper = track_bounds(passage.grid, loaded_columns(passage))
+        per_mark = 1.0 / (
+            self.density(film)
+            * float(np.prod(np.subtract(upper, lower)))
+            * len(squares)
+            / SIZE_CLASSES
         )
         return max(
-            one,
-            RISE * max(float(np.var(passage.heights[:, track(passage)] + change)), film**2) / rise,
+            per_mark,
+            MAX_VARIANCE_RISE
+            * max(float(np.var(passage.heights[:, loaded_columns(passage)] + change)), film**2)
+            / rise,
         )
 
     def density(self, film: float) -> float:
-        """Particles that one over-rolling brings to an area [1/m^2]: those in the oil that the film holds."""
+        """Return the particles that one over-rolling brings per area [1/m^2]: those in the film."""
         return self.concentration * film
 
     def sizes(self, shares: Field) -> Field:
-        """Diameters [m] of shares from 0 to 1 of all particles, by the distribution's inverse."""
+        """Return diameters [m] at quantiles 0 to 1 of the size distribution."""
         ratio = (self.smallest / self.largest) ** self.exponent
         return np.asarray(self.smallest * (1.0 - shares * (1.0 - ratio)) ** (-1.0 / self.exponent))
 
-    def mark(self, size: float, film: float, passage: Passage) -> Mark:
-        """What a particle leaves: as deep as it sinks in, as wide as a sphere is there, as long as it is dragged."""
+    def mark(self, size: float, film: float, passage: Passage) -> WearMark:
+        """Return the mark of a particle: its depth, a sphere's width there, and its drag length."""
         depth = self.sinking * (size - film)
         width = 2.0 * float(np.sqrt(depth * (size - depth)))
-        return Mark.of(dragged(passage), width, depth, self.cutting)
+        return WearMark.with_ridge(drag_length(passage), width, depth, self.cutting)
 
 
-def dragged(passage: Passage) -> float:
-    """How far the other body slides on this one while a point passes the Hertz zone [m]: 2 a |u_s|/u, on track."""
+def drag_length(passage: Passage) -> float:
+    """Return the sliding distance on this body during a passage of the Hertz zone [m]: 2 a |u_s|/u.
+
+    Limited to half the track.
+    """
     speed = abs(passage.material.speed)
     way = 2.0 * passage.half_width * passage.sliding_speed / speed if speed > 0.0 else np.inf
     return float(min(way, 0.5 * passage.grid.extent[0]))
 
 
-def track(passage: Passage) -> slice:
-    """Cells across rolling that the contact reaches: all of an endless one, else what is pressed by more than a trace.
+def loaded_columns(passage: Passage) -> slice:
+    """Return the cells across rolling that carry load: all of a line contact.
 
-    Of a solved point contact oil presses a little on all of its domain.
+    The pressure of a solved point contact is slightly above 0 on all of its domain, so columns
+    below LOADED_SHARE of the largest load are left out.
     """
     if passage.grid.periodic[1]:
         return slice(0, passage.grid.cells[1])
-    borne = np.sum([patch.pressure.sum(axis=0) for patch in passage.patches], axis=0)
-    pressed = np.flatnonzero(borne > TRACE * borne.max())
+    column_load = np.sum([patch.pressure.sum(axis=0) for patch in passage.patches], axis=0)
+    pressed = np.flatnonzero(column_load > LOADED_SHARE * column_load.max())
     return slice(int(pressed[0]), int(pressed[-1]) + 1) if pressed.size else slice(0, 0)
 
 
-def ends(grid: Grid, on_track: slice) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Lower and upper corner of a track of those cells [m]."""
+def track_bounds(grid: Grid, track_cells: slice) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return lower and upper corner of a track of those cells [m]."""
     (left, low), (right, high), step = grid.lower, grid.upper, grid.spacing[1]
-    whole = on_track == slice(0, grid.cells[1])
-    return (left, low if whole else low + on_track.start * step), (
+    whole = track_cells == slice(0, grid.cells[1])
+    return (left, low if whole else low + track_cells.start * step), (
         right,
-        high if whole else low + on_track.stop * step,
+        high if whole else low + track_cells.stop * step,
     )
 
 
-def stamp(dug: Field, piled: Field, mark: Mark, at: tuple[float, float], grid: Grid) -> None:
-    """Add a mark about a place to the fields of grooves and ridges [m], in place, each cell's mean of it."""
-    divided = [int(np.clip(np.ceil(FINE * step / mark.width), 1, FINEST)) for step in grid.spacing]
+def add_mark(dug: Field, piled: Field, mark: WearMark, at: tuple[float, float], grid: Grid) -> None:
+    """Add a mark at a point to the fields of grooves and ridges [m], in place, as cell means."""
+    divided = [
+        int(np.clip(np.ceil(MIN_POINTS * step / mark.width), 1, MAX_SUBDIVISION))
+        for step in grid.spacing
+    ]
     spans = (0.5 * mark.length + mark.reach, mark.reach)
     cells, places = [], []
     for axis in (0, 1):

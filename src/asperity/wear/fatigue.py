@@ -1,11 +1,11 @@
-"""Pits by fatigue: damage summed below every cell over its over-rollings, and material that breaks out when it is full.
+"""Fatigue pits: damage accumulated below every cell over its over-rollings, and removal at failure.
 
-After G. E. Morales-Espejel and V. Brizmer, Tribology Transactions 54 (2011) 625: stresses from the
-solved pressure and traction, Dang Van's measure of their path, a Wöhler line, Palmgren and Miner's
-sum, removal of what has failed, and mild wear that takes damaged layers away. Ours: the path is
-known at the patches' positions and the unloaded state; the half-space is smooth; the shape of the
-bowl; that a jump ends before more than a few cells fail; material from a layer below the deepest
-is as new.
+After G. E. Morales-Espejel and V. Brizmer, Tribology Transactions 54 (2011) 625: stresses from
+the solved pressure and traction, Dang Van's measure of their path, a Wöhler line, the
+Palmgren-Miner sum, removal of failed material, and mild wear that removes damaged layers.
+Assumptions of this implementation: the path is known at the patches' positions and in the
+unloaded state; the half-space is smooth; pits are bowls; a jump ends before more than a few
+cells fail; material that comes up from below the deepest layer is undamaged.
 """
 
 from dataclasses import dataclass
@@ -24,24 +24,21 @@ from asperity.wear.mechanism import Change, Passage, Patch
 Cells: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 LAYERS = 8
 DEEPEST = 1.0  # Hertz half-widths
-LUNDBERG_PALMGREN = (
-    9.3  # c/e = (31/3)/(10/9): exponent of life over shear stress, Lundberg and Palmgren (1947)
-)
-WEAKEST, MOST_SCATTER = 0.1, 0.3
-FEW = 0.01  # of all cells, that a jump may let fail
-FINE, FINEST = (
-    8.0,
-    16,
-)  # points across a bowl's radius, at least: cells are divided for it, into so many at most
+# c/e = (31/3)/(10/9): exponent of life over shear stress, Lundberg and Palmgren (1947)
+LUNDBERG_PALMGREN = 9.3
+MIN_STRENGTH, MAX_SCATTER = 0.1, 0.3
+MAX_FAILED_SHARE = 0.01  # of all cells, in a jump
+# points across a bowl's radius, at least, for which cells are subdivided up to a limit
+MIN_POINTS, MAX_SUBDIVISION = 8.0, 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pits(Parametric):
-    """Pits where Palmgren and Miner's sum passes 1, by a measure that subclasses take of each path of stress.
+    """Pits where the Palmgren-Miner sum exceeds 1; subclasses define the measure of a stress path.
 
-    `cycles` are the over-rollings that a cell bears at the `limit`; a life is cycles
-    (limit/measure)^exponent, below the limit endless. A pit is `aspect` times as wide as it is
-    deep. `scatter` is the standard deviation of the limit from cell to cell, relative, drawn once.
+    `cycles` is the number of over-rollings to failure at the `limit`; a life is cycles
+    (limit/measure)^exponent, infinite below the limit. A pit is `aspect` times as wide as deep.
+    `scatter` is the relative standard deviation of the limit from cell to cell, drawn once.
     """
 
     needs_temperature: ClassVar[bool] = False
@@ -56,24 +53,25 @@ class Pits(Parametric):
 
     def __post_init__(self) -> None:
         Parametric.__post_init__(self)
-        if not 0.0 <= self.scatter <= MOST_SCATTER:
+        if not 0.0 <= self.scatter <= MAX_SCATTER:
             raise BadInput(
-                f"fatigue scatter must lie between 0 and {MOST_SCATTER:g}, got {self.scatter:g}; leave it out for none"
+                f"fatigue scatter must lie between 0 and {MAX_SCATTER:g}, got {self.scatter:g}; "
+                "leave it out for none"
             )
 
     def __call__(self, passage: Passage) -> Change:
-        """Damage of the jump, and the pits of what it filled."""
-        depths = layers(passage.grid, passage.half_width)
+        """Return the damage of the jump and the pits of failed material."""
+        depths = layer_depths(passage.grid, passage.half_width)
         state = passage.state
         damage = np.asarray(state.get("damage", np.zeros((depths.size, *passage.grid.cells))))
         strength = np.asarray(state["strength"]) if "strength" in state else self._strength(passage)
-        damage = sunk(damage, depths, passage.removed)
+        damage = shift_damage(damage, depths, passage.removed)
         stressed, left = 0.0, np.full(damage.shape, np.inf)
         for layer, depth in enumerate(depths):
             path = stress_path(
                 passage.patches, passage.grid, float(depth), passage.material.poisson_ratio
             )
-            measure = self.measured(path).reshape(passage.grid.cells) / strength
+            measure = self.stress_measure(path).reshape(passage.grid.cells) / strength
             stressed = max(stressed, float(measure.max()))
             rate = self.damage(measure)
             damage[layer] += passage.jump * rate
@@ -85,27 +83,32 @@ class Pits(Parametric):
             )
         fullest = float(damage.max())
         failed = damage >= 1.0
-        pits, damage = broken_out(damage, depths, failed, passage.grid, self.aspect)
-        kept = {"damage": damage} | ({"strength": strength} if self.scatter > 0.0 else {})
+        pits, damage = break_out_pits(damage, depths, failed, passage.grid, self.aspect)
+        next_state = {"damage": damage} | ({"strength": strength} if self.scatter > 0.0 else {})
         dx, dy = passage.grid.spacing
         facts = {
-            "measure_pa": self.known(stressed),
+            "measure_pa": self.reported_measure(stressed),
             "sum": fullest,
             "cells": float(np.count_nonzero(failed.any(axis=0))),
             "volume_m3": float(pits.sum() * dx * dy),
         }
-        return Change(heights_change=-pits, state=kept, facts=facts, longest=soon(left))
+        return Change(
+            heights_change=-pits,
+            state=next_state,
+            facts=facts,
+            longest=overrollings_to_failures(left),
+        )
 
-    def measured(self, path: Field) -> Field:
-        """The measure of each path [Pa], of stresses of shape (6, paths, positions), as far as it passes the limit."""
+    def stress_measure(self, path: Field) -> Field:
+        """Return the measure [Pa] of stress paths (6, paths, positions); exact above the limit."""
         raise NotImplementedError
 
-    def known(self, measure: float) -> float:
-        """The largest measure [Pa] as a result states it."""
+    def reported_measure(self, measure: float) -> float:
+        """Return the largest measure [Pa] as results state it."""
         return measure
 
     def damage(self, measure: Field) -> Field:
-        """Share of its life that one over-rolling takes of a cell under a measure [Pa]; 0 up to the limit."""
+        """Return the damage per over-rolling of a cell under a measure [Pa]; 0 up to the limit."""
         ratio = np.asarray(measure) / self.limit
         return np.where(ratio > 1.0, np.maximum(ratio, 1.0) ** self.exponent / self.cycles, 0.0)
 
@@ -113,12 +116,12 @@ class Pits(Parametric):
         if self.scatter == 0.0:
             return np.ones(passage.grid.cells)
         drawn = 1.0 + self.scatter * passage.rng.standard_normal(passage.grid.cells)
-        return np.maximum(drawn, WEAKEST)
+        return np.maximum(drawn, MIN_STRENGTH)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DangVanPits(Pits):
-    """By Dang Van's τ + a σ_h, whose limit is τ₋₁ of reversed torsion."""
+    """Pits by Dang Van's τ + a σ_h; the limit is τ₋₁ of reversed torsion."""
 
     slope: Annotated[float, Parameter(symbol="a")] = 0.3
 
@@ -126,40 +129,44 @@ class DangVanPits(Pits):
         Pits.__post_init__(self)
         if not self.slope >= 0.0:
             raise BadInput(
-                f"fatigue slope must be 0 or more, got {self.slope:g}; it is 3 (torsion/bending - 1/2)"
+                f"fatigue slope must be 0 or more, got {self.slope:g}; "
+                "it is 3 (torsion/bending - 1/2)"
             )
 
-    def measured(self, path: Field) -> Field:
-        """Dang Van's measure; a bound where that is below the limit of any cell."""
-        weakest = max(WEAKEST, 1.0 - 6.0 * self.scatter) if self.scatter > 0.0 else 1.0
+    def stress_measure(self, path: Field) -> Field:
+        """Return Dang Van's measure; an upper bound where it is below the limit of any cell."""
+        weakest = max(MIN_STRENGTH, 1.0 - 6.0 * self.scatter) if self.scatter > 0.0 else 1.0
         return rating.dang_van_per_path(path, self.slope, above=weakest * self.limit)
 
-    def known(self, measure: float) -> float:
-        """Not a number up to the limit, where only a bound is computed."""
+    def reported_measure(self, measure: float) -> float:
+        """Return nan up to the limit, where only a bound is computed."""
         return measure if measure > self.limit else np.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VonMisesPits(Pits):
-    """By the largest von Mises stress of a passage."""
+    """Pits by the largest von Mises stress of a passage."""
 
-    def measured(self, path: Field) -> Field:
-        """The largest von Mises stress on each path."""
+    def stress_measure(self, path: Field) -> Field:
+        """Return the largest von Mises stress on each path."""
         return np.asarray(solution.StressTensor(*path).von_mises.max(axis=1))
 
 
 FATIGUE: dict[str, type[Pits]] = {"dang-van": DangVanPits, "von-mises": VonMisesPits}
 
 
-def soon(left: Field) -> float:
-    """Over-rollings after which few more cells have failed, of what is left to each layer of each."""
+def overrollings_to_failures(left: Field) -> float:
+    """Return the over-rollings until MAX_FAILED_SHARE more cells fail; at least 1.
+
+    `left` holds the remaining over-rollings of each layer of each cell.
+    """
     lives = left.min(axis=0).ravel()
-    few = int(FEW * lives.size)
+    few = int(MAX_FAILED_SHARE * lives.size)
     return max(float(np.partition(lives, few)[few]), 1.0)
 
 
-def layers(grid: Grid, half_width: float) -> Field:
-    """Depths that damage is summed at [m]: from half a cell to the Hertz half-width, in equal ratios."""
+def layer_depths(grid: Grid, half_width: float) -> Field:
+    """Return the depths of damage layers [m]: geometric, half a cell to the Hertz half-width."""
     first = 0.5 * min(grid.spacing)
     return np.geomspace(first, max(DEEPEST * half_width, 2.0 * first), LAYERS)
 
@@ -167,7 +174,10 @@ def layers(grid: Grid, half_width: float) -> Field:
 def stress_path(
     patches: tuple[Patch, ...], grid: Grid, depth: float, poisson_ratio: float
 ) -> Field:
-    """Stresses at a depth below every cell, unloaded and at each position [Pa], shape (6, cells, positions + 1)."""
+    """Compute stresses at a depth below every cell, unloaded and at each position [Pa].
+
+    The shape is (6, cells, positions + 1).
+    """
     path = np.zeros((6, grid.cells[0] * grid.cells[1], len(patches) + 1))
     around = Grid(grid.cells, grid.lower, grid.upper, (False, grid.periodic[1]))
     for position, patch in enumerate(patches, start=1):
@@ -181,7 +191,10 @@ def stress_path(
 
 
 def _to_the_middle(pressure: Field) -> int:
-    """Cells to roll by along x until the contact lies in the middle of its track: its ends are not one place then."""
+    """Return the shift along x, in cells, that moves the contact to the middle of its track.
+
+    The contact then does not wrap around the ends.
+    """
     count = pressure.shape[0]
     turned = np.exp(2j * np.pi * np.arange(count) / count) @ pressure.sum(axis=1)
     at = float(np.angle(turned)) / (2.0 * np.pi) * count
@@ -189,36 +202,37 @@ def _to_the_middle(pressure: Field) -> int:
     return ahead
 
 
-def sunk(damage: Field, depths: Field, removed: Field) -> Field:
-    """Damage at the same depths below a surface that is lower by `removed` [m], (nx, ny): what lay deeper comes up.
+def shift_damage(damage: Field, depths: Field, removed: Field) -> Field:
+    """Return damage at the same depths below a surface lowered by `removed` [m], shape (nx, ny).
 
-    Between layers it is interpolated; one more layer, as far down again in ratio, is as new.
+    Values between layers are interpolated; a further layer, extrapolated by the same ratio, is
+    undamaged.
     """
     if not np.any(removed):
         return damage.copy()
     deeper = np.append(depths, depths[-1] ** 2 / depths[-2])
-    known = np.concatenate([damage, np.zeros_like(damage[:1])])
-    wanted = np.minimum(depths[:, None, None] + removed, deeper[-1])
-    below = np.clip(np.searchsorted(deeper, wanted), 1, depths.size)
-    share = np.maximum((wanted - deeper[below - 1]) / (deeper[below] - deeper[below - 1]), 0.0)
-    upper, lower = (np.take_along_axis(known, index, axis=0) for index in (below - 1, below))
+    extended = np.concatenate([damage, np.zeros_like(damage[:1])])
+    depth = np.minimum(depths[:, None, None] + removed, deeper[-1])
+    below = np.clip(np.searchsorted(deeper, depth), 1, depths.size)
+    share = np.maximum((depth - deeper[below - 1]) / (deeper[below] - deeper[below - 1]), 0.0)
+    upper, lower = (np.take_along_axis(extended, index, axis=0) for index in (below - 1, below))
     return np.asarray(upper + share * (lower - upper))
 
 
-def broken_out(
+def break_out_pits(
     damage: Field, depths: Field, failed: Mask, grid: Grid, aspect: float
 ) -> tuple[Field, Field]:
-    """Pits [m], 0 or more, and the damage that is left, both below the new surface.
+    """Return the pit depths [m], 0 or more, and the remaining damage below the new surface.
 
-    Every cell that has failed loses a bowl, -z (1 - r²/R²), from the deepest layer z that failed,
-    2R = aspect z; where bowls overlap, the deeper counts. Layers that failed are then as damaged
-    as the one below them, the deepest as new.
+    Every failed cell loses a bowl, -z (1 - r²/R²), from the deepest failed layer z, 2R = aspect z;
+    where bowls overlap, the deeper counts. Failed layers then take the damage of the layer below
+    them; the deepest becomes undamaged.
     """
     pits = np.zeros(grid.cells)
     if not failed.any():
         return pits, damage
     deepest = np.where(failed.any(axis=0), depths.size - 1 - failed[::-1].argmax(axis=0), -1)
-    kept = damage.copy()
+    remaining = damage.copy()
     for layer in np.unique(deepest[deepest >= 0]):
         here = deepest == layer
         bowl, (half_x, half_y) = _bowl(float(depths[layer]), grid, aspect)
@@ -229,8 +243,8 @@ def broken_out(
             )
             inside = np.ix_(rows[0], columns[0])
             pits[inside] = np.maximum(pits[inside], bowl[np.ix_(rows[1], columns[1])])
-        kept[: layer + 1, here] = damage[layer + 1, here] if layer + 1 < depths.size else 0.0
-    return pits, sunk(kept, depths, pits)
+        remaining[: layer + 1, here] = damage[layer + 1, here] if layer + 1 < depths.size else 0.0
+    return pits, shift_damage(remaining, depths, pits)
 
 
 def _along_y(grid: Grid) -> tuple[int, bool]:
@@ -238,12 +252,12 @@ def _along_y(grid: Grid) -> tuple[int, bool]:
 
 
 def _bowl(depth: float, grid: Grid, aspect: float) -> tuple[Field, tuple[int, int]]:
-    """Each cell's mean of a bowl about the middle one of an odd number of cells; how many there are on either side."""
+    """Return the cell means of a bowl about the middle cell, and the cells on either side."""
     radius = 0.5 * aspect * depth
     halves, places = [], []
     for step, count in zip(grid.spacing, grid.cells, strict=True):
         half = min(int(np.ceil(radius / step - 0.5)), (count - 1) // 2)
-        divided = int(np.clip(np.ceil(FINE * step / radius), 1, FINEST))
+        divided = int(np.clip(np.ceil(MIN_POINTS * step / radius), 1, MAX_SUBDIVISION))
         fine = (np.arange((2 * half + 1) * divided) + 0.5) / divided
         places.append((fine - half - 0.5) * step)
         halves.append((half, divided))
@@ -251,7 +265,7 @@ def _bowl(depth: float, grid: Grid, aspect: float) -> tuple[Field, tuple[int, in
     square = (places[0][:, None] ** 2 + places[1][None, :] ** 2) / radius**2
     cells = (2 * half_x + 1, divided_x, 2 * half_y + 1, divided_y)
     bowl = np.maximum(1.0 - square, 0.0).reshape(cells).mean(axis=(1, 3))
-    if not bowl.any():  # far narrower than a cell
+    if not bowl.any():  # much narrower than a cell
         bowl[half_x, half_y] = 1.0
     if all(2.0 * radius < extent for extent in grid.extent):
         bowl *= 0.5 * np.pi * radius**2 / float(bowl.sum() * np.prod(grid.spacing))
@@ -259,7 +273,7 @@ def _bowl(depth: float, grid: Grid, aspect: float) -> tuple[Field, tuple[int, in
 
 
 def _window(at: int, half: int, count: int, repeats: bool) -> tuple[Cells, Cells]:
-    """Cells of a window about one, and which of the window's own they are; beyond an end that does not repeat: none."""
+    """Return the cells of a window about one, and their indices in the window, cut at open ends."""
     offsets = np.arange(-half, half + 1)
     cells = at + offsets
     if repeats:

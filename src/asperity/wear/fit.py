@@ -1,9 +1,10 @@
-"""One wear coefficient from a test: friction trace and scar of a ball or pin on a disc; and what another would lose.
+"""Wear coefficient from the friction trace and scar of a ball- or pin-on-disc test.
 
 k = V/(F s) of the disc alone, the scar's volume V over load and sliding distance (ASTM G99): the
-radius of the track cancels, so k is the scar's area over load and laps. What stands beside the
-scar is the disc's own, moved but not lost, or has come from the ball: the profile cannot say
-which. All shares between are taken as likely, as far as the disc does not gain by them.
+track radius cancels, so k is the scar's area over load and laps. Material piled up beside the
+scar either is the disc's own, displaced but not lost, or comes from the ball: the profile cannot
+distinguish them. All shares between are taken as equally likely, as long as the disc does not
+gain material.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,8 @@ from asperity.core.quantities import quantity
 from asperity.wear.laws import SCATTER
 from asperity.wear.scar import Scar, find_scar
 
-AROUND = 0.2  # of the scar's area round the track, relative: one profile does not tell; ours
+# relative scatter of the scar's area round the track, which one profile does not show; assumed
+AREA_SCATTER = 0.2
 DRAWS = 20_000
 INTERVAL = (0.05, 0.95)
 _COLUMNS = {
@@ -32,9 +34,10 @@ _COLUMNS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionTrace:
-    """A test: `load` [N], sliding `distance` [m], `laps`, `track_radius` [m], `friction_energy` [J], mean coefficient.
+    """Load, distance and friction of a test.
 
-    `notes` say in a sentence each where a number is from, or that two of them disagree.
+    `load` [N], sliding `distance` [m], `laps`, `track_radius` [m], `friction_energy` [J] and the
+    mean `coefficient` of friction. `notes` state where a number comes from, or that two disagree.
     """
 
     load: float
@@ -48,58 +51,57 @@ class FrictionTrace:
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
-    """A median and the 90 % interval about it."""
+class WearEstimate:
+    """Median and its 90 % interval."""
 
     median: float
     low: float
     high: float
 
     @classmethod
-    def of(cls, draws: Field) -> "Estimate":
-        """Of equally likely values."""
+    def from_draws(cls, draws: Field) -> "WearEstimate":
+        """Return median and interval of equally likely values."""
         low, median, high = np.quantile(draws, [INTERVAL[0], 0.5, INTERVAL[1]])
         return cls(float(median), float(low), float(high))
 
-    def ends(self) -> dict[str, float]:
-        """By name."""
+    def as_dict(self) -> dict[str, float]:
+        """Return the values by name."""
         return {"median": self.median, "low": self.low, "high": self.high}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FittedWear:
-    """What a test says of the disc's wear.
+class WearFit:
+    """Wear of the disc in a test.
 
-    `k` [1/Pa] with its interval in this test; `energy_coefficient` [m^3/J] the same over the
-    friction's energy; `k_all_lost` and `k_none_lost` [1/Pa] if all that is piled up is foreign, or
-    the disc's own (0 where more stands up than is missing); `volume` [m^3]; `second_volume` [m^3]
-    what a second test of the same kind would lose, with the scatter from test to test in its
-    interval.
+    `k` [1/Pa] with its interval in this test; `energy_coefficient` [m^3/J] relative to the friction
+    energy; `k_all_lost` and `k_none_lost` [1/Pa] if all piled-up material is foreign, or the disc's
+    own (0 where more is piled up than missing); `volume` [m^3]; `second_volume` [m^3] predicted for
+    a second test of the same kind, its interval including the scatter from test to test.
     """
 
     trace: FrictionTrace
     scar: Scar
-    k: Estimate
-    energy_coefficient: Estimate
+    k: WearEstimate
+    energy_coefficient: WearEstimate
     k_all_lost: float
     k_none_lost: float
-    volume: Estimate
-    second_volume: Estimate
+    volume: WearEstimate
+    second_volume: WearEstimate
     second_load: float
     second_distance: float
     notes: tuple[str, ...]
 
     def scalars(self) -> dict[str, Any]:
-        """What `asperity wear --json` says of a fit; an estimate as its median and the ends of its interval."""
+        """Return the values of `asperity wear --json` for a fit."""
         trace, scar = self.trace, self.scar
         return {
             "verdict": self.verdict(),
-            "wear_coefficient": self.k.ends(),
+            "wear_coefficient": self.k.as_dict(),
             "wear_coefficient_all_lost": self.k_all_lost,
             "wear_coefficient_none_lost": self.k_none_lost,
-            "energy_wear_coefficient": self.energy_coefficient.ends(),
-            "scar_volume_m3": self.volume.ends(),
-            "second_volume_m3": self.second_volume.ends(),
+            "energy_wear_coefficient": self.energy_coefficient.as_dict(),
+            "scar_volume_m3": self.volume.as_dict(),
+            "second_volume_m3": self.second_volume.as_dict(),
             "second_load_n": self.second_load,
             "second_distance_m": self.second_distance,
             "load_n": trace.load,
@@ -116,42 +118,43 @@ class FittedWear:
         }
 
     def verdict(self) -> str:
-        """One sentence: k, between what bounds, and what a second test would lose."""
+        """Return one sentence: k with its interval, and the predicted loss in a second test."""
         k, second, ends = (
             quantity("wear_coefficient"),
             quantity("second_volume_m3"),
             self.second_volume,
         )
         return (
-            f"k is {k.text(self.k.median)}, {k.number(self.k.low)} to {k.text(self.k.high)} at 90 %; a second test of "
-            f"{self.second_load:.4g} N over {self.second_distance:.4g} m would lose {second.number(ends.low)} to "
-            f"{second.text(ends.high)}."
+            f"k is {k.text(self.k.median)} (90 % interval {k.number(self.k.low)} to "
+            f"{k.text(self.k.high)}); predicted loss in a second test of "
+            f"{self.second_load:.4g} N over {self.second_distance:.4g} m: "
+            f"{second.number(ends.low)} to {second.text(ends.high)}."
         )
 
 
 def read_friction_trace(
     path: str | Path, *, load: float | None = None, track_radius: float | None = None
 ) -> FrictionTrace:
-    """Read a tribometer's record with columns for distance [m] or laps, and coefficient or friction force [N].
+    """Read a tribometer record: distance [m] or laps, and coefficient or friction force [N].
 
     Parameters
     ----------
-    load : [N]; by default what force over coefficient says
-    track_radius : [m]; by default what distance over laps says
+    load : [N]; by default friction force over coefficient
+    track_radius : [m]; by default from distance over laps
 
     Raises
     ------
     BadInput
-        for a record that lacks a column and its stand-in, and what `open_channels` refuses.
+        for a missing column without a substitute, and as `open_channels`.
     """
-    opened = recording.open_channels(path, rate_hz=1.0)  # nothing here hangs on time
+    opened = recording.open_channels(path, rate_hz=1.0)  # nothing here depends on time
     columns = {role: _column(opened, names) for role, names in _COLUMNS.items()}
     name, notes = Path(path).name, []
     mu, force = columns["coefficient"], columns["force"]
     if load is None:
         if mu is None or force is None:
             raise BadInput(
-                f"{name} has no two columns of coefficient and friction force; give the load"
+                f"{name} lacks a column of coefficient or friction force; state the load"
             )
         known = np.abs(mu) > 0.01
         load = float(np.median(force[known] / mu[known]))
@@ -160,7 +163,8 @@ def read_friction_trace(
     if mu is None:
         if force is None:
             raise BadInput(
-                f"{name} has no column of coefficient or friction force; name one mu or FrictionForce"
+                f"{name} has no column of coefficient or friction force; "
+                "name one mu or FrictionForce"
             )
         mu = force / load
     distance, laps, radius, error = _way(
@@ -183,32 +187,33 @@ def read_friction_trace(
 
 
 def _column(opened: list[recording.OpenRecording], names: tuple[str, ...]) -> Field | None:
-    """The values of the first column that is called so."""
-    for one in opened:
-        title = one.channel.name.strip().lower()
+    """Return the values of the first column whose title matches one of the names."""
+    for column in opened:
+        title = column.channel.name.strip().lower()
         if any(title == name or (len(name) > 2 and name in title) for name in names):
-            return np.asarray(one.read().values, dtype=float)
+            return np.asarray(column.read().values, dtype=float)
     return None
 
 
 def _way(
     name: str, distance: Field | None, laps: Field | None, radius: float | None, notes: list[str]
 ) -> tuple[float, float, float, float]:
-    """Distance [m], laps, radius [m] and the relative difference between what the record and the radius say."""
+    """Return distance [m], laps, radius [m] and the relative mismatch of record and radius."""
     length = None if distance is None else float(distance[-1])
     turns = None if laps is None else float(laps[-1])
-    for what, value in (("distance", length), ("number of laps", turns), ("track radius", radius)):
+    for label, value in (("distance", length), ("number of laps", turns), ("track radius", radius)):
         if value is not None and not 0.0 < value < np.inf:
-            raise UnreadableFile(f"{name} ends with a {what} of {value:g}; it must be positive")
+            raise UnreadableFile(f"{name} ends with a {label} of {value:g}; it must be positive")
     if length is not None and turns is not None:
-        said = length / turns / (2.0 * np.pi)
+        recorded = length / turns / (2.0 * np.pi)
         if radius is None:
-            notes.append(f"track radius {said * 1e3:.4g} mm: distance over laps")
-            return length, turns, said, 0.0
-        error = abs(said / radius - 1.0)
+            notes.append(f"track radius {recorded * 1e3:.4g} mm: distance over laps")
+            return length, turns, recorded, 0.0
+        error = abs(recorded / radius - 1.0)
         if error > 1e-3:
             notes.append(
-                f"distance over laps is a radius of {said * 1e3:.4g} mm, {error:.1%} off the one given"
+                f"distance over laps gives a radius of {recorded * 1e3:.4g} mm, "
+                f"{error:.1%} off the stated one"
             )
         return length, turns, radius, error
     if radius is not None and length is not None:
@@ -217,10 +222,10 @@ def _way(
         return turns * 2.0 * np.pi * radius, turns, radius, 0.0
     if length is None and turns is None:
         raise BadInput(
-            f"{name} has no column of distance or laps; name one Distance, in metres, or Laps"
+            f"{name} has no column of distance or laps; name one Distance (in metres) or Laps"
         )
     raise BadInput(
-        f"{name} has no column of {'laps' if turns is None else 'distance'}; give the track radius"
+        f"{name} has no column of {'laps' if turns is None else 'distance'}; state the track radius"
     )
 
 
@@ -231,18 +236,18 @@ def fit_wear_coefficient(
     second_load: float | None = None,
     second_distance: float | None = None,
     seed: int = 0,
-) -> FittedWear:
-    """The disc's wear coefficient from a test's friction trace and a profile across its scar.
+) -> WearFit:
+    """Fit the disc's wear coefficient to a friction trace and a profile across the scar.
 
     Parameters
     ----------
-    second_load, second_distance : of a second test [N, m]; those of the first unless given
+    second_load, second_distance : of a second test to predict [N, m]; by default those of the first
     seed : of the draws behind the intervals
 
     Raises
     ------
     BadInput
-        for what `find_scar` refuses, and a second test without load or distance.
+        for a second load or distance that is not positive, and as `find_scar`.
     """
     scar = find_scar(profile)
     load = require_positive("second load", trace.load if second_load is None else second_load, "N")
@@ -252,7 +257,9 @@ def fit_wear_coefficient(
     rng = np.random.default_rng(seed)
     missing, piled = _drawn_areas(scar, rng)
     own = rng.uniform(0.0, np.minimum(1.0, missing / np.maximum(piled, np.finfo(float).tiny)))
-    lost = (missing - own * piled) * np.maximum(1.0 + AROUND * rng.standard_normal(DRAWS), 0.0)
+    lost = (missing - own * piled) * np.maximum(
+        1.0 + AREA_SCATTER * rng.standard_normal(DRAWS), 0.0
+    )
     k = (
         lost
         / (trace.load * trace.laps)
@@ -261,17 +268,17 @@ def fit_wear_coefficient(
     volume = k * trace.load * trace.distance
     again = k * np.exp(
         np.sqrt(2.0) * SCATTER * rng.standard_normal(DRAWS)
-    )  # the first test is one draw too
+    )  # the first test scatters about the mean, too
     per_area = 1.0 / (trace.load * trace.laps)
-    return FittedWear(
+    return WearFit(
         trace=trace,
         scar=scar,
-        k=Estimate.of(k),
-        energy_coefficient=Estimate.of(volume / trace.friction_energy),
+        k=WearEstimate.from_draws(k),
+        energy_coefficient=WearEstimate.from_draws(volume / trace.friction_energy),
         k_all_lost=scar.missing * per_area,
         k_none_lost=max(scar.missing - scar.piled, 0.0) * per_area,
-        volume=Estimate.of(volume),
-        second_volume=Estimate.of(again * load * length),
+        volume=WearEstimate.from_draws(volume),
+        second_volume=WearEstimate.from_draws(again * load * length),
         second_load=load,
         second_distance=length,
         notes=_notes(trace, scar),
@@ -279,10 +286,10 @@ def fit_wear_coefficient(
 
 
 def _drawn_areas(scar: Scar, rng: np.random.Generator) -> tuple[Field, Field]:
-    """Areas missing and piled up [m^2], of a way to measure drawn at random, off by the old surface's waves."""
+    """Draw areas missing and piled up [m^2] over evaluation variants and waviness."""
     way = rng.integers(len(scar.areas), size=DRAWS)
     table = np.array(
-        [(one.missing, one.piled, one.missing_std, one.piled_std) for one in scar.areas]
+        [(area.missing, area.piled, area.missing_std, area.piled_std) for area in scar.areas]
     )[way]
     missing, piled = (table[:, i] + table[:, i + 2] * rng.standard_normal(DRAWS) for i in (0, 1))
     return np.maximum(missing, 0.0), np.maximum(piled, 0.0)
@@ -292,20 +299,22 @@ def _notes(trace: FrictionTrace, scar: Scar) -> tuple[str, ...]:
     share = scar.piled / scar.missing if scar.missing > 0.0 else np.inf
     notes = [
         *trace.notes,
-        f"track {scar.width * 1e6:.0f} um wide, found by what stands out of the roughness",
+        f"track {scar.width * 1e6:.0f} um wide, detected as deviation beyond the roughness",
     ]
     if share > 1.0:
         notes.append(
-            f"{share:.2g} times as much stands above the old surface as is missing below it: the disc may have lost "
-            "nothing, and k is an upper bound rather than a value"
+            f"the area above the old surface is {share:.2g} times the area below it: the disc may "
+            "have lost nothing, and k is an upper bound"
         )
     elif share > 0.05:
         notes.append(
-            f"{share:.0%} of what is missing stands beside it; whose it is the profile cannot tell"
+            f"{share:.0%} of the missing area is piled up beside it; the profile cannot show "
+            "which body it comes from"
         )
     notes.append(
-        "the energy coefficient is over all friction work; the energy law counts that of touching asperities: put it "
-        "there as it is if the test ran dry, and over the share that was theirs if not"
+        "the energy coefficient refers to all friction work, the energy law only to that of "
+        "touching asperities: use it unchanged for a dry test, else divide it by the asperities' "
+        "share"
     )
-    notes.append("one profile stands for the whole track; the ball's own wear is not in it")
+    notes.append("one profile represents the whole track; wear of the ball is not included")
     return tuple(notes)

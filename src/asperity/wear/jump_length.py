@@ -1,13 +1,13 @@
-"""How far a jump over many over-rollings may go, and what it takes off.
+"""Length of a jump over many over-rollings, and the depth that it removes.
 
-Where bodies touch all over, a wave of height A e^(iqx) carries a pressure of E* q A/2 and wears at
-k times it: A falls as exp(-k E* q s/2), s the way slid past it. A step that is longer than the
-shortest wave's decay would turn such waves over instead, and feed them. So what a jump takes off
-is integrated along it exactly for such waves, by the factor (1 - exp(-z))/z, z = k E* q s/2, on
-every wave of the map, and no jump is longer than some such decays: where bodies touch in parts,
-waves decay less, and what is spread along it is spread too far. The factor is a mean of Cauchy
-densities, so that the mean is kept and nothing is added anywhere. Where the cells end its spectrum
-it dips below 0 by some thousandths, which is cut off.
+Where the bodies touch everywhere, a wave of height A e^(iqx) carries a pressure of E* q A/2 and
+wears at k times that: A decays as exp(-k E* q s/2), with s the sliding distance. An explicit step
+longer than the decay of the shortest wave would invert such waves and amplify them. The depth of
+a jump is therefore integrated exactly for such waves, by the factor (1 - exp(-z))/z,
+z = k E* q s/2, on every wave of the map, and a jump is limited to a few such decays: where the
+contact is partial, waves decay more slowly and the depth is smoothed too much. The factor is a
+mean of Cauchy densities, so it preserves the mean and adds no material. Because the grid
+truncates its spectrum, it undershoots 0 by some thousandths, which are clipped.
 """
 
 import math
@@ -23,11 +23,11 @@ from asperity.wear.mechanism import Body
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exposure:
-    """How one body meets the contact.
+    """Exposure of one body to the contact.
 
-    `k` [1/Pa] is the coefficient of its wear by pressure, `overrolling` how often a point of it
-    passes [1/s], `width` of the contact along rolling [m], `sliding_speed` [m/s]; `body` says its
-    own speed. A body that stands still is always in the contact.
+    `k` [1/Pa] is its wear coefficient by pressure, `overrolling` the over-rolling frequency of a
+    point [1/s], `width` that of the contact along rolling [m], `sliding_speed` [m/s]; `body` holds
+    its own speed. A body that stands still is always in the contact.
     """
 
     k: float
@@ -37,29 +37,34 @@ class Exposure:
     sliding_speed: float
 
     @property
-    def stands(self) -> bool:
-        """Whether the body does not move."""
+    def is_stationary(self) -> bool:
+        """True if the body does not move."""
         return self.body.speed == 0.0
 
     @property
-    def share(self) -> float:
-        """Of the time that a point is in the contact."""
-        return 1.0 if self.stands else self.overrolling * self.width / abs(self.body.speed)
+    def contact_time_share(self) -> float:
+        """Fraction of time that a point spends in the contact."""
+        return 1.0 if self.is_stationary else self.overrolling * self.width / abs(self.body.speed)
 
-    def passages(self, length: float) -> float:
-        """What a mean rate over positions along a track of that length [m] is multiplied with for depth a second.
+    def depth_rate_factor(self, length: float) -> float:
+        """Return the factor from the mean rate over a track of `length` [m] to depth per second.
 
-        A passage takes the track's length over the speed, of which the mean is the mean over
-        positions.
+        A passage takes the track's length over the speed; the mean over positions is its mean.
         """
-        return 1.0 if self.stands else self.overrolling * length / abs(self.body.speed)
+        return 1.0 if self.is_stationary else self.overrolling * length / abs(self.body.speed)
 
-    def decay(
+    def decay_exponent(
         self, wavenumber: Field | float, seconds: float, reduced_modulus: float
     ) -> Field | float:
-        """Z of a wave [1/m] in so many seconds, where bodies touch all over."""
+        """Return z of a wave [1/m] after `seconds`, where the bodies touch everywhere."""
         return (
-            0.5 * self.k * reduced_modulus * wavenumber * self.sliding_speed * self.share * seconds
+            0.5
+            * self.k
+            * reduced_modulus
+            * wavenumber
+            * self.sliding_speed
+            * self.contact_time_share
+            * seconds
         )
 
 
@@ -67,41 +72,46 @@ def longest_jump(
     exposures: tuple[Exposure, Exposure],
     rates: tuple[Field, Field],
     height: float,
-    decay: float,
+    decay_exponent: float,
     spacing: tuple[float, float],
     reduced_modulus: float,
 ) -> float:
-    """Seconds in which no point loses more than `height` [m], and the shortest wave decays by exp(-`decay`) at most.
+    """Return the longest jump [s] allowed by the depth and decay limits; infinite without wear.
 
-    Infinite where nothing wears.
+    No point loses more than `height` [m], and the shortest wave decays by at most
+    exp(-`decay_exponent`).
     """
     steepest = math.pi * math.hypot(1.0 / spacing[0], 1.0 / spacing[1])
-    decays = max(float(exposure.decay(steepest, 1.0, reduced_modulus)) for exposure in exposures)
+    decays = max(
+        float(exposure.decay_exponent(steepest, 1.0, reduced_modulus)) for exposure in exposures
+    )
     fastest = max(float(rate.max()) for rate in rates)
     return min(
         math.inf if part <= 0.0 else most / part
-        for most, part in ((height, fastest), (decay, decays))
+        for most, part in ((height, fastest), (decay_exponent, decays))
     )
 
 
-def taken_off(
+def removed_depth(
     rate: Field, seconds: float, exposure: Exposure, grid: Grid, reduced_modulus: float
 ) -> Field:
-    """Depth that a jump takes off [m], from the rate at its beginning [m/s]: 0 or more, its mean the rate's."""
+    """Return the depth removed in a jump [m] from the initial rate [m/s]: 0 or more, same mean."""
     if not rate.any():
         return np.zeros_like(rate)
     waves = [2.0 * np.pi * scipy.fft.fftfreq(grid.cells[0], grid.spacing[0])]
     waves.append(2.0 * np.pi * scipy.fft.rfftfreq(grid.cells[1], grid.spacing[1]))
-    z = np.asarray(exposure.decay(np.hypot(waves[0][:, None], waves[1]), seconds, reduced_modulus))
+    z = np.asarray(
+        exposure.decay_exponent(np.hypot(waves[0][:, None], waves[1]), seconds, reduced_modulus)
+    )
     factor = np.where(z > 0.0, -np.expm1(-z) / np.where(z > 0.0, z, 1.0), 1.0)
     depth = scipy.fft.irfft2(scipy.fft.rfft2(rate * seconds) * factor, s=rate.shape)
-    # what dips below 0 is cut off, and the mean put back
+    # clip the undershoot below 0 and restore the mean
     depth = np.maximum(depth, 0.0)
-    if is_even(rate):
+    if is_uniform_along(rate):
         depth = np.broadcast_to(depth.mean(axis=0), depth.shape)
     return np.asarray(depth * (rate.mean() * seconds / depth.mean()))
 
 
-def is_even(heights: Field) -> bool:
-    """Whether a track is the same all along: then what wears it is, whatever the position, wears it all along."""
+def is_uniform_along(heights: Field) -> bool:
+    """Return True if a track is uniform along rolling, and so wears uniformly at any position."""
     return bool(np.all(heights == heights[:1]))

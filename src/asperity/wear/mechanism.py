@@ -1,10 +1,10 @@
-"""What a mechanism of wear is told of a jump over many over-rollings, and what it answers.
+"""Interface of wear mechanisms: input and result of one mechanism in a jump.
 
-A jump takes one body's track through the contact at several positions (`Patch`), removes what the
-law of removal says, and then asks every mechanism in turn (`Mechanism`): what it changes is added
-to the heights, its volume is booked, and its own state is kept with the run. A mechanism keeps
-nothing itself and draws from the passage's `rng` alone, so that a run that was killed goes on as
-if it had not been.
+A jump solves the contact at several positions of a body's track (`Patch`), applies the law of
+removal, and then calls every mechanism in turn (`Mechanism`). The mechanism's change is added to
+the heights, its volume is booked, and its state is stored with the run. A mechanism keeps no
+state itself and draws random numbers from the passage's `rng` only, so that an interrupted run
+resumes with identical results.
 """
 
 import math
@@ -18,12 +18,12 @@ import numpy.typing as npt
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 
-State = Mapping[str, npt.NDArray[Any]]
+MechanismState = Mapping[str, npt.NDArray[Any]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
-    """A body's material: `youngs_modulus`, `hardness` (None: elastic) [Pa], `poisson_ratio`; its `speed` [m/s]."""
+    """Material and `speed` [m/s] of a body; `hardness` is None if elastic. Moduli in Pa."""
 
     youngs_modulus: float
     poisson_ratio: float
@@ -33,13 +33,13 @@ class Body:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Patch:
-    """The contact, solved at one position of the track.
+    """Contact solved at one position of the track.
 
-    Maps have the track's shape and lie in the body's own frame, rolled by whole cells: 0 beside
-    the contact. `pressure` oil and asperities together, `asperity_pressure` that of cells where
-    bodies touch, 0 elsewhere, `shear` what the other body drags along +x with [Pa]; `film` [m],
-    infinite beside the contact; `temperature` [K above ambient] of this body's surface, None
-    unless a law or mechanism asks for it (`needs_temperature`).
+    Maps have the track's shape and lie in the body's own frame, shifted by whole cells; 0 outside
+    the contact. `pressure` is that of oil and asperities together, `asperity_pressure` that of
+    cells where the bodies touch (0 elsewhere), `shear` the shear stress of the other body along +x
+    [Pa]; `film` [m] is infinite outside the contact; `temperature` [K above ambient] is that of
+    this body's surface, None unless a law or mechanism needs it (`needs_temperature`).
     """
 
     pressure: Field
@@ -51,25 +51,25 @@ class Patch:
 
 @dataclass(frozen=True, kw_only=True)
 class Passage:
-    """What one jump knows of one body.
+    """Input of a mechanism: one jump of one body.
 
     Parameters
     ----------
     body : 0 or 1, the first or the second
     grid : of the track, which repeats along x (rolling)
-    heights : of the track now, what the jump's removal took already off [m], (nx, ny); positive is material
-    removed : what the law of removal took off in this jump [m], 0 or more
-    patches : the contact at positions that lie evenly along the track: a point's mean over them, times the track's
-        length, is its integral along a passage
+    heights : of the track after the jump's removal [m], shape (nx, ny); positive is material
+    removed : depth that the law of removal takes in this jump [m], 0 or more
+    patches : contact at positions spaced evenly along the track: the mean over them, times the
+        track's length, is a point's integral along a passage
     material : of this body
     sliding_speed : difference of both surfaces' speeds, 0 or more [m/s]
     half_width : of the Hertz zone along rolling [m]
-    overrollings : how often each point of the track has passed the contact before the jump
-    jump : how often it passes in the jump; not a whole number
-    seconds : that the jump lasts
+    overrollings : number of times each point of the track has passed the contact before the jump
+    jump : number of over-rollings in the jump; need not be whole
+    seconds : duration of the jump
     boundary_friction : shear over pressure where bodies touch
-    rng : numbers of this jump, body and mechanism; the same whenever the jump is computed again
-    state : what the mechanism answered last time; empty at first
+    rng : random numbers of this jump, body and mechanism; identical when the jump is recomputed
+    state : returned by the mechanism in the previous jump; empty at first
     """
 
     body: int
@@ -85,11 +85,11 @@ class Passage:
     seconds: float
     boundary_friction: float
     rng: np.random.Generator
-    state: State = field(default_factory=dict)
+    state: MechanismState = field(default_factory=dict)
 
     @property
-    def film_inside(self) -> float:
-        """Film that the pressure rests on: its mean over all positions, weighted with the pressure [m]."""
+    def loaded_film(self) -> float:
+        """Pressure-weighted mean film over all positions [m]."""
         pressed = [
             (patch.pressure[patch.pressure > 0.0], patch.film[patch.pressure > 0.0])
             for patch in self.patches
@@ -102,29 +102,28 @@ class Passage:
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """What a mechanism does in a jump.
+    """Result of a mechanism in one jump.
 
-    `heights_change` [m] is added to the body's heights (negative: taken off); `transferred` [m], 0
-    or more, is what of it goes over to the other body, on the body's own track: its volume is
-    booked as the other's gain, all else that `heights_change` sums to as worn off (or, where
-    positive, as stuck on). `state` comes back next time; equal arrays must give equal answers.
-    `facts` are numbers of this jump by name, SI: rows of the result hold them. `longest` is how
-    many over-rollings of this body the next jump may take at most, so that what the mechanism
-    changes is seen.
+    `heights_change` [m] is added to the body's heights (negative: removed). `transferred` [m], 0 or
+    more, is the part of it that moves to the other body, on the body's own track: its volume is
+    booked as the other's gain, the rest of `heights_change` as worn off (or, if positive, gained).
+    `state` is passed to the next call; equal arrays must give equal results. `facts` are SI numbers
+    of this jump by name, which become columns of the result. `longest` is the largest number of
+    over-rollings of this body in the next jump for which the mechanism is resolved.
     """
 
     heights_change: Field
-    state: State = field(default_factory=dict)
+    state: MechanismState = field(default_factory=dict)
     facts: Mapping[str, float] = field(default_factory=dict)
     transferred: Field | None = None
     longest: float = math.inf
 
 
 class Mechanism(Protocol):
-    """A law that roughens: a frozen dataclass of parameters that is called once a jump and body."""
+    """Law that roughens a surface: a frozen dataclass of parameters, called per jump and body."""
 
     needs_temperature: ClassVar[bool]
 
     def __call__(self, passage: Passage) -> Change:
-        """What it changes in the jump."""
+        """Return the change in this jump."""
         ...

@@ -1,8 +1,8 @@
-"""What a profile across a wear track shows: how much is missing below the old surface, how much stands above it.
+"""Wear scar in a profile across the track: area missing below, and piled up above, the old surface.
 
-The old surface is a polynomial through what lies beside the track. How far that choice, and the
-waves of the old surface, move the areas is measured on the profile itself: the same measurement is
-made where nothing was worn.
+The old surface is a polynomial through the profile beside the track. The uncertainty from that
+choice, and from the waviness of the old surface, is measured on the profile itself: the same
+evaluation is repeated where nothing was worn.
 """
 
 from dataclasses import dataclass
@@ -14,29 +14,23 @@ from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.surface import MeasuredSurface, length_text
 
-OUTSTANDING = 5.0  # robust standard deviations off the old surface: worn
-QUIET = 2.0  # robust standard deviations, within which a place in the track may be roughness alone
-GAP = (
-    0.25  # of the track's width, below which what lies between two outstanding places is part of it
-)
+OUTLIER_LEVEL = 5.0  # robust standard deviations off the old surface: worn
+ROUGHNESS_LEVEL = 2.0  # robust standard deviations: below, a point may be roughness
+MAX_GAP = 0.25  # of the track's width: narrower gaps between outlying parts belong to the track
 DEGREES = (1, 2)  # of the polynomial through the old surface
-REACHES = (
-    1.0,
-    2.0,
-    np.inf,
-)  # widths of the track, on either side, that the old surface is taken from
-MARGINS = (0.0, 0.1)  # of the width, added on either side of what stands out
-FEWEST = 20  # points across a track, and beside it
+REACHES = (1.0, 2.0, np.inf)  # track widths on either side that the old surface is fitted to
+MARGINS = (0.0, 0.1)  # of the width, added on either side of the detected track
+MIN_POINTS = 20  # across a track, and beside it
 _ROUNDS = 20
 
 
 @dataclass(frozen=True, slots=True)
 class ScarAreas:
-    """One way to measure a scar: areas [m^2] below and above the old surface, and their spread where nothing was worn.
+    """Scar areas by one evaluation variant [m^2], and their scatter where nothing was worn.
 
-    `missing` and `piled` have had taken off what roughness alone adds: what the same measurement
-    finds on the untouched profile, times the share of the track that is no rougher. Its standard
-    deviations are `missing_std`, `piled_std`.
+    `missing` and `piled` are corrected for roughness: the same evaluation of the untouched
+    profile, times the share of the track that is no rougher, is subtracted. `missing_std` and
+    `piled_std` are its standard deviations.
     """
 
     missing: float
@@ -47,10 +41,10 @@ class ScarAreas:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scar:
-    """A wear track in a profile.
+    """Wear track in a profile.
 
-    `edges` [m] from the profile's first point; `areas` one for each way to lay the old surface;
-    `heights` [m] above it the first way, shape (n,), at `spacing` [m]; `roughness` [m] is the
+    `edges` [m] from the profile's first point; `areas` one per evaluation variant; `heights` [m]
+    above the old surface of the first variant, shape (n,), at `spacing` [m]; `roughness` [m] is the
     robust standard deviation beside the track.
     """
 
@@ -62,7 +56,7 @@ class Scar:
 
     @property
     def width(self) -> float:
-        """Of the track [m]."""
+        """Width of the track [m]."""
         return self.edges[1] - self.edges[0]
 
     @property
@@ -77,12 +71,12 @@ class Scar:
 
 
 def find_scar(measured: MeasuredSurface) -> Scar:
-    """The wear track in a measured profile, which runs across it.
+    """Find the wear track in a measured profile across it.
 
     Raises
     ------
     BadInput
-        for a profile on which nothing stands out, or one with too little beside the track to tell the old surface.
+        for a profile without a detectable track, or with too few points beside it.
     """
     known = np.isfinite(measured.profile)
     spacing = measured.grid.spacing[0 if measured.uniform != 0 else 1]
@@ -91,50 +85,53 @@ def find_scar(measured: MeasuredSurface) -> Scar:
     first, last = _track(x, off, roughness, measured.name)
     edges = float(x[first]), float(x[last])
     width = edges[1] - edges[0]
-    beside = (x < edges[0]) | (x > edges[1])
+    untouched = (x < edges[0]) | (x > edges[1])
     if (
-        last - first < FEWEST
-        or np.count_nonzero(beside) < 2 * FEWEST
+        last - first < MIN_POINTS
+        or np.count_nonzero(untouched) < 2 * MIN_POINTS
         or width > 0.5 * (x[-1] - x[0])
     ):
         raise BadInput(
-            f"{measured.name} shows a track of {length_text(width)} in {length_text(x[-1] - x[0])}; it takes "
-            f"{FEWEST} points across the track and as much beside it as it is wide"
+            f"{measured.name} shows a track of {length_text(width)} in "
+            f"{length_text(x[-1] - x[0])}; measure at least {MIN_POINTS} points across the track "
+            "and its own width beside it"
         )
     ways = tuple(
-        _areas(x, z, edges, QUIET * roughness, *way) for way in product(DEGREES, REACHES, MARGINS)
+        _areas(x, z, edges, ROUGHNESS_LEVEL * roughness, *way)
+        for way in product(DEGREES, REACHES, MARGINS)
     )
     levelled = z - _old_surface(x, z, edges, DEGREES[0], np.inf)
     return Scar(edges=edges, areas=ways, heights=levelled, spacing=spacing, roughness=roughness)
 
 
 def _off_the_bulk(x: Field, z: Field) -> tuple[Field, float]:
-    """Heights off a line through the bulk of the profile, and the robust deviation of what makes the bulk."""
-    kept = np.ones(x.size, dtype=bool)
+    """Return heights above a robust line fit, and their robust standard deviation."""
+    inliers = np.ones(x.size, dtype=bool)
     off, deviation = z, 0.0
     for _ in range(_ROUNDS):
-        off = z - np.polynomial.Polynomial.fit(x[kept], z[kept], 1)(x)
-        deviation = 1.4826 * float(np.median(np.abs(off[kept] - np.median(off[kept]))))
-        now = np.abs(off) <= OUTSTANDING * deviation
-        if np.array_equal(now, kept) or np.count_nonzero(now) < FEWEST:
+        off = z - np.polynomial.Polynomial.fit(x[inliers], z[inliers], 1)(x)
+        deviation = 1.4826 * float(np.median(np.abs(off[inliers] - np.median(off[inliers]))))
+        selected = np.abs(off) <= OUTLIER_LEVEL * deviation
+        if np.array_equal(selected, inliers) or np.count_nonzero(selected) < MIN_POINTS:
             break
-        kept = now
+        inliers = selected
     return off, deviation
 
 
 def _track(x: Field, off: Field, roughness: float, name: str) -> tuple[int, int]:
-    """First and last point of the track: where most stands out, gaps closed, as far as the roughness is left."""
-    outstanding = np.flatnonzero(np.abs(off) > OUTSTANDING * roughness)
+    """Return first and last point of the track: the largest outlying part, gaps closed."""
+    outstanding = np.flatnonzero(np.abs(off) > OUTLIER_LEVEL * roughness)
     if outstanding.size == 0:
         raise BadInput(
-            f"{name} shows no track: nothing stands out of its roughness; measure across the track"
+            f"{name} shows no track: no point deviates beyond its roughness; measure across the "
+            "track"
         )
     parts = np.split(outstanding, np.flatnonzero(np.diff(outstanding) > 1) + 1)
     low = high = int(np.argmax([np.abs(off[part]).sum() for part in parts]))
     grown = True
     while grown:
         grown, first, last = False, int(parts[low][0]), int(parts[high][-1])
-        reach = GAP * max(x[last] - x[first], float(np.ptp(x)) / 20.0)
+        reach = MAX_GAP * max(x[last] - x[first], float(np.ptp(x)) / 20.0)
         if low > 0 and x[first] - x[parts[low - 1][-1]] <= reach:
             low, grown = low - 1, True
         if high < len(parts) - 1 and x[parts[high + 1][0]] - x[last] <= reach:
@@ -152,14 +149,14 @@ def _old_surface(
     reach: float,
     spared: tuple[float, float] | None = None,
 ) -> Field:
-    """The old surface under all points, through those beside `edges`; `spared` is a place to leave out besides."""
+    """Fit the old surface through points beside `edges`, without `spared`; return it at all x."""
     width = edges[1] - edges[0]
-    beside = ((x < edges[0]) & (x >= edges[0] - reach * width)) | (
+    untouched = ((x < edges[0]) & (x >= edges[0] - reach * width)) | (
         (x > edges[1]) & (x <= edges[1] + reach * width)
     )
     if spared is not None:
-        beside &= (x < spared[0]) | (x > spared[1])
-    return np.asarray(np.polynomial.Polynomial.fit(x[beside], z[beside], degree)(x))
+        untouched &= (x < spared[0]) | (x > spared[1])
+    return np.asarray(np.polynomial.Polynomial.fit(x[untouched], z[untouched], degree)(x))
 
 
 def _areas(
@@ -175,21 +172,21 @@ def _areas(
     widened = edges[0] - margin * width, edges[1] + margin * width
     off = z - _old_surface(x, z, widened, degree, reach)
     areas = _below_and_above(x, off, widened)
-    nothing = np.array(
+    unworn = np.array(
         [
             _below_and_above(x, z - _old_surface(x, z, window, degree, reach, widened), window)
             for window in _elsewhere(x, widened)
         ]
     ).reshape(-1, 2)
-    if not len(nothing):
+    if not len(unworn):
         return ScarAreas(*areas, 0.0, 0.0)
     share = float(np.mean(np.abs(off[(x >= widened[0]) & (x <= widened[1])]) < quiet))
-    missing, piled = np.maximum(np.array(areas) - share * nothing.mean(axis=0), 0.0)
-    return ScarAreas(float(missing), float(piled), *(float(one) for one in nothing.std(axis=0)))
+    missing, piled = np.maximum(np.array(areas) - share * unworn.mean(axis=0), 0.0)
+    return ScarAreas(float(missing), float(piled), *(float(std) for std in unworn.std(axis=0)))
 
 
 def _elsewhere(x: Field, edges: tuple[float, float]) -> list[tuple[float, float]]:
-    """Windows as wide as the track where nothing was worn, half a width apart."""
+    """Return windows as wide as the track where nothing was worn, half a width apart."""
     width = edges[1] - edges[0]
     starts = np.arange(x[0], x[-1] - width, 0.5 * width)
     return [(float(a), float(a + width)) for a in starts if a + width < edges[0] or a > edges[1]]

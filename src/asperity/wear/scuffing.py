@@ -1,8 +1,8 @@
-"""Scuffing: where load or heat passes a limit, removal jumps, and part of what comes off sticks to the other body.
+"""Scuffing: above a limit of load or heat, removal is multiplied and part of it transfers.
 
-Criteria: surface temperature above a limit (Blok 1937), or pressure times shear where bodies
-touch. Ours: that it is decided cell by cell and position by position, and that a cell heals once
-it is below the limit again.
+Criteria: surface temperature above a limit (Blok 1937), or pressure times shear where the bodies
+touch. Assumptions of this implementation: the criterion is applied per cell and position, and a
+cell recovers once it is below the limit again.
 """
 
 from dataclasses import dataclass
@@ -15,19 +15,19 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import Parameter, Parametric
 from asperity.wear.mechanism import Change, Passage, Patch
 
-STEP = 0.1  # of a body's Sq or film, that scuffing takes in a jump at most
-LEAST = 1e-8  # that Sq, or the film where it is more, is taken to be at least for it [m]
+STEP = 0.1  # largest scuffing depth in a jump, relative to the body's Sq or the film
+LEAST = 1e-8  # lower bound of that reference height [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scuffing(Parametric):
-    """Removal times `factor` where a limit is passed, which subclasses tell.
+    """Removal times `factor` where a limit is exceeded; subclasses define the limit.
 
-    Once it has taken a tenth of the body's Sq (of the film, where that is more) anywhere the
-    contact is another: in that jump it takes no more, and the next is no longer than it would take
-    for as much. `transfer` is the share of what scuffing takes off that sticks to the other body.
-    Removal is taken to be in proportion to the asperity pressure: a cell's share of scuffed load
-    is the share of its removal that jumps.
+    The contact changes once scuffing has removed a tenth of the body's Sq (or of the film, if
+    larger) anywhere: scuffing is limited to that depth in a jump, and the next jump is no longer
+    than that depth takes. `transfer` is the fraction of the scuffed volume that adheres to the
+    other body. Removal is assumed proportional to asperity pressure: a cell's share of scuffed load
+    is the share of its removal that is multiplied.
     """
 
     needs_temperature: ClassVar[bool] = False
@@ -45,15 +45,15 @@ class Scuffing(Parametric):
             )
 
     def __call__(self, passage: Passage) -> Change:
-        """What is taken off beyond the law of removal."""
+        """Return the removal in excess of the law of removal."""
         load = np.zeros(passage.grid.cells)
         scuffed = np.zeros(passage.grid.cells)
         for patch in passage.patches:
             load += patch.asperity_pressure
-            scuffed += np.where(self.passed(patch), patch.asperity_pressure, 0.0)
+            scuffed += np.where(self.exceeds_limit(patch), patch.asperity_pressure, 0.0)
         share = np.divide(scuffed, load, out=np.zeros_like(load), where=load > 0.0)
         taken = (self.factor - 1.0) * share * passage.removed
-        most = STEP * max(float(np.std(passage.heights)), passage.film_inside, LEAST)
+        most = STEP * max(float(np.std(passage.heights)), passage.loaded_film, LEAST)
         deepest = float(taken.max())
         taken *= min(1.0, most / deepest) if deepest > 0.0 else 1.0
         facts = {
@@ -65,39 +65,43 @@ class Scuffing(Parametric):
             heights_change=-taken, facts=facts, transferred=self.transfer * taken, longest=longest
         )
 
-    def passed(self, patch: Patch) -> Mask:
-        """Which cells touch and lie beyond the limit."""
+    def exceeds_limit(self, patch: Patch) -> Mask:
+        """Return the mask of touching cells above the limit."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HotScuffing(Scuffing):
-    """Where the surface is hotter than a limit above ambient."""
+class TemperatureScuffing(Scuffing):
+    """Scuffing where the surface temperature rise exceeds a limit."""
 
     needs_temperature: ClassVar[bool] = True
 
     limit: Annotated[float, Parameter("K", positive="scuffing limit")]
 
-    def passed(self, patch: Patch) -> Mask:
-        """Touching cells above the limit."""
+    def exceeds_limit(self, patch: Patch) -> Mask:
+        """Return the mask of touching cells above the limit."""
         if patch.temperature is None:
             raise BadInput(
-                "scuffing by temperature needs the flash temperature, which the contact has not; leave it out"
+                "scuffing by temperature needs the flash temperature, which is not known for this "
+                "contact; leave it out"
             )
         return (patch.temperature > self.limit) & (patch.asperity_pressure > 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LoadedScuffing(Scuffing):
-    """Where pressure times shear of touching asperities passes a limit."""
+class PressureShearScuffing(Scuffing):
+    """Scuffing where pressure times shear of touching asperities exceeds a limit."""
 
     limit: Annotated[float, Parameter("Pa^2", positive="scuffing limit")]
 
-    def passed(self, patch: Patch) -> Mask:
-        """Touching cells whose pressure times shear is above the limit."""
+    def exceeds_limit(self, patch: Patch) -> Mask:
+        """Return the mask of touching cells whose pressure times shear is above the limit."""
         return (patch.asperity_pressure > 0.0) & (
             patch.asperity_pressure * np.abs(patch.shear) > self.limit
         )
 
 
-SCUFFING: dict[str, type[Scuffing]] = {"temperature": HotScuffing, "pressure-shear": LoadedScuffing}
+SCUFFING: dict[str, type[Scuffing]] = {
+    "temperature": TemperatureScuffing,
+    "pressure-shear": PressureShearScuffing,
+}

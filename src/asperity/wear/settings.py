@@ -1,4 +1,4 @@
-"""How a contact wears, as a case states it: law, coefficients, mechanisms, and how time is cut into jumps."""
+"""Wear model of a case: law, coefficients, mechanisms and the length of jumps."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,38 +6,38 @@ from dataclasses import dataclass, field
 from asperity.core.errors import BadInput, require_positive
 from asperity.wear.debris import PLOUGHING
 from asperity.wear.fatigue import FATIGUE
-from asperity.wear.laws import Coefficient, RemovalLaw
+from asperity.wear.laws import RemovalLaw, WearCoefficient
 from asperity.wear.mechanism import Mechanism
 from asperity.wear.scuffing import SCUFFING
 
-MECHANISMS: dict[
-    str, Mapping[str, type[Mechanism]]
-] = {  # what roughens: by key of [wear], its laws by name
+# mechanisms that roughen: by key of [wear], their laws by name
+MECHANISMS: dict[str, Mapping[str, type[Mechanism]]] = {
     "fatigue": FATIGUE,
     "ploughing": PLOUGHING,
     "scuffing": SCUFFING,
 }
-DECAY = 80.0  # of the shortest wave, over the step: a factor e^4 at the usual 0.05
+DECAY = 80.0  # decay exponent of the shortest wave over `step`: a factor e^4 at the default 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
 class WearModel:
-    """How both bodies wear.
+    """Wear model of both bodies.
 
     Parameters
     ----------
-    law : of removal
+    law : law of removal
     coefficients : k of each body in that law
-    flattening : whether what the pressure cap presses flat stays so
-    mechanisms : what roughens, by its key in MECHANISMS, in the order in which it is asked
-    overrolling : how often a point of each body passes the contact [1/s]; None: bodies of equal radius, 2R each
-    patches : positions of the tracks that a jump is the mean of; None: one every Hertz half-width, and at least 4
-    step : depth that a jump takes off anywhere over the Sq of both, at most; and an eightieth of the decay of the
-        shortest wave in it
+    flattening : keep the plastic flattening by the pressure cap
+    mechanisms : mechanisms that roughen, by key of MECHANISMS, in the order of their application
+    overrolling : over-rolling frequency of a point of each body [1/s]; None: bodies of equal
+        radius, 2R each
+    patches : positions of the tracks per jump; None: one per Hertz half-width, at least 4
+    step : largest depth removed in a jump, relative to the composite Sq; 1/80 of the largest decay
+        exponent of the shortest wave
     """
 
     law: RemovalLaw
-    coefficients: tuple[Coefficient, Coefficient]
+    coefficients: tuple[WearCoefficient, WearCoefficient]
     flattening: bool = False
     mechanisms: Mapping[str, Mechanism] = field(default_factory=dict)
     overrolling: tuple[float, float] | None = None
@@ -49,26 +49,28 @@ class WearModel:
             require_positive("overrolling", rate, "Hz")
         if self.patches is not None and not 1 <= self.patches <= 1000:
             raise BadInput(
-                f"patches must be 1 to 1000, got {self.patches}; leave it out for one every half-width"
+                f"patches must be 1 to 1000, got {self.patches}; "
+                "leave it out for one per half-width"
             )
         if not 0.0 < self.step <= 0.5:
             raise BadInput(
-                f"step must lie above 0 and up to 0.5 of Sq, got {self.step:g}; 0.05 is usual"
+                f"step must be above 0 and at most 0.5 of Sq, got {self.step:g}; "
+                "the default is 0.05"
             )
 
     @property
     def decay(self) -> float:
-        """Of the shortest wave in a jump, as the exponent, at most."""
+        """Largest decay exponent of the shortest wave in a jump."""
         return DECAY * self.step
 
     @property
     def needs_temperature(self) -> bool:
-        """Whether law or mechanisms ask for the temperature of the surfaces."""
+        """True if the law or a mechanism needs surface temperatures."""
         return self.law.needs_temperature or any(
-            one.needs_temperature for one in self.mechanisms.values()
+            mechanism.needs_temperature for mechanism in self.mechanisms.values()
         )
 
     @property
-    def removal_alone(self) -> bool:
-        """Whether nothing but the law of removal acts: then all depends on k times time alone."""
+    def only_removal(self) -> bool:
+        """True if only the law of removal acts: the result then depends on k times time alone."""
         return not self.flattening and not self.mechanisms

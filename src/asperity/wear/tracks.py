@@ -1,7 +1,7 @@
-"""Where two tracks lie as the contact is solved on them: positions by whole cells, and maps laid back onto the tracks.
+"""Positions of two tracks under the contact, and mapping of contact fields onto the tracks.
 
-By whole cells nothing is interpolated, so that what wears off one position is what comes off the
-track, to rounding.
+Positions are whole cells, so nothing is interpolated: the depth removed at a position equals the
+depth lost by the track, to rounding.
 """
 
 from typing import NamedTuple
@@ -14,8 +14,8 @@ from asperity.surface import MovingSurfaces, Surface
 GOLDEN = 0.6180339887498949
 
 
-class Position(NamedTuple):
-    """Cell of either track that lies under the first cells of the contact; 0 for one that stands still."""
+class TrackPosition(NamedTuple):
+    """Cell of each track that lies under the first cells of the contact; 0 if it stands still."""
 
     first: int
     second: int
@@ -23,30 +23,32 @@ class Position(NamedTuple):
 
 def positions(
     cells: tuple[int, int], moves: tuple[bool, bool], count: int, jump: int, seed: int
-) -> tuple[Position, ...]:
-    """So many positions, evenly along each track and in every pairing as likely, others at every jump.
+) -> tuple[TrackPosition, ...]:
+    """Return `count` positions, evenly spaced along each track, paired at random per jump.
 
     Parameters
     ----------
     cells : of both tracks along rolling
-    moves : which of them has anywhere to go: a body that stands still, or that is the same everywhere, has not
-    count, jump, seed : how many, and which jump of which run; the same give the same
+    moves : False for a body that stands still or is uniform along its track
+    count, jump, seed : number of positions, number of the jump and seed of the run
     """
     rng = np.random.default_rng([seed, jump])
     along = [np.arange(count), rng.permutation(count)]
     places = []
-    for which, (length, goes) in enumerate(zip(cells, moves, strict=True)):
-        offset = (GOLDEN * (jump + 1) * (which + 1)) % 1.0
+    for body, (length, moving) in enumerate(zip(cells, moves, strict=True)):
+        offset = (GOLDEN * (jump + 1) * (body + 1)) % 1.0
         places.append(
-            np.floor((along[which] + offset) * length / count).astype(int) % length
-            if goes
+            np.floor((along[body] + offset) * length / count).astype(int) % length
+            if moving
             else 0 * along[0]
         )
-    return tuple(Position(int(first), int(second)) for first, second in zip(*places, strict=True))
+    return tuple(
+        TrackPosition(int(first), int(second)) for first, second in zip(*places, strict=True)
+    )
 
 
-def seen(surfaces: MovingSurfaces, position: Position) -> Surface:
-    """What the contact sees of both at a position: the sum of their heights on its grid."""
+def combined_roughness(surfaces: MovingSurfaces, position: TrackPosition) -> Surface:
+    """Return the sum of both bodies' heights on the contact's grid at a position."""
     length = surfaces.grid.cells[0]
     first, second = (
         np.roll(surface.heights, -start, axis=0)[:length]
@@ -55,15 +57,15 @@ def seen(surfaces: MovingSurfaces, position: Position) -> Surface:
     return Surface(first + second[:, ::-1], surfaces.grid)
 
 
-def on_track(
-    field: Field, cells: tuple[int, int], position: Position, body: int, beside: float = 0.0
+def map_to_track(
+    field: Field, cells: tuple[int, int], position: TrackPosition, body: int, outside: float = 0.0
 ) -> Field:
-    """A map of the contact on a body's track of so many cells, in the body's own frame; a number `beside` it."""
-    track = np.full(cells, beside)
+    """Place a contact field on a body's track of `cells`, in its own frame; `outside` elsewhere."""
+    track = np.full(cells, outside)
     track[: field.shape[0]] = field if body == 0 else field[:, ::-1]
     return np.roll(track, position[body], axis=0)
 
 
-def across(field: Field, position: Position, body: int) -> Field:
-    """What lies on one body's track where it lies on the other's, as long a one, that faces it at this position."""
+def to_other_track(field: Field, position: TrackPosition, body: int) -> Field:
+    """Map a field on one body's track to the other's, of equal length, at this position."""
     return np.roll(np.roll(field, -position[body], axis=0)[:, ::-1], position[1 - body], axis=0)

@@ -43,7 +43,7 @@ class Worn(NamedTuple):
 
 def worn_bodies(history: WearHistory) -> tuple[Worn, ...]:
     """The bodies that were rough, or have lost anything."""
-    before, after = history.before, history.after
+    before, after = history.initial_surfaces, history.final_surfaces
     pairs = ((before.first, after.first), (before.second, after.second))
     return tuple(
         Worn(name, *pair)
@@ -79,7 +79,7 @@ def curves(history: WearHistory) -> Exhibit:
         "over-hours",
         draw,
         "Over hours of running, a point a jump. Shaded about CLR: 90 % of its mean over a jump's positions."
-        + (by_k if history.scaled_by is not None else ""),
+        + (by_k if history.k_interval is not None else ""),
         "Roughness parameters, load and area shares, film, friction, flash temperature, worn depth and CRFA over hours",
     )
 
@@ -93,7 +93,7 @@ def _draw_over_hours(axes: Axes, history: WearHistory, key: str, colour: str, st
             factor * history.table[end].to_numpy(float) for end in ("clr_mean_low", "clr_mean_high")
         )
         axes.fill_between(hours, low, high, color=colour, alpha=0.3, linewidth=0)
-    band = history.with_k(key)
+    band = history.interval_by_k(key)
     if band is not None:
         axes.fill_between(
             hours,

@@ -8,7 +8,7 @@ from asperity.paper import is_papers_contact
 from asperity.report import animated_maps as moving
 from asperity.report.base import heading, render, tile, write_page
 from asperity.report.wear import exhibits
-from asperity.simulation import WearFrame, WearHistory, of_body
+from asperity.simulation import WearFrame, WearHistory, body_column
 
 TILES = ("sq_m", "clr", "friction_coefficient", "flash_temperature_max_k", "crf_hz")
 CONTACT = (
@@ -64,13 +64,13 @@ def write_wear_report(history: WearHistory, path: str | Path) -> Path:
 def render_wear_page(history: WearHistory) -> str:
     """The page as HTML text."""
     first, last = history.table.iloc[0], history.table.iloc[-1]
-    at_end = history.numbers_at_end
+    at_end = history.final_values
     bodies = exhibits.worn_bodies(history)
     sounds = bool(history.table["crf_hz"].notna().any())
     papers = is_papers_contact(history.case)
     reach = moving.ranges(history.case, history.frames)
     return render(
-        "wearing/page.html.j2",
+        "wear/page.html.j2",
         title="A contact that wears",
         history=history,
         tiles=[tile(quantity(key), at_end) for key in TILES if last[key] == last[key]],
@@ -80,10 +80,12 @@ def render_wear_page(history: WearHistory) -> str:
         surfaces=[exhibits.surfaces(body).picture() for body in bodies],
         profiles=exhibits.profiles(bodies).picture() if bodies else None,
         contact=[_line(key, first[key], last[key]) for key in CONTACT],
-        bodies=[_line(key, last[of_body(key, 0)], last[of_body(key, 1)]) for key in OF_BODIES],
+        bodies=[
+            _line(key, last[body_column(key, 0)], last[body_column(key, 1)]) for key in OF_BODIES
+        ],
         volumes=_volumes(history),
-        law=(type(history.ageing.model.law).__doc__ or "").split("\n")[0],
-        coefficients=[f"{one.k:.3g}" for one in history.ageing.model.coefficients],
+        law=(type(history.contact.model.law).__doc__ or "").split("\n")[0],
+        coefficients=[f"{one.k:.3g}" for one in history.contact.model.coefficients],
         stages=None if history.stages is None else in_print(history.stages.verdict),
         jump_error=quantity("jump_error").text(history.worn.error),
         script=moving.SCRIPT,
@@ -96,7 +98,7 @@ def render_wear_page(history: WearHistory) -> str:
 def _in_words(history: WearHistory, frame: WearFrame) -> str:
     """When a frame is, where on the tracks, and what the contact is like then on average."""
     row, spacing = history.table.iloc[frame.number], history.case.grid.spacing[0]
-    moves = [body for body in (0, 1) if history.ageing.bodies[body].speed != 0.0]
+    moves = [body for body in (0, 1) if history.contact.bodies[body].speed != 0.0]
     places = " and ".join(
         f"{1e3 * frame.position[body] * spacing:.3f} mm on body {body + 1}" for body in moves
     )

@@ -1,4 +1,4 @@
-"""A contact over time: a row a step, maps of some steps, and what both come to."""
+"""History of a moving contact: a table with a row per step, maps of some steps, and results."""
 
 import math
 from dataclasses import dataclass, field
@@ -45,7 +45,7 @@ OVER_PASSES = (
 
 
 class MotionFrame(NamedTuple):
-    """Maps of one step in single precision, (nx, ny): film [m], pressure [Pa], where bodies touch."""
+    """Maps of one step in single precision, (nx, ny): film [m], pressure [Pa], contact mask."""
 
     number: int
     time: float
@@ -56,13 +56,13 @@ class MotionFrame(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """A contact over time.
+    """Moving contact over time.
 
-    `table` has a row a step, step 0 the start: `step`, `heat_j` (friction's and the flow's, summed
-    over time by the trapezoidal rule) and the columns of `simulation.motion.rows`, which the catalogue of
-    quantities describes; `resonance_hz` is nan without an oscillator. `seconds` is what computing
-    took this time, of `computed` steps; `folder` where it is kept, `memory` what the next step
-    needs to know, `remarks` what the folder's files have to say of themselves.
+    `table` has a row per step, step 0 being the start: `step`, `heat_j` (friction's and the flow's,
+    integrated over time by the trapezoidal rule) and the columns of `motion.rows`, which the
+    catalogue of quantities describes; `resonance_hz` is nan without an oscillator. `seconds` is the
+    computing time of this call, for `computed` steps; `folder` where it is stored, `memory` the
+    state for the next step, `remarks` notes on the version of a stored history.
     """
 
     case: Case
@@ -81,7 +81,7 @@ class History:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences that a reader of the numbers has to know."""
+        """Notes for a reader of the numbers, one sentence each."""
         return (*self.remarks, *self.case.surface_notes, *self.case.notes)
 
     @property
@@ -91,9 +91,9 @@ class History:
 
     @property
     def settled(self) -> pandas.DataFrame:
-        """The steps that means are of: oil has crossed the domain once, or else the second half.
+        """Rows after settling: after oil has crossed the domain once, or else the second half.
 
-        Where surfaces are flattened nothing repeats, and it is the last pass.
+        With flattening nothing repeats, and the last pass is used.
         """
         if self.case.motion.flattening:
             length = steps_a_pass(self.case, self.case.moving_surfaces())
@@ -104,10 +104,11 @@ class History:
         return self.table[self.table["step"] >= min(crossing, (self.steps + 1) // 2)]
 
     def by_pass(self) -> pandas.DataFrame:
-        """Each whole pass of the rough surface's track (of two, the slower one's), the start apart: means of its steps.
+        """Return means over each whole pass of the rough surface's track, without the start.
 
-        Columns as in `table`, `pass` in place of `step`; of what only grows or falls (`time_s`,
-        `track_sq_m`, `flattened_m`, `heat_j`) the value at its end.
+        Of two rough surfaces, the slower one's track counts. Columns as in `table`, `pass` in
+        place of `step`; for cumulative quantities (`time_s`, `track_sq_m`, `flattened_m`,
+        `heat_j`) the value at the end of the pass.
         """
         length = steps_a_pass(self.case, self.case.moving_surfaces())
         moving = self.table[self.table["step"] > 0]
@@ -121,10 +122,9 @@ class History:
 
     @cached_property
     def vibration(self) -> Vibration | None:
-        """What the mean contact of the settled steps sounds like.
+        """Vibration of the mean contact of the settled steps.
 
-        None without [vibration], or where its stiffness or excitation is that of one solved
-        contact.
+        None without [vibration], or where its stiffness or excitation requires a solved contact.
         """
         model, case = self.case.vibration, self.case
         if model is None or model.needs_solution:
@@ -134,18 +134,18 @@ class History:
 
     @property
     def mean_state(self) -> ContactState:
-        """The mean contact of the settled steps; it has no lambda ratio."""
+        """Mean contact state of the settled steps, without a lambda ratio."""
         return mean_state(self.settled.mean(numeric_only=True))
 
     def surfaces(self) -> MovingSurfaces:
-        """The case's surfaces, as far pressed flat as they are at the end."""
+        """Return the case's surfaces with their final plastic flattening."""
         surfaces = self.case.moving_surfaces()
         if self.case.motion.flattening and self.memory is not None:
             return surfaces.lowered(self.memory["lowered_first"], self.memory["lowered_second"])
         return surfaces
 
     def scalars(self) -> dict[str, Any]:
-        """What `asperity run --json` says of the history: means and standard deviations over the settled steps."""
+        """Return the values of `asperity run --json`: statistics of the settled steps."""
         rows, first = self.settled, self.table.iloc[0]
         scalars: dict[str, Any] = {
             "verdict": self.verdict(),
@@ -175,25 +175,24 @@ class History:
         }
 
     def verdict(self) -> str:
-        """One sentence: what moving did to the contact."""
+        """Return one sentence: load share in motion and at the start."""
         rows, first = self.settled, self.table.iloc[0]
         at_start = "snapshot" if self.case.motion.start == "steady" else "contact at rest"
+        mean, deviation = 100 * rows["clr"].mean(), 100 * rows["clr"].std(ddof=0)
         sentence = (
-            f"Asperities carry {100 * rows['clr'].mean():.1f} ± {100 * rows['clr'].std(ddof=0):.1f} % of the load in "
+            f"Asperities carry {mean:.1f} ± {deviation:.1f} % of the load in "
             f"motion, {100 * first['clr']:.1f} % in the {at_start}: {self.steps} steps, "
             f"{1e6 * self.table['time_s'].iloc[-1]:.4g} us"
         )
         if self.case.motion.flattening and len(passes := self.by_pass()):
-            sentence += f", the mean of the last of {len(passes)} passes"
+            sentence += f", mean over the last of {len(passes)} passes"
         if self.failed:
-            sentence = (
-                f"NOT CONVERGED at step {self.failed[0]}, do not use what follows it: {sentence}"
-            )
+            sentence = f"NOT CONVERGED at step {self.failed[0]}, do not use later steps: {sentence}"
         return f"{sentence}."
 
 
 def steps_a_pass(case: Case, surfaces: MovingSurfaces) -> float:
-    """Length of a pass of the rough surface's whole track, of two the slower one's."""
+    """Return the steps per pass of the rough surface's whole track; of two, the slower one's."""
     rough = surfaces.rough if any(surfaces.rough) else (True, True)
     passage = max(surfaces.passage_time(index) for index in (0, 1) if rough[index])
     return passage / step_seconds(case.conditions, surfaces, case.motion.time_step)

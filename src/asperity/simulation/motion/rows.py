@@ -1,4 +1,4 @@
-"""A step of a history as a row: what is read off the contact, by the keys of the catalogue."""
+"""Row of a history table: values of the contact at one step, by the keys of the catalogue."""
 
 import math
 from dataclasses import dataclass
@@ -46,12 +46,12 @@ COLUMNS = (
     "newton_steps",
     "converged",
 )
-WARMING = ("friction_power_w", "flow_power_w")
+HEAT_SOURCES = ("friction_power_w", "flow_power_w")
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
-    """What the catalogue's sources name of a step."""
+class _StepSources:
+    """Attributes of a step that the catalogue's sources refer to."""
 
     snapshot: Snapshot
     case: Case
@@ -76,27 +76,27 @@ class _Step:
             return math.nan
         try:
             return oscillator(self.state, self.case.conditions, model).natural_frequency_hz
-        except BadInput:  # nothing touches: there is no spring
+        except BadInput:  # no asperity contact, hence no spring
             return math.nan
 
 
-def step_row(snapshot: Snapshot, case: Case, before: Row | None) -> Row:
-    """The line of the table; equal steps give equal lines, so what computing took is not in it."""
+def step_row(snapshot: Snapshot, case: Case, previous: Row | None) -> Row:
+    """Return the row of a step; equal steps give equal rows, so computing time is not included."""
     rubbing = friction(
         snapshot.solution, boundary_friction=case.boundary_friction, thermal=case.thermal
     )
-    numbers = read(_Step(snapshot, case, rubbing), map(quantity, COLUMNS))
+    numbers = read(_StepSources(snapshot, case, rubbing), map(quantity, COLUMNS))
     numbers["heat_j"] = 0.0
     row: Row = {"step": snapshot.number}
     row |= {key: math.nan if numbers[key] is None else numbers[key] for key in COLUMNS}
-    if before is not None:
-        warming = sum(float(end[key]) for end in (before, row) for key in WARMING)
-        row["heat_j"] = before["heat_j"] + 0.5 * warming * (snapshot.time - before["time_s"])
+    if previous is not None:
+        heating = sum(float(end[key]) for end in (previous, row) for key in HEAT_SOURCES)
+        row["heat_j"] = previous["heat_j"] + 0.5 * heating * (snapshot.time - previous["time_s"])
     return row
 
 
 def mean_state(means: Any) -> ContactState:
-    """A contact state of a row of means; it has no lambda ratio."""
+    """Return the contact state of a row of means, without a lambda ratio."""
     fields: dict[str, Any] = {
         quantity(key).source.removeprefix("state."): float(means[key]) for key in STATE
     }

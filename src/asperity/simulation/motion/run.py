@@ -1,4 +1,4 @@
-"""A case let move: the steps of a model of the moving contact, read off and kept; nothing is solved here."""
+"""Simulation of a moving contact: the steps of a model, recorded as a history."""
 
 import math
 import time
@@ -13,7 +13,7 @@ from asperity.core.errors import BadInput, NotConverged
 from asperity.core.limits import require_affordable
 from asperity.simulation.motion.history import History, steps_a_pass
 from asperity.simulation.motion.rows import Row, step_row
-from asperity.simulation.motion.store import open_keeper
+from asperity.simulation.motion.store import open_recorder
 from asperity.surface import MovingSurfaces
 from asperity.transient import Snapshot, Steps, moving_contact
 
@@ -23,11 +23,11 @@ MODELS: dict[str, Steps] = {  # by the case's `model`
     "paper": moving_contact,
     "conserving": moving_contact,
 }
-STEP_S, ROW_BYTES = 1e-5, 2000.0  # what a step takes: time a cell, memory
+STEP_S, ROW_BYTES = 1e-5, 2000.0  # cost of a step: time per cell [s], memory [B]
 
 
 class HistoryProgress(NamedTuple):
-    """How far a history is: the step just taken, of how many, and its row."""
+    """Progress of a history: number of the last step, number of steps, and its row."""
 
     number: int
     steps: int
@@ -44,68 +44,70 @@ def run_history(
     strict: bool = True,
     progress: Callable[[HistoryProgress], None] | None = None,
 ) -> History:
-    """Let a case's roughness move.
+    """Simulate the moving roughness of a case.
 
     Parameters
     ----------
-    case : with a [motion], or the defaults of one
-    steps : the number of the last step; the case's unless given
-    passes : in place of `steps`, how often the rough surface runs its whole track (of two, the slower one)
-    out : folder to keep the history in, and to go on from where it holds the same case's; None keeps it in memory
-    every : keep maps of every so many steps; about 40 in all unless given
-    strict : stop at the first step that does not converge; else mark it and go on
+    case : with a [motion], or its defaults
+    steps : number of the last step; by default the case's
+    passes : instead of `steps`, passes of the rough surface's track (of two, the slower one's)
+    out : folder for the history; resumes it if it holds the same case's; None keeps it in memory
+    every : keep maps every so many steps; by default about 40 in all
+    strict : stop at the first step that does not converge; else mark it and continue
     progress : called after every step
 
     Raises
     ------
     BadInput
-        for a dry contact, heat that is fed back, no steps, or a folder that holds something else.
+        for a dry contact, thermal feedback, no steps, or a folder with other contents.
     NotConverged
-        if `strict`; its `solution` is the history, the bad step the last of it.
+        if `strict`; its `solution` is the history, which ends with the failed step.
     """
     surfaces, model = _moving_parts(case)
     last = _last_step(case, surfaces, steps, passes)
     began = time.perf_counter()
-    # sums over several threads depend on their number, and vectors this short are slower for it
-    with open_keeper(case, surfaces, last, out, every) as keeper, threadpool_limits(1):
-        before = len(keeper.rows)
-        if last > keeper.last:
+    # sums over several threads depend on their number, and vectors this short run slower on them
+    with open_recorder(case, surfaces, last, out, every) as recorder, threadpool_limits(1):
+        before = len(recorder.rows)
+        if last > recorder.last:
             taken: Iterator[Snapshot] = model(
                 case.conditions,
                 case.lubricant,
                 surfaces,
                 start=case.motion.start,
-                resume=keeper.memory,
+                resume=recorder.memory,
                 time_step=case.motion.time_step,
                 flattening=case.motion.flattening,
                 options=case.options,
             )
             for snapshot in taken:
-                row = step_row(snapshot, case, keeper.rows[-1] if keeper.rows else None)
-                bad = strict and not row["converged"]
-                keeper.keep(snapshot, row, bad=bad)
+                row = step_row(snapshot, case, recorder.rows[-1] if recorder.rows else None)
+                failed = strict and not row["converged"]
+                recorder.record(snapshot, row, failed=failed)
                 if progress is not None:
                     progress(HistoryProgress(snapshot.number, last, row))
-                if bad or snapshot.number >= last:
+                if failed or snapshot.number >= last:
                     break
-        history = keeper.history(time.perf_counter() - began, len(keeper.rows) - before)
+        history = recorder.history(time.perf_counter() - began, len(recorder.rows) - before)
     if strict and history.failed:
         where = f"step {history.failed[0]} of {last} did not converge"
         raise NotConverged(
-            history, f"{where}; what came before it is good, strict=False marks it and goes on"
+            history, f"{where}; earlier steps are valid, strict=False marks it and continues"
         )
     return history
 
 
 def _moving_parts(case: Case) -> tuple[MovingSurfaces, Steps]:
     if case.lubricant is None:
-        raise BadInput(f"{case.source}: a dry contact has no history; give it a [lubricant]")
+        raise BadInput(f"{case.source}: a dry contact has no history; add a [lubricant]")
     if case.thermal.feedback:
-        raise BadInput(f"{case.source}: motion knows no warm film; set thermal.feedback=false")
+        raise BadInput(
+            f"{case.source}: motion does not support thermal feedback; set thermal.feedback=false"
+        )
     name: str = case.contents.model
     if name not in MODELS:
         raise BadInput(
-            f"{case.source}: model {name} has no steps in time; take one of {', '.join(MODELS)}"
+            f"{case.source}: model {name} has no time steps; choose one of {', '.join(MODELS)}"
         )
     return case.moving_surfaces(), MODELS[name]
 
@@ -114,23 +116,24 @@ def _last_step(
     case: Case, surfaces: MovingSurfaces, steps: int | None, passes: float | None
 ) -> int:
     if passes is None:
-        wanted = case.motion.steps if steps is None else steps
+        count = case.motion.steps if steps is None else steps
     elif steps is not None:
         raise BadInput(f"both steps ({steps}) and passes ({passes:g}) are given; leave one out")
     else:
         exact = passes * steps_a_pass(case, surfaces)
         if not 0.0 < exact < math.inf:
             raise BadInput(
-                f"passes must be positive, of a rough surface that moves, got {passes:g}; give steps"
+                f"passes must be positive and need a moving rough surface, got {passes:g}; state "
+                "steps instead"
             )
-        wanted = math.ceil(exact - 1e-9)
-    if wanted < 1:
-        raise BadInput(f"steps must be at least 1, got {wanted}")
+        count = math.ceil(exact - 1e-9)
+    if count < 1:
+        raise BadInput(f"steps must be at least 1, got {count}")
     nx, ny = case.grid.cells
-    seconds = STEP_S * nx * ny * float(wanted)
+    seconds = STEP_S * nx * ny * float(count)
     require_affordable(
-        f"a history of {float(wanted):.10g} steps",
-        memory=ROW_BYTES * float(wanted),
+        f"a history of {float(count):.10g} steps",
+        memory=ROW_BYTES * float(count),
         seconds=seconds,
     )
-    return wanted
+    return count

@@ -1,9 +1,9 @@
-"""How a mass on a contact vibrates over its history, without the paper's coupling.
+"""Vibration of a mass on a contact over its history, independent of the paper's coupling.
 
-The load is held at every step, so that the approach of the bodies is the way that a slow mass
-would go: it is the profile, and the tangent stiffness of the solved contact is the spring. No
-height from Sq, no cut-off from CAR, no sphere's stiffness from CLR; the paper's way stands beside
-it, on the same history.
+The load is prescribed at every step, so the approach of the bodies is the path of a slow mass: it
+is the profile, and the tangent stiffness of the solved contact is the spring. No height from Sq,
+no cut-off from CAR, no sphere's stiffness from CLR is used; the paper's coupling is evaluated on
+the same history for comparison.
 """
 
 import math
@@ -33,30 +33,29 @@ from asperity.solution import OscillatingContact, tangent_stiffness
 from asperity.surface import MovingSurfaces
 from asperity.vibration import ContactOscillator, acceleration
 
-MOMENTS = 5  # of the settled steps, at which the tangent stiffness is taken
-WAVES = 0.4  # of a passage's steps: the shortest wave that is resolved has two and a half steps
-RUNG_DOWN = 12.0  # time constants of the oscillator: what is left of the start is e^-12
-SAMPLES_PER_PERIOD = (
-    60.0  # straight lines between samples then cost the resonance 0.2 % of its power
-)
-SILENT = 1e-5  # of a²/R: what the solver's tolerance leaves of the approach is no roughness
+MOMENTS = 5  # settled steps at which the tangent stiffness is evaluated
+WAVES = 0.4  # of a passage's steps: the shortest resolved wave has 2.5 steps
+DECAY_TIMES = 12.0  # time constants of the oscillator: the transient decays to e^-12
+# linear interpolation between samples then reduces the resonance's power by 0.2 %
+SAMPLES_PER_PERIOD = 60.0
+MIN_APPROACH = 1e-5  # of a²/R: smaller variation is within the solver's tolerance
 
 
 @dataclass(frozen=True, kw_only=True)
 class HistoryVibration:
-    """A history as an accelerometer would record it.
+    """Vibration excited by a history, as an accelerometer would record it.
 
     `oscillator` has the mean of `stiffness` [N/m], shape (moments,), the tangent stiffness of the
-    contact as it lies at the steps `moments`; steps at which a neighbouring load could not be
-    solved are in `unsolved`. `damping` is the contact's own damping ratio at the moments, where
-    the mass resonates on its dynamic stiffness `dynamic` [N/m], yielded cells elastic; nan where
-    that is not determined, the last reason in `damping_failure`. `profile` [m] is one passage of
-    the rough track, the approach of the bodies about its mean, which repeats; `response` [m/s^2]
-    and `spectrum` are the steady answer to it, whose lines are `spacing_hz` apart, speed over
-    track. `not_periodic` is what of the approach does not repeat, root mean square over root mean
-    square. Without roughness, or where nothing repeats, these are None and `resonance.reason` says
-    why; `resonance` is estimated as in any record, `coupled` is the paper's way to the vibration
-    of the history's mean contact.
+    contact at the steps `moments`; steps at which a neighbouring load could not be solved are in
+    `unsolved`. `damping` is the contact's own damping ratio at the moments, where the mass
+    resonates on its dynamic stiffness `dynamic` [N/m], with yielded cells elastic; nan where not
+    determined, the last reason in `damping_failure`. `profile` [m] is the variation of the bodies'
+    approach over one passage of the rough track, repeated periodically; `response` [m/s^2] and
+    `spectrum` are the steady response to it, whose lines are `spacing_hz` apart, speed over track.
+    `not_periodic` is the rms of the approach's non-repeating part over its total rms. Without
+    roughness, or where nothing repeats, these are None and `resonance.reason` states why;
+    `resonance` is estimated as in any recording, `coupled` is the vibration of the history's mean
+    contact by the paper's coupling.
     """
 
     oscillator: ContactOscillator
@@ -76,19 +75,19 @@ class HistoryVibration:
 
     @property
     def dynamic_load(self) -> float | None:
-        """Root mean square of the dynamic force over the load; above 0.2 a linear spring misleads."""
+        """Root mean square of the dynamic force over the load; linear theory holds below 0.2."""
         if self.response is None or self.oscillator.load is None:
             return None
         return float(self.oscillator.mass * np.std(self.response.values) / self.oscillator.load)
 
     @property
     def crf_hz(self) -> float | None:
-        """The resonance that the history shows [Hz]."""
+        """Resonance found in the history [Hz]."""
         return self.resonance.crf_hz if self.resonance.found else None
 
     @property
     def coupled_crf_hz(self) -> float | None:
-        """The resonance by the paper's coupling [Hz]."""
+        """Resonance by the paper's coupling [Hz]."""
         return self.coupled.resonance.crf_hz if self.coupled.resonance.found else None
 
     @property
@@ -104,7 +103,7 @@ class HistoryVibration:
 
     @property
     def damping_ratio(self) -> float:
-        """Mean of the contact's own damping ratio over the moments that have one; nan without any."""
+        """Mean of the contact's own damping ratio over the moments that have one, or nan."""
         return _mean(self.damping)
 
     @property
@@ -114,7 +113,7 @@ class HistoryVibration:
 
     @property
     def dynamic_stiffness(self) -> float:
-        """Mean of the dynamic stiffness where the mass resonates on it [N/m]; nan without any."""
+        """Mean dynamic stiffness at which the mass resonates [N/m], or nan."""
         return _mean(self.dynamic)
 
     @property
@@ -128,35 +127,36 @@ class HistoryVibration:
         return None if self.profile is None else float(np.std(self.profile.values))
 
     def verdict(self) -> str:
-        """One sentence: the contact's own resonance, the paper's, and what drives the mass."""
+        """Return one sentence: the contact's own resonance, the paper's, and the excitation."""
         f0, coupled, force = (
             self.oscillator.natural_frequency_hz,
             self.coupled.oscillator,
             self.dynamic_load,
         )
-        by_paper = "not at all" if coupled is None else f"at {coupled.natural_frequency_hz:.0f} Hz"
+        by_paper = "none" if coupled is None else f"{coupled.natural_frequency_hz:.0f} Hz"
         sentence = (
-            f"By its own stiffness, taken at {len(self.moments)} moments, the contact resonates at "
-            f"{f0:.0f} ± {self.natural_frequency_std_hz:.0f} Hz, by the paper's coupling {by_paper}"
+            f"Resonance by the tangent stiffness at {len(self.moments)} moments: {f0:.0f} ± "
+            f"{self.natural_frequency_std_hz:.0f} Hz, by the paper's coupling: {by_paper}"
         )
         ratio = quantity("history_damping_ratio")
         if np.isfinite(self.damping_ratio):
-            sentence += f"; its oil damps with a ratio of {ratio.text(self.damping_ratio, self.damping_std)}"
+            damping = ratio.text(self.damping_ratio, self.damping_std)
+            sentence += f"; damping ratio of the oil film {damping}"
         else:
-            sentence += f"; its damping is not determined ({self.damping_failure})"
+            sentence += f"; damping not determined ({self.damping_failure})"
         if self.approach_std is not None and force is not None:
             sentence += (
-                f"; the approach of the bodies drives a mass on it by {1e9 * self.approach_std:.3g} nm rms, "
-                f"with a force of {100 * force:.0f} % of the load"
+                f"; excitation {1e9 * self.approach_std:.3g} nm rms, dynamic force "
+                f"{100 * force:.0f} % of the load"
             )
             if force > MAX_LINEAR_LOAD:
-                sentence += ", too much for a linear spring"
+                sentence += ", too large for a linear spring"
         if self.resonance.found:
             return f"{sentence}; the history shows {self.resonance.crf_hz:.0f} Hz."
         return f"{sentence}; the history shows no resonance ({self.resonance.reason})."
 
     def scalars(self) -> dict[str, Any]:
-        """What `asperity run --listen --json` says besides the history; None where there is none."""
+        """Return the additional values of `asperity run --listen --json`."""
         reasons = {
             "history_crf_reason": self.resonance.reason,
             "tangent_unsolved": list(self.unsolved),
@@ -167,32 +167,31 @@ class HistoryVibration:
 def history_vibration(
     history: History, model: VibrationModel | None = None, *, moments: int = MOMENTS
 ) -> HistoryVibration:
-    """Let the mass of a vibration model ride on a history.
+    """Compute the vibration of a mass over a history.
 
     Parameters
     ----------
-    history : its settled steps are ridden over, at least one passage of the rough track
-    model : mass, damping law, reference depth and indicator; the case's unless given. Its stiffness law and its
-        excitation are those of `coupled` only, and the paper's there if they ask for one solved contact
-    moments : how many steps, evenly over the settled ones, the tangent stiffness is the mean of
+    history : its settled steps are used, at least one passage of the rough track
+    model : mass, damping law, reference depth and indicator; by default the case's. Its stiffness
+        law and excitation apply to `coupled` only; laws that need a solved contact are replaced
+        by the paper's there
+    moments : number of settled steps, spread evenly, over which the tangent stiffness is averaged
 
     Raises
     ------
     BadInput
-        for no model, no moments, or what `contact_vibration` refuses.
+        for no model, no moments, and as `contact_vibration`.
     NotConverged
-        if the tangent stiffness could be had at none of the moments.
+        if the tangent stiffness could not be computed at any of the moments.
     """
     case = history.case
     model = case.vibration if model is None else model
     if model is None:
         raise BadInput(
-            f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio"
+            f"{case.source}: vibration is missing; add [vibration] with mass and damping_ratio"
         )
     if moments < 1:
-        raise BadInput(
-            f"the tangent stiffness is taken at 1 moment or more, got {moments}; {MOMENTS} is the default"
-        )
+        raise BadInput(f"moments must be 1 or more, got {moments}; the default is {MOMENTS}")
     surfaces = history.surfaces()
     taken = _moments(history, surfaces, model, moments)
     stiffness = taken.stiffness
@@ -237,7 +236,7 @@ def history_vibration(
 
 
 def _passage(history: History, period: float) -> tuple[Signal | None, float | None, str | None]:
-    """What `repeating` makes of the approach of the bodies, unless nothing moves."""
+    """Return the repeating approach of the bodies; none if it does not vary."""
     rows, case = history.settled, history.case
     profile, not_periodic, objection = repeating(
         rows["time_s"].to_numpy(), rows["rigid_approach_m"].to_numpy(), period
@@ -245,12 +244,12 @@ def _passage(history: History, period: float) -> tuple[Signal | None, float | No
     if (
         profile is not None
         and np.std(profile.values)
-        < SILENT * Scales.from_conditions(case.conditions, case.lubricant).gap
+        < MIN_APPROACH * Scales.from_conditions(case.conditions, case.lubricant).gap
     ):
         return (
             None,
             None,
-            "the approach of the bodies does not change: there is nothing to excite a vibration",
+            "the approach of the bodies does not vary: nothing excites a vibration",
         )
     return profile, not_periodic, objection
 
@@ -258,22 +257,22 @@ def _passage(history: History, period: float) -> tuple[Signal | None, float | No
 def repeating(
     time: Field, heights: Field, period: float
 ) -> tuple[Signal | None, float, str | None]:
-    """One period of what repeats in `heights` [m] at evenly spaced `time` [s], both (steps,), about its mean.
+    """Return one period of the repeating part of `heights` [m], without its mean.
 
-    Least squares of the period's waves, so that it need be no whole number of steps. Returns it,
-    what is left of the heights over what they vary by, both root mean square, and why there is no
-    period (or None).
+    `time` [s] is evenly spaced, both have shape (steps,). The period's waves are fitted by least
+    squares, so it need not be a whole number of steps. Also returns the rms of the remainder over
+    the rms of the heights, and the reason if there is no period (or None).
     """
     step = (time[-1] - time[0]) / (time.size - 1)
     length = period / step
     if time.size < length:
         missing = (
-            f"{time.size} settled steps are less than a passage of the rough track, {length:.0f}"
+            f"{time.size} settled steps are fewer than a passage of the rough track, {length:.0f}"
         )
         return (
             None,
             math.nan,
-            f"{missing}; let the history go on for {math.ceil(length) - time.size} steps more",
+            f"{missing}; extend the history by {math.ceil(length) - time.size} steps",
         )
     waves = int(WAVES * length)
     phase = 2.0 * np.pi * np.outer(time / period, np.arange(1, waves + 1))
@@ -293,7 +292,7 @@ def repeating(
 
 
 def resampled(profile: Signal, rate_hz: float) -> Signal:
-    """A profile that repeats, at `rate_hz` or faster: its own waves and no others."""
+    """Return a periodic profile at `rate_hz` or faster, band-limited to its own waves."""
     samples = profile.values.size
     finer = scipy.fft.next_fast_len(
         max(samples, math.ceil(samples * rate_hz / profile.rate_hz)), real=True
@@ -303,32 +302,32 @@ def resampled(profile: Signal, rate_hz: float) -> Signal:
 
 
 def steady_response(oscillator: ContactOscillator, profile: Signal) -> Signal:
-    """One period of the acceleration [m/s^2] over a profile that repeats for ever; the start has rung down."""
-    decay = RUNG_DOWN / (oscillator.damping_ratio * oscillator.angular_frequency)
+    """Return one period of the acceleration [m/s^2] over a periodic profile, without transient."""
+    decay = DECAY_TIMES / (oscillator.damping_ratio * oscillator.angular_frequency)
     times = math.ceil(decay / profile.duration_s) + 2
-    ridden = acceleration(oscillator, replace(profile, values=np.tile(profile.values, times)))
-    samples = profile.values.size  # the last period has no kink at its end
-    return replace(ridden, values=ridden.values[-2 * samples : -samples])
+    vibrated = acceleration(oscillator, replace(profile, values=np.tile(profile.values, times)))
+    samples = profile.values.size  # skip the last period, whose end has a kink
+    return replace(vibrated, values=vibrated.values[-2 * samples : -samples])
 
 
 def _period(surfaces: MovingSurfaces) -> tuple[float | None, str | None]:
-    """Time after which the contact is what it was [s], or why there is none."""
+    """Return the time after which the contact repeats [s], or the reason why it does not."""
     if not any(surfaces.rough):
-        return None, "the surfaces are flat: there is no roughness to excite a vibration"
+        return None, "the surfaces are smooth: no roughness excites a vibration"
     passages = [surfaces.passage_time(index) for index in (0, 1) if surfaces.rough[index]]
     moving = [passage for passage in passages if math.isfinite(passage)]
     if not moving:
-        return None, "the roughness stands still: nothing passes that could excite a vibration"
+        return None, "the roughness stands still: nothing excites a vibration"
     if not math.isclose(moving[0], moving[-1], rel_tol=1e-9):
         return (
             None,
-            "two rough surfaces at different speeds do not meet alike again: no passage repeats",
+            "two rough surfaces move at different speeds: no passage repeats",
         )
     return moving[0], None
 
 
 class _Moments(NamedTuple):
-    """The contact as it lies at some steps; `failure` is the last reason why a damping is not determined."""
+    """Contact at some steps; `failure` is the last reason for undetermined damping."""
 
     steps: tuple[int, ...]
     stiffness: Field
@@ -365,11 +364,13 @@ def _moments(
                 model.mass
             )
             shaken.append((found.damping_ratio, found.stiffness))
-        except AsperityError as refusal:  # every other number is as good without it
+        except AsperityError as refusal:  # all other numbers are valid without damping
             shaken.append((math.nan, math.nan))
             failure = str(refusal)
     if not stiffness:
-        reason = f"the tangent stiffness could be had at none of {len(unsolved)} steps: {lost}"
+        reason = (
+            f"the tangent stiffness could not be computed at any of {len(unsolved)} steps: {lost}"
+        )
         raise NotConverged(lost.solution, reason)
     damping, dynamic = np.array(shaken).T
     return _Moments(tuple(solved), np.array(stiffness), damping, dynamic, tuple(unsolved), failure)
@@ -386,12 +387,15 @@ def _spread(values: Field) -> float:
 
 
 def _resonance(spectrum: Spectrum, f0: float, model: VibrationModel) -> Resonance:
-    """Looked for about f0, where the lines are close enough to show one."""
+    """Estimate the resonance near f0, if the lines are close enough."""
     band = band_about(f0, float(spectrum.frequency_hz[-1]))
     apart = spectrum.spacing_hz
     if (band[1] - band[0]) / apart < FEWEST_LINES + 1:
         least = math.ceil((FEWEST_LINES + 1) * apart / (band[1] - band[0]))
-        reason = f"the track repeats: its lines lie {apart:.0f} Hz apart, too far to show a resonance near {f0:.0f} Hz"
-        remedy = f"make motion.track {least} times as long or more"
+        reason = (
+            f"the track repeats: its lines are {apart:.0f} Hz apart, too far to resolve a "
+            f"resonance near {f0:.0f} Hz"
+        )
+        remedy = f"raise motion.track at least {least}-fold"
         return no_resonance(f"{reason}; {remedy}", band, model.method)
     return contact_resonance(spectrum, band_hz=band, method=model.method)

@@ -1,6 +1,6 @@
-"""One position of the tracks, solved: maps that wear needs, and numbers; here or in worker processes.
+"""Solution at one position of the tracks: maps and numbers for wear, here or in worker processes.
 
-Each is solved from nothing, so that neither the order nor the process changes a number.
+Each position is solved from scratch, so neither order nor process changes a number.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,24 +31,19 @@ from asperity.solution import (
 )
 from asperity.surface import Surface
 
-LOOSELY = (
-    5e-2,
-    1e-2,
-)  # tolerances of a first solve, from which Newton's steps at once then meet the case's own
-NEARLY, AT_ONCE = (
-    80,
-    30,
-)  # steps of the first solve on each grid, and at once: where these lead anywhere, some ten
+# tolerances of a first solve, whose result starts Newton's method at the case's own tolerance
+LOOSE_TOLERANCES = (5e-2, 1e-2)
+# iterations of the first solve per grid, and from its result; about ten where it converges
+LOOSE_ITERATIONS, START_ITERATIONS = 80, 30
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Solved:
-    """A contact at one position, on its own grid; or `failure`, why there is none.
+class SolvedPosition:
+    """Contact solved at one position, on its own grid.
 
-    Maps: `pressure`, `asperity_pressure` (that of touching cells, what the oil there bears
-    counted, as CLR counts it) and `shear` on body 1 [Pa], `film` and `overlap` (None unless asked
-    for) [m], `temperatures` of both surfaces [K above ambient], None where heat could not be
-    shared between the bodies.
+    Maps: `pressure`, `asperity_pressure` (that of touching cells, with the oil there counted as CLR
+    counts it) and `shear` on body 1 [Pa], `film` and `overlap` (None unless requested) [m],
+    `temperatures` of both surfaces [K above ambient], None where the heat could not be partitioned.
     """
 
     pressure: Field
@@ -64,15 +59,15 @@ class Solved:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Failed:
-    """A position that could not be solved, and why."""
+class FailedPosition:
+    """Position that could not be solved, with the reason."""
 
     reason: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class PositionSolver:
-    """Solves the case's contact over a roughness."""
+    """Solver of the case's contact over a roughness."""
 
     conditions: ContactConditions
     lubricant: Lubricant | None
@@ -82,8 +77,8 @@ class PositionSolver:
     flattening: bool
 
     @classmethod
-    def of(cls, case: Case, *, flattening: bool) -> "PositionSolver":
-        """That of a case."""
+    def from_case(cls, case: Case, *, flattening: bool) -> "PositionSolver":
+        """Return the solver of a case."""
         return cls(
             conditions=case.conditions,
             lubricant=case.lubricant,
@@ -93,34 +88,35 @@ class PositionSolver:
             flattening=flattening,
         )
 
-    def __call__(self, surface: Surface) -> Solved | Failed:
-        """The contact there; one thread does the algebra, as two would sum in another order."""
+    def __call__(self, surface: Surface) -> SolvedPosition | FailedPosition:
+        """Solve the contact; single-threaded, as sums depend on the number of threads."""
         with threadpool_limits(1):
             try:
                 solution = self._solved(surface)
             except AsperityError as refusal:
-                return Failed(reason=str(refusal).rstrip("."))
+                return FailedPosition(reason=str(refusal).rstrip("."))
             return self._read(solution)
 
     def _solved(self, surface: Surface) -> ContactSolution:
-        """Loosely first, and to the tolerance from there.
+        """Solve loosely first, then to the tolerance from there.
 
-        On plateaus that wear has left, the first way gets near the solution and then goes round,
-        cells of a closed land opening and closing in turn, and a second way begins anew; from what
-        the first has found, all cells follow.
+        On worn plateaus, the default method stalls near the solution with cells that open and
+        close in turn; started from the loose solution, all cells converge.
         """
         most = self.options.max_iterations
-        few = replace(self.options, max_iterations=min(AT_ONCE, most))
+        few = replace(self.options, max_iterations=min(START_ITERATIONS, most))
         if self.lubricant is not None and np.any(surface.heights):
-            for tolerance in (one for one in LOOSELY if one > self.options.tolerance):
-                loose = replace(self.options, tolerance=tolerance, max_iterations=min(NEARLY, most))
-                with suppress(
-                    AsperityError
-                ):  # what is wrong with the contact, the case's own way says
-                    near = ehl.solve_contact(
+            for tolerance in (
+                value for value in LOOSE_TOLERANCES if value > self.options.tolerance
+            ):
+                loose = replace(
+                    self.options, tolerance=tolerance, max_iterations=min(LOOSE_ITERATIONS, most)
+                )
+                with suppress(AsperityError):  # the regular solve below reports errors
+                    guess = ehl.solve_contact(
                         self.conditions, self.lubricant, surface, options=loose, strict=False
                     )
-                    found = self._with_heat(surface, few, replace(near, options=few), strict=False)
+                    found = self._with_heat(surface, few, replace(guess, options=few), strict=False)
                     if found.convergence.converged:
                         return found
         return self._with_heat(surface, self.options)
@@ -144,8 +140,8 @@ class PositionSolver:
             strict=strict,
         )
 
-    def _read(self, solution: ContactSolution) -> Solved:
-        borne = np.where(solution.in_contact, np.maximum(solution.pressure, 0.0), 0.0)
+    def _read(self, solution: ContactSolution) -> SolvedPosition:
+        asperity_pressure = np.where(solution.in_contact, np.maximum(solution.pressure, 0.0), 0.0)
         rubbing: Friction | None = None
         temperatures, flash = None, np.nan
         try:
@@ -153,12 +149,12 @@ class PositionSolver:
                 solution, boundary_friction=self.boundary_friction, thermal=self.thermal
             )
             temperatures, flash = (heat.surface_1, heat.surface_2), heat.max_k
-        except AsperityError:  # the contact is as good without its heat
+        except AsperityError:  # the contact is valid without temperatures
             rubbing = rubbing or friction(solution, boundary_friction=self.boundary_friction)
         endless = self.conditions.endless
-        return Solved(
+        return SolvedPosition(
             pressure=solution.pressure,
-            asperity_pressure=borne,
+            asperity_pressure=asperity_pressure,
             shear=rubbing.shear,
             film=solution.gap,
             overlap=np.array(plastic_overlap(solution)) if self.flattening else None,
@@ -166,35 +162,37 @@ class PositionSolver:
             state=contact_state(solution),
             friction_coefficient=rubbing.coefficient,
             flash_temperature=flash,
-            at_edge=not endless
-            and bool(
-                borne[:, [1, -2]].any()
-            ),  # a scar as wide as the grid, whose rim bears nothing
+            # a scar as wide as the grid; cells at the rim carry no load
+            at_edge=not endless and bool(asperity_pressure[:, [1, -2]].any()),
         )
 
 
-class Crew(Protocol):
-    """What solves several positions at once."""
+class BatchSolver(Protocol):
+    """Solver of several positions at once."""
 
-    def __call__(self, surfaces: Sequence[Surface]) -> list[Solved | Failed]:
-        """In their order."""
+    def __call__(self, surfaces: Sequence[Surface]) -> list[SolvedPosition | FailedPosition]:
+        """Return the results in the order of the surfaces."""
         ...
 
 
 @contextmanager
-def crew(solver: PositionSolver, workers: int) -> Iterator[Crew]:
-    """So many processes, or none but this one; raises AsperityError, as it works, where one cannot start or dies."""
+def position_solvers(solver: PositionSolver, workers: int) -> Iterator[BatchSolver]:
+    """Create a solver with `workers` processes, or in this process for one worker.
+
+    Solving raises AsperityError where a process cannot start or dies.
+    """
     if min(workers, cores()) <= 1:
         yield lambda surfaces: [solver(surface) for surface in surfaces]
         return
     pool = ProcessPoolExecutor(min(workers, cores()), get_context("spawn"), set_up_worker)
 
-    def solve(surfaces: Sequence[Surface]) -> list[Solved | Failed]:
+    def solve(surfaces: Sequence[Surface]) -> list[SolvedPosition | FailedPosition]:
         try:
             return list(pool.map(solver, surfaces))
         except BrokenExecutor:
             raise AsperityError(
-                "a worker process could not start or died, for want of memory perhaps; wear with workers=1"
+                "a worker process could not start or died, possibly for lack of memory; "
+                "use workers=1"
             ) from None
 
     try:

@@ -1,7 +1,6 @@
-"""The contact as it was at some jumps, for pictures of it as it moves and wears: few enough, spread over the history.
+"""Contact maps of selected jumps, spread over a wear history, for figures and animations.
 
-Which jumps are kept depends on how many there have been alone, so that a run that was killed keeps
-the same.
+The selection depends only on the number of jumps, so a resumed run keeps the same frames.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,58 +10,60 @@ import numpy as np
 import numpy.typing as npt
 
 from asperity.core.arrays import Field, Mask
-from asperity.simulation.wear.contact import Solved
-from asperity.wear import Position
+from asperity.simulation.wear.contact import SolvedPosition
+from asperity.wear import TrackPosition
 
-MOST = 24  # frames of a history, besides its end
+MAX_FRAMES = 24  # of a history, besides its end
 
 
 class WearFrame(NamedTuple):
-    """The contact at one position of the tracks, at the beginning of a jump: maps on the contact's grid.
+    """Contact at one position of the tracks at the beginning of a jump: maps on the contact's grid.
 
-    `gap` [m] and `pressure` [Pa] as oil and asperities have it; `in_contact` is where bodies press
-    on one another.
+    `gap` [m] and `pressure` [Pa] of oil and asperities together; `in_contact` where the bodies
+    touch.
     """
 
     number: int
     hours: float
-    position: Position
+    position: TrackPosition
     gap: Field
     pressure: Field
     in_contact: Mask
 
     @classmethod
-    def of(cls, number: int, hours: float, at: Sequence[tuple[Position, Solved]]) -> "WearFrame":
-        """The first position of a jump; single precision is enough for the eye."""
-        place, solved = at[0]
+    def from_solutions(
+        cls, number: int, hours: float, solutions: Sequence[tuple[TrackPosition, SolvedPosition]]
+    ) -> "WearFrame":
+        """Return the first position of a jump, in single precision."""
+        place, solved = solutions[0]
         gap, pressure = (
             np.asarray(field, dtype=np.float32) for field in (solved.film, solved.pressure)
         )
         return cls(number, hours, place, gap, pressure, solved.asperity_pressure > 0.0)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """As arrays by name."""
-        told = np.array([self.number, self.hours, *self.position], dtype=float)
+        """Return the arrays to store, by name."""
+        numbers = np.array([self.number, self.hours, *self.position], dtype=float)
         return {
-            "told": told,
+            "told": numbers,  # name in the file format
             "gap": self.gap,
             "pressure": self.pressure,
             "in_contact": self.in_contact,
         }
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "WearFrame":
-        """What `arrays` made."""
+    def from_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "WearFrame":
+        """Rebuild a frame from `arrays`."""
         number, hours, first, second = map(float, arrays["told"])
-        place = Position(int(first), int(second))
+        place = TrackPosition(int(first), int(second))
         return cls(
             int(number), hours, place, arrays["gap"], arrays["pressure"], arrays["in_contact"]
         )
 
 
 def is_kept(number: int, latest: int) -> bool:
-    """Whether a history that has come to the latest jump keeps the frame of one before: every 2^n-th, MOST at most."""
+    """Return True if the frame of jump `number` is kept at jump `latest`: every 2^n-th jump."""
     every = 1
-    while latest >= every * MOST:
+    while latest >= every * MAX_FRAMES:
         every *= 2
     return number % every == 0

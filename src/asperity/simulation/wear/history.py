@@ -1,4 +1,4 @@
-"""A contact worn over hours: a row a jump, the surfaces before and after, and what they come to."""
+"""Wear history: a table with a row per jump, the surfaces before and after, and derived results."""
 
 import math
 from collections.abc import Sequence
@@ -18,16 +18,17 @@ from asperity.core.quantities import quantity
 from asperity.ehl import ContactState
 from asperity.paper import Moment
 from asperity.simulation.wear.frames import WearFrame
-from asperity.simulation.wear.jump import BODIES, Ageing
-from asperity.simulation.wear.notes import told
-from asperity.simulation.wear.rows import RESONANCE, of_body, state_of_row
-from asperity.simulation.wear.state import Worn
+from asperity.simulation.wear.jump import WearingContact
+from asperity.simulation.wear.notes import history_notes
+from asperity.simulation.wear.rows import RESONANCE, body_column, state_of_row
+from asperity.simulation.wear.state import WearState
+from asperity.simulation.wear.tracks import BODIES
 from asperity.surface import MovingSurfaces
 from asperity.trend import StageErrors, Stages, split_stages
 
 HOUR = 3600.0
-FEWEST_ROWS = 4  # that a drift is read from
-MOST_PLACES = 60  # that stages are read from
+MIN_ROWS = 4  # for a drift
+MAX_STAGE_POINTS = 60  # for the detection of stages
 ENDS = ("sq_m", "clr", "car", "h_mean_m", "friction_coefficient", "crf_hz", "crfa")
 
 
@@ -36,8 +37,8 @@ class _Slope(NamedTuple):
     scatter: float
 
 
-class Drift(NamedTuple):
-    """How fast a number changes as the contact wears, in its unit an hour, and the ends of its 90 % interval."""
+class WearDrift(NamedTuple):
+    """Rate of change of a quantity per hour, and its 90 % interval."""
 
     per_hour: float
     low: float
@@ -46,19 +47,20 @@ class Drift(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class WearHistory:
-    """A contact worn over hours.
+    """Wear of a contact over hours.
 
-    `table` has a row a jump, the contact at its beginning, and one for the end;
-    `docs/quantities.md` describes its columns, of which `..._1_m` and so on are one body's.
-    `before` and `worn` are the tracks at first, and what they have come to; `frames` the contact
-    at one position of some jumps and of the end; `seconds` what computing took this time, of
-    `computed` jumps; `failed` how many positions of all jumps could not be solved and were left
-    out of means; `folder` where it is kept, `path` of its table and `files` of its surfaces.
+    `table` has a row per jump, with the contact at its beginning, and one for the end;
+    `docs/quantities.md` describes its columns, of which `..._1_m` etc. are those of one body.
+    `initial_surfaces` and `worn` are the initial tracks and the final state; `frames` the contact
+    at one position of selected jumps and of the end; `seconds` the computing time of this call,
+    for `computed` jumps; `failed` the number of positions, over all jumps, that could not be
+    solved and were left out of means; `folder` where it is stored, `path` of its table and `files`
+    of its surfaces.
     """
 
-    ageing: Ageing
+    contact: WearingContact
     table: pandas.DataFrame
-    worn: Worn
+    worn: WearState
     frames: tuple[WearFrame, ...] = ()
     folder: Path | None = None
     path: Path | None = None
@@ -69,43 +71,43 @@ class WearHistory:
 
     @property
     def case(self) -> Case:
-        """What wore."""
-        return self.ageing.case
+        """Case that was worn."""
+        return self.contact.case
 
     @property
     def hours(self) -> float:
-        """How long it wore."""
+        """Duration of the wear."""
         return self.worn.time / HOUR
 
     @property
-    def before(self) -> MovingSurfaces:
-        """Both tracks at first."""
-        return self.ageing.surfaces
+    def initial_surfaces(self) -> MovingSurfaces:
+        """Initial tracks of both bodies."""
+        return self.contact.surfaces
 
     @property
-    def after(self) -> MovingSurfaces:
-        """Both tracks at the end."""
-        return self.ageing.worn_surfaces(self.worn)
+    def final_surfaces(self) -> MovingSurfaces:
+        """Final tracks of both bodies."""
+        return self.contact.worn_surfaces(self.worn)
 
     @property
     def overrollings(self) -> tuple[float, float]:
-        """How often a point of each body has passed the contact."""
-        first, second = (rate * self.worn.time for rate in self.ageing.overrolling)
+        """Number of times that a point of each body has passed the contact."""
+        first, second = (rate * self.worn.time for rate in self.contact.overrolling)
         return first, second
 
     @property
     def worn_volume(self) -> tuple[float, float]:
-        """What each body has lost all round it [m^3]: by law and mechanisms, not what was pressed flat."""
+        """Volume lost by each body all round [m^3], by law and mechanisms, without flattening."""
         return self._lost(0), self._lost(1)
 
     def _lost(self, body: int) -> float:
-        return self.ageing.volume(self.worn.worn[body] - self.worn.changed[body], body)
+        return self.contact.volume(self.worn.worn[body] - self.worn.changed[body], body)
 
     @property
     def volume_error(self) -> float:
-        """How far what the tracks lost is from k times asperity load times sliding distance, and mechanisms; relative.
+        """Relative difference of the lost volume and the booked one; the larger of both bodies.
 
-        The larger of both bodies'.
+        The booked volume is k times asperity load times sliding distance, and that of mechanisms.
         """
         booked = [self.worn.booked[body] + self.worn.mechanical[body] for body in BODIES]
         misses = [abs(self._lost(body) - booked[body]) for body in BODIES]
@@ -116,8 +118,8 @@ class WearHistory:
         )
 
     @property
-    def numbers_at_end(self) -> dict[str, float | None]:
-        """The last row by its columns; None for what is not known."""
+    def final_values(self) -> dict[str, float | None]:
+        """Last row by column; None for unknown values."""
         return {
             str(key): finite_or_none(float(value)) for key, value in self.table.iloc[-1].items()
         }
@@ -128,25 +130,24 @@ class WearHistory:
         return int(self.table["failed"].sum())
 
     @property
-    def scaled_by(self) -> tuple[float, float] | None:
-        """Ends of the 90 % interval of k over k, the same for both bodies; None where it is not the only clock.
+    def k_interval(self) -> tuple[float, float] | None:
+        """Ends of k's 90 % interval relative to k, if wear scales with k times time; else None.
 
-        Removal alone depends on k times time: with another k, all that happens, happens so much
-        earlier or later.
+        With removal only, and the same interval for both bodies, a different k only stretches time.
         """
-        first, second = self.ageing.model.coefficients
+        first, second = self.contact.model.coefficients
         same = (
             first.k == 0.0
             or second.k == 0.0
             or (first.low, first.high) == (second.low, second.high)
         )
-        if not self.ageing.model.removal_alone or not same:
+        if not self.contact.model.only_removal or not same:
             return None
         known = second if first.k == 0.0 else first
         return known.low, known.high
 
-    def at(self, hours: float) -> dict[str, float]:
-        """Every number at a moment, straight between the rows.
+    def values_at(self, hours: float) -> dict[str, float]:
+        """Return all quantities at a moment, interpolated linearly between rows.
 
         Raises
         ------
@@ -155,9 +156,7 @@ class WearHistory:
         """
         last = float(self.table["hours"].iloc[-1])
         if not 0.0 <= hours <= last * (1.0 + 1e-12):
-            raise BadInput(
-                f"the wear history has 0 to {last:g} h, got {hours:g} h; wear it for longer"
-            )
+            raise BadInput(f"the wear history has 0 to {last:g} h, got {hours:g} h; extend it")
         along = self.table["hours"].to_numpy()
         return {
             key: float(np.interp(hours, along, self.table[key].to_numpy(float)))
@@ -165,73 +164,79 @@ class WearHistory:
         }
 
     def state(self, hours: float) -> ContactState:
-        """The mean contact at a moment; raises as `at`."""
-        return state_of_row(self.at(hours))
+        """Return the mean contact state at a moment; raises as `values_at`."""
+        return state_of_row(self.values_at(hours))
 
     def moments(self, hours: Sequence[float] | None = None, count: int = 12) -> list[Moment]:
-        """When it may be recorded (`paper.simulate_rig`): at these hours, or so many spread evenly; raises as `at`."""
+        """Return moments for recordings of a simulated rig (`paper.simulate_rig`).
+
+        They are at `hours`, or `count` moments spread evenly. Raises as `values_at`.
+        """
         places = hours or list(np.linspace(0.0, float(self.table["hours"].iloc[-1]), count))
         return [Moment(float(place), self.state(float(place))) for place in places]
 
-    def with_k(self, key: str) -> "pandas.DataFrame | None":
-        """A number over the hours with its interval by k: columns `hours`, `low`, `high`.
+    def interval_by_k(self, key: str) -> "pandas.DataFrame | None":
+        """Return a quantity's 90 % interval by k over time: columns `hours`, `low`, `high`.
 
-        It is the range that the number has between the ends of the interval of k times the time;
-        nan from where the history would have to be longer. None where k is not the only clock
-        (`scaled_by`).
+        The interval is the range of the quantity between the ends of the interval of k times the
+        time; nan where the history would have to be longer. None where wear does not scale with k
+        (`k_interval`).
         """
-        if self.scaled_by is None:
+        if self.k_interval is None:
             return None
-        slow, fast = self.scaled_by
+        slow, fast = self.k_interval
         hours, values = self.table["hours"].to_numpy(float), self.table[key].to_numpy(float)
         ends = []
         for now in hours:
             inside = values[(hours >= slow * now) & (hours <= fast * now)]
-            reached = np.append(
+            reached_cells = np.append(
                 inside, np.interp([slow * now, min(fast * now, hours[-1])], hours, values)
             )
             whole = fast * now <= hours[-1] * (1.0 + 1e-12)
             ends.append(
-                (float(np.min(reached)), float(np.max(reached))) if whole else (math.nan, math.nan)
+                (float(np.min(reached_cells)), float(np.max(reached_cells)))
+                if whole
+                else (math.nan, math.nan)
             )
         low, high = np.array(ends).T
         return pandas.DataFrame({"hours": hours, "low": low, "high": high})
 
-    def drift(self, key: str, since: float = 0.0, until: float | None = None) -> Drift:
-        """How fast a number of the table changes between two moments [h], by the line nearest to its rows there.
+    def drift(self, key: str, since: float = 0.0, until: float | None = None) -> WearDrift:
+        """Return the rate of change of a column between two moments [h], by linear regression.
 
-        The interval is Student's of the line's slope, as rows scatter with the positions that they
-        are the mean of, and, where k is the only clock (`scaled_by`), it reaches over the slopes
-        with k at the ends of its interval: that of the history so much earlier or later, as far as
-        it goes, so much slower or faster.
+        The interval is Student's for the slope, given the scatter of the rows, and, where wear
+        scales with k (`k_interval`), also covers the slopes with k at the ends of its interval:
+        those of the history stretched in time, as far as it extends.
 
         Raises
         ------
         BadInput
-            for a number that the table has not, or fewer than FEWEST_ROWS rows between the moments that know it.
+            for an unknown column, or fewer than MIN_ROWS known rows between the moments.
         """
         if key not in self.table:
             raise BadInput(
-                f"the wear history has no number {key}; it has {', '.join(map(str, self.table.columns))}"
+                f"the wear history has no column {key}; "
+                f"it has {', '.join(map(str, self.table.columns))}"
             )
         end = float(self.table["hours"].iloc[-1])
         moments = since, end if until is None else until
         here = self._slope(key, *moments)
         if here is None:
             raise BadInput(
-                f"a drift of {key} needs {FEWEST_ROWS} rows that know it, got fewer from {moments[0]:g} to "
-                f"{moments[1]:g} h; take moments further apart, or wear it with a smaller wear.step"
+                f"a drift of {key} needs {MIN_ROWS} rows with a value, got fewer from "
+                f"{moments[0]:g} to {moments[1]:g} h; choose moments further apart, or a smaller "
+                "wear.step"
             )
         ends = [sign * here.scatter + here.slope for sign in (-1.0, 1.0)]
-        for factor in self.scaled_by or ():
+        for factor in self.k_interval or ():
             there = self._slope(key, factor * moments[0], min(factor * moments[1], end)) or here
             ends += [factor * (there.slope + sign * there.scatter) for sign in (-1.0, 1.0)]
-        return Drift(here.slope, min(ends), max(ends))
+        return WearDrift(here.slope, min(ends), max(ends))
 
     def _slope(self, key: str, since: float, until: float) -> "_Slope | None":
-        """Of the line nearest to the rows between, with half of its 90 % interval; None of too few rows."""
+        """Return slope and half its 90 % interval by linear regression; None with too few rows."""
         rows = self.table[self.table["hours"].between(since, until) & self.table[key].notna()]
-        if len(rows) < FEWEST_ROWS:
+        if len(rows) < MIN_ROWS:
             return None
         fitted = scipy.stats.linregress(rows["hours"].to_numpy(float), rows[key].to_numpy(float))
         return _Slope(
@@ -239,26 +244,26 @@ class WearHistory:
         )
 
     def volume_interval(self, body: int) -> tuple[float, float] | None:
-        """The 90 % interval of a body's worn volume [m^3], by k.
+        """Return the 90 % interval of a body's worn volume [m^3], by k.
 
-        Beyond the end it goes on as it last went: its upper end is too high where wear slows down.
+        It is extrapolated beyond the end at the last rate: too high where wear slows down.
         """
-        if self.scaled_by is None:
+        if self.k_interval is None:
             return None
         hours = self.table["hours"].to_numpy(float)
-        volume = self.table[of_body("worn_volume_m3", body)].to_numpy(float)
-        slow, fast = (end * hours[-1] for end in self.scaled_by)
+        volume = self.table[body_column("worn_volume_m3", body)].to_numpy(float)
+        slow, fast = (end * hours[-1] for end in self.k_interval)
         rate = (volume[-1] - volume[-2]) / (hours[-1] - hours[-2]) if len(hours) > 1 else 0.0
         return float(np.interp(slow, hours, volume)), float(volume[-1] + rate * (fast - hours[-1]))
 
     @cached_property
     def stages(self) -> Stages | None:
-        """Stages of wear that the present detectors find in CRF over hours; None where there is no CRF."""
+        """Wear stages detected in CRF over hours; None without CRF."""
         rows = self.table[self.table["crf_hz"].notna()]
         if len(rows) < 2:
             return None
         places = np.unique(
-            np.linspace(0, len(rows) - 1, min(MOST_PLACES, len(rows))).round().astype(int)
+            np.linspace(0, len(rows) - 1, min(MAX_STAGE_POINTS, len(rows))).round().astype(int)
         )
         chosen = rows.iloc[places]
         off = chosen["crf_std_hz"] if bool(chosen["crf_std_hz"].notna().all()) else None
@@ -271,7 +276,7 @@ class WearHistory:
         )
 
     def scalars(self) -> dict[str, Any]:
-        """What `asperity wear --json` says of it."""
+        """Return the values of `asperity wear --json`."""
         first, last = self.table.iloc[0], self.table.iloc[-1]
         scalars: dict[str, Any] = {
             "verdict": self.verdict(),
@@ -279,13 +284,13 @@ class WearHistory:
             "overrollings": list(self.overrollings),
             "worn_volume_m3": list(self.worn_volume),
             "worn_volume_interval_m3": [self.volume_interval(body) for body in BODIES],
-            "worn_depth_m": [float(last[of_body("worn_depth_m", body)]) for body in BODIES],
+            "worn_depth_m": [float(last[body_column("worn_depth_m", body)]) for body in BODIES],
             "volume_error": self.volume_error,
             "jump_error": self.worn.error,
             "jumps": len(self.table) - 1,
             "computed": self.computed,
             "failed": self.failed,
-            "patches": self.ageing.patches,
+            "patches": self.contact.patches,
             "seconds": self.seconds,
             "folder": None if self.folder is None else str(self.folder),
             "table": None if self.path is None else str(self.path),
@@ -300,13 +305,15 @@ class WearHistory:
         return scalars
 
     def verdict(self) -> str:
-        """One sentence: what wear did to the contact."""
+        """Return one sentence: worn depths, and changes of Sq, CLR and CRF."""
         first, last = self.table.iloc[0], self.table.iloc[-1]
         depths = " and ".join(
-            quantity("worn_depth_m").text(last[of_body("worn_depth_m", body)]) for body in BODIES
+            quantity("worn_depth_m").text(last[body_column("worn_depth_m", body)])
+            for body in BODIES
         )
         changes = ", ".join(
-            f"{quantity(key).short} {quantity(key).number(first[key])} to {quantity(key).text(last[key])}"
+            f"{quantity(key).short} {quantity(key).number(first[key])} to "
+            f"{quantity(key).text(last[key])}"
             for key in ("sq_m", "clr", "crf_hz")
             if math.isfinite(float(last[key])) and math.isfinite(float(first[key]))
         )
@@ -314,24 +321,28 @@ class WearHistory:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader of the numbers has to know, a sentence each."""
-        model, ageing = self.ageing.model, self.ageing
+        """Notes for a reader of the numbers, one sentence each."""
+        model, contact = self.contact.model, self.contact
         notes = [*self.remarks, *self.case.notes]
         if model.overrolling is None:
-            rates = " and ".join(f"{rate:.4g}" for rate in ageing.overrolling)
+            rates = " and ".join(f"{rate:.4g}" for rate in contact.overrolling)
             notes.append(
-                f"Bodies of equal radius are assumed: {rates} over-rollings a second; state wear.overrolling."
+                f"Bodies of equal radius are assumed, with {rates} over-rollings per second; "
+                "state wear.overrolling if that is wrong."
             )
         if self.failed:
             notes.append(
-                f"{self.failed} contacts could not be solved and were left out of the means of their jumps."
+                f"{self.failed} contacts could not be solved and are left out of the means of "
+                "their jumps."
             )
         if self.case.conditions.sliding_speed == 0.0:
-            notes.append("Without sliding nothing is worn off.")
-        notes += told(ageing, self.table, self.worn)
+            notes.append("There is no sliding, so nothing wears off.")
+        notes += history_notes(contact, self.table, self.worn)
         acting = [name for name in ("fatigue", "ploughing", "scuffing") if name in model.mechanisms]
         acting += ["flattening"] if model.flattening else []
         notes.append(
-            f"Besides removal: {', '.join(acting)}." if acting else "Nothing but removal acts."
+            f"Modelled besides removal: {', '.join(acting)}."
+            if acting
+            else "Only removal is modelled, no roughening."
         )
         return tuple(notes)

@@ -1,8 +1,7 @@
-"""One jump of a wearing contact: how far it may go, what the law of removal takes off, what else changes the surfaces.
+"""One jump of a wearing contact: its length, the removal, and the mechanisms that follow.
 
-Order: the contact is solved at positions of the tracks; the law's rate at its beginning is taken
-along the jump; what the pressure cap pressed flat stays flat; then each mechanism is asked, body
-by body.
+Order: the contact is solved at positions of the tracks; the initial rate of the law is integrated
+over the jump; plastic flattening is kept; then each mechanism is applied, body by body.
 """
 
 import math
@@ -11,123 +10,73 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy
 
-from asperity.case import Case
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.simulation.wear.contact import PositionSolver, Solved
-from asperity.simulation.wear.reach import part_of, reached
-from asperity.simulation.wear.state import Worn
-from asperity.surface import MovingSurfaces, Surface
+from asperity.simulation.wear.contact import PositionSolver, SolvedPosition
+from asperity.simulation.wear.state import WearState
+from asperity.simulation.wear.tracks import BODIES, WearingTracks
 from asperity.wear import (
-    Body,
     Change,
     Exposure,
+    MechanismState,
     Passage,
     Patch,
-    Position,
-    Rubbing,
-    State,
-    WearModel,
-    across,
-    is_even,
+    RubbingConditions,
+    TrackPosition,
+    is_uniform_along,
     longest_jump,
-    on_track,
-    positions,
-    taken_off,
+    map_to_track,
+    removed_depth,
+    to_other_track,
 )
 
-FEWEST_PATCHES = 4
-# of a smooth contact's approach a^2/(2R): what a jump's step is a share of where Sq is less
-LEAST_HEIGHT = 0.1
-WORST_ERROR = (
-    1e-3  # of Sq, by which this jump and the one before may differ from one of both together
-)
-FIRST, SHORTER, SHORTEST = (
-    0.5,
-    0.7,
-    1.0 / 64.0,
-)  # of the longest jump: the first, with none before it; and in steps
-GAUSS = (
-    math.sqrt(0.5 * math.log(2.0)) / math.pi
-)  # deviation of ISO 16610-61's filter over its cut-off
-BODIES = (0, 1)
+Solutions = Sequence[tuple[TrackPosition, SolvedPosition]]
+# largest difference in Sq, relative, between two successive jumps and one jump over both
+MAX_JUMP_ERROR = 1e-3
+FIRST_JUMP = 0.5  # of the longest jump: the first jump has none before it to compare with
+JUMP_REDUCTION, MIN_JUMP = 0.7, 1.0 / 64.0  # factor per reduction, and the limit
 
 
 @dataclass(frozen=True)
-class Ageing:
-    """A case's contact as it wears: what stays the same from jump to jump."""
-
-    case: Case
-    model: WearModel
-    surfaces: MovingSurfaces
+class WearingContact(WearingTracks):
+    """Contact of a case that wears: what stays the same from jump to jump."""
 
     @cached_property
     def solver(self) -> PositionSolver:
-        """What solves the contact at a position."""
-        return PositionSolver.of(self.case, flattening=self.model.flattening)
+        """Solver of the contact at a position."""
+        return PositionSolver.from_case(self.case, flattening=self.model.flattening)
 
-    @cached_property
-    def overrolling(self) -> tuple[float, float]:
-        """How often a point of each body passes the contact [1/s]; 0 of one that stands still."""
-        conditions = self.case.conditions
-        if self.model.overrolling is not None:
-            rates = self.model.overrolling
-        else:
-            round_trip = 4.0 * math.pi * conditions.radius_along_rolling
-            first, second = (abs(speed) / round_trip for speed in conditions.surface_speeds)
-            rates = (first, second)
-        still = [speed == 0.0 for speed in conditions.surface_speeds]
-        return 0.0 if still[0] else rates[0], 0.0 if still[1] else rates[1]
+    def exposures(self, solutions: Solutions = ()) -> tuple[Exposure, Exposure]:
+        """Return the exposure of each body to the contact, solved at those positions.
 
-    @cached_property
-    def bodies(self) -> tuple[Body, Body]:
-        """Both bodies' material and speed."""
-        conditions = self.case.conditions
-        first, second = (
-            Body(
-                youngs_modulus=modulus,
-                poisson_ratio=ratio,
-                hardness=conditions.hardness,
-                speed=speed,
-            )
-            for modulus, ratio, speed in zip(
-                conditions.pair.youngs_moduli,
-                conditions.pair.poisson_ratios,
-                conditions.surface_speeds,
-                strict=True,
-            )
-        )
-        return first, second
-
-    def exposures(self, at: Sequence[tuple[Position, Solved]] = ()) -> tuple[Exposure, Exposure]:
-        """How each body meets the contact, solved at those positions; none: one as cold as its surroundings."""
+        Without `solutions`, the contact is taken at ambient temperature.
+        """
         conditions = self.case.conditions
         first, second = (
             Exposure(
-                k=coefficient.k * self._acting(at, which),
+                k=coefficient.k * self._law_factor(solutions, index),
                 body=body,
                 overrolling=rate,
                 width=2.0 * conditions.hertz.half_widths[0],
                 sliding_speed=conditions.sliding_speed,
             )
-            for which, coefficient, body, rate in zip(
+            for index, coefficient, body, rate in zip(
                 BODIES, self.model.coefficients, self.bodies, self.overrolling, strict=True
             )
         )
         return first, second
 
-    def _acting(self, at: Sequence[tuple[Position, Solved]], body: int) -> float:
-        """What the law makes of pressure times sliding, at most: 1 by Archard's, the share of defects by theirs."""
-        cold = Rubbing(
+    def _law_factor(self, solutions: Solutions, body: int) -> float:
+        """Return the largest ratio of the law to pressure times sliding speed: 1 for Archard's."""
+        cold = RubbingConditions(
             pressure=np.ones(1),
             shear=np.full(1, self.case.boundary_friction),
             sliding_speed=self.case.conditions.sliding_speed,
             temperature=np.full(1, self.case.thermal.ambient),
         )
         worst = 0.0
-        for rubbing in [self.rubbing(solved, body) for _, solved in at] or [cold]:
+        for rubbing in [self.rubbing(solved, body) for _, solved in solutions] or [cold]:
             by_archard = rubbing.pressure * rubbing.sliding_speed
             rubs = by_archard > 0.0
             worst = max(
@@ -135,152 +84,46 @@ class Ageing:
             )
         return worst
 
-    @cached_property
-    def patches(self) -> int:
-        """Positions that a jump is the mean of; one where no body has anywhere to go."""
-        if self.model.patches is not None:
-            return self.model.patches
-        length = self.surfaces.first.grid.extent[0]
-        return max(
-            FEWEST_PATCHES, math.ceil(length / self.case.conditions.hertz.half_widths[0] - 1e-9)
-        )
-
-    @property
-    def seed(self) -> int:
-        """Of all that is drawn: the case's surface's."""
-        return int(getattr(self.case.contents.surface, "seed", 0))
-
-    def perimeter(self, body: int) -> float:
-        """Way along a body that wears as its track does [m]: all round it, or the domain where it stands still."""
-        speed, rate = self.bodies[body].speed, self.overrolling[body]
-        return self.surfaces.first.grid.extent[0] if speed == 0.0 else abs(speed) / rate
-
-    @property
-    def width(self) -> float:
-        """Of the wearing track across rolling [m]: a line contact's length, else the domain's."""
-        length = self.case.conditions.length if self.case.conditions.endless else None
-        return self.surfaces.grid.extent[1] if length is None else length
-
-    def volume(self, depth: Field, body: int) -> float:
-        """What a depth on a body's track [m] is of volume [m^3], all round the body."""
-        return float(depth.mean()) * self.perimeter(body) * self.width
-
-    # Where bodies are
-    # ------------------------------------------------------------------------------------------------
-
-    def worn_surfaces(self, worn: Worn) -> MovingSurfaces:
-        """Both tracks as they are now."""
-        return self.surfaces.lowered(worn.lowered(0), worn.lowered(1))
-
-    def track(self, worn: Worn, body: int) -> tuple[slice, slice]:
-        """Cells of a body's track that the contact reaches: the Hertz zone, or more where the scar has grown beyond.
-
-        All along rolling of a body that moves, and all across of an endless contact.
-        """
-        along = across = slice(None)
-        grid, half_widths = self.surfaces.grid, self.case.conditions.hertz.half_widths
-        if self.bodies[body].speed == 0.0:
-            along = reached(worn.worn[body].mean(axis=1), grid.x, half_widths[0])
-        if not self.case.conditions.endless:
-            both = worn.worn[0].mean(axis=0) + worn.worn[1].mean(axis=0)[::-1]
-            across = reached(both + both[::-1], 0.5 * (grid.y - grid.y[::-1]), half_widths[1])
-        return along, across
-
-    def levelled(self, worn: Worn) -> tuple[Surface, Surface]:
-        """Both tracks' roughness where the contact reaches them, without the form that wear has given them."""
-        now = self.worn_surfaces(worn)
-        first, second = (
-            part_of(
-                Surface(surface.heights + self._form(worn, body), surface.grid),
-                self.track(worn, body),
-            )
-            for body, surface in enumerate((now.first, now.second))
-        )
-        return first, second
-
-    def _form(self, worn: Worn, body: int) -> Field:
-        """Of a groove its mean profile, along what is alike; of a standing body's bounded scar its long waves.
-
-        Where no body was rough all of such a scar is form.
-        """
-        lowered, endless = worn.lowered(body), self.case.conditions.endless
-        moves = self.bodies[body].speed != 0.0
-        if endless and moves:
-            return np.zeros_like(lowered)
-        if endless or moves:
-            return np.broadcast_to(
-                lowered.mean(axis=0 if moves else 1, keepdims=True), lowered.shape
-            )
-        scar = worn.worn[body] + worn.flattened[body]
-        if not any(self.surfaces.rough):
-            return np.asarray(scar)
-        half_width, spacing = self.case.conditions.hertz.half_widths[0], self.surfaces.grid.spacing
-        return np.asarray(
-            scipy.ndimage.gaussian_filter(
-                scar, [GAUSS * half_width / step for step in spacing], mode="nearest"
-            )
-        )
-
-    def positions(self, worn: Worn) -> tuple[Position, ...]:
-        """Where the contact is solved in this jump."""
-        now = self.worn_surfaces(worn)
-        tracks = (now.first, now.second)
-        first, second = (
-            self.bodies[body].speed != 0.0 and not is_even(tracks[body].heights) for body in BODIES
-        )  # one that is the same all along need go nowhere
-        cells = (now.first.grid.cells[0], now.second.grid.cells[0])
-        count = self.patches if first or second else 1
-        return positions(cells, (first, second), count, worn.number, self.seed)
-
-    def height(self, worn: Worn) -> float:
-        """What steps and errors are counted against [m]: Sq; of smooth bodies their scars', or a share of the approach.
-
-        Of rough ones the scar's form is left out.
-        """
-        conditions, now = self.case.conditions, self.worn_surfaces(worn)
-        bodies = self.levelled(worn) if any(self.surfaces.rough) else (now.first, now.second)
-        approach = conditions.hertz.half_widths[0] ** 2 / (2.0 * conditions.radius_along_rolling)
-        return max(math.hypot(*(surface.sq for surface in bodies)), LEAST_HEIGHT * approach)
-
-    # What is taken off
-    # -----------------------------------------------------------------------------------------------
-
-    def rubbing(self, solved: Solved, body: int) -> Rubbing:
-        """What the law of removal is told of a body at a position."""
+    def rubbing(self, solved: SolvedPosition, body: int) -> RubbingConditions:
+        """Return the input of the law of removal for a body at a position."""
         needed = self.model.law.needs_temperature
         if needed and solved.temperatures is None:
             raise BadInput(
-                f"{self.case.source}: no temperature of the contact is known; take another law of removal"
+                f"{self.case.source}: the temperature of the contact is not known; "
+                "choose another law of removal"
             )
         temperature = None
         if needed and solved.temperatures is not None:
             temperature = self.case.thermal.ambient + solved.temperatures[body]
-        return Rubbing(
+        return RubbingConditions(
             pressure=solved.asperity_pressure,
             shear=self.case.boundary_friction * solved.asperity_pressure,
             sliding_speed=self.case.conditions.sliding_speed,
             temperature=temperature,
         )
 
-    def rate(self, worn: Worn, at: Sequence[tuple[Position, Solved]], body: int) -> Field:
-        """Depth that a body's track loses [m/s]."""
+    def rate(self, worn: WearState, solutions: Solutions, body: int) -> Field:
+        """Return the rate of depth loss of a body's track [m/s]."""
         surface = (self.surfaces.first, self.surfaces.second)[body]
-        laid = [
-            on_track(self.model.law(self.rubbing(solved, body)), surface.grid.cells, position, body)
-            for position, solved in at
+        on_track = [
+            map_to_track(
+                self.model.law(self.rubbing(solved, body)), surface.grid.cells, position, body
+            )
+            for position, solved in solutions
         ]
-        passages = self.exposures()[body].passages(surface.grid.extent[0])
-        rate = self.model.coefficients[body].k * passages * np.mean(laid, axis=0)
-        if self.bodies[body].speed != 0.0 and is_even(surface.heights - worn.lowered(body)):
-            rate = np.broadcast_to(
-                rate.mean(axis=0), rate.shape
-            ).copy()  # each point of it meets every position
+        depth_rate_factor = self.exposures()[body].depth_rate_factor(surface.grid.extent[0])
+        rate = self.model.coefficients[body].k * depth_rate_factor * np.mean(on_track, axis=0)
+        if self.bodies[body].speed != 0.0 and is_uniform_along(
+            surface.heights - worn.lowered(body)
+        ):
+            # each point of a uniform track passes every position
+            rate = np.broadcast_to(rate.mean(axis=0), rate.shape).copy()
         return np.asarray(rate)
 
-    def booked(self, at: Sequence[tuple[Position, Solved]], body: int) -> float:
-        """Volume that a body loses by law [m^3/s]: its k times the law's sum over the contact, on average."""
+    def booked_rate(self, solutions: Solutions, body: int) -> float:
+        """Return the volume a body loses by the law [m^3/s]: k times the law's mean sum."""
         (dx, dy), grid = self.surfaces.grid.spacing, self.surfaces.grid
-        sums = [float(self.model.law(self.rubbing(solved, body)).sum()) for _, solved in at]
+        sums = [float(self.model.law(self.rubbing(solved, body)).sum()) for _, solved in solutions]
         return (
             self.model.coefficients[body].k
             * float(np.mean(sums))
@@ -290,56 +133,57 @@ class Ageing:
             / grid.extent[1]
         )
 
-    def seconds(self, worn: Worn, at: Sequence[tuple[Position, Solved]]) -> float:
-        """How long the jump from the contacts at those positions may be."""
-        rates = self.rate(worn, at, 0), self.rate(worn, at, 1)
-        exposures, spacing = self.exposures(at), self.surfaces.grid.spacing
+    def seconds(self, worn: WearState, solutions: Solutions) -> float:
+        """Return the length of the jump from the contacts at those positions [s]."""
+        rates = self.rate(worn, solutions, 0), self.rate(worn, solutions, 1)
+        exposures, spacing = self.exposures(solutions), self.surfaces.grid.spacing
         height = self.model.step * self.height(worn)
         modulus = self.case.conditions.pair.reduced_modulus
         longest = longest_jump(exposures, rates, height, self.model.decay, spacing, modulus)
         longest = min(longest, worn.longest)
         if self.model.flattening or (worn.number == 0 and self.model.mechanisms):
             slowest = min((rate for rate in self.overrolling if rate > 0.0), default=1.0)
-            longest = min(
-                longest, max(worn.time, 1.0 / slowest)
-            )  # what settles at once is looked at often at first
+            # fast initial changes need short jumps
+            longest = min(longest, max(worn.time, 1.0 / slowest))
         return self._within_error(worn, rates, exposures, longest)
 
     def _within_error(
         self,
-        worn: Worn,
+        worn: WearState,
         rates: tuple[Field, Field],
         exposures: tuple[Exposure, Exposure],
         longest: float,
     ) -> float:
-        """The longest jump that differs little enough from the one before going on; nothing is solved for it."""
+        """Return the longest jump within MAX_JUMP_ERROR of the previous one; solves nothing."""
         if math.isinf(longest):
             return longest
         if worn.seconds == 0.0:
-            return FIRST * longest
+            return FIRST_JUMP * longest
         seconds = longest
-        while seconds > SHORTEST * longest:
+        while seconds > MIN_JUMP * longest:
             if (
                 self._error(worn, self._removed(rates, seconds, exposures), exposures, seconds)
-                <= WORST_ERROR
+                <= MAX_JUMP_ERROR
             ):
                 break
-            seconds *= SHORTER
+            seconds *= JUMP_REDUCTION
         return seconds
 
-    def jumped(self, worn: Worn, at: Sequence[tuple[Position, Solved]], seconds: float) -> Worn:
-        """Both bodies after a jump of so many seconds from the contacts at those positions."""
-        rates = self.rate(worn, at, 0), self.rate(worn, at, 1)
-        exposures = self.exposures(at)
+    def after_jump(self, worn: WearState, solutions: Solutions, seconds: float) -> WearState:
+        """Return both bodies after a jump of `seconds` from the contacts at those positions."""
+        rates = self.rate(worn, solutions, 0), self.rate(worn, solutions, 1)
+        exposures = self.exposures(solutions)
         removed = self._removed(rates, seconds, exposures)
-        booked = tuple(worn.booked[body] + self.booked(at, body) * seconds for body in BODIES)
+        booked = tuple(
+            worn.booked[body] + self.booked_rate(solutions, body) * seconds for body in BODIES
+        )
         lost = worn.worn[0] + removed[0], worn.worn[1] + removed[1]
         after = replace(
             worn,
             number=worn.number + 1,
             time=worn.time + seconds,
             worn=lost,
-            flattened=self._flattened(worn, at),
+            flattened=self._flattening(worn, solutions),
             booked=(booked[0], booked[1]),
             error=worn.error + self._error(worn, removed, exposures, seconds),
             rates=rates,
@@ -349,7 +193,9 @@ class Ageing:
         )
         for place, name in enumerate(self.model.mechanisms):
             for body in BODIES:
-                after = self._roughened(worn, after, at, removed[body], name, (body, place))
+                after = self._with_mechanism(
+                    worn, after, solutions, removed[body], name, (body, place)
+                )
         return after
 
     def _removed(
@@ -360,13 +206,13 @@ class Ageing:
             (self.surfaces.first, self.surfaces.second),
         )
         first, second = (
-            taken_off(rates[body], seconds, exposures[body], tracks[body].grid, modulus)
+            removed_depth(rates[body], seconds, exposures[body], tracks[body].grid, modulus)
             for body in BODIES
         )
         return first, second
 
-    def _flattened(self, worn: Worn, at: Sequence[tuple[Position, Solved]]) -> tuple[Field, Field]:
-        """What the cap has pressed flat: of each point the deepest overlap at any position, by halves on two rough."""
+    def _flattening(self, worn: WearState, solutions: Solutions) -> tuple[Field, Field]:
+        """Return the plastic flattening: per point the deepest overlap, shared by rough bodies."""
         if not self.model.flattening:
             return worn.flattened
         rough = self.surfaces.rough
@@ -378,8 +224,8 @@ class Ageing:
             * rough[body]
             * np.max(
                 [
-                    on_track(solved.overlap, tracks[body].grid.cells, position, body)
-                    for position, solved in at
+                    map_to_track(solved.overlap, tracks[body].grid.cells, position, body)
+                    for position, solved in solutions
                     if solved.overlap is not None
                 ],
                 axis=0,
@@ -390,12 +236,12 @@ class Ageing:
 
     def _error(
         self,
-        worn: Worn,
+        worn: WearState,
         removed: tuple[Field, Field],
         exposures: tuple[Exposure, Exposure],
         seconds: float,
     ) -> float:
-        """How far what this jump takes off and the one before differ in Sq from one of both together, relative."""
+        """Return the relative difference in Sq between two successive jumps and one over both."""
         if worn.seconds == 0.0:
             return 0.0
         once, twice = (
@@ -418,19 +264,16 @@ class Ageing:
         )
         return abs(at_once - now) / self.height(after)
 
-    # What roughens
-    # ---------------------------------------------------------------------------------------------------
-
-    def _roughened(
+    def _with_mechanism(
         self,
-        worn: Worn,
-        after: Worn,
-        at: Sequence[tuple[Position, Solved]],
+        worn: WearState,
+        after: WearState,
+        solutions: Solutions,
         removed: Field,
         name: str,
         which: tuple[int, int],
-    ) -> Worn:
-        """One mechanism, asked of one body."""
+    ) -> WearState:
+        """Return the state after one mechanism of one body."""
         body, _ = which
         now = self.worn_surfaces(after)
         surface, label = (now.first, now.second)[body], f"{name}.{body + 1}"
@@ -439,7 +282,7 @@ class Ageing:
             grid=surface.grid,
             heights=surface.heights,
             removed=removed,
-            patches=tuple(self._patch(position, solved, body) for position, solved in at),
+            patches=tuple(self._patch(position, solved, body) for position, solved in solutions),
             material=self.bodies[body],
             sliding_speed=self.case.conditions.sliding_speed,
             half_width=self.case.conditions.hertz.half_widths[0],
@@ -451,11 +294,16 @@ class Ageing:
             state=after.states.get(label, {}),
         )
         change = self.model.mechanisms[name](passage)
-        return self._booked_change(after, change, body, label, [place for place, _ in at])
+        return self._with_change(after, change, body, label, [place for place, _ in solutions])
 
-    def _booked_change(
-        self, after: Worn, change: Change, body: int, label: str, places: Sequence[Position]
-    ) -> Worn:
+    def _with_change(
+        self,
+        after: WearState,
+        change: Change,
+        body: int,
+        label: str,
+        places: Sequence[TrackPosition],
+    ) -> WearState:
         changed, mechanical = list(after.changed), list(after.mechanical)
         changed[body] = changed[body] + change.heights_change
         mechanical[body] -= self.volume(change.heights_change, body)
@@ -463,11 +311,11 @@ class Ageing:
             other = 1 - body
             thinner = self.perimeter(body) / self.perimeter(other)
             given = thinner * np.mean(
-                [across(change.transferred, place, body) for place in places], axis=0
+                [to_other_track(change.transferred, place, body) for place in places], axis=0
             )
             changed[other] = changed[other] + given
             mechanical[other] -= self.volume(given, other)
-        states: dict[str, State] = {**after.states, label: change.state}
+        states: dict[str, MechanismState] = {**after.states, label: change.state}
         facts: Mapping[str, float] = {
             f"{label}.{key}": float(value) for key, value in change.facts.items()
         }
@@ -481,19 +329,19 @@ class Ageing:
             facts={**after.facts, **facts},
         )
 
-    def _patch(self, position: Position, solved: Solved, body: int) -> Patch:
+    def _patch(self, position: TrackPosition, solved: SolvedPosition, body: int) -> Patch:
         cells = (self.surfaces.first, self.surfaces.second)[body].grid.cells
 
-        def laid(field: Field, beside: float = 0.0) -> Field:
-            return on_track(field, cells, position, body, beside)
+        def on_track(field: Field, outside: float = 0.0) -> Field:
+            return map_to_track(field, cells, position, body, outside)
 
         temperature = None
         if self.model.needs_temperature and solved.temperatures is not None:
-            temperature = laid(solved.temperatures[body])
+            temperature = on_track(solved.temperatures[body])
         return Patch(
-            pressure=laid(solved.pressure),
-            asperity_pressure=laid(solved.asperity_pressure),
-            shear=laid(solved.shear if body == 0 else -solved.shear),
-            film=laid(solved.film, math.inf),
+            pressure=on_track(solved.pressure),
+            asperity_pressure=on_track(solved.asperity_pressure),
+            shear=on_track(solved.shear if body == 0 else -solved.shear),
+            film=on_track(solved.film, math.inf),
             temperature=temperature,
         )

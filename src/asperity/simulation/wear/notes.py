@@ -1,96 +1,113 @@
-"""What a reader of a wear history has to know of it, beside its numbers: a sentence each."""
+"""Notes on a wear history: one sentence each on what limits its numbers."""
 
 import math
 
 import pandas
 
-from asperity.simulation.wear.jump import BODIES, Ageing
-from asperity.simulation.wear.state import Worn
+from asperity.simulation.wear.jump import WearingContact
+from asperity.simulation.wear.state import WearState
+from asperity.simulation.wear.tracks import BODIES
 from asperity.surface import correlation_lengths
-from asperity.wear import Position, seen
+from asperity.wear import TrackPosition, combined_roughness
 
 NAMES = ("first", "second")
-FAR = 0.05  # relative, by which the bodies' radii may miss the contact's unsaid
-WANTED = 8.0  # cells along a correlation length, as a grid that is chosen has
-ENOUGH = 0.8  # of them: a sample's correlation length scatters about that of its kind
-FEW = 5  # jumps, in which a point has met the contact at few places of it
+RADIUS_TOLERANCE = 0.05  # relative, between the bodies' radii and the contact's
+RECOMMENDED_CELLS = 8.0  # per correlation length, as in automatic grids
+ENOUGH_CELLS = 0.8  # of them: the correlation length of a sample scatters
+FEW_JUMPS = 5  # in which a point is sampled at few positions of the contact
 
 
-def told(ageing: Ageing, table: pandas.DataFrame, worn: Worn) -> list[str]:
-    """Those that apply to a history of that table that ended so."""
-    every = (of_cells(ageing), of_grooves(ageing), of_radii(ageing), of_standing(ageing))
-    return [one for one in (*every, of_few_jumps(ageing, len(table) - 1, worn)) if one is not None]
+def history_notes(contact: WearingContact, table: pandas.DataFrame, worn: WearState) -> list[str]:
+    """Return the notes that apply to a history with that table and final state."""
+    every = (
+        cells_note(contact),
+        grooves_note(contact),
+        radii_note(contact),
+        standing_note(contact),
+    )
+    notes = (*every, few_jumps_note(contact, len(table) - 1, worn))
+    return [note for note in notes if note is not None]
 
 
-def of_cells(ageing: Ageing) -> str | None:
-    """That the roughness has too few cells for its load share and its wear, and how many it wants; None of enough."""
-    grid = ageing.surfaces.grid
-    if not any(ageing.surfaces.rough):
+def cells_note(contact: WearingContact) -> str | None:
+    """Return a note if the roughness has too few cells per correlation length, with a remedy."""
+    grid = contact.surfaces.grid
+    if not any(contact.surfaces.rough):
         return None
-    lengths = correlation_lengths(seen(ageing.surfaces, Position(0, 0)))
+    lengths = correlation_lengths(combined_roughness(contact.surfaces, TrackPosition(0, 0)))
     along = [length / spacing for length, spacing in zip(lengths, grid.spacing, strict=True)]
-    if not min((one for one in along if not math.isnan(one)), default=math.inf) < ENOUGH * WANTED:
+    fewest = min((count for count in along if not math.isnan(count)), default=math.inf)
+    if not fewest < ENOUGH_CELLS * RECOMMENDED_CELLS:
         return None
-    wanted = [
-        cells if not one < WANTED else 8 * math.ceil(WANTED * cells / one / 8.0)
-        for cells, one in zip(grid.cells, along, strict=True)
+    recommended = [
+        cells
+        if not count < RECOMMENDED_CELLS
+        else 8 * math.ceil(RECOMMENDED_CELLS * cells / count / 8.0)
+        for cells, count in zip(grid.cells, along, strict=True)
     ]
-    told = " by ".join("many" if math.isnan(one) else f"{one:.2g}" for one in along)
+    stated = " by ".join("many" if math.isnan(count) else f"{count:.2g}" for count in along)
     return (
-        f"The roughness has {told} cells along its correlation lengths, where {WANTED:g} are wanted: on "
-        "so few CLR comes out too high, and what wears too fast (examples/wear.toml begins with a CLR of 0.71, 0.64 "
-        f'and 0.60 on 64, 128 and 256 cells); state grid.cells = {wanted}, or "auto".'
+        f"The roughness has {stated} cells along its correlation lengths; "
+        f"{RECOMMENDED_CELLS:g} are recommended. With fewer cells, CLR and wear rate come out too "
+        "high (examples/wear.toml starts with a CLR of 0.71, 0.64 and 0.60 on 64, 128 and 256 "
+        f'cells); state grid.cells = {recommended}, or "auto".'
     )
 
 
-def of_grooves(ageing: Ageing) -> str | None:
-    """How little of its partner a smooth moving body meets in an endless contact; None where that does no harm."""
-    rough, speeds = ageing.surfaces.rough, ageing.case.conditions.surface_speeds
-    if not ageing.case.conditions.endless or sum(rough) != 1 or 0.0 in speeds:
+def grooves_note(contact: WearingContact) -> str | None:
+    """Return a note on a smooth moving body that contacts a single track of its partner."""
+    rough, speeds = contact.surfaces.rough, contact.case.conditions.surface_speeds
+    if not contact.case.conditions.endless or sum(rough) != 1 or 0.0 in speeds:
         return None
     smooth = rough.index(False)
-    if ageing.model.coefficients[smooth].k == 0.0:
+    if contact.model.coefficients[smooth].k == 0.0:
         return None
-    tracks = ageing.perimeter(1 - smooth) / ageing.surfaces.first.grid.extent[0]
+    tracks = contact.perimeter(1 - smooth) / contact.surfaces.first.grid.extent[0]
     return (
-        f"The {('first', 'second')[smooth]} body is smooth and meets one track of {tracks:.0f} all round its partner, "
-        "again and again: its grooves, largest depth and Sq are that track's doing; its mean depth is not."
+        f"The {NAMES[smooth]} body is smooth and always contacts the same simulated track, one of "
+        f"{tracks:.0f} around its partner: its grooves, largest depth and Sq are specific to that "
+        "track; its mean depth is not."
     )
 
 
-def of_radii(ageing: Ageing) -> str | None:
-    """How far speeds and stated over-rolling rates are from the contact's radius; None where they fit."""
-    stated, conditions = ageing.model.overrolling, ageing.case.conditions
+def radii_note(contact: WearingContact) -> str | None:
+    """Return a note if speeds and over-rolling rates contradict the contact's radius."""
+    stated, conditions = contact.model.overrolling, contact.case.conditions
     if stated is None or 0.0 in conditions.surface_speeds:
         return None
     curvatures = [
         2.0 * math.pi * rate / abs(speed)
         for rate, speed in zip(stated, conditions.surface_speeds, strict=True)
     ]
-    contact = 1.0 / conditions.radius_along_rolling
-    if abs(sum(curvatures) - contact) <= FAR * contact:
+    curvature = 1.0 / conditions.radius_along_rolling
+    if abs(sum(curvatures) - curvature) <= RADIUS_TOLERANCE * curvature:
         return None
-    first, second = (f"{1e3 / curvature:.4g}" for curvature in curvatures)
+    first, second = (f"{1e3 / value:.4g}" for value in curvatures)
     return (
-        f"wear.overrolling makes bodies of {first} and {second} mm radius, which outside one another do not give the "
-        f"contact's {1e3 * conditions.radius_along_rolling:.4g} mm; check that the pair is in the bodies' order."
+        f"wear.overrolling implies bodies of {first} and {second} mm radius, which do not give the "
+        f"contact's {1e3 * conditions.radius_along_rolling:.4g} mm in external contact; check "
+        "the order of the pair."
     )
 
 
-def of_standing(ageing: Ageing) -> str | None:
-    """That a body at rest gets no pits and no marks; None where that leaves nothing out."""
-    still = [NAMES[body] for body in BODIES if ageing.bodies[body].speed == 0.0]
-    passing = [name for name in ("fatigue", "ploughing") if name in ageing.model.mechanisms]
+def standing_note(contact: WearingContact) -> str | None:
+    """Return a note if a body at rest can have no pits or marks although these are requested."""
+    still = [NAMES[body] for body in BODIES if contact.bodies[body].speed == 0.0]
+    passing = [name for name in ("fatigue", "ploughing") if name in contact.model.mechanisms]
     if not still or not passing:
         return None
-    return f"Nothing over-rolls the {still[0]} body, which stands still: {' and '.join(passing)} spare it."
+    return (
+        f"The {still[0]} body stands still and is not over-rolled: "
+        f"no {' or '.join(passing)} acts on it."
+    )
 
 
-def of_few_jumps(ageing: Ageing, jumps: int, worn: Worn) -> str | None:
-    """That few jumps sample a passage at few places; None of many, and where nothing is rough or moves."""
-    if jumps >= FEW or len(ageing.positions(worn)) == 1:
+def few_jumps_note(contact: WearingContact, jumps: int, worn: WearState) -> str | None:
+    """Return a note if few jumps sample a passage at few positions."""
+    if jumps >= FEW_JUMPS or len(contact.positions(worn)) == 1:
         return None
     return (
-        f"In {jumps} jumps of {ageing.patches} positions each point has met the contact at few places of it: depths at "
-        "a point scatter by some 10 %, volumes do not. More wear.patches, or a smaller wear.step, sample it more often."
+        f"In {jumps} jumps of {contact.patches} positions, each point was sampled at few positions "
+        "of the contact: local depths scatter by about 10 %; volumes do not. Raise wear.patches "
+        "or lower wear.step."
     )

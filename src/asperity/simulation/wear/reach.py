@@ -1,4 +1,4 @@
-"""The part of a track that the contact reaches: the Hertz zone, and the scar where it has grown beyond."""
+"""Part of a track that lies in the contact: the Hertz zone, or the scar where it is larger."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.core.arrays import Field
 from asperity.surface import Surface
 
-TRACE = 0.01  # of the deepest profile: what has lost less lies beside the track
+WORN_SHARE = 0.01  # of the largest depth: places worn less lie outside the track
 
 
-def reached(depth: Field, places: Field, half_width: float) -> slice:
-    """Cells of the Hertz zone, and of what is worn by more than a trace; as many as a surface has at least."""
-    inside = np.flatnonzero((np.abs(places) <= half_width) | (depth > TRACE * depth.max()))
+def reached_cells(depth: Field, places: Field, half_width: float) -> slice:
+    """Return the cells of the Hertz zone and the scar; at least the fewest of a surface."""
+    inside = np.flatnonzero((np.abs(places) <= half_width) | (depth > WORN_SHARE * depth.max()))
     first, last = (
         (int(inside[0]), int(inside[-1])) if inside.size else (places.size // 2, places.size // 2)
     )
@@ -20,8 +20,8 @@ def reached(depth: Field, places: Field, half_width: float) -> slice:
     return slice(first, max(last + (short + 1) // 2 + 1, first + MIN_CELLS))
 
 
-def part_of(surface: Surface, cells: tuple[slice, slice]) -> Surface:
-    """The part of a surface on those cells."""
+def cropped(surface: Surface, cells: tuple[slice, slice]) -> Surface:
+    """Return the part of a surface on those cells."""
     heights, grid = surface.heights[cells], surface.grid
     if heights.shape == grid.cells:
         return surface
@@ -37,10 +37,10 @@ def part_of(surface: Surface, cells: tuple[slice, slice]) -> Surface:
     repeats = [
         repeat and part == slice(None) for repeat, part in zip(grid.periodic, cells, strict=True)
     ]
-    kept = Grid(
+    part = Grid(
         (heights.shape[0], heights.shape[1]),
         (lower[0], lower[1]),
         (upper[0], upper[1]),
         (repeats[0], repeats[1]),
     )
-    return Surface(heights, kept)
+    return Surface(heights, part)

@@ -1,4 +1,4 @@
-"""A moment of a wearing contact as a row: roughness of both bodies, what they have lost, and the contact over it."""
+"""Row of a wear table: roughness of both bodies, their wear, and the contact."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,19 +12,19 @@ from asperity.core.errors import BadInput
 from asperity.coupling import excitation, oscillator, resonance_at
 from asperity.ehl import ContactState, Sides, Uncertainty
 from asperity.results import prediction_interval
-from asperity.simulation.wear.contact import Solved
+from asperity.simulation.wear.contact import SolvedPosition
 from asperity.surface import Surface, height_parameters
 
 Row = dict[str, float | int]
 
-LEVEL = 0.95  # of Student's distribution: 90 % lie between both of its ends
-RESONANCE = {  # end of an interval of CRF: that of CLR
+LEVEL = 0.95  # quantile of Student's distribution for a two-sided 90 % interval
+RESONANCE = {  # end of an interval of CRF: the corresponding end of CLR
     "crf_low_hz": "clr_low",
     "crf_high_hz": "clr_high",
     "crf_mean_low_hz": "clr_mean_low",
     "crf_mean_high_hz": "clr_mean_high",
 }
-LEAST_SQ = 1e-15  # [m] below which heights are rounding, and have no shape
+MIN_SQ = 1e-15  # [m] below which heights are rounding errors
 
 ROUGHNESS = {  # column: field of HeightParameters
     "sq_m": "sq",
@@ -49,17 +49,17 @@ STATE = {  # field of ContactState: its column
 }
 
 
-def of_body(key: str, body: int) -> str:
-    """The column of one body's number: `sq_1_m` of `sq_m`."""
+def body_column(key: str, body: int) -> str:
+    """Return the column of one body's quantity: `sq_1_m` of `sq_m`."""
     stem, mark, unit = key.rpartition("_")
     return f"{stem}_{body + 1}_{unit}" if mark and unit in ("m", "m3") else f"{key}_{body + 1}"
 
 
 def roughness(surfaces: tuple[Surface, Surface]) -> Row:
-    """Sq, Sa, Ssk, Sku, Sk, Spk and Svk of each body, and of both as they lie on one another at first.
+    """Return Sq, Sa, Ssk, Sku, Sk, Spk and Svk of each body and of their initial superposition.
 
-    Where one has less of a track, as it stands still, it is repeated along the other's. What is
-    smooth to rounding has no skewness.
+    A shorter track (of a body at rest) is repeated along the other's. A surface smooth to rounding
+    has no skewness or kurtosis.
     """
     first, second = surfaces
     longer = max(surfaces, key=lambda surface: surface.grid.cells[0]).grid
@@ -70,19 +70,19 @@ def roughness(surfaces: tuple[Surface, Surface]) -> Row:
     row: Row = {}
     for surface, name in ((first, 0), (second, 1), (both, None)):
         parameters = height_parameters(surface)
-        rough = parameters.sq > LEAST_SQ
+        rough = parameters.sq > MIN_SQ
         for key, field in ROUGHNESS.items():
             known = rough or key not in ("ssk", "sku")
-            row[key if name is None else of_body(key, name)] = (
+            row[key if name is None else body_column(key, name)] = (
                 float(getattr(parameters, field)) if known else math.nan
             )
     return row
 
 
-def load_share(solved: Sequence[Solved]) -> Uncertainty:
-    """CLR over the positions: the cells' part, and how far a further position's may lie from the mean."""
-    shares = [one.state.clr for one in solved]
-    own = [one.state.error.clr for one in solved if one.state.error is not None]
+def load_share(solved: Sequence[SolvedPosition]) -> Uncertainty:
+    """Return CLR over the positions, with the grid's uncertainty and the scatter of positions."""
+    shares = [position.state.clr for position in solved]
+    own = [position.state.error.clr for position in solved if position.state.error is not None]
 
     def mean(sides: list[Sides | None]) -> Sides | None:
         known = [both for both in sides if both is not None]
@@ -96,27 +96,28 @@ def load_share(solved: Sequence[Solved]) -> Uncertainty:
     )
     return Uncertainty(
         value=float(np.mean(shares)) if len(shares) > 1 else value,
-        iteration=mean([one.iteration for one in own]),
-        grid=mean([one.grid for one in own]),
+        iteration=mean([error.iteration for error in own]),
+        grid=mean([error.grid for error in own]),
         surfaces=scatter,
         range=(0.0, 1.0),
     )
 
 
-def contact_row(case: Case, solved: Sequence[Solved], sq: float) -> Row:
-    """What the mean contact is like, with 90 % intervals of its load share and resonance: whole, and of the mean alone.
+def contact_row(case: Case, solved: Sequence[SolvedPosition], sq: float) -> Row:
+    """Return the mean contact with 90 % intervals of load share and resonance: total and mean.
 
-    `sq` [m] is that of the tracks, the form that wear gave them left out.
+    `sq` [m] is that of the tracks without the form that wear created.
     """
     share = load_share(solved)
     low, high = share.interval or (math.nan, math.nan)
-    flashes = [one.flash_temperature for one in solved]
+    flashes = [position.flash_temperature for position in solved]
     row: Row = {"sq_m": sq}
     for name, key in STATE.items():
-        values = [value for one in solved if (value := getattr(one.state, name)) is not None]
+        known = (getattr(position.state, name) for position in solved)
+        values = [value for value in known if value is not None]
         if name != "sq":
             row[key] = float(np.mean(values)) if values else math.nan
-    shares = [one.state.clr for one in solved]
+    shares = [position.state.clr for position in solved]
     off = float(np.std(shares, ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
     reach = off * float(scipy.special.stdtrit(max(len(shares) - 1, 1), LEVEL))
     of_mean = max(0.0, row["clr"] - reach), min(1.0, row["clr"] + reach)
@@ -125,14 +126,19 @@ def contact_row(case: Case, solved: Sequence[Solved], sq: float) -> Row:
         "clr_high": high,
         "clr_mean_low": of_mean[0] if len(shares) > 1 else math.nan,
         "clr_mean_high": of_mean[1] if len(shares) > 1 else math.nan,
-        "friction_coefficient": float(np.mean([one.friction_coefficient for one in solved])),
+        "friction_coefficient": float(
+            np.mean([position.friction_coefficient for position in solved])
+        ),
         "flash_temperature_max_k": max(flashes) if all(map(math.isfinite, flashes)) else math.nan,
     }
     return row | _resonance(case, row, off)
 
 
 def _resonance(case: Case, row: Row, off: float) -> Row:
-    """Of the mean contact's oscillator, and the height of its line, in closed form; `off` of the mean CLR."""
+    """Return the mean contact's resonance and the height of its line, in closed form.
+
+    `off` is the standard deviation of the mean CLR.
+    """
     nothing = dict.fromkeys(("crf_hz", "crf_std_hz", *RESONANCE, "crfa"), math.nan)
     model, conditions, state = case.vibration, case.conditions, state_of_row(row)
     if model is None or model.needs_solution:
@@ -140,13 +146,11 @@ def _resonance(case: Case, row: Row, off: float) -> Row:
     try:
         spring = oscillator(state, conditions, model)
         below = excitation(state, conditions, model)
-    except (
-        BadInput
-    ):  # nothing touches, or nothing is rough: there is no spring, or nothing that excites it
+    except BadInput:  # no asperity contact, or no roughness: no spring, or no excitation
         return nothing
     own = np.array(spring.natural_frequency_hz)
 
-    def at(clr: float) -> float:
+    def frequency(clr: float) -> float:
         known = (
             None
             if math.isnan(clr)
@@ -156,14 +160,14 @@ def _resonance(case: Case, row: Row, off: float) -> Row:
 
     return {
         "crf_hz": float(own),
-        "crf_std_hz": 0.5 * (at(state.clr + off) - at(state.clr - off)),
-        **{key: at(row[share]) for key, share in RESONANCE.items()},
+        "crf_std_hz": 0.5 * (frequency(state.clr + off) - frequency(state.clr - off)),
+        **{key: frequency(row[share]) for key, share in RESONANCE.items()},
         "crfa": float(spring.gain(own) * below.density(own, model.rate_hz)),
     }
 
 
 def state_of_row(row: Mapping[str, Any]) -> ContactState:
-    """The mean contact of a row, for what vibrates on it; how it was solved is not in it."""
+    """Return the mean contact state of a row, without convergence data."""
     known: dict[str, Any] = {name: float(row[key]) for name, key in STATE.items()}
     slope = known.pop("contact_slope")
     return ContactState(

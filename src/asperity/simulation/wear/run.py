@@ -1,4 +1,4 @@
-"""A case let wear for hours: contacts solved, jumps taken, each kept; nothing is solved here."""
+"""Wear simulation over hours: positions are solved, jumps taken, and each jump recorded."""
 
 import math
 import time
@@ -9,24 +9,30 @@ from typing import NamedTuple
 from asperity.case import Case
 from asperity.core.errors import AsperityError, BadInput, NotConverged, require_positive
 from asperity.core.limits import require_affordable
-from asperity.simulation.wear.contact import Crew, Failed, Solved, crew
+from asperity.simulation.wear.contact import (
+    BatchSolver,
+    FailedPosition,
+    SolvedPosition,
+    position_solvers,
+)
 from asperity.simulation.wear.frames import WearFrame
 from asperity.simulation.wear.history import HOUR, WearHistory
-from asperity.simulation.wear.jump import BODIES, Ageing
-from asperity.simulation.wear.rows import Row, contact_row, of_body, roughness
-from asperity.simulation.wear.state import Worn
-from asperity.simulation.wear.store import Keeper, open_keeper
+from asperity.simulation.wear.jump import WearingContact
+from asperity.simulation.wear.rows import Row, body_column, contact_row, roughness
+from asperity.simulation.wear.state import WearState
+from asperity.simulation.wear.store import WearRecorder, open_recorder
+from asperity.simulation.wear.tracks import BODIES
 from asperity.surface import MovingSurfaces
-from asperity.wear import Position, longest_jump, seen
+from asperity.wear import TrackPosition, combined_roughness, longest_jump
 
-CELL_S = 2e-5  # that a position takes, a cell
-SAME = 1e-12  # of a time, by which two are one
+CELL_S = 2e-5  # computing time of a position, per cell [s]
+TIME_TOLERANCE = 1e-12  # relative, of equal times
 
-At = list[tuple[Position, Solved]]
+SolvedPositions = list[tuple[TrackPosition, SolvedPosition]]
 
 
 class WearProgress(NamedTuple):
-    """How far a wear history is: hours, of how many, and the row of the jump that was just looked at."""
+    """Progress of a wear history: hours done, hours requested, and the row of the current jump."""
 
     hours: float
     of_hours: float
@@ -42,116 +48,125 @@ def run_wear(
     workers: int = 1,
     progress: Callable[[WearProgress], None] | None = None,
 ) -> WearHistory:
-    """Let a case wear.
+    """Simulate the wear of a case.
 
     Parameters
     ----------
-    case : with a [wear]; its [motion] says which body is rough, and how long the tracks are
+    case : with a [wear]; its [motion] states which body is rough, and the length of the tracks
     hours : of running
     surfaces : both bodies' tracks, in place of the case's own
-    out : folder to keep the history in, and to go on from where it holds the same case's; None keeps it in memory
-    workers : processes that solve positions of the tracks at once; they change no number
+    out : folder for the history; resumes it if it holds the same case's; None keeps it in memory
+    workers : processes that solve positions in parallel; results do not depend on them
     progress : called before every jump, and at the end
 
     Raises
     ------
     BadInput
-        for a case without [wear], hours that are not positive, fewer than the folder holds, a folder that holds
-        something else, or wear that is too fast for its jumps to come to an end.
+        for a case without [wear], hours that are not positive or fewer than the folder holds, a
+        folder with other contents, or wear that needs too many jumps.
     NotConverged
-        where more than half of a jump's positions could not be solved.
+        if more than half of a jump's positions could not be solved.
     AsperityError
-        where the worn contact has grown to the edge of its grid, or worker processes cannot start.
+        if the worn contact has grown to the edge of its grid, or worker processes cannot start.
     """
     if case.wear is None:
         raise BadInput(
             f"{case.source}: wear is left out; add [wear] with k, the wear coefficient of each body"
         )
     end = require_positive("hours of wear", hours, "h") * HOUR
-    ageing = Ageing(case, case.wear, surfaces or case.moving_surfaces())
-    _require_affordable(ageing, end)
+    contact = WearingContact(case, case.wear, surfaces or case.moving_surfaces())
+    _require_affordable(contact, end)
     began = time.perf_counter()
-    with open_keeper(ageing, out) as keeper, crew(ageing.solver, workers) as solve:
-        computed = _go_on(ageing, keeper, solve, end, progress)
-        return keeper.history(time.perf_counter() - began, computed)
+    with (
+        open_recorder(contact, out) as recorder,
+        position_solvers(contact.solver, workers) as solve,
+    ):
+        computed = _advance(contact, recorder, solve, end, progress)
+        return recorder.history(time.perf_counter() - began, computed)
 
 
-def _go_on(
-    ageing: Ageing,
-    keeper: Keeper,
-    solve: Crew,
+def _advance(
+    contact: WearingContact,
+    recorder: WearRecorder,
+    solve: BatchSolver,
     end: float,
     progress: Callable[[WearProgress], None] | None,
 ) -> int:
-    """Jump to the end, from where the history is; the number of jumps taken."""
-    if keeper.end is not None and abs(keeper.end.worn.time - end) <= SAME * end:
+    """Advance the history to `end`; return the number of jumps computed."""
+    if recorder.end is not None and abs(recorder.end.worn.time - end) <= TIME_TOLERANCE * end:
         return 0
-    held = max(keeper.worn.time, 0.0 if keeper.end is None else keeper.end.worn.time)
-    if held >= end * (1.0 - SAME):
+    folder = None if recorder.files is None else recorder.files.path
+    held = max(recorder.worn.time, 0.0 if recorder.end is None else recorder.end.worn.time)
+    if held >= end * (1.0 - TIME_TOLERANCE):
         raise BadInput(
-            f"{keeper.folder} holds {held / HOUR:.6g} h of wear, got {end / HOUR:.6g} h; ask for as many "
-            "or more, or name a new folder"
+            f"{folder} holds {held / HOUR:.6g} h of wear, got {end / HOUR:.6g} h; state at least "
+            "as many hours, or name a new folder"
         )
-    worn, at_end, computed = keeper.worn, False, 0
+    worn, at_end, computed = recorder.worn, False, 0
     while True:
-        at, row = look(ageing, worn, solve)
-        frame = WearFrame.of(worn.number, worn.time / HOUR, at)
+        solutions, row = solve_positions(contact, worn, solve)
+        frame = WearFrame.from_solutions(worn.number, worn.time / HOUR, solutions)
         if not at_end:
-            keeper.take(row, frame)
+            recorder.record(row, frame)
         if progress is not None:
             progress(WearProgress(worn.time / HOUR, end / HOUR, row))
         if at_end:
-            keeper.finish(worn, row, frame)
+            recorder.finish(worn, row, frame)
             return computed
-        seconds = ageing.seconds(worn, at)
-        at_end = worn.time + seconds >= end * (1.0 - SAME)
+        seconds = contact.seconds(worn, solutions)
+        at_end = worn.time + seconds >= end * (1.0 - TIME_TOLERANCE)
         if at_end:
             seconds = end - worn.time
-        worn = ageing.jumped(worn, at, seconds)
+        worn = contact.after_jump(worn, solutions, seconds)
         computed += 1
         if not at_end:
-            keeper.keep(worn)
+            recorder.save(worn)
 
 
-def look(ageing: Ageing, worn: Worn, solve: Crew) -> tuple[At, Row]:
-    """The contact as it is now, at every position of the jump, and its row."""
-    surfaces, places = ageing.worn_surfaces(worn), ageing.positions(worn)
-    outcomes = solve([seen(surfaces, place) for place in places])
-    at = [
-        (place, one) for place, one in zip(places, outcomes, strict=True) if isinstance(one, Solved)
+def solve_positions(
+    contact: WearingContact, worn: WearState, solve: BatchSolver
+) -> tuple[SolvedPositions, Row]:
+    """Solve the contact at every position of the jump; return the solutions and their row."""
+    surfaces, places = contact.worn_surfaces(worn), contact.positions(worn)
+    outcomes = solve([combined_roughness(surfaces, place) for place in places])
+    solutions = [
+        (place, outcome)
+        for place, outcome in zip(places, outcomes, strict=True)
+        if isinstance(outcome, SolvedPosition)
     ]
-    failures = [one.reason for one in outcomes if isinstance(one, Failed)]
-    if len(at) < max(1, (len(places) + 1) // 2):
+    failures = [outcome.reason for outcome in outcomes if isinstance(outcome, FailedPosition)]
+    if len(solutions) < max(1, (len(places) + 1) // 2):
         when = f"after {worn.time / HOUR:.4g} h"
         remedy = "raise solver.tolerance or solver.max_iterations"
-        if len(places) == 1:  # there is no other to take the mean of
-            remedy += ", or let the rough body be the one that moves (motion.rough, or a slip of the other sign)"
+        if len(places) == 1:  # a mean over other positions is not possible
+            remedy += ", or make the moving body the rough one (motion.rough, or the sign of slip)"
         raise NotConverged(
             None,
-            f"{len(failures)} of {len(places)} contacts could not be solved {when}: {failures[0]}; {remedy}",
+            f"{len(failures)} of {len(places)} contacts could not be solved {when}: "
+            f"{failures[0]}; {remedy}",
         )
-    if any(one.at_edge for _, one in at):
+    if any(solved.at_edge for _, solved in solutions):
         raise AsperityError(
-            f"the contact has grown as wide as its grid after {worn.time / HOUR:.4g} h; state a wider grid.y, in "
-            "half-widths"
+            f"the contact has grown as wide as its grid after {worn.time / HOUR:.4g} h; state a "
+            "wider grid.y, in half-widths"
         )
-    return at, _row(ageing, worn, at, len(failures))
+    return solutions, _row(contact, worn, solutions, len(failures))
 
 
-def _row(ageing: Ageing, worn: Worn, at: At, failed: int) -> Row:
-    rough = roughness(ageing.levelled(worn))
+def _row(contact: WearingContact, worn: WearState, solutions: SolvedPositions, failed: int) -> Row:
+    rough = roughness(contact.levelled(worn))
     row: Row = {"jump": worn.number, "hours": worn.time / HOUR}
     for body in BODIES:
-        depth, track = worn.worn[body] - worn.changed[body], ageing.track(worn, body)
+        depth, track = worn.worn[body] - worn.changed[body], contact.track(worn, body)
         row |= {
-            of_body("overrollings", body): worn.time * ageing.overrolling[body],
-            of_body("worn_depth_m", body): float(depth[track].mean()),
-            of_body("worn_depth_max_m", body): float(depth.max()),
-            of_body("worn_volume_m3", body): ageing.volume(depth, body),
-            of_body("flattened_m", body): float(worn.flattened[body][track].mean()),
+            body_column("overrollings", body): worn.time * contact.overrolling[body],
+            body_column("worn_depth_m", body): float(depth[track].mean()),
+            body_column("worn_depth_max_m", body): float(depth.max()),
+            body_column("worn_volume_m3", body): contact.volume(depth, body),
+            body_column("flattened_m", body): float(worn.flattened[body][track].mean()),
         }
     row |= rough
-    row |= contact_row(ageing.case, [one for _, one in at], float(rough["sq_m"]))
+    row |= contact_row(contact.case, [solved for _, solved in solutions], float(rough["sq_m"]))
     return row | {
         "jump_seconds": worn.seconds,
         "jump_error": worn.error,
@@ -160,16 +175,16 @@ def _row(ageing: Ageing, worn: Worn, at: At, failed: int) -> Row:
     }
 
 
-def _require_affordable(ageing: Ageing, end: float) -> None:
-    """Refuse wear so fast that its shortest waves ask for more jumps than anybody can wait for."""
-    nothing, grid = (ageing.surfaces.first.heights * 0.0,) * 2, ageing.case.grid
-    modulus = ageing.case.conditions.pair.reduced_modulus
+def _require_affordable(contact: WearingContact, end: float) -> None:
+    """Refuse wear that needs too many jumps, limited by the decay of its shortest waves."""
+    nothing, grid = (contact.surfaces.first.heights * 0.0,) * 2, contact.case.grid
+    modulus = contact.case.conditions.pair.reduced_modulus
     longest = longest_jump(
-        ageing.exposures(), nothing, 1.0, ageing.model.decay, grid.spacing, modulus
+        contact.exposures(), nothing, 1.0, contact.model.decay, grid.spacing, modulus
     )
     jumps = 1.0 if math.isinf(longest) else max(1.0, end / longest)
     require_affordable(
         f"wear of {end / HOUR:.6g} h in {jumps:.4g} jumps",
         memory=3000.0 * jumps,
-        seconds=CELL_S * grid.cells[0] * grid.cells[1] * ageing.patches * jumps,
+        seconds=CELL_S * grid.cells[0] * grid.cells[1] * contact.patches * jumps,
     )

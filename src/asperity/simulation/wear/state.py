@@ -1,4 +1,4 @@
-"""What a wearing contact has come to between two jumps: all that the next one needs, and its way to and from arrays."""
+"""State of a wearing contact between two jumps, and its conversion to and from arrays."""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from asperity.core.arrays import Field
 from asperity.surface import MovingSurfaces
-from asperity.wear import State
+from asperity.wear import MechanismState
 
 Arrays = dict[str, npt.NDArray[Any]]
 Both = tuple[Field, Field]
@@ -18,16 +18,16 @@ FIELDS = ("worn", "flattened", "changed", "rates")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Worn:
+class WearState:
     """Both bodies' tracks at the beginning of a jump; maps in each body's own frame [m].
 
-    `number` of the jump and its `time` [s]; `worn` what the law of removal took off, `flattened`
-    what was pressed flat, `changed` what mechanisms added (or, negative, took). `booked` is what
-    `worn` must be of volume [m^3], k times asperity load times sliding distance; `mechanical` what
-    mechanisms took. `rates` [m/s] and `seconds` of the jump before, for the comparison of two
-    jumps with one; `error` of Sq, relative, that it has summed up to; `longest` [s] that
-    mechanisms let the next jump take. `facts` of the jump and `states` of mechanisms, by name and
-    body.
+    `number` of the jump and its `time` [s]; `worn` the depth removed by the law, `flattened` the
+    plastic flattening, `changed` the change by mechanisms (negative: removed). `booked` is the
+    volume that `worn` must amount to [m^3], k times asperity load times sliding distance;
+    `mechanical` the volume that mechanisms removed. `rates` [m/s] and `seconds` of the previous
+    jump, to compare two jumps with one; `error` the accumulated relative error of Sq; `longest` [s]
+    the limit that mechanisms set for the next jump. `facts` of the jump and `states` of the
+    mechanisms, by name and body.
     """
 
     number: int = 0
@@ -42,20 +42,20 @@ class Worn:
     error: float = 0.0
     longest: float = math.inf
     facts: Mapping[str, float] = field(default_factory=dict)
-    states: Mapping[str, State] = field(default_factory=dict)
+    states: Mapping[str, MechanismState] = field(default_factory=dict)
 
     @classmethod
-    def begin(cls, surfaces: MovingSurfaces) -> "Worn":
-        """Nothing lost."""
+    def unworn(cls, surfaces: MovingSurfaces) -> "WearState":
+        """Return the state before any wear."""
         nothing = (np.zeros(surfaces.first.grid.cells), np.zeros(surfaces.second.grid.cells))
         return cls(worn=nothing, flattened=nothing, changed=nothing, rates=nothing)
 
     def lowered(self, body: int) -> Field:
-        """How much lower a body's track is than at first [m]."""
+        """Return the depth by which a body's track is lower than at first [m]."""
         return np.asarray(self.worn[body] + self.flattened[body] - self.changed[body])
 
     def arrays(self) -> Arrays:
-        """As arrays by name."""
+        """Return the arrays to store, by name."""
         arrays: Arrays = {
             f"{name}_{body}": getattr(self, name)[body] for name in FIELDS for body in (0, 1)
         }
@@ -76,8 +76,8 @@ class Worn:
         return arrays
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "Worn":
-        """What `arrays` made."""
+    def from_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "WearState":
+        """Rebuild a state from `arrays`."""
         number, time, seconds, error, longest, *volumes = map(float, arrays["numbers"])
         states: dict[str, dict[str, npt.NDArray[Any]]] = {}
         for name, value in arrays.items():
@@ -90,8 +90,8 @@ class Worn:
             if name.startswith("fact:")
         }
         maps: dict[str, Any] = {name: (arrays[f"{name}_0"], arrays[f"{name}_1"]) for name in FIELDS}
-        begun = cls(
+        base = cls(
             **maps, number=int(number), time=time, seconds=seconds, error=error, longest=longest
         )
         booked, mechanical = (volumes[0], volumes[1]), (volumes[2], volumes[3])
-        return replace(begun, booked=booked, mechanical=mechanical, facts=facts, states=states)
+        return replace(base, booked=booked, mechanical=mechanical, facts=facts, states=states)
