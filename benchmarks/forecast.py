@@ -24,11 +24,11 @@ from asperity.inference import (
     Emulator,
     Forward,
     Observation,
-    Point,
+    OperatingPoint,
     Setting,
     build_emulator,
     forecast_observations,
-    setting_of,
+    inference_setting,
 )
 from asperity.inference.drifting_contact import KNOTS, along_range, between_knots
 from asperity.inference.outputs import CLR, OUTPUTS
@@ -96,7 +96,7 @@ def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
 
 def judge_all(histories: int, steady: int, kept: Path, *, end: float = float("inf")) -> None:
     """A row for each series, as it is done."""
-    setting = setting_of(load_case(CASE))
+    setting = inference_setting(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     rows = Rows(ROWS, ("kind", "number"))
     counts = {"wearing": histories, "otherwise": histories, "steady": steady, "slow": steady}
@@ -111,7 +111,7 @@ def judge_all(histories: int, steady: int, kept: Path, *, end: float = float("in
 def judged(setting: Setting, emulator: Emulator, kind: str, number: int) -> dict[str, Any]:
     """One series: what is foretold of it, and what comes."""
     rng = np.random.default_rng([SEED, number, list(CLASSES).index(kind)])
-    forward = Forward(setting, emulator, (Point(*PLACE),))
+    forward = Forward(setting, emulator, (OperatingPoint(*PLACE),))
     crossing = np.nan
     while True:
         z = rng.standard_normal((1, len(setting.unknowns)))

@@ -15,15 +15,15 @@ from asperity.core.errors import BadInput
 from asperity.inference import (
     Forward,
     Observation,
-    Point,
+    OperatingPoint,
     build_emulator,
     design_contact,
     extend_emulator,
     forecast_observations,
     infer_observations,
-    listen,
-    setting_of,
-    with_further,
+    inference_setting,
+    observe_recordings,
+    refine_emulator,
 )
 from asperity.inference.outputs import OUTPUTS
 from asperity.inference.posterior import emulated_share, posterior_shares
@@ -60,7 +60,7 @@ def test_an_emulator_comes_back_as_it_was_and_is_no_other_cases(small):
     for key in ("clr", "contact_stiffness_n_m"):
         assert np.array_equal(again(at, [key])[key], emulator(at, [key])[key])
     assert again.quality == emulator.quality
-    other = setting_of(load_case(EXAMPLE).with_overrides({**SMALL, "contact.slip": 0.1}))
+    other = inference_setting(load_case(EXAMPLE).with_overrides({**SMALL, "contact.slip": 0.1}))
     with pytest.raises(BadInput, match="holds the emulator of another case"):
         build_emulator(other, folder=folder)
 
@@ -81,7 +81,7 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     setting, first, folder = small
     shutil.copytree(folder, tmp_path / "own")
     emulator = replace(first, folder=tmp_path / "own")
-    points = [Point(load, speed) for load in (420.0, 580.0) for speed in (1.2, 2.8)]
+    points = [OperatingPoint(load, speed) for load in (420.0, 580.0) for speed in (1.2, 2.8)]
     z = np.zeros((1, len(setting.unknowns)))
     shown = Forward(setting, emulator, tuple(points)).shown(z, "hertz-point")
     heard = [
@@ -92,7 +92,7 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     ]
     found = infer_observations(setting, emulator, heard)
     with ThreadPoolExecutor(1) as executor:
-        wider = with_further(found, 24, executor=executor)
+        wider = refine_emulator(found, 24, executor=executor)
         near = posterior_shares(found.forward, found.draws, 12, seed=99)
         plan = plan_points(
             setting.case,
@@ -118,7 +118,7 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     again = build_emulator(setting, folder=tmp_path / "own")
     assert np.array_equal(again(near, ["clr"])["clr"], wider.emulator(near, ["clr"])["clr"])
     assert again.quality == wider.emulator.quality
-    kept = with_further(infer_observations(setting, formula_emulator(setting), heard), 8)
+    kept = refine_emulator(infer_observations(setting, formula_emulator(setting), heard), 8)
     assert "it was not extended" in kept.notes[-1]
     with pytest.raises(BadInput, match="holds no emulator"):
         extend_emulator(setting, replace(emulator, folder=tmp_path), near)
@@ -241,7 +241,7 @@ def test_no_real_recording_is_told_anything_from(folder):
         pytest.skip("the shared data are not here")
     setting = formula_setting()
     options = {"ims": {"rate_hz": 20_000.0, "unit": "g", "channel": "1"}, "endaq": {"channel": "1"}}
-    heard = listen([SHARED / "vibration" / folder], setting, **options.get(folder, {}))
+    heard = observe_recordings([SHARED / "vibration" / folder], setting, **options.get(folder, {}))
     found = infer_observations(
         setting, formula_emulator(setting), heard.observations, silent=heard.silent
     )

@@ -10,28 +10,28 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from asperity.core.errors import BadInput
 from asperity.inference import (
-    Follower,
     Forward,
-    Listened,
     Observation,
-    Point,
+    ObservedSeries,
+    OperatingPoint,
+    SeriesForecaster,
     design_contact,
-    forecast_heard,
     forecast_observations,
-    latest,
+    forecast_series,
+    latest_observations,
     read_limit,
     wear_drift,
 )
 from asperity.inference.drifting_contact import (
     DRIFT_STD,
     KNOTS,
+    ChannelTable,
     Course,
-    Extra,
-    Table,
+    CourseParameters,
     between_knots,
 )
 from asperity.inference.forecast import Limit
-from asperity.inference.gaussian_process import Process
+from asperity.inference.gaussian_process import GaussianProcess
 from asperity.inference.likelihood import (
     ALONG,
     EMULATED_HEIGHT_STD,
@@ -41,7 +41,7 @@ from asperity.inference.likelihood import (
     WEIGHTS,
 )
 from asperity.inference.sampling import RULED_OUT, Pool, importance
-from asperity.inference.visits import MOST, MOST_PLACES, series_of
+from asperity.inference.visits import MOST, MOST_PLACES, visit_series
 from support.emulated import formula, formula_emulator, formula_setting
 
 TIMES = np.array([0.0, 0.15, 0.4, 0.75, 1.0])
@@ -66,13 +66,13 @@ def recording(x, crf=3000.0, std=6.0, **more):
     return Observation(load_n=500.0, entrainment_m_s=1.91, crf_hz=crf, crf_std_hz=std, x=x, **more)
 
 
-HEARD = Listened(observations=(recording(1.0),))
+HEARD = ObservedSeries(observations=(recording(1.0),))
 
 
 def heard_along(setting, emulator, shares, *, seed=0, std=2e-3):
     """What a contact in the middle of its priors shows while its Sq goes along its range."""
     rng = np.random.default_rng(seed)
-    forward = Forward(setting, emulator, (Point(500.0, 1.91),))
+    forward = Forward(setting, emulator, (OperatingPoint(500.0, 1.91),))
     z = np.zeros((len(shares), len(setting.unknowns)))
     z[:, 0] = setting.unknowns[0].at_share(shares)
     shown = forward.shown(z, "hertz-point")
@@ -88,10 +88,12 @@ def heard_along(setting, emulator, shares, *, seed=0, std=2e-3):
 
 
 def test_a_kept_forecast_knows_how_many_contacts_its_emulator_had(setting, emulator):
-    asked = Follower(setting, emulator, Limit("clr", 0.5))
-    extended = Follower(setting, replace(emulator, points=emulator.points + 8), Limit("clr", 0.5))
+    asked = SeriesForecaster(setting, emulator, Limit("clr", 0.5))
+    extended = SeriesForecaster(
+        setting, replace(emulator, points=emulator.points + 8), Limit("clr", 0.5)
+    )
     assert asked.question != extended.question
-    assert asked.question == Follower(setting, emulator, Limit("clr", 0.5)).question
+    assert asked.question == SeriesForecaster(setting, emulator, Limit("clr", 0.5)).question
 
 
 # The filter ----------------------------------------------------------------------------------------------------------
@@ -102,7 +104,7 @@ def straight_table(share, memory, places=2):
     knots = np.linspace(0.0, 1.0, KNOTS)
     lines = {"crf": 8.0 + 0.4 * knots, "damping": -4.0 - 0.1 * knots, "crfa": 1.0 + 2.0 * knots}
     count = 2
-    return Table(
+    return ChannelTable(
         {key: np.tile(line, (count, places, 1)) for key, line in lines.items()},
         {
             key: np.tile(std**2 * np.array([[1.0, ALIKE], [ALIKE, 1.0]]), (count, 1, 1))
@@ -110,7 +112,7 @@ def straight_table(share, memory, places=2):
         },
         np.tile([-0.3, 0.3], (count, 1)),
         np.full(count, share),
-        Extra(
+        CourseParameters(
             {key: np.full(count, size) for key, size in SIZE.items()},
             *(np.full(count, value) for value in (RESTLESS, SCATTER, memory)),
         ),
@@ -136,7 +138,7 @@ def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(
         for number, time in enumerate(TIMES)
         for load in (400.0, 700.0)
     ]
-    series = series_of(observations)
+    series = visit_series(observations)
     forward = Forward(setting, emulator, series.places)
     course = Course(forward, series, "hertz-point", "sq_m")
     walked = course._walk(straight_table(0.4, memory), moving=moving)
@@ -189,7 +191,9 @@ def test_errors_of_near_operating_points_are_nearly_the_same():
     rng = np.random.default_rng(2)
     x, at = rng.random((20, 2)), rng.random((4, 3, 2))
     at[:, 1] = at[:, 0] + 1e-3
-    process = Process(x, np.sin(4.0 * x[:, 0]), np.full(20, 0.01), np.array([0.5, 2.0]), 1.3, 1e-3)
+    process = GaussianProcess(
+        x, np.sin(4.0 * x[:, 0]), np.full(20, 0.01), np.array([0.5, 2.0]), 1.3, 1e-3
+    )
     kernel = ConstantKernel(1.3) * Matern([0.5, 2.0], nu=2.5)
     known = kernel(x) + np.diag(process.noise / process._scale**2 + process.rough)
     for group, found in zip(at, process.correlations(at), strict=True):
@@ -288,7 +292,7 @@ def test_a_wear_history_is_the_first_drift(setting, emulator):
 
 
 def test_many_visits_are_taken_together_and_none_is_lost():
-    series = series_of([recording(float(number), 3000.0 + number) for number in range(200)])
+    series = visit_series([recording(float(number), 3000.0 + number) for number in range(200)])
     assert len(series.x) == MOST
     assert series.span == pytest.approx(199.0, abs=3.0)
     assert np.exp([sound.heard.value for sound in series.sounds]) == pytest.approx(
@@ -306,14 +310,14 @@ def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_fo
         replace(recording(float(number)), load_n=load)
         for number, load in enumerate([500.0, *loads, 800.0])
     ]
-    series = series_of(heard)
+    series = visit_series(heard)
     assert [place.load_n for place in series.places] == [500.0, 800.0]
     assert series.usual == 0
     forward = Forward(setting, emulator, series.places)
     course = Course(forward, series, "hertz-point", "sq_m")
     z = rng.standard_normal((400, forward.dims))
     there = (
-        Forward(setting, emulator, tuple(Point(load, 1.91) for load in loads))
+        Forward(setting, emulator, tuple(OperatingPoint(load, 1.91) for load in loads))
         .shown(z, "hertz-point")
         .crf
     )
@@ -329,9 +333,9 @@ def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_fo
         )
         assert np.sign(change.mean()) == np.sign(load - 500.0)
     many = [replace(recording(float(number)), load_n=250.0 + 45.0 * number) for number in range(15)]
-    assert len(series_of(many).places) <= MOST_PLACES
+    assert len(visit_series(many).places) <= MOST_PLACES
     near = [replace(recording(float(number)), load_n=500.0 * 1.02**number) for number in range(8)]
-    assert series_of(near[::-1]) == series_of(near)  # who is whose place hangs on no order
+    assert visit_series(near[::-1]) == visit_series(near)  # who is whose place hangs on no order
 
 
 def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
@@ -339,7 +343,7 @@ def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
         replace(recording(x), load_n=load)
         for x, load in ((0.0, 300.0), (80.0, 700.0), (91.0, 500.0))
     ]
-    now = latest(Listened(observations=(*heard, recording(100.0))))
+    now = latest_observations(ObservedSeries(observations=(*heard, recording(100.0))))
     assert [one.x for one in now.observations] == [
         100.0
     ]  # 500 N; 700 N was last heard too long ago
@@ -350,7 +354,7 @@ def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
     ("call", "said"),
     [
         (
-            lambda _: series_of(
+            lambda _: visit_series(
                 [replace(recording(float(x)), temperature_k=(None, 340.0)[x % 2]) for x in range(6)]
             ),
             "some recordings have a temperature and some have none",
@@ -364,10 +368,13 @@ def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
             "--forecast clr takes a share of the load",
         ),
         (lambda setting: read_limit("sq=2 N", setting), "--forecast sq must be"),
-        (lambda _: series_of([recording(float("nan"))]), "has no place in time; give a column x"),
-        (lambda _: series_of([recording(float("inf"))]), "has no place in time"),
         (
-            lambda _: series_of([recording(1.0)] * 9),
+            lambda _: visit_series([recording(float("nan"))]),
+            "has no place in time; give a column x",
+        ),
+        (lambda _: visit_series([recording(float("inf"))]), "has no place in time"),
+        (
+            lambda _: visit_series([recording(1.0)] * 9),
             "4 recordings at different times or more, got 1",
         ),
         (
@@ -385,13 +392,13 @@ def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
             "a limit of Sq must lie within what .infer. allows, 0.25 µm to 4 µm, got 10 µm",
         ),
         (
-            lambda setting: forecast_heard(
+            lambda setting: forecast_series(
                 setting, None, HEARD, read_limit("hardness=2 GPa", setting), worn="worn"
             ),
             "--worn says how Sq drifts, and the limit is of hardness_pa",
         ),
         (
-            lambda setting: forecast_heard(setting, None, HEARD, Limit("clr", 0.5), worn="worn"),
+            lambda setting: forecast_series(setting, None, HEARD, Limit("clr", 0.5), worn="worn"),
             "4 recordings at different times or more, got 1",
         ),
     ],
@@ -408,7 +415,9 @@ def test_what_keeps_the_load_share_low_does_so_in_nineteen_contacts_of_twenty(se
     """At the bound that is stated, asked of the formula itself and of other contacts."""
     rng = np.random.default_rng(11)
     conditions = setting.case.conditions
-    forward = Forward(setting, emulator, (Point(conditions.load, conditions.entrainment_speed),))
+    forward = Forward(
+        setting, emulator, (OperatingPoint(conditions.load, conditions.entrainment_speed),)
+    )
     found = design_contact(forward, rng.standard_normal((600, forward.dims)), clr=0.3)
     ways = {lever.key: lever for lever in found.levers}
     assert list(ways) == ["sq_m", "oil_viscosity_pa_s", "load_n", "entrainment_speed_m_s"]

@@ -14,22 +14,22 @@ from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
 from asperity.coupling import dry_full_load, excitation, oscillator
 from asperity.inference import (
+    ChannelPrediction,
     Forward,
-    Heard,
     Inference,
+    LogMeasurement,
     Observation,
-    Point,
-    Shown,
+    OperatingPoint,
     Unknown,
     infer_contact,
     infer_observations,
-    setting_of,
-    with_measured,
+    inference_setting,
+    with_measured_surface,
     with_observation,
 )
 from asperity.inference import emulator as emulator_module
-from asperity.inference.estimates import bits, estimate
-from asperity.inference.gaussian_process import Process, fit_process
+from asperity.inference.estimates import information_gain, quantity_estimate
+from asperity.inference.gaussian_process import GaussianProcess, fit_process
 from asperity.inference.likelihood import (
     ALONG,
     COMMON,
@@ -40,7 +40,7 @@ from asperity.inference.likelihood import (
     SIZES,
     log_likelihood,
 )
-from asperity.inference.observations import points_of
+from asperity.inference.observations import operating_points
 from asperity.inference.outputs import OUTPUTS
 from asperity.inference.sampling import Pool, importance, nested
 from asperity.surface import MeasuredSurface
@@ -69,7 +69,9 @@ def truth(setting):
 def heard(setting, emulator, points, *, law="hertz-point", std=1e-3, seed=1):
     """What the true contact shows at operating points, with errors of measurement."""
     rng = np.random.default_rng(seed)
-    forward = Forward(setting, emulator, tuple(Point(load, speed) for load, speed in points))
+    forward = Forward(
+        setting, emulator, tuple(OperatingPoint(load, speed) for load, speed in points)
+    )
     shown = forward.shown(truth(setting), law)
     crf = np.exp(shown.crf[0] + std * rng.standard_normal(len(points)))
     return [
@@ -153,10 +155,16 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
     rng = np.random.default_rng(2)
     crf, damping, crfa, lever = rng.standard_normal((4, 3, 4))
     stds = rng.uniform(0.1, 0.3, (3, 3, 4))
-    shown = Shown(crf, stds[0], damping, stds[1], crfa, stds[2], lever)
-    said = [Heard(0.3, 0.2), Heard(), Heard(-0.1, 0.5), Heard(1.0, 0.1)]
+    shown = ChannelPrediction(crf, stds[0], damping, stds[1], crfa, stds[2], lever)
+    said = [
+        LogMeasurement(0.3, 0.2),
+        LogMeasurement(),
+        LogMeasurement(-0.1, 0.5),
+        LogMeasurement(1.0, 0.1),
+    ]
     points = [
-        Point(500.0 * 1.01**i, 1.0, crf=one, damping=one, crfa=one) for i, one in enumerate(said)
+        OperatingPoint(500.0 * 1.01**i, 1.0, crf=one, damping=one, crfa=one)
+        for i, one in enumerate(said)
     ]
     here = [0, 2, 3]
     near = norm.pdf(np.subtract.outer(here, here) * np.log(1.01) / 0.03) / norm.pdf(0.0)
@@ -216,10 +224,15 @@ def test_bits_are_those_of_a_narrowed_normal_and_nothing_of_chance():
     prior = rng.standard_normal(40_000)
     narrow = 0.3 + 0.25 * rng.standard_normal(40_000)
     told = -np.log2(0.25) + 0.5 * (0.25**2 + 0.3**2 - 1.0) / np.log(2.0)
-    assert bits(narrow, prior, 40_000.0) == pytest.approx(told, abs=0.1)  # of 20 classes
-    assert bits(rng.standard_normal(300), prior, 300.0) < 0.03
-    against = estimate(2.0 + 0.2 * rng.standard_normal(4000), prior, 4000.0, bounded=True)
-    assert (against.against, estimate(prior, prior, 4000.0, bounded=True).against) == ("high", "")
+    assert information_gain(narrow, prior, 40_000.0) == pytest.approx(
+        told, abs=0.1
+    )  # of 20 classes
+    assert information_gain(rng.standard_normal(300), prior, 300.0) < 0.03
+    against = quantity_estimate(2.0 + 0.2 * rng.standard_normal(4000), prior, 4000.0, bounded=True)
+    assert (against.against, quantity_estimate(prior, prior, 4000.0, bounded=True).against) == (
+        "high",
+        "",
+    )
 
 
 # Laws ----------------------------------------------------------------------------------------------------------------
@@ -227,7 +240,7 @@ def test_bits_are_those_of_a_narrowed_normal_and_nothing_of_chance():
 
 def test_crf_and_crfa_are_those_of_the_coupling(setting, emulator):
     """The oscillator and its excitation as `solve` makes them, at the load share that is emulated."""
-    forward = Forward(setting, emulator, (Point(300.0, 0.8), Point(900.0, 2.5)))
+    forward = Forward(setting, emulator, (OperatingPoint(300.0, 0.8), OperatingPoint(900.0, 2.5)))
     z = truth(setting)
     shown, states = forward.shown(z, "hertz-point"), forward.states(z, ["clr", "car"])
     model = replace_choices(setting, z)
@@ -263,7 +276,7 @@ def replace_choices(setting, z):
 
 
 def test_the_own_law_hears_stiffness_and_damping(setting, emulator):
-    forward = Forward(setting, emulator, (Point(500.0, 1.91),))
+    forward = Forward(setting, emulator, (OperatingPoint(500.0, 1.91),))
     z = truth(setting)
     state = forward.states(z, ["contact_stiffness_n_m", "contact_damping_ratio"])
     shown = forward.shown(z, "own")
@@ -388,24 +401,26 @@ def test_what_repeats_have_in_common_does_not_average_away():
         load_n=500.0, entrainment_m_s=1.0, crf_hz=3000.0, crf_std_hz=5.0, crf_shared_std_hz=3.0
     )
     for count in (1, 4, 1000):
-        assert 3000.0 * points_of([one] * count)[0].crf.std == pytest.approx(
+        assert 3000.0 * operating_points([one] * count)[0].crf.std == pytest.approx(
             np.hypot(3.0, 4.0 / np.sqrt(count))
         )
 
 
 def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
     """Five recordings that agree at what is as good as one place do not speak for a small error."""
-    said = Heard(8.0, 2e-3)
+    said = LogMeasurement(8.0, 2e-3)
     off = np.linspace(-0.4, 0.4, 2001)[:, None]
 
     def width(loads):
-        points = [Point(load, 1.0, crf=said) for load in loads]
+        points = [OperatingPoint(load, 1.0, crf=said) for load in loads]
         nothing, lever = (
             np.full((len(off), len(loads)), np.nan),
             np.tile(np.log(loads), (len(off), 1)),
         )
         crf = 8.0 + off + np.zeros_like(nothing)
-        shown = Shown(crf, np.full_like(crf, 0.01), nothing, nothing, nothing, nothing, lever)
+        shown = ChannelPrediction(
+            crf, np.full_like(crf, 0.01), nothing, nothing, nothing, nothing, lever
+        )
         weights = np.exp(log_likelihood(shown, points, discrepancy=True))
         return np.sqrt(weights @ off[:, 0] ** 2 / weights.sum())
 
@@ -422,7 +437,7 @@ def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"infer.sq": {"from": "1 um", "to": "0.5 um"}}, "must have a range that goes upwards"),
+        ({"infer.sq": {"from": "1 um", "to": "0.5 um"}}, "must have an ascending range"),
         ({"infer.sq": {"from": "0.5 um", "to": "2 N"}}, "infer.sq.to must be in um"),
         (
             {"infer.radius": {"from": "1 mm", "to": "2 mm"}},
@@ -445,7 +460,7 @@ def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
 )
 def test_what_cannot_be_inferred_is_refused(change, said):
     with pytest.raises(BadInput, match=said):
-        setting_of(load_case(CASE).with_overrides(change))
+        inference_setting(load_case(CASE).with_overrides(change))
 
 
 def test_an_operating_point_beyond_the_emulator_is_refused(setting, emulator):
@@ -485,7 +500,7 @@ def test_a_missing_extra_is_said_with_its_remedy(monkeypatch, tmp_path):
 
 def test_a_process_of_no_slope_is_flat():
     x = np.linspace(0.0, 1.0, 12)[:, None]
-    process = Process(x, np.full(12, 2.0), np.full(12, 1e-4), np.ones(1), 1.0, 1e-4)
+    process = GaussianProcess(x, np.full(12, 2.0), np.full(12, 1e-4), np.ones(1), 1.0, 1e-4)
     mean, std = process(np.array([[0.35], [0.9]]))
     assert mean == pytest.approx([2.0, 2.0], abs=1e-6)
     assert np.all(std >= 0.0)
@@ -508,7 +523,7 @@ def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
     rng = np.random.default_rng(6)
     grid = Grid((64, 64), (-1e-3, -1e-3), (1e-3, 1e-3), (False, False))
     measured = MeasuredSurface(0.7e-6 * rng.standard_normal((64, 64)), grid, "ring.csv", "text")
-    known, said = with_measured(setting, measured)
+    known, said = with_measured_surface(setting, measured)
     z = np.array([-1.0, 0.0, 1.0])
     assert 1e6 * known.contact[0].value(z) == pytest.approx(
         [0.7 - 0.022, 0.7, 0.7 + 0.022], abs=0.006
@@ -519,9 +534,9 @@ def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
     alone = of_one.posterior()["clr"]
     assert told.high - told.low < 0.8 * (alone.high - alone.low)
     with pytest.raises(BadInput, match=r"widen infer\.sq"):
-        with_measured(setting, replace(measured, heights=10.0 * measured.heights))
+        with_measured_surface(setting, replace(measured, heights=10.0 * measured.heights))
     with pytest.raises(BadInput, match="the case knows its Sq"):
-        with_measured(replace(setting, contact=setting.contact[1:]), measured)
+        with_measured_surface(replace(setting, contact=setting.contact[1:]), measured)
 
 
 def test_further_points_never_take_a_folder_that_is_there(monkeypatch, tmp_path):

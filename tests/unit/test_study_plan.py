@@ -123,7 +123,7 @@ REFUSED = [
     ({"sq": sq_range(step="0.1 um", count=3)}, "study.sq needs either step or count"),
     ({"sq": sq_range(step="0 um")}, "study.sq.step must be positive"),
     ({"sq": sq_range(step="0.1 N")}, 'must be in um as the range\'s beginning is, got "0.1 N"'),
-    ({"sq": {"from": "2 um", "to": "1 um", "step": "1 um"}}, "study.sq must go upwards"),
+    ({"sq": {"from": "2 um", "to": "1 um", "step": "1 um"}}, "study.sq must be ascending"),
     ({"sq": ["1 N"]}, "surface.sq must be a length"),
     ({"sq": ["1 foobar"]}, 'got "1 foobar", whose unit is not known'),
     ({"sq": [1]}, "got the bare number 1"),
@@ -140,7 +140,7 @@ REFUSED = [
         {"sq": ["1 um"], "surface": [{"kind": "flat"}]},
         "sweeps surface and surface.sq, a part of it",
     ),
-    ({"motion": {"steps": [3, 4]}}, "study.motion.steps changes nothing in a study"),
+    ({"motion": {"steps": [3, 4]}}, "study.motion.steps has no effect in a study"),
 ]
 
 

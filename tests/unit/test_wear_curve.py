@@ -21,7 +21,7 @@ from asperity.paper import (
     rig_prediction,
 )
 from asperity.results import solve_case
-from asperity.study import WearCurve, curve_of, plan_points, run_study, wear_curve
+from asperity.study import WearCurve, curve_from_study, plan_points, run_study, wear_curve
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -59,11 +59,11 @@ def test_means_deviations_and_intervals_are_students():
 def test_between_levels_the_curve_is_straight_and_their_surfaces_independent():
     curve = made([1.0, 2.0], 3, car=lambda sq, seed: sq + (seed - 1.0))
     reach = 2.91998558 / np.sqrt(3.0)
-    middle, low, high = curve.at(1.25e-6, "car")
+    middle, low, high = curve.interpolate(1.25e-6, "car")
     off = reach * np.hypot(0.75, 0.25)
     assert (middle, low, high) == pytest.approx((1.25, 1.25 - off, 1.25 + off))
-    assert curve.at(2e-6, "car") == pytest.approx((2.0, 2.0 - reach, 2.0 + reach))
-    assert np.isnan(curve.at(2.1e-6, "car")).all()
+    assert curve.interpolate(2e-6, "car") == pytest.approx((2.0, 2.0 - reach, 2.0 + reach))
+    assert np.isnan(curve.interpolate(2.1e-6, "car")).all()
 
 
 def test_what_failed_or_was_not_heard_is_in_no_mean():
@@ -178,7 +178,7 @@ def test_a_study_of_something_else_has_no_wear_curve():
     with pytest.raises(
         BadInput, match=r"needs a study that varies surface\.sq alone, got contact\.load"
     ):
-        curve_of(result)
+        curve_from_study(result)
 
 
 def test_anchors_of_ones_own_are_read_and_mistakes_named(tmp_path):

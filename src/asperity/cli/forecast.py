@@ -11,7 +11,7 @@ from asperity.cli.output import progress
 from asperity.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from asperity.inference import Emulator, Follower, Setting
+    from asperity.inference import Emulator, SeriesForecaster, Setting
     from asperity.study import StudyProgress
 
 EMULATING = "the emulator's contacts; once for a case, and kept ..."
@@ -33,7 +33,7 @@ def follower(
     *,
     workers: int,
     quiet: bool,
-) -> "Follower | None":
+) -> "SeriesForecaster | None":
     """Who foretells a series that is tracked or watched; None where nobody asked."""
     require_forecast(forecast, worn=worn, emulator=emulator)
     if forecast is None:
@@ -41,11 +41,11 @@ def follower(
     contact = contact_at(case_file)
     if not isinstance(contact, case.Case):
         raise BadInput("--forecast needs the contact; give --case CASE.toml of one contact")
-    setting = inference.setting_of(contact)
+    setting = inference.inference_setting(contact)
     limit = inference.read_limit(forecast, setting)
     inference.require_limit(setting, limit, worn=worn is not None)
     history = None if worn is None else simulation.load_wear(worn)
-    return inference.Follower(
+    return inference.SeriesForecaster(
         setting, emulated(setting, emulator, workers, quiet=quiet), limit, history
     )
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         Forecast,
         Inference,
         Limit,
-        Listened,
+        ObservedSeries,
         Sampler,
         Setting,
     )
@@ -96,10 +96,10 @@ def infer(
         inference.require_limit(setting, limit, worn=worn is not None)
     history = None if worn is None else simulation.load_wear(worn)
     require_output(page, ".html", option="--report")
-    count, heard = workers or processes.cores(), inference.Listened()
+    count, heard = workers or processes.cores(), inference.ObservedSeries()
     if paths:
         with progress("recordings", "reading recordings ...", quiet=quiet):
-            heard = inference.listen(
+            heard = inference.observe_recordings(
                 paths,
                 setting,
                 table=table_file,
@@ -114,12 +114,12 @@ def infer(
             )
     answering = emulated(setting, emulator, count, quiet=quiet)
     ahead = _forecast(setting, answering, heard, limit, history, seed)
-    latest = inference.latest(heard) if ahead is not None and ahead.told else heard
+    latest = inference.latest_observations(heard) if ahead is not None and ahead.told else heard
     now = replace(latest, notes=(*latest.notes, *known))
     by = cast("Sampler", sampler)
-    found = inference.infer_heard(setting, answering, now, sampler=by, seed=seed)
+    found = inference.infer_series(setting, answering, now, sampler=by, seed=seed)
     with contacts_solved(quiet=quiet) as step:
-        found = inference.with_further(found, extend, sampler=by, workers=count, progress=step)
+        found = inference.refine_emulator(found, extend, sampler=by, workers=count, progress=step)
     if found.emulator is not answering:
         ahead = _forecast(setting, found.emulator, heard, limit, history, seed)
     kept = (
@@ -156,7 +156,7 @@ def _required(
 def _forecast(
     setting: "Setting",
     emulator: "Emulator",
-    heard: "Listened",
+    heard: "ObservedSeries",
     limit: "Limit | None",
     history: "WearHistory | None",
     seed: int,
@@ -164,17 +164,17 @@ def _forecast(
     """When the limit is crossed; None where nobody asked."""
     if limit is None:
         return None
-    return inference.forecast_heard(setting, emulator, heard, limit, worn=history, seed=seed)
+    return inference.forecast_series(setting, emulator, heard, limit, worn=history, seed=seed)
 
 
 def _setting(
     path: Path, overrides: list[str] | None, surface: Path | None
 ) -> tuple["Setting", tuple[str, ...]]:
     """What is to be inferred, Sq as a surface was measured where one is given, and a note of that."""
-    setting = inference.setting_of(chosen_case(path, overrides))
+    setting = inference.inference_setting(chosen_case(path, overrides))
     if surface is None:
         return setting, ()
-    setting, said = inference.with_measured(setting, surfaces.read_surface(surface))
+    setting, said = inference.with_measured_surface(setting, surfaces.read_surface(surface))
     return setting, (said,)
 
 
@@ -228,9 +228,9 @@ def _told(found: "Inference") -> Block:
 
 def _points(found: "Inference") -> Block:
     """A row an operating point that was recorded."""
-    rows = [one.cells() for one in found.at_points()]
+    rows = [one.cells() for one in found.point_estimates()]
     if rows:
-        yield from columns(found.at_points()[0].HEADS, rows)
+        yield from columns(found.point_estimates()[0].HEADS, rows)
 
 
 def _notes(found: "Inference") -> Block:

@@ -11,7 +11,7 @@ from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 from asperity.inference.forward import Forward
-from asperity.inference.observations import Point
+from asperity.inference.observations import OperatingPoint
 from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.priors import Unknown
 from asperity.inference.settings import LOAD, SPEED, TEMPERATURE, Setting
@@ -26,7 +26,7 @@ Way = Literal["at most", "at least", "any", "none"]
 
 
 @dataclass(frozen=True)
-class Lever:
+class DesignVariable:
     """What one quantity alone must be for the load share to stay below a value, all else as it is known.
 
     `way` is "at most" or "at least" `bound` [SI]; "any" or "none" where all of the range does, or
@@ -64,7 +64,7 @@ class Design:
 
     clr: float
     now: float
-    levers: tuple[Lever, ...]
+    levers: tuple[DesignVariable, ...]
 
     def sentence(self) -> str:
         """In words."""
@@ -123,7 +123,7 @@ def _levers(setting: Setting) -> Sequence[Unknown]:
     return [known[key] for key in LEVERS if key in known]
 
 
-def _lever(forward: Forward, z: Field, lever: Unknown, clr: float) -> Lever:
+def _lever(forward: Forward, z: Field, lever: Unknown, clr: float) -> DesignVariable:
     shares = np.linspace(0.0, 1.0, VALUES)
     values = lever.to_si(np.array([lever.range.value(share) for share in shares]))
     if lever.range.key in NAMES:
@@ -139,14 +139,18 @@ def _lever(forward: Forward, z: Field, lever: Unknown, clr: float) -> Lever:
         )
     enough = chances >= SURELY
     if enough.all() or not enough.any():
-        return Lever(lever.key, "any" if enough.all() else "none", None, values, chances)
+        return DesignVariable(lever.key, "any" if enough.all() else "none", None, values, chances)
     if enough[0]:
         last = int(np.argmin(enough)) - 1  # the end of what is enough from the low end on
-        return Lever(lever.key, "at most", _between(values, chances, last), values, chances)
+        return DesignVariable(
+            lever.key, "at most", _between(values, chances, last), values, chances
+        )
     if enough[-1]:
         last = VALUES - 1 - int(np.argmin(enough[::-1]))
-        return Lever(lever.key, "at least", _between(values, chances, last), values, chances)
-    return Lever(lever.key, "none", None, values, chances)
+        return DesignVariable(
+            lever.key, "at least", _between(values, chances, last), values, chances
+        )
+    return DesignVariable(lever.key, "none", None, values, chances)
 
 
 def _between(values: Field, chances: Field, place: int) -> float:
@@ -164,7 +168,7 @@ def _chances(forward: Forward, z: Field, clr: float) -> Field:
     return np.asarray(ndtr((limit - mean) / np.maximum(std, 1e-9)).mean(axis=0))
 
 
-def _moved(point: Point, key: str, value: float) -> Point:
+def _moved(point: OperatingPoint, key: str, value: float) -> OperatingPoint:
     if key == LOAD:
         return replace(point, load_n=value)
     return (

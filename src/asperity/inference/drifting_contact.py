@@ -25,11 +25,11 @@ from asperity.inference.likelihood import (
     WEIGHTS,
     law_correlations,
 )
-from asperity.inference.observations import Heard, likeness
+from asperity.inference.observations import LogMeasurement, point_similarity
 from asperity.inference.outputs import CLR
 from asperity.inference.priors import si
 from asperity.inference.settings import OPERATING, TEMPERATURE
-from asperity.inference.visits import CHANNELS, Series, Sound
+from asperity.inference.visits import CHANNELS, SeriesMeasurement, VisitSeries
 
 KNOTS = 17  # of the table along the range of what drifts
 DRIFT_STD = 0.3  # of the first drift, in shares of the range over the series
@@ -58,14 +58,14 @@ PROBES, STEPS = (
 )  # contacts, and steps (load, speed, K), by which sounds are moved
 
 
-class Followed(NamedTuple):
+class CourseLikelihood(NamedTuple):
     """ln p of all that was heard, of contacts that stay as they are and that change; shape (n,)."""
 
     steady: Field
     moving: Field
 
 
-class Walked(NamedTuple):
+class FilteredCourse(NamedTuple):
     """Contacts at the last visit: share of the range, its drift over the series, the error of CRF at the usual place.
 
     `mean` (n, 3), `covariance` (n, 3, 3), `path` (n, visits) the share at each visit as it was
@@ -78,7 +78,7 @@ class Walked(NamedTuple):
     path: Field
 
 
-class Extra(NamedTuple):
+class CourseParameters(NamedTuple):
     """What a course adds to a contact's unknowns: shape (n,) each; `sizes` are the law's errors, relative to CRF."""
 
     sizes: Mapping[str, Field]
@@ -87,7 +87,7 @@ class Extra(NamedTuple):
     memory: Field
 
     @classmethod
-    def of(cls, z: Field) -> "Extra":
+    def of(cls, z: Field) -> "CourseParameters":
         """From standard normal numbers (n, EXTRA)."""
         own = np.array(SIZES)[np.minimum((len(SIZES) * ndtr(z[:, :3])).astype(int), len(SIZES) - 1)]
         return cls(
@@ -112,7 +112,7 @@ class Course:
     """
 
     forward: Forward
-    series: Series
+    series: VisitSeries
     law: Law
     drifting: str
     drift: tuple[float, float] = (0.0, DRIFT_STD)
@@ -133,7 +133,7 @@ class Course:
         return self.forward.dims + EXTRA
 
     @property
-    def sounds(self) -> tuple[Sound, ...]:
+    def sounds(self) -> tuple[SeriesMeasurement, ...]:
         """All that was heard as it would have been at its place: moved there as contacts of the prior move in the mean.
 
         By how much these differ is in `leanings`: whoever moves one recording too far moves all of
@@ -147,7 +147,7 @@ class Course:
         return self._brought[1]
 
     @cached_property
-    def _brought(self) -> tuple[tuple[Sound, ...], Mapping[tuple[str, int], Field]]:
+    def _brought(self) -> tuple[tuple[SeriesMeasurement, ...], Mapping[tuple[str, int], Field]]:
         asides = np.array([sound.aside for sound in self.series.sounds])
         z = np.random.default_rng(0).standard_normal((PROBES, self.forward.dims))
         here, moved = self.forward.shown(z, self.law, deviations=False), {}
@@ -163,26 +163,28 @@ class Course:
                 sound.aside[axis] * float(np.mean(slope[sound.channel][:, sound.place]))
                 for axis, slope in moved.items()
             )
-            sounds.append(sound._replace(heard=Heard(sound.heard.value - by, sound.heard.std)))
+            sounds.append(
+                sound._replace(heard=LogMeasurement(sound.heard.value - by, sound.heard.std))
+            )
         leanings = {
             (key, axis): slope[key].std(axis=0) for axis, slope in moved.items() for key in CHANNELS
         }
         return tuple(sounds), leanings
 
-    def __call__(self, z: Field) -> Followed:
+    def __call__(self, z: Field) -> CourseLikelihood:
         """How probable what was heard makes contacts, shape (n, dims), without a course and with any."""
-        table = Table.of(self, z)
-        return Followed(*(self._walk(table, moving=moving).log for moving in (False, True)))
+        table = ChannelTable.of(self, z)
+        return CourseLikelihood(*(self._walk(table, moving=moving).log for moving in (False, True)))
 
-    def walk(self, z: Field, *, moving: bool) -> Walked:
+    def walk(self, z: Field, *, moving: bool) -> FilteredCourse:
         """Where contacts are at the end."""
-        return self._walk(Table.of(self, z), moving=moving)
+        return self._walk(ChannelTable.of(self, z), moving=moving)
 
-    def _walk(self, table: "Table", *, moving: bool) -> Walked:
+    def _walk(self, table: "ChannelTable", *, moving: bool) -> FilteredCourse:
         places = len(self.forward.points)
         state = _State.begin(
             table,
-            likeness(self.forward.points),
+            point_similarity(self.forward.points),
             self.drift if moving else (0.0, 0.0),
             self.leanings,
         )
@@ -196,20 +198,22 @@ class Course:
             state.hear(sound, table, places)
             path[:, sound.visit] = state.mean[:, SHARE]
         kept = [SHARE, SPEED, FIRST + self.series.usual]
-        return Walked(state.log, state.mean[:, kept], state.covariance[:, kept][:, :, kept], path)
+        return FilteredCourse(
+            state.log, state.mean[:, kept], state.covariance[:, kept][:, :, kept], path
+        )
 
 
-class Table(NamedTuple):
+class ChannelTable(NamedTuple):
     """What contacts would show along the range of what drifts: each channel (n, places, knots)."""
 
     channels: Mapping[str, Field]
     errors: Mapping[str, Field]  # covariance of the emulator's, (n, places, places)
     lever: Field  # of the law's exponent, (n, places), 0 in the mean
     share: Field  # where each begins, (n,)
-    extra: Extra
+    extra: CourseParameters
 
     @classmethod
-    def of(cls, course: Course, z: Field) -> "Table":
+    def of(cls, course: Course, z: Field) -> "ChannelTable":
         """By the emulator's means, along the range; its deviations where each contact begins."""
         forward, column = course.forward, course.column
         contacts, unknown = z[:, : forward.dims], forward.setting.unknowns[column]
@@ -236,7 +240,7 @@ class Table(NamedTuple):
             errors,
             here.lever - here.lever.mean(axis=1, keepdims=True),
             unknown.share(contacts[:, column]),
-            Extra.of(z[:, forward.dims :]),
+            CourseParameters.of(z[:, forward.dims :]),
         )
 
     def at(self, channel: str, place: int, share: Field) -> tuple[Field, Field]:
@@ -297,7 +301,7 @@ class _State:
     @classmethod
     def begin(
         cls,
-        table: Table,
+        table: ChannelTable,
         near: Field,
         drift: tuple[float, float],
         leanings: Mapping[tuple[str, int], Field],
@@ -327,7 +331,7 @@ class _State:
             )
         return cls(mean, covariance, np.zeros(count), leanings)
 
-    def wait(self, time: float, restless: Field, extra: Extra, visits: int) -> None:
+    def wait(self, time: float, restless: Field, extra: CourseParameters, visits: int) -> None:
         """Let the share drift on, its drift wander (an integrated Wiener process), and slow scatter be forgotten."""
         left = extra.memory ** (time * visits)
         self.mean[:, SLOW] *= left
@@ -342,7 +346,7 @@ class _State:
             self.covariance[:, row, column] += restless**2 * time**2 / 2.0
         self.covariance[:, SPEED, SPEED] += restless**2 * time
 
-    def hear(self, sound: Sound, table: Table, places: int) -> None:
+    def hear(self, sound: SeriesMeasurement, table: ChannelTable, places: int) -> None:
         """One logarithm heard: what it makes of the state."""
         channel, place = sound.channel, sound.place
         error = FIRST + CHANNELS.index(channel) * places + place
@@ -387,7 +391,7 @@ class _State:
         self.mean += gain * rest[:, None]
         self.covariance -= gain[:, :, None] * across[:, None, :]
 
-    def _lean(self, sound: Sound) -> tuple[list[int], Field]:
+    def _lean(self, sound: SeriesMeasurement) -> tuple[list[int], Field]:
         """The states of how a contact goes with what a sound was heard aside in, and what they do to it."""
         first = self.mean.shape[1] - len(self.leanings)
         heard = [

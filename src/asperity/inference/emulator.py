@@ -22,7 +22,7 @@ from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.files import make_folder, user_cache
 from asperity.core.storage import read_json, write_json
-from asperity.inference.gaussian_process import Process, fit_process, require_learning
+from asperity.inference.gaussian_process import GaussianProcess, fit_process, require_learning
 from asperity.inference.outputs import CLR, OUTPUTS, Output
 from asperity.inference.settings import LOAD, SPEED, TEMPERATURE, Setting
 from asperity.study import (
@@ -51,7 +51,7 @@ FILM_EXPONENTS = {
 
 
 @dataclass(frozen=True)
-class Quality:
+class EmulatorQuality:
     """How far an emulator is off, found on points held out, in the output's own unit.
 
     `error` is the rms of held-out means against emulated ones; `coverage` the share of them within
@@ -67,7 +67,7 @@ class Quality:
 
 
 @dataclass(frozen=True)
-class GridError:
+class EmulatorGridError:
     """What twice the cells change of an output, on its scale: in the mean, and by rms over points.
 
     Both are of the same surfaces on both grids. Finer grids still are taken to change it as much
@@ -87,16 +87,16 @@ class Emulator:
     """Means over patches of what a contact shows, anywhere in its ranges, each with a standard deviation."""
 
     ranges: tuple[ParameterRange, ...]
-    features: "Features"
-    processes: Mapping[str, Process]
-    quality: Mapping[str, Quality]
+    features: "EmulatorFeatures"
+    processes: Mapping[str, GaussianProcess]
+    quality: Mapping[str, EmulatorQuality]
     points: int
     surfaces: int
     failed: int
     folder: Path
     seconds: float  # spent on its contacts
     cells: tuple[int, int] = (0, 0)
-    grid: Mapping[str, GridError] = field(default_factory=dict)
+    grid: Mapping[str, EmulatorGridError] = field(default_factory=dict)
     further: int = 0  # of the points, those where posteriors were
 
     def __call__(self, shares: Field, wanted: Iterable[str]) -> dict[str, tuple[Field, Field]]:
@@ -129,7 +129,7 @@ class Emulator:
 
     def sentence(self) -> str:
         """How good it is, in words."""
-        clr, grid = self.quality[CLR], self.grid.get(CLR, GridError())
+        clr, grid = self.quality[CLR], self.grid.get(CLR, EmulatorGridError())
         moved = OUTPUTS[CLR].back(np.array([0.0, grid.shift]))
         finer = (
             f" On twice the cells CLR 50 % is {100 * moved[1]:.0f} %, which is corrected for."
@@ -145,7 +145,7 @@ class Emulator:
 
 
 @dataclass(frozen=True)
-class Features:
+class EmulatorFeatures:
     """Shares of the ranges with one of them, that of the speed, replaced by an estimated film ratio.
 
     Film and contact hang on the product of viscosity and speed, by powers that are known nearly;
@@ -182,12 +182,12 @@ class Features:
         return x
 
 
-def features_of(setting: Setting) -> Features:
+def emulator_features(setting: Setting) -> EmulatorFeatures:
     """How a setting's shares become points; of an oil by its data sheet, with viscosity over temperature."""
     ranges = setting.ranges
     entry = next((entry for entry in ranges if entry.key == TEMPERATURE), None)
     if entry is None:
-        return Features(ranges)
+        return EmulatorFeatures(ranges)
     at, logs = np.linspace(0.0, 1.0, 9), []
     for share in at:
         oil = setting.case.with_overrides(overrides_at(setting.case, [entry], [share])).lubricant
@@ -196,11 +196,11 @@ def features_of(setting: Setting) -> Features:
         viscosity = float(oil.viscosity(zero)[0])
         logs.append((np.log(viscosity), np.log(float(oil.viscosity.log_slope(zero)[0]))))
     viscosity, alpha = np.array(logs).T
-    return Features(ranges, (at, viscosity - viscosity.mean(), alpha - alpha.mean()))
+    return EmulatorFeatures(ranges, (at, viscosity - viscosity.mean(), alpha - alpha.mean()))
 
 
 # Built and kept
-# ------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------
 
 
 def emulators_folder() -> Path:
@@ -220,7 +220,7 @@ def build_emulator(
 
     Parameters
     ----------
-    setting : from `setting_of`
+    setting : from `inference_setting`
     folder : where it is kept; by default one in the user's cache, by case, ranges and version
     executor, workers, progress : see `asperity.study.run_study`
 
@@ -258,7 +258,7 @@ def build_emulator(
             f"{len(shares) - len(means.points)} of {len(shares)} points of the emulator failed ({first}); narrow the "
             "ranges in [infer]"
         )
-    features = features_of(setting)
+    features = emulator_features(setting)
     finer = _finer(setting, sobol, home=home, **how)
     processes, quality = _processes(means, features(shares[means.points]), fitted, identity)
     return Emulator(
@@ -339,7 +339,7 @@ def _finer(setting: Setting, sobol: Field, *, home: Path, **how: Any) -> pandas.
     ).table
 
 
-def _grid_errors(coarse: pandas.DataFrame, fine: pandas.DataFrame) -> dict[str, GridError]:
+def _grid_errors(coarse: pandas.DataFrame, fine: pandas.DataFrame) -> dict[str, EmulatorGridError]:
     """What twice the cells change, from points of which all surfaces were solved on both grids."""
     keys = list(OUTPUTS)
     means = []
@@ -353,13 +353,13 @@ def _grid_errors(coarse: pandas.DataFrame, fine: pandas.DataFrame) -> dict[str, 
     errors = {}
     for key, output in OUTPUTS.items():
         change = output.forward(new[key].to_numpy()) - output.forward(old[key].to_numpy())
-        errors[key] = GridError(float(np.mean(change)), float(np.sqrt(np.mean(change**2))))
+        errors[key] = EmulatorGridError(float(np.mean(change)), float(np.sqrt(np.mean(change**2))))
     return errors
 
 
 def _processes(
     means: "_Means", x: Field, fitted: Path, identity: str
-) -> tuple[dict[str, Process], dict[str, Quality]]:
+) -> tuple[dict[str, GaussianProcess], dict[str, EmulatorQuality]]:
     """A process for each output and how good it is: as they were kept, or fitted now, and kept."""
     processes, quality = {}, {}
     known = read_json(fitted, "delete it, and it is fitted again") if fitted.exists() else None
@@ -393,12 +393,14 @@ def sobol_shares(setting: Setting) -> Field:
 
 def _as_kept(
     known: Mapping[str, Any], key: str, x: Field, y: Field, noise: Field
-) -> tuple[Process, Quality]:
+) -> tuple[GaussianProcess, EmulatorQuality]:
     try:
         entry = known["outputs"][key]
         lengths = np.asarray(entry["lengths"], dtype=float)
-        process = Process(x, y, noise, lengths, float(entry["level"]), float(entry["rough"]))
-        return process, Quality(**entry["quality"])
+        process = GaussianProcess(
+            x, y, noise, lengths, float(entry["level"]), float(entry["rough"])
+        )
+        return process, EmulatorQuality(**entry["quality"])
     except (KeyError, TypeError, ValueError):
         raise UnreadableFile(
             f"{FITTED} says nothing of {key}; delete it, and it is fitted again"
@@ -451,20 +453,20 @@ def _smoothed(output: Output, mean: Field, variance: Field) -> Field:
     return np.asarray(np.exp(np.interp(scaled, centres, np.log(levels))) / output.slope(mean) ** 2)
 
 
-def _held_out(means: _Means, output: Output, whole: Process) -> Quality:
+def _held_out(means: _Means, output: Output, whole: GaussianProcess) -> EmulatorQuality:
     """Each point foretold by a process fitted to the others."""
     y, noise = means.scaled(output)
     fold = np.arange(y.size) % FOLDS
-    foretold, std = np.empty(y.size), np.empty(y.size)
+    predictive_mixture, std = np.empty(y.size), np.empty(y.size)
     for number in range(FOLDS):
         out = fold == number
         process = fit_process(whole.x[~out], y[~out], noise[~out], start=whole)
-        foretold[out], std[out] = process(whole.x[out])
+        predictive_mixture[out], std[out] = process(whole.x[out])
     mean = means.mean[output.key].to_numpy()
     variance = means.variance[output.key].to_numpy()
-    within = np.abs(y - foretold) <= NORMAL_90 * np.sqrt(std**2 + noise)
-    return Quality(
-        error=float(np.sqrt(np.mean((output.back(foretold) - mean) ** 2))),
+    within = np.abs(y - predictive_mixture) <= NORMAL_90 * np.sqrt(std**2 + noise)
+    return EmulatorQuality(
+        error=float(np.sqrt(np.mean((output.back(predictive_mixture) - mean) ** 2))),
         coverage=float(np.mean(within)),
         scatter=float(np.sqrt(np.mean(variance))),
         scatter_of_mean=float(np.sqrt(np.mean(variance / means.surfaces))),

@@ -11,7 +11,7 @@ from asperity.core.arrays import Field
 
 ENDS = (0.05, 0.5, 0.95)
 BINS = 20  # of what was known before, equally probable
-LEARNT_BITS = 0.5  # the interval is then about two thirds of what it was
+LEARNT_FROM_BITS = 0.5  # the interval is then about two thirds of what it was
 EDGE = 0.05  # share of a prior at either end, and
 CROWDED = 5.0  # how many times as much of the posterior must lie there to lie against the end
 
@@ -33,7 +33,7 @@ class Estimate:
     @property
     def learnt(self) -> bool:
         """Whether recordings taught it, or it is as it was assumed."""
-        return self.information_bits >= LEARNT_BITS
+        return self.information_bits >= LEARNT_FROM_BITS
 
     def scalars(self) -> dict[str, Any]:
         """As JSON has it."""
@@ -47,31 +47,34 @@ class Estimate:
         }
 
 
-def estimate(values: Field, prior: Field, effective: float, *, bounded: bool = False) -> Estimate:
+def quantity_estimate(
+    values: Field, prior: Field, effective: float, *, bounded: bool = False
+) -> Estimate:
     """Of equally probable draws after and before, which are worth `effective` independent ones."""
     low, median, high = (float(end) for end in np.quantile(values, ENDS))
     return Estimate(
         median,
         low,
         high,
-        bits(values, prior, effective),
+        information_gain(values, prior, effective),
         _against(values, prior) if bounded else "",
     )
 
 
-def estimates(
+def quantity_estimates(
     after: Mapping[str, Field],
     before: Mapping[str, Field],
     effective: float,
     bounded: frozenset[str],
 ) -> dict[str, Estimate]:
-    """`estimate` of several quantities by their keys."""
+    """`quantity_estimate` of several quantities by their keys."""
     return {
-        key: estimate(after[key], before[key], effective, bounded=key in bounded) for key in after
+        key: quantity_estimate(after[key], before[key], effective, bounded=key in bounded)
+        for key in after
     }
 
 
-def bits(values: Field, prior: Field, effective: float) -> float:
+def information_gain(values: Field, prior: Field, effective: float) -> float:
     """Kullback and Leibler's information of the posterior over the prior, in bits; 0 where chance makes as much.
 
     By histogram over classes that were equally probable before, less what so few draws make of

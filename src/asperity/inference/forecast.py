@@ -12,16 +12,22 @@ from asperity.case import read_amount
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
-from asperity.inference.drifting_contact import Course, Extra, Walked, between_knots, tabulated
+from asperity.inference.drifting_contact import (
+    Course,
+    CourseParameters,
+    FilteredCourse,
+    between_knots,
+    tabulated,
+)
 from asperity.inference.emulator import Emulator
 from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law
 from asperity.inference.observations import Observation
 from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.posterior import joined, taken
 from asperity.inference.priors import si
-from asperity.inference.sampling import RULED_OUT, Pool, Sampled, importance
+from asperity.inference.sampling import RULED_OUT, Pool, WeightedSamples, importance
 from asperity.inference.settings import Setting
-from asperity.inference.visits import Series, series_of
+from asperity.inference.visits import VisitSeries, visit_series
 from asperity.monitoring import Bands
 
 ENOUGH, COURSES = 400.0, 1500  # effective draws of each model; courses that are let run on
@@ -83,7 +89,7 @@ class Forecast:
 
     limit: Limit
     drifting: str
-    series: Series
+    series: VisitSeries
     rising: bool
     log_odds: float
     already: float
@@ -200,7 +206,7 @@ def read_limit(text: str, setting: Setting) -> Limit:
 class _Model(NamedTuple):
     course: Course
     moving: bool
-    sampled: Sampled
+    sampled: WeightedSamples
 
 
 def forecast_observations(
@@ -239,7 +245,7 @@ def forecast_observations(
     limit = Limit(*limit)
     drifting = drifting or ("sq_m" if limit.key == CLR else limit.key)
     require_limit(setting, limit, drifting)
-    series = series_of(observations)
+    series = visit_series(observations)
     forward = Forward(setting, emulator, series.places)
     models, best = [], -np.inf
     for law in laws:
@@ -344,7 +350,10 @@ def _let_run(
     course, weights = model.course, model.sampled.weights
     places = (rng.random() + np.arange(count)) / count
     z = model.sampled.z[np.minimum(np.searchsorted(np.cumsum(weights), places), len(weights) - 1)]
-    extra, walked = Extra.of(z[:, course.forward.dims :]), course.walk(z, moving=model.moving)
+    extra, walked = (
+        CourseParameters.of(z[:, course.forward.dims :]),
+        course.walk(z, moving=model.moving),
+    )
     share, speed, error = _drawn(walked, rng)
     ahead = _run_on(share, speed, extra.restless if model.moving else np.zeros(count), rng)
     unknown = course.forward.setting.unknowns[course.column]
@@ -367,7 +376,7 @@ def _let_run(
     )
 
 
-def _drawn(walked: Walked, rng: np.random.Generator) -> Field:
+def _drawn(walked: FilteredCourse, rng: np.random.Generator) -> Field:
     """Share, drift and error of each contact at the last visit, (3, n)."""
     values, axes = np.linalg.eigh(walked.covariance)
     drawn = np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(values.shape)

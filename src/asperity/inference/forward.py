@@ -18,8 +18,8 @@ from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 from asperity.coupling import NoiseExcitation
-from asperity.inference.emulator import Emulator, GridError
-from asperity.inference.observations import Point
+from asperity.inference.emulator import Emulator, EmulatorGridError
+from asperity.inference.observations import OperatingPoint
 from asperity.inference.outputs import CAR, CLR, DAMPING, OUTPUTS, STIFFNESS
 from asperity.inference.priors import Unknown, share_of
 from asperity.inference.settings import GRID_ERROR, LOAD, OFFSET, SPEED, TEMPERATURE, Setting
@@ -30,7 +30,7 @@ LEAST_SHARE = 1e-4  # of the load: below it, its logarithm means nothing
 LEAST_DAMPING = 1e-4
 
 
-class Shown(NamedTuple):
+class ChannelPrediction(NamedTuple):
     """What a law says that recordings show: arrays of (unknowns, operating points); logarithms, and their deviations.
 
     That of CRFA is the emulator's of CAR. `lever` is by how much ln CRF moves with the law's
@@ -58,7 +58,7 @@ class Forward:
 
     setting: Setting
     emulator: Emulator
-    points: tuple[Point, ...]
+    points: tuple[OperatingPoint, ...]
 
     def __post_init__(self) -> None:
         for point in self.points:
@@ -118,7 +118,7 @@ class Forward:
         z_grid = self.unknown(z, GRID_ERROR, 0.0)[:, None]
         found: dict[str, tuple[Field, Field]] = {}
         for key, (mean, std) in answers.items():
-            error = self.emulator.grid.get(key, GridError())
+            error = self.emulator.grid.get(key, EmulatorGridError())
             found[key] = mean.reshape(rows, places) + error.at(z_grid), std.reshape(rows, places)
         return found
 
@@ -153,7 +153,9 @@ class Forward:
         model = self.setting.case.vibration
         return model is not None and isinstance(model.excitation, NoiseExcitation)
 
-    def shown(self, z: Field, law: Law, *, heights: bool = True, deviations: bool = True) -> Shown:
+    def shown(
+        self, z: Field, law: Law, *, heights: bool = True, deviations: bool = True
+    ) -> ChannelPrediction:
         """What recordings show at unknowns z, shape (n, dims), by a law.
 
         CRFA is nan where no `heights` are wanted, deviations are 0 where none are.
@@ -168,7 +170,7 @@ class Forward:
         emulated: Mapping[str, tuple[Field, Field]],
         *,
         heights: bool = True,
-    ) -> Shown:
+    ) -> ChannelPrediction:
         """The same of outputs that are emulated already: those of `outputs` at least."""
         model = self.setting.case.vibration
         assert model is not None
@@ -189,7 +191,9 @@ class Forward:
         crfa, crfa_std = np.full(crf.shape, np.nan), np.full(crf.shape, np.nan)
         if heights and self._noisy:
             crfa, crfa_std = self._height(z, crf, damping, emulated[CAR])
-        return Shown(crf, 0.5 * stiffness_std, damping, damping_std, crfa, crfa_std, lever)
+        return ChannelPrediction(
+            crf, 0.5 * stiffness_std, damping, damping_std, crfa, crfa_std, lever
+        )
 
     def _sphere(self, emulated: tuple[Field, Field], loads: Field) -> tuple[Field, Field, Field]:
         """Logarithm of the sphere's stiffness under CLR F, its deviation, and ln(CLR F)."""
@@ -236,7 +240,7 @@ class Forward:
         return np.asarray(height), power * exponent * emulated[1] / (OUTPUTS[CAR].slope(car) * car)
 
 
-def _operating_value(setting: Setting, point: Point, key: str) -> float:
+def _operating_value(setting: Setting, point: OperatingPoint, key: str) -> float:
     """An operating quantity of a point, SI; the case's own temperature where the point has none."""
     if key == LOAD:
         return point.load_n
@@ -247,7 +251,7 @@ def _operating_value(setting: Setting, point: Point, key: str) -> float:
     return float(setting.case.contents.lubricant.temperature)  # type: ignore[union-attr]
 
 
-def require_inside(setting: Setting, point: Point) -> None:
+def require_inside(setting: Setting, point: OperatingPoint) -> None:
     """BadInput for an operating point that the emulator does not reach, or a temperature that its oil has not."""
     if point.temperature_k is not None and all(
         entry.key != TEMPERATURE for entry in setting.operating

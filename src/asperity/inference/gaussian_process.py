@@ -23,7 +23,7 @@ AT_ONCE = 512  # points asked at a time: their kernel stays in the processor's c
 
 
 @dataclass(frozen=True)
-class Process:
+class GaussianProcess:
     """A linear trend, and a Gaussian process (Matern 5/2, a length each axis) of what is left, on its own scale.
 
     Parameters
@@ -143,7 +143,9 @@ def require_learning() -> None:
         ) from None
 
 
-def fit_process(x: Field, y: Field, noise: Field, start: Process | None = None) -> Process:
+def fit_process(
+    x: Field, y: Field, noise: Field, start: GaussianProcess | None = None
+) -> GaussianProcess:
     """The likeliest process through values with known noise, from `start` or from lengths of the whole cube."""
     require_learning()
     from sklearn.exceptions import ConvergenceWarning
@@ -154,7 +156,7 @@ def fit_process(x: Field, y: Field, noise: Field, start: Process | None = None) 
     level, rough = 1.0, 0.01
     if start is not None:
         lengths, level, rough = start.lengths, start.level, start.rough
-    plain = Process(x, y, noise, lengths, level, rough)
+    plain = GaussianProcess(x, y, noise, lengths, level, rough)
     kernel = ConstantKernel(level, LEVELS) * Matern(lengths, LENGTHS, nu=2.5) + WhiteKernel(
         rough, ROUGHNESS
     )
@@ -167,7 +169,7 @@ def fit_process(x: Field, y: Field, noise: Field, start: Process | None = None) 
         )  # a length at its bound is one that does not matter
         learner.fit(x, (y - _basis(x) @ plain._trend) / plain._scale)
     product, white = learner.kernel_.k1, learner.kernel_.k2
-    return Process(
+    return GaussianProcess(
         x,
         y,
         noise,

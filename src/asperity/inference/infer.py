@@ -13,7 +13,7 @@ from asperity.inference.forecast import Forecast, Limit, forecast_observations, 
 from asperity.inference.forward import Forward, Law
 from asperity.inference.inference import Inference
 from asperity.inference.next_point import candidate_points, expected_information
-from asperity.inference.observations import Observation, Point, points_of
+from asperity.inference.observations import Observation, OperatingPoint, operating_points
 from asperity.inference.posterior import (
     Draws,
     Sampler,
@@ -26,10 +26,10 @@ from asperity.inference.posterior import (
     with_point,
 )
 from asperity.inference.priors import share_of
-from asperity.inference.recording_input import Listened, listen
+from asperity.inference.recording_input import ObservedSeries, observe_recordings
 from asperity.inference.sampling import Pool
-from asperity.inference.settings import Setting, setting_of
-from asperity.inference.visits import series_of
+from asperity.inference.settings import Setting, inference_setting
+from asperity.inference.visits import visit_series
 from asperity.simulation import WearHistory, load_wear
 from asperity.study import StudyProgress
 
@@ -62,11 +62,11 @@ def infer_contact(
     ----------
     recordings : files and folders, or each an `Observation`; none at all gives what is known before any
     case : the contact; its [infer] says what is not known of it
-    table : csv of what each file was recorded at, see `listen`
+    table : csv of what each file was recorded at, see `observe_recordings`
     emulator : one that is there, or the folder to keep it in; None: one in the user's cache. Building it solves
         hundreds of contacts, once
     sampler : "importance", seconds; "nested", minutes, by dynesty, to check the other
-    extend : by how many points the emulator may be extended where the posterior is, see `with_further`
+    extend : by how many points the emulator may be extended where the posterior is, see `refine_emulator`
     seed : of all that is drawn; the same seed gives the same numbers
     workers, executor, progress : see `asperity.study.run_study`, of the emulator's contacts
 
@@ -78,25 +78,29 @@ def infer_contact(
         where a posterior was not found, or too many of the emulator's contacts fail.
     """
     require_choice("sampler", sampler, SAMPLERS)
-    setting = setting_of(case)
+    setting = inference_setting(case)
     given = [one for one in recordings if isinstance(one, Observation)]
     files = [one for one in recordings if not isinstance(one, Observation)]
     if given and files:
         raise BadInput(
             "recordings must be files or observations, got both; infer one after the other"
         )
-    heard = listen(files, setting, table=table) if files else Listened(observations=tuple(given))
+    heard = (
+        observe_recordings(files, setting, table=table)
+        if files
+        else ObservedSeries(observations=tuple(given))
+    )
     if not isinstance(emulator, Emulator):
         emulator = build_emulator(
             setting, folder=emulator, executor=executor, workers=workers, progress=progress
         )
-    found = infer_heard(setting, emulator, heard, sampler=sampler, seed=seed)
-    return with_further(
+    found = infer_series(setting, emulator, heard, sampler=sampler, seed=seed)
+    return refine_emulator(
         found, extend, sampler=sampler, executor=executor, workers=workers, progress=progress
     )
 
 
-def with_further(
+def refine_emulator(
     found: Inference, most: int, *, sampler: Sampler = "importance", **how: Any
 ) -> Inference:
     """The same with an emulator that is extended where the posterior is, by up to `most` points; and a note of it.
@@ -140,15 +144,15 @@ def with_further(
     return replace(found, notes=(*found.notes, f"{said}."))
 
 
-def infer_heard(
+def infer_series(
     setting: Setting,
     emulator: Emulator,
-    heard: Listened,
+    heard: ObservedSeries,
     *,
     sampler: Sampler = "importance",
     seed: int = 0,
 ) -> Inference:
-    """The same, of what `listen` heard."""
+    """The same, of what `observe_recordings` heard."""
     return infer_observations(
         setting,
         emulator,
@@ -160,17 +164,17 @@ def infer_heard(
     )
 
 
-def forecast_heard(
+def forecast_series(
     setting: Setting,
     emulator: Emulator,
-    heard: Listened,
+    heard: ObservedSeries,
     limit: Limit,
     *,
     worn: str | Path | WearHistory | None = None,
     seed: int = 0,
     x_name: str = "",
 ) -> Forecast:
-    """`forecast_observations` of what `listen` heard; `worn` is a history of `asperity wear`, whose drift is expected.
+    """`forecast_observations` of what `observe_recordings` heard; `worn` is a history of `asperity wear`, whose drift is expected.
 
     Its hours are those of x, from the first recording on. `x_name` is what x is, that of the track
     where it has one.
@@ -180,7 +184,7 @@ def forecast_heard(
     drift = None
     if worn is not None and times:
         require_limit(setting, limit, worn=True)
-        series_of(heard.observations)  # refuses what is no series
+        visit_series(heard.observations)  # refuses what is no series
         history = worn if isinstance(worn, WearHistory) else load_wear(worn)
         drift = wear_drift(setting, history, max(times) - min(times))
     return forecast_observations(
@@ -214,7 +218,7 @@ def wear_drift(setting: Setting, history: WearHistory, hours: float) -> tuple[fl
     return mean, max(abs(mean), LEAST_DRIFT_STD)
 
 
-def latest(heard: Listened) -> Listened:
+def latest_observations(heard: ObservedSeries) -> ObservedSeries:
     """The last recording at each operating point alone, of the last tenth of the series: the contact has changed."""
     times = [one.x for one in heard.observations]
     begin = max(times) - LATELY * (max(times) - min(times))
@@ -241,8 +245,8 @@ def infer_observations(
 ) -> Inference:
     """The same, of a setting and its emulator; `silent` are recordings that said nothing, and why."""
     conditions = setting.case.conditions
-    own = Point(conditions.load, conditions.entrainment_speed)
-    forward = Forward(setting, emulator, (own, *points_of(observations)))
+    own = OperatingPoint(conditions.load, conditions.entrainment_speed)
+    forward = Forward(setting, emulator, (own, *operating_points(observations)))
     return _inferred(
         forward, tuple(observations), new_pools(forward, seed), sampler, seed, silent, notes
     )
@@ -258,7 +262,7 @@ def with_observation(inference: Inference, observation: Observation) -> Inferenc
     """
     observations = (*inference.observations, observation)
     before = inference.forward
-    points = (before.points[0], *points_of(observations))
+    points = (before.points[0], *operating_points(observations))
     forward, pools = replace(before, points=points), dict(inference.pools)
     if not inference.observations:
         pools = new_pools(forward, inference.seed)

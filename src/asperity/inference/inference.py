@@ -9,19 +9,19 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
 from asperity.inference.emulator import Emulator
-from asperity.inference.estimates import Estimate, estimates
+from asperity.inference.estimates import Estimate, quantity_estimates
 from asperity.inference.forward import LAWS, Forward, Law
 from asperity.inference.next_point import NextPoint
-from asperity.inference.observations import Observation, Point
+from asperity.inference.observations import Observation, OperatingPoint
 from asperity.inference.outputs import CLR, FILM, OUTPUTS
-from asperity.inference.posterior import Draws, Model
+from asperity.inference.posterior import Draws, ModelEvidence
 from asperity.inference.sampling import Pool
 from asperity.inference.settings import Setting
 from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW
 
 STAGES = ("full film", "mixed lubrication", "boundary lubrication")
-CRUCIAL = (CLR, "sq_m")  # what the product is asked for
-TOLD_BITS = (
+KEY_QUANTITIES = (CLR, "sq_m")  # what the product is asked for
+IDENTIFIED_BITS = (
     1.0  # of CLR or Sq, from which on it is called told: half of what was possible is ruled out
 )
 TIED = 0.7  # correlation from which on two unknowns are said to stand in for one another
@@ -42,7 +42,7 @@ class PointEstimates:
         "stage",
     )
 
-    point: Point
+    point: OperatingPoint
     state: Mapping[str, Estimate]
     stages: Mapping[str, float]
 
@@ -90,7 +90,7 @@ class Inference:
     forward: Forward
     observations: tuple[Observation, ...]
     silent: tuple[tuple[str, str], ...]
-    models: tuple[Model, ...]
+    models: tuple[ModelEvidence, ...]
     prior: Draws
     draws: Draws
     exact: Draws
@@ -129,9 +129,11 @@ class Inference:
         """Every quantity at the case's own load and speed, with what was learned of it."""
         draws = self.draws if discrepancy else self.exact
         bounded = frozenset(unknown.key for unknown in self.setting.unknowns if unknown.bounded)
-        return estimates(self.values(draws), self.values(self.prior), draws.effective, bounded)
+        return quantity_estimates(
+            self.values(draws), self.values(self.prior), draws.effective, bounded
+        )
 
-    def at_points(self) -> tuple[PointEstimates, ...]:
+    def point_estimates(self) -> tuple[PointEstimates, ...]:
         """The contact's state at each operating point that was recorded."""
         found = []
         for place, point in enumerate(self.forward.points):
@@ -139,7 +141,7 @@ class Inference:
                 continue
             after, before = self.values(self.draws, place), self.values(self.prior, place)
             keys = [*self.draws.states, *(["lambda_ratio"] if "lambda_ratio" in after else [])]
-            state = estimates(
+            state = quantity_estimates(
                 {key: after[key] for key in keys},
                 {key: before[key] for key in keys},
                 self.draws.effective,
@@ -148,7 +150,7 @@ class Inference:
             found.append(PointEstimates(point, state, stages(after[CLR])))
         return tuple(found)
 
-    def heard_again(self) -> Field:
+    def posterior_predictive(self) -> Field:
         """Logarithms of CRF that possible contacts would show, shape (n, points), with errors of emulator and law."""
         rng = np.random.default_rng([self.seed, 7])
         heard = np.empty((len(self.draws.z), len(self.forward.points)))
@@ -176,7 +178,11 @@ class Inference:
 
     def _untold(self) -> list[str]:
         known = self.posterior()
-        return [key for key in CRUCIAL if key in known and known[key].information_bits < TOLD_BITS]
+        return [
+            key
+            for key in KEY_QUANTITIES
+            if key in known and known[key].information_bits < IDENTIFIED_BITS
+        ]
 
     @property
     def reason(self) -> str:
@@ -215,7 +221,7 @@ class Inference:
         return names[0], names[1]
 
     @property
-    def grid_points(self) -> tuple[float, float]:
+    def grid_effect(self) -> tuple[float, float]:
         """What twice the cells change of CLR at its median, and half the width of its interval; shares of the load."""
         one, scale = self.posterior()[CLR], OUTPUTS[CLR]
         moved = self.emulator.grid[CLR].rms if CLR in self.emulator.grid else 0.0
@@ -236,7 +242,7 @@ class Inference:
                 )
         if not self.observations:
             return tuple(said)
-        by_grid, half = self.grid_points
+        by_grid, half = self.grid_effect
         if by_grid > half:
             said.append(
                 f"The emulator's own grid is off by {100 * by_grid:.1f} points of CLR, more than half the interval's "
@@ -261,17 +267,21 @@ class Inference:
             return f"Cannot be told: {self.reason}. What is stated is what was known before."
         known, following = self.posterior(), self.next_point
         parts = []
-        for key in CRUCIAL:
+        for key in KEY_QUANTITIES:
             if key in known:
                 one, shown = known[key], quantity(key)
                 interval = shown.interval(one.low, one.high)
                 value = (
                     f"{shown.text(one.median)} ({interval}, 90 %)"
-                    if one.information_bits >= TOLD_BITS
+                    if one.information_bits >= IDENTIFIED_BITS
                     else "not told"
                 )
                 parts.append(f"{shown.short} {value}")
-        told = [key for key in CRUCIAL if key in known and known[key].information_bits >= TOLD_BITS]
+        told = [
+            key
+            for key in KEY_QUANTITIES
+            if key in known and known[key].information_bits >= IDENTIFIED_BITS
+        ]
         first = "; ".join(parts) if told else f"Cannot be told: {self.reason}"
         why = f" ({self.reason})" if told and self.reason else ""
         load, speed = quantity("load_n"), quantity("entrainment_speed_m_s")
@@ -294,7 +304,7 @@ class Inference:
             "stages": stages(self.values(self.draws)[CLR]),
             "load_n": conditions.load,
             "entrainment_m_s": conditions.entrainment_speed,
-            "points": [one.scalars() for one in self.at_points()],
+            "points": [one.scalars() for one in self.point_estimates()],
             "next_point": self.next_point.scalars(),
             "evidence": [model.scalars() for model in self.models],
             "law_error": self.law_error if self.observations else None,

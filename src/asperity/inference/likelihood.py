@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.inference.forward import Shown
-from asperity.inference.observations import Point, likeness
+from asperity.inference.forward import ChannelPrediction
+from asperity.inference.observations import OperatingPoint, point_similarity
 
 SIZES = (0.005, 0.02, 0.08)  # of the law's error, relative to CRF: 3, 12 and 60 % of a load share
 WEIGHTS: Mapping[str, float] = {
@@ -37,7 +37,9 @@ EMULATED_HEIGHT_STD = 0.05  # of ln CRFA beyond what CAR's deviation makes: its 
 AT_ONCE = 2**20  # numbers of covariances that are held at a time
 
 
-def log_likelihood(shown: Shown, points: Sequence[Point], *, discrepancy: bool) -> Field:
+def log_likelihood(
+    shown: ChannelPrediction, points: Sequence[OperatingPoint], *, discrepancy: bool
+) -> Field:
     """Logarithm of p(heard | unknowns), shape (n,); `shown` has a column for each of the points."""
     sizes = SIZES if discrepancy else (0.0,)
     whole = [log_at_sizes(shown, points, channel, sizes) for channel in WEIGHTS]
@@ -45,7 +47,10 @@ def log_likelihood(shown: Shown, points: Sequence[Point], *, discrepancy: bool) 
 
 
 def log_at_sizes(
-    shown: Shown, points: Sequence[Point], channel: str, sizes: Sequence[float] = SIZES
+    shown: ChannelPrediction,
+    points: Sequence[OperatingPoint],
+    channel: str,
+    sizes: Sequence[float] = SIZES,
 ) -> Field:
     """The same of one channel, for each size of the law's error, shape (sizes, n)."""
     value, std = _heard(points, channel)
@@ -54,7 +59,7 @@ def log_at_sizes(
     logs = np.zeros((len(sizes), len(mean)))
     if not here.any():
         return logs
-    near = likeness(points)[np.ix_(here, here)]
+    near = point_similarity(points)[np.ix_(here, here)]
     for rows in _parts(len(mean), int(here.sum())):
         rest = value[here] - mean[rows][:, here]
         known = emulated_errors(channel, _deviation(shown, channel)[rows][:, here], near) + np.diag(
@@ -66,7 +71,7 @@ def log_at_sizes(
     return logs
 
 
-class Foretold(NamedTuple):
+class PredictiveMixture(NamedTuple):
     """What contacts would show: normal parts, one for each size of the law's error, shape (sizes, n, points) each.
 
     `log_share` is ln probability of each part, `std` is without what a measurement adds.
@@ -88,16 +93,19 @@ class Foretold(NamedTuple):
         return np.asarray(peak + np.log(sum(np.exp(one - peak) for one in parts)))
 
 
-def foretold(
-    shown: Shown, points: Sequence[Point], channel: str, sizes: Sequence[float] = SIZES
-) -> Foretold:
+def predictive_mixture(
+    shown: ChannelPrediction,
+    points: Sequence[OperatingPoint],
+    channel: str,
+    sizes: Sequence[float] = SIZES,
+) -> PredictiveMixture:
     """What contacts would show at all points, by what was heard at some of them.
 
     The errors of law and emulator are those that the likelihood counts, given what they were where
     something was heard; so are the sizes of the law's.
     """
     value, measured = _heard(points, channel)
-    mean, lever, near = getattr(shown, channel), shown.lever, likeness(points)
+    mean, lever, near = getattr(shown, channel), shown.lever, point_similarity(points)
     here = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
     logs = log_at_sizes(shown, points, channel, sizes)
     share = logs - np.logaddexp.reduce(logs, axis=0)
@@ -118,10 +126,10 @@ def foretold(
                 )
                 variance -= np.einsum("nhp,nhp->np", across, taught)
             std[number, rows] = np.sqrt(np.maximum(variance, 0.0))
-    return Foretold(np.broadcast_to(share[:, :, None], std.shape), expected, std)
+    return PredictiveMixture(np.broadcast_to(share[:, :, None], std.shape), expected, std)
 
 
-def _heard(points: Sequence[Point], channel: str) -> tuple[Field, Field]:
+def _heard(points: Sequence[OperatingPoint], channel: str) -> tuple[Field, Field]:
     """Values and deviations of a channel at points."""
     heard = [getattr(point, channel) for point in points]
     return np.array([one.value for one in heard]), np.array([one.std for one in heard])
@@ -161,7 +169,7 @@ def emulated_errors(channel: str, std: Field, near: Field) -> Field:
     return np.asarray(errors + GAIN_STD**2 if channel == "crfa" else errors)
 
 
-def _deviation(shown: Shown, channel: str) -> Field:
+def _deviation(shown: ChannelPrediction, channel: str) -> Field:
     std = getattr(shown, f"{channel}_std")
     return np.asarray(np.hypot(std, EMULATED_HEIGHT_STD) if channel == "crfa" else std)
 

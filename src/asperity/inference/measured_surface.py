@@ -16,7 +16,7 @@ INSTRUMENT_STD = 0.03  # of Sq, relative: instruments differ by that on the same
 PARTS = 2  # of a map along each axis: how much Sq differs from place to place
 
 
-def with_measured(setting: Setting, measured: MeasuredSurface) -> tuple[Setting, str]:
+def with_measured_surface(setting: Setting, measured: MeasuredSurface) -> tuple[Setting, str]:
     """A setting whose Sq is known as a surface was measured, within the range of the emulator; and a sentence of it.
 
     Form is removed (a paraboloid). The deviation is that of the parts of the map, over the root of

@@ -9,8 +9,8 @@ from scipy.special import logsumexp
 
 from asperity.core.arrays import Field
 from asperity.inference.forward import LAWS, Forward
-from asperity.inference.likelihood import SIZES, Foretold, foretold
-from asperity.inference.observations import Point
+from asperity.inference.likelihood import SIZES, PredictiveMixture, predictive_mixture
+from asperity.inference.observations import OperatingPoint
 from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.posterior import Draws
 from asperity.inference.priors import Unknown
@@ -56,22 +56,24 @@ def candidate_points(setting: Setting, across: int = ACROSS) -> tuple[tuple[floa
     return tuple((load, speed) for load in axes[0] for speed in axes[1])
 
 
-class WouldShow(NamedTuple):
+class PredictedRecordings(NamedTuple):
     """What possible contacts would show at operating points, by all that was heard; arrays of (..., contacts, points).
 
     `channels` are ln CRF and ln ζ, `heard` is whether there is a line.
     """
 
-    channels: Mapping[str, Foretold]
+    channels: Mapping[str, PredictiveMixture]
     heard: Field
 
 
-def would_show(forward: Forward, draws: Draws, places: Sequence[Point]) -> WouldShow:
+def predict_recordings(
+    forward: Forward, draws: Draws, places: Sequence[OperatingPoint]
+) -> PredictedRecordings:
     """What contacts of the posterior would show at places: of the errors there is known what was heard of them."""
     known = tuple(point for point in forward.points if not np.isnan(point.crf.value))
     there = replace(forward, points=(*known, *places))
     shape = len(SIZES), len(draws.z), len(places)
-    channels = {key: Foretold(*(np.empty(shape) for _ in range(3))) for key in USUAL}
+    channels = {key: PredictiveMixture(*(np.empty(shape) for _ in range(3))) for key in USUAL}
     heard = np.ones(shape[1:], dtype=bool)
     for number, law in enumerate(LAWS):
         of_law = draws.law == number
@@ -82,9 +84,9 @@ def would_show(forward: Forward, draws: Draws, places: Sequence[Point]) -> Would
         if CLR in emulated:
             heard[of_law] = OUTPUTS[CLR].back(emulated[CLR][0][:, len(known) :]) > SILENT
         for key, whole in channels.items():
-            for array, own in zip(whole, foretold(shown, there.points, key), strict=True):
+            for array, own in zip(whole, predictive_mixture(shown, there.points, key), strict=True):
                 array[:, of_law] = own[:, :, len(known) :]
-    return WouldShow(channels, heard)
+    return PredictedRecordings(channels, heard)
 
 
 def expected_information(
@@ -104,8 +106,8 @@ def expected_information(
     measured = dict(USUAL)
     if known:
         measured["crf"] = float(np.median([point.crf.std for point in known]))
-    places = [Point(load, speed, temperature) for load, speed in candidates]
-    shown = would_show(forward, draws.taken(rows), places)
+    places = [OperatingPoint(load, speed, temperature) for load, speed in candidates]
+    shown = predict_recordings(forward, draws.taken(rows), places)
     chances = {
         key: (rng.random(len(rows)), rng.standard_normal(len(rows))) for key in USUAL
     }  # the same everywhere
@@ -125,12 +127,12 @@ def expected_information(
     ]
 
 
-def at_place(whole: Foretold, place: int) -> Foretold:
+def at_place(whole: PredictiveMixture, place: int) -> PredictiveMixture:
     """At one of the points: (sizes, contacts)."""
-    return Foretold(*(array[:, :, place] for array in whole))
+    return PredictiveMixture(*(array[:, :, place] for array in whole))
 
 
-def _information(channels: Sequence[tuple[Foretold, float, tuple[Field, Field]]]) -> float:
+def _information(channels: Sequence[tuple[PredictiveMixture, float, tuple[Field, Field]]]) -> float:
     """Mutual information, in bits, of a contact's number and what it shows, of independent channels.
 
     Each is what contacts would show, what a measurement adds, and chance: uniform and normal

@@ -72,7 +72,7 @@ class Observation:
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class LogMeasurement:
     """A logarithm that was measured at an operating point, and its standard deviation; nan where it was not."""
 
     value: float = math.nan
@@ -80,19 +80,19 @@ class Heard:
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class OperatingPoint:
     """An operating point, and what its recordings say together."""
 
     load_n: float
     entrainment_m_s: float
     temperature_k: float | None = None
-    crf: Heard = field(default_factory=Heard)
-    damping: Heard = field(default_factory=Heard)
-    crfa: Heard = field(default_factory=Heard)
+    crf: LogMeasurement = field(default_factory=LogMeasurement)
+    damping: LogMeasurement = field(default_factory=LogMeasurement)
+    crfa: LogMeasurement = field(default_factory=LogMeasurement)
     names: tuple[str, ...] = ()
 
 
-def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
+def operating_points(observations: Sequence[Observation]) -> tuple[OperatingPoint, ...]:
     """Recordings by their operating points, in order: those of one point are repeats of one thing.
 
     Raises
@@ -105,7 +105,7 @@ def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
     for one in observations:
         groups.setdefault(one.place, []).append(one)
     return tuple(
-        Point(
+        OperatingPoint(
             *place,
             crf=_together(
                 [(one.crf_hz, one.crf_std_hz, one.crf_shared_std_hz) for one in group], LEAST_STD
@@ -118,14 +118,14 @@ def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
     )
 
 
-def conditions(point: Point) -> Field:
+def conditions(point: OperatingPoint) -> Field:
     """Logarithms of load and speed, and temperature [K]."""
     return np.array(
         [math.log(point.load_n), math.log(point.entrainment_m_s), point.temperature_k or 0.0]
     )
 
 
-def likeness(points: Sequence[Point]) -> Field:
+def point_similarity(points: Sequence[OperatingPoint]) -> Field:
     """How far what is a point's own is the others' too, as a correlation, (points, points): 1 at one place."""
     at = np.array([conditions(point) for point in points]) / ALIKE
     return np.asarray(np.exp(-0.5 * np.sum((at[:, None] - at) ** 2, axis=-1)))
@@ -139,7 +139,7 @@ def require_temperatures(observations: Sequence[Observation]) -> None:
         )
 
 
-def _together(heard: Sequence[tuple[float, float, float]], least: float = 0.0) -> Heard:
+def _together(heard: Sequence[tuple[float, float, float]], least: float = 0.0) -> LogMeasurement:
     """The logarithm that repeats measure, of values, deviations, and what of these is common to all of them.
 
     Their weighted mean, and no surer of it than their scatter lets them be, nor than what they
@@ -157,7 +157,7 @@ def _together(heard: Sequence[tuple[float, float, float]], least: float = 0.0) -
         ]
     )
     if not len(known):
-        return Heard()
+        return LogMeasurement()
     values, stds, common = known.T
     weights = stds**-2.0 / np.sum(stds**-2.0)
     mean = float(weights @ values)
@@ -165,4 +165,4 @@ def _together(heard: Sequence[tuple[float, float, float]], least: float = 0.0) -
     if len(known) > 1:
         scatter = float(np.sqrt(np.sum((values - mean) ** 2) / (len(known) - 1) / len(known)))
         std = max(std, scatter)
-    return Heard(mean, math.hypot(std, float(weights @ common)))
+    return LogMeasurement(mean, math.hypot(std, float(weights @ common)))

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError
-from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law, Shown
+from asperity.inference.forward import LAWS, LEAST_SHARE, ChannelPrediction, Forward, Law
 from asperity.inference.likelihood import (
     SIZES,
     WEIGHTS,
@@ -22,14 +22,14 @@ from asperity.inference.likelihood import (
     log_at_sizes,
     log_likelihood,
 )
-from asperity.inference.observations import Point, likeness
+from asperity.inference.observations import OperatingPoint, point_similarity
 from asperity.inference.outputs import CAR, CLR, FILM, FRICTION, OUTPUTS
 from asperity.inference.sampling import (
     FEWEST,
     QUICKLY,
     RULED_OUT,
     Pool,
-    Sampled,
+    WeightedSamples,
     importance,
     nested,
 )
@@ -43,7 +43,7 @@ MODELS: tuple[tuple[Law, bool], ...] = tuple(
 
 
 @dataclass(frozen=True)
-class Model:
+class ModelEvidence:
     """A law, with or without its error, and how probable what was heard makes it among all models.
 
     `found` is whether its posterior could be sampled; one that is ruled out need not be.
@@ -91,7 +91,7 @@ def sample_models(
     sampler: Sampler,
     seed: int,
     quickly: bool = False,
-) -> tuple[tuple[Model, ...], dict[tuple[Law, bool], Sampled]]:
+) -> tuple[tuple[ModelEvidence, ...], dict[tuple[Law, bool], WeightedSamples]]:
     """Every model sampled, with its evidence; `quickly` is enough where draws were learnt before.
 
     Raises
@@ -100,7 +100,7 @@ def sample_models(
         where the posterior of a model that counts was not found.
     """
     forward = forward.heard
-    sampled: dict[tuple[Law, bool], Sampled] = {}
+    sampled: dict[tuple[Law, bool], WeightedSamples] = {}
     how: dict[str, Any] = {"enough": QUICKLY, "probed": 0} if quickly else {}
     best = -np.inf
     for law, discrepancy in _likeliest_first(forward, pools):
@@ -118,7 +118,7 @@ def sample_models(
             )
     total = logsumexp([one.log_evidence for one in sampled.values()])
     models = tuple(
-        Model(
+        ModelEvidence(
             law,
             discrepancy,
             one.log_evidence,
@@ -143,11 +143,13 @@ def _likeliest_first(forward: Forward, pools: Mapping[Law, Pool]) -> list[tuple[
     return sorted(MODELS, key=likelihood, reverse=True)
 
 
-def _target(points: tuple[Point, ...], *, discrepancy: bool) -> Callable[[Shown], Field]:
+def _target(
+    points: tuple[OperatingPoint, ...], *, discrepancy: bool
+) -> Callable[[ChannelPrediction], Field]:
     return lambda shown: log_likelihood(shown, points, discrepancy=discrepancy)
 
 
-def _evaluate(forward: Forward, law: Law) -> Callable[[Field], Shown]:
+def _evaluate(forward: Forward, law: Law) -> Callable[[Field], ChannelPrediction]:
     return lambda z: forward.shown(z, law)
 
 
@@ -167,7 +169,9 @@ def with_point(pools: Mapping[Law, Pool], forward: Forward, added: Forward) -> d
             [_target(before, discrepancy=flag)(whole.shown) for flag in (True, False)]
         )
         more = added.shown(pool.z, law)
-        columns = Shown(*(np.hstack(pair) for pair in zip(pool.shown, more, strict=True)))
+        columns = ChannelPrediction(
+            *(np.hstack(pair) for pair in zip(pool.shown, more, strict=True))
+        )
         extended[law] = pool.with_columns(_evaluate(forward, law), columns)
     return extended
 
@@ -186,11 +190,15 @@ def joined(first: Columns, second: Columns) -> Columns:
 
 
 # Draws
-# ---------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------
 
 
 def posterior_draws(
-    forward: Forward, sampled: Mapping[tuple[Law, bool], Sampled], *, discrepancy: bool, seed: int
+    forward: Forward,
+    sampled: Mapping[tuple[Law, bool], WeightedSamples],
+    *,
+    discrepancy: bool,
+    seed: int,
 ) -> Draws:
     """Equally probable contacts by both laws, weighed by their evidence, with or without the laws' error."""
     rng = np.random.default_rng([seed, 4, discrepancy])
@@ -248,7 +256,7 @@ def prior_draws(forward: Forward, seed: int, known: Draws | None = None) -> Draw
 def _drawn(
     forward: Forward,
     law: Law,
-    sampled: Sampled,
+    sampled: WeightedSamples,
     count: int,
     rng: np.random.Generator,
     *,
@@ -274,7 +282,9 @@ def _drawn(
     return Draws(z, np.full(count, LAWS.index(law)), sizes, states, sampled.effective)
 
 
-def _sizes(shown: Shown, points: tuple[Point, ...], rng: np.random.Generator) -> dict[str, Field]:
+def _sizes(
+    shown: ChannelPrediction, points: tuple[OperatingPoint, ...], rng: np.random.Generator
+) -> dict[str, Field]:
     """How large the law's errors are, drawn for each contact from what was heard."""
     found = {}
     for channel, weight in WEIGHTS.items():
@@ -288,8 +298,8 @@ def _sizes(shown: Shown, points: tuple[Point, ...], rng: np.random.Generator) ->
 def _corrected(
     mean: Field,
     std: Field,
-    shown: Shown,
-    points: tuple[Point, ...],
+    shown: ChannelPrediction,
+    points: tuple[OperatingPoint, ...],
     size: Field,
     rng: np.random.Generator,
 ) -> Field:
@@ -300,7 +310,7 @@ def _corrected(
     """
     heard = np.array([point.crf.value for point in points])
     here = ~np.isnan(heard)
-    near = likeness(points)
+    near = point_similarity(points)
     emulator = emulated_errors("crf", std, near)
     errors = _drawn_normal(emulator, rng)
     if not here.any():

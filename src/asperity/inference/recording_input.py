@@ -18,7 +18,7 @@ from asperity.study import overrides_at
 
 
 @dataclass(frozen=True)
-class Listened:
+class ObservedSeries:
     """What a series of recordings gave: by default nothing.
 
     `silent` are the names of recordings without a usable resonance, and why; `notes` what was
@@ -31,7 +31,7 @@ class Listened:
     notes: tuple[str, ...] = ()
 
 
-def listen(
+def observe_recordings(
     paths: Sequence[str | Path],
     setting: Setting,
     *,
@@ -45,7 +45,7 @@ def listen(
     method: SeriesMethod | None = None,
     workers: int = 1,
     progress: Callable[[Reading], None] | None = None,
-) -> Listened:
+) -> ObservedSeries:
     """Track recordings with the present readers and methods, and put their operating points beside their resonances.
 
     Parameters
@@ -65,7 +65,7 @@ def listen(
     tracked = track_recordings(
         paths,
         case=setting.case,
-        band_hz=band_hz or band_of(setting),
+        band_hz=band_hz or resonance_band(setting),
         rate_hz=rate_hz,
         unit=unit,
         channel=channel,
@@ -76,10 +76,10 @@ def listen(
         workers=workers,
         progress=progress,
     )
-    return observed(tracked, setting.case)
+    return observations_from_track(tracked, setting.case)
 
 
-def band_of(setting: Setting) -> tuple[float, float]:
+def resonance_band(setting: Setting) -> tuple[float, float]:
     """Where the resonance of the asperities' own spring can lie [Hz], over all loads and masses that are possible."""
     model = setting.case.vibration
     assert model is not None
@@ -99,15 +99,17 @@ def band_of(setting: Setting) -> tuple[float, float]:
     return low * float(np.sqrt(model.mass / heavy)), high * float(np.sqrt(model.mass / light))
 
 
-def observed(tracked: Track, case: Case) -> Listened:
+def observations_from_track(tracked: Track, case: Case) -> ObservedSeries:
     """The resonances of a track with their operating points, and what was taken for granted."""
-    heard = observed_rows(
+    heard = observations_from_rows(
         [one.row() for one in tracked.recordings], case, comparable=tracked.comparable
     )
     return replace(heard, track=tracked, notes=(*tracked.notes, *heard.notes))
 
 
-def observed_rows(rows: Sequence[Mapping[str, Any]], case: Case, *, comparable: bool) -> Listened:
+def observations_from_rows(
+    rows: Sequence[Mapping[str, Any]], case: Case, *, comparable: bool
+) -> ObservedSeries:
     """The same of lines as `asperity track --json` and a store have them; CRFA counts where it is `comparable`."""
     observations, silent, assumed = [], [], set()
     for row in rows:
@@ -144,7 +146,7 @@ def observed_rows(rows: Sequence[Mapping[str, Any]], case: Case, *, comparable: 
         f"No table or sidecar says the {words[key]} of every recording; that of {case.source} was taken."
         for key in sorted(assumed)
     ]
-    return Listened(None, tuple(observations), tuple(silent), tuple(notes))
+    return ObservedSeries(None, tuple(observations), tuple(silent), tuple(notes))
 
 
 def _with_deviation(row: Mapping[str, Any], key: str, std: str) -> tuple[float, float]:

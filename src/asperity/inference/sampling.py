@@ -108,7 +108,7 @@ class Pool:
 
 
 @dataclass(frozen=True)
-class Sampled:
+class WeightedSamples:
     """A posterior as weighted draws: `z` (n, d), `weights` that sum to 1, ln evidence and its deviation."""
 
     z: Field
@@ -144,7 +144,7 @@ def importance(
     probed: int = PROBED,
     least: float = 0.0,
     longest: int = 0,
-) -> Sampled:
+) -> WeightedSamples:
     """Sample a target from better and better proposals, until the draws are worth `enough` or for so many rounds.
 
     `best` is the ln evidence of another model: beside one that is far better, no draws are spent
@@ -165,10 +165,12 @@ def importance(
     peak = float(logsumexp(weights))
     normal = np.exp(weights - peak)
     relative = np.sqrt(max(float(np.sum(normal**2)) - 1.0 / pool.drawn, 0.0))
-    return Sampled(pool.z, normal, peak - float(np.log(pool.drawn)), float(relative), target)
+    return WeightedSamples(
+        pool.z, normal, peak - float(np.log(pool.drawn)), float(relative), target
+    )
 
 
-def nested(evaluate: Evaluate, log_target: Target, dims: int, seed: int) -> Sampled:
+def nested(evaluate: Evaluate, log_target: Target, dims: int, seed: int) -> WeightedSamples:
     """The same by nested sampling (dynesty), which finds what importance sampling may miss, and takes longer.
 
     Raises
@@ -193,7 +195,7 @@ def nested(evaluate: Evaluate, log_target: Target, dims: int, seed: int) -> Samp
     sampler.run_nested(dlogz=0.1, print_progress=False)
     results = sampler.results
     weights = np.exp(results.logwt - results.logz[-1])
-    return Sampled(
+    return WeightedSamples(
         np.asarray(results.samples),
         weights / weights.sum(),
         float(results.logz[-1]),

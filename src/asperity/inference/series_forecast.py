@@ -7,15 +7,15 @@ from typing import Any
 from asperity.core.errors import AsperityError
 from asperity.inference.emulator import Emulator
 from asperity.inference.forecast import Forecast, Limit, require_limit
-from asperity.inference.infer import forecast_heard
-from asperity.inference.recording_input import observed_rows
+from asperity.inference.infer import forecast_series
+from asperity.inference.recording_input import observations_from_rows
 from asperity.inference.settings import Setting
 from asperity.monitoring import Bands
 from asperity.simulation import WearHistory
 
 
 @dataclass(frozen=True, slots=True)
-class Foreseen:
+class SeriesForecast:
     """A forecast of a series so far; `forecast` is None where there is none, for a `reason`."""
 
     forecast: Forecast | None
@@ -41,12 +41,12 @@ class Foreseen:
 
 
 @dataclass(frozen=True)
-class Follower:
+class SeriesForecaster:
     """Foretells a series by its rows, as `asperity track --json` and a store have them.
 
     Parameters
     ----------
-    setting, emulator, limit, worn, seed : as `forecast_heard` takes them
+    setting, emulator, limit, worn, seed : as `forecast_series` takes them
 
     Raises
     ------
@@ -75,12 +75,12 @@ class Follower:
 
     def __call__(
         self, rows: Sequence[Mapping[str, Any]], x_name: str, *, comparable: bool
-    ) -> Foreseen:
+    ) -> SeriesForecast:
         """When the limit is crossed; why that is not told, where it cannot be."""
-        heard = observed_rows(rows, self.setting.case, comparable=comparable)
+        heard = observations_from_rows(rows, self.setting.case, comparable=comparable)
         try:
-            return Foreseen(
-                forecast_heard(
+            return SeriesForecast(
+                forecast_series(
                     self.setting,
                     self.emulator,
                     heard,
@@ -91,4 +91,4 @@ class Follower:
                 )
             )
         except AsperityError as error:
-            return Foreseen(None, str(error).rstrip("."))
+            return SeriesForecast(None, str(error).rstrip("."))

@@ -100,7 +100,7 @@ class Setting:
         return (*(unknown.range for unknown in self.contact), *self.operating)
 
 
-def setting_of(case: Case) -> Setting:
+def inference_setting(case: Case) -> Setting:
     """What a case leaves to be inferred, by its [infer] and, where that says nothing, by the defaults in `UNKNOWNS`.
 
     Raises

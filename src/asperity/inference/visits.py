@@ -10,11 +10,11 @@ import numpy as np
 from asperity.core.errors import BadInput
 from asperity.inference.observations import (
     ALIKE,
-    Heard,
+    LogMeasurement,
     Observation,
-    Point,
+    OperatingPoint,
     conditions,
-    points_of,
+    operating_points,
     require_temperatures,
 )
 
@@ -24,7 +24,7 @@ MOST_PLACES = 8  # more, and those further apart are taken for one
 WIDER = 1.5
 
 
-class Sound(NamedTuple):
+class SeriesMeasurement(NamedTuple):
     """A logarithm heard: when (0 the first visit, 1 the last), in which channel, at which place, how surely.
 
     `aside` is where it was heard less the place: logarithms of load and speed, and temperature [K].
@@ -34,12 +34,12 @@ class Sound(NamedTuple):
     visit: int
     channel: str
     place: int
-    heard: Heard
+    heard: LogMeasurement
     aside: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Series:
+class VisitSeries:
     """Visits to one machine.
 
     Parameters
@@ -50,8 +50,8 @@ class Series:
     """
 
     x: tuple[float, ...]
-    places: tuple[Point, ...]
-    sounds: tuple[Sound, ...]
+    places: tuple[OperatingPoint, ...]
+    sounds: tuple[SeriesMeasurement, ...]
 
     @property
     def span(self) -> float:
@@ -65,7 +65,7 @@ class Series:
         return int(np.argmax(counts))
 
 
-def series_of(observations: Sequence[Observation]) -> Series:
+def visit_series(observations: Sequence[Observation]) -> VisitSeries:
     """Recordings by their x, in whichever order they are given.
 
     Raises
@@ -91,37 +91,39 @@ def series_of(observations: Sequence[Observation]) -> Series:
     )
     groups = np.array_split(np.array(times), min(MOST, len(times)))
     x = tuple(float(group.mean()) for group in groups)
-    places = _places(points_of(observations))
+    places = _places(operating_points(observations))
     sounds = []
     for visit, group in enumerate(groups):
         own = [one for one in observations if group[0] <= one.x <= group[-1]]
-        for point in points_of(own):
+        for point in operating_points(own):
             place, aside = _nearest(point, places)
             at = (x[visit] - x[0]) / (x[-1] - x[0])
             sounds += [
-                Sound(at, visit, channel, place, heard, aside)
+                SeriesMeasurement(at, visit, channel, place, heard, aside)
                 for channel in CHANNELS
                 if not math.isnan((heard := getattr(point, channel)).value)
             ]
-    return Series(x, places, tuple(sounds))
+    return VisitSeries(x, places, tuple(sounds))
 
 
-def _places(points: Sequence[Point]) -> tuple[Point, ...]:
+def _places(points: Sequence[OperatingPoint]) -> tuple[OperatingPoint, ...]:
     """Operating points, in order, those left out that lie near one that is there: each is emulated by itself."""
     near = ALIKE
     while True:
-        places: list[Point] = []
+        places: list[OperatingPoint] = []
         for point in points:
             if all(np.any(np.abs(conditions(point) - conditions(one)) > near) for one in places):
                 places.append(point)
         if len(places) <= MOST_PLACES:
             return tuple(
-                Point(one.load_n, one.entrainment_m_s, one.temperature_k) for one in places
+                OperatingPoint(one.load_n, one.entrainment_m_s, one.temperature_k) for one in places
             )
         near = WIDER * near
 
 
-def _nearest(point: Point, places: Sequence[Point]) -> tuple[int, tuple[float, float, float]]:
+def _nearest(
+    point: OperatingPoint, places: Sequence[OperatingPoint]
+) -> tuple[int, tuple[float, float, float]]:
     """Which place an operating point is taken for, and by how much it is another."""
     asides = [conditions(point) - conditions(one) for one in places]
     place = int(np.argmin([np.sum((aside / ALIKE) ** 2) for aside in asides]))

@@ -42,7 +42,7 @@ class CurveOverSq(Protocol):
     def stages(self) -> Mapping[str, Stages]:
         """Along Sq in micrometres, by vibration preset."""
 
-    def at(self, sq: float, quantity: str) -> tuple[float, float, float]:
+    def interpolate(self, sq: float, quantity: str) -> tuple[float, float, float]:
         """Mean at a roughness [m] and its interval; nan where the curve does not reach."""
 
 
@@ -82,10 +82,10 @@ class Anchor:
                 else (stages.split, *stages.interval)
             )
         assert self.sq is not None
-        here = curve.at(self.sq, self.quantity)
+        here = curve.interpolate(self.sq, self.quantity)
         if self.since is None:
             return here
-        there = curve.at(self.since, self.quantity)
+        there = curve.interpolate(self.since, self.quantity)
         off = float(np.hypot(here[2] - here[0], there[2] - there[0]))
         change = here[0] - there[0]
         return change, change - off, change + off
@@ -124,7 +124,9 @@ def compare_with_anchors(
 def rig_prediction(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> pandas.DataFrame:
     """Our CRF at the rig's twelve Sq values with the spread over seeds, beside what is printed: the two ends."""
     table = pandas.DataFrame({"sq_um": SAMPLES_SQ_UM, "sq_std_um": SAMPLES_STD_UM})
-    table[["crf_hz", "low", "high"]] = [curve.at(1e-6 * sq, quantity) for sq in SAMPLES_SQ_UM]
+    table[["crf_hz", "low", "high"]] = [
+        curve.interpolate(1e-6 * sq, quantity) for sq in SAMPLES_SQ_UM
+    ]
     table["printed_hz"] = [CRF_ENDS_HZ[0], *[np.nan] * (len(table) - 2), CRF_ENDS_HZ[1]]
     return table
 
