@@ -200,8 +200,8 @@ CRF = Anchor(name="CRF", quantity="crf_hz", sq=2e-6, value=3800.0, tolerance=10.
 @pytest.mark.parametrize(
     ("anchors", "settings", "said"),
     [
-        ([], {}, "needs an anchor"),
-        ([replace(CRF, fitted=False)], {}, "needs an anchor"),
+        ([], {}, "needs a fitted anchor"),
+        ([replace(CRF, fitted=False)], {}, "needs a fitted anchor"),
         (
             [Anchor(name="bend", quantity="split", value=2.0, tolerance=0.1)],
             {},

@@ -126,7 +126,7 @@ def test_a_contact_that_draws_no_oil_in_has_its_reason(gears, monkeypatch):
     found = solve_machine(flat, workers=1)
     assert found.rows[0]["h_central_m"] > 0.0
     assert found.rows[1]["slide_to_roll"] is None
-    assert "draw no oil in" in found.rows[1]["reason"]
+    assert "entrain no oil" in found.rows[1]["reason"]
     monkeypatch.setitem(vars(flat), "contacts", (against,))
-    with pytest.raises(BadInput, match="no contact draws oil in"):
+    with pytest.raises(BadInput, match="no contact entrains oil"):
         solve_machine(flat)

@@ -130,7 +130,7 @@ REFUSED = [
     ({"sq": []}, "study.sq must be a list of values or a range"),
     ({"sq": ["1 um"], "surface": {"sq": ["2 um"]}}, "sweeps one quantity twice"),
     ({"kind": "solve"}, "study varies nothing"),
-    ({"sq": sq_range(step="0.1 pm"), "seeds": 5}, "widen its steps"),
+    ({"sq": sq_range(step="0.1 pm"), "seeds": 5}, "use larger steps"),
     ({"sq": sq_range(step="1 um"), "seeds": 0}, "study.seeds must be 1 or more"),
     ({"slip": {"from": 0, "to": 1, "count": 3, "scale": "log"}}, "must be positive on a log scale"),
     ({"load": ["200 N", "0.2 kN"]}, "has the point contact.load = 0.2 kN twice"),
@@ -153,7 +153,7 @@ def test_a_study_that_cannot_be_meant_is_refused_in_one_sentence(paper, study, s
 
 
 def test_a_case_without_a_study_says_how_to_add_one(paper):
-    with pytest.raises(BadInput, match=r"add \[study\] with what is varied"):
+    with pytest.raises(BadInput, match=r"add \[study\] with the quantity to vary"):
         plan_study(paper.with_overrides({"study": "none"}))
 
 
