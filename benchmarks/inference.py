@@ -285,7 +285,7 @@ HELD = (
 def judged(setting: Setting, emulator: Emulator, machine: Machine) -> Iterator[dict[str, Any]]:
     """A row for the machine heard at one operating point, and one at all of them."""
     heard = [] if machine.states is None else recordings(setting, machine)
-    at_one = [one for one in heard if one.place[:2] == ONE]
+    at_one = [one for one in heard if one.conditions[:2] == ONE]
     for points, observations in ((1, at_one), (len(PLACES), heard)):
         row = {
             "machine": machine.number,
@@ -297,7 +297,7 @@ def judged(setting: Setting, emulator: Emulator, machine: Machine) -> Iterator[d
             yield row | dict.fromkeys(HELD, "")
             continue
         found = infer_observations(setting, emulator, observations, seed=machine.number)
-        yield row | held(found, observations[0].place[:2], machine)
+        yield row | held(found, observations[0].conditions[:2], machine)
 
 
 def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[str, Any]:

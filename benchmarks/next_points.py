@@ -19,7 +19,7 @@ from asperity.case import load_case
 from asperity.core.arrays import Field
 from asperity.inference import (
     Emulator,
-    Forward,
+    ForwardModel,
     Observation,
     OperatingPoint,
     Setting,
@@ -28,7 +28,7 @@ from asperity.inference import (
     inference_setting,
 )
 from asperity.inference.likelihood import emulated_errors
-from asperity.inference.next_point import USUAL, PredictedRecordings, predict_recordings
+from asperity.inference.next_point import TYPICAL_STD, PredictedRecordings, predict_recordings
 from asperity.inference.observations import point_similarity
 from benchmarks.inference import CASE, KEPT, LEAST_SHARE, LEFT_S, share
 from benchmarks.rows import FOLDER, Rows
@@ -70,11 +70,11 @@ def judge_all(machines: int, kept: Path, *, end: float = float("inf")) -> None:
 def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     """Bits that the advised point teaches, and those drawn at random."""
     rng = np.random.default_rng([SEED, number])
-    first = Forward(setting, emulator, (OperatingPoint(*FIRST),))
+    first = ForwardModel(setting, emulator, (OperatingPoint(*FIRST),))
     z = rng.standard_normal((1, first.dims))
     while first.states(z, ["clr"])["clr"][0, 0] < 0.05:
         z = rng.standard_normal((1, first.dims))
-    own, usual = rng.standard_normal(1), [USUAL[key] for key in ("crf", "damping")]
+    own, usual = rng.standard_normal(1), [TYPICAL_STD[key] for key in ("crf", "damping")]
     crf, damping = np.exp(_heard(first, z, own, rng)[:, 0])
     found = infer_observations(
         setting,
@@ -99,7 +99,7 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     points = tuple(OperatingPoint(*place) for place in places)
     shown, every = (
         predict_recordings(found.forward, found.draws, points),
-        Forward(setting, emulator, (OperatingPoint(*FIRST), *points)),
+        ForwardModel(setting, emulator, (OperatingPoint(*FIRST), *points)),
     )
     information_gain = np.array(
         [taught(shown, _heard(every, z, own, rng)[:, 1:]) for _ in range(TIMES)]
@@ -120,17 +120,20 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     }
 
 
-def _heard(forward: Forward, z: Field, own: Field, rng: np.random.Generator) -> Field:
+def _heard(forward: ForwardModel, z: Field, own: Field, rng: np.random.Generator) -> Field:
     """Logarithms of frequency and damping as the true machine shows them once, (2, points).
 
     `own` is the chance that its emulator's error at the first point has, which is the same each time.
     """
-    shown = forward.shown(z, "hertz-point", heights=False)
+    shown = forward.predict(z, "hertz-point", heights=False)
     lower = np.linalg.cholesky(
         emulated_errors("crf", shown.crf_std, point_similarity(forward.points))[0]
     )
     errors = lower @ np.concatenate([own, rng.standard_normal(len(lower) - 1)])
-    measured = rng.standard_normal((2, len(lower))) * [[USUAL["crf"]], [USUAL["damping"]]]
+    measured = rng.standard_normal((2, len(lower))) * [
+        [TYPICAL_STD["crf"]],
+        [TYPICAL_STD["damping"]],
+    ]
     return np.stack([shown.crf[0] + errors, shown.damping[0]]) + measured
 
 
@@ -138,7 +141,7 @@ def taught(shown: PredictedRecordings, heard: Field) -> Field:
     """Bits by which the entropy of what is possible falls at each point: by the weights that what is heard gives."""
     logs = np.asarray(
         sum(
-            shown.channels[key].log_density(value, USUAL[key])
+            shown.channels[key].log_density(value, TYPICAL_STD[key])
             for key, value in zip(("crf", "damping"), heard, strict=True)
         )
     )

@@ -124,7 +124,7 @@ def test_infer_foretells_with_a_wear_history_and_a_measured_surface(asp, asked):
     assert said["forecast"]["sentence"].startswith("CLR rises above 75.0 %")
     assert said["forecast"]["by"]["median"] >= said["forecast"]["time"]["low"]
     assert [len(point["files"]) for point in said["points"]] == [1]  # of the last recording
-    assert any("in the last tenth of it" in note for note in said["notes"])
+    assert any("within the last tenth of the series" in note for note in said["notes"])
     rough = 1.5e-6 * np.random.default_rng(1).standard_normal((48, 48))
     x3pio.write("ring.x3p", rough, x_scale=2e-6, y_scale=2e-6)
     known = json.loads(asp("infer", *asked, "--surface", "ring.x3p", "--json")[1])

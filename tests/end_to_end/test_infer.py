@@ -13,9 +13,10 @@ from scipy.io import wavfile
 from asperity.case import load_case
 from asperity.core.errors import BadInput
 from asperity.inference import (
-    Forward,
+    ForwardModel,
     Observation,
     OperatingPoint,
+    RecordingInput,
     build_emulator,
     design_contact,
     extend_emulator,
@@ -50,7 +51,7 @@ def test_an_emulator_foretells_contacts_and_says_how_well(small):
         emulator.values(np.array([[0.5, 0.5, share]]), "clr")[0] for share in (0.05, 0.95)
     )
     assert slow > fast + 0.05  # and less where the film is thicker
-    assert "which is corrected for" in emulator.sentence()
+    assert "this is corrected" in emulator.sentence()
 
 
 def test_an_emulator_comes_back_as_it_was_and_is_no_other_cases(small):
@@ -83,7 +84,7 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     emulator = replace(first, folder=tmp_path / "own")
     points = [OperatingPoint(load, speed) for load in (420.0, 580.0) for speed in (1.2, 2.8)]
     z = np.zeros((1, len(setting.unknowns)))
-    shown = Forward(setting, emulator, tuple(points)).shown(z, "hertz-point")
+    shown = ForwardModel(setting, emulator, tuple(points)).predict(z, "hertz-point")
     heard = [
         Observation(
             load_n=point.load_n, entrainment_m_s=point.entrainment_m_s, crf_hz=hertz, crf_std_hz=3.0
@@ -111,10 +112,10 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     assert np.sqrt(np.mean(((scale.forward(truth) - mean) / np.hypot(after, by_chance)) ** 2)) < 2.0
     assert (wider.emulator.points, wider.emulator.further) == (40, 24)
     assert (
-        f"makes {100 * emulated_share(wider.forward, wider.draws):.0f} % of the variance of CLR"
+        f"makes up {100 * emulated_share(wider.forward, wider.draws):.0f} % of the posterior"
         in wider.notes[-1]
     )
-    assert "before it was extended by 24 points where the posterior is" in wider.notes[-1]
+    assert "before 24 points were added" in wider.notes[-1]
     again = build_emulator(setting, folder=tmp_path / "own")
     assert np.array_equal(again(near, ["clr"])["clr"], wider.emulator(near, ["clr"])["clr"])
     assert again.quality == wider.emulator.quality
@@ -147,7 +148,7 @@ def test_noise_cannot_be_told_by_command(asp, small):
     code, out, err = asp(*command, "--json", "--report", "page.html")
     assert (code, err) == (0, "")
     said = json.loads(out)
-    assert said["verdict"].startswith("Cannot be told: no recording shows a contact resonance")
+    assert said["verdict"].startswith("Not identified: no recording shows a contact resonance")
     assert said["identifiable"] is False
     assert len(said["silent"]) == 2
     assert "<script" not in Path("page.html").read_text("utf-8")
@@ -241,11 +242,13 @@ def test_no_real_recording_is_told_anything_from(folder):
         pytest.skip("the shared data are not here")
     setting = formula_setting()
     options = {"ims": {"rate_hz": 20_000.0, "unit": "g", "channel": "1"}, "endaq": {"channel": "1"}}
-    heard = observe_recordings([SHARED / "vibration" / folder], setting, **options.get(folder, {}))
-    found = infer_observations(
-        setting, formula_emulator(setting), heard.observations, silent=heard.silent
+    heard = observe_recordings(
+        [SHARED / "vibration" / folder], setting, source=RecordingInput(**options.get(folder, {}))
     )
-    assert found.verdict().startswith("Cannot be told")
+    found = infer_observations(
+        setting, formula_emulator(setting), heard.observations, excluded=heard.excluded
+    )
+    assert found.verdict().startswith("Not identified")
     assert not found.identifiable
 
 

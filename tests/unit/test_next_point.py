@@ -7,7 +7,7 @@ import pytest
 
 from asperity.inference import (
     ChannelPrediction,
-    Forward,
+    ForwardModel,
     LogMeasurement,
     Observation,
     OperatingPoint,
@@ -21,7 +21,7 @@ from asperity.inference.likelihood import (
     log_likelihood,
     predictive_mixture,
 )
-from asperity.inference.next_point import _information, at_place, expected_information
+from asperity.inference.next_point import _mutual_information, at_point, expected_information
 from asperity.inference.observations import point_similarity
 from support.emulated import formula_emulator, formula_setting
 
@@ -34,8 +34,8 @@ LOADS = (500.0, 500.0, 800.0)
 
 def heard_once(setting, emulator, times=1):
     """A contact with unknowns in the middle of their priors, heard so often at one point."""
-    forward = Forward(setting, emulator, (OperatingPoint(*HERE),))
-    shown = forward.shown(np.zeros((1, forward.dims)), "hertz-point")
+    forward = ForwardModel(setting, emulator, (OperatingPoint(*HERE),))
+    shown = forward.predict(np.zeros((1, forward.dims)), "hertz-point")
     crf, damping = (float(np.exp(values[0, 0])) for values in (shown.crf, shown.damping))
     one = Observation(
         load_n=HERE[0],
@@ -83,9 +83,9 @@ def linear(unknown, emulated=0.01):
     """What it shows: ln CRF goes with its one unknown; forces are known."""
     crf = 8.0 + 0.1 * unknown[:, None] * SLOPES
     nothing = np.full_like(crf, np.nan)
-    lever = np.tile(np.log(LOADS), (len(crf), 1))
+    log_force = np.tile(np.log(LOADS), (len(crf), 1))
     return ChannelPrediction(
-        crf, np.full_like(crf, emulated), nothing, nothing, nothing, nothing, lever
+        crf, np.full_like(crf, emulated), nothing, nothing, nothing, nothing, log_force
     )
 
 
@@ -102,7 +102,7 @@ def points(std, value=8.02):
 def covariance(size, emulated=0.01):
     """Of the errors at the three points, of one machine: those of the likelihood, the exponent's about the first."""
     shown, near = linear(np.zeros(1), emulated), point_similarity(points(1e-3))
-    law = law_errors("crf", shown.lever, np.array([size]), near, shown.lever[:, :1])
+    law = law_errors("crf", shown.log_force, np.array([size]), near, shown.log_force[:, :1])
     return (law + emulated_errors("crf", shown.crf_std, near))[0]
 
 
@@ -122,13 +122,13 @@ def told(place, size, std, emulated=0.01, count=3000):
     """The same by possible machines: drawn from what the first recording leaves, and asked what they would show."""
     rng = np.random.default_rng(1)
     variance = covariance(size, emulated)[0, 0] + std**2
-    lever = 0.1 * SLOPES[0]
-    left = 1.0 / (1.0 + lever**2 / variance)
-    unknown = left * lever / variance * 0.02 + np.sqrt(left) * rng.standard_normal(count)
-    shown = at_place(
+    log_force = 0.1 * SLOPES[0]
+    left = 1.0 / (1.0 + log_force**2 / variance)
+    unknown = left * log_force / variance * 0.02 + np.sqrt(left) * rng.standard_normal(count)
+    shown = at_point(
         predictive_mixture(linear(unknown, emulated), points(std), "crf", [size]), place
     )
-    return _information([(shown, std, (rng.random(count), rng.standard_normal(count)))])
+    return _mutual_information([(shown, std, (rng.random(count), rng.standard_normal(count)))])
 
 
 @pytest.mark.parametrize("size", [0.0, *SIZES])
@@ -149,7 +149,7 @@ def test_a_repeat_tells_what_measurement_left_open_and_no_more():
 
 def test_what_was_heard_says_nothing_of_errors_elsewhere_under_another_force():
     """Without the emulator's share that all points have in common; an exponent that is off adds to what is left."""
-    far = linear(np.zeros(1), emulated=0.0)._replace(lever=np.log([[1.0, 1.0, 1e6]]))
+    far = linear(np.zeros(1), emulated=0.0)._replace(log_force=np.log([[1.0, 1.0, 1e6]]))
     shown = predictive_mixture(far, points(1e-3), "crf", [0.02])
     assert shown.mean[0, 0, 2] == pytest.approx(8.0, abs=1e-9)
     assert shown.std[0, 0, 2] == pytest.approx(np.hypot(0.02, EXPONENT_STD * np.log(1e6)), rel=1e-9)

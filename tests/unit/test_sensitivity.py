@@ -217,7 +217,7 @@ def test_why_contacts_failed_is_said_where_too_many_did(paper, threads, monkeypa
     hardness = ParameterRange("material.hardness", 1.0, 2.0, "GPa")
     case = paper.with_overrides({**SMALL, "lubricant": "none"})
     with pytest.raises(
-        AsperityError, match="curves; the first: the roller is square; narrow the ranges"
+        AsperityError, match="factors; the first: the roller is square; narrow the ranges"
     ):
         sensitivity(
             case,

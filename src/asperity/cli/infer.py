@@ -102,19 +102,25 @@ def infer(
             heard = inference.observe_recordings(
                 paths,
                 setting,
-                table=table_file,
-                band_hz=band,
-                rate_hz=rate,
-                unit=unit,
-                channel=channel,
-                scale=scale,
-                shaft_hz=shaft or None,
-                method=cast("SeriesMethod | None", method),
+                source=inference.RecordingInput(
+                    table=table_file,
+                    band_hz=band,
+                    rate_hz=rate,
+                    unit=unit,
+                    channel=channel,
+                    scale=scale,
+                    shaft_hz=shaft or None,
+                    method=cast("SeriesMethod | None", method),
+                ),
                 workers=count,
             )
     answering = emulated(setting, emulator, count, quiet=quiet)
     ahead = _forecast(setting, answering, heard, limit, history, seed)
-    latest = inference.latest_observations(heard) if ahead is not None and ahead.told else heard
+    latest = (
+        inference.latest_observations(heard)
+        if ahead is not None and ahead.change_detected
+        else heard
+    )
     now = replace(latest, notes=(*latest.notes, *known))
     by = cast("Sampler", sampler)
     found = inference.infer_series(setting, answering, now, sampler=by, seed=seed)

@@ -18,10 +18,11 @@ from .forecast import read_limit as read_limit
 from .forecast import require_limit as require_limit
 from .forward import LAWS as LAWS
 from .forward import ChannelPrediction as ChannelPrediction
-from .forward import Forward as Forward
+from .forward import ForwardModel as ForwardModel
 from .forward import Law as Law
 from .gaussian_process import GaussianProcess as GaussianProcess
 from .infer import SAMPLERS as SAMPLERS
+from .infer import InferenceSettings as InferenceSettings
 from .infer import forecast_series as forecast_series
 from .infer import infer_contact as infer_contact
 from .infer import infer_observations as infer_observations
@@ -43,6 +44,7 @@ from .posterior import ModelEvidence as ModelEvidence
 from .posterior import Sampler as Sampler
 from .priors import Unknown as Unknown
 from .recording_input import ObservedSeries as ObservedSeries
+from .recording_input import RecordingInput as RecordingInput
 from .recording_input import observe_recordings as observe_recordings
 from .sampling import Pool as Pool
 from .series_forecast import SeriesForecast as SeriesForecast

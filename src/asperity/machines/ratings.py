@@ -256,9 +256,7 @@ def _outside_scope(gears: SpurGear) -> str:
         outside.append(f"a pitch-line speed of {pitch_line:.3g} m/s ({low:g} to {high:g})")
     low, high = WORKING_ANGLES
     if not low <= working <= high:
-        outside.append(
-            f"a working pressure angle of {working:.3g} deg ({low:g} to {high:g})"
-        )
+        outside.append(f"a working pressure angle of {working:.3g} deg ({low:g} to {high:g})")
     return ", ".join(outside)
 
 
