@@ -69,8 +69,8 @@ def test_a_track_foretells_and_the_forecast_is_an_alarm(asp, asked):
     said = json.loads(out)
     assert (code, said["alarm"]["state"]) == (0, "none")
     assert said["forecast"] == {
-        "sentence": "No forecast: a forecast takes resonances of 4 recordings at different "
-        "times or more, got 0; leave --forecast out, or record again."
+        "sentence": "No forecast: a forecast needs resonances of at least 4 recordings at different "
+        "times, got 0; leave --forecast out, or record again."
     }
     assert said["verdict"].endswith(said["forecast"]["sentence"])
     page = Path("silent.html").read_text("utf-8")
@@ -113,7 +113,7 @@ def test_a_watch_foretells_keeps_it_and_stops_when_somebody_has_looked(asp, aske
     looked = json.loads(out)
     assert (code, looked["alarm"]["state"]) == (0, "none")
     assert looked["forecast"]["sentence"].startswith(
-        "No forecast: a forecast takes resonances of 4"
+        "No forecast: a forecast needs resonances of at least 4"
     )
 
 

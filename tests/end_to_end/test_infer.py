@@ -123,7 +123,7 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     assert "it was not extended" in kept.notes[-1]
     with pytest.raises(BadInput, match="holds no emulator"):
         extend_emulator(setting, replace(emulator, folder=tmp_path), near)
-    with pytest.raises(BadInput, match="has 4096 points at most"):
+    with pytest.raises(BadInput, match="has at most 4096 points"):
         extend_emulator(setting, replace(emulator, points=4090), near)
 
 
@@ -156,7 +156,7 @@ def test_noise_cannot_be_told_by_command(asp, small):
     assert (said["forecast"], said["design"]) == (None, None)
     code, out, err = asp(*command, "--forecast", "clr=0.5")
     assert (code, out) == (2, "")
-    assert "a forecast takes resonances of 4 recordings at different times or more, got 0" in err
+    assert "a forecast needs resonances of at least 4 recordings at different times, got 0" in err
     code, out, _ = asp(
         "infer", "--case", "infer.toml", "--emulator", str(folder), "--design", "0.6", "--json"
     )
@@ -198,7 +198,7 @@ def test_refusals_are_one_sentence(asp):
         ),
         (
             ("a.wav", "--case", "infer.toml", "--forecast", "sq=1 m"),
-            "a limit of Sq must lie within what [infer]",
+            "a limit of Sq must lie within the range in [infer]",
         ),
         (
             ("--case", "infer.toml", "--design", "nan"),

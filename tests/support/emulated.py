@@ -7,7 +7,7 @@ from scipy.stats import qmc
 
 from asperity.case import load_case
 from asperity.inference import Emulator, EmulatorQuality, Setting, inference_setting
-from asperity.inference.emulator import emulator_features
+from asperity.inference.feature_map import emulator_features
 from asperity.inference.gaussian_process import GaussianProcess
 from asperity.inference.outputs import OUTPUTS
 

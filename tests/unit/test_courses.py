@@ -260,7 +260,7 @@ def test_a_contact_that_stays_as_it_is_is_not_said_to_change(setting, emulator):
     heard, _ = heard_along(setting, emulator, np.full(20, 0.55), seed=5)
     found = forecast_observations(setting, emulator, heard, limit=read_limit("sq=3 um", setting))
     assert (found.change_detected, found.alarm) == (False, False)
-    assert found.sentence().startswith("No change of the contact is told over 20 visits")
+    assert found.sentence().startswith("No change of the contact is detected over 20 visits")
     assert found.drifting == "sq_m"
     json.dumps(found.scalars(), allow_nan=False)
 
@@ -351,7 +351,7 @@ def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
     assert [one.x for one in now.observations] == [
         100.0
     ]  # 500 N; 700 N was last heard too long ago
-    assert now.notes[-1].endswith("Operating points that were last recorded before: 2.")
+    assert now.notes[-1].endswith("Operating points recorded only before: 2.")
 
 
 @pytest.mark.parametrize(
@@ -393,13 +393,13 @@ def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
         ),
         (
             lambda setting: forecast_observations(setting, None, [], limit=("sq_m", 1e-5)),
-            "a limit of Sq must lie within what .infer. allows, 0.25 µm to 4 µm, got 10 µm",
+            "a limit of Sq must lie within the range in .infer., 0.25 µm to 4 µm, got 10 µm",
         ),
         (
             lambda setting: forecast_series(
                 setting, None, HEARD, read_limit("hardness=2 GPa", setting), worn="worn"
             ),
-            "--worn says how Sq drifts, and the limit is of hardness_pa",
+            "--worn is a prior for the drift of Sq, but the limit is of hardness_pa",
         ),
         (
             lambda setting: forecast_series(setting, None, HEARD, Limit("clr", 0.5), worn="worn"),

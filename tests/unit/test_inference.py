@@ -483,7 +483,9 @@ def test_an_operating_point_beyond_the_emulator_is_refused(setting, emulator):
     "wrong", [{"load_n": 0.0}, {"crf_std_hz": float("nan")}, {"crf_shared_std_hz": 6.0}]
 )
 def test_an_observation_that_is_none_is_refused(wrong):
-    with pytest.raises(BadInput, match=r"must be positive|is a part of crf_std_hz, 3 Hz, got 6 Hz"):
+    with pytest.raises(
+        BadInput, match=r"must be positive|must be at most crf_std_hz, 3 Hz, got 6 Hz"
+    ):
         Observation(
             **{
                 "load_n": 500.0,

@@ -248,7 +248,7 @@ def test_teeth_that_are_warmer_than_their_oil_are_said():
     """fzg-c: 390 K against 363 K, where VG 220 of index 95 has 0.47 of its viscosity."""
     case = load_machine(EXAMPLES / "fzg-c.toml")
     (said,) = [note for note in machine_conditions(case).notes if "bulk temperature" in note]
-    assert "oil of 90 degC, as it is supplied" in said
+    assert "supply temperature of 90 degC" in said
     assert "of 117 degC it has 0.47 of that viscosity" in said
     same = load_machine(EXAMPLES / "fzg-c.toml", {"rating.bulk_temperature": "90 degC"})
     assert not any("bulk temperature" in note for note in machine_conditions(same).notes)

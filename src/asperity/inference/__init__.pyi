@@ -3,13 +3,13 @@ from .design import DesignVariable as DesignVariable
 from .design import design_contact as design_contact
 from .design import require_share as require_share
 from .emulator import Emulator as Emulator
-from .emulator import EmulatorFeatures as EmulatorFeatures
 from .emulator import EmulatorGridError as EmulatorGridError
 from .emulator import EmulatorQuality as EmulatorQuality
 from .emulator import build_emulator as build_emulator
 from .emulator import emulators_folder as emulators_folder
 from .emulator import extend_emulator as extend_emulator
 from .estimates import Estimate as Estimate
+from .feature_map import EmulatorFeatures as EmulatorFeatures
 from .forecast import Forecast as Forecast
 from .forecast import Interval as Interval
 from .forecast import Limit as Limit

@@ -60,7 +60,7 @@ class DesignVariable:
 
 @dataclass(frozen=True)
 class Design:
-    """Changes that keep CLR below `clr` with a probability of 95 %; `now` is the present probability."""
+    """Changes that keep CLR below `clr` with a probability of 95 %; `now` is the present one."""
 
     clr: float
     now: float

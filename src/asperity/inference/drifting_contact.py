@@ -137,7 +137,7 @@ class DriftModel:
 
     @property
     def slope_scatter(self) -> Mapping[tuple[str, int], Field]:
-        """Standard deviation of a channel's slope in load (0), speed (1), temperature (2), (points,)."""
+        """Standard deviation (points,) of slopes by channel and axis: load, speed, temperature."""
         return self._translated[1]
 
     @cached_property
@@ -208,7 +208,7 @@ class DriftModel:
 
 
 class ChannelTable(NamedTuple):
-    """Predicted channels of contacts along the range of the drifting unknown, (n, points, knots)."""
+    """Predicted channels along the range of the drifting unknown, (n, points, knots)."""
 
     channels: Mapping[str, Field]
     errors: Mapping[str, Field]  # covariance of the emulator's errors, (n, points, points)
@@ -218,7 +218,7 @@ class ChannelTable(NamedTuple):
 
     @classmethod
     def from_contacts(cls, model: DriftModel, z: Field) -> "ChannelTable":
-        """Tabulate the emulator's means along the range; deviations are those at the initial share."""
+        """Tabulate the emulator's means; its deviations are those at the initial share."""
         forward, column = model.forward, model.column
         contacts, unknown = z[:, : forward.dims], forward.setting.unknowns[column]
         initial = forward.predict(contacts, model.law)

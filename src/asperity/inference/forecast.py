@@ -124,13 +124,14 @@ class Forecast:
         if not self.change_detected:
             odds = np.exp(min(self.log_odds, 50.0))
             return (
-                f"No change of the contact is detected over {len(x)} visits (odds {odds:.2g} to 1); "
-                f"no forecast of when {limit} is crossed."
+                f"No change of the contact is detected over {len(x)} visits "
+                f"(odds {odds:.2g} to 1); no forecast of when {limit} is crossed."
             )
         way = "rises above" if self.rising else "falls below"
         if self.already >= 0.5:
             side = "above" if self.rising else "below"
-            return f"{entry.short} is {side} {entry.text(self.limit.value)} (probability {self.already:.2f})."
+            value = entry.text(self.limit.value)
+            return f"{entry.short} is {side} {value} (probability {self.already:.2f})."
         unit = f" in {self.x_name}" if self.x_name else ""
         sentence = (
             f"{entry.short} {way} {entry.text(self.limit.value)} within {self.horizon:.3g} after "
@@ -395,7 +396,7 @@ def _draw_state(filtered: FilteredState, rng: np.random.Generator) -> Field:
 
 
 def _integrate(share: Field, drift: Field, diffusion: Field, rng: np.random.Generator) -> Field:
-    """Simulate shares from the last visit, (n, steps + 1), as an exact integrated Wiener process."""
+    """Simulate shares from the last visit, (n, steps + 1): an exact integrated Wiener process."""
     time = HORIZON / STEPS
     path = [share]
     for _ in range(STEPS):

@@ -103,7 +103,7 @@ class ForwardModel:
     def emulate(
         self, z: Field, keys: Sequence[str], *, deviations: bool = True
     ) -> dict[str, tuple[Field, Field]]:
-        """Return mean and standard deviation (or 0) of outputs on their scales, shape (n, points)."""
+        """Return mean and deviation (or 0) of outputs on their scales, shape (n, points)."""
         shares = self.shares(z)
         rows, points, ranges = shares.shape
         flat = shares.reshape(-1, ranges)
@@ -199,7 +199,7 @@ class ForwardModel:
         )
 
     def _sphere(self, emulated: tuple[Field, Field], loads: Field) -> tuple[Field, Field, Field]:
-        """Return ln of the sphere's stiffness under CLR F, its standard deviation, and ln(CLR F)."""
+        """Return ln of the sphere's stiffness under CLR F, its deviation, and ln(CLR F)."""
         mean, std = emulated
         share = OUTPUTS[CLR].back(mean)
         bounded = np.maximum(share, MIN_SHARE)
@@ -273,7 +273,7 @@ def require_inside(setting: Setting, point: OperatingPoint) -> None:
             shown = quantity(names[entry.key])
             label = f" of {point.names[0]}" if point.names and point.names[0] else ""
             raise BadInput(
-                f"{shown.name}{label} must lie within the emulator's range, {shown.number(low)} to "
-                f"{shown.text(high)}, got {shown.text(value)}; "
+                f"{shown.name}{label} must lie within {shown.number(low)} to {shown.text(high)}, "
+                f"the emulator's range, got {shown.text(value)}; "
                 f"widen infer.{entry.key.rpartition('.')[2]} in the case"
             )

@@ -54,7 +54,7 @@ class GaussianProcess:
 
     @cached_property
     def _solved(self) -> tuple[Field, Field]:
-        """Transposed inverse Cholesky factor of the covariance, and inverse covariance times data."""
+        """Transposed inverse Cholesky factor of the covariance; inverse covariance times data."""
         residual = (self.y - _basis(self.x) @ self._trend) / self._scale
         covariance = self._kernel(self.x, float) + np.diag(self.noise / self._scale**2 + self.rough)
         lower = scipy.linalg.cholesky(covariance, lower=True)
@@ -84,7 +84,7 @@ class GaussianProcess:
         return np.asarray(kernel)
 
     def __call__(self, x: Field) -> tuple[Field, Field]:
-        """Predict mean and standard deviation at points, shape (n, d), of the mean over surfaces."""
+        """Predict mean and deviation at points, shape (n, d), of the mean over surfaces."""
         whitener, weights = self._single
         means, stds = [], []
         for part in np.array_split(x, max(1, -(-len(x) // CHUNK_SIZE))):

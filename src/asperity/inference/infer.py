@@ -75,8 +75,8 @@ def infer_contact(
     recordings : files and folders, or `Observation` objects; without any, the prior is returned
     case : the contact; its [infer] defines the unknowns
     table : csv of operating points by file, see `RecordingInput`
-    emulator : an emulator, or its folder; None: one in the user's cache. Building it solves hundreds
-        of contacts, once
+    emulator : an emulator, or its folder; None: one in the user's cache. Building it once solves
+        hundreds of contacts
     settings : sampler, extension of the emulator, random seed; None: the defaults
     workers, executor, progress : see `asperity.study.run_study`, for the emulator's contacts
 

@@ -221,7 +221,7 @@ class Inference:
 
     @property
     def grid_effect(self) -> tuple[float, float]:
-        """Grid error of CLR at its median, and half the width of its interval; shares of the load."""
+        """Grid error of CLR at its median, and half the width of its interval (load shares)."""
         estimate, scale = self.posterior()[CLR], OUTPUTS[CLR]
         change = self.emulator.grid[CLR].rms if CLR in self.emulator.grid else 0.0
         median = scale.forward(np.array(estimate.median))
@@ -235,16 +235,16 @@ class Inference:
             if estimate.against:
                 end = "lower" if estimate.against == "low" else "upper"
                 warnings.append(
-                    f"{quantity(key).name} is limited by the {end} end of its prior; widen its range "
-                    "in [infer] if physically possible."
+                    f"{quantity(key).name} is limited by the {end} end of its prior; widen its "
+                    "range in [infer] if physically possible."
                 )
         if not self.observations:
             return tuple(warnings)
         by_grid, half = self.grid_effect
         if by_grid > half:
             warnings.append(
-                f"The emulator's grid error is {100 * by_grid:.1f} points of CLR, more than half the "
-                f"interval's width ({100 * half:.1f}); increase infer.cells."
+                f"The emulator's grid error is {100 * by_grid:.1f} points of CLR, more than half "
+                f"the interval's width ({100 * half:.1f}); increase infer.cells."
             )
         paper = self.law_probability("hertz-point")
         if paper < UNLIKELY:

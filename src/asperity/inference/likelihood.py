@@ -172,7 +172,7 @@ def law_correlations(log_force: Field, similarity: Field) -> Field:
 
 
 def emulated_errors(channel: str, std: Field, similarity: Field) -> Field:
-    """Return the covariance of the emulator's errors of deviation `std` (n, points), with any gain."""
+    """Return the covariance of the emulator's errors of deviation `std` (n, points)."""
     errors = std[:, :, None] * std[:, None, :] * (COMMON_SHARE + (1.0 - COMMON_SHARE) * similarity)
     return np.asarray(errors + GAIN_STD**2 if channel == "crfa" else errors)
 

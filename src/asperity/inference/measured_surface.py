@@ -57,7 +57,7 @@ def with_measured_surface(setting: Setting, measured: MeasuredSurface) -> tuple[
 
 
 def _between_parts(heights: Field) -> float:
-    """Return the standard deviation of Sq from the parts of a map; 0 if there are too few heights."""
+    """Return the standard deviation of Sq from the parts of a map; 0 if there are too few."""
     parts = [
         part
         for row in np.array_split(heights, PARTS)

@@ -221,7 +221,7 @@ def posterior_draws(
 
 
 def emulated_share(forward: ForwardModel, draws: Draws) -> float:
-    """Return the emulator's share of the posterior variance of CLR, on its scale, at the case's point."""
+    """Return the emulator's share of CLR's posterior variance on its scale, at the case's point."""
     _, std = replace(forward, points=forward.points[:1]).emulate(draws.z, [CLR])[CLR]
     total = float(np.var(OUTPUTS[CLR].forward(draws.states[CLR][:, 0])))
     return min(float(np.mean(std**2)) / total, 1.0)

@@ -19,7 +19,7 @@ from asperity.study import overrides_at
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingInput:
-    """How recordings are read and analysed.
+    """Options for reading and analysing recordings.
 
     Parameters
     ----------

@@ -106,7 +106,7 @@ class Pool:
 
 @dataclass(frozen=True)
 class WeightedSamples:
-    """A posterior as weighted draws: `z` (n, d), normalised `weights`, ln evidence and its error."""
+    """A posterior as weighted draws: `z` (n, d), normalised `weights`, ln evidence and error."""
 
     z: Field
     weights: Field
@@ -227,7 +227,7 @@ def _tempered(log_weights: Field) -> Field:
 def _proposal(
     z: Field, weights: Field, rng: np.random.Generator
 ) -> tuple[Callable[[Field], Field], Field]:
-    """Return ln density and a batch of a proposal: normals at weighted draws, mixed with the prior."""
+    """Return ln density and a batch of a proposal: normals at weighted draws, and the prior."""
     mean = weights @ z
     covariance = (weights[:, None] * (z - mean)).T @ (z - mean)
     covariance = COMPONENT_WIDTH**2 * covariance + 1e-4 * np.eye(len(mean))

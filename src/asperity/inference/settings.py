@@ -237,9 +237,9 @@ def _unknown(
         resolved = _resolved(case, stated, operating) if key in LENGTHS else stated
         if resolved != stated:
             raise BadInput(
-                f"{case.source}: infer.{key.rpartition('.')[2]} must lie within {resolved.low:g} to "
-                f"{resolved.high:g} {resolved.unit}, which the emulator's grid resolves at every "
-                "load; narrow it, or increase infer.cells"
+                f"{case.source}: infer.{key.rpartition('.')[2]} must lie within {resolved.low:g} "
+                f"to {resolved.high:g} {resolved.unit}, which the emulator's grid resolves at "
+                "every load; narrow it, or increase infer.cells"
             )
         return Unknown(default.key, stated)
     number, unit = split_amount(own)
@@ -274,7 +274,7 @@ def _resolved(
     if low >= high:
         raise BadInput(
             f"{case.source}: the emulator's grid resolves no correlation length from "
-            f"{lengths.low:g} to {lengths.high:g} {lengths.unit}; increase infer.cells, or mark the "
-            'length as "known"'
+            f"{lengths.low:g} to {lengths.high:g} {lengths.unit}; increase infer.cells, or mark "
+            'the length as "known"'
         )
     return replace(lengths, low=low, high=high)

@@ -15,7 +15,8 @@ _LIFE = "ISO/TS 16281:2008"
 _MICROPITTING = "ISO/TR 15144-1:2014"
 _TEETH = (
     "unmodified spur gears in mineral or PAO oil, tested at modules of 3 to 11 mm, "
-    "working pressure angles to 25 deg, above 2 m/s at the pitch line; dynamic factors, tip relief and coatings are taken as 1"
+    "working pressure angles to 25 deg, above 2 m/s at the pitch line; dynamic factors, "
+    "tip relief and coatings are taken as 1"
 )
 _STRESS = "elastic half-space; the asperities do not move, residual stress is neglected"
 FACTS: dict[str, RatingFacts] = {
@@ -44,8 +45,8 @@ FACTS: dict[str, RatingFacts] = {
         "ISO 281:2007, 9.3.3",
         "a_ISO = 0.1 (1 - (c₁ - c₂/κ^e)^g (e_C C_u/P)^h)^-k, at most 50, "
         "P the larger of P_ref and the radial load",
-        "κ of 0.1 to 4; one factor for the whole bearing, also of rollers, where ISO/TS 16281 uses one "
-        " per slice. Roughness enters through κ, not through the solved film",
+        "κ of 0.1 to 4; one factor for the whole bearing, also of rollers, where ISO/TS 16281 uses "
+        "one per slice. Roughness enters through κ, not through the solved film",
     ),
     "modified_life_s": RatingFacts(
         "ISO 281:2007", "L_10m = a_ISO L₁₀r at the stated speed", "90 % survive"

@@ -84,8 +84,8 @@ class MachineResult:
             )
             yield (
                 f"The Hertz pressure of {pressure} at {highest['name']} is above {limit}, the "
-                "static limit of hardened bearing steel (ISO 76): the bodies deform plastically, and the "
-                "elastic solution does not apply."
+                "static limit of hardened bearing steel (ISO 76): the bodies deform plastically, "
+                "and the elastic solution does not apply."
             )
 
     def scalars(self) -> dict[str, Any]:

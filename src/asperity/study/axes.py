@@ -82,7 +82,7 @@ def swept_axis(plan: StudyPlan, table: pandas.DataFrame, key: str) -> SweptAxis:
 
 
 def varying_outputs(table: pandas.DataFrame) -> list[str]:
-    """Return the keys of `OUTPUTS` that vary in a study's table; CRF and CRFA by preset if given."""
+    """Return the keys of `OUTPUTS` that vary in a study's table; CRF and CRFA by preset if any."""
     by_preset = ("crf_hz", "crfa") if "crf_sound_hz" in table else ()
     present = [key for key in OUTPUTS if key in table and key not in by_preset]
     return [key for key in present if _varies(table[key].to_numpy(dtype=float))]
