@@ -72,7 +72,7 @@ def test_not_solved_the_worst_is_pressed_hardest(gears):
     found = machine_conditions(gears)
     assert found.worst["p_hertz_pa"] == max(row["p_hertz_pa"] for row in found.rows)
     assert found.verdict().endswith(
-        "B, Hertz pressure 1.6671 GPa, slide-to-roll ratio −46 %; not solved."
+        "the highest Hertz pressure is 1.6671 GPa at B, slide-to-roll ratio −46 %; not solved."
     )
 
 
