@@ -135,7 +135,8 @@ class Emulator:
             f"Emulator of {self.points} contacts{added}, {self.surfaces} surfaces each: "
             f"cross-validation error of CLR {100 * clr.error:.1f} points (rms; scatter of one "
             f"surface {100 * clr.scatter:.1f}), coverage of the 90 % interval "
-            f"{100 * clr.coverage:.0f} %. Its grid has {self.cells[0]} x {self.cells[1]} cells.{finer}"
+            f"{100 * clr.coverage:.0f} %. Its grid has {self.cells[0]} x {self.cells[1]} cells."
+            f"{finer}"
         )
 
 
