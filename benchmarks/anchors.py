@@ -10,7 +10,7 @@ from pathlib import Path
 
 from asperity.case import load_case
 from asperity.paper import PAPER_ANCHORS, compare_with_anchors, rig_deviation
-from asperity.study import WearCurve, curve_of, plan_study, run_study, study_executor
+from asperity.study import WearCurve, curve_from_study, plan_study, run_study, study_executor
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 CASES = {
@@ -37,7 +37,7 @@ def curves(cells: int | None) -> dict[str, WearCurve]:
             case = load_case(EXAMPLES / file).with_overrides({"model": model})
             if cells is not None:
                 case = case.with_overrides({"grid.cells": [cells, cells]})
-            found[name] = curve_of(run_study(plan_study(case), executor=executor))
+            found[name] = curve_from_study(run_study(plan_study(case), executor=executor))
     return found
 
 

@@ -22,13 +22,13 @@ from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError
 from asperity.inference import (
     Emulator,
-    Forward,
+    ForwardModel,
     Observation,
-    Point,
+    OperatingPoint,
     Setting,
     build_emulator,
     forecast_observations,
-    setting_of,
+    inference_setting,
 )
 from asperity.inference.drifting_contact import KNOTS, along_range, between_knots
 from asperity.inference.outputs import CLR, OUTPUTS
@@ -96,7 +96,7 @@ def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
 
 def judge_all(histories: int, steady: int, kept: Path, *, end: float = float("inf")) -> None:
     """A row for each series, as it is done."""
-    setting = setting_of(load_case(CASE))
+    setting = inference_setting(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     rows = Rows(ROWS, ("kind", "number"))
     counts = {"wearing": histories, "otherwise": histories, "steady": steady, "slow": steady}
@@ -111,7 +111,7 @@ def judge_all(histories: int, steady: int, kept: Path, *, end: float = float("in
 def judged(setting: Setting, emulator: Emulator, kind: str, number: int) -> dict[str, Any]:
     """One series: what is foretold of it, and what comes."""
     rng = np.random.default_rng([SEED, number, list(CLASSES).index(kind)])
-    forward = Forward(setting, emulator, (Point(*PLACE),))
+    forward = ForwardModel(setting, emulator, (OperatingPoint(*PLACE),))
     crossing = np.nan
     while True:
         z = rng.standard_normal((1, len(setting.unknowns)))
@@ -198,14 +198,14 @@ def _course(shape: str, begin: float, rng: np.random.Generator) -> Field:
 
 
 def _shown(
-    forward: Forward, z: Field, course: Field, rng: np.random.Generator
+    forward: ForwardModel, z: Field, course: Field, rng: np.random.Generator
 ) -> tuple[dict[str, Field], Field]:
     """Logarithms that the true contact shows, and its load share: the emulator's, off by a draw of its deviation."""
     unknown, grid = forward.setting.unknowns[0], np.linspace(0.0, 1.0, 4 * KNOTS)
     along = along_range(z, 0, unknown.at_share(grid))
-    shown = forward.shown(along, "hertz-point", deviations=False)
-    mean, _ = forward.emulated(along, [CLR], deviations=False)[CLR]
-    _, std = forward.emulated(z, [CLR])[CLR]
+    shown = forward.predict(along, "hertz-point", deviations=False)
+    mean, _ = forward.emulate(along, [CLR], deviations=False)[CLR]
+    _, std = forward.emulate(z, [CLR])[CLR]
     scale = between_knots(mean.T, course[None])[0][0] + std[0, 0] * rng.standard_normal()
     clr = OUTPUTS[CLR].back(scale)
     tables = {

@@ -32,10 +32,10 @@ from asperity.inference import (
     Setting,
     build_emulator,
     infer_observations,
-    setting_of,
+    inference_setting,
 )
 from asperity.inference.inference import STAGES, stages
-from asperity.inference.recording_input import band_of
+from asperity.inference.recording_input import resonance_band
 from asperity.paper import Disturbance
 from asperity.paper.rig_recording import GRID_HZ, RigTest, contact_line, draw_background
 from asperity.resonance import remove_lines, series_resonances
@@ -88,7 +88,7 @@ def judge_all(
     machines: int, finer: int, kept: Path, *, known: bool = False, end: float = float("inf")
 ) -> None:
     """Every machine, in turn; its rows as it is done."""
-    setting = setting_of(load_case(CASE))
+    setting = inference_setting(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     print(emulator.sentence(), flush=True)
     on_its_grid = replace(emulator, grid={})
@@ -203,7 +203,7 @@ def recordings(setting: Setting, machine: Machine) -> list[Observation]:
     )
     rng = np.random.default_rng([SEED, machine.number])
     frequency = np.arange(0.0, RATE_HZ / 2.0 + GRID_HZ, GRID_HZ)
-    band = band_of(setting)
+    band = resonance_band(setting)
     background = draw_background(frequency, band, Disturbance(), rng)
     spectra, places = [], []
     for place, (load, speed) in enumerate(PLACES):
@@ -285,7 +285,7 @@ HELD = (
 def judged(setting: Setting, emulator: Emulator, machine: Machine) -> Iterator[dict[str, Any]]:
     """A row for the machine heard at one operating point, and one at all of them."""
     heard = [] if machine.states is None else recordings(setting, machine)
-    at_one = [one for one in heard if one.place[:2] == ONE]
+    at_one = [one for one in heard if one.conditions[:2] == ONE]
     for points, observations in ((1, at_one), (len(PLACES), heard)):
         row = {
             "machine": machine.number,
@@ -297,7 +297,7 @@ def judged(setting: Setting, emulator: Emulator, machine: Machine) -> Iterator[d
             yield row | dict.fromkeys(HELD, "")
             continue
         found = infer_observations(setting, emulator, observations, seed=machine.number)
-        yield row | held(found, observations[0].place[:2], machine)
+        yield row | held(found, observations[0].conditions[:2], machine)
 
 
 def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[str, Any]:
@@ -317,7 +317,7 @@ def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[st
         ):
             low, high = np.quantile(values, (0.05, 0.95))
             ends |= {f"{key}_{name}low": float(low), f"{key}_{name}high": float(high)}
-    own = found.at_points()[place - 1]
+    own = found.point_estimates()[place - 1]
     true_stage = max(stages(np.array([clr])).items(), key=lambda entry: entry[1])[0]
     ordered = sorted(STAGES, key=lambda stage: -own.stages[stage])
     reached = np.cumsum([own.stages[stage] for stage in ordered])
@@ -391,13 +391,13 @@ def tables() -> Iterator[str]:
             f"{median(rows, f'sq_{name}high', f'sq_{name}low', np.divide):.2f}"
             for name in ("", "exact_")
         ]
-        bits = [
+        information_gain = [
             f"{np.median([float(row[f'{key}_bits']) for row in rows]):.1f}" for key in ("clr", "sq")
         ]
         error = f"{100 * np.median([float(row['law_error']) for row in rows]):.1f}"
         exact = np.clip([float(row["exact_probability"]) for row in rows], 1e-300, 1.0 - 1e-9)
         odds = f"{np.median(np.log(1.0 / exact - 1.0)):.1f}"
-        yield f"| {' | '.join((law, points, *clr, *sq, *bits, error, odds))} |"
+        yield f"| {' | '.join((law, points, *clr, *sq, *information_gain, error, odds))} |"
     machines = {row["machine"] for row in every}
     yield f"Sample: {len(machines)} machines."
     silent = {

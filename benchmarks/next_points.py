@@ -19,17 +19,17 @@ from asperity.case import load_case
 from asperity.core.arrays import Field
 from asperity.inference import (
     Emulator,
-    Forward,
+    ForwardModel,
     Observation,
-    Point,
+    OperatingPoint,
     Setting,
     build_emulator,
     infer_observations,
-    setting_of,
+    inference_setting,
 )
 from asperity.inference.likelihood import emulated_errors
-from asperity.inference.next_point import USUAL, WouldShow, would_show
-from asperity.inference.observations import likeness
+from asperity.inference.next_point import TYPICAL_STD, PredictedRecordings, predict_recordings
+from asperity.inference.observations import point_similarity
 from benchmarks.inference import CASE, KEPT, LEAST_SHARE, LEFT_S, share
 from benchmarks.rows import FOLDER, Rows
 
@@ -57,7 +57,7 @@ def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
 
 def judge_all(machines: int, kept: Path, *, end: float = float("inf")) -> None:
     """A row for each machine, as it is done."""
-    setting = setting_of(load_case(CASE))
+    setting = inference_setting(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     rows = Rows(ROWS, ("machine",))
     for number in range(machines):
@@ -70,11 +70,11 @@ def judge_all(machines: int, kept: Path, *, end: float = float("inf")) -> None:
 def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     """Bits that the advised point teaches, and those drawn at random."""
     rng = np.random.default_rng([SEED, number])
-    first = Forward(setting, emulator, (Point(*FIRST),))
+    first = ForwardModel(setting, emulator, (OperatingPoint(*FIRST),))
     z = rng.standard_normal((1, first.dims))
     while first.states(z, ["clr"])["clr"][0, 0] < 0.05:
         z = rng.standard_normal((1, first.dims))
-    own, usual = rng.standard_normal(1), [USUAL[key] for key in ("crf", "damping")]
+    own, usual = rng.standard_normal(1), [TYPICAL_STD[key] for key in ("crf", "damping")]
     crf, damping = np.exp(_heard(first, z, own, rng)[:, 0])
     found = infer_observations(
         setting,
@@ -96,14 +96,16 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     )
     places = [(found.next_point.load_n, found.next_point.entrainment_m_s)]
     places += [(loads.value(rng.random()), speeds.value(rng.random())) for _ in range(RANDOM)]
-    points = tuple(Point(*place) for place in places)
+    points = tuple(OperatingPoint(*place) for place in places)
     shown, every = (
-        would_show(found.forward, found.draws, points),
-        Forward(setting, emulator, (Point(*FIRST), *points)),
+        predict_recordings(found.forward, found.draws, points),
+        ForwardModel(setting, emulator, (OperatingPoint(*FIRST), *points)),
     )
-    bits = np.array([taught(shown, _heard(every, z, own, rng)[:, 1:]) for _ in range(TIMES)])
+    information_gain = np.array(
+        [taught(shown, _heard(every, z, own, rng)[:, 1:]) for _ in range(TIMES)]
+    )
     shows = every.states(z, ["clr"])["clr"][0, 1:] > LEAST_SHARE
-    once, mean = bits[0], bits.mean(axis=0)
+    once, mean = information_gain[0], information_gain.mean(axis=0)
     return {
         "machine": number,
         "advised_shows": int(shows[0]),
@@ -118,23 +120,28 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     }
 
 
-def _heard(forward: Forward, z: Field, own: Field, rng: np.random.Generator) -> Field:
+def _heard(forward: ForwardModel, z: Field, own: Field, rng: np.random.Generator) -> Field:
     """Logarithms of frequency and damping as the true machine shows them once, (2, points).
 
     `own` is the chance that its emulator's error at the first point has, which is the same each time.
     """
-    shown = forward.shown(z, "hertz-point", heights=False)
-    lower = np.linalg.cholesky(emulated_errors("crf", shown.crf_std, likeness(forward.points))[0])
+    shown = forward.predict(z, "hertz-point", heights=False)
+    lower = np.linalg.cholesky(
+        emulated_errors("crf", shown.crf_std, point_similarity(forward.points))[0]
+    )
     errors = lower @ np.concatenate([own, rng.standard_normal(len(lower) - 1)])
-    measured = rng.standard_normal((2, len(lower))) * [[USUAL["crf"]], [USUAL["damping"]]]
+    measured = rng.standard_normal((2, len(lower))) * [
+        [TYPICAL_STD["crf"]],
+        [TYPICAL_STD["damping"]],
+    ]
     return np.stack([shown.crf[0] + errors, shown.damping[0]]) + measured
 
 
-def taught(shown: WouldShow, heard: Field) -> Field:
+def taught(shown: PredictedRecordings, heard: Field) -> Field:
     """Bits by which the entropy of what is possible falls at each point: by the weights that what is heard gives."""
     logs = np.asarray(
         sum(
-            shown.channels[key].log_density(value, USUAL[key])
+            shown.channels[key].log_density(value, TYPICAL_STD[key])
             for key, value in zip(("crf", "damping"), heard, strict=True)
         )
     )
@@ -155,8 +162,10 @@ def tables() -> Iterator[str]:
     yield "|---|---|---|---|---|"
     for key, name in (("once", "once"), ("mean", f"mean of {TIMES} times")):
         better = share([row[key] > row[f"{key}_random"] for row in rows])
-        bits = [f"{np.median([row[name] for row in rows]):.2f}" for name in (key, f"{key}_random")]
-        yield f"| {name} | {len(rows)} | {better} | {bits[0]} | {bits[1]} |"
+        information_gain = [
+            f"{np.median([row[name] for row in rows]):.2f}" for name in (key, f"{key}_random")
+        ]
+        yield f"| {name} | {len(rows)} | {better} | {information_gain[0]} | {information_gain[1]} |"
     shows = share([row["advised_shows"] == 1.0 for row in rows])
     yield (
         f"At the advised point a line is to be heard (CLR over {100 * LEAST_SHARE:.0f} %) in {shows} of machines. Rows "

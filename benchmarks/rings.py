@@ -13,7 +13,13 @@ import numpy as np
 from asperity.case import load_case
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
-from asperity.inference import Observation, Unknown, build_emulator, infer_observations, setting_of
+from asperity.inference import (
+    Observation,
+    Unknown,
+    build_emulator,
+    infer_observations,
+    inference_setting,
+)
 from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM
 from benchmarks.inference import CASE, KEPT
 
@@ -30,7 +36,7 @@ def main() -> None:
 
 def lines(*, fast: bool, kept: Path = KEPT) -> Iterator[str]:  # noqa: ARG001 - short as it is
     """What `python -m benchmarks rings` prints."""
-    setting = setting_of(load_case(CASE))
+    setting = inference_setting(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     clr, kg = quantity("clr"), quantity("mass_kg")
     yield "## The paper's rings at 500 N: what Sq says of CLR, and what a printed CRF adds"

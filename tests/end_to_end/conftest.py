@@ -7,7 +7,7 @@ import pytest
 
 from asperity.case import load_case
 from asperity.cli import main
-from asperity.inference import build_emulator, setting_of
+from asperity.inference import build_emulator, inference_setting
 from support.emulated import CASE, SMALL
 
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
@@ -33,6 +33,6 @@ def asp(tmp_path, monkeypatch, capsys):
 def small(tmp_path_factory):
     """A setting, its emulator of a few small contacts, and the folder that holds it: what extends it takes a copy."""
     folder = tmp_path_factory.mktemp("infer") / "emulator"
-    setting = setting_of(load_case(CASE).with_overrides(SMALL))
+    setting = inference_setting(load_case(CASE).with_overrides(SMALL))
     with ThreadPoolExecutor(1) as executor:
         return setting, build_emulator(setting, folder=folder, executor=executor), folder

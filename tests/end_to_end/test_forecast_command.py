@@ -70,8 +70,8 @@ def test_a_track_foretells_and_the_forecast_is_an_alarm(asp, asked):
     said = json.loads(out)
     assert (code, said["alarm"]["state"]) == (0, "none")
     assert said["forecast"] == {
-        "sentence": "No forecast: a forecast takes resonances of 4 recordings at different "
-        "times or more, got 0; leave --forecast out, or record again."
+        "sentence": "No forecast: a forecast needs resonances of at least 4 recordings at different "
+        "times, got 0; leave --forecast out, or record again."
     }
     assert said["verdict"].endswith(said["forecast"]["sentence"])
     page = Path("silent.html").read_text("utf-8")
@@ -114,7 +114,7 @@ def test_a_watch_foretells_keeps_it_and_stops_when_somebody_has_looked(asp, aske
     looked = json.loads(out)
     assert (code, looked["alarm"]["state"]) == (0, "none")
     assert looked["forecast"]["sentence"].startswith(
-        "No forecast: a forecast takes resonances of 4"
+        "No forecast: a forecast needs resonances of at least 4"
     )
 
 
@@ -125,7 +125,7 @@ def test_infer_foretells_with_a_wear_history_and_a_measured_surface(asp, asked):
     assert said["forecast"]["sentence"].startswith("CLR rises above 75.0 %")
     assert said["forecast"]["by"]["median"] >= said["forecast"]["time"]["low"]
     assert [len(point["files"]) for point in said["points"]] == [1]  # of the last recording
-    assert any("in the last tenth of it" in note for note in said["notes"])
+    assert any("within the last tenth of the series" in note for note in said["notes"])
     rough = 1.5e-6 * np.random.default_rng(1).standard_normal((48, 48))
     x3pio.write("ring.x3p", rough, x_scale=2e-6, y_scale=2e-6)
     known = json.loads(asp("infer", *asked, "--surface", "ring.x3p", "--json")[1])

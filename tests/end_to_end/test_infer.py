@@ -13,17 +13,18 @@ from scipy.io import wavfile
 from asperity.case import load_case
 from asperity.core.errors import BadInput
 from asperity.inference import (
-    Forward,
+    ForwardModel,
     Observation,
-    Point,
+    OperatingPoint,
+    RecordingInput,
     build_emulator,
     design_contact,
     extend_emulator,
     forecast_observations,
     infer_observations,
-    listen,
-    setting_of,
-    with_further,
+    inference_setting,
+    observe_recordings,
+    refine_emulator,
 )
 from asperity.inference.outputs import OUTPUTS
 from asperity.inference.posterior import emulated_share, posterior_shares
@@ -50,7 +51,7 @@ def test_an_emulator_foretells_contacts_and_says_how_well(small):
         emulator.values(np.array([[0.5, 0.5, share]]), "clr")[0] for share in (0.05, 0.95)
     )
     assert slow > fast + 0.05  # and less where the film is thicker
-    assert "which is corrected for" in emulator.sentence()
+    assert "this is corrected" in emulator.sentence()
 
 
 def test_an_emulator_comes_back_as_it_was_and_is_no_other_cases(small):
@@ -60,7 +61,7 @@ def test_an_emulator_comes_back_as_it_was_and_is_no_other_cases(small):
     for key in ("clr", "contact_stiffness_n_m"):
         assert np.array_equal(again(at, [key])[key], emulator(at, [key])[key])
     assert again.quality == emulator.quality
-    other = setting_of(load_case(EXAMPLE).with_overrides({**SMALL, "contact.slip": 0.1}))
+    other = inference_setting(load_case(EXAMPLE).with_overrides({**SMALL, "contact.slip": 0.1}))
     with pytest.raises(BadInput, match="holds the emulator of another case"):
         build_emulator(other, folder=folder)
 
@@ -81,9 +82,9 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     setting, first, folder = small
     shutil.copytree(folder, tmp_path / "own")
     emulator = replace(first, folder=tmp_path / "own")
-    points = [Point(load, speed) for load in (420.0, 580.0) for speed in (1.2, 2.8)]
+    points = [OperatingPoint(load, speed) for load in (420.0, 580.0) for speed in (1.2, 2.8)]
     z = np.zeros((1, len(setting.unknowns)))
-    shown = Forward(setting, emulator, tuple(points)).shown(z, "hertz-point")
+    shown = ForwardModel(setting, emulator, tuple(points)).predict(z, "hertz-point")
     heard = [
         Observation(
             load_n=point.load_n, entrainment_m_s=point.entrainment_m_s, crf_hz=hertz, crf_std_hz=3.0
@@ -92,7 +93,7 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     ]
     found = infer_observations(setting, emulator, heard)
     with ThreadPoolExecutor(1) as executor:
-        wider = with_further(found, 24, executor=executor)
+        wider = refine_emulator(found, 24, executor=executor)
         near = posterior_shares(found.forward, found.draws, 12, seed=99)
         plan = plan_points(
             setting.case,
@@ -111,18 +112,18 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     assert np.sqrt(np.mean(((scale.forward(truth) - mean) / np.hypot(after, by_chance)) ** 2)) < 2.0
     assert (wider.emulator.points, wider.emulator.further) == (40, 24)
     assert (
-        f"makes {100 * emulated_share(wider.forward, wider.draws):.0f} % of the variance of CLR"
+        f"makes up {100 * emulated_share(wider.forward, wider.draws):.0f} % of the posterior"
         in wider.notes[-1]
     )
-    assert "before it was extended by 24 points where the posterior is" in wider.notes[-1]
+    assert "before 24 points were added" in wider.notes[-1]
     again = build_emulator(setting, folder=tmp_path / "own")
     assert np.array_equal(again(near, ["clr"])["clr"], wider.emulator(near, ["clr"])["clr"])
     assert again.quality == wider.emulator.quality
-    kept = with_further(infer_observations(setting, formula_emulator(setting), heard), 8)
+    kept = refine_emulator(infer_observations(setting, formula_emulator(setting), heard), 8)
     assert "it was not extended" in kept.notes[-1]
     with pytest.raises(BadInput, match="holds no emulator"):
         extend_emulator(setting, replace(emulator, folder=tmp_path), near)
-    with pytest.raises(BadInput, match="has 4096 points at most"):
+    with pytest.raises(BadInput, match="has at most 4096 points"):
         extend_emulator(setting, replace(emulator, points=4090), near)
 
 
@@ -147,7 +148,7 @@ def test_noise_cannot_be_told_by_command(asp, small):
     code, out, err = asp(*command, "--json", "--report", "page.html")
     assert (code, err) == (0, "")
     said = json.loads(out)
-    assert said["verdict"].startswith("Cannot be told: no recording shows a contact resonance")
+    assert said["verdict"].startswith("Not identified: no recording shows a contact resonance")
     assert said["identifiable"] is False
     assert len(said["silent"]) == 2
     assert "<script" not in Path("page.html").read_text("utf-8")
@@ -155,7 +156,7 @@ def test_noise_cannot_be_told_by_command(asp, small):
     assert (said["forecast"], said["design"]) == (None, None)
     code, out, err = asp(*command, "--forecast", "clr=0.5")
     assert (code, out) == (2, "")
-    assert "a forecast takes resonances of 4 recordings at different times or more, got 0" in err
+    assert "a forecast needs resonances of at least 4 recordings at different times, got 0" in err
     code, out, _ = asp(
         "infer", "--case", "infer.toml", "--emulator", str(folder), "--design", "0.6", "--json"
     )
@@ -197,7 +198,7 @@ def test_refusals_are_one_sentence(asp):
         ),
         (
             ("a.wav", "--case", "infer.toml", "--forecast", "sq=1 m"),
-            "a limit of Sq must lie within what [infer]",
+            "a limit of Sq must lie within the range in [infer]",
         ),
         (
             ("--case", "infer.toml", "--design", "nan"),
@@ -241,11 +242,13 @@ def test_no_real_recording_is_told_anything_from(folder):
         pytest.skip("the shared data are not here")
     setting = formula_setting()
     options = {"ims": {"rate_hz": 20_000.0, "unit": "g", "channel": "1"}, "endaq": {"channel": "1"}}
-    heard = listen([SHARED / "vibration" / folder], setting, **options.get(folder, {}))
-    found = infer_observations(
-        setting, formula_emulator(setting), heard.observations, silent=heard.silent
+    heard = observe_recordings(
+        [SHARED / "vibration" / folder], setting, source=RecordingInput(**options.get(folder, {}))
     )
-    assert found.verdict().startswith("Cannot be told")
+    found = infer_observations(
+        setting, formula_emulator(setting), heard.observations, excluded=heard.excluded
+    )
+    assert found.verdict().startswith("Not identified")
     assert not found.identifiable
 
 

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.stats import qmc
 
 from asperity.case import load_case
-from asperity.inference import Emulator, Quality, Setting, setting_of
-from asperity.inference.emulator import features_of
-from asperity.inference.gaussian_process import Process
+from asperity.inference import Emulator, EmulatorQuality, Setting, inference_setting
+from asperity.inference.feature_map import emulator_features
+from asperity.inference.gaussian_process import GaussianProcess
 from asperity.inference.outputs import OUTPUTS
 
 CASE = Path(__file__).parents[2] / "examples" / "infer.toml"
@@ -33,7 +33,7 @@ SMALL = {  # a few small contacts
 def formula_setting(**overrides: object) -> Setting:
     """The example's setting."""
     case = load_case(CASE)
-    return setting_of(case.with_overrides(overrides) if overrides else case)
+    return inference_setting(case.with_overrides(overrides) if overrides else case)
 
 
 def formula(x: np.ndarray, sq: np.ndarray) -> dict[str, np.ndarray]:
@@ -53,17 +53,19 @@ def formula(x: np.ndarray, sq: np.ndarray) -> dict[str, np.ndarray]:
 def formula_emulator(setting: Setting) -> Emulator:
     """Processes through the formula, on a Sobol sequence, without noise."""
     shares = qmc.Sobol(len(setting.ranges), rng=np.random.default_rng(1)).random(POINTS)
-    features = features_of(setting)
+    features = emulator_features(setting)
     x = features(shares)
     speed = len(setting.contact) + 1
     values = formula(x[:, speed], 1e-6 * setting.contact[0].in_unit(_z(shares[:, 0])))
     lengths = np.full(x.shape[1], 30.0)
     lengths[[0, speed]] = 3.0, 0.6
     processes = {
-        key: Process(x, output.forward(values[key]), np.full(POINTS, 1e-4), lengths, 30.0, 4e-4)
+        key: GaussianProcess(
+            x, output.forward(values[key]), np.full(POINTS, 1e-4), lengths, 30.0, 4e-4
+        )
         for key, output in OUTPUTS.items()
     }
-    quality = {key: Quality(0.01, 0.9, 0.05, 0.02) for key in OUTPUTS}
+    quality = {key: EmulatorQuality(0.01, 0.9, 0.05, 0.02) for key in OUTPUTS}
     return Emulator(
         setting.ranges, features, processes, quality, POINTS, 4, 0, Path("formula"), 0.0
     )

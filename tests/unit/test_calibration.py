@@ -16,7 +16,7 @@ from asperity import load_case
 from asperity.cli import main
 from asperity.core.errors import BadInput
 from asperity.paper import Anchor
-from asperity.study import calibrate, plan_points, run_study
+from asperity.study import CalibrationSettings, calibrate, plan_points, run_study
 from asperity.study.calibration import _levels
 from asperity.study.sensitivities import MisfitSlopes
 
@@ -76,8 +76,8 @@ def test_what_made_the_anchors_is_found_and_what_they_do_not_see_is_said(dry, th
         ),
         Anchor(name="CRF", quantity="crf_hz", sq=3e-6, value=full_load_crf(230e9), tolerance=10.0),
     ]
-    settings = {"free": [CAP, MODULUS, FRICTION], **QUICK, "out": tmp_path}
-    found = calibrate(dry, anchors, **settings, executor=threads)
+    settings = CalibrationSettings(free=[CAP, MODULUS, FRICTION], **QUICK)
+    found = calibrate(dry, anchors, settings=settings, out=tmp_path, executor=threads)
     cap, modulus, friction = found.parameters
     assert cap.value == pytest.approx(1.3, rel=0.03)
     assert modulus.value == pytest.approx(230.0, rel=0.02)
@@ -101,7 +101,9 @@ def test_what_made_the_anchors_is_found_and_what_they_do_not_see_is_said(dry, th
     json.dumps(found.scalars(), allow_nan=False)
 
     parts = sorted((tmp_path / "evaluations" / "parts").iterdir())
-    again = calibrate(dry, anchors, **settings, executor=threads)  # from the folder
+    again = calibrate(
+        dry, anchors, settings=settings, out=tmp_path, executor=threads
+    )  # from the folder
     assert again.parameters == found.parameters
     assert sorted((tmp_path / "evaluations" / "parts").iterdir()) == parts
 
@@ -112,7 +114,9 @@ def test_anchors_that_contradict_each_other_are_met_halfway_and_named(silent, th
         Anchor(name="little", quantity="car_domain", sq=2e-6, value=0.25, tolerance=0.01),
         Anchor(name="much", quantity="car_domain", sq=2e-6, value=0.35, tolerance=0.01),
     ]
-    found = calibrate(silent, anchors, free=[CAP], **QUICK, executor=threads)
+    found = calibrate(
+        silent, anchors, settings=CalibrationSettings(free=[CAP], **QUICK), executor=threads
+    )
     miss = found.fit.set_index("anchor")["miss"]
     assert miss["little"] == pytest.approx(0.05, abs=0.01)
     assert miss["much"] == pytest.approx(-0.05, abs=0.01)
@@ -132,12 +136,18 @@ def test_a_bound_that_is_kept_does_not_pull(silent, threads):
     bound = Anchor(
         name="above", quantity="car_domain", sq=2e-6, value=0.1, tolerance=0.001, sense="at least"
     )
-    found = calibrate(silent, [car, bound], free=[CAP], **QUICK, executor=threads)
-    alone = calibrate(silent, [car], free=[CAP], **QUICK, executor=threads)
+    found = calibrate(
+        silent, [car, bound], settings=CalibrationSettings(free=[CAP], **QUICK), executor=threads
+    )
+    alone = calibrate(
+        silent, [car], settings=CalibrationSettings(free=[CAP], **QUICK), executor=threads
+    )
     assert found.parameters == alone.parameters
     assert found.fit.set_index("anchor").loc["above", "miss"] == 0.0
     beyond = replace(bound, value=0.95)  # more than the softest cap can give
-    pushed = calibrate(silent, [beyond], free=[CAP], **QUICK, executor=threads)
+    pushed = calibrate(
+        silent, [beyond], settings=CalibrationSettings(free=[CAP], **QUICK), executor=threads
+    )
     assert pushed.parameters[0].at_end
     assert pushed.parameters[0].value == pytest.approx(0.5, rel=0.03)
     assert "At the end of the range: material.hardness." in pushed.verdict()
@@ -190,8 +200,8 @@ CRF = Anchor(name="CRF", quantity="crf_hz", sq=2e-6, value=3800.0, tolerance=10.
 @pytest.mark.parametrize(
     ("anchors", "settings", "said"),
     [
-        ([], {}, "needs an anchor"),
-        ([replace(CRF, fitted=False)], {}, "needs an anchor"),
+        ([], {}, "needs a fitted anchor"),
+        ([replace(CRF, fitted=False)], {}, "needs a fitted anchor"),
         (
             [Anchor(name="bend", quantity="split", value=2.0, tolerance=0.1)],
             {},
@@ -204,15 +214,20 @@ CRF = Anchor(name="CRF", quantity="crf_hz", sq=2e-6, value=3800.0, tolerance=10.
     ],
 )
 def test_what_cannot_be_asked_is_refused_in_a_sentence(dry, threads, anchors, settings, said):
+    chosen = CalibrationSettings(**{"free": [MODULUS], **QUICK, **settings})
     with pytest.raises(BadInput) as refused:
-        calibrate(dry, anchors, **{"free": [MODULUS], **QUICK, **settings}, executor=threads)
+        calibrate(dry, anchors, settings=chosen, executor=threads)
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
 def test_an_anchor_of_the_resonance_needs_a_vibration(dry):
     with pytest.raises(BadInput, match=r"'CRF' needs a vibration; add \[vibration\]"):
-        calibrate(dry.with_overrides({"vibration": "none"}), [CRF], free=[MODULUS])
+        calibrate(
+            dry.with_overrides({"vibration": "none"}),
+            [CRF],
+            settings=CalibrationSettings(free=[MODULUS]),
+        )
 
 
 def test_the_command_writes_a_case_that_a_study_can_run(silent, tmp_path, monkeypatch, capsys):

@@ -15,7 +15,7 @@ from asperity.recording import check_recording, open_recording, read_recording
 from asperity.resonance import contact_resonance
 from asperity.results import solve_case
 from asperity.simulation import run_history
-from asperity.study import curve_of, plan_study, run_study, study_scalars
+from asperity.study import curve_from_study, plan_study, run_study, study_scalars
 from asperity.surface import describe_surface
 
 COPIES = {
@@ -54,7 +54,7 @@ def told(tmp_path_factory):
         ),
         "plan": (plan, lambda plan: [plan.design, [entry.id for entry in plan.cases]]),
         "study": (study, lambda study: [study_scalars(study), study.table]),
-        "curve": (curve_of(study), lambda curve: [curve.verdict(), curve.summary()]),
+        "curve": (curve_from_study(study), lambda curve: [curve.verdict(), curve.summary()]),
         "recording": (recording, lambda recording: [recording.values, recording.facts]),
         "quality": (
             check_recording(open_recording(paths[0], rate_hz=2e4)),

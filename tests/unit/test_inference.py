@@ -14,33 +14,33 @@ from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
 from asperity.coupling import dry_full_load, excitation, oscillator
 from asperity.inference import (
-    Forward,
-    Heard,
+    ChannelPrediction,
+    ForwardModel,
     Inference,
+    LogMeasurement,
     Observation,
-    Point,
-    Shown,
+    OperatingPoint,
     Unknown,
     infer_contact,
     infer_observations,
-    setting_of,
-    with_measured,
+    inference_setting,
+    with_measured_surface,
     with_observation,
 )
 from asperity.inference import emulator as emulator_module
-from asperity.inference.estimates import bits, estimate
-from asperity.inference.gaussian_process import Process, fit_process
+from asperity.inference.estimates import information_gain, quantity_estimate
+from asperity.inference.gaussian_process import GaussianProcess, fit_process
 from asperity.inference.likelihood import (
-    ALONG,
-    COMMON,
+    COMMON_SHARE,
     EMULATED_HEIGHT_STD,
     EXPONENT_STD,
+    FORCE_LENGTH,
     GAIN_STD,
-    OWN,
+    POINT_SHARE,
     SIZES,
     log_likelihood,
 )
-from asperity.inference.observations import points_of
+from asperity.inference.observations import operating_points
 from asperity.inference.outputs import OUTPUTS
 from asperity.inference.sampling import Pool, importance, nested
 from asperity.surface import MeasuredSurface
@@ -69,8 +69,10 @@ def truth(setting):
 def heard(setting, emulator, points, *, law="hertz-point", std=1e-3, seed=1):
     """What the true contact shows at operating points, with errors of measurement."""
     rng = np.random.default_rng(seed)
-    forward = Forward(setting, emulator, tuple(Point(load, speed) for load, speed in points))
-    shown = forward.shown(truth(setting), law)
+    forward = ForwardModel(
+        setting, emulator, tuple(OperatingPoint(load, speed) for load, speed in points)
+    )
+    shown = forward.predict(truth(setting), law)
     crf = np.exp(shown.crf[0] + std * rng.standard_normal(len(points)))
     return [
         Observation(
@@ -151,18 +153,24 @@ def test_priors_have_the_quantiles_that_are_stated():
 def test_the_likelihood_is_the_multivariate_normal(discrepancy):
     """Of three channels, each with a size of the law's error of its own, covariances written out."""
     rng = np.random.default_rng(2)
-    crf, damping, crfa, lever = rng.standard_normal((4, 3, 4))
+    crf, damping, crfa, log_force = rng.standard_normal((4, 3, 4))
     stds = rng.uniform(0.1, 0.3, (3, 3, 4))
-    shown = Shown(crf, stds[0], damping, stds[1], crfa, stds[2], lever)
-    said = [Heard(0.3, 0.2), Heard(), Heard(-0.1, 0.5), Heard(1.0, 0.1)]
+    shown = ChannelPrediction(crf, stds[0], damping, stds[1], crfa, stds[2], log_force)
+    said = [
+        LogMeasurement(0.3, 0.2),
+        LogMeasurement(),
+        LogMeasurement(-0.1, 0.5),
+        LogMeasurement(1.0, 0.1),
+    ]
     points = [
-        Point(500.0 * 1.01**i, 1.0, crf=one, damping=one, crfa=one) for i, one in enumerate(said)
+        OperatingPoint(500.0 * 1.01**i, 1.0, crf=one, damping=one, crfa=one)
+        for i, one in enumerate(said)
     ]
     here = [0, 2, 3]
     near = norm.pdf(np.subtract.outer(here, here) * np.log(1.01) / 0.03) / norm.pdf(0.0)
     sizes = SIZES if discrepancy else (0.0,)
     for row in range(3):
-        force, expected = lever[row, here], 0.0
+        force, expected = log_force[row, here], 0.0
         steep = EXPONENT_STD * discrepancy * (force - force.mean())
         common = {"crf": np.outer(steep, steep), "damping": 0.0, "crfa": GAIN_STD**2}
         beyond = {"crf": 0.0, "damping": 0.0, "crfa": EMULATED_HEIGHT_STD}
@@ -170,10 +178,12 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
             {"crf": 1.0, "damping": 5.0, "crfa": 10.0}.items()
         ):
             std = np.hypot(stds[number, row, here], beyond[channel])
-            known = common[channel] + np.outer(std, std) * (COMMON + (1.0 - COMMON) * near)
+            known = common[channel] + np.outer(std, std) * (
+                COMMON_SHARE + (1.0 - COMMON_SHARE) * near
+            )
             known = known + np.diag([said[i].std ** 2 for i in here])
-            alike = OWN * near + (1.0 - OWN) * norm.pdf(
-                np.subtract.outer(force, force) / ALONG
+            alike = POINT_SHARE * near + (1.0 - POINT_SHARE) * norm.pdf(
+                np.subtract.outer(force, force) / FORCE_LENGTH
             ) / norm.pdf(0.0)
             densities = [
                 multivariate_normal(
@@ -189,13 +199,13 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
 
 def test_importance_and_nested_sampling_find_a_known_posterior():
     """A line of two unknowns heard once: mean, variance and evidence in closed form."""
-    lever, value, noise = np.array([1.0, -2.0]), 3.0, 0.5
+    gradient, value, noise = np.array([1.0, -2.0]), 3.0, 0.5
 
     def target(z):
-        return -0.5 * ((z @ lever - value) / noise) ** 2 - np.log(noise * np.sqrt(2.0 * np.pi))
+        return -0.5 * ((z @ gradient - value) / noise) ** 2 - np.log(noise * np.sqrt(2.0 * np.pi))
 
-    variance = lever @ lever + noise**2
-    mean, evidence = lever * value / variance, norm(0.0, np.sqrt(variance)).logpdf(value)
+    variance = gradient @ gradient + noise**2
+    mean, evidence = gradient * value / variance, norm(0.0, np.sqrt(variance)).logpdf(value)
     pool = Pool(lambda z: z, lambda a, b: np.concatenate([a, b]), lambda a, rows: a[rows], 2, 0)
     for sampled in (importance(pool, target), nested(lambda z: z, target, 2, 0)):
         assert sampled.log_evidence == pytest.approx(
@@ -204,7 +214,7 @@ def test_importance_and_nested_sampling_find_a_known_posterior():
         found = sampled.weights @ sampled.z
         spread = np.sqrt(sampled.weights @ (sampled.z - found) ** 2)
         assert found == pytest.approx(mean, abs=0.12)
-        assert spread == pytest.approx(np.sqrt(1.0 - lever**2 / variance), rel=0.12)
+        assert spread == pytest.approx(np.sqrt(1.0 - gradient**2 / variance), rel=0.12)
         told = 0.5 * np.log2(variance / noise**2) + 0.5 * (
             mean @ mean + noise**2 / variance - 1.0
         ) / np.log(2.0)
@@ -216,10 +226,15 @@ def test_bits_are_those_of_a_narrowed_normal_and_nothing_of_chance():
     prior = rng.standard_normal(40_000)
     narrow = 0.3 + 0.25 * rng.standard_normal(40_000)
     told = -np.log2(0.25) + 0.5 * (0.25**2 + 0.3**2 - 1.0) / np.log(2.0)
-    assert bits(narrow, prior, 40_000.0) == pytest.approx(told, abs=0.1)  # of 20 classes
-    assert bits(rng.standard_normal(300), prior, 300.0) < 0.03
-    against = estimate(2.0 + 0.2 * rng.standard_normal(4000), prior, 4000.0, bounded=True)
-    assert (against.against, estimate(prior, prior, 4000.0, bounded=True).against) == ("high", "")
+    assert information_gain(narrow, prior, 40_000.0) == pytest.approx(
+        told, abs=0.1
+    )  # of 20 classes
+    assert information_gain(rng.standard_normal(300), prior, 300.0) < 0.03
+    against = quantity_estimate(2.0 + 0.2 * rng.standard_normal(4000), prior, 4000.0, bounded=True)
+    assert (against.against, quantity_estimate(prior, prior, 4000.0, bounded=True).against) == (
+        "high",
+        "",
+    )
 
 
 # Laws ----------------------------------------------------------------------------------------------------------------
@@ -227,9 +242,11 @@ def test_bits_are_those_of_a_narrowed_normal_and_nothing_of_chance():
 
 def test_crf_and_crfa_are_those_of_the_coupling(setting, emulator):
     """The oscillator and its excitation as `solve` makes them, at the load share that is emulated."""
-    forward = Forward(setting, emulator, (Point(300.0, 0.8), Point(900.0, 2.5)))
+    forward = ForwardModel(
+        setting, emulator, (OperatingPoint(300.0, 0.8), OperatingPoint(900.0, 2.5))
+    )
     z = truth(setting)
-    shown, states = forward.shown(z, "hertz-point"), forward.states(z, ["clr", "car"])
+    shown, states = forward.predict(z, "hertz-point"), forward.states(z, ["clr", "car"])
     model = replace_choices(setting, z)
     expected = []
     for place, point in enumerate(forward.points):
@@ -263,10 +280,10 @@ def replace_choices(setting, z):
 
 
 def test_the_own_law_hears_stiffness_and_damping(setting, emulator):
-    forward = Forward(setting, emulator, (Point(500.0, 1.91),))
+    forward = ForwardModel(setting, emulator, (OperatingPoint(500.0, 1.91),))
     z = truth(setting)
     state = forward.states(z, ["contact_stiffness_n_m", "contact_damping_ratio"])
-    shown = forward.shown(z, "own")
+    shown = forward.predict(z, "own")
     hertz = np.sqrt(state["contact_stiffness_n_m"][0, 0] / 0.1) / (2.0 * np.pi)
     assert np.exp(shown.crf[0, 0]) == pytest.approx(hertz, rel=1e-9)
     assert np.exp(shown.damping[0, 0]) == pytest.approx(
@@ -281,13 +298,13 @@ def test_one_operating_point_leaves_sq_open_and_six_do_not(setting, emulator, of
     sq = float(setting.unknowns[0].value(truth(setting)[:, 0])[0])
     wide, narrow = of_one.posterior()["sq_m"], of_six.posterior()["sq_m"]
     assert not of_one.identifiable
-    assert "one operating point is one frequency" in of_one.reason
+    assert "one operating point gives one frequency" in of_one.reason
     assert narrow.information_bits > wide.information_bits + 0.5
     assert narrow.low < sq < narrow.high
     assert of_six.identifiable
-    clr = Forward(setting, emulator, of_six.forward.points[:1]).states(truth(setting), ["clr"])[
-        "clr"
-    ][0, 0]
+    clr = ForwardModel(setting, emulator, of_six.forward.points[:1]).states(
+        truth(setting), ["clr"]
+    )["clr"][0, 0]
     told = of_six.posterior()["clr"]
     assert told.low < clr < told.high
     assert told.information_bits > 2.0
@@ -315,7 +332,7 @@ def test_a_wrong_law_widens_the_intervals_and_is_said(setting, emulator, of_six)
     ]
     found = infer_observations(setting, emulator, wrong)
     assert found.law_error > 0.05
-    assert any("an error of about" in warning for warning in found.warnings())
+    assert any("model error of about" in warning for warning in found.warnings())
     assert (
         found.models[0].log_evidence > found.models[1].log_evidence + 10.0
     )  # with the error against exact
@@ -327,14 +344,14 @@ def test_a_wrong_law_widens_the_intervals_and_is_said(setting, emulator, of_six)
 
 
 def test_nothing_heard_cannot_be_told(setting, emulator):
-    silent = (
+    excluded = (
         ("a.wav", "one spectrum cannot tell"),
         ("b.wav", "too short"),
         ("c.wav", "one spectrum cannot tell"),
     )
-    found = infer_observations(setting, emulator, [], silent=silent)
+    found = infer_observations(setting, emulator, [], excluded=excluded)
     assert found.verdict().startswith(
-        "Cannot be told: no recording shows a contact resonance (2 of 3: one spectrum"
+        "Not identified: no recording shows a contact resonance (2 of 3: one spectrum"
     )
     assert not found.identifiable
     assert all(one.information_bits < 0.1 for one in found.posterior().values())
@@ -388,24 +405,26 @@ def test_what_repeats_have_in_common_does_not_average_away():
         load_n=500.0, entrainment_m_s=1.0, crf_hz=3000.0, crf_std_hz=5.0, crf_shared_std_hz=3.0
     )
     for count in (1, 4, 1000):
-        assert 3000.0 * points_of([one] * count)[0].crf.std == pytest.approx(
+        assert 3000.0 * operating_points([one] * count)[0].crf.std == pytest.approx(
             np.hypot(3.0, 4.0 / np.sqrt(count))
         )
 
 
 def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
     """Five recordings that agree at what is as good as one place do not speak for a small error."""
-    said = Heard(8.0, 2e-3)
+    said = LogMeasurement(8.0, 2e-3)
     off = np.linspace(-0.4, 0.4, 2001)[:, None]
 
     def width(loads):
-        points = [Point(load, 1.0, crf=said) for load in loads]
-        nothing, lever = (
+        points = [OperatingPoint(load, 1.0, crf=said) for load in loads]
+        nothing, log_force = (
             np.full((len(off), len(loads)), np.nan),
             np.tile(np.log(loads), (len(off), 1)),
         )
         crf = 8.0 + off + np.zeros_like(nothing)
-        shown = Shown(crf, np.full_like(crf, 0.01), nothing, nothing, nothing, nothing, lever)
+        shown = ChannelPrediction(
+            crf, np.full_like(crf, 0.01), nothing, nothing, nothing, nothing, log_force
+        )
         weights = np.exp(log_likelihood(shown, points, discrepancy=True))
         return np.sqrt(weights @ off[:, 0] ** 2 / weights.sum())
 
@@ -422,30 +441,30 @@ def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"infer.sq": {"from": "1 um", "to": "0.5 um"}}, "must have a range that goes upwards"),
+        ({"infer.sq": {"from": "1 um", "to": "0.5 um"}}, "must have an ascending range"),
         ({"infer.sq": {"from": "0.5 um", "to": "2 N"}}, "infer.sq.to must be in um"),
         (
             {"infer.radius": {"from": "1 mm", "to": "2 mm"}},
-            "infer.radius cannot be inferred; what can is",
+            "infer.radius cannot be inferred; possible are",
         ),
         (
             {"infer.correlation_length": {"from": "5 um", "to": "40 um"}},
-            "which the emulator's grid carries",
+            "which the emulator's grid resolves",
         ),
         (
             {"infer.load": {"value": "500 N", "std": "1 N"}},
-            "is where the contact may be run; give from and to",
+            "is an operating range; give from and to",
         ),
         ({"infer.sq": {"value": "1 um", "std": "0 um"}}, "infer.surface.sq.std must be positive"),
         ({"infer.points": 3}, "infer.points must be greater than or equal to 16"),
-        ({"vibration": "none"}, "vibration is left out"),
+        ({"vibration": "none"}, "vibration is missing"),
         ({"lubricant": "none"}, "the contact is dry"),
         ({"surface": {"kind": "flat"}}, "surface is flat"),
     ],
 )
 def test_what_cannot_be_inferred_is_refused(change, said):
     with pytest.raises(BadInput, match=said):
-        setting_of(load_case(CASE).with_overrides(change))
+        inference_setting(load_case(CASE).with_overrides(change))
 
 
 def test_an_operating_point_beyond_the_emulator_is_refused(setting, emulator):
@@ -456,7 +475,7 @@ def test_an_operating_point_beyond_the_emulator_is_refused(setting, emulator):
         BadInput, match=r"load of far.wav must lie within 250 to 950 N.*widen infer.load"
     ):
         infer_observations(setting, emulator, [far])
-    with pytest.raises(BadInput, match="needs an oil by its data sheet"):
+    with pytest.raises(BadInput, match="needs an oil given by its data sheet"):
         infer_observations(setting, emulator, [replace(far, load_n=500.0, temperature_k=340.0)])
 
 
@@ -464,7 +483,9 @@ def test_an_operating_point_beyond_the_emulator_is_refused(setting, emulator):
     "wrong", [{"load_n": 0.0}, {"crf_std_hz": float("nan")}, {"crf_shared_std_hz": 6.0}]
 )
 def test_an_observation_that_is_none_is_refused(wrong):
-    with pytest.raises(BadInput, match=r"must be positive|is a part of crf_std_hz, 3 Hz, got 6 Hz"):
+    with pytest.raises(
+        BadInput, match=r"must be positive|must be at most crf_std_hz, 3 Hz, got 6 Hz"
+    ):
         Observation(
             **{
                 "load_n": 500.0,
@@ -485,7 +506,7 @@ def test_a_missing_extra_is_said_with_its_remedy(monkeypatch, tmp_path):
 
 def test_a_process_of_no_slope_is_flat():
     x = np.linspace(0.0, 1.0, 12)[:, None]
-    process = Process(x, np.full(12, 2.0), np.full(12, 1e-4), np.ones(1), 1.0, 1e-4)
+    process = GaussianProcess(x, np.full(12, 2.0), np.full(12, 1e-4), np.ones(1), 1.0, 1e-4)
     mean, std = process(np.array([[0.35], [0.9]]))
     assert mean == pytest.approx([2.0, 2.0], abs=1e-6)
     assert np.all(std >= 0.0)
@@ -508,7 +529,7 @@ def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
     rng = np.random.default_rng(6)
     grid = Grid((64, 64), (-1e-3, -1e-3), (1e-3, 1e-3), (False, False))
     measured = MeasuredSurface(0.7e-6 * rng.standard_normal((64, 64)), grid, "ring.csv", "text")
-    known, said = with_measured(setting, measured)
+    known, said = with_measured_surface(setting, measured)
     z = np.array([-1.0, 0.0, 1.0])
     assert 1e6 * known.contact[0].value(z) == pytest.approx(
         [0.7 - 0.022, 0.7, 0.7 + 0.022], abs=0.006
@@ -519,9 +540,9 @@ def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
     alone = of_one.posterior()["clr"]
     assert told.high - told.low < 0.8 * (alone.high - alone.low)
     with pytest.raises(BadInput, match=r"widen infer\.sq"):
-        with_measured(setting, replace(measured, heights=10.0 * measured.heights))
-    with pytest.raises(BadInput, match="the case knows its Sq"):
-        with_measured(replace(setting, contact=setting.contact[1:]), measured)
+        with_measured_surface(setting, replace(measured, heights=10.0 * measured.heights))
+    with pytest.raises(BadInput, match="Sq is known in the case"):
+        with_measured_surface(replace(setting, contact=setting.contact[1:]), measured)
 
 
 def test_further_points_never_take_a_folder_that_is_there(monkeypatch, tmp_path):

@@ -72,7 +72,7 @@ def test_not_solved_the_worst_is_pressed_hardest(gears):
     found = machine_conditions(gears)
     assert found.worst["p_hertz_pa"] == max(row["p_hertz_pa"] for row in found.rows)
     assert found.verdict().endswith(
-        "B, Hertz pressure 1.6671 GPa, slide-to-roll ratio −46 %; not solved."
+        "the highest Hertz pressure is 1.6671 GPa at B, slide-to-roll ratio −46 %; not solved."
     )
 
 
@@ -126,7 +126,7 @@ def test_a_contact_that_draws_no_oil_in_has_its_reason(gears, monkeypatch):
     found = solve_machine(flat, workers=1)
     assert found.rows[0]["h_central_m"] > 0.0
     assert found.rows[1]["slide_to_roll"] is None
-    assert "draw no oil in" in found.rows[1]["reason"]
+    assert "entrain no oil" in found.rows[1]["reason"]
     monkeypatch.setitem(vars(flat), "contacts", (against,))
-    with pytest.raises(BadInput, match="no contact draws oil in"):
+    with pytest.raises(BadInput, match="no contact entrains oil"):
         solve_machine(flat)

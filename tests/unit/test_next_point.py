@@ -5,17 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.inference import Forward, Heard, Observation, Point, Shown, infer_observations
+from asperity.inference import (
+    ChannelPrediction,
+    ForwardModel,
+    LogMeasurement,
+    Observation,
+    OperatingPoint,
+    infer_observations,
+)
 from asperity.inference.likelihood import (
     EXPONENT_STD,
     SIZES,
     emulated_errors,
-    foretold,
     law_errors,
     log_likelihood,
+    predictive_mixture,
 )
-from asperity.inference.next_point import _information, at_place, expected_information
-from asperity.inference.observations import likeness
+from asperity.inference.next_point import _mutual_information, at_point, expected_information
+from asperity.inference.observations import point_similarity
 from support.emulated import formula_emulator, formula_setting
 
 HERE = (500.0, 0.8)
@@ -27,8 +34,8 @@ LOADS = (500.0, 500.0, 800.0)
 
 def heard_once(setting, emulator, times=1):
     """A contact with unknowns in the middle of their priors, heard so often at one point."""
-    forward = Forward(setting, emulator, (Point(*HERE),))
-    shown = forward.shown(np.zeros((1, forward.dims)), "hertz-point")
+    forward = ForwardModel(setting, emulator, (OperatingPoint(*HERE),))
+    shown = forward.predict(np.zeros((1, forward.dims)), "hertz-point")
     crf, damping = (float(np.exp(values[0, 0])) for values in (shown.crf, shown.damping))
     one = Observation(
         load_n=HERE[0],
@@ -76,22 +83,26 @@ def linear(unknown, emulated=0.01):
     """What it shows: ln CRF goes with its one unknown; forces are known."""
     crf = 8.0 + 0.1 * unknown[:, None] * SLOPES
     nothing = np.full_like(crf, np.nan)
-    lever = np.tile(np.log(LOADS), (len(crf), 1))
-    return Shown(crf, np.full_like(crf, emulated), nothing, nothing, nothing, nothing, lever)
+    log_force = np.tile(np.log(LOADS), (len(crf), 1))
+    return ChannelPrediction(
+        crf, np.full_like(crf, emulated), nothing, nothing, nothing, nothing, log_force
+    )
 
 
 def points(std, value=8.02):
     """Heard at the first alone."""
     return [
-        Point(load, 1.0, crf=Heard(value, std) if place == 0 else Heard())
+        OperatingPoint(
+            load, 1.0, crf=LogMeasurement(value, std) if place == 0 else LogMeasurement()
+        )
         for place, load in enumerate(LOADS)
     ]
 
 
 def covariance(size, emulated=0.01):
     """Of the errors at the three points, of one machine: those of the likelihood, the exponent's about the first."""
-    shown, near = linear(np.zeros(1), emulated), likeness(points(1e-3))
-    law = law_errors("crf", shown.lever, np.array([size]), near, shown.lever[:, :1])
+    shown, near = linear(np.zeros(1), emulated), point_similarity(points(1e-3))
+    law = law_errors("crf", shown.log_force, np.array([size]), near, shown.log_force[:, :1])
     return (law + emulated_errors("crf", shown.crf_std, near))[0]
 
 
@@ -111,11 +122,13 @@ def told(place, size, std, emulated=0.01, count=3000):
     """The same by possible machines: drawn from what the first recording leaves, and asked what they would show."""
     rng = np.random.default_rng(1)
     variance = covariance(size, emulated)[0, 0] + std**2
-    lever = 0.1 * SLOPES[0]
-    left = 1.0 / (1.0 + lever**2 / variance)
-    unknown = left * lever / variance * 0.02 + np.sqrt(left) * rng.standard_normal(count)
-    shown = at_place(foretold(linear(unknown, emulated), points(std), "crf", [size]), place)
-    return _information([(shown, std, (rng.random(count), rng.standard_normal(count)))])
+    log_force = 0.1 * SLOPES[0]
+    left = 1.0 / (1.0 + log_force**2 / variance)
+    unknown = left * log_force / variance * 0.02 + np.sqrt(left) * rng.standard_normal(count)
+    shown = at_point(
+        predictive_mixture(linear(unknown, emulated), points(std), "crf", [size]), place
+    )
+    return _mutual_information([(shown, std, (rng.random(count), rng.standard_normal(count)))])
 
 
 @pytest.mark.parametrize("size", [0.0, *SIZES])
@@ -136,21 +149,24 @@ def test_a_repeat_tells_what_measurement_left_open_and_no_more():
 
 def test_what_was_heard_says_nothing_of_errors_elsewhere_under_another_force():
     """Without the emulator's share that all points have in common; an exponent that is off adds to what is left."""
-    far = linear(np.zeros(1), emulated=0.0)._replace(lever=np.log([[1.0, 1.0, 1e6]]))
-    shown = foretold(far, points(1e-3), "crf", [0.02])
+    far = linear(np.zeros(1), emulated=0.0)._replace(log_force=np.log([[1.0, 1.0, 1e6]]))
+    shown = predictive_mixture(far, points(1e-3), "crf", [0.02])
     assert shown.mean[0, 0, 2] == pytest.approx(8.0, abs=1e-9)
     assert shown.std[0, 0, 2] == pytest.approx(np.hypot(0.02, EXPONENT_STD * np.log(1e6)), rel=1e-9)
 
 
 def test_densities_of_what_would_be_heard_make_the_likelihood_of_both():
     """p(first) p(second given first) is p(both), the law's sizes unknown, as long as no exponent is off."""
-    same = [Point(500.0, 1.0, crf=Heard(8.02, 2e-3)), Point(500.0, 2.0, crf=Heard(7.96, 2e-3))]
-    first = [same[0], replace(same[1], crf=Heard())]
+    same = [
+        OperatingPoint(500.0, 1.0, crf=LogMeasurement(8.02, 2e-3)),
+        OperatingPoint(500.0, 2.0, crf=LogMeasurement(7.96, 2e-3)),
+    ]
+    first = [same[0], replace(same[1], crf=LogMeasurement())]
     rng = np.random.default_rng(3)
     crf, nothing = 8.0 + 0.05 * rng.standard_normal((6, 2)), np.full((6, 2), np.nan)
-    shown = Shown(
+    shown = ChannelPrediction(
         crf, np.full((6, 2), 0.01), nothing, nothing, nothing, nothing, np.full((6, 2), 6.0)
     )
-    then = foretold(shown, first, "crf").log_density(np.array([np.nan, 7.96]), 2e-3)[:, 1]
+    then = predictive_mixture(shown, first, "crf").log_density(np.array([np.nan, 7.96]), 2e-3)[:, 1]
     one, both = (log_likelihood(shown, points, discrepancy=True) for points in (first, same))
     assert one + then == pytest.approx(both, abs=1e-9)

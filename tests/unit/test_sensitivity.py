@@ -12,7 +12,7 @@ import pytest
 from asperity import load_case
 from asperity.cli import main
 from asperity.core.errors import AsperityError, BadInput
-from asperity.study import ParameterRange, global_sensitivity, sensitivity
+from asperity.study import ParameterRange, SensitivitySettings, global_sensitivity, sensitivity
 from asperity.study.global_sensitivity import knee
 from asperity.study.ranges import LENGTH_KEY, OPEN_RANGES, open_ranges, overrides_at, parse_range
 from asperity.study.sensitivity_indices import indices, sample_design
@@ -97,11 +97,9 @@ def test_rounding_is_no_effect_and_counts_for_no_factor(paper, threads):
     )
     found = sensitivity(
         dry,
-        vary=["contact.load=200 N..800 N"],
-        size=2,
-        sq=[1e-6],
-        levels=0,
-        cells=24,
+        settings=SensitivitySettings(
+            vary=["contact.load=200 N..800 N"], size=2, sq=[1e-6], levels=0, cells=24
+        ),
         executor=threads,
     )
     assert found.spread("clr at 1 um") == pytest.approx(
@@ -109,7 +107,7 @@ def test_rounding_is_no_effect_and_counts_for_no_factor(paper, threads):
     )  # all load on asperities, to rounding
     assert (found.ranking("clr at 1 um")["mu_star"] == 0.0).all()
     assert found.overall().sum() == pytest.approx(1.0)  # of CAR alone
-    assert "CLR at Sq 1 um from 100 to 100 % (moved by none of them)" in found.verdict()
+    assert "CLR at Sq 1 um from 100 to 100 % (main factor: none of them)" in found.verdict()
 
 
 def test_the_knee_of_a_broken_line_is_its_break():
@@ -134,7 +132,7 @@ def test_ranges_are_read_and_gone_through():
         ("material.hardness", "KEY=LOW..HIGH"),
         ("material.hardness=1 GPa..", "KEY=LOW..HIGH"),
         ("material.hardness=1 GPa..3 um", "must be in GPa"),
-        ("material.hardness=3 GPa..1 GPa", "goes upwards"),
+        ("material.hardness=3 GPa..1 GPa", "ascending range"),
         ("material.hardness=hard..harder", 'got "hard"'),
     ],
 )
@@ -202,7 +200,9 @@ def test_ranges_of_which_nothing_would_be_left_are_refused_before_anything_is_so
     with pytest.raises(
         BadInput, match=r"correlation length along x must be at least 2 cells.*; narrow the ranges"
     ):
-        sensitivity(paper, vary=[lengths], sq=[1e-6], levels=0, cells=64)
+        sensitivity(
+            paper, settings=SensitivitySettings(vary=[lengths], sq=[1e-6], levels=0, cells=64)
+        )
 
 
 def test_why_contacts_failed_is_said_where_too_many_did(paper, threads, monkeypatch):
@@ -217,24 +217,22 @@ def test_why_contacts_failed_is_said_where_too_many_did(paper, threads, monkeypa
     hardness = ParameterRange("material.hardness", 1.0, 2.0, "GPa")
     case = paper.with_overrides({**SMALL, "lubricant": "none"})
     with pytest.raises(
-        AsperityError, match="curves; the first: the roller is square; narrow the ranges"
+        AsperityError, match="factors; the first: the roller is square; narrow the ranges"
     ):
-        sensitivity(case, vary=[hardness], sq=[1e-6], levels=0, cells=32, size=2, executor=threads)
+        sensitivity(
+            case,
+            settings=SensitivitySettings(vary=[hardness], sq=[1e-6], levels=0, cells=32, size=2),
+            executor=threads,
+        )
 
 
 def test_the_cutoff_moves_crfa_by_its_cube_and_nothing_else(paper, threads, tmp_path):
     """Noise of one height behind a second-order low pass far below the resonance: CRFA ~ fc³."""
     case = paper.with_overrides(SMALL)
     ranges = ["vibration.cutoff_reference=10 Hz..40 Hz", "material.hardness=0.7 GPa..3 GPa"]
-    settings = {
-        "vary": ranges,
-        "size": 3,
-        "sq": [1e-6, 3e-6],
-        "levels": 0,
-        "cells": 32,
-        "out": tmp_path / "study",
-    }
-    found = sensitivity(case, **settings, executor=threads)
+    settings = SensitivitySettings(vary=ranges, size=3, sq=[1e-6, 3e-6], levels=0, cells=32)
+    out = tmp_path / "study"
+    found = sensitivity(case, settings=settings, out=out, executor=threads)
     assert found.factors == ("vibration.cutoff_reference", "material.hardness", "seed")
     effect = found.effects.set_index(["outcome", "factor"])["mu_star"]
     for sq in ("1 um", "3 um"):
@@ -251,7 +249,7 @@ def test_the_cutoff_moves_crfa_by_its_cube_and_nothing_else(paper, threads, tmp_
     assert "vibration.cutoff_reference" in found.verdict()
     json.dumps(found.scalars(), allow_nan=False)
 
-    again = sensitivity(case, **settings, executor=threads)  # from the folder
+    again = sensitivity(case, settings=settings, out=out, executor=threads)  # from the folder
     assert again.result.computed == 0
     assert again.effects.equals(found.effects)
 
@@ -260,11 +258,9 @@ def test_the_seed_of_a_trajectory_changes_once(paper, threads):
     """Along a trajectory of Morris the surface changes at the seed's step and at no other."""
     found = sensitivity(
         paper.with_overrides({**SMALL, "vibration": "none"}),
-        vary=["material.hardness=1 GPa..3 GPa"],
-        size=4,
-        sq=[2e-6],
-        levels=0,
-        cells=32,
+        settings=SensitivitySettings(
+            vary=["material.hardness=1 GPa..3 GPa"], size=4, sq=[2e-6], levels=0, cells=32
+        ),
         executor=threads,
     )
     seeds = found.result.table["surface.seed"].to_numpy().reshape(4, 3)
@@ -277,14 +273,16 @@ def test_a_contact_without_a_resonance_counts_as_a_share_of_one_percent(paper, t
     case = paper.with_overrides({**SMALL, "contact.entrainment_speed": "40 m/s"})
     found = sensitivity(
         case,
-        vary=["vibration.cutoff_reference=20 Hz..40 Hz"],
-        size=2,
-        sq=[0.1e-6],
-        levels=0,
-        cells=32,
+        settings=SensitivitySettings(
+            vary=["vibration.cutoff_reference=20 Hz..40 Hz"],
+            size=2,
+            sq=[0.1e-6],
+            levels=0,
+            cells=32,
+        ),
         executor=threads,
     )
-    assert found.silent == 1.0
+    assert found.full_film_share == 1.0
     full = found.result.table["full_load_crf_hz"].iloc[0]
     assert found.values["crf_hz at 0.1 um"].to_numpy() == pytest.approx(full * 0.01 ** (1 / 6))
     assert (found.effects["mu_star"] == 0.0).all()
@@ -301,7 +299,7 @@ def test_a_contact_without_a_resonance_counts_as_a_share_of_one_percent(paper, t
         ({"vary": ["contact.load=100 N..200 N"] * 2}, "varied twice"),
         ({"vary": ["contact.laod=100 N..200 N"]}, "did you mean load"),
         ({"vary": ["contact.load=100 m..200 m"]}, "must be a force"),
-        ({"vary": ["contact.load[0]=100 N..200 N"]}, "no entry of the case"),
+        ({"vary": ["contact.load[0]=100 N..200 N"]}, "not an entry of the case"),
         ({"sq": []}, "at least one Sq"),
         ({"cells": 4}, "cells must be 8 or more"),
         ({"seeds": 0}, "seeds must be 1 or more"),
@@ -309,7 +307,7 @@ def test_a_contact_without_a_resonance_counts_as_a_share_of_one_percent(paper, t
 )
 def test_what_cannot_be_asked_is_refused_in_a_sentence(paper, settings, said):
     with pytest.raises(BadInput) as refused:
-        sensitivity(paper, **settings)
+        sensitivity(paper, settings=SensitivitySettings(**settings))
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
 

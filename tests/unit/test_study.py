@@ -20,7 +20,14 @@ from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.processes import cores
 from asperity.core.storage import read_json, write_json, write_table
 from asperity.results import RUN_GROUPS, solve_case
-from asperity.study import estimate_study, load_study, plan_points, plan_study, run_study
+from asperity.study import (
+    estimate_study,
+    load_study,
+    merge_studies,
+    plan_points,
+    plan_study,
+    run_study,
+)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRY = {
@@ -135,12 +142,8 @@ def test_shards_make_up_the_whole_in_one_folder_or_merged(plan, unbroken, execut
         assert len(alone.table) == 2
         run_study(plan, out=tmp_path / "together", executor=executor, shard=(k, 3))
     same(load_study(tmp_path / "together"), unbroken)
-    merged = run_study(
-        plan,
-        out=tmp_path / "merged",
-        executor=executor,
-        merge_from=[tmp_path / f"{k}" for k in (1, 2, 3)],
-    )
+    merge_studies(plan, [tmp_path / f"{k}" for k in (1, 2, 3)], out=tmp_path / "merged")
+    merged = run_study(plan, out=tmp_path / "merged", executor=executor)
     assert merged.computed == 0
     same(merged, unbroken)
 
@@ -337,18 +340,18 @@ def test_a_map_that_is_missing_exchanged_or_anothers_is_refused(mapped, tmp_path
     result, case_id, _ = map_files(folder)
     group = folder / "fields.zarr" / case_id
     (group / "pressure").rename(group / "other")
-    with pytest.raises(UnreadableFile, match="other content"):
+    with pytest.raises(UnreadableFile, match="digest mismatch"):
         result.maps(case_id)
     (group / "other").rename(group / "pressure")
     (group / "gap" / "c" / "0" / "0").unlink()  # to zarr, a chunk that was never written is zeros
-    with pytest.raises(UnreadableFile, match="other content"):
+    with pytest.raises(UnreadableFile, match="digest mismatch"):
         result.maps(case_id)
     shutil.rmtree(group)
     shutil.copytree(mapped[1] / "fields.zarr" / map_files(mapped[1])[1], group)
     with pytest.raises(UnreadableFile, match="another study"):
         result.maps(case_id)
     shutil.rmtree(group)
-    with pytest.raises(UnreadableFile, match="keeps no maps"):
+    with pytest.raises(UnreadableFile, match="has no maps"):
         result.maps(case_id)
     with pytest.raises(BadInput, match="no finished case"):
         result.maps("../parts")

@@ -8,7 +8,7 @@ from asperity.report.study.dynamic import over_roughness, rank_correlation, told
 from asperity.report.study.page import study_exhibits
 from asperity.report.study.sweep import sweep_exhibits
 from asperity.report.style import ON_PAPER
-from asperity.study import StudyOverview, curve_of
+from asperity.study import StudyOverview, curve_from_study
 
 
 def shaken(*, seeds=5):
@@ -27,7 +27,7 @@ def shaken(*, seeds=5):
 
 def test_damping_and_stiffness_stand_over_sq_with_their_intervals():
     result = shaken()
-    curve = curve_of(result)
+    curve = curve_from_study(result)
     above, below = figure_of(over_roughness, result).axes
     (mean,) = [line for line in above.get_lines() if line.get_label() == "yielded cells elastic"]
     assert mean.get_ydata() == pytest.approx(curve.mean("contact_damping_ratio"))
@@ -42,7 +42,7 @@ def test_the_load_share_stands_over_each_indicator_with_its_rank_correlation():
     assert [panel.get_xlabel() for panel in panels[:3]] == ["CRF, sound [Hz]", "k [N/µm]", "ζ"]
     found = {panel.get_xlabel(): panel.collections[0].get_offsets() for panel in panels[:3]}
     assert len(found["ζ"]) == len(result.table) - 1
-    exhibit = told_by(StudyOverview(result), curve_of(result))
+    exhibit = told_by(StudyOverview(result), curve_from_study(result))
     for key in ("contact_damping_ratio", "contact_stiffness_n_m", "crf_sound_hz"):
         rank = rank_correlation(result.table, key)
         assert f"{rank:+.2f}".replace("-", "−") in exhibit.caption
@@ -65,9 +65,9 @@ def test_page_and_levels_have_them_and_a_study_that_did_not_shake_has_none():
     result = shaken()
     names = [exhibit.name for exhibit in study_exhibits(without_maps(result))]
     assert names[-2:] == ["damping", "told"]
-    summary = curve_of(result).summary()
+    summary = curve_from_study(result).summary()
     assert summary["contact_damping_ratio"].to_numpy() == pytest.approx(
-        curve_of(result).mean("contact_damping_ratio")
+        curve_from_study(result).mean("contact_damping_ratio")
     )
     assert {
         "contact_damping_ratio_std",

@@ -126,14 +126,14 @@ REFUSED = [
         {"sq": sq_range(step="0.1 N")},
         'must have the unit um, as the start of the range, got "0.1 N"',
     ),
-    ({"sq": {"from": "2 um", "to": "1 um", "step": "1 um"}}, "study.sq must go upwards"),
+    ({"sq": {"from": "2 um", "to": "1 um", "step": "1 um"}}, "study.sq must be ascending"),
     ({"sq": ["1 N"]}, "surface.sq must be a length"),
     ({"sq": ["1 foobar"]}, 'got "1 foobar", whose unit is unknown'),
     ({"sq": [1]}, "got the bare number 1"),
     ({"sq": []}, "study.sq must be a list of values or a range"),
     ({"sq": ["1 um"], "surface": {"sq": ["2 um"]}}, "sweeps one quantity twice"),
     ({"kind": "solve"}, "study varies nothing"),
-    ({"sq": sq_range(step="0.1 pm"), "seeds": 5}, "widen its steps"),
+    ({"sq": sq_range(step="0.1 pm"), "seeds": 5}, "use larger steps"),
     ({"sq": sq_range(step="1 um"), "seeds": 0}, "study.seeds must be 1 or more"),
     ({"slip": {"from": 0, "to": 1, "count": 3, "scale": "log"}}, "must be positive on a log scale"),
     ({"load": ["200 N", "0.2 kN"]}, "has the point contact.load = 0.2 kN twice"),
@@ -143,7 +143,7 @@ REFUSED = [
         {"sq": ["1 um"], "surface": [{"kind": "flat"}]},
         "sweeps surface and surface.sq, a part of it",
     ),
-    ({"motion": {"steps": [3, 4]}}, "study.motion.steps changes nothing in a study"),
+    ({"motion": {"steps": [3, 4]}}, "study.motion.steps has no effect in a study"),
 ]
 
 
@@ -156,7 +156,7 @@ def test_a_study_that_cannot_be_meant_is_refused_in_one_sentence(paper, study, s
 
 
 def test_a_case_without_a_study_says_how_to_add_one(paper):
-    with pytest.raises(BadInput, match=r"add \[study\] with what is varied"):
+    with pytest.raises(BadInput, match=r"add \[study\] with the quantity to vary"):
         plan_study(paper.with_overrides({"study": "none"}))
 
 

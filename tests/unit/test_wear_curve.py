@@ -21,7 +21,7 @@ from asperity.paper import (
     rig_prediction,
 )
 from asperity.results import solve_case
-from asperity.study import WearCurve, curve_of, plan_points, run_study, wear_curve
+from asperity.study import WearCurve, curve_from_study, plan_points, run_study, wear_curve
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -178,7 +178,7 @@ def test_a_study_of_something_else_has_no_wear_curve():
     with pytest.raises(
         BadInput, match=r"needs a study that varies surface\.sq alone, got contact\.load"
     ):
-        curve_of(result)
+        curve_from_study(result)
 
 
 def test_anchors_of_ones_own_are_read_and_mistakes_named(tmp_path):

@@ -11,7 +11,7 @@ from asperity.cli.output import progress
 from asperity.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from asperity.inference import Emulator, Follower, Setting
+    from asperity.inference import Emulator, SeriesForecaster, Setting
     from asperity.study import StudyProgress
 
 EMULATING = "solving contacts for the emulator; once per case ..."
@@ -33,7 +33,7 @@ def series_forecaster(
     *,
     workers: int,
     quiet: bool,
-) -> "Follower | None":
+) -> "SeriesForecaster | None":
     """Build the forecaster of a tracked or watched series; None without `--forecast`."""
     require_forecast(forecast, worn=worn, emulator=emulator)
     if forecast is None:
@@ -41,11 +41,11 @@ def series_forecaster(
     contact = contact_at(case_file)
     if not isinstance(contact, case.Case):
         raise BadInput("--forecast needs a contact; give --case CASE.toml of a single contact")
-    setting = inference.setting_of(contact)
+    setting = inference.inference_setting(contact)
     limit = inference.read_limit(forecast, setting)
     inference.require_limit(setting, limit, worn=worn is not None)
     history = None if worn is None else simulation.load_wear(worn)
-    return inference.Follower(
+    return inference.SeriesForecaster(
         setting, emulated(setting, emulator, workers, quiet=quiet), limit, history
     )
 

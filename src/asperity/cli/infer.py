@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         Forecast,
         Inference,
         Limit,
-        Listened,
+        ObservedSeries,
         Sampler,
         Setting,
     )
@@ -106,30 +106,36 @@ def infer(
         inference.require_limit(setting, limit, worn=worn is not None)
     history = None if worn is None else simulation.load_wear(worn)
     require_output(page, ".html", option="--report")
-    count, observations = workers or processes.cores(), inference.Listened()
+    count, observations = workers or processes.cores(), inference.ObservedSeries()
     if paths:
         with progress("recordings", "reading recordings ...", quiet=quiet):
-            observations = inference.listen(
+            observations = inference.observe_recordings(
                 paths,
                 setting,
-                table=table_file,
-                band_hz=band,
-                rate_hz=rate,
-                unit=unit,
-                channel=channel,
-                scale=scale,
-                shaft_hz=shaft or None,
-                method=cast("SeriesMethod | None", method),
+                source=inference.RecordingInput(
+                    table=table_file,
+                    band_hz=band,
+                    rate_hz=rate,
+                    unit=unit,
+                    channel=channel,
+                    scale=scale,
+                    shaft_hz=shaft or None,
+                    method=cast("SeriesMethod | None", method),
+                ),
                 workers=count,
             )
     answering = emulated(setting, emulator, count, quiet=quiet)
     ahead = _forecast(setting, answering, observations, limit, history, seed)
-    latest = inference.latest(observations) if ahead is not None and ahead.told else observations
+    latest = (
+        inference.latest_observations(observations)
+        if ahead is not None and ahead.change_detected
+        else observations
+    )
     now = replace(latest, notes=(*latest.notes, *known))
     by = cast("Sampler", sampler)
-    found = inference.infer_heard(setting, answering, now, sampler=by, seed=seed)
+    found = inference.infer_series(setting, answering, now, sampler=by, seed=seed)
     with contacts_solved(quiet=quiet) as step:
-        found = inference.with_further(found, extend, sampler=by, workers=count, progress=step)
+        found = inference.refine_emulator(found, extend, sampler=by, workers=count, progress=step)
     if found.emulator is not answering:
         ahead = _forecast(setting, found.emulator, observations, limit, history, seed)
     designed = (
@@ -166,7 +172,7 @@ def _required(
 def _forecast(
     setting: "Setting",
     emulator: "Emulator",
-    observations: "Listened",
+    observations: "ObservedSeries",
     limit: "Limit | None",
     history: "WearHistory | None",
     seed: int,
@@ -174,17 +180,19 @@ def _forecast(
     """Forecast when the limit is crossed; None without a limit."""
     if limit is None:
         return None
-    return inference.forecast_heard(setting, emulator, observations, limit, worn=history, seed=seed)
+    return inference.forecast_series(
+        setting, emulator, observations, limit, worn=history, seed=seed
+    )
 
 
 def _setting(
     path: Path, overrides: list[str] | None, surface: Path | None
 ) -> tuple["Setting", tuple[str, ...]]:
     """Return the setting, with Sq as measured on a surface if one is given, and a note on it."""
-    setting = inference.setting_of(chosen_case(path, overrides))
+    setting = inference.inference_setting(chosen_case(path, overrides))
     if surface is None:
         return setting, ()
-    setting, note = inference.with_measured(setting, surfaces.read_surface(surface))
+    setting, note = inference.with_measured_surface(setting, surfaces.read_surface(surface))
     return setting, (note,)
 
 
@@ -255,9 +263,9 @@ def _posterior(found: "Inference") -> Block:
 
 def _points(found: "Inference") -> Block:
     """Return a row per recorded operating point."""
-    rows = [point.cells() for point in found.at_points()]
+    rows = [point.cells() for point in found.point_estimates()]
     if rows:
-        yield from columns(found.at_points()[0].HEADS, rows)
+        yield from columns(found.point_estimates()[0].HEADS, rows)
 
 
 def _notes(found: "Inference") -> Block:

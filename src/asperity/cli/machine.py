@@ -106,8 +106,8 @@ def _ratings(result: "MachineResult") -> Iterator[Row]:
         beyond = f"; outside its range: {rating.beyond}" if rating.beyond else ""
         if rating.reason:
             yield entry.title, f"not rated: {rating.reason}"
-        elif rating.alone is not None:
-            yield entry.title, f"{entry.text(rating.alone)}  ({rating.standard}{beyond})"
+        elif rating.machine_value is not None:
+            yield entry.title, f"{entry.text(rating.machine_value)}  ({rating.standard}{beyond})"
         else:
             yield (
                 entry.title,

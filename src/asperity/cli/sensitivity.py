@@ -102,14 +102,16 @@ def sensitivity(
     with study_progress(chosen.source, quiet=quiet) as step:
         result = study.sensitivity(
             chosen,
-            vary=vary,
-            method=method,  # type: ignore[arg-type]
-            size=size,
-            sq=lengths("--sq", sq) or study.SQ_LEVELS,
-            levels=levels,
-            cells=cells,
-            seeds=seeds,
-            sample_seed=sample_seed,
+            settings=study.SensitivitySettings(
+                vary=vary,
+                method=method,  # type: ignore[arg-type]
+                size=size,
+                sq=lengths("--sq", sq) or study.SQ_LEVELS,
+                levels=levels,
+                cells=cells,
+                seeds=seeds,
+                sample_seed=sample_seed,
+            ),
             out=None if out is None else out / "study",
             workers=workers,
             progress=step,
@@ -238,13 +240,15 @@ def calibrate(
         result = study.calibrate(
             chosen,
             aims,
-            free=free,
-            levels=lengths("--level", level),
-            cells=cells,
-            seeds=seeds,
-            screened=screened,
-            starts=starts,
-            sample_seed=sample_seed,
+            settings=study.CalibrationSettings(
+                free=free,
+                levels=lengths("--level", level),
+                cells=cells,
+                seeds=seeds,
+                screened=screened,
+                starts=starts,
+                sample_seed=sample_seed,
+            ),
             out=out,
             workers=workers,
             progress=step,

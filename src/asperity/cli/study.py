@@ -78,6 +78,9 @@ def study_command(
         _show_estimate(plan, cost, as_json=as_json, quiet=quiet)
         return
     with _executor(executor) as pool, study_progress(path.name, quiet=quiet) as step:
+        if merge:
+            assert out is not None
+            study.merge_studies(plan, merge, out=out, shard=part)
         result = study.run_study(
             plan,
             out=out,
@@ -86,7 +89,6 @@ def study_command(
             shard=part,
             retry_failed=retry_failed,
             fields=tuple(name.strip() for name in (fields or "").split(",") if name.strip()),
-            merge_from=merge or (),
             progress=step,
         )
     made = _make_page(result, page, figures, quiet=quiet)

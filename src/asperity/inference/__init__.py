@@ -1,4 +1,4 @@
-"""Contact spectroscopy: what recordings say of a contact, with intervals, and what to run next."""
+"""Bayesian inference of a contact's state from recordings, forecasts, and experiment design."""
 
 import lazy_loader
 

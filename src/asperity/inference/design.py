@@ -1,4 +1,4 @@
-"""The question turned round: which load, speed, viscosity or finish keeps the load share below a value."""
+"""Design: the load, speed, viscosity or roughness that keeps CLR below a value."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -10,27 +10,27 @@ from scipy.special import ndtr
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
-from asperity.inference.forward import Forward
-from asperity.inference.observations import Point
+from asperity.inference.forward import ForwardModel
+from asperity.inference.observations import OperatingPoint
 from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.priors import Unknown
 from asperity.inference.settings import LOAD, SPEED, TEMPERATURE, Setting
 
-SURELY = 0.95
-VALUES = 25  # of each lever, along its range
-CONTACTS = 600  # possible ones that each value is asked of
-LEVERS = ("surface.sq", "lubricant.viscosity.eta0", TEMPERATURE, LOAD, SPEED)
+PROBABILITY = 0.95  # required of CLR below the value
+VALUES = 25  # of each design variable, along its range
+CONTACTS = 600  # draws evaluated at each value
+VARIABLE_KEYS = ("surface.sq", "lubricant.viscosity.eta0", TEMPERATURE, LOAD, SPEED)
 NAMES = {LOAD: "load_n", SPEED: "entrainment_speed_m_s", TEMPERATURE: "oil_temperature_k"}
 
 Way = Literal["at most", "at least", "any", "none"]
 
 
 @dataclass(frozen=True)
-class Lever:
-    """What one quantity alone must be for the load share to stay below a value, all else as it is known.
+class DesignVariable:
+    """Bound on one quantity that keeps CLR below a value, all else as known.
 
-    `way` is "at most" or "at least" `bound` [SI]; "any" or "none" where all of the range does, or
-    nothing of it. `values` [SI] and `chances` are the probabilities over the whole range.
+    `way` is "at most" or "at least" `bound` [SI], or "any" or "none" of the range. `chances` are
+    the probabilities at `values` [SI] over the range.
     """
 
     key: str
@@ -40,7 +40,7 @@ class Lever:
     chances: Field = field(repr=False)
 
     def sentence(self) -> str:
-        """In words."""
+        """Return the result as a sentence."""
         entry = quantity(self.key)
         ends = f"{entry.number(float(self.values.min()))} to {entry.text(float(self.values.max()))}"
         if self.bound is None:
@@ -48,7 +48,7 @@ class Lever:
         return f"{entry.name}: {self.way} {entry.text(self.bound)}"
 
     def scalars(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """Return the JSON output."""
         return {
             "key": self.key,
             "way": self.way,
@@ -60,26 +60,26 @@ class Lever:
 
 @dataclass(frozen=True)
 class Design:
-    """What keeps the load share below `clr` with a probability of 95 %; `now` is that probability as things are."""
+    """Changes that keep CLR below `clr` with a probability of 95 %; `now` is the present one."""
 
     clr: float
     now: float
-    levers: tuple[Lever, ...]
+    levers: tuple[DesignVariable, ...]
 
     def sentence(self) -> str:
-        """In words."""
+        """Return the result as a sentence."""
         limit = quantity(CLR).text(self.clr)
         ways = "; ".join(lever.sentence() for lever in self.levers)
         return (
-            f"CLR stays below {limit} with a probability of {self.now:.2f} as it is; with {SURELY:.2f}, by one alone, "
-            f"for {ways}."
+            f"CLR stays below {limit} with a probability of {self.now:.2f} at present; "
+            f"changing one quantity gives {PROBABILITY:.2f} for {ways}."
         )
 
     def scalars(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """Return the JSON output."""
         return {
             "clr": self.clr,
-            "probability": SURELY,
+            "probability": PROBABILITY,
             "now": self.now,
             "sentence": self.sentence(),
             "levers": [lever.scalars() for lever in self.levers],
@@ -87,84 +87,88 @@ class Design:
 
 
 def require_share(name: str, clr: float) -> None:
-    """BadInput for what is no load share."""
+    """Raise BadInput unless `clr` is a load share."""
     if not 0.0 < clr < 1.0:
         raise BadInput(f"{name} must be a load share between 0 and 1, got {clr:g}; 0.3 is 30 %")
 
 
-def design_contact(forward: Forward, z: Field, *, clr: float) -> Design:
-    """Which load, speed, viscosity (or temperature) or roughness keeps CLR below a value, at the first point.
+def design_contact(forward: ForwardModel, z: Field, *, clr: float) -> Design:
+    """Find the load, speed, viscosity (or temperature) or roughness that keeps CLR below a value.
 
-    Each alone is put to values along its range, in all contacts that are possible; the rest of
-    them stays.
+    Each quantity alone is varied along its range for all draws, at the first operating point.
 
     Parameters
     ----------
-    forward : its first operating point is the one asked of
-    z : unknowns of equally probable contacts (n, dims), before recordings or after
-    clr : the load share that is not to be exceeded
+    forward : its first operating point is the one evaluated
+    z : draws of the unknowns (n, dims), from prior or posterior
+    clr : maximum load share
 
     Raises
     ------
     BadInput
-        for a load share that is none.
+        for a `clr` outside 0 to 1.
     """
     require_share("--design", clr)
     chosen = z[:: max(1, len(z) // CONTACTS)][:CONTACTS]
     own = replace(forward, points=forward.points[:1])
-    levers = [_lever(own, chosen, entry, clr) for entry in _levers(own.setting)]
-    return Design(clr, float(_chances(own, chosen, clr)[0]), tuple(levers))
+    levers = [_design_variable(own, chosen, entry, clr) for entry in _variables(own.setting)]
+    return Design(clr, float(_probability_below(own, chosen, clr)[0]), tuple(levers))
 
 
-def _levers(setting: Setting) -> Sequence[Unknown]:
-    """Unknowns and operating quantities that somebody can choose."""
+def _variables(setting: Setting) -> Sequence[Unknown]:
+    """Return the unknowns and operating quantities that can be chosen by design."""
     known = {unknown.range.key: unknown for unknown in setting.contact}
     known |= {entry.key: Unknown(NAMES[entry.key], entry) for entry in setting.operating}
-    return [known[key] for key in LEVERS if key in known]
+    return [known[key] for key in VARIABLE_KEYS if key in known]
 
 
-def _lever(forward: Forward, z: Field, lever: Unknown, clr: float) -> Lever:
+def _design_variable(
+    forward: ForwardModel, z: Field, unknown: Unknown, clr: float
+) -> DesignVariable:
     shares = np.linspace(0.0, 1.0, VALUES)
-    values = lever.to_si(np.array([lever.range.value(share) for share in shares]))
-    if lever.range.key in NAMES:
-        asked = replace(
-            forward,
-            points=tuple(_moved(forward.points[0], lever.range.key, float(v)) for v in values),
+    values = unknown.to_si(np.array([unknown.range.value(share) for share in shares]))
+    key = unknown.range.key
+    if key in NAMES:
+        varied = replace(
+            forward, points=tuple(_with_value(forward.points[0], key, float(v)) for v in values)
         )
-        chances = _chances(asked, z, clr)
+        chances = _probability_below(varied, z, clr)
     else:
-        column = forward.setting.unknowns.index(lever)
+        column = forward.setting.unknowns.index(unknown)
         chances = np.array(
-            [_chances(forward, _put(z, column, at), clr)[0] for at in lever.at_share(shares)]
+            [
+                _probability_below(forward, _with_column(z, column, value), clr)[0]
+                for value in unknown.at_share(shares)
+            ]
         )
-    enough = chances >= SURELY
-    if enough.all() or not enough.any():
-        return Lever(lever.key, "any" if enough.all() else "none", None, values, chances)
-    if enough[0]:
-        last = int(np.argmin(enough)) - 1  # the end of what is enough from the low end on
-        return Lever(lever.key, "at most", _between(values, chances, last), values, chances)
-    if enough[-1]:
+    enough = chances >= PROBABILITY
+    way: Way = "any" if enough.all() else "none"
+    bound = None
+    if enough[0] and not enough.all():
+        last = int(np.argmin(enough)) - 1  # end of the sufficient values from the low end
+        way, bound = "at most", _crossing(values, chances, last)
+    elif enough[-1] and not enough.all():
         last = VALUES - 1 - int(np.argmin(enough[::-1]))
-        return Lever(lever.key, "at least", _between(values, chances, last), values, chances)
-    return Lever(lever.key, "none", None, values, chances)
+        way, bound = "at least", _crossing(values, chances, last)
+    return DesignVariable(unknown.key, way, bound, values, chances)
 
 
-def _between(values: Field, chances: Field, place: int) -> float:
-    """Where the chance is enough, between two values."""
-    order = np.argsort(chances[place : place + 2])
+def _crossing(values: Field, chances: Field, index: int) -> float:
+    """Interpolate the value at which the probability is reached."""
+    order = np.argsort(chances[index : index + 2])
     return float(
-        np.interp(SURELY, chances[place : place + 2][order], values[place : place + 2][order])
+        np.interp(PROBABILITY, chances[index : index + 2][order], values[index : index + 2][order])
     )
 
 
-def _chances(forward: Forward, z: Field, clr: float) -> Field:
-    """Probability that CLR stays below, at each operating point: over contacts, and what the emulator leaves open."""
-    mean, std = forward.emulated(z, [CLR])[CLR]
+def _probability_below(forward: ForwardModel, z: Field, clr: float) -> Field:
+    """Return the probability of CLR below `clr` at each point, over draws and emulator error."""
+    mean, std = forward.emulate(z, [CLR])[CLR]
     limit = OUTPUTS[CLR].forward(np.array(clr))
     return np.asarray(ndtr((limit - mean) / np.maximum(std, 1e-9)).mean(axis=0))
 
 
-def _moved(point: Point, key: str, value: float) -> Point:
+def _with_value(point: OperatingPoint, key: str, value: float) -> OperatingPoint:
     if key == LOAD:
         return replace(point, load_n=value)
     return (
@@ -174,7 +178,7 @@ def _moved(point: Point, key: str, value: float) -> Point:
     )
 
 
-def _put(z: Field, column: int, at: float) -> Field:
-    moved = z.copy()
-    moved[:, column] = at
-    return moved
+def _with_column(z: Field, column: int, value: float) -> Field:
+    changed = z.copy()
+    changed[:, column] = value
+    return changed

@@ -1,8 +1,8 @@
-"""A contact that changes in time: one unknown drifts, and each possible contact follows what is heard of it.
+"""A contact in which one unknown drifts: each draw is filtered through the series of measurements.
 
-A particle is a contact that does not change but for the one unknown; along its course a Kalman
-filter goes, over a table of the emulator. So all that a course can do is integrated, and particles
-are drawn from the unknowns alone.
+A particle is a contact with constant unknowns except for the drifting one. A Kalman filter on a
+table of the emulator follows the drift, so that the course is integrated out analytically and
+particles are drawn from the constant unknowns alone.
 """
 
 import math
@@ -16,7 +16,7 @@ from scipy.special import ndtr
 
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.inference.forward import Forward, Law
+from asperity.inference.forward import ForwardModel, Law
 from asperity.inference.likelihood import (
     EMULATED_HEIGHT_STD,
     EXPONENT_STD,
@@ -25,51 +25,42 @@ from asperity.inference.likelihood import (
     WEIGHTS,
     law_correlations,
 )
-from asperity.inference.observations import Heard, likeness
+from asperity.inference.observations import LogMeasurement, point_similarity
 from asperity.inference.outputs import CLR
 from asperity.inference.priors import si
-from asperity.inference.settings import OPERATING_KEYS, TEMPERATURE
-from asperity.inference.visits import CHANNELS, Series, Sound
+from asperity.inference.settings import OPERATING, TEMPERATURE
+from asperity.inference.visits import CHANNELS, SeriesMeasurement, VisitSeries
 
-KNOTS = 17  # of the table along the range of what drifts
-DRIFT_STD = 0.3  # of the first drift, in shares of the range over the series
-RESTLESS, RESTLESS_SPREAD = (
-    0.1,
-    1.0,
-)  # how much a drift changes over the series; median, deviation of its logarithm
-SCATTER, SCATTER_SPREAD = 1e-3, 1.0  # of CRF from visit to visit beyond its own deviation, relative
-MEMORIES = (
-    0.0,
-    0.4,
-    0.65,
-    0.85,
-)  # correlation of the scatter of CRF from one visit to the next, evenly spaced ones
-ALIKE = (0.7, 0.1, 0.1, 0.1)  # how probable each is: as where stages are read off a series
-EXTRA = (
-    6  # unknowns of a course: the law's error in each channel, restlessness, scatter and its memory
-)
-PASSES = 2  # of an update: the table is no straight line
-SHARE, SPEED, LEVER, GAIN, SLOW, FIRST = range(
-    6
-)  # places in the state: the rest are errors of channels at places
-PROBES, STEPS = (
-    256,
-    (0.02, 0.02, 2.0),
-)  # contacts, and steps (load, speed, K), by which sounds are moved
+KNOTS = 17  # of the table along the range of the drifting unknown
+DRIFT_STD = 0.3  # of the initial drift, in shares of the range over the series
+# change of the drift over the series: median, standard deviation of its logarithm
+DIFFUSION, DIFFUSION_SPREAD = 0.1, 1.0
+# relative scatter of CRF between visits beyond its standard deviation: median, spread of its log
+SCATTER, SCATTER_SPREAD = 1e-3, 1.0
+# correlation of this scatter between consecutive, evenly spaced visits, and its probabilities,
+# those used for stages of a series
+CORRELATIONS = (0.0, 0.4, 0.65, 0.85)
+CORRELATION_PROBABILITIES = (0.7, 0.1, 0.1, 0.1)
+PARAMETERS = 6  # of a drift: the law's error in three channels, diffusion, scatter, correlation
+ITERATIONS = 2  # of an update, since the table is nonlinear
+# indices of the state; errors of channels at points follow
+SHARE, DRIFT, EXPONENT, GAIN, SLOW_SCATTER, FIRST_ERROR = range(6)
+SLOPE_DRAWS = 256  # prior draws for the slopes over operating conditions
+SLOPE_STEPS = (0.02, 0.02, 2.0)  # in ln load, ln speed and temperature [K]
 
 
-class Followed(NamedTuple):
-    """ln p of all that was heard, of contacts that stay as they are and that change; shape (n,)."""
+class CourseLikelihood(NamedTuple):
+    """Log-likelihood of all measurements for constant and for changing contacts, shape (n,)."""
 
     steady: Field
-    moving: Field
+    changing: Field
 
 
-class Walked(NamedTuple):
-    """Contacts at the last visit: share of the range, its drift over the series, the error of CRF at the usual place.
+class FilteredState(NamedTuple):
+    """State at the last visit: share of the range, drift over the series, error of CRF.
 
-    `mean` (n, 3), `covariance` (n, 3, 3), `path` (n, visits) the share at each visit as it was
-    known then, `log`.
+    The error is that at the main operating point. `mean` (n, 3), `covariance` (n, 3, 3); `path`
+    (n, visits) is the filtered share at each visit, `log` the log-likelihood (n,).
     """
 
     log: Field
@@ -78,41 +69,43 @@ class Walked(NamedTuple):
     path: Field
 
 
-class Extra(NamedTuple):
-    """What a course adds to a contact's unknowns: shape (n,) each; `sizes` are the law's errors, relative to CRF."""
+class DriftParameters(NamedTuple):
+    """Unknowns of a drift, shape (n,) each; `sizes` are the law's errors relative to CRF."""
 
     sizes: Mapping[str, Field]
-    restless: Field
+    diffusion: Field
     scatter: Field
-    memory: Field
+    correlation: Field
 
     @classmethod
-    def of(cls, z: Field) -> "Extra":
-        """From standard normal numbers (n, EXTRA)."""
+    def from_normal(cls, z: Field) -> "DriftParameters":
+        """Convert standard normal numbers (n, PARAMETERS)."""
         own = np.array(SIZES)[np.minimum((len(SIZES) * ndtr(z[:, :3])).astype(int), len(SIZES) - 1)]
+        thresholds = np.cumsum(CORRELATION_PROBABILITIES)[:-1]
         return cls(
             dict(zip(CHANNELS, own.T, strict=True)),
-            RESTLESS * np.exp(RESTLESS_SPREAD * z[:, 3]),
+            DIFFUSION * np.exp(DIFFUSION_SPREAD * z[:, 3]),
             SCATTER * np.exp(SCATTER_SPREAD * z[:, 4]),
-            np.array(MEMORIES)[np.searchsorted(np.cumsum(ALIKE)[:-1], ndtr(z[:, 5]))],
+            np.array(CORRELATIONS)[np.searchsorted(thresholds, ndtr(z[:, 5]))],
         )
 
 
 @dataclass(frozen=True)
-class Course:
-    """What a series shows of a contact of which one unknown drifts.
+class DriftModel:
+    """Likelihood of a series for a contact in which one unknown drifts.
 
     Parameters
     ----------
-    forward : with the operating points of the series
-    series : what was heard, and when
+    forward : at the operating points of the series
+    series : the measurements and their times
     law : of the spring
     drifting : key of the unknown that changes
-    drift : mean and standard deviation of the first drift, in shares of the unknown's range over the series
+    drift : mean and standard deviation of the initial drift, in shares of the unknown's range over
+        the series
     """
 
-    forward: Forward
-    series: Series
+    forward: ForwardModel
+    series: VisitSeries
     law: Law
     drifting: str
     drift: tuple[float, float] = (0.0, DRIFT_STD)
@@ -120,289 +113,318 @@ class Course:
     def __post_init__(self) -> None:
         known = [unknown.key for unknown in self.forward.setting.contact]
         if self.drifting not in known:
-            raise BadInput(f"what drifts must be among {', '.join(known)}, got {self.drifting!r}")
+            raise BadInput(
+                f"the drifting quantity must be among {', '.join(known)}, got {self.drifting!r}"
+            )
 
     @property
     def column(self) -> int:
-        """Which unknown drifts."""
+        """Index of the drifting unknown."""
         return [unknown.key for unknown in self.forward.setting.unknowns].index(self.drifting)
 
     @property
     def dims(self) -> int:
-        """Unknowns of a contact and of its course."""
-        return self.forward.dims + EXTRA
+        """Number of unknowns of a contact and its drift."""
+        return self.forward.dims + PARAMETERS
 
     @property
-    def sounds(self) -> tuple[Sound, ...]:
-        """All that was heard as it would have been at its place: moved there as contacts of the prior move in the mean.
+    def measurements(self) -> tuple[SeriesMeasurement, ...]:
+        """Measurements translated to their nominal operating points, by the mean prior slope.
 
-        By how much these differ is in `leanings`: whoever moves one recording too far moves all of
-        them too far.
+        `slope_scatter` is the deviation of the slopes, an error common to all measurements.
         """
-        return self._brought[0]
+        return self._translated[0]
 
     @property
-    def leanings(self) -> Mapping[tuple[str, int], Field]:
-        """By how much contacts differ in how a channel goes with load (0), speed (1) or temperature (2), (places,)."""
-        return self._brought[1]
+    def slope_scatter(self) -> Mapping[tuple[str, int], Field]:
+        """Standard deviation (points,) of slopes by channel and axis: load, speed, temperature."""
+        return self._translated[1]
 
     @cached_property
-    def _brought(self) -> tuple[tuple[Sound, ...], Mapping[tuple[str, int], Field]]:
-        asides = np.array([sound.aside for sound in self.series.sounds])
-        z = np.random.default_rng(0).standard_normal((PROBES, self.forward.dims))
-        here, moved = self.forward.shown(z, self.law, deviations=False), {}
-        for axis in np.flatnonzero(np.any(asides != 0.0, axis=0)):
-            forward, steps = _aside(self.forward, int(axis))
-            there = forward.shown(z, self.law, deviations=False)
-            moved[int(axis)] = {
-                key: (getattr(there, key) - getattr(here, key)) / steps for key in CHANNELS
+    def _translated(
+        self,
+    ) -> tuple[tuple[SeriesMeasurement, ...], Mapping[tuple[str, int], Field]]:
+        offsets = np.array([entry.offset for entry in self.series.measurements])
+        z = np.random.default_rng(0).standard_normal((SLOPE_DRAWS, self.forward.dims))
+        base, slopes = self.forward.predict(z, self.law, deviations=False), {}
+        for axis in np.flatnonzero(np.any(offsets != 0.0, axis=0)):
+            forward, steps = _stepped(self.forward, int(axis))
+            stepped = forward.predict(z, self.law, deviations=False)
+            slopes[int(axis)] = {
+                key: (getattr(stepped, key) - getattr(base, key)) / steps for key in CHANNELS
             }
-        sounds = []
-        for sound in self.series.sounds:
-            by = sum(
-                sound.aside[axis] * float(np.mean(slope[sound.channel][:, sound.place]))
-                for axis, slope in moved.items()
+        measurements = []
+        for entry in self.series.measurements:
+            change = sum(
+                entry.offset[axis] * float(np.mean(slope[entry.channel][:, entry.point]))
+                for axis, slope in slopes.items()
             )
-            sounds.append(sound._replace(heard=Heard(sound.heard.value - by, sound.heard.std)))
-        leanings = {
-            (key, axis): slope[key].std(axis=0) for axis, slope in moved.items() for key in CHANNELS
+            measurements.append(
+                entry._replace(
+                    measured=LogMeasurement(entry.measured.value - change, entry.measured.std)
+                )
+            )
+        slope_scatter = {
+            (key, axis): slope[key].std(axis=0)
+            for axis, slope in slopes.items()
+            for key in CHANNELS
         }
-        return tuple(sounds), leanings
+        return tuple(measurements), slope_scatter
 
-    def __call__(self, z: Field) -> Followed:
-        """How probable what was heard makes contacts, shape (n, dims), without a course and with any."""
-        table = Table.of(self, z)
-        return Followed(*(self._walk(table, moving=moving).log for moving in (False, True)))
-
-    def walk(self, z: Field, *, moving: bool) -> Walked:
-        """Where contacts are at the end."""
-        return self._walk(Table.of(self, z), moving=moving)
-
-    def _walk(self, table: "Table", *, moving: bool) -> Walked:
-        places = len(self.forward.points)
-        state = _State.begin(
-            table,
-            likeness(self.forward.points),
-            self.drift if moving else (0.0, 0.0),
-            self.leanings,
+    def __call__(self, z: Field) -> CourseLikelihood:
+        """Return the log-likelihood of contacts (n, dims), constant and changing."""
+        table = ChannelTable.from_contacts(self, z)
+        return CourseLikelihood(
+            *(self._filter(table, changing=changing).log for changing in (False, True))
         )
-        restless = table.extra.restless if moving else np.zeros(len(table.share))
+
+    def filter_series(self, z: Field, *, changing: bool) -> FilteredState:
+        """Return the filtered state of contacts (n, dims) at the last visit."""
+        return self._filter(ChannelTable.from_contacts(self, z), changing=changing)
+
+    def _filter(self, table: "ChannelTable", *, changing: bool) -> FilteredState:
+        points = len(self.forward.points)
+        state = _KalmanState.initial(
+            table,
+            point_similarity(self.forward.points),
+            self.drift if changing else (0.0, 0.0),
+            self.slope_scatter,
+        )
+        diffusion = table.parameters.diffusion if changing else np.zeros(len(table.share))
         path = np.empty((len(table.share), len(self.series.x)))
-        before = 0.0
-        for sound in self.sounds:
-            if sound.at > before:
-                state.wait(sound.at - before, restless, table.extra, len(self.series.x) - 1)
-                before = sound.at
-            state.hear(sound, table, places)
-            path[:, sound.visit] = state.mean[:, SHARE]
-        kept = [SHARE, SPEED, FIRST + self.series.usual]
-        return Walked(state.log, state.mean[:, kept], state.covariance[:, kept][:, :, kept], path)
+        time = 0.0
+        for entry in self.measurements:
+            if entry.time > time:
+                state.advance(
+                    entry.time - time, diffusion, table.parameters, len(self.series.x) - 1
+                )
+                time = entry.time
+            state.update(entry, table, points)
+            path[:, entry.visit] = state.mean[:, SHARE]
+        kept = [SHARE, DRIFT, FIRST_ERROR + self.series.main_point]
+        return FilteredState(
+            state.log, state.mean[:, kept], state.covariance[:, kept][:, :, kept], path
+        )
 
 
-class Table(NamedTuple):
-    """What contacts would show along the range of what drifts: each channel (n, places, knots)."""
+class ChannelTable(NamedTuple):
+    """Predicted channels along the range of the drifting unknown, (n, points, knots)."""
 
     channels: Mapping[str, Field]
-    errors: Mapping[str, Field]  # covariance of the emulator's, (n, places, places)
-    lever: Field  # of the law's exponent, (n, places), 0 in the mean
-    share: Field  # where each begins, (n,)
-    extra: Extra
+    errors: Mapping[str, Field]  # covariance of the emulator's errors, (n, points, points)
+    log_force: Field  # derivative with respect to the law's exponent, (n, points), mean 0
+    share: Field  # initial share of the range, (n,)
+    parameters: DriftParameters
 
     @classmethod
-    def of(cls, course: Course, z: Field) -> "Table":
-        """By the emulator's means, along the range; its deviations where each contact begins."""
-        forward, column = course.forward, course.column
+    def from_contacts(cls, model: DriftModel, z: Field) -> "ChannelTable":
+        """Tabulate the emulator's means; its deviations are those at the initial share."""
+        forward, column = model.forward, model.column
         contacts, unknown = z[:, : forward.dims], forward.setting.unknowns[column]
-        here = forward.shown(contacts, course.law)
+        initial = forward.predict(contacts, model.law)
         along = along_range(contacts, column, unknown.at_share(np.linspace(0.0, 1.0, KNOTS)))
-        shown = forward.shown(along, course.law, deviations=False)
-        tables = {key: _by_knots(getattr(shown, key)) for key in CHANNELS}
-        alike = forward.correlations(contacts, course.law)
-        heights = np.nan_to_num(here.crfa_std)
+        prediction = forward.predict(along, model.law, deviations=False)
+        tables = {key: _by_knots(getattr(prediction, key)) for key in CHANNELS}
+        correlations = forward.correlations(contacts, model.law)
+        heights = np.nan_to_num(initial.crfa_std)
         errors = {
-            key: std[:, :, None] * std[:, None, :] * alike[key]
+            key: std[:, :, None] * std[:, None, :] * correlations[key]
             for key, std in (
-                ("crf", here.crf_std),
-                ("damping", here.damping_std),
+                ("crf", initial.crf_std),
+                ("damping", initial.damping_std),
                 ("crfa", heights),
             )
         }
-        own = np.arange(heights.shape[1])
-        errors["crfa"][:, own, own] += np.where(
-            np.isnan(here.crfa_std), 0.0, EMULATED_HEIGHT_STD**2
+        diagonal = np.arange(heights.shape[1])
+        errors["crfa"][:, diagonal, diagonal] += np.where(
+            np.isnan(initial.crfa_std), 0.0, EMULATED_HEIGHT_STD**2
         )
         return cls(
             tables,
             errors,
-            here.lever - here.lever.mean(axis=1, keepdims=True),
+            initial.log_force - initial.log_force.mean(axis=1, keepdims=True),
             unknown.share(contacts[:, column]),
-            Extra.of(z[:, forward.dims :]),
+            DriftParameters.from_normal(z[:, forward.dims :]),
         )
 
-    def at(self, channel: str, place: int, share: Field) -> tuple[Field, Field]:
-        """Value and slope at shares of the range; level beyond its ends."""
-        return between_knots(self.channels[channel][:, place], share)
+    def interpolate(self, channel: str, point: int, share: Field) -> tuple[Field, Field]:
+        """Return value and slope at shares of the range; constant beyond its ends."""
+        return between_knots(self.channels[channel][:, point], share)
 
 
-def _aside(forward: Forward, axis: int) -> tuple[Forward, Field]:
-    """The same a step aside in load (0), speed (1) or temperature (2), towards the middle of its range; the steps."""
-    entry = next(
-        one for one in forward.setting.operating if one.key == (*OPERATING_KEYS, TEMPERATURE)[axis]
-    )
+def _stepped(forward: ForwardModel, axis: int) -> tuple[ForwardModel, Field]:
+    """Return the model one step away in load (0), speed (1) or temperature (2), and the steps.
+
+    Steps are taken towards the middle of the range.
+    """
+    key = (*OPERATING, TEMPERATURE)[axis]
+    entry = next(entry for entry in forward.setting.operating if entry.key == key)
     low, high = (si(end, entry.unit) for end in (entry.low, entry.high))
     name = ("load_n", "entrainment_m_s", "temperature_k")[axis]
     steps, points = np.empty(len(forward.points)), []
-    for place, point in enumerate(forward.points):
+    for number, point in enumerate(forward.points):
         value = getattr(point, name)
-        steps[place] = STEPS[axis] if value < 0.5 * (low + high) else -STEPS[axis]
-        moved = value + steps[place] if axis == 2 else value * math.exp(steps[place])
-        points.append(replace(point, **{name: moved}))
+        steps[number] = SLOPE_STEPS[axis] if value < 0.5 * (low + high) else -SLOPE_STEPS[axis]
+        stepped = value + steps[number] if axis == 2 else value * math.exp(steps[number])
+        points.append(replace(point, **{name: stepped}))
     return replace(forward, points=tuple(points)), steps
 
 
 def along_range(z: Field, column: int, knots: Field) -> Field:
-    """Contacts with one unknown at each of the knots, behind one another: (knots n, dims)."""
+    """Return contacts with one unknown at each of the knots, stacked: (knots n, dims)."""
     along = np.tile(z, (len(knots), 1))
     along[:, column] = np.repeat(knots, len(z))
     return along
 
 
 def _by_knots(values: Field) -> Field:
-    """From (knots n, places) to (n, places, knots)."""
+    """Reshape from (knots n, points) to (n, points, knots)."""
     return np.ascontiguousarray(np.moveaxis(values.reshape(KNOTS, -1, values.shape[1]), 0, -1))
 
 
 def between_knots(table: Field, share: Field) -> tuple[Field, Field]:
-    """Values and slopes of tables (n, knots) over 0 to 1 at shares (n,) or (n, m)."""
+    """Interpolate tables (n, knots) over 0 to 1 at shares (n,) or (n, m): values and slopes."""
     last = table.shape[1] - 1
-    at = np.clip(share, 0.0, 1.0) * last
-    place = np.minimum(at.astype(int), last - 1)
+    position = np.clip(share, 0.0, 1.0) * last
+    index = np.minimum(position.astype(int), last - 1)
     rows = np.arange(len(table)).reshape(-1, *[1] * (share.ndim - 1))
-    low, high = table[rows, place], table[rows, place + 1]
+    low, high = table[rows, index], table[rows, index + 1]
     inside = (share >= 0.0) & (share <= 1.0)
-    return low + (at - place) * (high - low), np.where(inside, last * (high - low), 0.0)
+    return low + (position - index) * (high - low), np.where(inside, last * (high - low), 0.0)
 
 
 @dataclass
-class _State:
-    """Means and covariances of all contacts' states, and ln p of what was heard so far."""
+class _KalmanState:
+    """Means and covariances of all contacts' states, and the log-likelihood so far."""
 
     mean: Field
     covariance: Field
     log: Field
-    leanings: Mapping[
-        tuple[str, int], Field
-    ]  # of each, the last states say how far a contact has it
+    slope_scatter: Mapping[tuple[str, int], Field]  # one standard normal state each, at the end
 
     @classmethod
-    def begin(
+    def initial(
         cls,
-        table: Table,
-        near: Field,
+        table: ChannelTable,
+        similarity: Field,
         drift: tuple[float, float],
-        leanings: Mapping[tuple[str, int], Field],
-    ) -> "_State":
-        """Before anything is heard: the share is the contact's, all else open."""
-        count, places = len(table.share), len(near)
-        before = FIRST + len(CHANNELS) * places
-        mean = np.zeros((count, before + len(leanings)))
-        mean[:, SHARE], mean[:, SPEED] = table.share, drift[0]
+        slope_scatter: Mapping[tuple[str, int], Field],
+    ) -> "_KalmanState":
+        """Return the prior state: the share is the contact's, all else is uncertain."""
+        count, points = len(table.share), len(similarity)
+        before = FIRST_ERROR + len(CHANNELS) * points
+        mean = np.zeros((count, before + len(slope_scatter)))
+        mean[:, SHARE], mean[:, DRIFT] = table.share, drift[0]
         variance = np.zeros_like(mean)
-        variance[:, SPEED], variance[:, LEVER], variance[:, GAIN] = (
+        variance[:, DRIFT], variance[:, EXPONENT], variance[:, GAIN] = (
             drift[1] ** 2,
             EXPONENT_STD**2,
             GAIN_STD**2,
         )
-        variance[:, SLOW] = table.extra.scatter**2 * (table.extra.memory > 0.0)
+        parameters = table.parameters
+        variance[:, SLOW_SCATTER] = parameters.scatter**2 * (parameters.correlation > 0.0)
         variance[:, before:] = 1.0
         covariance = np.zeros((*mean.shape, mean.shape[1]))
         diagonal = np.arange(mean.shape[1])
         covariance[:, diagonal, diagonal] = variance
         for number, channel in enumerate(CHANNELS):
-            own = slice(FIRST + number * places, FIRST + (number + 1) * places)
-            size = WEIGHTS[channel] * table.extra.sizes[channel]
-            correlations = law_correlations(table.lever, near)
+            own = slice(FIRST_ERROR + number * points, FIRST_ERROR + (number + 1) * points)
+            size = WEIGHTS[channel] * parameters.sizes[channel]
+            correlations = law_correlations(table.log_force, similarity)
             covariance[:, own, own] += (
                 table.errors[channel] + size[:, None, None] ** 2 * correlations
             )
-        return cls(mean, covariance, np.zeros(count), leanings)
+        return cls(mean, covariance, np.zeros(count), slope_scatter)
 
-    def wait(self, time: float, restless: Field, extra: Extra, visits: int) -> None:
-        """Let the share drift on, its drift wander (an integrated Wiener process), and slow scatter be forgotten."""
-        left = extra.memory ** (time * visits)
-        self.mean[:, SLOW] *= left
-        self.covariance[:, SLOW] *= left[:, None]
-        self.covariance[:, :, SLOW] *= left[:, None]
-        self.covariance[:, SLOW, SLOW] += extra.scatter**2 * (extra.memory > 0.0) * (1.0 - left**2)
-        self.mean[:, SHARE] += time * self.mean[:, SPEED]
-        self.covariance[:, SHARE] += time * self.covariance[:, SPEED]
-        self.covariance[:, :, SHARE] += time * self.covariance[:, :, SPEED]
-        self.covariance[:, SHARE, SHARE] += restless**2 * time**3 / 3.0
-        for row, column in ((SHARE, SPEED), (SPEED, SHARE)):
-            self.covariance[:, row, column] += restless**2 * time**2 / 2.0
-        self.covariance[:, SPEED, SPEED] += restless**2 * time
+    def advance(
+        self, time: float, diffusion: Field, parameters: DriftParameters, visits: int
+    ) -> None:
+        """Predict the state after `time`: integrated Wiener process, decaying slow scatter."""
+        decay = parameters.correlation ** (time * visits)
+        self.mean[:, SLOW_SCATTER] *= decay
+        self.covariance[:, SLOW_SCATTER] *= decay[:, None]
+        self.covariance[:, :, SLOW_SCATTER] *= decay[:, None]
+        self.covariance[:, SLOW_SCATTER, SLOW_SCATTER] += (
+            parameters.scatter**2 * (parameters.correlation > 0.0) * (1.0 - decay**2)
+        )
+        self.mean[:, SHARE] += time * self.mean[:, DRIFT]
+        self.covariance[:, SHARE] += time * self.covariance[:, DRIFT]
+        self.covariance[:, :, SHARE] += time * self.covariance[:, :, DRIFT]
+        self.covariance[:, SHARE, SHARE] += diffusion**2 * time**3 / 3.0
+        for row, column in ((SHARE, DRIFT), (DRIFT, SHARE)):
+            self.covariance[:, row, column] += diffusion**2 * time**2 / 2.0
+        self.covariance[:, DRIFT, DRIFT] += diffusion**2 * time
 
-    def hear(self, sound: Sound, table: Table, places: int) -> None:
-        """One logarithm heard: what it makes of the state."""
-        channel, place = sound.channel, sound.place
-        error = FIRST + CHANNELS.index(channel) * places + place
-        noise = sound.heard.std**2 + (WEIGHTS[channel] * table.extra.scatter) ** 2
-        if channel == "crf":
-            noise = np.where(
-                table.extra.memory > 0.0, sound.heard.std**2, noise
-            )  # its scatter is in the state
-        leans, lean = self._lean(sound)
+    def update(self, entry: SeriesMeasurement, table: ChannelTable, points: int) -> None:
+        """Update the state and the log-likelihood with one measurement."""
+        channel, point, parameters = entry.channel, entry.point, table.parameters
+        error = FIRST_ERROR + CHANNELS.index(channel) * points + point
+        noise = entry.measured.std**2 + (WEIGHTS[channel] * parameters.scatter) ** 2
+        if channel == "crf":  # correlated scatter is in the state
+            noise = np.where(parameters.correlation > 0.0, entry.measured.std**2, noise)
+        slope_states, slope_factors = self._slope_states(entry)
         share = self.mean[:, SHARE]
-        for turn in range(PASSES):
-            value, slope = table.at(channel, place, share)
-            said = (
+        for iteration in range(ITERATIONS):
+            value, slope = table.interpolate(channel, point, share)
+            expected = (
                 value
                 + slope * (self.mean[:, SHARE] - share)
                 + self.mean[:, error]
-                + self.mean[:, leans] @ lean
+                + self.mean[:, slope_states] @ slope_factors
             )
-            with_share = slope[:, None] * self.covariance[:, SHARE]
-            spread = self.covariance[:, error] + self.covariance[:, :, leans] @ lean
+            from_share = slope[:, None] * self.covariance[:, SHARE]
+            from_errors = (
+                self.covariance[:, error] + self.covariance[:, :, slope_states] @ slope_factors
+            )
             if channel == "crf":
-                spread += (
-                    table.lever[:, place, None] * self.covariance[:, LEVER]
-                    + self.covariance[:, SLOW]
+                from_errors += (
+                    table.log_force[:, point, None] * self.covariance[:, EXPONENT]
+                    + self.covariance[:, SLOW_SCATTER]
                 )
-                said = said + table.lever[:, place] * self.mean[:, LEVER] + self.mean[:, SLOW]
+                expected = (
+                    expected
+                    + table.log_force[:, point] * self.mean[:, EXPONENT]
+                    + self.mean[:, SLOW_SCATTER]
+                )
             elif channel == "crfa":
-                spread += self.covariance[:, GAIN]
-                said = said + self.mean[:, GAIN]
-            across = with_share + spread
-            total = slope * across[:, SHARE] + across[:, error] + across[:, leans] @ lean + noise
+                from_errors += self.covariance[:, GAIN]
+                expected = expected + self.mean[:, GAIN]
+            across = from_share + from_errors
+            total = (
+                slope * across[:, SHARE]
+                + across[:, error]
+                + across[:, slope_states] @ slope_factors
+                + noise
+            )
             if channel == "crf":
-                total += table.lever[:, place] * across[:, LEVER] + across[:, SLOW]
+                total += table.log_force[:, point] * across[:, EXPONENT] + across[:, SLOW_SCATTER]
             elif channel == "crfa":
                 total += across[:, GAIN]
-            rest = sound.heard.value - said
-            if turn == 0:
-                log = -0.5 * (rest**2 / total + np.log(2.0 * np.pi * total))
-            share = self.mean[:, SHARE] + across[:, SHARE] / total * rest
+            residual = entry.measured.value - expected
+            if iteration == 0:
+                log = -0.5 * (residual**2 / total + np.log(2.0 * np.pi * total))
+            share = self.mean[:, SHARE] + across[:, SHARE] / total * residual
         self.log += log
         gain = across / total[:, None]
-        self.mean += gain * rest[:, None]
+        self.mean += gain * residual[:, None]
         self.covariance -= gain[:, :, None] * across[:, None, :]
 
-    def _lean(self, sound: Sound) -> tuple[list[int], Field]:
-        """The states of how a contact goes with what a sound was heard aside in, and what they do to it."""
-        first = self.mean.shape[1] - len(self.leanings)
-        heard = [
-            (first + number, sound.aside[axis] * spread[sound.place])
-            for number, ((channel, axis), spread) in enumerate(self.leanings.items())
-            if channel == sound.channel and sound.aside[axis]
+    def _slope_states(self, entry: SeriesMeasurement) -> tuple[list[int], Field]:
+        """Return the slope states that affect a measurement off its nominal point, and factors."""
+        first = self.mean.shape[1] - len(self.slope_scatter)
+        affected = [
+            (first + number, entry.offset[axis] * scatter[entry.point])
+            for number, ((channel, axis), scatter) in enumerate(self.slope_scatter.items())
+            if channel == entry.channel and entry.offset[axis]
         ]
-        return [state for state, _ in heard], np.array([by for _, by in heard])
+        return [state for state, _ in affected], np.array([factor for _, factor in affected])
 
 
-def tabulated(forward: Forward, z: Field, column: int, place: int) -> tuple[Field, Field]:
-    """The load share's scale along the range of what drifts, (n, knots), and the emulator's deviation, (n,)."""
-    at = Forward(forward.setting, forward.emulator, forward.points[place : place + 1])
+def tabulated(forward: ForwardModel, z: Field, column: int, point: int) -> tuple[Field, Field]:
+    """Tabulate CLR on its scale along the drifting range, (n, knots), and its deviation, (n,)."""
+    local = ForwardModel(forward.setting, forward.emulator, forward.points[point : point + 1])
     contacts = z[:, : forward.dims]
     knots = forward.setting.unknowns[column].at_share(np.linspace(0.0, 1.0, KNOTS))
-    mean, _ = at.emulated(along_range(contacts, column, knots), [CLR], deviations=False)[CLR]
-    _, std = at.emulated(contacts, [CLR])[CLR]
+    mean, _ = local.emulate(along_range(contacts, column, knots), [CLR], deviations=False)[CLR]
+    _, std = local.emulate(contacts, [CLR])[CLR]
     return _by_knots(mean)[:, 0], std[:, 0]

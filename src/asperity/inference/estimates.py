@@ -1,4 +1,4 @@
-"""A quantity before and after recordings: median, 90 % interval, and how many bits were learned of it."""
+"""Posterior estimates: median, 90 % interval and information gain over the prior."""
 
 import math
 from collections.abc import Mapping
@@ -10,18 +10,19 @@ import numpy as np
 from asperity.core.arrays import Field
 
 ENDS = (0.05, 0.5, 0.95)
-BINS = 20  # of what was known before, equally probable
-LEARNT_BITS = 0.5  # the interval is then about two thirds of what it was
-EDGE = 0.05  # share of a prior at either end, and
-CROWDED = 5.0  # how many times as much of the posterior must lie there to lie against the end
+BINS = 20  # equally probable bins of the prior
+LEARNT_FROM_BITS = 0.5  # information gain at which an interval shrinks to about two thirds
+EDGE = 0.05  # fraction of the prior counted as its end
+CROWDED = (
+    5.0  # ratio of posterior to prior mass at an end from which the prior limits the posterior
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """Median and ends of the 90 % interval, SI, and what was learned against the prior.
+    """Median and 90 % interval in SI, and information gain over the prior.
 
-    `against` is "low" or "high" where the posterior lies against an end of its prior, which then
-    decides the interval.
+    `against` is "low" or "high" if that end of the prior limits the posterior.
     """
 
     median: float
@@ -32,11 +33,11 @@ class Estimate:
 
     @property
     def learnt(self) -> bool:
-        """Whether recordings taught it, or it is as it was assumed."""
-        return self.information_bits >= LEARNT_BITS
+        """True if the recordings are informative; False if the prior is essentially unchanged."""
+        return self.information_bits >= LEARNT_FROM_BITS
 
     def scalars(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """Return the JSON output of the estimate."""
         return {
             "median": self.median,
             "low": self.low,
@@ -47,48 +48,51 @@ class Estimate:
         }
 
 
-def estimate(values: Field, prior: Field, effective: float, *, bounded: bool = False) -> Estimate:
-    """Of equally probable draws after and before, which are worth `effective` independent ones."""
+def quantity_estimate(
+    values: Field, prior: Field, effective: float, *, bounded: bool = False
+) -> Estimate:
+    """Estimate a quantity from posterior and prior draws of `effective` sample size."""
     low, median, high = (float(end) for end in np.quantile(values, ENDS))
     return Estimate(
         median,
         low,
         high,
-        bits(values, prior, effective),
+        information_gain(values, prior, effective),
         _against(values, prior) if bounded else "",
     )
 
 
-def estimates(
+def quantity_estimates(
     after: Mapping[str, Field],
     before: Mapping[str, Field],
     effective: float,
     bounded: frozenset[str],
 ) -> dict[str, Estimate]:
-    """`estimate` of several quantities by their keys."""
+    """Estimate several quantities by key, see `quantity_estimate`."""
     return {
-        key: estimate(after[key], before[key], effective, bounded=key in bounded) for key in after
+        key: quantity_estimate(after[key], before[key], effective, bounded=key in bounded)
+        for key in after
     }
 
 
-def bits(values: Field, prior: Field, effective: float) -> float:
-    """Kullback and Leibler's information of the posterior over the prior, in bits; 0 where chance makes as much.
+def information_gain(values: Field, prior: Field, effective: float) -> float:
+    """Return the Kullback-Leibler divergence of the posterior from the prior in bits, at least 0.
 
-    By histogram over classes that were equally probable before, less what so few draws make of
-    nothing (Miller and Madow).
+    Computed from a histogram with equally probable bins of the prior, minus the Miller-Madow bias
+    of the sample size.
     """
     ordered = np.sort(prior)
     inner = np.quantile(ordered, np.linspace(0.0, 1.0, BINS + 1)[1:-1])
     edges: Field = np.unique(inner)
-    places = edges.size + 1
-    after = np.bincount(np.searchsorted(edges, values, side="right"), minlength=places) / len(
-        values
+    bins = edges.size + 1
+    after = np.bincount(np.searchsorted(edges, values, side="right"), minlength=bins) / len(values)
+    before = np.bincount(np.searchsorted(edges, prior, side="right"), minlength=bins) / len(prior)
+    occupied = after > 0.0
+    divergence = float(
+        np.sum(after[occupied] * np.log2(after[occupied] / np.maximum(before[occupied], 1e-12)))
     )
-    before = np.bincount(np.searchsorted(edges, prior, side="right"), minlength=places) / len(prior)
-    told = after > 0.0
-    found = float(np.sum(after[told] * np.log2(after[told] / np.maximum(before[told], 1e-12))))
-    by_chance = (int(np.count_nonzero(told)) - 1) / (2.0 * effective * math.log(2.0))
-    return max(float(found - by_chance), 0.0)
+    bias = (int(np.count_nonzero(occupied)) - 1) / (2.0 * effective * math.log(2.0))
+    return max(float(divergence - bias), 0.0)
 
 
 def _against(values: Field, prior: Field) -> Literal["", "low", "high"]:

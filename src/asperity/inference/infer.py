@@ -1,19 +1,20 @@
-"""The one call: recordings, or what they said, to what is possible of the contact."""
+"""Inference of a contact from recordings or observations, and forecasts of a series."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from asperity.case import Case
+from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_choice
 from asperity.inference.emulator import Emulator, build_emulator, extend_emulator
 from asperity.inference.forecast import Forecast, Limit, forecast_observations, require_limit
-from asperity.inference.forward import Forward, Law
+from asperity.inference.forward import ChannelPrediction, ForwardModel, Law
 from asperity.inference.inference import Inference
 from asperity.inference.next_point import candidate_points, expected_information
-from asperity.inference.observations import Observation, Point, points_of
+from asperity.inference.observations import Observation, OperatingPoint, operating_points
 from asperity.inference.posterior import (
     Draws,
     Sampler,
@@ -26,21 +27,34 @@ from asperity.inference.posterior import (
     with_point,
 )
 from asperity.inference.priors import share_of
-from asperity.inference.recording_input import Listened, listen
+from asperity.inference.recording_input import ObservedSeries, RecordingInput, observe_recordings
 from asperity.inference.sampling import Pool
-from asperity.inference.settings import Setting, setting_of
-from asperity.inference.visits import series_of
+from asperity.inference.settings import Setting, inference_setting
+from asperity.inference.visits import visit_series
 from asperity.simulation import WearHistory, load_wear
 from asperity.study import StudyProgress
 
-# share of CLR's variance over the posterior, from which on the emulator's own is worth reducing
-MATERIAL = 0.1
-LATELY = 0.1  # of a series: recordings of one state of a contact that changes
-ROUND = 16  # points by which an emulator is extended before the next posterior
-LEAST_DRIFT_STD = (
-    0.02  # of a first drift that a wear model foretells, in shares of the range over the series
-)
+EMULATOR_SHARE = 0.1  # of CLR's posterior variance from which on the emulator is extended
+RECENT = 0.1  # fraction of a series regarded as one state of a changing contact
+EXTENSION_STEP = 16  # points added to the emulator before the next posterior
+MIN_DRIFT_STD = 0.02  # of a drift from a wear model, in shares of the range over the series
 SAMPLERS: tuple[Sampler, ...] = ("importance", "nested")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InferenceSettings:
+    """Numerical settings of an inference.
+
+    Parameters
+    ----------
+    sampler : "importance", takes seconds; "nested", takes minutes, an independent check (dynesty)
+    extend : maximum number of points to add to the emulator, see `refine_emulator`
+    seed : random seed
+    """
+
+    sampler: Sampler = "importance"
+    extend: int = 0
+    seed: int = 0
 
 
 def infer_contact(
@@ -49,184 +63,197 @@ def infer_contact(
     case: Case,
     table: str | Path | None = None,
     emulator: Emulator | str | Path | None = None,
-    sampler: Sampler = "importance",
-    extend: int = 0,
-    seed: int = 0,
+    settings: InferenceSettings | None = None,
     workers: int | None = None,
     executor: Executor | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> Inference:
-    """What recordings say of a contact, with intervals, and what cannot be told.
+    """Infer a contact's state from recordings: posterior intervals and their information gain.
 
     Parameters
     ----------
-    recordings : files and folders, or each an `Observation`; none at all gives what is known before any
-    case : the contact; its [infer] says what is not known of it
-    table : csv of what each file was recorded at, see `listen`
-    emulator : one that is there, or the folder to keep it in; None: one in the user's cache. Building it solves
-        hundreds of contacts, once
-    sampler : "importance", seconds; "nested", minutes, by dynesty, to check the other
-    extend : by how many points the emulator may be extended where the posterior is, see `with_further`
-    seed : of all that is drawn; the same seed gives the same numbers
-    workers, executor, progress : see `asperity.study.run_study`, of the emulator's contacts
+    recordings : files and folders, or `Observation` objects; without any, the prior is returned
+    case : the contact; its [infer] defines the unknowns
+    table : csv of operating points by file, see `RecordingInput`
+    emulator : an emulator, or its folder; None: one in the user's cache. Building it once solves
+        hundreds of contacts
+    settings : sampler, extension of the emulator, random seed; None: the defaults
+    workers, executor, progress : see `asperity.study.run_study`, for the emulator's contacts
 
     Raises
     ------
     BadInput
-        for a case, table, recording or operating point that cannot be used; without the extra `infer`.
+        for a case, table, recording or operating point that cannot be used; without the extra
+        `infer`.
     AsperityError
-        where a posterior was not found, or too many of the emulator's contacts fail.
+        if a posterior was not found, or too many of the emulator's contacts fail.
     """
-    require_choice("sampler", sampler, SAMPLERS)
-    setting = setting_of(case)
-    given = [one for one in recordings if isinstance(one, Observation)]
-    files = [one for one in recordings if not isinstance(one, Observation)]
+    settings = settings or InferenceSettings()
+    require_choice("sampler", settings.sampler, SAMPLERS)
+    setting = inference_setting(case)
+    given = [entry for entry in recordings if isinstance(entry, Observation)]
+    files = [entry for entry in recordings if not isinstance(entry, Observation)]
     if given and files:
-        raise BadInput(
-            "recordings must be files or observations, got both; infer one after the other"
-        )
-    heard = listen(files, setting, table=table) if files else Listened(observations=tuple(given))
+        raise BadInput("recordings must be files or observations, not both")
+    if files:
+        series = observe_recordings(files, setting, source=RecordingInput(table=table))
+    else:
+        series = ObservedSeries(observations=tuple(given))
     if not isinstance(emulator, Emulator):
         emulator = build_emulator(
             setting, folder=emulator, executor=executor, workers=workers, progress=progress
         )
-    found = infer_heard(setting, emulator, heard, sampler=sampler, seed=seed)
-    return with_further(
-        found, extend, sampler=sampler, executor=executor, workers=workers, progress=progress
+    inference = infer_series(
+        setting, emulator, series, sampler=settings.sampler, seed=settings.seed
+    )
+    return refine_emulator(
+        inference,
+        settings.extend,
+        sampler=settings.sampler,
+        executor=executor,
+        workers=workers,
+        progress=progress,
     )
 
 
-def with_further(
-    found: Inference, most: int, *, sampler: Sampler = "importance", **how: Any
+def refine_emulator(
+    inference: Inference, max_points: int, *, sampler: Sampler = "importance", **options: Any
 ) -> Inference:
-    """The same with an emulator that is extended where the posterior is, by up to `most` points; and a note of it.
+    """Extend the emulator in the region of the posterior by up to `max_points` points; add a note.
 
-    In rounds, each a posterior, as long as the emulator's own variance is more than a tenth of
-    CLR's over the posterior, on its scale, at the case's own operating point. Further points are
-    contacts drawn from the posterior, at this operating point and those that were heard in turn;
-    they are kept with the emulator. `how` is as `build_emulator` takes it.
+    Points are added in rounds, each with a new posterior, while the emulator's variance exceeds a
+    tenth of the posterior variance of CLR (on its scale, at the case's operating point). They are
+    posterior draws at the measured operating points in turn, and are stored with the emulator.
+    `options` are those of `build_emulator`.
 
     Raises
     ------
     BadInput
-        for an emulator that is not kept on disk, or one that would have too many points.
+        for an emulator that is not on disk, or too many points.
     """
-    added, first = 0, found
+    added, first = 0, inference
     before = share = emulated_share(first.forward, first.draws)
-    while most > added and share > MATERIAL and found.observations:
-        count = min(most - added, ROUND)
-        shares = posterior_shares(found.forward, found.draws, count, found.seed + added)
-        emulator = extend_emulator(found.setting, found.emulator, shares, **how)
-        found, added = (
+    while max_points > added and share > EMULATOR_SHARE and inference.observations:
+        count = min(max_points - added, EXTENSION_STEP)
+        shares = posterior_shares(inference.forward, inference.draws, count, inference.seed + added)
+        emulator = extend_emulator(inference.setting, inference.emulator, shares, **options)
+        inference, added = (
             infer_observations(
-                found.setting,
+                inference.setting,
                 emulator,
-                found.observations,
+                inference.observations,
                 sampler=sampler,
-                seed=found.seed,
-                silent=found.silent,
+                seed=inference.seed,
+                excluded=inference.excluded,
                 notes=first.notes,
             ),
             added + count,
         )
-        share = emulated_share(found.forward, found.draws)
-    if most == 0 or not found.observations:
-        return found
-    said = f"The emulator's own error makes {100 * share:.0f} % of the variance of CLR that is left"
+        share = emulated_share(inference.forward, inference.draws)
+    if max_points == 0 or not inference.observations:
+        return inference
+    note = f"The emulator's error makes up {100 * share:.0f} % of the posterior variance of CLR"
     if added:
-        said += f", {100 * before:.0f} % before it was extended by {added} points where the posterior is"
+        note += f", {100 * before:.0f} % before {added} points were added"
     else:
-        said += f", and it was not extended: it is from {100 * MATERIAL:.0f} % on"
-    return replace(found, notes=(*found.notes, f"{said}."))
+        note += f"; it was not extended (threshold {100 * EMULATOR_SHARE:.0f} %)"
+    return replace(inference, notes=(*inference.notes, f"{note}."))
 
 
-def infer_heard(
+def infer_series(
     setting: Setting,
     emulator: Emulator,
-    heard: Listened,
+    series: ObservedSeries,
     *,
     sampler: Sampler = "importance",
     seed: int = 0,
 ) -> Inference:
-    """The same, of what `listen` heard."""
+    """Infer a contact from the result of `observe_recordings`."""
     return infer_observations(
         setting,
         emulator,
-        heard.observations,
+        series.observations,
         sampler=sampler,
         seed=seed,
-        silent=heard.silent,
-        notes=heard.notes,
+        excluded=series.excluded,
+        notes=series.notes,
     )
 
 
-def forecast_heard(
+def forecast_series(
     setting: Setting,
     emulator: Emulator,
-    heard: Listened,
+    series: ObservedSeries,
     limit: Limit,
     *,
     worn: str | Path | WearHistory | None = None,
     seed: int = 0,
     x_name: str = "",
 ) -> Forecast:
-    """`forecast_observations` of what `listen` heard; `worn` is a history of `asperity wear`, whose drift is expected.
+    """Forecast the result of `observe_recordings`, see `forecast_observations`.
 
-    Its hours are those of x, from the first recording on. `x_name` is what x is, that of the track
-    where it has one.
+    Parameters
+    ----------
+    setting, emulator, limit, seed : see `forecast_observations`
+    series : the observations
+    worn : history of `asperity wear` as prior for the drift of Sq; its hours are those of x, from
+        the first recording
+    x_name : label of x; that of the track if there is one
     """
-    x_name = heard.track.x_name if heard.track is not None else x_name
-    times = [one.x for one in heard.observations]
+    x_name = series.track.x_name if series.track is not None else x_name
+    times = [observation.x for observation in series.observations]
     drift = None
     if worn is not None and times:
         require_limit(setting, limit, worn=True)
-        series_of(heard.observations)  # refuses what is no series
+        visit_series(series.observations)  # raises BadInput for an unusable series
         history = worn if isinstance(worn, WearHistory) else load_wear(worn)
         drift = wear_drift(setting, history, max(times) - min(times))
-    return forecast_observations(
-        setting, emulator, heard.observations, limit=limit, drift=drift, seed=seed, x_name=x_name
+    forecast = forecast_observations(
+        setting, emulator, series.observations, limit=limit, drift=drift, seed=seed
     )
+    return replace(forecast, x_name=x_name)
 
 
 def wear_drift(setting: Setting, history: WearHistory, hours: float) -> tuple[float, float]:
-    """First drift of Sq, in shares of its range over so many hours, as a wear history has it; and its deviation.
+    """Return mean and deviation of the drift of Sq from a wear history, in shares over `hours`.
 
-    Wear coefficients are known to a factor of two: the deviation is the drift itself.
+    Wear coefficients are uncertain by a factor of two: the deviation equals the drift.
 
     Raises
     ------
     BadInput
-        where the case knows its Sq.
+        if Sq is known in the case.
     """
-    unknown = next((one for one in setting.contact if one.key == "sq_m"), None)
+    unknown = next((entry for entry in setting.contact if entry.key == "sq_m"), None)
     if unknown is None:
-        raise BadInput("the case knows its Sq, which cannot drift; leave --worn out")
+        raise BadInput("Sq is known in the case and cannot drift; leave --worn out")
     end = min(hours, history.hours)
     if end <= 0.0:
-        raise BadInput(
-            "the wear history has no hours, and says nothing of a drift; leave --worn out"
-        )
+        raise BadInput("the wear history has no hours and gives no drift; leave --worn out")
     first, last = (
         float(share_of(unknown.range, unknown.from_si(history.values_at(time)["sq_m"])))
         for time in (0.0, end)
     )
     mean = (last - first) * hours / end
-    return mean, max(abs(mean), LEAST_DRIFT_STD)
+    return mean, max(abs(mean), MIN_DRIFT_STD)
 
 
-def latest(heard: Listened) -> Listened:
-    """The last recording at each operating point alone, of the last tenth of the series: the contact has changed."""
-    times = [one.x for one in heard.observations]
-    begin = max(times) - LATELY * (max(times) - min(times))
-    last = {one.place: one for one in sorted(heard.observations, key=lambda one: one.x)}
-    of_now = [one for one in last.values() if one.x >= begin]
+def latest_observations(series: ObservedSeries) -> ObservedSeries:
+    """Return only the last recording at each operating point, from the last tenth of the series."""
+    times = [observation.x for observation in series.observations]
+    begin = max(times) - RECENT * (max(times) - min(times))
+    last = {
+        observation.conditions: observation
+        for observation in sorted(series.observations, key=lambda entry: entry.x)
+    }
+    recent = [observation for observation in last.values() if observation.x >= begin]
     note = (
-        "The contact changes over the series: the numbers are of the last recording at each operating point, in the "
-        "last tenth of it."
+        "The contact changes over the series: the numbers are those of the last recording at each "
+        "operating point, within the last tenth of the series."
     )
-    if len(of_now) < len(last):
-        note += f" Operating points that were last recorded before: {len(last) - len(of_now)}."
-    return replace(heard, observations=tuple(of_now), notes=(*heard.notes, note))
+    if len(recent) < len(last):
+        note += f" Operating points recorded only before: {len(last) - len(recent)}."
+    return replace(series, observations=tuple(recent), notes=(*series.notes, note))
 
 
 def infer_observations(
@@ -236,56 +263,70 @@ def infer_observations(
     *,
     sampler: Sampler = "importance",
     seed: int = 0,
-    silent: tuple[tuple[str, str], ...] = (),
+    excluded: tuple[tuple[str, str], ...] = (),
     notes: tuple[str, ...] = (),
 ) -> Inference:
-    """The same, of a setting and its emulator; `silent` are recordings that said nothing, and why."""
+    """Infer a contact from observations.
+
+    Parameters
+    ----------
+    setting, emulator : from `inference_setting` and `build_emulator`
+    observations : resonances with their operating points
+    sampler, seed : see `InferenceSettings`
+    excluded : recordings without a usable resonance, with reasons
+    notes : notes to add to the result
+    """
     conditions = setting.case.conditions
-    own = Point(conditions.load, conditions.entrainment_speed)
-    forward = Forward(setting, emulator, (own, *points_of(observations)))
-    return _inferred(
-        forward, tuple(observations), new_pools(forward, seed), sampler, seed, silent, notes
-    )
+    own = OperatingPoint(conditions.load, conditions.entrainment_speed)
+    forward = ForwardModel(setting, emulator, (own, *operating_points(observations)))
+    source = _Source(tuple(observations), excluded, notes)
+    return _infer(forward, source, new_pools(forward, seed), sampler, seed)
 
 
 def with_observation(inference: Inference, observation: Observation) -> Inference:
-    """One recording more, by the draws that are there: a second where the whole takes several.
+    """Update an inference with one more observation, reusing its draws: about a second.
 
     Raises
     ------
     BadInput
-        for an operating point that the emulator does not reach.
+        for an operating point outside the emulator's ranges.
     """
     observations = (*inference.observations, observation)
-    before = inference.forward
-    points = (before.points[0], *points_of(observations))
-    forward, pools = replace(before, points=points), dict(inference.pools)
+    previous = inference.forward
+    points = (previous.points[0], *operating_points(observations))
+    forward, pools = replace(previous, points=points), dict(inference.pools)
     if not inference.observations:
         pools = new_pools(forward, inference.seed)
-    elif len(points) > len(before.points):
-        pools = with_point(pools, forward, replace(before, points=points[-1:]))
+    elif len(points) > len(previous.points):
+        pools = with_point(pools, forward, replace(previous, points=points[-1:]))
     else:
         pools = {
-            law: pool.with_columns(_again(forward, law), pool.shown) for law, pool in pools.items()
+            law: pool.with_columns(_predictor(forward, law), pool.outputs)
+            for law, pool in pools.items()
         }
-    told = inference.silent, inference.notes
-    return _inferred(
-        forward, observations, pools, "importance", inference.seed, *told, prior=inference.prior
-    )
+    source = _Source(observations, inference.excluded, inference.notes)
+    return _infer(forward, source, pools, "importance", inference.seed, prior=inference.prior)
 
 
-def _again(forward: Forward, law: Law) -> Callable[..., object]:
-    return lambda z: forward.heard.shown(z, law)
+def _predictor(forward: ForwardModel, law: Law) -> Callable[[Field], ChannelPrediction]:
+    return lambda z: forward.observed.predict(z, law)
 
 
-def _inferred(
-    forward: Forward,
-    observations: tuple[Observation, ...],
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """The data of an inference: observations, excluded recordings and notes."""
+
+    observations: tuple[Observation, ...]
+    excluded: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...]
+
+
+def _infer(
+    forward: ForwardModel,
+    source: _Source,
     pools: dict[Law, Pool],
     sampler: Sampler,
     seed: int,
-    silent: tuple[tuple[str, str], ...],
-    notes: tuple[str, ...],
     *,
     prior: Draws | None = None,
 ) -> Inference:
@@ -296,8 +337,8 @@ def _inferred(
     candidates = expected_information(forward, draws, candidate_points(forward.setting), seed=seed)
     return Inference(
         forward=forward,
-        observations=observations,
-        silent=silent,
+        observations=source.observations,
+        excluded=source.excluded,
         models=models,
         prior=prior_draws(forward, seed, prior),
         draws=draws,
@@ -305,5 +346,5 @@ def _inferred(
         candidates=tuple(candidates),
         pools=pools,
         seed=seed,
-        notes=notes,
+        notes=source.notes,
     )

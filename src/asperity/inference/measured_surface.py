@@ -1,4 +1,4 @@
-"""A measured surface as what is known of Sq before any recording."""
+"""A measured surface as the prior of Sq."""
 
 import math
 from dataclasses import replace
@@ -12,45 +12,52 @@ from asperity.inference.priors import REACH, Unknown
 from asperity.inference.settings import Setting
 from asperity.surface import MeasuredSurface, condition_surface
 
-INSTRUMENT_STD = 0.03  # of Sq, relative: instruments differ by that on the same surface
-PARTS = 2  # of a map along each axis: how much Sq differs from place to place
+INSTRUMENT_STD = 0.03  # of Sq, relative: difference between instruments on the same surface
+PARTS = 2  # parts of a map along each axis, to estimate the scatter of Sq over the surface
 
 
-def with_measured(setting: Setting, measured: MeasuredSurface) -> tuple[Setting, str]:
-    """A setting whose Sq is known as a surface was measured, within the range of the emulator; and a sentence of it.
+def with_measured_surface(setting: Setting, measured: MeasuredSurface) -> tuple[Setting, str]:
+    """Return the setting with the Sq of a measured surface as prior, and a note.
 
-    Form is removed (a paraboloid). The deviation is that of the parts of the map, over the root of
-    their number, and the instrument's.
+    Form (a paraboloid) is removed. The standard deviation combines the scatter over parts of the
+    map, divided by the root of their number, and that of the instrument.
 
     Raises
     ------
     BadInput
-        where the case's Sq is known already, or the measured one lies outside its range.
+        if Sq is not unknown in the case, or the measured Sq is outside its range.
     """
-    place = next((number for number, one in enumerate(setting.contact) if one.key == "sq_m"), None)
-    if place is None:
-        raise BadInput("the case knows its Sq; leave --surface out, or take infer.sq from the case")
+    index = next(
+        (number for number, entry in enumerate(setting.contact) if entry.key == "sq_m"), None
+    )
+    if index is None:
+        raise BadInput(
+            "Sq is known in the case; leave --surface out, or remove infer.sq from the case"
+        )
     rough, _ = condition_surface(measured)
     sq = float(np.nanstd(rough.heights))
     std = math.hypot(_between_parts(rough.heights), INSTRUMENT_STD * sq)
-    unknown = setting.contact[place]
+    unknown = setting.contact[index]
     zero, mean = (float(unknown.from_si(value)) for value in (0.0, sq))
     spread = float(unknown.from_si(std)) - zero
     entry, low, high = quantity("sq_m"), unknown.range.low, unknown.range.high
     if not low < mean < high:
         raise BadInput(
-            f"Sq of {measured.name} is {entry.text(sq)}, and the emulator goes from {low:g} to {high:g} "
-            f"{unknown.range.unit}; widen infer.sq in the case"
+            f"Sq of {measured.name} is {entry.text(sq)}, outside the emulator's range of {low:g} "
+            f"to {high:g} {unknown.range.unit}; widen infer.sq in the case"
         )
     spread = min(spread, 0.999 * mean / REACH)
     known = Unknown(unknown.key, unknown.range, mean, spread)
-    contact = (*setting.contact[:place], known, *setting.contact[place + 1 :])
-    said = f"Sq is taken as {measured.name} shows it, {entry.text(sq, std)}, of both bodies together: the other is smooth."
-    return replace(setting, contact=contact), said
+    contact = (*setting.contact[:index], known, *setting.contact[index + 1 :])
+    note = (
+        f"The prior of Sq is that of {measured.name}, {entry.text(sq, std)}, "
+        "taken as the composite roughness (smooth counterbody)."
+    )
+    return replace(setting, contact=contact), note
 
 
 def _between_parts(heights: Field) -> float:
-    """Standard deviation of Sq over a map that its parts let expect; 0 where there are too few heights."""
+    """Return the standard deviation of Sq from the parts of a map; 0 if there are too few."""
     parts = [
         part
         for row in np.array_split(heights, PARTS)

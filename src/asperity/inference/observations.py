@@ -1,4 +1,4 @@
-"""What a recording says: a resonance with its deviations, and under which load and speed it was made."""
+"""Observations: contact resonances with standard deviations and operating points."""
 
 import math
 from collections.abc import Sequence
@@ -9,11 +9,10 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_positive
 
-LEAST_STD = 1e-4  # relative, of a frequency: no machine is steadier
-LOST = math.nan
-ALIKE = np.array(
-    [0.03, 0.03, 1.5]
-)  # load and speed, relative, and temperature [K], that are as good as one place
+MIN_FREQUENCY_STD = 1e-4  # relative; no machine runs more steadily
+MISSING = math.nan
+# differences of load and speed (relative) and temperature [K] within which points count as similar
+SIMILARITY_SCALES = np.array([0.03, 0.03, 1.5])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,12 +22,12 @@ class Observation:
     Parameters
     ----------
     load_n, entrainment_m_s : load [N] and entrainment speed [m/s] of the contact
-    temperature_k : of the oil [K]; None: as the case has it
-    crf_hz, crf_std_hz : frequency of the resonance and its standard deviation [Hz]
-    crfa, crfa_std : its height [(m/s^2)^2/Hz]; nan where it is not comparable
-    damping_ratio, damping_std : its width; nan where it is not determined
-    crf_shared_std_hz : part of `crf_std_hz` that all recordings at its operating point have in common
-    name, x : what it is called, and where it stands in a series (hours)
+    temperature_k : of the oil [K]; None: that of the case
+    crf_hz, crf_std_hz : resonance frequency and its standard deviation [Hz]
+    crfa, crfa_std : height of the resonance [(m/s^2)^2/Hz]; nan if not comparable
+    damping_ratio, damping_std : from the width of the resonance; nan if not determined
+    crf_shared_std_hz : part of `crf_std_hz` common to all recordings at the operating point
+    name, x : label, and position in a series (hours)
     """
 
     load_n: float
@@ -36,128 +35,131 @@ class Observation:
     crf_hz: float
     crf_std_hz: float
     temperature_k: float | None = None
-    crfa: float = LOST
-    crfa_std: float = LOST
-    damping_ratio: float = LOST
-    damping_std: float = LOST
+    crfa: float = MISSING
+    crfa_std: float = MISSING
+    damping_ratio: float = MISSING
+    damping_std: float = MISSING
     crf_shared_std_hz: float = 0.0
     name: str = ""
-    x: float = LOST
+    x: float = MISSING
 
     def __post_init__(self) -> None:
-        what = f"{self.name}: " if self.name else ""
-        require_positive(f"{what}load_n", self.load_n, "N")
-        require_positive(f"{what}entrainment_m_s", self.entrainment_m_s, "m/s")
-        require_positive(f"{what}crf_hz", self.crf_hz, "Hz")
-        require_positive(f"{what}crf_std_hz", self.crf_std_hz, "Hz")
+        prefix = f"{self.name}: " if self.name else ""
+        require_positive(f"{prefix}load_n", self.load_n, "N")
+        require_positive(f"{prefix}entrainment_m_s", self.entrainment_m_s, "m/s")
+        require_positive(f"{prefix}crf_hz", self.crf_hz, "Hz")
+        require_positive(f"{prefix}crf_std_hz", self.crf_std_hz, "Hz")
         for name, value, std in (
             ("crfa", self.crfa, self.crfa_std),
             ("damping_ratio", self.damping_ratio, self.damping_std),
         ):
             if not math.isnan(value):
-                require_positive(f"{what}{name}", value)
-                require_positive(f"{what}standard deviation of {name}", std)
+                require_positive(f"{prefix}{name}", value)
+                require_positive(f"{prefix}standard deviation of {name}", std)
         if not 0.0 <= self.crf_shared_std_hz <= self.crf_std_hz * (1.0 + 1e-9):
             raise BadInput(
-                f"{what}crf_shared_std_hz is a part of crf_std_hz, {self.crf_std_hz:g} Hz, got "
-                f"{self.crf_shared_std_hz:g} Hz"
+                f"{prefix}crf_shared_std_hz must be at most crf_std_hz, {self.crf_std_hz:g} Hz, "
+                f"got {self.crf_shared_std_hz:g} Hz"
             )
         if self.temperature_k is not None:
-            require_positive(f"{what}temperature_k", self.temperature_k, "K")
+            require_positive(f"{prefix}temperature_k", self.temperature_k, "K")
 
     @property
-    def place(self) -> tuple[float, float, float | None]:
-        """Its operating point."""
+    def conditions(self) -> tuple[float, float, float | None]:
+        """Load [N], entrainment speed [m/s] and temperature [K]."""
         return self.load_n, self.entrainment_m_s, self.temperature_k
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
-    """A logarithm that was measured at an operating point, and its standard deviation; nan where it was not."""
+class LogMeasurement:
+    """Logarithm of a measured quantity and its standard deviation; nan if not measured."""
 
     value: float = math.nan
     std: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
-    """An operating point, and what its recordings say together."""
+class OperatingPoint:
+    """An operating point and the combined measurements of its recordings."""
 
     load_n: float
     entrainment_m_s: float
     temperature_k: float | None = None
-    crf: Heard = field(default_factory=Heard)
-    damping: Heard = field(default_factory=Heard)
-    crfa: Heard = field(default_factory=Heard)
+    crf: LogMeasurement = field(default_factory=LogMeasurement)
+    damping: LogMeasurement = field(default_factory=LogMeasurement)
+    crfa: LogMeasurement = field(default_factory=LogMeasurement)
     names: tuple[str, ...] = ()
 
 
-def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
-    """Recordings by their operating points, in order: those of one point are repeats of one thing.
+def operating_points(observations: Sequence[Observation]) -> tuple[OperatingPoint, ...]:
+    """Group observations by operating point, in order; repeats are combined.
 
     Raises
     ------
     BadInput
-        where only some of them say how warm the oil was.
+        if only some observations have an oil temperature.
     """
     require_temperatures(observations)
     groups: dict[tuple[float, float, float | None], list[Observation]] = {}
-    for one in observations:
-        groups.setdefault(one.place, []).append(one)
+    for observation in observations:
+        groups.setdefault(observation.conditions, []).append(observation)
     return tuple(
-        Point(
-            *place,
-            crf=_together(
-                [(one.crf_hz, one.crf_std_hz, one.crf_shared_std_hz) for one in group], LEAST_STD
+        OperatingPoint(
+            *conditions,
+            crf=_combined(
+                [(entry.crf_hz, entry.crf_std_hz, entry.crf_shared_std_hz) for entry in group],
+                MIN_FREQUENCY_STD,
             ),
-            damping=_together([(one.damping_ratio, one.damping_std, 0.0) for one in group]),
-            crfa=_together([(one.crfa, one.crfa_std, 0.0) for one in group]),
-            names=tuple(one.name for one in group),
+            damping=_combined([(entry.damping_ratio, entry.damping_std, 0.0) for entry in group]),
+            crfa=_combined([(entry.crfa, entry.crfa_std, 0.0) for entry in group]),
+            names=tuple(entry.name for entry in group),
         )
-        for place, group in groups.items()
+        for conditions, group in groups.items()
     )
 
 
-def conditions(point: Point) -> Field:
-    """Logarithms of load and speed, and temperature [K]."""
+def point_coordinates(point: OperatingPoint) -> Field:
+    """Return the logarithms of load and speed, and the temperature [K]."""
     return np.array(
         [math.log(point.load_n), math.log(point.entrainment_m_s), point.temperature_k or 0.0]
     )
 
 
-def likeness(points: Sequence[Point]) -> Field:
-    """How far what is a point's own is the others' too, as a correlation, (points, points): 1 at one place."""
-    at = np.array([conditions(point) for point in points]) / ALIKE
-    return np.asarray(np.exp(-0.5 * np.sum((at[:, None] - at) ** 2, axis=-1)))
+def point_similarity(points: Sequence[OperatingPoint]) -> Field:
+    """Return the correlation of point-specific errors, (points, points): 1 for equal conditions."""
+    scaled = np.array([point_coordinates(point) for point in points]) / SIMILARITY_SCALES
+    return np.asarray(np.exp(-0.5 * np.sum((scaled[:, None] - scaled) ** 2, axis=-1)))
 
 
 def require_temperatures(observations: Sequence[Observation]) -> None:
-    """BadInput where only some of them say how warm the oil was."""
-    if len({one.temperature_k is None for one in observations}) > 1:
+    """Raise BadInput if only some observations have an oil temperature."""
+    if len({observation.temperature_k is None for observation in observations}) > 1:
         raise BadInput(
-            "some recordings have a temperature and some have none; give it of all, or of none"
+            "some recordings have a temperature and some have none; give it for all or for none"
         )
 
 
-def _together(heard: Sequence[tuple[float, float, float]], least: float = 0.0) -> Heard:
-    """The logarithm that repeats measure, of values, deviations, and what of these is common to all of them.
+def _combined(
+    repeats: Sequence[tuple[float, float, float]], min_std: float = 0.0
+) -> LogMeasurement:
+    """Combine repeats (value, standard deviation, shared part of it) into one logarithm.
 
-    Their weighted mean, and no surer of it than their scatter lets them be, nor than what they
-    have in common.
+    The result is the weighted mean; its deviation is at least that of the scatter of the repeats
+    and includes the shared part.
     """
     known = np.array(
         [
             (
                 math.log(value),
-                max(math.sqrt(max(std**2 - common**2, 0.0)) / value, least),
+                max(math.sqrt(max(std**2 - common**2, 0.0)) / value, min_std),
                 common / value,
             )
-            for value, std, common in heard
+            for value, std, common in repeats
             if not math.isnan(value)
         ]
     )
     if not len(known):
-        return Heard()
+        return LogMeasurement()
     values, stds, common = known.T
     weights = stds**-2.0 / np.sum(stds**-2.0)
     mean = float(weights @ values)
@@ -165,4 +167,4 @@ def _together(heard: Sequence[tuple[float, float, float]], least: float = 0.0) -
     if len(known) > 1:
         scatter = float(np.sqrt(np.sum((values - mean) ** 2) / (len(known) - 1) / len(known)))
         std = max(std, scatter)
-    return Heard(mean, math.hypot(std, float(weights @ common)))
+    return LogMeasurement(mean, math.hypot(std, float(weights @ common)))

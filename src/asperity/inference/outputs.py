@@ -1,4 +1,4 @@
-"""What is emulated of a contact, and on which scale: one on which it is smooth, and its ends are not walls."""
+"""Emulated quantities of a contact and their scales, on which they are smooth and unbounded."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,23 +7,23 @@ import numpy as np
 
 from asperity.core.arrays import Field
 
-SHARE_FLOOR = 0.005  # of load or area: below it, recordings and grids tell nothing
+SHARE_FLOOR = 0.005  # of load; smaller values are not resolved by recordings or grids
 AREA_FLOOR = 0.002
 DAMPING_FLOOR = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """A quantity of the contact: its key in the catalogue, and the scale that it is emulated on."""
+    """An emulated quantity: its key in the catalogue, and its scale."""
 
     key: str
     forward: Callable[[Field], Field]
     back: Callable[[Field], Field]
-    slope: Callable[[Field], Field]  # of `forward`, by which scatter is taken to the scale
+    slope: Callable[[Field], Field]  # derivative of `forward`, to convert scatter to the scale
 
 
 def _share(key: str, floor: float) -> Output:
-    """A share, 0 to 1, by its logit, softened by a floor so that 0 is a number too."""
+    """Return a share (0 to 1) on a logit scale with a floor, finite at 0 and 1."""
     whole = 1.0 + 2.0 * floor
 
     def forward(value: Field) -> Field:
@@ -43,7 +43,7 @@ def _positive(key: str) -> Output:
 
 
 def _signed(key: str, floor: float) -> Output:
-    """A number of either sign over decades: inverse hyperbolic sine."""
+    """Return a signed quantity on an inverse hyperbolic sine scale."""
     return Output(
         key,
         lambda value: np.asarray(np.arcsinh(value / floor)),

@@ -1,7 +1,6 @@
-"""Posteriors of all models, and what contacts they leave possible: draws of unknowns with the contact's state.
+"""Posteriors of all models: draws of unknowns with the contact's state.
 
-A model is a law of the contact's spring, with or without a term for its error. Models are weighed
-by their evidence.
+A model is a spring law with or without a discrepancy term. Models are weighted by their evidence.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,7 +12,7 @@ from scipy.special import logsumexp
 
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError
-from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law, Shown
+from asperity.inference.forward import LAWS, MIN_SHARE, ChannelPrediction, ForwardModel, Law
 from asperity.inference.likelihood import (
     SIZES,
     WEIGHTS,
@@ -22,20 +21,20 @@ from asperity.inference.likelihood import (
     log_at_sizes,
     log_likelihood,
 )
-from asperity.inference.observations import Point, likeness
+from asperity.inference.observations import OperatingPoint, point_similarity
 from asperity.inference.outputs import CAR, CLR, FILM, FRICTION, OUTPUTS
 from asperity.inference.sampling import (
     FEWEST,
-    QUICKLY,
+    QUICK_ENOUGH,
     RULED_OUT,
     Pool,
-    Sampled,
+    WeightedSamples,
     importance,
     nested,
 )
 
 Sampler = Literal["importance", "nested"]
-DRAWS = 2000  # equally probable ones, of each posterior
+DRAWS = 2000  # equally probable draws of a posterior
 STATE = (CLR, CAR, FILM, FRICTION)
 MODELS: tuple[tuple[Law, bool], ...] = tuple(
     (law, discrepancy) for law in LAWS for discrepancy in (True, False)
@@ -43,11 +42,8 @@ MODELS: tuple[tuple[Law, bool], ...] = tuple(
 
 
 @dataclass(frozen=True)
-class Model:
-    """A law, with or without its error, and how probable what was heard makes it among all models.
-
-    `found` is whether its posterior could be sampled; one that is ruled out need not be.
-    """
+class ModelEvidence:
+    """Evidence and posterior probability of a model: a law with or without discrepancy."""
 
     law: Law
     discrepancy: bool
@@ -58,116 +54,124 @@ class Model:
     effective: float
 
     def scalars(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """Return the JSON output of the model."""
         return dict(vars(self))
 
 
 @dataclass(frozen=True)
 class Draws:
-    """Equally probable contacts: unknowns z (n, dims), states (n, points) in their own units, which law each is by.
+    """Equally probable contacts: unknowns z (n, dims), law, and states (n, points) in own units.
 
-    `sizes` are the law's errors that each has in ln CRF, ln ζ and ln CRFA; `effective` how many
-    independent ones they are worth.
+    `sizes` are the law's errors of each draw in ln CRF, ln ζ and ln CRFA; `effective` is the
+    effective sample size.
     """
 
     z: Field
-    law: Field  # number in LAWS
+    law: Field  # index in LAWS
     sizes: Mapping[str, Field]
     states: Mapping[str, Field]
     effective: float
 
-    def taken(self, rows: Any) -> "Draws":
-        """Some of them."""
+    def select_rows(self, rows: Any) -> "Draws":
+        """Return the draws of some rows."""
         sizes, states = (
-            {key: one[rows] for key, one in whole.items()} for whole in (self.sizes, self.states)
+            {key: values[rows] for key, values in columns.items()}
+            for columns in (self.sizes, self.states)
         )
         return replace(self, z=self.z[rows], law=self.law[rows], sizes=sizes, states=states)
 
 
 def sample_models(
-    forward: Forward,
+    forward: ForwardModel,
     pools: Mapping[Law, Pool],
     *,
     sampler: Sampler,
     seed: int,
     quickly: bool = False,
-) -> tuple[tuple[Model, ...], dict[tuple[Law, bool], Sampled]]:
-    """Every model sampled, with its evidence; `quickly` is enough where draws were learnt before.
+) -> tuple[tuple[ModelEvidence, ...], dict[tuple[Law, bool], WeightedSamples]]:
+    """Sample every model and return its evidence; `quickly` needs fewer effective draws.
 
     Raises
     ------
     AsperityError
-        where the posterior of a model that counts was not found.
+        if the posterior of a relevant model was not found.
     """
-    forward = forward.heard
-    sampled: dict[tuple[Law, bool], Sampled] = {}
-    how: dict[str, Any] = {"enough": QUICKLY, "probed": 0} if quickly else {}
+    forward = forward.observed
+    sampled: dict[tuple[Law, bool], WeightedSamples] = {}
+    options: dict[str, Any] = {"enough": QUICK_ENOUGH, "probed": 0} if quickly else {}
     best = -np.inf
-    for law, discrepancy in _likeliest_first(forward, pools):
+    for law, discrepancy in _by_likelihood(forward, pools):
         target = _target(forward.points, discrepancy=discrepancy)
         if sampler == "nested":
-            one = nested(_evaluate(forward, law), target, forward.dims, seed)
+            samples = nested(_evaluate(forward, law), target, forward.dims, seed)
         else:
-            one = importance(pools[law], target, best=best, **how)
-        sampled[law, discrepancy], best = one, max(best, one.log_evidence)
-    for (law, _), one in sampled.items():
-        if one.effective < FEWEST and one.log_evidence > best - RULED_OUT:
+            samples = importance(pools[law], target, best=best, **options)
+        sampled[law, discrepancy], best = samples, max(best, samples.log_evidence)
+    for (law, _), samples in sampled.items():
+        if samples.effective < FEWEST and samples.log_evidence > best - RULED_OUT:
             raise AsperityError(
-                f"the posterior by the law {law} was not found: its draws are worth {one.effective:.0f}; take nested "
-                "sampling, or wider priors"
+                f"the posterior of the law {law} was not found: effective sample size "
+                f"{samples.effective:.0f}; use nested sampling or wider priors"
             )
-    total = logsumexp([one.log_evidence for one in sampled.values()])
+    total = logsumexp([samples.log_evidence for samples in sampled.values()])
     models = tuple(
-        Model(
+        ModelEvidence(
             law,
             discrepancy,
-            one.log_evidence,
-            one.log_evidence_std,
-            float(np.exp(one.log_evidence - total)),
-            one.information_bits,
-            one.effective,
+            samples.log_evidence,
+            samples.log_evidence_std,
+            float(np.exp(samples.log_evidence - total)),
+            samples.information_bits,
+            samples.effective,
         )
-        for (law, discrepancy), one in sorted(
+        for (law, discrepancy), samples in sorted(
             sampled.items(), key=lambda entry: MODELS.index(entry[0])
         )
     )
     return models, sampled
 
 
-def _likeliest_first(forward: Forward, pools: Mapping[Law, Pool]) -> list[tuple[Law, bool]]:
-    """Models by what the draws that are there make of them: draws are then not spent on the hopeless."""
+def _by_likelihood(forward: ForwardModel, pools: Mapping[Law, Pool]) -> list[tuple[Law, bool]]:
+    """Return the models by their largest likelihood so far, so that poor models need few draws."""
 
     def likelihood(model: tuple[Law, bool]) -> float:
-        return float(_target(forward.points, discrepancy=model[1])(pools[model[0]].shown).max())
+        return float(_target(forward.points, discrepancy=model[1])(pools[model[0]].outputs).max())
 
     return sorted(MODELS, key=likelihood, reverse=True)
 
 
-def _target(points: tuple[Point, ...], *, discrepancy: bool) -> Callable[[Shown], Field]:
-    return lambda shown: log_likelihood(shown, points, discrepancy=discrepancy)
+def _target(
+    points: tuple[OperatingPoint, ...], *, discrepancy: bool
+) -> Callable[[ChannelPrediction], Field]:
+    return lambda prediction: log_likelihood(prediction, points, discrepancy=discrepancy)
 
 
-def _evaluate(forward: Forward, law: Law) -> Callable[[Field], Shown]:
-    return lambda z: forward.shown(z, law)
+def _evaluate(forward: ForwardModel, law: Law) -> Callable[[Field], ChannelPrediction]:
+    return lambda z: forward.predict(z, law)
 
 
-def new_pools(forward: Forward, seed: int) -> dict[Law, Pool]:
-    """Draws from the prior, for each law."""
+def new_pools(forward: ForwardModel, seed: int) -> dict[Law, Pool]:
+    """Draw from the prior for each law."""
     return {
-        law: Pool(_evaluate(forward.heard, law), joined, taken, forward.dims, seed) for law in LAWS
+        law: Pool(_evaluate(forward.observed, law), join_rows, select_rows, forward.dims, seed)
+        for law in LAWS
     }
 
 
-def with_point(pools: Mapping[Law, Pool], forward: Forward, added: Forward) -> dict[Law, Pool]:
-    """The draws that count, with one more operating point, `added`, behind those of before; `forward` has them all."""
-    extended, forward = {}, forward.heard
-    before = forward.points[: -len(added.points)]
-    for law, whole in pools.items():
-        pool = whole.reduced(
-            [_target(before, discrepancy=flag)(whole.shown) for flag in (True, False)]
+def with_point(
+    pools: Mapping[Law, Pool], forward: ForwardModel, added: ForwardModel
+) -> dict[Law, Pool]:
+    """Return the relevant draws with one more operating point; `forward` has all points."""
+    extended, forward = {}, forward.observed
+    previous = forward.points[: -len(added.points)]
+    for law, complete in pools.items():
+        pool = complete.reduced(
+            [_target(previous, discrepancy=flag)(complete.outputs) for flag in (True, False)]
         )
-        more = added.shown(pool.z, law)
-        columns = Shown(*(np.hstack(pair) for pair in zip(pool.shown, more, strict=True)))
+        more = added.predict(pool.z, law)
+        columns = ChannelPrediction(
+            *(np.hstack(pair) for pair in zip(pool.outputs, more, strict=True))
+        )
         extended[law] = pool.with_columns(_evaluate(forward, law), columns)
     return extended
 
@@ -175,63 +179,69 @@ def with_point(pools: Mapping[Law, Pool], forward: Forward, added: Forward) -> d
 Columns = TypeVar("Columns", bound=tuple[Field, ...])
 
 
-def taken(shown: Columns, rows: Field) -> Columns:
-    """Some rows of each column."""
-    return type(shown)(*(column[rows] for column in shown))
+def select_rows(columns: Columns, rows: Field) -> Columns:
+    """Return some rows of each column."""
+    return type(columns)(*(column[rows] for column in columns))
 
 
-def joined(first: Columns, second: Columns) -> Columns:
-    """Rows of one behind those of the other."""
+def join_rows(first: Columns, second: Columns) -> Columns:
+    """Concatenate the rows of two results."""
     return type(first)(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
 
 
 # Draws
-# ---------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------
 
 
 def posterior_draws(
-    forward: Forward, sampled: Mapping[tuple[Law, bool], Sampled], *, discrepancy: bool, seed: int
+    forward: ForwardModel,
+    sampled: Mapping[tuple[Law, bool], WeightedSamples],
+    *,
+    discrepancy: bool,
+    seed: int,
 ) -> Draws:
-    """Equally probable contacts by both laws, weighed by their evidence, with or without the laws' error."""
+    """Draw equally probable contacts from both laws, weighted by evidence."""
     rng = np.random.default_rng([seed, 4, discrepancy])
     both = [sampled[law, discrepancy] for law in LAWS]
-    total = logsumexp([one.log_evidence for one in both])
-    shares = np.exp([one.log_evidence - total for one in both])
+    total = logsumexp([samples.log_evidence for samples in both])
+    shares = np.exp([samples.log_evidence - total for samples in both])
     counts = np.round(DRAWS * shares).astype(int)
     parts = [
-        _drawn(forward, law, one, int(count), rng, discrepancy=discrepancy)
-        for law, one, count in zip(LAWS, both, counts, strict=True)
+        _draw(forward, law, samples, int(count), rng, discrepancy=discrepancy)
+        for law, samples, count in zip(LAWS, both, counts, strict=True)
         if count
     ]
     effective = float(
-        1.0 / np.sum([share**2 / one.effective for share, one in zip(shares, both, strict=True)])
+        1.0
+        / np.sum(
+            [share**2 / samples.effective for share, samples in zip(shares, both, strict=True)]
+        )
     )
-    whole = _joined_draws(parts)
-    return replace(whole, effective=effective)
+    return replace(_joined_draws(parts), effective=effective)
 
 
-def emulated_share(forward: Forward, draws: Draws) -> float:
-    """Share of CLR's variance over the posterior, on its scale, that is the emulator's own: at the case's own point."""
-    _, std = replace(forward, points=forward.points[:1]).emulated(draws.z, [CLR])[CLR]
-    whole = float(np.var(OUTPUTS[CLR].forward(draws.states[CLR][:, 0])))
-    return min(float(np.mean(std**2)) / whole, 1.0)
+def emulated_share(forward: ForwardModel, draws: Draws) -> float:
+    """Return the emulator's share of CLR's posterior variance on its scale, at the case's point."""
+    _, std = replace(forward, points=forward.points[:1]).emulate(draws.z, [CLR])[CLR]
+    total = float(np.var(OUTPUTS[CLR].forward(draws.states[CLR][:, 0])))
+    return min(float(np.mean(std**2)) / total, 1.0)
 
 
-def posterior_shares(forward: Forward, draws: Draws, count: int, seed: int) -> Field:
-    """Shares of the emulator's ranges of contacts drawn from the posterior, (count, ranges): at each point in turn."""
+def posterior_shares(forward: ForwardModel, draws: Draws, count: int, seed: int) -> Field:
+    """Draw emulator inputs (count, ranges) from the posterior, cycling through the points."""
     rng = np.random.default_rng([seed, 6])
     chosen = forward.shares(draws.z[rng.permutation(len(draws.z))[:count]])
     return np.asarray(chosen[np.arange(len(chosen)), np.arange(len(chosen)) % len(forward.points)])
 
 
-def prior_draws(forward: Forward, seed: int, known: Draws | None = None) -> Draws:
-    """Equally probable contacts before any recording; those `known` with more operating points behind theirs."""
-    there = 0 if known is None else known.states[CLR].shape[1]
-    rng = np.random.default_rng([seed, 5, *([there] if there else [])])
+def prior_draws(forward: ForwardModel, seed: int, known: Draws | None = None) -> Draws:
+    """Draw contacts from the prior, or extend `known` draws by further operating points."""
+    present = 0 if known is None else known.states[CLR].shape[1]
+    rng = np.random.default_rng([seed, 5, *([present] if present else [])])
     z = rng.standard_normal((DRAWS, forward.dims)) if known is None else known.z
     states = {}
-    if there < len(forward.points):
-        emulated = replace(forward, points=forward.points[there:]).emulated(z, STATE)
+    if present < len(forward.points):
+        emulated = replace(forward, points=forward.points[present:]).emulate(z, STATE)
         states = {
             key: OUTPUTS[key].back(mean + std * rng.standard_normal(mean.shape))
             for key, (mean, std) in emulated.items()
@@ -245,84 +255,89 @@ def prior_draws(forward: Forward, seed: int, known: Draws | None = None) -> Draw
     )
 
 
-def _drawn(
-    forward: Forward,
+def _draw(
+    forward: ForwardModel,
     law: Law,
-    sampled: Sampled,
+    sampled: WeightedSamples,
     count: int,
     rng: np.random.Generator,
     *,
     discrepancy: bool,
 ) -> Draws:
-    places = (rng.random() + np.arange(count)) / count
+    levels = (rng.random() + np.arange(count)) / count  # systematic resampling
     chosen = np.minimum(
-        np.searchsorted(np.cumsum(sampled.weights), places), len(sampled.weights) - 1
+        np.searchsorted(np.cumsum(sampled.weights), levels), len(sampled.weights) - 1
     )
     z = sampled.z[chosen]
-    emulated = forward.emulated(z, tuple(dict.fromkeys((*STATE, *forward.outputs(law)))))
-    shown = forward.shown_by(z, law, emulated)
+    emulated = forward.emulate(z, tuple(dict.fromkeys((*STATE, *forward.required_outputs(law)))))
+    prediction = forward.predict_from(z, law, emulated)
     none = dict.fromkeys(WEIGHTS, np.zeros(count))
-    sizes = _sizes(shown, forward.points, rng) if discrepancy else none
+    sizes = _sizes(prediction, forward.points, rng) if discrepancy else none
     states = {}
     for key in STATE:
         mean, std = emulated[key]
         if key == CLR and law == "hertz-point":
-            scaled = _corrected(mean, std, shown, forward.points, sizes["crf"], rng)
+            scaled = _corrected(mean, std, prediction, forward.points, sizes["crf"], rng)
         else:
             scaled = mean + std * rng.standard_normal(mean.shape)
         states[key] = OUTPUTS[key].back(scaled)
     return Draws(z, np.full(count, LAWS.index(law)), sizes, states, sampled.effective)
 
 
-def _sizes(shown: Shown, points: tuple[Point, ...], rng: np.random.Generator) -> dict[str, Field]:
-    """How large the law's errors are, drawn for each contact from what was heard."""
-    found = {}
+def _sizes(
+    prediction: ChannelPrediction, points: tuple[OperatingPoint, ...], rng: np.random.Generator
+) -> dict[str, Field]:
+    """Draw the sizes of the law's errors for each contact from their posterior."""
+    sizes = {}
     for channel, weight in WEIGHTS.items():
-        logs = log_at_sizes(shown, points, channel)
+        logs = log_at_sizes(prediction, points, channel)
         shares = np.exp(logs - logsumexp(logs, axis=0))
-        place = np.sum(np.cumsum(shares, axis=0) < rng.random(shares.shape[1]), axis=0)
-        found[channel] = weight * np.array(SIZES)[np.minimum(place, len(SIZES) - 1)]
-    return found
+        index = np.sum(np.cumsum(shares, axis=0) < rng.random(shares.shape[1]), axis=0)
+        sizes[channel] = weight * np.array(SIZES)[np.minimum(index, len(SIZES) - 1)]
+    return sizes
 
 
 def _corrected(
     mean: Field,
     std: Field,
-    shown: Shown,
-    points: tuple[Point, ...],
+    prediction: ChannelPrediction,
+    points: tuple[OperatingPoint, ...],
     size: Field,
     rng: np.random.Generator,
 ) -> Field:
-    """Load shares that the emulator left open, drawn with what all CRF together say of them: on CLR's scale.
+    """Draw load shares with the emulator's error conditional on all CRF, on CLR's scale.
 
-    By Matheron's rule: a joint draw of shares and frequencies, moved by what the frequencies heard
-    differ from it.
+    By Matheron's rule: a joint draw of shares and frequencies is corrected by the difference of
+    the measured frequencies from it.
     """
-    heard = np.array([point.crf.value for point in points])
-    here = ~np.isnan(heard)
-    near = likeness(points)
-    emulator = emulated_errors("crf", std, near)
-    errors = _drawn_normal(emulator, rng)
+    measured = np.array([point.crf.value for point in points])
+    here = ~np.isnan(measured)
+    similarity = point_similarity(points)
+    emulator = emulated_errors("crf", std, similarity)
+    errors = _draw_normal(emulator, rng)
     if not here.any():
         return mean + errors
     share = OUTPUTS[CLR].back(mean)
-    slope = 1.0 / (
-        6.0 * np.maximum(share, LEAST_SHARE) * OUTPUTS[CLR].slope(share)
-    )  # d ln CRF / d scale
+    # d ln CRF / d scale
+    slope = 1.0 / (6.0 * np.maximum(share, MIN_SHARE) * OUTPUTS[CLR].slope(share))
     slope = slope[:, here]
-    measured = np.array([point.crf.std for point in points])[here]
-    rest = law_errors("crf", shown.lever[:, here], size, near[np.ix_(here, here)]) + np.diag(
-        measured**2
+    measured_std = np.array([point.crf.std for point in points])[here]
+    law = law_errors("crf", prediction.log_force[:, here], size, similarity[np.ix_(here, here)])
+    noise = law + np.diag(measured_std**2)
+    across = emulator[:, :, here] * slope[:, None]  # covariance of shares and frequencies
+    total = across[:, here] * slope[:, :, None] + noise
+    residual = (
+        measured[here]
+        - prediction.crf[:, here]
+        - slope * errors[:, here]
+        - _draw_normal(noise, rng)
     )
-    across = emulator[:, :, here] * slope[:, None]  # of shares and frequencies
-    whole = across[:, here] * slope[:, :, None] + rest
-    off = heard[here] - shown.crf[:, here] - slope * errors[:, here] - _drawn_normal(rest, rng)
-    moved = across @ np.linalg.solve(whole, off[:, :, None])
-    return np.asarray(mean + errors + moved[:, :, 0])
+    correction = across @ np.linalg.solve(total, residual[:, :, None])
+    return np.asarray(mean + errors + correction[:, :, 0])
 
 
-def _drawn_normal(covariance: Field, rng: np.random.Generator) -> Field:
-    """A draw of no mean for each covariance, (n, points)."""
+def _draw_normal(covariance: Field, rng: np.random.Generator) -> Field:
+    """Draw from a zero-mean normal distribution for each covariance, (n, points)."""
     count, points, _ = covariance.shape
     lower = np.linalg.cholesky(covariance + 1e-12 * np.eye(points))
     return np.asarray((lower @ rng.standard_normal((count, points, 1)))[:, :, 0])

@@ -1,7 +1,6 @@
-"""What is known of a quantity before any recording, as a standard normal number.
+"""Priors of unknown quantities as maps from a standard normal number z.
 
-Every prior is a map from such a number z, so that samplers and proposals need to know one
-distribution only.
+Samplers and proposals then only deal with the standard normal distribution.
 """
 
 import math
@@ -14,19 +13,19 @@ from asperity.case import to_si
 from asperity.core.arrays import Field
 from asperity.study import ParameterRange
 
-REACH = 3.5  # standard deviations of a stated value that its range goes to
-END = 1e-6  # share of a range from its ends, where a normal number is infinite
+REACH = 3.5  # half-width of the range of a stated value, in standard deviations
+END = 1e-6  # distance kept from the ends of a range, where z is infinite
 
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A quantity that is not known: its key in the catalogue, its range, and what is known of it within.
+    """An unknown quantity: its key, its range and its prior.
 
     Parameters
     ----------
     key : in the catalogue of quantities, such as "sq_m"
-    range : case key and ends; without `std`, every share of the way is as probable as any other
-    mean, std : of a stated value, in the range's unit; normal, or lognormal where that would reach 0
+    range : case key and ends; without `std`, the prior is uniform in the share of the range
+    mean, std : of a stated value, in the range's unit; normal, or lognormal if that would reach 0
     """
 
     key: str
@@ -38,7 +37,7 @@ class Unknown:
     def stated(
         cls, key: str, case_key: str, mean: float, std: float, unit: str, reason: str = ""
     ) -> "Unknown":
-        """A value with its standard deviation."""
+        """Return an unknown with a stated value and standard deviation."""
         if mean - REACH * std > 0.0 or mean <= 0.0:
             low, high = mean - REACH * std, mean + REACH * std
         else:
@@ -48,11 +47,11 @@ class Unknown:
 
     @property
     def bounded(self) -> bool:
-        """Whether its range is all that is known."""
+        """True if the prior is uniform over the range."""
         return math.isnan(self.std)
 
     def in_unit(self, z: Field) -> Field:
-        """Values at z in the range's unit; any shape."""
+        """Return the values at z in the range's unit; any shape."""
         low, high = self.range.low, self.range.high
         if self.bounded:
             share = ndtr(z)
@@ -66,7 +65,7 @@ class Unknown:
         return np.asarray(np.clip(values, low, high))
 
     def at_share(self, share: Field) -> Field:
-        """The z at which its value lies so far along its range: the inverse of `share`, within the range."""
+        """Return the z of a share of the range, the inverse of `share`."""
         share = np.clip(share, END, 1.0 - END)
         if self.bounded:
             return np.asarray(ndtri(share))
@@ -77,31 +76,31 @@ class Unknown:
         return np.asarray(np.log(value / self.mean) * REACH / math.log(high / self.mean))
 
     def value(self, z: Field) -> Field:
-        """Values at z, SI."""
+        """Return the values at z in SI."""
         return self.to_si(self.in_unit(z))
 
     def to_si(self, values: Field) -> Field:
-        """Values of the range's unit in SI."""
-        zero, one = (si(number, self.range.unit) for number in (0.0, 1.0))
-        return np.asarray(zero + (one - zero) * values)
+        """Convert values from the range's unit to SI."""
+        zero, unit = (si(number, self.range.unit) for number in (0.0, 1.0))
+        return np.asarray(zero + (unit - zero) * values)
 
     def from_si(self, values: Field | float) -> Field:
-        """Values in SI in the range's unit."""
-        zero, one = (si(number, self.range.unit) for number in (0.0, 1.0))
-        return np.asarray((np.asarray(values) - zero) / (one - zero))
+        """Convert values from SI to the range's unit."""
+        zero, unit = (si(number, self.range.unit) for number in (0.0, 1.0))
+        return np.asarray((np.asarray(values) - zero) / (unit - zero))
 
     def share(self, z: Field) -> Field:
-        """How far along its range, 0 to 1, the values at z lie: what an emulator is asked by."""
+        """Return the share of the range, 0 to 1, of the values at z, the emulator's input."""
         return share_of(self.range, self.in_unit(z))
 
 
 def share_of(entry: ParameterRange, values: Field) -> Field:
-    """`ParameterRange.share` of many values, in the range's unit."""
+    """Return the shares of a range at `values` in its unit; see `ParameterRange.share`."""
     if entry.log:
         return np.asarray(np.log(values / entry.low) / math.log(entry.high / entry.low))
     return np.asarray((values - entry.low) / (entry.high - entry.low))
 
 
 def si(number: float, unit: str) -> float:
-    """A number with a unit of a case file, in SI."""
+    """Convert a number with a unit of a case file to SI."""
     return float(to_si(f"{number!r} {unit}")) if unit else number

@@ -1,4 +1,4 @@
-"""Recordings to observations: tracked as a series, each with the load, speed and temperature that it was made at."""
+"""Observations from recordings: tracked as a series, each with its operating point."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,72 +24,86 @@ from asperity.resonance import SeriesMethod
 from asperity.study import overrides_at
 
 
-@dataclass(frozen=True)
-class Listened:
-    """What a series of recordings gave: by default nothing.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordingInput:
+    """Options for reading and analysing recordings.
 
-    `silent` are the names of recordings without a usable resonance, and why; `notes` what was
-    taken for granted.
+    Parameters
+    ----------
+    table : csv with the columns file, load_n, entrainment_m_s, temperature_degc and x; missing
+        values come from sidecar files, else from the case
+    band_hz : search band; None: the possible band of the contact resonance
+    rate_hz, unit, channel, scale, shaft_hz, method : see `track_recordings`
+    """
+
+    table: str | Path | None = None
+    band_hz: tuple[float, float] | None = None
+    rate_hz: float | None = None
+    unit: str | None = None
+    channel: str | None = None
+    scale: float | None = None
+    shaft_hz: Sequence[float] | None = None
+    method: SeriesMethod | None = None
+
+
+@dataclass(frozen=True)
+class ObservedSeries:
+    """Observations of a series of recordings; empty by default.
+
+    `excluded` are the names of recordings without a usable resonance, with reasons; `notes` state
+    assumptions.
     """
 
     track: Track | None = None
     observations: tuple[Observation, ...] = ()
-    silent: tuple[tuple[str, str], ...] = ()
+    excluded: tuple[tuple[str, str], ...] = ()
     notes: tuple[str, ...] = ()
 
 
-def listen(
+def observe_recordings(
     paths: Sequence[str | Path],
     setting: Setting,
     *,
-    table: str | Path | None = None,
-    band_hz: tuple[float, float] | None = None,
-    rate_hz: float | None = None,
-    unit: str | None = None,
-    channel: str | None = None,
-    scale: float | None = None,
-    shaft_hz: Sequence[float] | None = None,
-    method: SeriesMethod | None = None,
+    source: RecordingInput | None = None,
     workers: int = 1,
     progress: Callable[[Reading], None] | None = None,
-) -> Listened:
-    """Track recordings with the present readers and methods, and put their operating points beside their resonances.
+) -> ObservedSeries:
+    """Track recordings and combine their resonances with their operating points.
 
     Parameters
     ----------
     paths : files, and folders of files
-    setting : says where a resonance may lie, over all loads and masses
-    table : csv with the columns file, load_n, entrainment_m_s, temperature_degc, and x; what it does not say, a sidecar
-        may, and else the case's own is taken
-    band_hz, rate_hz, unit, channel, scale, shaft_hz, method, workers, progress : see `track_recordings`
+    setting : defines the possible band of the resonance, over all loads and masses
+    source : table of operating points, and how to read and analyse the files; None: the defaults
+    workers, progress : see `track_recordings`
 
     Raises
     ------
     BadInput
         for a table or recordings that cannot be used.
     """
-    places = None if table is None else read_table(table)
+    source = source or RecordingInput()
     tracked = track_recordings(
         paths,
         TrackSettings(
-            rate_hz=rate_hz,
-            unit=unit,
-            channel=channel,
-            scale=scale,
-            band_hz=band_hz or band_of(setting),
-            shaft_hz=shaft_hz,
-            method=method,
+            rate_hz=source.rate_hz,
+            unit=source.unit,
+            channel=source.channel,
+            scale=source.scale,
+            band_hz=source.band_hz or resonance_band(setting),
+            shaft_hz=source.shaft_hz,
+            method=source.method,
             workers=workers,
         ),
         case=setting.case,
-        table=places,
+        table=None if source.table is None else read_table(source.table),
         progress=progress,
     )
-    return observed(tracked, setting.case)
+    return observations_from_track(tracked, setting.case)
 
 
-def band_of(setting: Setting) -> tuple[float, float]:
-    """Where the resonance of the asperities' own spring can lie [Hz], over all loads and masses that are possible."""
+def resonance_band(setting: Setting) -> tuple[float, float]:
+    """Return the band [Hz] that can hold the contact resonance, over all loads and masses."""
     model = setting.case.vibration
     assert model is not None
     loads = next(entry for entry in setting.operating if entry.key == LOAD)
@@ -108,24 +122,29 @@ def band_of(setting: Setting) -> tuple[float, float]:
     return low * float(np.sqrt(model.mass / heavy)), high * float(np.sqrt(model.mass / light))
 
 
-def observed(tracked: Track, case: Case) -> Listened:
-    """The resonances of a track with their operating points, and what was taken for granted."""
-    heard = observed_rows(
-        [one.row() for one in tracked.recordings], case, comparable=tracked.comparable
+def observations_from_track(tracked: Track, case: Case) -> ObservedSeries:
+    """Return the resonances of a track with their operating points, and notes on assumptions."""
+    series = observations_from_rows(
+        [recording.row() for recording in tracked.recordings], case, comparable=tracked.comparable
     )
-    return replace(heard, track=tracked, notes=(*tracked.notes, *heard.notes))
+    return replace(series, track=tracked, notes=(*tracked.notes, *series.notes))
 
 
-def observed_rows(rows: Sequence[Mapping[str, Any]], case: Case, *, comparable: bool) -> Listened:
-    """The same of lines as `asperity track --json` and a store have them; CRFA counts where it is `comparable`."""
-    observations, silent, assumed = [], [], set()
+def observations_from_rows(
+    rows: Sequence[Mapping[str, Any]], case: Case, *, comparable: bool
+) -> ObservedSeries:
+    """Return observations from rows of `asperity track --json` or a store.
+
+    CRFA is used only if it is `comparable` between recordings.
+    """
+    observations, excluded, assumed = [], [], set()
     for row in rows:
         name, std = Path(row["file"]).name, row["crf_std_hz"]
         if not row["found"]:
-            silent.append((name, row["reason"]))
+            excluded.append((name, row["reason"]))
             continue
         if not std:
-            silent.append((name, "its method states no deviation of CRF"))
+            excluded.append((name, "its method gives no standard deviation of CRF"))
             continue
         assumed |= {key for key in ("load_n", "entrainment_m_s") if row[key] is None}
         speed, celsius = row["entrainment_m_s"], row["temperature_degc"]
@@ -138,8 +157,8 @@ def observed_rows(rows: Sequence[Mapping[str, Any]], case: Case, *, comparable: 
                 temperature_k=None if celsius is None else celsius + ZERO_CELSIUS,
                 crf_hz=row["crf_hz"],
                 crf_std_hz=std,
-                crf_shared_std_hz=row.get("crf_shared_std_hz")
-                or 0.0,  # lines of an older store do not say
+                # missing in rows of an older store
+                crf_shared_std_hz=row.get("crf_shared_std_hz") or 0.0,
                 crfa=crfa,
                 crfa_std=crfa_std,
                 damping_ratio=damping,
@@ -150,12 +169,12 @@ def observed_rows(rows: Sequence[Mapping[str, Any]], case: Case, *, comparable: 
         )
     words = {"load_n": "load", "entrainment_m_s": "entrainment speed"}
     notes = [
-        f"No table or sidecar says the {words[key]} of every recording; that of {case.source} was taken."
+        f"The {words[key]} is not given for every recording; that of {case.source} was used."
         for key in sorted(assumed)
     ]
-    return Listened(None, tuple(observations), tuple(silent), tuple(notes))
+    return ObservedSeries(None, tuple(observations), tuple(excluded), tuple(notes))
 
 
 def _with_deviation(row: Mapping[str, Any], key: str, std: str) -> tuple[float, float]:
-    """A number of a line and its deviation; nan where there is none."""
+    """Return a value of a row and its standard deviation; nan if either is missing."""
     return (row[key], row[std]) if row[key] is not None and row[std] else (nan, nan)

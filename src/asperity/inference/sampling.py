@@ -1,7 +1,7 @@
-"""Samples of a posterior: importance sampling that learns where the posterior is, and nested sampling to check it by.
+"""Posterior sampling: adaptive importance sampling, and nested sampling as a check.
 
-Unknowns are standard normal before any recording. What a proposal costs is the emulator; so every
-draw is kept, and counts for each target that is asked of it.
+The prior of all unknowns is standard normal. Evaluating the emulator dominates the cost, so every
+draw is kept and reused for all targets.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,37 +15,34 @@ from scipy.special import logsumexp, ndtri
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 
-FIRST, BATCH, ROUNDS = 4096, 2048, 30  # draws from the prior, and of each round after it
-ENOUGH = 1000.0  # effective samples: a quantile is then known to a twentieth of the width
-QUICKLY = 200.0  # of one recording more
-FEWEST = 60.0  # below it a posterior was not found
-CENTRES = 40  # of a proposal
-# effective samples that a proposal is learnt from, at least: the target is flattened until then
-LEARNT_FROM = 150.0
-NARROWER = 0.6  # width of a proposal's parts over the width of the whole
-FROM_PRIOR = 0.1
-HOPELESS = 40.0  # in ln evidence below another model, and no more draws are spent on it
-RULED_OUT = 12.0  # likewise, and it need not be found: odds of 160 000 to one
-PROBED = 4  # rounds before that is believed
-NEGLIGIBLE = 1e-5  # weight over the largest, of a draw that need not be kept
-LIVE = 400  # points of nested sampling
+FIRST, BATCH, ROUNDS = 4096, 2048, 30  # draws from the prior, draws per round, rounds
+ENOUGH = 1000.0  # effective sample size: the error of a quantile is 1/20 of the width
+QUICK_ENOUGH = 200.0  # effective sample size for one more recording
+FEWEST = 60.0  # effective sample size below which a posterior was not found
+CENTRES = 40  # components of a proposal
+MIN_EFFECTIVE = 150.0  # effective sample size of a proposal; the target is tempered to reach it
+COMPONENT_WIDTH = 0.6  # width of a proposal's components relative to the whole
+PRIOR_WEIGHT = 0.1  # of the prior in a proposal
+HOPELESS = 40.0  # deficit in ln evidence from which on no more draws are spent on a model
+RULED_OUT = 12.0  # deficit from which on a model counts as ruled out: odds of 160 000 to one
+PROBED = 4  # rounds before a model may be judged hopeless
+NEGLIGIBLE = 1e-5  # weight relative to the largest, below which a draw is dropped
+LIVE_POINTS = 400  # of nested sampling
 
-Target = Callable[[Any], Field]  # what was computed for draws, to the logarithm of their likelihood
-Evaluate = Callable[
-    [Field], Any
-]  # unknowns (n, d) to whatever a target is computed from; indexable by rows
+Target = Callable[[Any], Field]  # outputs of draws to log-likelihoods
+Evaluate = Callable[[Field], Any]  # unknowns (n, d) to the inputs of targets, indexable by rows
 
 
 @dataclass
 class Pool:
-    """Draws from several proposals, and what was computed for each.
+    """Draws from several proposals, and the outputs computed for each.
 
     Parameters
     ----------
-    evaluate : unknowns to what the targets take
-    join, take : results of two calls to one; rows of a result
-    dims : unknowns
-    seed : of all draws
+    evaluate : maps unknowns to the outputs that targets use
+    join, take : concatenate two outputs; select rows of an output
+    dims : number of unknowns
+    seed : random seed
     """
 
     evaluate: Evaluate
@@ -54,7 +51,7 @@ class Pool:
     dims: int
     seed: int
     z: Field = field(init=False)
-    shown: Any = field(init=False)
+    outputs: Any = field(init=False)
     proposals: list[tuple[int, Callable[[Field], Field]]] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -63,53 +60,53 @@ class Pool:
         self.rng = np.random.default_rng([self.seed, 1])
         uniform = qmc.Sobol(self.dims, rng=np.random.default_rng([self.seed, 2])).random(FIRST)
         self.z = ndtri(np.clip(uniform, 1e-9, 1.0 - 1e-9))
-        self.shown = self.evaluate(self.z)
+        self.outputs = self.evaluate(self.z)
         self.proposals = [(FIRST, _log_normal)]
         self._log_proposed = _log_normal(self.z) + np.log(FIRST)
 
     @property
     def drawn(self) -> int:
-        """How many draws there were, those included that were left out since."""
+        """Number of draws, including those dropped since."""
         return sum(count for count, _ in self.proposals)
 
     def reduced(self, targets: Sequence[Field]) -> "Pool":
-        """Only the draws that count for one of these targets."""
+        """Return a pool of only the draws relevant for one of these targets."""
         counts = np.zeros(len(self.z), dtype=bool)
         for target in targets:
             weights = self.log_weights(target)
             counts |= weights >= weights.max() + np.log(NEGLIGIBLE)
-        other = self.with_columns(self.evaluate, self.take(self.shown, counts))
+        other = self.with_columns(self.evaluate, self.take(self.outputs, counts))
         other.z, other._log_proposed = self.z[counts], self._log_proposed[counts]
         return other
 
-    def with_columns(self, evaluate: Evaluate, shown: Any) -> "Pool":
-        """The same draws with something else computed for each."""
+    def with_columns(self, evaluate: Evaluate, outputs: Any) -> "Pool":
+        """Return the same draws with other outputs."""
         other = copy(self)
-        other.evaluate, other.shown, other.proposals = evaluate, shown, list(self.proposals)
+        other.evaluate, other.outputs, other.proposals = evaluate, outputs, list(self.proposals)
         other.rng = deepcopy(self.rng)
         return other
 
     def log_weights(self, log_target: Field) -> Field:
-        """Logarithms of importance weights, whose mean is the evidence."""
+        """Return ln importance weights; the mean weight is the evidence."""
         return np.asarray(
             log_target + _log_normal(self.z) - (self._log_proposed - np.log(self.drawn))
         )
 
     def learn(self, log_weights: Field) -> None:
-        """Draw another batch where the weights are."""
-        proposal, drawn = _proposal(self.z, _flattened(log_weights), self.rng)
+        """Draw another batch from a proposal fitted to the weights."""
+        proposal, drawn = _proposal(self.z, _tempered(log_weights), self.rng)
         self._log_proposed = np.logaddexp(self._log_proposed, proposal(self.z) + np.log(BATCH))
         earlier = np.stack([np.log(count) + density(drawn) for count, density in self.proposals])
         here = np.logaddexp(logsumexp(earlier, axis=0), proposal(drawn) + np.log(BATCH))
         self._log_proposed = np.concatenate([self._log_proposed, here])
         self.z = np.concatenate([self.z, drawn])
-        self.shown = self.join(self.shown, self.evaluate(drawn))
+        self.outputs = self.join(self.outputs, self.evaluate(drawn))
         self.proposals.append((BATCH, proposal))
 
 
 @dataclass(frozen=True)
-class Sampled:
-    """A posterior as weighted draws: `z` (n, d), `weights` that sum to 1, ln evidence and its deviation."""
+class WeightedSamples:
+    """A posterior as weighted draws: `z` (n, d), normalised `weights`, ln evidence and error."""
 
     z: Field
     weights: Field
@@ -119,16 +116,16 @@ class Sampled:
 
     @property
     def effective(self) -> float:
-        """How many independent draws it is worth."""
+        """Effective sample size."""
         return float(1.0 / np.sum(self.weights**2))
 
     @property
     def information_bits(self) -> float:
-        """What was learned of all unknowns together: the mean of ln L over the posterior, less ln evidence."""
-        told = self.weights > 0.0
+        """Information gain on all unknowns: posterior mean of ln L minus ln evidence, in bits."""
+        used = self.weights > 0.0
         return max(
             float(
-                (self.weights[told] @ self.log_likelihood[told] - self.log_evidence) / np.log(2.0)
+                (self.weights[used] @ self.log_likelihood[used] - self.log_evidence) / np.log(2.0)
             ),
             0.0,
         )
@@ -144,32 +141,41 @@ def importance(
     probed: int = PROBED,
     least: float = 0.0,
     longest: int = 0,
-) -> Sampled:
-    """Sample a target from better and better proposals, until the draws are worth `enough` or for so many rounds.
+) -> WeightedSamples:
+    """Sample a target adaptively until the effective sample size is `enough`.
 
-    `best` is the ln evidence of another model: beside one that is far better, no draws are spent
-    after `probed` rounds. Where draws are worth less than `least` after all rounds, and the model
-    is not ruled out, it goes on for `longest`.
+    Parameters
+    ----------
+    pool : draws so far; further ones are added
+    log_target : outputs to log-likelihoods
+    enough : effective sample size to reach
+    rounds : maximum number of rounds
+    best : ln evidence of the best other model
+    probed : rounds after which sampling stops if the model is far worse than `best`
+    least : effective sample size to reach even in more rounds, unless the model is ruled out
+    longest : maximum number of rounds to reach `least`
     """
     target: Field = np.empty(0)
     for number in range(max(rounds, longest) + 1):
-        fresh = pool.take(pool.shown, slice(len(target), None))
+        fresh = pool.take(pool.outputs, slice(len(target), None))
         target = np.concatenate([target, log_target(fresh)])
         weights = pool.log_weights(target)
         behind = best - (float(logsumexp(weights)) - np.log(pool.drawn))
         hopeless = number >= probed and behind > HOPELESS
-        found = number >= rounds and (_effective(weights) >= least or behind > RULED_OUT)
-        if _effective(weights) >= enough or hopeless or found or number >= max(rounds, longest):
+        done = number >= rounds and (_effective(weights) >= least or behind > RULED_OUT)
+        if _effective(weights) >= enough or hopeless or done or number >= max(rounds, longest):
             break
         pool.learn(weights)
     peak = float(logsumexp(weights))
     normal = np.exp(weights - peak)
     relative = np.sqrt(max(float(np.sum(normal**2)) - 1.0 / pool.drawn, 0.0))
-    return Sampled(pool.z, normal, peak - float(np.log(pool.drawn)), float(relative), target)
+    return WeightedSamples(
+        pool.z, normal, peak - float(np.log(pool.drawn)), float(relative), target
+    )
 
 
-def nested(evaluate: Evaluate, log_target: Target, dims: int, seed: int) -> Sampled:
-    """The same by nested sampling (dynesty), which finds what importance sampling may miss, and takes longer.
+def nested(evaluate: Evaluate, log_target: Target, dims: int, seed: int) -> WeightedSamples:
+    """Sample a target by nested sampling (dynesty), slower and more robust to several modes.
 
     Raises
     ------
@@ -186,14 +192,14 @@ def nested(evaluate: Evaluate, log_target: Target, dims: int, seed: int) -> Samp
         lambda z: float(log_target(evaluate(z[None]))[0]),
         lambda share: ndtri(np.clip(share, 1e-9, 1.0 - 1e-9)),
         dims,
-        nlive=LIVE,
+        nlive=LIVE_POINTS,
         sample="rwalk",
         rstate=np.random.default_rng([seed, 3]),
     )
     sampler.run_nested(dlogz=0.1, print_progress=False)
     results = sampler.results
     weights = np.exp(results.logwt - results.logz[-1])
-    return Sampled(
+    return WeightedSamples(
         np.asarray(results.samples),
         weights / weights.sum(),
         float(results.logz[-1]),
@@ -210,10 +216,10 @@ def _effective(log_weights: Field) -> float:
     return float(np.exp(2.0 * logsumexp(log_weights) - logsumexp(2.0 * log_weights)))
 
 
-def _flattened(log_weights: Field) -> Field:
-    """Normalised weights, of a target flattened until draws are worth enough to learn from."""
+def _tempered(log_weights: Field) -> Field:
+    """Return normalised weights of the target, tempered to a minimum effective sample size."""
     power = 1.0
-    while _effective(power * log_weights) < LEARNT_FROM and power > 1e-6:
+    while _effective(power * log_weights) < MIN_EFFECTIVE and power > 1e-6:
         power *= 0.8
     return np.asarray(np.exp(power * log_weights - logsumexp(power * log_weights)))
 
@@ -221,32 +227,34 @@ def _flattened(log_weights: Field) -> Field:
 def _proposal(
     z: Field, weights: Field, rng: np.random.Generator
 ) -> tuple[Callable[[Field], Field], Field]:
-    """Normals about draws taken by their weights, the prior beside them; its density's logarithm, and a batch of it."""
+    """Return ln density and a batch of a proposal: normals at weighted draws, and the prior."""
     mean = weights @ z
     covariance = (weights[:, None] * (z - mean)).T @ (z - mean)
-    covariance = NARROWER**2 * covariance + 1e-4 * np.eye(len(mean))
+    covariance = COMPONENT_WIDTH**2 * covariance + 1e-4 * np.eye(len(mean))
     centres = z[rng.choice(len(z), CENTRES, p=weights)]
     lower = np.linalg.cholesky(covariance)
     log_norm = -np.sum(np.log(np.diag(lower))) - 0.5 * len(mean) * np.log(2.0 * np.pi)
     inverse = np.linalg.inv(lower)
     whitened = centres @ inverse.T
 
-    def density(at: Field) -> Field:
-        own = at @ inverse.T
-        minus = own @ whitened.T  # of half the square of the distance to each centre, in place
-        minus -= 0.5 * np.sum(whitened**2, axis=1)
-        minus -= 0.5 * np.sum(own**2, axis=1)[:, None]
-        peak = minus.max(axis=1)
-        minus -= peak[:, None]
-        parts = peak + np.log(np.exp(minus, out=minus).mean(axis=1)) + log_norm
+    def density(points: Field) -> Field:
+        own = points @ inverse.T
+        exponent = own @ whitened.T  # minus half the squared distance to each centre, in place
+        exponent -= 0.5 * np.sum(whitened**2, axis=1)
+        exponent -= 0.5 * np.sum(own**2, axis=1)[:, None]
+        peak = exponent.max(axis=1)
+        exponent -= peak[:, None]
+        parts = peak + np.log(np.exp(exponent, out=exponent).mean(axis=1)) + log_norm
         return np.asarray(
-            np.logaddexp(np.log1p(-FROM_PRIOR) + parts, np.log(FROM_PRIOR) + _log_normal(at))
+            np.logaddexp(
+                np.log1p(-PRIOR_WEIGHT) + parts, np.log(PRIOR_WEIGHT) + _log_normal(points)
+            )
         )
 
     drawn = (
         centres[rng.integers(CENTRES, size=BATCH)]
         + rng.standard_normal((BATCH, len(mean))) @ lower.T
     )
-    anywhere = rng.random(BATCH) < FROM_PRIOR
-    drawn[anywhere] = rng.standard_normal((int(anywhere.sum()), len(mean)))
+    from_prior = rng.random(BATCH) < PRIOR_WEIGHT
+    drawn[from_prior] = rng.standard_normal((int(from_prior.sum()), len(mean)))
     return density, drawn

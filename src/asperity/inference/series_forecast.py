@@ -1,4 +1,4 @@
-"""A series that is tracked or watched, foretold by its rows."""
+"""Forecast of a tracked or watched series from its rows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,51 +7,51 @@ from typing import Any
 from asperity.core.errors import AsperityError
 from asperity.inference.emulator import Emulator
 from asperity.inference.forecast import Forecast, Limit, require_limit
-from asperity.inference.infer import forecast_heard
-from asperity.inference.recording_input import observed_rows
+from asperity.inference.infer import forecast_series
+from asperity.inference.recording_input import observations_from_rows
 from asperity.inference.settings import Setting
 from asperity.monitoring import Bands
 from asperity.simulation import WearHistory
 
 
 @dataclass(frozen=True, slots=True)
-class Foreseen:
-    """A forecast of a series so far; `forecast` is None where there is none, for a `reason`."""
+class SeriesForecast:
+    """The forecast of a series, or None with the `reason`."""
 
     forecast: Forecast | None
     reason: str = ""
 
     @property
     def bands(self) -> Bands | None:
-        """The limit's quantity over the series and ahead."""
+        """The limit's quantity over the series and in the forecast."""
         return None if self.forecast is None else self.forecast.bands
 
     @property
     def alarm(self) -> bool:
-        """Whether a change is told and the limit is near, or past."""
+        """True if a change is detected and the limit is, or probably will be, crossed."""
         return self.forecast is not None and self.forecast.alarm
 
     def sentence(self) -> str:
-        """In words."""
+        """Return the forecast as a sentence."""
         return f"No forecast: {self.reason}." if self.forecast is None else self.forecast.sentence()
 
     def scalars(self) -> dict[str, Any]:
-        """As JSON has it: only its sentence where there is none."""
+        """Return the JSON output; only a sentence without a forecast."""
         return {"sentence": self.sentence()} if self.forecast is None else self.forecast.scalars()
 
 
 @dataclass(frozen=True)
-class Follower:
-    """Foretells a series by its rows, as `asperity track --json` and a store have them.
+class SeriesForecaster:
+    """Forecasts a series from rows as in `asperity track --json` and a store.
 
     Parameters
     ----------
-    setting, emulator, limit, worn, seed : as `forecast_heard` takes them
+    setting, emulator, limit, worn, seed : see `forecast_series`
 
     Raises
     ------
     BadInput
-        for a limit that cannot be crossed, or a wear history that says nothing of it.
+        for a limit that cannot be crossed, or that a wear history does not apply to.
     """
 
     setting: Setting
@@ -65,25 +65,25 @@ class Follower:
 
     @property
     def question(self) -> str:
-        """By which an answer that is kept is known again."""
+        """Text that identifies the forecast, to recognise a stored one."""
         worn = (
             "" if self.worn is None else f", {self.worn.hours:g} h of wear from {self.worn.folder}"
         )
-        # of which there are more when extended
+        # the number of contacts changes when the emulator is extended
         emulator = f"{self.emulator.folder}, {self.emulator.points} contacts"
         return f"{self.limit.key}={self.limit.value:g} by {emulator}, seed {self.seed}{worn}"
 
     def __call__(
         self, rows: Sequence[Mapping[str, Any]], x_name: str, *, comparable: bool
-    ) -> Foreseen:
-        """When the limit is crossed; why that is not told, where it cannot be."""
-        heard = observed_rows(rows, self.setting.case, comparable=comparable)
+    ) -> SeriesForecast:
+        """Return the forecast, or the reason why there is none."""
+        series = observations_from_rows(rows, self.setting.case, comparable=comparable)
         try:
-            return Foreseen(
-                forecast_heard(
+            return SeriesForecast(
+                forecast_series(
                     self.setting,
                     self.emulator,
-                    heard,
+                    series,
                     self.limit,
                     worn=self.worn,
                     seed=self.seed,
@@ -91,4 +91,4 @@ class Follower:
                 )
             )
         except AsperityError as error:
-            return Foreseen(None, str(error).rstrip("."))
+            return SeriesForecast(None, str(error).rstrip("."))

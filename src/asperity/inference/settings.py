@@ -1,4 +1,4 @@
-"""What a case leaves to be inferred: the unknowns with their priors, where it may be run, and how it is emulated."""
+"""Inference setting of a case: unknowns and priors, operating ranges, size of the emulator."""
 
 import math
 from collections.abc import Mapping
@@ -12,13 +12,11 @@ from asperity.study import ParameterRange, full_key, overrides_at, require_range
 
 LOAD, SPEED, TEMPERATURE = "contact.load", "contact.entrainment_speed", "lubricant.temperature"
 OFFSET, GRID_ERROR = "temperature_offset_k", "grid_error"
-OPERATING_KEYS: Mapping[str, tuple[float, float]] = {
-    LOAD: (0.4, 2.0),
-    SPEED: (0.25, 2.0),
-}  # of the case's own
-TEMPERATURE_SPAN_K = 25.0  # either side of the case's own
+# default ranges of load and speed, as factors on the case's values
+OPERATING: Mapping[str, tuple[float, float]] = {LOAD: (0.4, 2.0), SPEED: (0.25, 2.0)}
+TEMPERATURE_SPAN_K = 25.0  # either side of the case's temperature
 OFFSET_STD_K = 3.0
-CELLS_OF_A_LENGTH = 2.0  # correlation lengths shorter than that are none on the grid
+MIN_CELLS_PER_LENGTH = 2.0  # the grid does not resolve shorter correlation lengths
 LENGTHS = (
     "surface.correlation_length",
     "surface.correlation_length[0]",
@@ -28,7 +26,7 @@ LENGTHS = (
 
 @dataclass(frozen=True, slots=True)
 class _Default:
-    """What is taken of a quantity where [infer] says nothing: a factor either way, ends, or a relative deviation."""
+    """Default prior of a quantity: a factor either way, ends, or a relative deviation."""
 
     key: str
     factor: float = 1.0
@@ -44,16 +42,16 @@ UNKNOWNS: Mapping[str, _Default] = {
     LENGTHS[1]: _Default("correlation_length_x_m", 1.6, reason="a factor 1.6 either way"),
     LENGTHS[2]: _Default("correlation_length_y_m", 1.6, reason="a factor 1.6 either way"),
     "material.hardness": _Default(
-        "hardness_pa", 2.0, reason="a factor 2 either way: it is seldom stated"
+        "hardness_pa", 2.0, reason="a factor 2 either way: it is seldom known"
     ),
     "lubricant.viscosity.eta0": _Default("oil_viscosity_pa_s", 2.0, reason="15 to 20 K either way"),
     "lubricant.viscosity.alpha": _Default(
-        "oil_alpha_1_pa", 1.25, reason="what estimates of alpha differ by"
+        "oil_alpha_1_pa", 1.25, reason="the difference between estimates of alpha"
     ),
     "vibration.mass": _Default(
         "mass_kg",
         relative_std=0.1,
-        reason="a mass is weighed, its effective share is not",
+        reason="the mass is weighed, its effective share is not known",
         emulated=False,
     ),
     "vibration.damping_ratio": _Default(
@@ -63,21 +61,21 @@ UNKNOWNS: Mapping[str, _Default] = {
         "cutoff_exponent",
         ends=(0.0, 0.5),
         emulated=False,
-        reason="from a cut-off that ignores CAR to one that goes with its root",
+        reason="from a cut-off independent of CAR to one proportional to its square root",
     ),
 }
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What is to be inferred of a case.
+    """Unknowns, priors and operating ranges of a case, and the size of its emulator.
 
     Parameters
     ----------
     case : the contact, on the emulator's grid, without [infer]
-    contact : unknowns that the emulator takes
-    others : unknowns of what it is heard by: mass, damping, bandwidth; temperature's offset; the error by the grid
-    operating : ranges of load, speed and, of an oil by its data sheet, temperature
+    contact : unknowns that are inputs of the emulator
+    others : unknowns of the measurement: mass, damping, bandwidth, temperature offset, grid error
+    operating : ranges of load and speed, and of temperature for an oil given by its data sheet
     points, surfaces, seed : of the emulator
     """
 
@@ -91,34 +89,32 @@ class Setting:
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """All of them, in the order of their numbers."""
+        """All unknowns, in the order of z."""
         return (*self.contact, *self.others)
 
     @property
     def ranges(self) -> tuple[ParameterRange, ...]:
-        """What the emulator is asked by, in order."""
+        """Ranges of the emulator's inputs, in order."""
         return (*(unknown.range for unknown in self.contact), *self.operating)
 
 
-def setting_of(case: Case) -> Setting:
-    """What a case leaves to be inferred, by its [infer] and, where that says nothing, by the defaults in `UNKNOWNS`.
+def inference_setting(case: Case) -> Setting:
+    """Return the inference setting of a case from its [infer] and the defaults in `UNKNOWNS`.
 
     Raises
     ------
     BadInput
-        for a case without [vibration], oil or roughness; a prior for what cannot be inferred; a range that the grid
-        cannot carry.
+        for a case without [vibration], oil or roughness; a prior of a quantity that cannot be
+        inferred; a range that the grid does not resolve.
     """
     if case.vibration is None:
         raise BadInput(
-            f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio"
+            f"{case.source}: vibration is missing; add [vibration] with mass and damping_ratio"
         )
     if case.lubricant is None:
-        raise BadInput(
-            f"{case.source}: the contact is dry, and shares no load with oil; state a lubricant"
-        )
+        raise BadInput(f"{case.source}: the contact is dry, so that CLR is 1; add a lubricant")
     if stated_value(case, "surface.kind") == "flat":
-        raise BadInput(f"{case.source}: surface is flat, and nothing touches; take a rough one")
+        raise BadInput(f"{case.source}: surface is flat, without asperity contact; use a rough one")
     section = case.contents.infer or InferSection()
     base = case.with_overrides(
         {"infer": "none", "study": "none", "grid.cells": list(section.cells)}
@@ -132,12 +128,12 @@ def setting_of(case: Case) -> Setting:
     ]
     if not any(unknown.key == "sq_m" for unknown in unknowns) and "surface.sq" not in stated:
         raise BadInput(
-            f"{case.source}: surface has no sq to infer; take a generated one, kind gaussian"
+            f"{case.source}: surface has no sq to infer; use a generated surface, kind gaussian"
         )
     if any(entry.key == TEMPERATURE for entry in operating):
         unknowns.append(
             Unknown.stated(
-                OFFSET, TEMPERATURE, 0.0, OFFSET_STD_K, "K", "of the oil against that stated"
+                OFFSET, TEMPERATURE, 0.0, OFFSET_STD_K, "K", "of the oil from the stated value"
             )
         )
     unknowns.append(
@@ -155,21 +151,19 @@ def setting_of(case: Case) -> Setting:
 
 
 def _key_of(case: Case, name: str) -> str:
-    """The case key that a name in [infer] means; BadInput for one that is neither an unknown nor an operating one."""
+    """Return the case key of a name in [infer]; BadInput for one that cannot be inferred."""
     key = name if name in UNKNOWNS else full_key(case, name, "infer")
-    if key not in UNKNOWNS and key not in (*OPERATING_KEYS, TEMPERATURE):
+    if key not in UNKNOWNS and key not in (*OPERATING, TEMPERATURE):
         known = ", ".join(
-            sorted(
-                {entry.rpartition(".")[2] for entry in (*UNKNOWNS, *OPERATING_KEYS, TEMPERATURE)}
-            )
+            sorted({entry.rpartition(".")[2] for entry in (*UNKNOWNS, *OPERATING, TEMPERATURE)})
         )
-        raise BadInput(f"{case.source}: infer.{name} cannot be inferred; what can is {known}")
+        raise BadInput(f"{case.source}: infer.{name} cannot be inferred; possible are {known}")
     return key
 
 
 def _operating(case: Case, stated: Mapping[str, Any]) -> tuple[ParameterRange, ...]:
     ranges = []
-    for key, (low, high) in OPERATING_KEYS.items():
+    for key, (low, high) in OPERATING.items():
         own, unit = split_amount(stated_value(case, key))
         default = ParameterRange(
             key, low * float(own), high * float(own), unit, "about the case's own"
@@ -182,20 +176,19 @@ def _operating(case: Case, stated: Mapping[str, Any]) -> tuple[ParameterRange, .
         ranges.append(_stated_range(case, TEMPERATURE, stated.get(TEMPERATURE)) or default)
     elif TEMPERATURE in stated:
         raise BadInput(
-            f"{case.source}: infer.temperature needs an oil by its data sheet; state grade and temperature"
+            f"{case.source}: infer.temperature needs an oil given by its data sheet; "
+            "set grade and temperature"
         )
     return tuple(ranges)
 
 
 def _stated_range(case: Case, key: str, prior: Any) -> ParameterRange | None:
-    """Where the contact may be run, as [infer] states it; None where it does not."""
+    """Return an operating range stated in [infer], or None."""
     if prior is None:
         return None
     if not isinstance(prior, PriorSection) or prior.start is None:
         name = key.rpartition(".")[2]
-        raise BadInput(
-            f"{case.source}: infer.{name} is where the contact may be run; give from and to"
-        )
+        raise BadInput(f"{case.source}: infer.{name} is an operating range; give from and to")
     return _range(case, key, prior.start, prior.to)
 
 
@@ -218,7 +211,7 @@ def _amount(
 def _unknown(
     case: Case, key: str, default: _Default, prior: Any, operating: tuple[ParameterRange, ...]
 ) -> Unknown | None:
-    """A quantity that is not known, as stated or by default; None where the case has none, or knows it."""
+    """Return an unknown with its stated or default prior; None if absent or known in the case."""
     own = stated_value(case, key)
     if key == LENGTHS[0] and isinstance(own, list):
         own = own[0] if own[0] == own[1] else None
@@ -227,7 +220,7 @@ def _unknown(
     if prior == "known" or own is None:
         if isinstance(prior, PriorSection):
             raise BadInput(
-                f"{case.source}: infer.{key} has a prior, and the case has no such quantity"
+                f"{case.source}: infer.{key} has a prior, but the case has no such quantity"
             )
         return None
     if isinstance(prior, PriorSection) and prior.start is None:
@@ -235,16 +228,18 @@ def _unknown(
         std, _ = _amount(case, key, "std", prior.std, unit)
         if not 0.0 < std < math.inf:
             raise BadInput(
-                f'{case.source}: infer.{key}.std must be positive, got {prior.std}; what is sure is "known"'
+                f"{case.source}: infer.{key}.std must be positive, got {prior.std}; "
+                'for a certain value, write "known"'
             )
         return Unknown.stated(default.key, key, mean, std, unit, "as stated")
     if isinstance(prior, PriorSection):
         stated = _range(case, key, prior.start, prior.to)
-        carried = _carried(case, stated, operating) if key in LENGTHS else stated
-        if carried != stated:
+        resolved = _resolved(case, stated, operating) if key in LENGTHS else stated
+        if resolved != stated:
             raise BadInput(
-                f"{case.source}: infer.{key.rpartition('.')[2]} must lie within {carried.low:g} to {carried.high:g} "
-                f"{carried.unit}, which the emulator's grid carries at every load; narrow it, or state more infer.cells"
+                f"{case.source}: infer.{key.rpartition('.')[2]} must lie within {resolved.low:g} "
+                f"to {resolved.high:g} {resolved.unit}, which the emulator's grid resolves at "
+                "every load; narrow it, or increase infer.cells"
             )
         return Unknown(default.key, stated)
     number, unit = split_amount(own)
@@ -255,7 +250,7 @@ def _unknown(
         )
     low, high = default.ends or (mean / default.factor, mean * default.factor)
     entry = ParameterRange(key, float(f"{low:.4g}"), float(f"{high:.4g}"), unit, default.reason)
-    return Unknown(default.key, _carried(case, entry, operating) if key in LENGTHS else entry)
+    return Unknown(default.key, _resolved(case, entry, operating) if key in LENGTHS else entry)
 
 
 def _isotropic(case: Case) -> bool:
@@ -263,14 +258,14 @@ def _isotropic(case: Case) -> bool:
     return not isinstance(lengths, list) or lengths[0] == lengths[1]
 
 
-def _carried(
+def _resolved(
     case: Case, lengths: ParameterRange, operating: tuple[ParameterRange, ...]
 ) -> ParameterRange:
-    """The part of a range of correlation lengths that the grid carries at every load."""
+    """Limit a range of correlation lengths to those that the grid resolves at every load."""
     loads = next(entry for entry in operating if entry.key == LOAD)
     grids = [case.with_overrides(overrides_at(case, [loads], [end])).grid for end in (0.0, 1.0)]
     scale = 1.0 / float(Unknown("", lengths).to_si(1.0))  # type: ignore[arg-type]
-    low = CELLS_OF_A_LENGTH * scale * max(max(grid.spacing) for grid in grids)
+    low = MIN_CELLS_PER_LENGTH * scale * max(max(grid.spacing) for grid in grids)
     high = 0.49 * scale * min(min(grid.extent) for grid in grids)
     low, high = (
         max(lengths.low, float(f"{1.005 * low:.3g}")),
@@ -278,7 +273,8 @@ def _carried(
     )
     if low >= high:
         raise BadInput(
-            f"{case.source}: the emulator's grid carries no correlation length from {lengths.low:g} to "
-            f"{lengths.high:g} {lengths.unit}; state more infer.cells, or the length as known"
+            f"{case.source}: the emulator's grid resolves no correlation length from "
+            f"{lengths.low:g} to {lengths.high:g} {lengths.unit}; increase infer.cells, or mark "
+            'the length as "known"'
         )
     return replace(lengths, low=low, high=high)

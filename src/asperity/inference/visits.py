@@ -1,4 +1,4 @@
-"""A series of recordings as visits: what was heard at each time, at which operating points."""
+"""A series of recordings grouped into visits: measurements by time and operating point."""
 
 import math
 from collections.abc import Sequence
@@ -9,121 +9,135 @@ import numpy as np
 
 from asperity.core.errors import BadInput
 from asperity.inference.observations import (
-    ALIKE,
-    Heard,
+    SIMILARITY_SCALES,
+    LogMeasurement,
     Observation,
-    Point,
-    conditions,
-    points_of,
+    OperatingPoint,
+    operating_points,
+    point_coordinates,
     require_temperatures,
 )
 
-FEWEST, MOST = 4, 60  # visits; neighbours of more are taken together
+MIN_VISITS, MAX_VISITS = 4, 60  # more visits are merged with their neighbours
 CHANNELS = ("crf", "damping", "crfa")
-MOST_PLACES = 8  # more, and those further apart are taken for one
-WIDER = 1.5
+MAX_POINTS = 8  # with more, points further apart are merged
+WIDENING = 1.5  # factor on the merging distance
 
 
-class Sound(NamedTuple):
-    """A logarithm heard: when (0 the first visit, 1 the last), in which channel, at which place, how surely.
+class SeriesMeasurement(NamedTuple):
+    """One measured logarithm: relative time (0 first visit, 1 last), channel and operating point.
 
-    `aside` is where it was heard less the place: logarithms of load and speed, and temperature [K].
+    `offset` is the actual operating point minus the nominal one: logarithms of load and speed, and
+    temperature [K].
     """
 
-    at: float
+    time: float
     visit: int
     channel: str
-    place: int
-    heard: Heard
-    aside: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    point: int
+    measured: LogMeasurement
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Series:
+class VisitSeries:
     """Visits to one machine.
 
     Parameters
     ----------
-    x : when each visit was, in the series' own unit (hours)
-    places : operating points that were run, without what was heard there
-    sounds : all that was heard, in order
+    x : time of each visit, in the series' own unit (hours)
+    points : nominal operating points, without measurements
+    measurements : all measurements, in order
     """
 
     x: tuple[float, ...]
-    places: tuple[Point, ...]
-    sounds: tuple[Sound, ...]
+    points: tuple[OperatingPoint, ...]
+    measurements: tuple[SeriesMeasurement, ...]
 
     @property
     def span(self) -> float:
-        """From the first visit to the last."""
+        """Time from the first visit to the last."""
         return self.x[-1] - self.x[0]
 
     @property
-    def usual(self) -> int:
-        """The place that was heard most often."""
-        counts = np.bincount([sound.place for sound in self.sounds if sound.channel == "crf"])
+    def main_point(self) -> int:
+        """Index of the operating point measured most often."""
+        counts = np.bincount([entry.point for entry in self.measurements if entry.channel == "crf"])
         return int(np.argmax(counts))
 
 
-def series_of(observations: Sequence[Observation]) -> Series:
-    """Recordings by their x, in whichever order they are given.
+def visit_series(observations: Sequence[Observation]) -> VisitSeries:
+    """Group observations, in any order, into visits by their x.
 
     Raises
     ------
     BadInput
-        where one has no x, only some say how warm the oil was, or there are fewer than four visits.
+        if an observation has no x, only some have an oil temperature, or there are fewer than four
+        visits.
     """
-    for one in observations:
-        if not math.isfinite(one.x):
+    for observation in observations:
+        if not math.isfinite(observation.x):
             raise BadInput(
-                f"{one.name or 'a recording'} has no place in time; give a column x (hours) in --table"
+                f"{observation.name or 'a recording'} has no time; "
+                "give a column x (hours) in --table"
             )
-    times = sorted({one.x for one in observations})
-    if len(times) < FEWEST:
+    times = sorted({observation.x for observation in observations})
+    if len(times) < MIN_VISITS:
         raise BadInput(
-            f"a forecast takes resonances of {FEWEST} recordings at different times or more, got {len(times)}; leave "
-            "--forecast out, or record again"
+            f"a forecast needs resonances of at least {MIN_VISITS} recordings at different times, "
+            f"got {len(times)}; leave --forecast out, or record again"
         )
     require_temperatures(observations)
     observations = sorted(
         observations,
-        key=lambda one: (one.x, one.load_n, one.entrainment_m_s, one.temperature_k or 0.0),
+        key=lambda entry: (
+            entry.x,
+            entry.load_n,
+            entry.entrainment_m_s,
+            entry.temperature_k or 0.0,
+        ),
     )
-    groups = np.array_split(np.array(times), min(MOST, len(times)))
+    groups = np.array_split(np.array(times), min(MAX_VISITS, len(times)))
     x = tuple(float(group.mean()) for group in groups)
-    places = _places(points_of(observations))
-    sounds = []
+    nominal = _nominal_points(operating_points(observations))
+    measurements = []
     for visit, group in enumerate(groups):
-        own = [one for one in observations if group[0] <= one.x <= group[-1]]
-        for point in points_of(own):
-            place, aside = _nearest(point, places)
-            at = (x[visit] - x[0]) / (x[-1] - x[0])
-            sounds += [
-                Sound(at, visit, channel, place, heard, aside)
+        members = [entry for entry in observations if group[0] <= entry.x <= group[-1]]
+        for point in operating_points(members):
+            index, offset = _nearest(point, nominal)
+            time = (x[visit] - x[0]) / (x[-1] - x[0])
+            measurements += [
+                SeriesMeasurement(time, visit, channel, index, measured, offset)
                 for channel in CHANNELS
-                if not math.isnan((heard := getattr(point, channel)).value)
+                if not math.isnan((measured := getattr(point, channel)).value)
             ]
-    return Series(x, places, tuple(sounds))
+    return VisitSeries(x, nominal, tuple(measurements))
 
 
-def _places(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Operating points, in order, those left out that lie near one that is there: each is emulated by itself."""
-    near = ALIKE
+def _nominal_points(points: Sequence[OperatingPoint]) -> tuple[OperatingPoint, ...]:
+    """Return operating points in order, without those close to an earlier one."""
+    distance = SIMILARITY_SCALES
     while True:
-        places: list[Point] = []
+        nominal: list[OperatingPoint] = []
         for point in points:
-            if all(np.any(np.abs(conditions(point) - conditions(one)) > near) for one in places):
-                places.append(point)
-        if len(places) <= MOST_PLACES:
+            if all(
+                np.any(np.abs(point_coordinates(point) - point_coordinates(other)) > distance)
+                for other in nominal
+            ):
+                nominal.append(point)
+        if len(nominal) <= MAX_POINTS:
             return tuple(
-                Point(one.load_n, one.entrainment_m_s, one.temperature_k) for one in places
+                OperatingPoint(point.load_n, point.entrainment_m_s, point.temperature_k)
+                for point in nominal
             )
-        near = WIDER * near
+        distance = WIDENING * distance
 
 
-def _nearest(point: Point, places: Sequence[Point]) -> tuple[int, tuple[float, float, float]]:
-    """Which place an operating point is taken for, and by how much it is another."""
-    asides = [conditions(point) - conditions(one) for one in places]
-    place = int(np.argmin([np.sum((aside / ALIKE) ** 2) for aside in asides]))
-    load, speed, temperature = (float(value) for value in asides[place])
-    return place, (load, speed, temperature)
+def _nearest(
+    point: OperatingPoint, nominal: Sequence[OperatingPoint]
+) -> tuple[int, tuple[float, float, float]]:
+    """Return the index of the nearest nominal point and the offset from it."""
+    offsets = [point_coordinates(point) - point_coordinates(other) for other in nominal]
+    index = int(np.argmin([np.sum((offset / SIMILARITY_SCALES) ** 2) for offset in offsets]))
+    load, speed, temperature = (float(value) for value in offsets[index])
+    return index, (load, speed, temperature)

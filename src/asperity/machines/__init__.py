@@ -1,4 +1,4 @@
-"""Machine contacts solved, summarised and rated."""
+"""Solution, summary and rating of a machine's contacts."""
 
 import lazy_loader
 

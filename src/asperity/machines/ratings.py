@@ -1,9 +1,8 @@
-"""A machine rated as standards have it, beside its solved contacts; and Dang Van's measure below a solved one.
+"""Ratings of a machine by standards, and the Dang Van criterion below a solved contact.
 
-A rating takes the machine, the oil and, where its standard says so, a roughness number. Nothing
-solved goes into it, so that roughness counts once in the rating and once in the solved contact,
-and in neither twice. Dang Van's measure is the other way round: of a solved contact's stresses,
-with no roughness number.
+A rating uses the machine, the oil and, if its standard requires it, a roughness number, but no
+solved quantity, so that roughness is not counted twice. The Dang Van criterion uses the stresses
+of a solved contact and no roughness number.
 """
 
 import math
@@ -25,18 +24,17 @@ from asperity.results import Run
 from asperity.solution import SubsurfaceStress, stress_below
 
 MILLION = 1e6
-PITCH_LINE = 2.0, 80.0  # m/s that the gears' ratings are for, by their standards' scopes
-WORKING = 15.0, 25.0  # deg, of the working pressure angle
-WARMER = 3.0  # K of the teeth above the oil that are said
+PITCH_LINE_SPEEDS = 2.0, 80.0  # m/s, scope of the standards for gears
+WORKING_ANGLES = 15.0, 25.0  # deg, of the working pressure angle, their scope
+WARMER = 3.0  # K of the teeth above the oil from which on a note is given
 SLOW_HEAT = 1.0  # Peclet number u a/2κ below which Blok's flash is more than 6 % too high
 
 
 @dataclass(frozen=True)
 class Rating:
-    """A rating: its key among the quantities, and its values by contact; "" is the whole machine.
+    """A rating: its quantity key, and its values by contact; "" is the whole machine.
 
-    `reason` says why it has none, `beyond` what of the machine lies outside what the standard is
-    for.
+    `reason` states why values are missing, `beyond` what lies outside the scope of the standard.
     """
 
     key: str
@@ -46,35 +44,37 @@ class Rating:
 
     @property
     def standard(self) -> str:
-        """Where it is from."""
+        """Standard that defines the rating."""
         return FACTS[self.key].standard
 
     @property
     def formula(self) -> str:
-        """What is computed."""
+        """Formula of the rating."""
         return FACTS[self.key].formula
 
     @property
     def validity(self) -> str:
-        """What it is made for, and what is left out here."""
+        """Scope of the rating, and simplifications made here."""
         return FACTS[self.key].validity
 
     @property
-    def alone(self) -> float | None:
-        """The one value of the whole machine; None where it is by contact, or is missing."""
+    def machine_value(self) -> float | None:
+        """Value of the whole machine; None if it is by contact or missing."""
         return self.values.get("")
 
     def to_dict(self) -> dict[str, Any]:
-        """As `machine --json` prints it."""
+        """Return the JSON output of the rating."""
         value: dict[str, Any] = (
-            {"value": self.alone} if set(self.values) <= {""} else {"values": dict(self.values)}
+            {"value": self.machine_value}
+            if set(self.values) <= {""}
+            else {"values": dict(self.values)}
         )
         facts = {"standard": self.standard, "formula": self.formula, "validity": self.validity}
         return {"key": self.key, **value, **facts, "reason": self.reason, "beyond": self.beyond}
 
 
 def machine_ratings(case: MachineCase) -> tuple[Rating, ...]:
-    """The ratings of a bearing or a pair of gears; none of other machines, or without an oil and a roughness."""
+    """Return the ratings of a bearing or gear pair; none for other machines or without oil."""
     drawn = [contact for contact in case.contacts if not contact.stands_still]
     if not case.complete or not drawn:
         return ()
@@ -82,34 +82,37 @@ def machine_ratings(case: MachineCase) -> tuple[Rating, ...]:
     if stated.lubricant is None:
         return ()
     if isinstance(case.machine, SpurGear):
-        return _of_gears(case, case.machine, stated)
+        return _gear_ratings(case, case.machine, stated)
     if isinstance(case.machine, CylindricalRollerBearing | BallBearing):
-        return _of_bearing(case, case.machine, stated)
+        return _bearing_ratings(case, case.machine, stated)
     return ()
 
 
-def _whole(key: str, value: float | None, reason: str = "") -> Rating:
+def _machine_rating(key: str, value: float | None, reason: str = "") -> Rating:
     return Rating(key, {"": value}, reason if value is None else "")
 
 
 # Bearings
-# ------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------
 
 
-def _of_bearing(
+def _bearing_ratings(
     case: MachineCase, bearing: CylindricalRollerBearing | BallBearing, stated: Case
 ) -> tuple[Rating, ...]:
     oil, given = stated.lubricant, case.rating
     assert oil is not None
-    thin = rating.reference_viscosity(bearing.speed, bearing.pitch_diameter)
-    kappa = oil.viscosity.eta0 / oil.density.rho0 / thin
-    found = [_whole("reference_viscosity_m2_s", thin), _whole("viscosity_ratio", kappa)]
+    reference = rating.reference_viscosity(bearing.speed, bearing.pitch_diameter)
+    kappa = oil.viscosity.eta0 / oil.density.rho0 / reference
+    ratings = [
+        _machine_rating("reference_viscosity_m2_s", reference),
+        _machine_rating("viscosity_ratio", kappa),
+    ]
     if given.dynamic_load_rating is None:
-        no = "[rating] has no dynamic_load_rating"
+        reason = "[rating] has no dynamic_load_rating"
         return (
-            *found,
+            *ratings,
             *(
-                _whole(key, None, no)
+                _machine_rating(key, None, reason)
                 for key in ("reference_life", "life_factor", "modified_life_s")
             ),
         )
@@ -118,32 +121,43 @@ def _of_bearing(
     life = _reference_life(case, bearing, capacity)
     power = 3.0 if element == "ball" else 10.0 / 3.0
     equivalent = capacity / (life / MILLION) ** (1.0 / power)
-    found += [_whole("reference_life", life), _whole("equivalent_load_n", equivalent)]
+    ratings += [
+        _machine_rating("reference_life", life),
+        _machine_rating("equivalent_load_n", equivalent),
+    ]
     missing = [
         name for name in ("fatigue_load_limit", "contamination") if getattr(given, name) is None
     ]
     if missing:
-        no = f"[rating] has no {' and no '.join(missing)}"
-        return (*found, _whole("life_factor", None, no), _whole("modified_life_s", None, no))
+        reason = f"[rating] has no {' and no '.join(missing)}"
+        return (
+            *ratings,
+            _machine_rating("life_factor", None, reason),
+            _machine_rating("modified_life_s", None, reason),
+        )
     assert given.fatigue_load_limit is not None
     assert given.contamination is not None
-    # a_ISO is of stresses: slices and clearance lengthen a life, but no roller's stress falls below
-    # that of the load
+    # a_ISO depends on stress: slices and clearance may lengthen the life, but they do not reduce a
+    # roller's stress below that of the load
     share = (
         float(given.contamination)
         * float(given.fatigue_load_limit)
         / max(equivalent, bearing.radial_load)
     )
     factor = rating.life_factor(element, kappa, share)
-    thick = "the viscosity ratio lies below 0.1, where ISO 281 rates nothing"
-    hours = None if factor is None else factor * life * math.tau / bearing.speed
-    return (*found, _whole("life_factor", factor, thick), _whole("modified_life_s", hours, thick))
+    reason = "the viscosity ratio is below 0.1, outside ISO 281"
+    seconds = None if factor is None else factor * life * math.tau / bearing.speed
+    return (
+        *ratings,
+        _machine_rating("life_factor", factor, reason),
+        _machine_rating("modified_life_s", seconds, reason),
+    )
 
 
 def _reference_life(
     case: MachineCase, bearing: CylindricalRollerBearing | BallBearing, capacity: float
 ) -> float:
-    """[revolutions]."""
+    """Return the reference life [revolutions]."""
     if isinstance(bearing, BallBearing):
         ratio = bearing.ball_diameter * math.cos(bearing.contact_angle) / bearing.pitch_diameter
         raceway = rating.BallRaceway(ratio, bearing.osculation, bearing.contact_angle)
@@ -155,45 +169,43 @@ def _reference_life(
 
 
 # Gears
-# ---------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------
 
 
 GEAR_KEYS = ("mesh_friction", "rated_bulk_k", "rated_flash_k", "rated_film")
 
 
-def _of_gears(case: MachineCase, gears: SpurGear, stated: Case) -> tuple[Rating, ...]:
+def _gear_ratings(case: MachineCase, gears: SpurGear, stated: Case) -> tuple[Rating, ...]:
+    def missing(reason: str) -> tuple[Rating, ...]:
+        return tuple(_machine_rating(key, None, reason) for key in GEAR_KEYS)
+
     section, given = stated.contents.lubricant, case.rating
     if not isinstance(section, SheetSection):
-        return tuple(
-            _whole(key, None, "the oil is stated by laws, without its data sheet")
-            for key in GEAR_KEYS
-        )
+        return missing("the oil is given by laws, not by a data sheet")
     if "C" not in gears.path:
-        return tuple(
-            _whole(key, None, "the teeth do not meet at the pitch point") for key in GEAR_KEYS
-        )
+        return missing("the teeth do not meet at the pitch point")
     supply = float(section.temperature)
     try:
         oil = _gear_oil(section.sheet)
     except BadInput as refusal:
-        return tuple(_whole(key, None, str(refusal)) for key in GEAR_KEYS)
-    rough = _mean_ra(stated) if given.roughness_ra is None else float(given.roughness_ra)
-    if rough == 0.0:
-        return tuple(_whole(key, None, "the flanks are smooth") for key in GEAR_KEYS)
+        return missing(str(refusal))
+    roughness = _mean_ra(stated) if given.roughness_ra is None else float(given.roughness_ra)
+    if roughness == 0.0:
+        return missing("the flanks are smooth")
     pitch = gears.contact("C", gears.path["C"])
     assert not isinstance(pitch.radius, tuple)
     friction = rating.mesh_friction(
         gears.normal_force / gears.face_width,
         pitch.radius,
         sum(pitch.surface_speeds),
-        rough,
+        roughness,
         oil.viscosity(supply),
         oil.factor,
     )
     bulk = _bulk(case, gears, friction, supply)
     solids = stated.thermal.solids
     mesh = rating.Mesh(
-        rough, case.pair.effective_modulus, (solids[0].effusivity, solids[1].effusivity)
+        roughness, case.pair.effective_modulus, (solids[0].effusivity, solids[1].effusivity)
     )
     points = {contact.name: _mesh_point(case, contact) for contact in case.contacts}
     films = {
@@ -202,30 +214,28 @@ def _of_gears(case: MachineCase, gears: SpurGear, stated: Case) -> tuple[Rating,
     }
     rises = {name: rise for name, (_, rise) in films.items()}
     film = {name: value for name, (value, _) in films.items()}
-    gone = (
+    reason = (
         ""
         if None not in film.values()
-        else "the flash takes the oil beyond 510 degC, where the estimate of α ends"
+        else "the flash heats the oil above 510 degC, the limit of the estimate of α"
     )
-    slow = min(
+    peclet = min(
         (
             min(point.speeds) * point.half_width / (2.0 * solids[0].diffusivity)
             for point in points.values()
         ),
     )
-    teeth, fast = (
-        _beyond(gears),
-        "" if slow >= SLOW_HEAT else f"a Peclet number of {slow:.2g}, for 1 and more",
-    )
-    both = "; ".join(filter(None, (teeth, fast)))
-    found = (
-        _whole("mesh_friction", friction),
-        _whole("rated_bulk_k", bulk),
+    gear_scope = _outside_scope(gears)
+    heat_scope = "" if peclet >= SLOW_HEAT else f"a Peclet number of {peclet:.2g} (1 or more)"
+    both = "; ".join(filter(None, (gear_scope, heat_scope)))
+    ratings = (
+        _machine_rating("mesh_friction", friction),
+        _machine_rating("rated_bulk_k", bulk),
         Rating("rated_flash_k", rises, beyond=both),
-        Rating("rated_film", film, gone),
+        Rating("rated_film", film, reason),
         *_limits(case, film, bulk + max(rises.values()), oil, supply),
     )
-    return tuple(replace(each, beyond=each.beyond or teeth) for each in found)
+    return tuple(replace(entry, beyond=entry.beyond or gear_scope) for entry in ratings)
 
 
 def _mesh_point(case: MachineCase, contact: MachineContact) -> rating.MeshPoint:
@@ -237,19 +247,17 @@ def _mesh_point(case: MachineCase, contact: MachineContact) -> rating.MeshPoint:
     )
 
 
-def _beyond(gears: SpurGear) -> str:
-    """What of the gears lies outside what the standards' ratings are for; nothing where all is within."""
-    working, found = math.degrees(gears.working_angle), []
+def _outside_scope(gears: SpurGear) -> str:
+    """Return the properties of the gears outside the scope of the standards, or ""."""
+    working, outside = math.degrees(gears.working_angle), []
     pitch_line = gears.speed * gears.base_radii[0] / math.cos(gears.working_angle)
-    if not PITCH_LINE[0] <= pitch_line <= PITCH_LINE[1]:
-        found.append(
-            f"a pitch-line speed of {pitch_line:.3g} m/s, for {PITCH_LINE[0]:g} to {PITCH_LINE[1]:g}"
-        )
-    if not WORKING[0] <= working <= WORKING[1]:
-        found.append(
-            f"a working pressure angle of {working:.3g} deg, for {WORKING[0]:g} to {WORKING[1]:g}"
-        )
-    return ", ".join(found)
+    low, high = PITCH_LINE_SPEEDS
+    if not low <= pitch_line <= high:
+        outside.append(f"a pitch-line speed of {pitch_line:.3g} m/s ({low:g} to {high:g})")
+    low, high = WORKING_ANGLES
+    if not low <= working <= high:
+        outside.append(f"a working pressure angle of {working:.3g} deg ({low:g} to {high:g})")
+    return ", ".join(outside)
 
 
 def _limits(
@@ -259,28 +267,34 @@ def _limits(
     oil: rating.GearOil,
     supply: float,
 ) -> tuple[Rating, ...]:
-    """Safety against micropitting and the margin to scuffing, where their limits are given."""
+    """Return the safety against micropitting and the margin to scuffing, if limits are given."""
     given = case.rating
-    missing = "[rating] has no permissible_film: it is of a test of the oil"
-    safety = _whole("micropitting_safety", None, missing)
+    missing = "[rating] has no permissible_film, from a test of the oil"
+    safety = _machine_rating("micropitting_safety", None, missing)
     known = [value for value in film.values() if value is not None]
     if given.permissible_film is not None and len(known) < len(film):
-        safety = _whole(
-            "micropitting_safety", None, "the specific film is not known all along the path"
+        safety = _machine_rating(
+            "micropitting_safety", None, "the specific film is not known along the whole path"
         )
     elif given.permissible_film is not None:
-        safety = _whole("micropitting_safety", min(known) / float(given.permissible_film))
-    missing = "[rating] has no scuffing_stage: it is of an FZG test of the oil"
-    margin = (_whole("scuffing_limit_k", None, missing), _whole("scuffing_margin_k", None, missing))
+        safety = _machine_rating("micropitting_safety", min(known) / float(given.permissible_film))
+    missing = "[rating] has no scuffing_stage, from an FZG test of the oil"
+    margin = (
+        _machine_rating("scuffing_limit_k", None, missing),
+        _machine_rating("scuffing_margin_k", None, missing),
+    )
     if given.scuffing_stage is not None:
         factor = oil.factor * (1e3 * oil.viscosity(supply)) ** -0.05
         limit = rating.scuffing_temperature(float(given.scuffing_stage), factor) + 273.15
-        margin = (_whole("scuffing_limit_k", limit), _whole("scuffing_margin_k", limit - hottest))
+        margin = (
+            _machine_rating("scuffing_limit_k", limit),
+            _machine_rating("scuffing_margin_k", limit - hottest),
+        )
     return safety, *margin
 
 
 def _mean_ra(stated: Case) -> float:
-    """Of both flanks, taken as Gaussian [m]: of their own Sq, or of two equal ones with the composite Sq."""
+    """Return the mean Ra [m] of Gaussian flanks, from each Sq or half the composite variance."""
     bodies = stated.composite()
     if bodies is None:
         return stated.surface().sq / math.sqrt(math.pi)
@@ -288,27 +302,27 @@ def _mean_ra(stated: Case) -> float:
 
 
 def _bulk(case: MachineCase, gears: SpurGear, friction: float, supply: float) -> float:
-    """Of the teeth [K]: as given, or by their losses."""
+    """Return the bulk temperature of the teeth [K]: as given, or from their losses."""
     given = case.rating
     if given.bulk_temperature is not None:
         return float(given.bulk_temperature)
     path, pitch = gears.path, gears.base_pitch
     parts = (path["E"] - path["C"]) / pitch, (path["C"] - path["A"]) / pitch
-    lost = (
+    loss = (
         gears.torque
         * gears.speed
         * friction
         * rating.loss_factor(parts, gears.contact_ratio, gears.teeth)
     )
     return rating.bulk_temperature(
-        supply, lost, gears.centres, gears.face_width, spray=given.oil_supply == "spray"
+        supply, loss, gears.centres, gears.face_width, spray=given.oil_supply == "spray"
     )
 
 
 def _gear_oil(sheet: OilSheet) -> rating.GearOil:
-    """Beyond 150 °C too, where a flash of microseconds takes it: the standard's α is one of the oil at 38 °C.
+    """Return the oil of a gear rating, valid above 150 °C for the duration of a flash.
 
-    No viscosity of the hot oil enters, so that none is too thin for it.
+    The standard's α uses the oil at 38 °C and no viscosity of the hot oil.
     """
     return rating.GearOil(
         lambda kelvin: sheet.walther(kelvin) * sheet.density(kelvin),
@@ -318,8 +332,8 @@ def _gear_oil(sheet: OilSheet) -> rating.GearOil:
 
 
 def warmer_teeth(case: MachineCase, ratings: Sequence[Rating]) -> Iterator[str]:
-    """That gears' contacts are solved with the oil as it is supplied, where their teeth are rated to be warmer."""
-    bulk = next((each.alone for each in ratings if each.key == "rated_bulk_k"), None)
+    """Note that gear contacts are solved at supply temperature although the teeth are warmer."""
+    bulk = next((entry.machine_value for entry in ratings if entry.key == "rated_bulk_k"), None)
     drawn = [contact for contact in case.contacts if not contact.stands_still]
     section = case.case(drawn[0]).contents.lubricant if bulk is not None else None
     if (
@@ -331,22 +345,24 @@ def warmer_teeth(case: MachineCase, ratings: Sequence[Rating]) -> Iterator[str]:
     supply, sheet = float(section.temperature), section.sheet
     share = sheet.walther(bulk) * sheet.density(bulk) / sheet.viscosity(supply)
     yield (
-        f"The contacts are solved with oil of {supply - 273.15:.3g} degC, as it is supplied; at the teeth's rated bulk "
-        f"temperature of {bulk - 273.15:.3g} degC it has {share:.2f} of that viscosity, and films are thinner. State "
-        "that as lubricant.temperature and as rating.bulk_temperature to solve them so."
+        f"The contacts are solved at the oil's supply temperature of {supply - 273.15:.3g} degC; "
+        f"at the teeth's rated bulk temperature of {bulk - 273.15:.3g} degC it has {share:.2f} of "
+        "that viscosity, and films are thinner. To solve at that temperature, set it as "
+        "lubricant.temperature and rating.bulk_temperature."
     )
 
 
 # Fatigue
-# -------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class DangVan:
-    """Dang Van's measure below a solved contact, over depth [Pa].
+    """Dang Van stress below a solved contact over depth [Pa].
 
-    `depths` [m]; `solved` of the rough contact, `smooth` of Hertz' under the same coefficient of
-    friction; `core_depth` below which the cells have no say; `slope` a; `limit` τ₋₁ [Pa].
+    `depths` [m]; `solved` of the rough contact, `smooth` of the Hertz contact with the same
+    friction coefficient; `core_depth`, below which the cell size has no effect; `slope` a; `limit`
+    τ₋₁ [Pa].
     """
 
     depths: Field
@@ -357,23 +373,23 @@ class DangVan:
     limit: float
 
     def ratings(self) -> tuple[Rating, ...]:
-        """Largest from the core down and above it, and the same of the smooth contact."""
+        """Return the largest stress in the core, above it and if smooth, and the safety."""
         core = self.depths >= self.core_depth
         return (
-            _whole("dang_van_pa", float(self.solved[core].max())),
-            _whole("dang_van_shallow_pa", float(self.solved[~core].max())),
-            _whole("dang_van_smooth_pa", float(self.smooth.max())),
-            _whole("dang_van_safety", self.limit / float(self.solved[core].max())),
+            _machine_rating("dang_van_pa", float(self.solved[core].max())),
+            _machine_rating("dang_van_shallow_pa", float(self.solved[~core].max())),
+            _machine_rating("dang_van_smooth_pa", float(self.smooth.max())),
+            _machine_rating("dang_van_safety", self.limit / float(self.solved[core].max())),
         )
 
 
 def dang_van_below(run: Run, limits: tuple[float, float]) -> DangVan:
-    """Of material that passes below a solved contact at rest, from no stress to none.
+    """Compute the Dang Van stress of material that passes below a solved contact.
 
     Parameters
     ----------
     run : the solved contact
-    limits : of the material in reversed torsion and reversed bending [Pa]
+    limits : fatigue limits of the material in reversed torsion and reversed bending [Pa]
 
     Raises
     ------
@@ -400,17 +416,17 @@ def dang_van_below(run: Run, limits: tuple[float, float]) -> DangVan:
         poisson_ratio=stress.poisson_ratio,
         body=stress.body,
     )
-    rough, ideal = (_over_depth(one, slope) for one in (stress, smooth))
+    rough, ideal = (_over_depth(field, slope) for field in (stress, smooth))
     return DangVan(stress.depths, rough, ideal, stress.core_depth, slope, limits[0])
 
 
 def _over_depth(stress: SubsurfaceStress, slope: float) -> Field:
-    """The largest measure of all lines along rolling at each depth."""
-    found = []
+    """Return the largest Dang Van stress over all lines along rolling at each depth."""
+    largest = []
     for depth in stress.depths:
         levels = stress.tractions.stresses(float(depth), stress.poisson_ratio, cache=False)
         passing = np.concatenate(
             [np.swapaxes(levels, 1, 2), np.zeros((6, levels.shape[2], 1))], axis=2
         )
-        found.append(rating.dang_van(passing, slope))
-    return np.array(found)
+        largest.append(rating.dang_van(passing, slope))
+    return np.array(largest)

@@ -1,4 +1,4 @@
-"""What became of a machine: its contacts, a row each, the worst of them, what is concluded, and its ratings."""
+"""Result of a machine: one row per contact, the worst contact, verdict, notes and ratings."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,23 +12,16 @@ from asperity.machine import MachineContact
 from asperity.machines.ratings import DangVan, Rating, dang_van_below, machine_ratings, warmer_teeth
 from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW, Run
 
-HARDEST, STEEL_FROM = (
-    4.2e9,
-    180e9,
-)  # pressure; Young's modulus of both bodies from which it is meant [Pa]
-SAID = (
-    "viscosity_ratio",
-    "life_factor",
-    "rated_film",
-    "scuffing_margin_k",
-)  # ratings, in the verdict
+STATIC_LIMIT = 4.2e9  # Hertz pressure of hardened bearing steel, ISO 76 [Pa]
+STEEL_FROM = 180e9  # Young's modulus of both bodies from which the limit applies [Pa]
+VERDICT_RATINGS = ("viscosity_ratio", "life_factor", "rated_film", "scuffing_margin_k")
 
 
 @dataclass(frozen=True)
 class MachineResult:
-    """A machine's contacts, a row each; `folder` keeps them. Solved numbers are absent where none was solved.
+    """A machine's contacts, one row each, stored in `folder`; solved numbers if they were solved.
 
-    `run` is the worst contact with its fields, where it was opened.
+    `run` is the worst contact with its fields, if loaded.
     """
 
     case: MachineCase
@@ -40,29 +33,29 @@ class MachineResult:
 
     @property
     def failures(self) -> list[dict[str, Any]]:
-        """The contacts that were not solved, each with its `reason`."""
+        """Rows of the contacts that were not solved, each with its `reason`."""
         return [row for row in self.rows if row.get("reason")]
 
     @property
     def worst(self) -> dict[str, Any]:
-        """The contact to look at first.
+        """Row of the most critical contact.
 
-        Of solved ones that whose asperities carry most; in full film the one with the least film
-        ratio, of smooth ones the least film; not solved, that of the largest Hertz pressure.
+        The solved contact with the highest CLR; in full film the lowest film ratio, for smooth
+        surfaces the thinnest film; if none was solved, the highest Hertz pressure.
         """
 
-        def badness(row: Mapping[str, Any]) -> tuple[float, ...]:
+        def severity(row: Mapping[str, Any]) -> tuple[float, ...]:
             if row.get("clr") is None:
                 return -1.0, 0.0, row["p_hertz_pa"]
             share = row["clr"] if row["clr"] >= FULL_FILM_BELOW else 0.0
             film = row["h_min_m"] if row["lambda_ratio"] is None else row["lambda_ratio"]
             return share, -film, row["p_hertz_pa"]
 
-        return max(self.rows, key=badness)
+        return max(self.rows, key=severity)
 
     @cached_property
     def dang_van(self) -> DangVan | None:
-        """Dang Van's measure below the worst contact, where it was opened and the material's limits are given."""
+        """Dang Van stress below the worst contact, if loaded and fatigue limits are given."""
         limits = self.case.rating.fatigue_limits
         if self.run is None or limits is None:
             return None
@@ -70,7 +63,7 @@ class MachineResult:
 
     @cached_property
     def ratings(self) -> tuple[Rating, ...]:
-        """As standards have them, beside the solved numbers and without them; of fatigue, below the worst contact."""
+        """Ratings by standards, and those of fatigue below the worst contact."""
         return (
             *machine_ratings(self.case),
             *(() if self.dang_van is None else self.dang_van.ratings()),
@@ -78,24 +71,25 @@ class MachineResult:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader of the contacts has to know, a sentence each."""
-        return (*self.case.notes, *self._too_hard(), *warmer_teeth(self.case, self.ratings))
+        """Notes on the contacts, one sentence each."""
+        return (*self.case.notes, *self._yielding(), *warmer_teeth(self.case, self.ratings))
 
-    def _too_hard(self) -> Iterator[str]:
-        """A Hertz pressure that no rolling contact of steel bears."""
-        hardest = max(self.rows, key=lambda row: row["p_hertz_pa"])
+    def _yielding(self) -> Iterator[str]:
+        """Warn of a Hertz pressure above the static limit of steel."""
+        highest = max(self.rows, key=lambda row: row["p_hertz_pa"])
         steel = min(self.case.pair.youngs_moduli) > STEEL_FROM
-        if steel and hardest["p_hertz_pa"] > HARDEST:
-            pressure, most = (
-                quantity("hertz_pressure_pa").text(p) for p in (hardest["p_hertz_pa"], HARDEST)
+        if steel and highest["p_hertz_pa"] > STATIC_LIMIT:
+            pressure, limit = (
+                quantity("hertz_pressure_pa").text(p) for p in (highest["p_hertz_pa"], STATIC_LIMIT)
             )
             yield (
-                f"Hertz's pressure of {pressure} at {hardest['name']} is above {most}, the static limit of hardened "
-                "bearing steel (ISO 76): the bodies yield for good, and their elastic contact is none of theirs."
+                f"The Hertz pressure of {pressure} at {highest['name']} is above {limit}, the "
+                "static limit of hardened bearing steel (ISO 76): the bodies deform plastically, "
+                "and the elastic solution does not apply."
             )
 
     def scalars(self) -> dict[str, Any]:
-        """What `machine --json` prints."""
+        """Return the JSON output of `asperity machine`."""
         return {
             "verdict": self.verdict(),
             "contacts": list(self.rows),
@@ -107,14 +101,18 @@ class MachineResult:
         }
 
     def verdict(self) -> str:
-        """What a tribologist would conclude, in a sentence."""
+        """Return one sentence on lubrication regime, worst contact, film and ratings."""
         worst, title = self.worst, self.case.machine.title()
         if not self.solved:
             sliding = ""
             if worst["slide_to_roll"]:
-                sliding = f", slide-to-roll ratio {quantity('slide_to_roll').text(worst['slide_to_roll'])}"
+                ratio = quantity("slide_to_roll").text(worst["slide_to_roll"])
+                sliding = f", slide-to-roll ratio {ratio}"
             pressure = quantity("hertz_pressure_pa").text(worst["p_hertz_pa"])
-            return f"{title}: most heavily pressed is {worst['name']}, Hertz pressure {pressure}{sliding}; not solved."
+            return (
+                f"{title}: the highest Hertz pressure is {pressure} at {worst['name']}{sliding}; "
+                "not solved."
+            )
         if worst.get("clr") is None:
             return f"{title}: NOT SOLVED, {len(self.failures)} of {len(self.rows)} contacts failed."
         regimes = [_regime(row) for row in self.rows if row.get("clr") is not None]
@@ -143,23 +141,24 @@ class MachineResult:
         return (
             f"{title}: {_regime(worst)}{part}; worst is {worst['name']}, where asperities carry "
             f"{_share(worst)} of the load{doubt} on a film of "
-            f"{quantity('h_central_m').text(worst['h_central_m'])}{film}{flash}{self._rated()}{failed}."
+            f"{quantity('h_central_m').text(worst['h_central_m'])}{film}{flash}"
+            f"{self._rated()}{failed}."
         )
 
     def _rated(self) -> str:
-        """The ratings that a tribologist looks at first, as the end of a sentence."""
-        said = []
+        """Return the most important ratings as the end of a sentence."""
+        parts = []
         for rating in self.ratings:
-            if rating.key in SAID and not rating.reason and not rating.beyond:
+            if rating.key in VERDICT_RATINGS and not rating.reason and not rating.beyond:
                 known = {name: value for name, value in rating.values.items() if value is not None}
-                least = min(known, key=lambda name: known[name])
-                where = f" at {least}" if least else ""
-                said.append(f"{quantity(rating.key).named(known[least])}{where}")
-        return f"; rated {', '.join(said)}" if said else ""
+                lowest = min(known, key=lambda name: known[name])
+                contact = f" at {lowest}" if lowest else ""
+                parts.append(f"{quantity(rating.key).named(known[lowest])}{contact}")
+        return f"; rated {', '.join(parts)}" if parts else ""
 
 
 def _share(row: Mapping[str, Any]) -> str:
-    """The load share with its interval, where it has one."""
+    """Return the load share with its interval, if it has one."""
     entry = quantity("clr")
     low, high = (row.get(end) for end in entry.ends)
     whole = "" if low is None or high is None else f" ({entry.interval(low, high)})"
@@ -167,7 +166,7 @@ def _share(row: Mapping[str, Any]) -> str:
 
 
 def condition_row(contact: MachineContact, case: MachineCase) -> dict[str, Any]:
-    """A contact's row, as far as it is known before it is solved."""
+    """Return a contact's conditions, known before it is solved."""
     speeds = contact.surface_speeds
     return {
         "name": contact.name,

@@ -1,6 +1,6 @@
-"""A machine's contacts solved: each a case of a study, kept as it ends, resumed, and spread over processes.
+"""Solution of a machine's contacts as a study: stored, resumable and parallel.
 
-Contacts that are the same (both sides of a load zone) are solved once.
+Identical contacts (both sides of a load zone) are solved once.
 """
 
 import json
@@ -23,13 +23,12 @@ from asperity.machines.result import MachineResult, condition_row
 from asperity.results import Run, load_run, solve_case
 from asperity.study import DONE, StudyPlan, StudyProgress, plan_points, run_study
 
-ALL_CELLS = 1_000_000  # of chosen grids together: about two minutes on two processors
+ALL_CELLS = 1_000_000  # of all automatic grids together: about two minutes on two processors
 FEWEST_CELLS = 48  # along an axis
-# surfaces that a contact's numbers are means of, unless [solver] says: few where their cells are
-# many
+# default number of surfaces per contact: few on grids above FINE_GRID cells
 MANY_SURFACES, FEW_SURFACES, FINE_GRID = 5, 3, 128 * 128
 WORST = "worst.nc"
-SOLVED = (  # what is read off every solved contact
+SOLVED_KEYS = (  # quantities of a solved contact
     *(
         "h_central_m",
         "h_min_m",
@@ -53,10 +52,10 @@ SOLVED = (  # what is read off every solved contact
 
 
 def machine_conditions(case: MachineCase) -> MachineResult:
-    """The contacts' conditions alone; nothing is solved."""
-    begun = time.perf_counter()
+    """Return the conditions of the contacts without solving them."""
+    start = time.perf_counter()
     rows = tuple(condition_row(contact, case) for contact in case.contacts)
-    return MachineResult(case, rows, False, time.perf_counter() - begun)
+    return MachineResult(case, rows, False, time.perf_counter() - start)
 
 
 def solve_machine(
@@ -72,45 +71,45 @@ def solve_machine(
     Parameters
     ----------
     case : from `load_machine`
-    out : folder that keeps the contacts as they end, and to go on from; None: in memory
-    workers, executor, progress : as of `run_study`
+    out : folder to store the contacts in and resume from; None: in memory
+    workers, executor, progress : see `run_study`
 
     Raises
     ------
     BadInput
-        for a case that lacks what solving needs, or whose contacts draw no oil in; a folder that cannot be used.
+        for a case without lubricant or surface, without entrainment, or an unusable folder.
     AsperityError
         if results cannot be written.
     """
-    begun = time.perf_counter()
+    start = time.perf_counter()
     if not case.complete:
         raise BadInput(
-            f"{case.source}: solving needs [lubricant] and [surface]; add them, or ask for a dry run"
+            f"{case.source}: solving needs [lubricant] and [surface]; add them, or use a dry run"
         )
-    drawn = [contact for contact in case.contacts if not contact.stands_still]
-    if not drawn:
-        raise BadInput(f"{case.source}: no contact draws oil in; correct the speeds")
-    plan, places = _plan(case, drawn)
-    found = run_study(plan, out=out, workers=workers, executor=executor, progress=progress)
-    table = found.table.set_index("point")
+    moving = [contact for contact in case.contacts if not contact.stands_still]
+    if not moving:
+        raise BadInput(f"{case.source}: no contact entrains oil; correct the speeds")
+    plan, points = _plan(case, moving)
+    study = run_study(plan, out=out, workers=workers, executor=executor, progress=progress)
+    table = study.table.set_index("point")
     rows = tuple(
-        {**condition_row(contact, case), **_solved(table, places.get(contact.name))}
+        {**condition_row(contact, case), **_solved_row(table, points.get(contact.name))}
         for contact in case.contacts
     )
-    result = MachineResult(case, rows, True, time.perf_counter() - begun, found.folder)
-    if found.folder is None or result.worst.get("clr") is None:
+    result = MachineResult(case, rows, True, time.perf_counter() - start, study.folder)
+    if study.folder is None or result.worst.get("clr") is None:
         return result
-    point = next(entry for entry in plan.cases if entry.point == places[result.worst["name"]])
-    run = _opened(plan.case.with_overrides(point.overrides), found.folder / WORST)
-    return replace(result, run=run, seconds=time.perf_counter() - begun)
+    point = next(entry for entry in plan.cases if entry.point == points[result.worst["name"]])
+    run = _load_or_solve(plan.case.with_overrides(point.overrides), study.folder / WORST)
+    return replace(result, run=run, seconds=time.perf_counter() - start)
 
 
-def _opened(case: Case, path: Path) -> Run:
-    """A contact with its fields: kept before, or solved now and kept."""
+def _load_or_solve(case: Case, path: Path) -> Run:
+    """Return a contact with its fields, loaded from `path` or solved and saved there."""
     if path.exists():
-        kept = load_run(path)
-        if kept.case.text == case.text:
-            return kept
+        stored = load_run(path)
+        if stored.case.text == case.text:
+            return stored
     run = solve_case(case, surfaces=None, workers=cores(), strict=False)
     run.save(path)
     return run
@@ -119,64 +118,64 @@ def _opened(case: Case, path: Path) -> Run:
 def _plan(
     case: MachineCase, contacts: Sequence[MachineContact]
 ) -> tuple[StudyPlan, dict[str, int]]:
-    """A study of the contacts that differ, and which of its points each contact is."""
+    """Return a study of the distinct contacts, and the point of each contact."""
     keys = {contact.name: json.dumps(case.contact_table(contact)) for contact in contacts}
-    different = {keys[contact.name]: contact for contact in reversed(contacts)}
+    distinct = {keys[contact.name]: contact for contact in reversed(contacts)}
     order = list(dict.fromkeys(keys.values()))
     points = [
-        {"contact": json.loads(key), **_effort(case.case(different[key]), ALL_CELLS // len(order))}
+        {"contact": json.loads(key), **_effort(case.case(distinct[key]), ALL_CELLS // len(order))}
         for key in order
     ]
-    places = {name: order.index(key) for name, key in keys.items()}
+    point_numbers = {name: order.index(key) for name, key in keys.items()}
     base = case.case(contacts[0])
     seed = getattr(base.contents.surface, "seed", None)
     axes = list(dict.fromkeys(key for point in points for key in point))
     seeds = 1 if seed is None else (seed,)
     return plan_points(
         base, points, axes=axes, seeds=seeds, kind="surfaces", seeding="common"
-    ), places
+    ), point_numbers
 
 
-def _effort(case: Case, most: int) -> dict[str, Any]:
-    """Cells and surfaces of a contact."""
-    smaller = _smaller_grid(case, most)
+def _effort(case: Case, max_cells: int) -> dict[str, Any]:
+    """Return overrides for the cells and surfaces of a contact."""
+    smaller = _smaller_grid(case, max_cells)
     coarse = case.with_overrides(smaller) if smaller else case
     nx, ny = coarse.grid.cells
-    wait = MANY_SURFACES if nx * ny <= FINE_GRID else FEW_SURFACES
+    surfaces = MANY_SURFACES if nx * ny <= FINE_GRID else FEW_SURFACES
     stated = case.contents.solver.surfaces
     return {
         **smaller,
-        "solver.surfaces": min(coarse.surface_count(), wait) if stated is None else stated,
+        "solver.surfaces": min(coarse.surface_count(), surfaces) if stated is None else stated,
     }
 
 
-def _smaller_grid(case: Case, most: int) -> dict[str, Any]:
-    """Cells in place of a chosen grid's, where those are too many and no accuracy was asked for."""
+def _smaller_grid(case: Case, max_cells: int) -> dict[str, Any]:
+    """Return an override that coarsens an automatic grid without a requested accuracy."""
     section, (nx, ny) = case.contents.grid, case.grid.cells
-    if section.cells != "auto" or section.accuracy is not None or nx * ny <= most:
+    if section.cells != "auto" or section.accuracy is not None or nx * ny <= max_cells:
         return {}
-    smaller = math.sqrt(most / (nx * ny))
-    return {"grid.cells": [max(FEWEST_CELLS, 8 * int(count * smaller / 8)) for count in (nx, ny)]}
+    ratio = math.sqrt(max_cells / (nx * ny))
+    return {"grid.cells": [max(FEWEST_CELLS, 8 * int(count * ratio / 8)) for count in (nx, ny)]}
 
 
-def _solved(table: pandas.DataFrame, point: int | None) -> dict[str, Any]:
-    """What was solved of a contact, or why it was not."""
-    nothing = dict.fromkeys(SOLVED)
+def _solved_row(table: pandas.DataFrame, point: int | None) -> dict[str, Any]:
+    """Return the solved quantities of a contact, or the reason why there are none."""
+    empty = dict.fromkeys(SOLVED_KEYS)
     if point is None:
-        return {**nothing, "reason": "the surfaces draw no oil in here: no steady film"}
+        return {**empty, "reason": "the surfaces entrain no oil: no steady film"}
     if point not in table.index:
-        return {**nothing, "reason": "not computed"}
+        return {**empty, "reason": "not computed"}
     row = table.loc[point]
     if row["status"] != DONE:
-        return {**nothing, "reason": str(row["reason"])}
-    return {key: _plain(row.get(key)) for key in SOLVED} | {
-        "surfaces": int(_plain(row["surfaces"])),
+        return {**empty, "reason": str(row["reason"])}
+    return {key: _json_value(row.get(key)) for key in SOLVED_KEYS} | {
+        "surfaces": int(_json_value(row["surfaces"])),
         "reason": "",
     }
 
 
-def _plain(value: Any) -> Any:
-    """A table's entry as JSON has it."""
+def _json_value(value: Any) -> Any:
+    """Convert a table's entry to JSON."""
     if value is None or isinstance(value, bool):
         return value
     if hasattr(value, "item"):

@@ -1,8 +1,8 @@
-"""Sweeps of a case: what is varied, where it is computed, what is kept, and what the paper's anchors say to it.
+"""Parameter studies of a case: plan, execution, storage, wear curve, sensitivity and calibration.
 
-`plan` says which cases there are, `evaluate` turns one into a row, `store` keeps rows through any
-crash, `execute` spreads cases over processes or machines. On these stand `curve` (the paper's Figs
-7 and 8), `sensitivity` and `calibration`.
+`plan` lists the cases, `evaluate` computes one row per case, `store` stores rows crash-safely,
+`execute` distributes cases over processes or machines. `curve` (the paper's Figs 7 and 8),
+`global_sensitivity` and `calibration` build on them.
 """
 
 import lazy_loader

@@ -1,10 +1,8 @@
-"""How far anchors are missed with any values of the free quantities: on the real solver, each set solved once."""
+"""Misfit of a case's wear curve to anchors, as a function of the free quantities."""
 
 import itertools
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas
@@ -16,21 +14,24 @@ from asperity.core.errors import AsperityError
 from asperity.paper import Anchor
 from asperity.study.curve import WearCurve, sq_points
 from asperity.study.evaluate import DONE
-from asperity.study.execute import StudyProgress, run_study
-from asperity.study.full_film import with_silence
+from asperity.study.execute import StudyResult
+from asperity.study.full_film import with_full_film_limits
 from asperity.study.plan import StudyPlan, plan_points
 from asperity.study.ranges import ParameterRange, overrides_at
 
 CHECK_SEEDS = 5
-STEP = 0.1  # of a range, either way, over which slopes are taken
-MOST_STEPS = 8  # of least squares from one start
-NEARER = 1e-2  # of a range, or of the misfit: smaller steps and gains are lost in the roughness
-LOST = 20.0  # tolerances that an anchor without a value counts as missed by
-EDGE = 0.01  # of a range: a quantity this near to its end would go on
+STEP = 0.1  # half-width of the central differences, as a fraction of a range
+MAX_STEPS = 8  # of least squares from one start
+TOLERANCE = 1e-2  # of a range or of the misfit; smaller changes are noise of the realisation
+MISSING_RESIDUAL = 20.0  # residual of an anchor without a value, in tolerances
+EDGE = 0.01  # fraction of a range within which a value counts as being at its end
 
 
 class MisfitSolver:
-    """The real solver as a function of shares of the ranges; each set is solved once, and kept in `out`."""
+    """The contact solver as a function of fractions of the ranges; each set is solved once.
+
+    `run` computes a plan, stored under the given name.
+    """
 
     def __init__(
         self,
@@ -39,72 +40,69 @@ class MisfitSolver:
         aimed: Sequence[Anchor],
         sq: Sequence[float],
         seeds: int,
-        out: Path | None,
-        executor: Executor,
-        progress: Callable[[StudyProgress], None] | None,
+        run: Callable[[StudyPlan, str], StudyResult],
     ) -> None:
         self.case, self.ranges, self.aimed, self.sq, self.seeds = case, ranges, aimed, sq, seeds
-        self.out, self.executor, self.progress = out, executor, progress
+        self.run = run
         self.known: dict[tuple[float, ...] | None, pandas.DataFrame] = {}
         self.cases = self.failed = 0
         self.seconds = 0.0
 
     def solve(
-        self, wanted: Sequence[Field | None], seeds: int | None = None
+        self, parameter_sets: Sequence[Field | None], seeds: int | None = None
     ) -> list[pandas.DataFrame]:
-        """The rows of each set of shares (None: the case as it is), all levels and seeds, as one study."""
+        """Solve sets of shares (None: the case itself) at all levels and seeds as one study."""
         sets = [
             {} if shares is None else overrides_at(self.case, self.ranges, shares)
-            for shares in wanted
+            for shares in parameter_sets
         ]
         points = [{**chosen, **level} for chosen in sets for level in sq_points(self.sq)]
         table = self._run(
             plan_points(self.case, points, seeds=seeds or self.seeds, seeding="common"),
             "evaluations",
         )
-        place = table["point"] // len(self.sq)
-        return [with_silence(table[place == number]) for number in range(len(sets))]
+        set_number = table["point"] // len(self.sq)
+        return [with_full_film_limits(table[set_number == number]) for number in range(len(sets))]
 
     def _run(self, plan: StudyPlan, folder: str) -> pandas.DataFrame:
-        out = None if self.out is None else self.out / folder
-        result = run_study(plan, out=out, executor=self.executor, progress=self.progress)
+        result = self.run(plan, folder)
         self.cases += len(plan.cases)
         self.failed += result.failed
         self.seconds += result.seconds
         return result.table
 
-    def learn(self, wanted: Sequence[Field | None]) -> None:
-        """Solve those of the sets that are not known yet."""
-        new = [shares for shares in wanted if _name(shares) not in self.known]
+    def solve_missing(self, parameter_sets: Sequence[Field | None]) -> None:
+        """Solve the sets that have not been solved yet."""
+        new = [shares for shares in parameter_sets if _name(shares) not in self.known]
         if new:
             self.known.update(zip(map(_name, new), self.solve(new), strict=True))
 
     def curve(self, shares: Field | None) -> WearCurve:
-        """The wear curve of one set."""
-        self.learn([shares])
+        """Return the wear curve of one set."""
+        self.solve_missing([shares])
         return WearCurve(np.array(self.sq), self.known[_name(shares)])
 
-    def misses(self, shares: Field | None) -> Field:
-        """What each anchor that is aimed at is missed by, in its tolerances."""
+    def residuals(self, shares: Field | None) -> Field:
+        """Return the residual of each fitted anchor, in its tolerances."""
         curve = self.curve(shares)
         if not (curve.table["status"] == DONE).any():
-            return np.full(len(self.aimed), LOST)
-        each = ((anchor, anchor.evaluate(curve)[0]) for anchor in self.aimed)
+            return np.full(len(self.aimed), MISSING_RESIDUAL)
+        values = ((anchor, anchor.evaluate(curve)[0]) for anchor in self.aimed)
         return np.array(
             [
-                anchor.miss(ours) / anchor.tolerance if np.isfinite(ours) else LOST
-                for anchor, ours in each
+                anchor.miss(value) / anchor.tolerance if np.isfinite(value) else MISSING_RESIDUAL
+                for anchor, value in values
             ]
         )
 
     def misfit(self, shares: Field | None) -> float:
-        """Sum of the squared misses."""
-        return float(np.sum(self.misses(shares) ** 2))
+        """Return the sum of squared residuals."""
+        return float(np.sum(self.residuals(shares) ** 2))
 
-    def checked(self, calibrated: Case) -> WearCurve:
-        """The calibrated case on its own cells, on surfaces of its own at every level."""
+    def check(self, calibrated: Case) -> WearCurve:
+        """Solve the calibrated case on its own grid, with independent surfaces at every level."""
         plan = plan_points(calibrated, sq_points(self.sq), seeds=CHECK_SEEDS)
-        return WearCurve(np.array(self.sq), with_silence(self._run(plan, "check")))
+        return WearCurve(np.array(self.sq), with_full_film_limits(self._run(plan, "check")))
 
 
 def _name(shares: Field | None) -> tuple[float, ...] | None:
@@ -112,25 +110,25 @@ def _name(shares: Field | None) -> tuple[float, ...] | None:
 
 
 def least_misfit(solver: MisfitSolver, screened: int, starts: int, seed: int) -> Field:
-    """The shares of least misfit among all that were tried."""
+    """Return the shares of least misfit among all sets tried."""
     count = len(solver.ranges)
     cube = [
         np.round(shares, 6)
         for shares in scipy.stats.qmc.LatinHypercube(count, rng=seed).random(screened)
     ]
-    solver.learn([None, *cube])
+    solver.solve_missing([None, *cube])
     if not any((table["status"] == DONE).any() for table in solver.known.values()):
         reasons = next(iter(solver.known.values()))["reason"]
         raise AsperityError(f"no parameter set could be solved: {reasons.iloc[0]}")
     for first in sorted(cube, key=solver.misfit)[:starts]:
         scipy.optimize.least_squares(
-            solver.misses,
+            solver.residuals,
             np.clip(first, EDGE, 1.0 - EDGE),
-            jac=partial(_central, solver),
+            jac=partial(_central_differences, solver),
             bounds=(0.0, 1.0),
-            max_nfev=MOST_STEPS,
-            xtol=NEARER,
-            ftol=NEARER,
+            max_nfev=MAX_STEPS,
+            xtol=TOLERANCE,
+            ftol=TOLERANCE,
         )
     return min(
         (np.array(shares) for shares in solver.known if shares is not None), key=solver.misfit
@@ -138,7 +136,7 @@ def least_misfit(solver: MisfitSolver, screened: int, starts: int, seed: int) ->
 
 
 def neighbours(shares: Field) -> list[tuple[Field, Field]]:
-    """For each share the two sets STEP below and above it, inside the ranges."""
+    """Return, for each share, the two sets STEP below and above it, inside the ranges."""
     pairs = []
     for i in range(shares.size):
         low, high = shares.copy(), shares.copy()
@@ -147,12 +145,12 @@ def neighbours(shares: Field) -> list[tuple[Field, Field]]:
     return pairs
 
 
-def _central(solver: MisfitSolver, shares: Field) -> Field:
-    """Slopes of the misses by differences, shape (anchors, shares); all that they need in one study."""
+def _central_differences(solver: MisfitSolver, shares: Field) -> Field:
+    """Return the Jacobian of the residuals, shape (anchors, shares), from one study."""
     pairs = neighbours(shares)
-    solver.learn([shares, *itertools.chain(*pairs)])
+    solver.solve_missing([shares, *itertools.chain(*pairs)])
     columns = [
-        (solver.misses(high) - solver.misses(low)) / (high[i] - low[i])
+        (solver.residuals(high) - solver.residuals(low)) / (high[i] - low[i])
         for i, (low, high) in enumerate(pairs)
     ]
     return np.stack(columns, axis=1)

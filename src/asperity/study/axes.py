@@ -1,6 +1,6 @@
-"""A study's rows over what was swept: each case's place on an axis, means at each place, outputs that vary.
+"""Swept axes of a study's table: values of each case, means at each value, varying outputs.
 
-Swept quantities are in the unit that they were written in.
+Swept quantities keep the unit of the case file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,15 +13,15 @@ import pandas
 from asperity.case import split_amount
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.study.curve import student_reach
+from asperity.study.curve import student_half_width
 from asperity.study.plan import StudyPlan, as_written
 from asperity.study.ranges import stated_value
 
-MOST_VALUES = 12  # of a swept quantity that has a mean each, however few cases share one
-GROUPS = 8  # of one with more
-SAME = 1e-9  # relative difference that is rounding
-CHOICES = ("law", "kind", "file")  # keys that say what a table is
-OUTPUTS = (  # columns of a study's table that are looked at, in the order in which they are shown
+MAX_VALUES = 12  # up to this many values of a swept quantity, each has a mean of its own
+GROUPS = 8  # groups of a quantity with more values
+ROUNDING = 1e-9  # relative difference attributed to rounding
+CHOICES = ("law", "kind", "file")  # keys that name the choice made in a table
+OUTPUTS = (  # columns of a study's table to show, in display order
     "clr",
     "car",
     "car_domain",
@@ -45,27 +45,27 @@ OUTPUTS = (  # columns of a study's table that are looked at, in the order in wh
 
 @dataclass(frozen=True)
 class SweptAxis:
-    """A swept quantity over the rows of a table: numbers in `unit`, or the places of names."""
+    """A swept quantity over the rows of a table: numbers in `unit`, or indices into `names`."""
 
     key: str
     values: Field  # (rows,)
-    unit: str = ""  # as the case file writes it
-    names: tuple[str, ...] = ()  # of the places, where it is no number
+    unit: str = ""  # as in the case file
+    names: tuple[str, ...] = ()  # of the values, where these are not numbers
     logarithmic: bool = False
 
     @property
-    def places(self) -> Field:
-        """The different values, in order."""
+    def distinct(self) -> Field:
+        """The distinct values, in order."""
         return np.unique(self.values)
 
     @property
     def binned(self) -> bool:
-        """Whether means are those of groups of neighbours: of samples no two are alike."""
-        return self.places.size > max(MOST_VALUES, 0.5 * self.values.size)
+        """True if means are taken over groups of neighbouring values, as for random samples."""
+        return self.distinct.size > max(MAX_VALUES, 0.5 * self.values.size)
 
 
 def swept_axis(plan: StudyPlan, table: pandas.DataFrame, key: str) -> SweptAxis:
-    """A swept key over the rows of a study's table, in the unit that its first value was written in."""
+    """Return a swept key over the rows of a study's table, in the unit of its first value."""
     own = stated_value(plan.case, key)
     own = "not set" if own is None else own
     written = [plan.cases[number].overrides.get(key, own) for number in table["number"]]
@@ -78,18 +78,18 @@ def swept_axis(plan: StudyPlan, table: pandas.DataFrame, key: str) -> SweptAxis:
             names = {text: text for text in names}
         values = np.array([list(names).index(text) for text in texts], dtype=float)
         return SweptAxis(key, values, names=tuple(names.values()))
-    return SweptAxis(key, numbers, unit, logarithmic=_crowds_low(np.unique(numbers)))
+    return SweptAxis(key, numbers, unit, logarithmic=_logarithmic(np.unique(numbers)))
 
 
 def varying_outputs(table: pandas.DataFrame) -> list[str]:
-    """Which of `OUTPUTS` a study's table holds and vary in it; CRF and CRFA once where the presets have theirs."""
+    """Return the keys of `OUTPUTS` that vary in a study's table; CRF and CRFA by preset if any."""
     by_preset = ("crf_hz", "crfa") if "crf_sound_hz" in table else ()
-    there = [key for key in OUTPUTS if key in table and key not in by_preset]
-    return [key for key in there if _varies(table[key].to_numpy(dtype=float))]
+    present = [key for key in OUTPUTS if key in table and key not in by_preset]
+    return [key for key in present if _varies(table[key].to_numpy(dtype=float))]
 
 
 def group_means(x: Field, values: Field, *, binned: bool) -> tuple[Field, Field, Field, Field]:
-    """Means over cases with one x, or over near ones, and Student's interval of each mean: x, mean, low, high."""
+    """Return x, mean and Student's interval (low, high) over cases of equal or neighbouring x."""
     group = np.unique(x, return_inverse=True)[1]
     if binned:
         group = np.searchsorted(
@@ -99,48 +99,48 @@ def group_means(x: Field, values: Field, *, binned: bool) -> tuple[Field, Field,
     for number in np.unique(group):
         members = values[group == number]
         mean = members.mean()
-        reach = student_reach(members.std(ddof=1), members.size) if members.size > 1 else np.nan
-        rows.append((x[group == number].mean(), mean, mean - reach, mean + reach))
-    places, means, low, high = np.array(rows, dtype=float).reshape(-1, 4).T
-    return places, means, low, high
+        half = student_half_width(members.std(ddof=1), members.size) if members.size > 1 else np.nan
+        rows.append((x[group == number].mean(), mean, mean - half, mean + half))
+    centres, means, low, high = np.array(rows, dtype=float).reshape(-1, 4).T
+    return centres, means, low, high
 
 
 def pair_means(values: Field, across: SweptAxis, up: SweptAxis) -> Field:
-    """Means over the cases at each pair of places, shape (places up, places across); nan where there is none."""
-    rows, columns = up.places, across.places
+    """Return means over the cases at each pair of values, shape (up, across); nan without cases."""
+    rows, columns = up.distinct, across.distinct
     cells = np.full((rows.size, columns.size), np.nan)
     for j, row in enumerate(rows):
         for i, column in enumerate(columns):
-            here = values[(across.values == column) & (up.values == row) & np.isfinite(values)]
-            if here.size:
-                cells[j, i] = here.mean()
+            members = values[(across.values == column) & (up.values == row) & np.isfinite(values)]
+            if members.size:
+                cells[j, i] = members.mean()
     return cells
 
 
 def _varies(values: Field) -> bool:
-    """Whether numbers differ by more than their last digits."""
+    """Return True if numbers differ by more than rounding."""
     known = values[np.isfinite(values)]
-    return known.size > 0 and float(np.ptp(known)) > SAME * float(np.abs(known).max())
+    return known.size > 0 and float(np.ptp(known)) > ROUNDING * float(np.abs(known).max())
 
 
 def _short(value: Any) -> str:
-    """A table by what it chooses, a file by its name."""
+    """Return a short label: the choice of a table, the name of a file."""
     if isinstance(value, Mapping):
         value = next((value[key] for key in CHOICES if key in value), value)
     return as_written(value).rpartition("/")[2]
 
 
 def _numbers(written: Sequence[Any]) -> tuple[Field, str]:
-    """Values in the first one's unit; BadInput where one is no number or an uneven pair."""
+    """Return values in the unit of the first; BadInput for a non-number or an uneven pair."""
     pairs = [list(value) if isinstance(value, list | tuple) else [value] for value in written]
     if any(entry != pair[0] for pair in pairs for entry in pair):
-        raise BadInput("uneven pairs are no single numbers")
+        raise BadInput("a pair of different values is not a single number")
     single = [pair[0] for pair in pairs]
     unit = split_amount(single[0])[1]
     return np.array([float(split_amount(value, unit)[0]) for value in single]), unit
 
 
-def _crowds_low(places: Field) -> bool:
-    """Whether most values stand near the lower end, as on a logarithmic scale."""
-    low, high = float(places[0]), float(places[-1])
-    return low > 0.0 and high >= 4.0 * low and float(np.median(places)) - low < 0.35 * (high - low)
+def _logarithmic(values: Field) -> bool:
+    """Return True if most values lie at the lower end, as on a logarithmic scale."""
+    low, high = float(values[0]), float(values[-1])
+    return low > 0.0 and high >= 4.0 * low and float(np.median(values)) - low < 0.35 * (high - low)

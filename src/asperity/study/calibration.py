@@ -1,14 +1,15 @@
-"""The quantities of a case that best meet what is known of its wear curve: found on the real solver, with the cost.
+"""Calibration of a case's free quantities to anchors of its wear curve.
 
-Least squares of scipy from the best of a Latin hypercube. The objective is a little rough (a moved
-domain or correlation length draws the surface anew), so slopes are taken over a tenth of each
-range, and what seeds alone do to them is taken out before anything is called determined.
+Least squares (scipy) starts from the best points of a Latin hypercube. The objective is slightly
+rough because a changed domain or correlation length draws a new surface, so slopes are taken over
+a tenth of each range and their scatter over seeds is removed from the information.
 docs/theory/calibration.md has the equations.
 """
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,8 @@ from asperity.paper import PAPER_ANCHORS, SPLIT_ANCHOR, Anchor, compare_with_anc
 from asperity.study.anchor_misfit import CHECK_SEEDS, EDGE, MisfitSolver, least_misfit
 from asperity.study.calibration_result import LEARNT_FROM, CalibratedParameter, Calibration
 from asperity.study.curve import SQ_KEY, WearCurve
-from asperity.study.execute import StudyProgress, study_executor
+from asperity.study.execute import StudyProgress, StudyResult, run_study, study_executor
+from asperity.study.plan import StudyPlan
 from asperity.study.ranges import (
     OPEN_RANGES,
     ParameterRange,
@@ -34,52 +36,71 @@ from asperity.study.ranges import (
 )
 from asperity.study.sensitivities import PRIOR_VARIANCE, MisfitSlopes
 
-FREE = OPEN_RANGES[:4]  # what decides CAR and CLR: cap, correlation length, alpha, inlet
-CELLS, SEEDS, SCREENED, STARTS = 128, 3, 32, 2
-SLOPE_SEEDS = 2  # times as many surfaces for the slopes at the end as for the fit
-SAME_LEVEL = 0.02  # Sq nearer than this to another are solved once
+FREE = OPEN_RANGES[:4]  # they control CAR and CLR: cap, correlation length, alpha, inlet
+SLOPE_SEEDS = 2  # the final slopes use this many times the surfaces of the fit
+SAME_LEVEL = 0.02  # relative difference below which two levels of Sq are solved as one
 RESERVED = {
-    SQ_KEY: "anchors are at roughnesses of their own",
-    "surface.seed": "what is found should not hang on one surface; give seeds",
-    "vibration.seed": "what is found should not hang on one record; give seeds",
-    "grid.cells": "they go with the domain; give cells",
+    SQ_KEY: "the anchors set the roughness",
+    "surface.seed": "the result should not depend on one surface; give seeds",
+    "vibration.seed": "the result should not depend on one record; give seeds",
+    "grid.cells": "they follow the domain; give cells",
 }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrationSettings:
+    """Settings of a calibration.
+
+    Parameters
+    ----------
+    free : ranges to search, or their texts (`parse_range`); by default those of pressure cap,
+        correlation length, pressure-viscosity coefficient and inlet that the case has
+    levels : roughnesses to solve at [m]; by default those of the anchors
+    cells : along each axis of the widest domain; None: the case's own
+    seeds : surfaces per level, the same in every evaluation
+    screened : parameter sets of the Latin hypercube
+    starts : number of the best sets that least squares starts from
+    sample_seed : random seed of the hypercube
+    """
+
+    free: Sequence[ParameterRange | str] | None = None
+    levels: Sequence[float] | None = None
+    cells: int | None = 128
+    seeds: int = 3
+    screened: int = 32
+    starts: int = 2
+    sample_seed: int = 0
+
+    def ranges(self, case: Case) -> tuple[ParameterRange, ...]:
+        """Return the ranges to search; BadInput for one that the case refuses."""
+        if self.free is None:
+            ranges = open_ranges(case, FREE)
+        else:
+            ranges = tuple(parse_range(r) if isinstance(r, str) else r for r in self.free)
+        require_ranges(case, ranges, RESERVED)
+        return ranges
 
 
 def calibrate(
     case: Case,
     anchors: Sequence[Anchor] = PAPER_ANCHORS,
     *,
-    free: Sequence[ParameterRange | str] | None = None,
-    levels: Sequence[float] | None = None,
-    cells: int | None = CELLS,
-    seeds: int = SEEDS,
-    screened: int = SCREENED,
-    starts: int = STARTS,
-    sample_seed: int = 0,
+    settings: CalibrationSettings | None = None,
     out: str | Path | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> Calibration:
-    """Find the values of free quantities with which a case's wear curve best meets anchors.
+    """Fit free quantities of a case so that its wear curve meets anchors.
 
-    The misfit is the sum over the anchors that are `fitted` of (miss/tolerance)^2, on means over
-    `seeds` surfaces that are the same in every evaluation.
+    The misfit is the sum over the `fitted` anchors of (miss/tolerance)^2, on means over surfaces.
 
     Parameters
     ----------
-    case : the contact; what is not free stays as it is
-    anchors : what the curve should meet
-    free : ranges to search, or their texts (`parse_range`); by default pressure cap, correlation length,
-        pressure-viscosity coefficient and inlet, as far as the case has them
-    levels : roughnesses to solve at [m]; by default the anchors' own
-    cells : along each axis of the widest domain; None: the case's own
-    seeds : surfaces a level
-    screened : parameter sets of the Latin hypercube that the starts are chosen from
-    starts : how many of the best least squares starts from
-    sample_seed : of the hypercube
-    out : folder that keeps every evaluation, so that a second call goes on where the first was stopped
+    case : the contact; quantities that are not free keep their values
+    anchors : values that the curve should meet
+    settings : free ranges, levels, grid, seeds and search effort; None: the defaults
+    out : folder that stores every evaluation; a second call resumes from it
     executor, workers, progress : see `run_study`
 
     Raises
@@ -89,25 +110,25 @@ def calibrate(
     AsperityError
         if no parameter set can be solved.
     """
-    given, case = case, at_cells(case, cells)
-    wanted = (
-        FREE if free is None else tuple(parse_range(r) if isinstance(r, str) else r for r in free)
-    )
-    ranges = open_ranges(case, wanted) if free is None else wanted
-    require_ranges(case, ranges, RESERVED)
+    settings = settings or CalibrationSettings()
+    given, case = case, at_cells(case, settings.cells)
+    ranges = settings.ranges(case)
     aimed = _aimed_at(case, anchors)
-    sq = _levels(aimed, levels)
-    for name, count in (("seeds", seeds), ("screened", screened), ("starts", starts)):
-        if count < 1:
-            raise BadInput(f"{name} must be 1 or more, got {count}")
+    sq = _levels(aimed, settings.levels)
+    for name in ("seeds", "screened", "starts"):
+        if getattr(settings, name) < 1:
+            raise BadInput(f"{name} must be 1 or more, got {getattr(settings, name)}")
     with nullcontext(executor) if executor is not None else study_executor(workers) as pool:
-        solver = MisfitSolver(
-            case, ranges, aimed, sq, seeds, None if out is None else Path(out), pool, progress
-        )
-        best = least_misfit(solver, screened, starts, sample_seed)
-        slopes = MisfitSlopes.at(solver, best, SLOPE_SEEDS * seeds)
+
+        def run(plan: StudyPlan, folder: str) -> StudyResult:
+            path = None if out is None else Path(out) / folder
+            return run_study(plan, out=path, executor=pool, progress=progress)
+
+        solver = MisfitSolver(case, ranges, aimed, sq, settings.seeds, run)
+        best = least_misfit(solver, settings.screened, settings.starts, settings.sample_seed)
+        slopes = MisfitSlopes.from_differences(solver, best, SLOPE_SEEDS * settings.seeds)
         calibrated = _calibrated(given, ranges, best)
-        check = solver.checked(calibrated)
+        check = solver.check(calibrated)
     return _result(given, calibrated, anchors, solver, best, slopes, check)
 
 
@@ -150,11 +171,11 @@ def _result(
 def _aimed_at(case: Case, anchors: Sequence[Anchor]) -> tuple[Anchor, ...]:
     aimed = tuple(anchor for anchor in anchors if anchor.fitted)
     if not aimed:
-        raise BadInput("calibration needs an anchor to aim at, got none; leave out fitted = false")
+        raise BadInput("calibration needs a fitted anchor, got none; remove fitted = false")
     for anchor in aimed:
         if anchor.quantity == SPLIT_ANCHOR:
             raise BadInput(
-                f"anchor {anchor.name!r} is a split, which moves in jumps; set fitted = false for it"
+                f"anchor {anchor.name!r} is a split, which varies in steps; set fitted = false"
             )
         if case.vibration is None and anchor.quantity.startswith("crf"):
             raise BadInput(
@@ -164,7 +185,7 @@ def _aimed_at(case: Case, anchors: Sequence[Anchor]) -> tuple[Anchor, ...]:
 
 
 def _levels(aimed: Sequence[Anchor], levels: Sequence[float] | None) -> tuple[float, ...]:
-    """Roughnesses to solve at [m]: those given, or the anchors', of near ones the outer."""
+    """Return the roughnesses to solve at [m]: as given, or the anchors' with close ones merged."""
     anchored = sorted(
         {sq for anchor in aimed for sq in (anchor.sq, anchor.since) if sq is not None}
     )
@@ -176,7 +197,8 @@ def _levels(aimed: Sequence[Anchor], levels: Sequence[float] | None) -> tuple[fl
             or chosen[-1] < anchored[-1] * (1 - 1e-9)
         ):
             raise BadInput(
-                f"levels must span the anchors' Sq from {1e6 * anchored[0]:g} to {1e6 * anchored[-1]:g} um, "
+                f"levels must span the anchors' Sq from {1e6 * anchored[0]:g} to "
+                f"{1e6 * anchored[-1]:g} um, "
                 f"got {', '.join(f'{1e6 * level:g}' for level in chosen) or 'none'}"
             )
         return tuple(chosen)
@@ -189,7 +211,7 @@ def _levels(aimed: Sequence[Anchor], levels: Sequence[float] | None) -> tuple[fl
 
 
 def _calibrated(case: Case, ranges: Sequence[ParameterRange], best: Field) -> Case:
-    """The case with what was found, on its own cells, and a study of its wear curve where it has none."""
+    """Return the case with the fitted values, its own cells and a [study] of its wear curve."""
     overrides = overrides_at(case, ranges, best)
     overrides.pop("grid.cells", None)
     if case.contents.study is None:
@@ -206,8 +228,8 @@ def _parameters(
     parameters = []
     for entry, share, std in zip(ranges, best, deviations, strict=True):
         learnt = float(1.0 - std**2 / PRIOR_VARIANCE)
-        reach = (share - std, share + std) if learnt >= LEARNT_FROM else (0.0, 1.0)
-        low, high = (entry.value(min(max(end, 0.0), 1.0)) for end in reach)
+        ends = (share - std, share + std) if learnt >= LEARNT_FROM else (0.0, 1.0)
+        low, high = (entry.value(min(max(end, 0.0), 1.0)) for end in ends)
         parameters.append(
             CalibratedParameter(
                 range=entry,
@@ -224,15 +246,15 @@ def _parameters(
 
 
 def _start(case: Case, entry: ParameterRange) -> float | None:
-    """What the case itself has, in the range's unit; of a pair in which both are free as one, the first."""
+    """Return the case's own value in the range's unit; the first entry of a pair."""
     value = stated_value(case, entry.key)
     value = value[0] if isinstance(value, list) else value
     return None if value is None else float(split_amount(value, entry.unit)[0])
 
 
 def _compared(curve: WearCurve, anchors: Sequence[Anchor]) -> pandas.DataFrame:
-    """The anchors that the curve's levels can tell."""
-    reached = [a for a in anchors if a.sq is not None and np.isfinite(a.evaluate(curve)[0])]
+    """Compare the curve with the fitted anchors and those within its levels."""
+    covered = [a for a in anchors if a.sq is not None and np.isfinite(a.evaluate(curve)[0])]
     return compare_with_anchors(
-        curve, [*reached, *(a for a in anchors if a.fitted and a not in reached)]
+        curve, [*covered, *(a for a in anchors if a.fitted and a not in covered)]
     )

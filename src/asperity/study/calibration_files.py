@@ -1,4 +1,4 @@
-"""What a calibration leaves on disk: the case it found, as a file, and its misses as one table."""
+"""Files of a calibration: the calibrated case and the table of anchors."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,13 +14,13 @@ SURFACE_FILES = ("surface.file", "surface.second.file")
 
 
 def calibrated_text(calibration: Calibration, folder: Path) -> str:
-    """The calibrated case as a file in `folder`, what it meets above it."""
+    """Return the text of the calibrated case file in `folder`, headed by the verdict."""
     heading = f"# {calibration.case.source}, calibrated by asperity. {calibration.verdict()}"
-    return f"{heading}\n\n{_moved(calibration.calibrated, folder).text}"
+    return f"{heading}\n\n{_relocated(calibration.calibrated, folder).text}"
 
 
 def anchor_table(calibration: Calibration) -> "pandas.DataFrame":
-    """A row an anchor and curve: the case as given, fitted, and checked on its own cells and new surfaces."""
+    """Return one row per anchor and curve: as given, fitted, and checked on new surfaces."""
     import pandas
 
     tables = {
@@ -31,8 +31,8 @@ def anchor_table(calibration: Calibration) -> "pandas.DataFrame":
     return pandas.concat([table.assign(curve=name) for name, table in tables.items()])
 
 
-def _moved(case: Case, folder: Path) -> Case:
-    """The case with its surface files named as seen from `folder`."""
+def _relocated(case: Case, folder: Path) -> Case:
+    """Return the case with its surface files relative to `folder`."""
     files = {key: stated_value(case, key) for key in SURFACE_FILES}
     moved = {
         key: relative_path(case.folder / name, folder)

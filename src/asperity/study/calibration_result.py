@@ -1,4 +1,4 @@
-"""What a calibration found: values with their open ends, directions, trade-offs, and the curves behind them."""
+"""Result of a calibration: values with intervals, directions, trade-offs and wear curves."""
 
 import math
 from dataclasses import dataclass, field
@@ -13,16 +13,15 @@ from asperity.paper import Anchor
 from asperity.study.curve import WearCurve
 from asperity.study.ranges import ParameterRange
 
-# share of a range's variance that the anchors must take away from a quantity to determine it
-LEARNT_FROM = 0.5
+LEARNT_FROM = 0.5  # fraction of prior variance removed from which on a quantity is identifiable
 
 
 class CalibratedParameter(NamedTuple):
-    """A quantity that was free: what was found, and how well the anchors determine it.
+    """A calibrated quantity and its uncertainty.
 
-    `low` and `high` are one standard deviation either way, the range searched counting as what was
-    known before, and the whole range where the anchors do not determine the quantity; `learnt` is
-    how much of the range's variance they took away, 0 nothing, 1 all.
+    `low` and `high` are one standard deviation either side of `value` with the searched range as
+    prior, or the whole range if the quantity is not identifiable; `learnt` is the fraction of the
+    prior variance that the anchors remove, 0 to 1.
     """
 
     range: ParameterRange
@@ -36,12 +35,12 @@ class CalibratedParameter(NamedTuple):
 
     @property
     def identifiable(self) -> bool:
-        """Whether the anchors determine it, rather than the range."""
+        """True if the anchors, not the range, determine the quantity."""
         return self.learnt >= LEARNT_FROM
 
 
 class ParameterDirection(NamedTuple):
-    """A direction in the space of shares: `weights` of the quantities, how far the anchors let it go (in ranges)."""
+    """A direction in the space of shares: `weights` of the quantities, standard deviation."""
 
     weights: tuple[float, ...]
     std: float
@@ -49,10 +48,10 @@ class ParameterDirection(NamedTuple):
 
 
 class TradeOff(NamedTuple):
-    """What the others would gain if one anchor were given up: by slopes, so for small steps only.
+    """Effect of dropping one anchor on the fit of the others, linearised.
 
-    `misfit` of the others (sum of squared misses in tolerances) would go to `without`; `relieved`
-    would gain most, its miss in tolerances going from `miss` to `miss_without`.
+    The `misfit` of the others (sum of squared residuals in tolerances) would drop to `without`;
+    `relieved` would gain most, its residual changing from `miss` to `miss_without`.
     """
 
     given_up: str
@@ -65,23 +64,23 @@ class TradeOff(NamedTuple):
 
 @dataclass(frozen=True)
 class Calibration:
-    """What best meets the anchors, and what that leaves open.
+    """Values that best meet the anchors, and their uncertainty.
 
     Parameters
     ----------
     case : as given, on the cells of the fit
-    calibrated : the case with what was found, on its own cells, ready for `asperity study`
-    anchors : all of them; `aimed_at` are those that decided
+    calibrated : the case with the fitted values, on its own cells, ready for `asperity study`
+    anchors : all of them; `aimed_at` are the fitted ones
     parameters : of the free quantities, in order
     correlation : shape (parameters, parameters)
     directions : of the free quantities, the best determined first
-    trade_offs : the dearest anchor first
-    start, fit, check : as `compare_with_anchors` has it. `check` is on the case's own cells, with surfaces that the fit
-        has not seen; `low` and `high` are 90 % intervals over seeds
-    misfit, start_misfit : sums of squared misses in tolerances
-    evaluations, cases : parameter sets tried, contacts solved or found in the folder
-    failed : contacts that failed or did not converge, and were left out
-    seconds : it took
+    trade_offs : the most costly anchor first
+    start, fit, check : from `compare_with_anchors`. `check` uses the case's own cells and surfaces
+        not used in the fit; `low` and `high` are 90 % intervals over seeds
+    misfit, start_misfit : sums of squared residuals in tolerances
+    evaluations, cases : parameter sets tried, contacts solved or read from the folder
+    failed : contacts that failed or did not converge, left out
+    seconds : computing time
     """
 
     case: Case
@@ -106,7 +105,7 @@ class Calibration:
 
     @property
     def aimed_at(self) -> tuple[Anchor, ...]:
-        """The anchors that decided."""
+        """The anchors that were fitted."""
         return tuple(anchor for anchor in self.anchors if anchor.fitted)
 
     @property
@@ -117,17 +116,18 @@ class Calibration:
         )
 
     def verdict(self) -> str:
-        """What was found, what it meets, what cannot be met together and what stays open."""
+        """Return the values found, the anchors met and missed, and the undetermined quantities."""
         aimed = {anchor.name for anchor in self.aimed_at}
-        met = self.fit[self.fit["anchor"].isin(aimed)]
+        fitted = self.fit[self.fit["anchor"].isin(aimed)]
         missed = [
             f"{row.anchor} ({row.ours:.4g} for {row.printed:g})"
-            for row in met[~met["met"]].itertuples()
+            for row in fitted[~fitted["met"]].itertuples()
         ]
         values = ", ".join(
             f"{p.range.key} {p.value:.3g} {p.range.unit}".rstrip() for p in self.parameters
         )
-        sentence = f"{int(met['met'].sum())} of {len(met)} anchors are met within their tolerances with {values}"
+        count = f"{int(fitted['met'].sum())} of {len(fitted)}"
+        sentence = f"{count} anchors are met within their tolerances with {values}"
         sentence += f"; missed: {', '.join(missed)}." if missed else "."
         if self.unidentifiable:
             sentence += f" Not determined by the anchors: {', '.join(self.unidentifiable)}."
@@ -137,7 +137,7 @@ class Calibration:
         return sentence
 
     def scalars(self) -> dict[str, Any]:
-        """What `asperity calibrate --json` prints; None where there is none."""
+        """Return the JSON output of `asperity calibrate`."""
 
         def rows(table: pandas.DataFrame) -> list[dict[str, Any]]:
             return [
@@ -177,7 +177,7 @@ class Calibration:
 
 
 def as_json(value: Any) -> Any:
-    """A value of a table as JSON holds it: None for nan and infinity."""
+    """Convert a table entry to JSON: None for nan and infinity."""
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

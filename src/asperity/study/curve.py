@@ -1,4 +1,4 @@
-"""The wear curve, the paper's Figs 7 and 8: roughness to load sharing to contact resonance to stage, over seeds."""
+"""Wear curve (the paper's Figs 7 and 8): load sharing, contact resonance and stages over Sq."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
@@ -19,7 +19,7 @@ from asperity.study.plan import plan_points
 from asperity.trend import StageErrors, Stages, split_stages
 
 SQ_KEY = "surface.sq"
-MEAN_CONFIDENCE = 0.90  # of the intervals of means
+MEAN_CONFIDENCE = 0.90  # confidence level of intervals of means
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class WearCurve:
 
     Parameters
     ----------
-    sq : shape (levels,), roughness wanted [m], rising
-    table : a row a case, as in `StudyResult.table`; what failed is left out of every mean
+    sq : shape (levels,), nominal roughness [m], ascending
+    table : one row per case, as in `StudyResult.table`; failed cases are left out of every mean
     """
 
     sq: Field
@@ -41,12 +41,12 @@ class WearCurve:
         return int((self.table["status"] != DONE).sum())
 
     def values(self, quantity: str, level: int) -> Field:
-        """Every seed's value of a column at a level, shape (seeds,); seeds without one are left out.
+        """Return every seed's finite value of a column at a level, shape (seeds,).
 
         Raises
         ------
         BadInput
-            for a column that the table has not.
+            for a column that the table does not have.
         """
         if quantity not in self.table:
             raise BadInput(
@@ -57,18 +57,18 @@ class WearCurve:
         return np.asarray(values[np.isfinite(values)])
 
     def by_case(self, quantity: str) -> tuple[Field, Field]:
-        """Sq [m] and value of every case that may be used and has a value, each (cases,)."""
+        """Return Sq [m] and value of every valid case, each of shape (cases,)."""
         rows = self.table[self.table["status"] == DONE].dropna(subset=quantity)
         return rows[SQ_KEY].to_numpy(dtype=float), rows[quantity].to_numpy(dtype=float)
 
     def mean(self, quantity: str) -> Field:
-        """Mean over seeds, shape (levels,); nan where no seed has a value."""
+        """Return the mean over seeds, shape (levels,); nan where no seed has a value."""
         return np.array(
             [values.mean() if values.size else np.nan for values in self._by_level(quantity)]
         )
 
     def std(self, quantity: str) -> Field:
-        """Standard deviation over seeds, of one surface against another, shape (levels,)."""
+        """Return the standard deviation over seeds (single surfaces), shape (levels,)."""
         return np.array(
             [
                 values.std(ddof=1) if values.size > 1 else np.nan
@@ -77,16 +77,16 @@ class WearCurve:
         )
 
     def interval(self, quantity: str, level: float = MEAN_CONFIDENCE) -> Field:
-        """Student's interval of the mean over seeds, shape (levels, 2); nan with fewer than two seeds."""
+        """Return Student's interval of the mean, shape (levels, 2); nan for fewer than 2 seeds."""
         counts = np.array([values.size for values in self._by_level(quantity)])
-        reach = student_reach(self.std(quantity), counts, level)
-        return self.mean(quantity)[:, None] + np.outer(reach, (-1.0, 1.0))
+        half_width = student_half_width(self.std(quantity), counts, level)
+        return self.mean(quantity)[:, None] + np.outer(half_width, (-1.0, 1.0))
 
     def interpolate(
         self, sq: float, quantity: str, level: float = MEAN_CONFIDENCE
     ) -> tuple[float, float, float]:
-        """Mean at any roughness [m] and its interval, straight between levels; nan outside of them."""
-        mean, reach = (
+        """Interpolate mean and interval linearly at a roughness [m]; nan outside the levels."""
+        mean, half_width = (
             self.mean(quantity),
             np.diff(self.interval(quantity, level), axis=1)[:, 0] / 2.0,
         )
@@ -102,14 +102,13 @@ class WearCurve:
             weights[right - 1 : right + 1] = 1.0 - share, share
         used = weights > 0.0
         middle = float(weights[used] @ mean[used])
-        off = float(
-            np.sqrt(np.sum((weights[used] * reach[used]) ** 2))
-        )  # neighbouring levels have their own surfaces
-        return middle, middle - off, middle + off
+        # the surfaces of neighbouring levels are independent
+        error = float(np.sqrt(np.sum((weights[used] * half_width[used]) ** 2)))
+        return middle, middle - error, middle + error
 
     @cached_property
     def stages(self) -> dict[str, Stages]:
-        """Stages along Sq in micrometres, from the CRF and CRFA of each vibration preset; empty without vibration."""
+        """Stages over Sq [um] from CRF and CRFA of each preset; empty without vibration."""
         rows, stages = self.table[self.table["status"] == DONE], {}
         for preset in BOTH_PRESETS:
             if f"crf_{preset}_hz" in rows:
@@ -121,7 +120,7 @@ class WearCurve:
         return stages
 
     def summary(self) -> pandas.DataFrame:
-        """Mean, standard deviation and interval of the paper's quantities, a row a level."""
+        """Return mean, deviation and interval of the paper's quantities, one row per level."""
         columns: dict[str, Field] = {"sq_um": 1e6 * self.sq}
         for name in self.quantities:
             low, high = self.interval(name).T
@@ -135,24 +134,25 @@ class WearCurve:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The columns that the paper's Figs 7 and 8 show, and those of contacts that were shaken."""
+        """Columns shown in the paper's Figs 7 and 8, and dynamic stiffness and damping if any."""
         resonances = [
             key for preset in BOTH_PRESETS for key in (f"crf_{preset}_hz", f"crfa_{preset}")
         ]
         own = ("contact_damping_ratio", "contact_damping_ratio_virgin", "contact_stiffness_n_m")
-        wanted = ("car", "car_domain", "clr", "friction_coefficient", "h_mean_m", *resonances, *own)
-        return tuple(name for name in wanted if name in self.table)
+        static = ("car", "car_domain", "clr", "friction_coefficient", "h_mean_m")
+        return tuple(name for name in (*static, *resonances, *own) if name in self.table)
 
     def verdict(self) -> str:
-        """One sentence: where load sharing and resonance go, and where wear turns severe."""
+        """Return one sentence on load sharing, resonance and the onset of severe wear."""
         sq, clr = 1e6 * self.sq, 100.0 * self.mean("clr")
         sentence = (
-            f"Between Sq {sq[0]:.3g} and {sq[-1]:.3g} um the asperities' share of the load goes from {clr[0]:.0f} to "
-            f"{clr[-1]:.0f} %"
+            f"Between Sq {sq[0]:.3g} and {sq[-1]:.3g} um the asperities' share of the load goes "
+            f"from {clr[0]:.0f} to {clr[-1]:.0f} %"
         )
         if "crf_sound_hz" in self.table:
             crf = self.mean("crf_sound_hz")
-            sentence += f", the contact resonance from {crf[0]:.0f} to {crf[-1]:.0f} Hz. {self.stages['sound'].verdict}"
+            sentence += f", the contact resonance from {crf[0]:.0f} to {crf[-1]:.0f} Hz. "
+            sentence += self.stages["sound"].verdict
         sentence = f"{sentence.rstrip('.')}."
         return (
             f"{self.left_out} CASES FAILED and are left out: {sentence}"
@@ -164,8 +164,8 @@ class WearCurve:
         return [self.values(quantity, level) for level in range(self.sq.size)]
 
 
-def student_reach(std: ArrayLike, counts: ArrayLike, level: float = MEAN_CONFIDENCE) -> Field:
-    """Half the width of Student's interval of a mean over `counts` values of this standard deviation."""
+def student_half_width(std: ArrayLike, counts: ArrayLike, level: float = MEAN_CONFIDENCE) -> Field:
+    """Return half the width of Student's interval of a mean over `counts` values."""
     quantile = scipy.special.stdtrit(np.maximum(np.asarray(counts) - 1, 1), 0.5 + level / 2.0)
     return np.asarray(quantile * std / np.sqrt(np.maximum(counts, 1)))
 
@@ -183,9 +183,9 @@ def wear_curve(
 
     Parameters
     ----------
-    case : its surface is generated anew for each case, at the wanted Sq
+    case : the contact; its surface is generated anew for each Sq and seed
     sq_values : shape (levels,) [m]
-    seeds : surfaces a level, or their seeds
+    seeds : number of surfaces per level, or their seeds
     executor, workers, progress : see `run_study`
 
     Raises
@@ -196,21 +196,21 @@ def wear_curve(
     for sq in sq_values:
         require_positive("Sq", sq, "m")
     plan = plan_points(case, sq_points(sorted(set(sq_values))), seeds=seeds)
-    return curve_of(run_study(plan, executor=executor, workers=workers, progress=progress))
+    return curve_from_study(run_study(plan, executor=executor, workers=workers, progress=progress))
 
 
 def sq_points(levels: Sequence[float]) -> list[dict[str, str]]:
-    """Points of a study at these roughnesses [m]."""
+    """Return the points of a study at these roughnesses [m]."""
     return [{SQ_KEY: f"{1e6 * sq:.9g} um"} for sq in levels]
 
 
-def curve_of(result: StudyResult) -> WearCurve:
-    """The wear curve of a study that varies Sq and nothing else.
+def curve_from_study(result: StudyResult) -> WearCurve:
+    """Return the wear curve of a study that varies only Sq.
 
     Raises
     ------
     BadInput
-        if the study varies something else, or holds no finished case.
+        if the study varies anything else or has no finished case.
     """
     if not is_wear_study(result):
         swept = ", ".join(result.plan.axes) or "none"
@@ -221,6 +221,6 @@ def curve_of(result: StudyResult) -> WearCurve:
 
 
 def is_wear_study(result: StudyResult) -> bool:
-    """Whether a study's cases differ in Sq (and seeds) alone."""
+    """Return True if a study varies only Sq and seeds."""
     swept = [key for key in result.plan.axes if key not in ("surface.seed", "vibration.seed")]
     return swept == [SQ_KEY] and result.plan.kind != "vibrate"

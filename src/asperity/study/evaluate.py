@@ -1,7 +1,7 @@
-"""One case of a study to one row: solved, made to vibrate by both vibration presets, every number by its name.
+"""Evaluation of one case of a study: solve it, compute vibrations, return one row.
 
-Runs in worker processes: takes and gives only what can be sent, raises nothing that a case can
-cause.
+Runs in worker processes: arguments and results are picklable, and a failing case returns a row
+instead of raising.
 """
 
 import logging
@@ -24,50 +24,48 @@ StudyField = Literal["pressure", "gap", "in_contact", "surface_height"]
 DONE, NOT_CONVERGED, FAILED = get_args(CaseStatus)
 FIELDS: tuple[StudyField, ...] = get_args(StudyField)
 BOTH_PRESETS = ("sound", "paper")
-QUICK = tuple(
-    group for group in RUN_GROUPS if group not in ("own", "virgin")
-)  # they take as long as the contact
+# without the dynamic stiffness, which takes as long as the contact
+QUICK = tuple(group for group in RUN_GROUPS if group not in ("own", "virgin"))
 STILL = tuple(group for group in RUN_GROUPS if group not in ("heat", "stress", "resonance"))
 
 Row = dict[str, Any]
-_alone = (
-    threading.Lock()
-)  # the solver's work arrays are one set a process, and an executor may have threads
+# the solver has one set of work arrays per process, and an executor may use threads
+_solver_lock = threading.Lock()
 
 
 def evaluate_batch(
-    case: Case, kind: str, batch: Sequence[Mapping[str, Any]], wanted: tuple[str, ...] = ()
+    case: Case, kind: str, batch: Sequence[Mapping[str, Any]], fields: tuple[str, ...] = ()
 ) -> list[tuple[Row, dict[str, Field]]]:
-    """Rows, and the fields wanted, of `case` with each of the batch's overrides.
+    """Return rows and requested fields of `case` with each of the batch's overrides.
 
-    One thread does the algebra: two would sum in another order, and a resumed study is to be the
-    same to the last bit.
+    Linear algebra uses one thread, since the order of summation must not depend on the number of
+    threads: a resumed study is bit-identical.
     """
-    with _alone, threadpool_limits(1):
-        return [evaluate(case, kind, overrides, wanted) for overrides in batch]
+    with _solver_lock, threadpool_limits(1):
+        return [evaluate(case, kind, overrides, fields) for overrides in batch]
 
 
 def timed_batch(*job: Any) -> tuple[list[tuple[Row, dict[str, Field]]], float]:
-    """`evaluate_batch`, and the seconds it took."""
-    begun = time.perf_counter()
-    return evaluate_batch(*job), time.perf_counter() - begun
+    """Return the results of `evaluate_batch` and the seconds taken."""
+    start = time.perf_counter()
+    return evaluate_batch(*job), time.perf_counter() - start
 
 
 def evaluate(
-    case: Case, kind: str, overrides: Mapping[str, Any], wanted: tuple[str, ...] = ()
+    case: Case, kind: str, overrides: Mapping[str, Any], fields: tuple[str, ...] = ()
 ) -> tuple[Row, dict[str, Field]]:
-    """The row of one case: `status`, `reason` and every scalar; a failure is a row too, and says why."""
+    """Return the row of one case: `status`, `reason` and every scalar, and the requested fields."""
     try:
-        return EVALUATIONS[kind](case.with_overrides(overrides), wanted)
+        return EVALUATIONS[kind](case.with_overrides(overrides), fields)
     except AsperityError as refusal:
         return {"status": FAILED, "reason": str(refusal)}, {}
-    except Exception as mistake:  # ours, and no reason to lose the others
+    except Exception as error:  # an internal error must not lose the other cases
         logging.getLogger(__name__).exception("a case of a study failed: %s", overrides)
-        return {"status": FAILED, "reason": f"{type(mistake).__name__}: {mistake}"}, {}
+        return {"status": FAILED, "reason": f"{type(error).__name__}: {error}"}, {}
 
 
-def _solved(
-    case: Case, wanted: tuple[str, ...], groups: Sequence[str] = QUICK
+def _solve(
+    case: Case, fields: tuple[str, ...], groups: Sequence[str] = QUICK
 ) -> tuple[Row, dict[str, Field]]:
     run = solve_case(case, strict=False)
     row: Row = {**_status(run), **run.numbers(groups)}
@@ -80,7 +78,7 @@ def _solved(
         "in_contact": run.solution.in_contact,
         "surface_height": run.solution.surface.heights,
     }
-    return row, {name: maps[name] for name in wanted}
+    return row, {name: maps[name] for name in fields}
 
 
 def _status(run: Run) -> Row:
@@ -90,33 +88,33 @@ def _status(run: Run) -> Row:
     return {"status": NOT_CONVERGED, "reason": convergence.explain()}
 
 
-def _over_surfaces(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
-    """Means over the surfaces that [solver] asks for, and intervals, as `asperity solve` gives them."""
+def _solve_surfaces(case: Case, _fields: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
+    """Return means and intervals over the surfaces set in [solver], as `asperity solve` does."""
     run = solve_case(case, surfaces=None, strict=False, groups=QUICK)
     return {**_status(run), **run.scalars()}, {}
 
 
-def _still(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
-    """The contact with its own stiffness and damping where its mass resonates, and no record of a vibration."""
+def _solve_dynamic(case: Case, _fields: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
+    """Solve the contact with its own dynamic stiffness and damping, without a vibration record."""
     run = solve_case(case.with_overrides({"vibration": "none"}), strict=False)
     return {**_status(run), **replace(run, case=case).numbers(STILL)}, {}
 
 
-def _vibrated(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
+def _vibrate(case: Case, _fields: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
     return {"status": DONE, "reason": "", **vibrate_case(case).scalars()}, {}
 
 
 EVALUATIONS: dict[str, Callable[[Case, tuple[str, ...]], tuple[Row, dict[str, Field]]]] = {
-    "solve": _solved,
-    "shake": lambda case, wanted: _solved(case, wanted, RUN_GROUPS),
-    "surfaces": _over_surfaces,
-    "still": _still,
-    "vibrate": _vibrated,
+    "solve": _solve,
+    "shake": lambda case, fields: _solve(case, fields, RUN_GROUPS),
+    "surfaces": _solve_surfaces,
+    "still": _solve_dynamic,
+    "vibrate": _vibrate,
 }
 
 
 def _both_presets(case: Case, run: Run) -> Row:
-    """CRF and CRFA of the one contact by the sound vibration preset and by the paper's."""
+    """Return CRF and CRFA of a contact for both vibration presets, "sound" and "paper"."""
     row: Row = {}
     for preset in BOTH_PRESETS:
         model = case.with_overrides({"vibration.preset": preset}).vibration

@@ -1,7 +1,7 @@
-"""A study computed: batches of cases over processes or machines, any `concurrent.futures` executor, kept as they end.
+"""Execution of a study: batches of cases on any `concurrent.futures` executor.
 
-Nothing here depends on how cases are spread: each is solved from nothing, with its own seeds, so
-that a resumed, sharded or distributed study gives what an unbroken one gives.
+Each case is solved from scratch with its own seeds, so a resumed, sharded or distributed study
+gives the same results as an uninterrupted one.
 """
 
 import math
@@ -31,31 +31,27 @@ from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.core.files import versions
 from asperity.core.processes import cores, set_up_worker
-from asperity.core.storage import MANIFEST
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, timed_batch
 from asperity.study.maps import require_zarr
 from asperity.study.plan import StudyCase, StudyPlan
 from asperity.study.store import (
-    Store,
-    in_order,
-    manifest_of,
-    open_kept,
-    open_read,
-    open_store,
-    table_of,
+    StudyFolder,
+    load_study_folder,
+    open_study_folder,
+    ordered_table,
+    rows_table,
+    study_manifest,
 )
 
-BATCH_S = 2.0  # work in a batch: long beside the cost of handing it over, short enough to lose
+BATCH_S = 2.0  # work in a batch: long against the cost of submitting it, short enough to lose
 LARGEST_BATCH = 200
-BATCHES_AHEAD = 2  # a worker; more would only be lost in a crash
-MOST_DEATHS = 3  # of the processes that computed one case, the last of them with nothing beside it
-DASK_WAIT_S = 10.0
-PROCESS_S = 2.0  # until a worker process is there, with its libraries
+BATCHES_AHEAD = 2  # per worker; more would only be lost in a crash
+MAX_CRASHES = 3  # of the processes that computed one case, the last of them running it alone
 
 
 @dataclass(frozen=True)
 class StudyProgress:
-    """How far a study is: `kept` were finished before, `rate` counts cases a second since."""
+    """Progress of a study: `kept` cases were finished before, `done` since."""
 
     total: int
     kept: int
@@ -65,64 +61,64 @@ class StudyProgress:
 
     @property
     def rate(self) -> float:
-        """Cases a second."""
+        """Cases per second."""
         return self.done / self.seconds if self.seconds > 0.0 else 0.0
 
     @property
     def seconds_left(self) -> float | None:
-        """Time left at the rate so far; None before the first case."""
+        """Remaining time at the present rate; None before the first case."""
         return (self.total - self.kept - self.done) / self.rate if self.done else None
 
 
 @dataclass(frozen=True)
 class StudyResult:
-    """A study: its plan, and a row for every finished case, in the plan's order."""
+    """A study: its plan and one row per finished case, in the order of the plan."""
 
     plan: StudyPlan
     table: pandas.DataFrame
     folder: Path | None = None
     path: Path | None = None  # of the merged table
     seconds: float = 0.0
-    computed: int = 0  # now; the other rows were kept from before
+    computed: int = 0  # in this call; the other rows were stored before
 
     @property
     def failures(self) -> pandas.DataFrame:
-        """The rows that must not be used, each with its reason."""
+        """The rows of failed cases, each with its reason."""
         rows: pandas.DataFrame = self.table[self.table["status"] != DONE]
         return rows
 
     @property
     def failed(self) -> int:
-        """How many cases failed or did not converge."""
+        """Number of cases that failed or did not converge."""
         return len(self.failures)
 
     @property
     def missing(self) -> int:
-        """Cases of the plan that nobody has computed yet."""
+        """Number of cases not yet computed."""
         return len(self.plan.cases) - len(self.table)
 
     @property
     def versions(self) -> dict[str, str]:
-        """Of asperity and what it stands on, when the folder was begun; in memory, those of now."""
-        return versions() if self.folder is None else dict(manifest_of(self.folder)["versions"])
+        """Versions of asperity and its dependencies at the start of the study."""
+        return versions() if self.folder is None else dict(study_manifest(self.folder)["versions"])
 
     def maps(self, case_id: str) -> dict[str, Field]:
-        """The maps that `fields` asked for of a case, each (nx, ny) in SI.
+        """Read the stored maps of a case, each (nx, ny) in SI; see `fields` of `run_study`.
 
         Raises
         ------
         UnreadableFile
-            where none are kept, or they are damaged.
+            if no maps are stored or they are damaged.
         BadInput
             for a case of another study, or a study in memory.
         """
         if self.folder is None:
-            raise BadInput("maps are kept in a study's folder, and this study has none; give out")
+            raise BadInput("maps are stored in a study's folder, and this study has none; give out")
         if case_id not in self.table["case_id"].to_numpy():
             raise BadInput(
                 f"the study has no finished case {case_id!r}; take one of the column case_id"
             )
-        return open_kept(self.folder).maps(case_id)
+        return load_study_folder(self.folder).maps(case_id)
 
 
 def run_study(
@@ -134,21 +130,19 @@ def run_study(
     shard: tuple[int, int] = (1, 1),
     retry_failed: bool = False,
     fields: Sequence[str] = (),
-    merge_from: Sequence[str | Path] = (),
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> StudyResult:
-    """Compute what is missing of a study.
+    """Compute the missing cases of a study.
 
     Parameters
     ----------
     plan : from `plan_study` or `plan_points`
-    out : folder to keep it in, and to go on from; None: in memory
-    executor : anything of `concurrent.futures`, with asperity importable where it runs; by default processes of its own
-    workers : processes, by default as many as there are processors
-    shard : (k, n), compute only every n-th case, beginning with the k-th
+    out : folder to store the study in and resume from; None: in memory
+    executor : any `concurrent.futures` executor that can import asperity; None: new processes
+    workers : number of processes, by default one per processor
+    shard : (k, n), compute only every n-th case, starting with the k-th
     retry_failed : compute failed cases again
-    fields : maps to keep beside the rows, of FIELDS; needs `out`
-    merge_from : folders of the same study computed elsewhere, whose cases are taken over
+    fields : maps to store beside the rows, of FIELDS; needs `out`
     progress : called after every batch
 
     Raises
@@ -158,48 +152,71 @@ def run_study(
     AsperityError
         if results cannot be written, or the executor is lost; finished cases are kept.
     """
-    if not 1 <= shard[0] <= shard[1]:
-        raise BadInput(f"shard must be k/N with 1 <= k <= N, got {shard[0]}/{shard[1]}")
+    _require_shard(shard)
     if workers is not None:
         require_positive("workers", workers)
     unknown = [name for name in fields if name not in FIELDS]
     if unknown:
         raise BadInput(f"fields must be among {', '.join(FIELDS)}, got {unknown[0]}")
-    if (fields or merge_from) and out is None:
-        raise BadInput("fields and merged folders need a folder to be kept in; give out")
+    if fields and out is None:
+        raise BadInput("fields need a folder to be stored in; give out")
     if fields:
         require_zarr()
-    begun = time.perf_counter()
-    with nullcontext() if out is None else open_store(Path(out), plan, shard) as store:
-        for other in merge_from:
-            assert store is not None
-            store.take_from(Path(other))
-        work = _Work(plan, store, shard, retry_failed, tuple(fields), begun, progress)
+    start = time.perf_counter()
+    with nullcontext() if out is None else open_study_folder(Path(out), plan, shard) as store:
+        work = _Work(plan, store, shard, retry_failed, tuple(fields), start, progress)
         if work.waiting:
             _compute(work, executor, workers)
-        seconds = time.perf_counter() - begun
+        seconds = time.perf_counter() - start
         if store is None:
-            table = in_order([table_of(work.rows)] if work.rows else [], plan)
+            table = ordered_table([rows_table(work.rows)] if work.rows else [], plan)
             return StudyResult(plan, table, seconds=seconds, computed=work.done)
         path = store.merge()
         return StudyResult(plan, store.table(), store.folder, path, seconds, work.done)
 
 
+def merge_studies(
+    plan: StudyPlan,
+    folders: Sequence[str | Path],
+    *,
+    out: str | Path,
+    shard: tuple[int, int] = (1, 1),
+) -> None:
+    """Copy the finished cases of other folders of the same study into `out`.
+
+    Parameters
+    ----------
+    plan : of all folders
+    folders : the same study computed elsewhere
+    out : folder to copy to
+    shard : of the computation that follows, as in `run_study`
+
+    Raises
+    ------
+    BadInput
+        for a folder that holds another study, or that another process computes in.
+    """
+    _require_shard(shard)
+    with open_study_folder(Path(out), plan, shard) as store:
+        for folder in folders:
+            store.import_parts(Path(folder))
+
+
 def load_study(folder: str | Path) -> StudyResult:
-    """Read what a study's folder holds, finished or not.
+    """Read a study's folder, finished or not.
 
     Raises
     ------
     UnreadableFile
-        if the folder holds no study, or something in it is damaged.
+        if the folder holds no study or is damaged.
     """
-    store = open_kept(Path(folder))
+    store = load_study_folder(Path(folder))
     return StudyResult(store.plan, store.table(), store.folder, store.merged)
 
 
 @contextmanager
 def study_executor(workers: int | None = None) -> Iterator[Executor]:
-    """Processes for several studies in a row: starting them takes seconds."""
+    """Provide worker processes for several studies; starting them takes seconds."""
     pool = _pool(workers or cores())
     try:
         yield pool
@@ -207,35 +224,9 @@ def study_executor(workers: int | None = None) -> Iterator[Executor]:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-@contextmanager
-def dask_executor(address: str) -> Iterator[Executor]:
-    """The workers of a dask scheduler, such as tcp://10.0.0.1:8786.
-
-    Raises
-    ------
-    BadInput
-        if dask.distributed is not installed, or nobody answers at the address.
-    """
-    try:
-        from distributed import Client
-    except ModuleNotFoundError:
-        raise BadInput(
-            "a dask executor needs dask.distributed; pip install 'asperity[study]'"
-        ) from None
-    try:
-        client: Any = Client(address, timeout=DASK_WAIT_S)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError, TypeError) as error:
-        raise BadInput(
-            f"no dask scheduler answers at {address} ({type(error).__name__}); check the address"
-        ) from None
-    with client:
-        try:
-            client.wait_for_workers(1, timeout=DASK_WAIT_S)
-        except TimeoutError:
-            raise BadInput(
-                f"the dask scheduler at {address} has no workers; start some with dask worker"
-            ) from None
-        yield client.get_executor(pure=False)
+def _require_shard(shard: tuple[int, int]) -> None:
+    if not 1 <= shard[0] <= shard[1]:
+        raise BadInput(f"shard must be k/N with 1 <= k <= N, got {shard[0]}/{shard[1]}")
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:
@@ -243,67 +234,59 @@ def _pool(workers: int) -> ProcessPoolExecutor:
 
 
 def _require_start(pool: Executor) -> None:
-    """AsperityError where processes die before they are given a case: then no case is to blame."""
+    """Raise AsperityError if processes die before they receive a case."""
     try:
         pool.submit(os.getpid).result()
     except BrokenExecutor:
         raise AsperityError(
-            "worker processes cannot start, nothing was computed by them; a script needs to be a file with its calls "
+            "worker processes cannot start; a script must be a file with its calls "
             'under if __name__ == "__main__":, or give executor=ThreadPoolExecutor()'
         ) from None
 
 
 class _Work:
-    """What is still to be computed, in batches that suit its pace, and what has been."""
+    """Cases to compute, in batches of a suitable duration, and the results so far."""
 
     def __init__(
         self,
         plan: StudyPlan,
-        store: Store | None,
+        store: StudyFolder | None,
         shard: tuple[int, int],
         retry_failed: bool,
         fields: tuple[str, ...],
-        begun: float,
+        start: float,
         progress: Callable[[StudyProgress], None] | None,
     ) -> None:
         known = {} if store is None else store.finished()
-        self.plan, self.store, self.fields, self.begun, self.progress = (
-            plan,
-            store,
-            fields,
-            begun,
-            progress,
-        )
+        self.plan, self.store, self.fields = plan, store, fields
+        self.start, self.progress = start, progress
         self.attempts = {case_id: attempt + 1 for case_id, (_, attempt) in known.items()}
-        share = {case.id: case for case in _share(plan, shard)}
+        share = {case.id: case for case in shard_cases(plan, shard)}
         kept = {
             case_id for case_id, (status, _) in known.items() if status == DONE or not retry_failed
         }
         self.waiting = deque(case for case in share.values() if case.id not in kept)
         self.total, self.kept = len(share), len(share) - len(self.waiting)
         self.done = self.failures = 0
-        self.deaths: Counter[str] = Counter()
-        self.case_s: float | None = None  # a worker takes for a case
+        self.crashes: Counter[str] = Counter()
+        self.case_s: float | None = None  # time per case on one worker
         self.rows: list[Row] = []
 
     def batch(self, workers: int) -> list[StudyCase]:
-        """The next cases to hand to one worker."""
-        if self.deaths[
-            self.waiting[0].id
-        ]:  # a process died over it: on its own, it shows whose fault that was
+        """Remove and return the next cases for one worker."""
+        if self.crashes[self.waiting[0].id]:  # run a suspect alone, to tell whether it is the cause
             return [self.waiting.popleft()]
         size = (
             1
             if self.case_s is None
             else math.ceil(BATCH_S / max(self.case_s, BATCH_S / LARGEST_BATCH))
         )
-        fair = math.ceil(
-            len(self.waiting) / (2 * workers)
-        )  # or one worker ends long after the others
-        next_ones = takewhile(
-            lambda case: not self.deaths[case.id], islice(self.waiting, min(size, fair))
+        # otherwise one worker finishes long after the others
+        fair = math.ceil(len(self.waiting) / (2 * workers))
+        following = takewhile(
+            lambda case: not self.crashes[case.id], islice(self.waiting, min(size, fair))
         )
-        return [self.waiting.popleft() for _ in list(next_ones)]
+        return [self.waiting.popleft() for _ in list(following)]
 
     def finish(
         self,
@@ -311,7 +294,7 @@ class _Work:
         results: Sequence[tuple[Row, dict[str, Field]]],
         seconds: float,
     ) -> None:
-        """Keep what a worker brings back."""
+        """Store the results of a batch."""
         rows, fields = [], {}
         for case, (row, maps) in zip(batch, results, strict=True):
             rows.append({"case_id": case.id, "attempt": self.attempts.get(case.id, 1), **row})
@@ -319,24 +302,24 @@ class _Work:
         if self.store is None:
             self.rows += rows
         else:
-            self.store.keep(rows, fields)
+            self.store.write_batch(rows, fields)
         pace = seconds / len(batch)
         self.case_s = pace if self.case_s is None else 0.7 * self.case_s + 0.3 * pace
         self.done += len(batch)
         self.failures += sum(row["status"] != DONE for row in rows)
-        self.tell()
+        self.report()
 
-    def tell(self) -> None:
-        """Report how far the study is."""
+    def report(self) -> None:
+        """Report the progress of the study."""
         if self.progress is not None:
-            seconds = time.perf_counter() - self.begun
+            seconds = time.perf_counter() - self.start
             self.progress(StudyProgress(self.total, self.kept, self.done, self.failures, seconds))
 
-    def bury(self, batches: Sequence[Sequence[StudyCase]], *, certain: bool) -> None:
-        """Take back the cases whose process died; where it is `certain` that one killed it, that case has failed."""
+    def requeue(self, batches: Sequence[Sequence[StudyCase]], *, failed: bool) -> None:
+        """Queue the cases of a crashed process again, or record them as `failed`."""
         for case in chain(*batches):
-            self.deaths[case.id] += 1
-            if certain:
+            self.crashes[case.id] += 1
+            if failed:
                 row = {
                     "status": FAILED,
                     "reason": "the process that computed it died: killed, or out of memory",
@@ -347,22 +330,23 @@ class _Work:
 
 
 def _compute(work: _Work, executor: Executor | None, workers: int | None) -> None:
-    work.tell()
+    work.report()
     if executor is not None:
-        _spread(work, executor, workers or _workers_of(executor))
+        _run_batches(work, executor, workers or _worker_count(executor))
         if work.waiting:
             raise AsperityError(
-                "the executor lost its workers; finished cases are kept, run the study again to go on"
+                "the executor lost its workers; finished cases are kept, "
+                "run the study again to resume"
             )
         return
     count = min(workers or cores(), len(work.waiting))
     started = True
-    while work.waiting:  # a pool that lost a process is broken, and another takes over
+    while work.waiting:  # a pool that lost a process is broken and is replaced
         pool, before = _pool(count), work.done
         try:
             if not started:
                 _require_start(pool)
-            _spread(work, pool, count)
+            _run_batches(work, pool, count)
             started = work.done > before
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -370,11 +354,11 @@ def _compute(work: _Work, executor: Executor | None, workers: int | None) -> Non
         pool.shutdown(wait=True)
 
 
-def _spread(work: _Work, executor: Executor, workers: int) -> None:
-    """Hand out batches until none are left, or the executor is broken."""
+def _run_batches(work: _Work, executor: Executor, workers: int) -> None:
+    """Submit batches until none are left or the executor is broken."""
     pending: dict[Future[Any], list[StudyCase]] = {}
     while work.waiting or pending:
-        broken = not _hand_out(work, executor, workers, pending)
+        broken = not _submit(work, executor, workers, pending)
         lost: list[list[StudyCase]] = []
         for future in wait(pending, return_when=FIRST_COMPLETED).done:
             batch = pending.pop(future)
@@ -385,26 +369,28 @@ def _spread(work: _Work, executor: Executor, workers: int) -> None:
             except Exception as error:
                 if type(error).__name__ != "KilledWorker":
                     raise AsperityError(
-                        f"the executor failed ({type(error).__name__}: {error}); finished cases are kept"
+                        f"the executor failed ({type(error).__name__}: {error}); "
+                        "finished cases are kept"
                     ) from error
-                work.bury([batch], certain=len(batch) == 1)  # dask has tried it on several workers
+                # dask has tried it on several workers
+                work.requeue([batch], failed=len(batch) == 1)
             else:
                 work.finish(batch, results, seconds)
         if lost or broken:
-            lost += _salvaged(work, pending)
-            only = len(lost) == 1 and len(lost[0]) == 1
-            work.bury(lost, certain=only and work.deaths[lost[0][0].id] >= MOST_DEATHS - 1)
+            lost += _salvage(work, pending)
+            single = len(lost) == 1 and len(lost[0]) == 1
+            work.requeue(lost, failed=single and work.crashes[lost[0][0].id] >= MAX_CRASHES - 1)
             return
 
 
-def _hand_out(
+def _submit(
     work: _Work, executor: Executor, workers: int, pending: dict[Future[Any], list[StudyCase]]
 ) -> bool:
-    """Keep every worker supplied; False if the executor takes nothing any more."""
+    """Keep every worker supplied; return False if the executor is broken."""
     while work.waiting and len(pending) < BATCHES_AHEAD * workers:
         cases = (work.waiting[0], *chain(*pending.values()))
-        if pending and any(work.deaths[case.id] for case in cases):
-            return True  # a case that may have killed its process has the executor to itself
+        if pending and any(work.crashes[case.id] for case in cases):
+            return True  # a suspect runs alone on the executor
         batch = work.batch(workers)
         job = (work.plan.case, work.plan.kind, [case.overrides for case in batch], work.fields)
         try:
@@ -415,8 +401,8 @@ def _hand_out(
     return True
 
 
-def _salvaged(work: _Work, pending: dict[Future[Any], list[StudyCase]]) -> list[list[StudyCase]]:
-    """Keep what a broken executor finished after all; the batches that it did not."""
+def _salvage(work: _Work, pending: dict[Future[Any], list[StudyCase]]) -> list[list[StudyCase]]:
+    """Store the batches that a broken executor finished; return those it did not."""
     lost = []
     for future, batch in pending.items():
         try:
@@ -428,62 +414,13 @@ def _salvaged(work: _Work, pending: dict[Future[Any], list[StudyCase]]) -> list[
     return lost
 
 
-def _workers_of(executor: Executor) -> int:
+def _worker_count(executor: Executor) -> int:
     client = getattr(executor, "_client", None)
     if client is not None:
         return max(1, int(sum(client.nthreads().values())))
     return int(getattr(executor, "_max_workers", None) or cores())
 
 
-@dataclass(frozen=True)
-class StudyCost:
-    """What a study will cost, from a few of its cases computed and thrown away."""
-
-    cases: int  # of this shard
-    kept: int
-    case_s: float  # one worker, mean of those tried
-    tried: int
-    workers: int
-    start_s: float = 0.0  # until a worker has loaded and compiled
-
-    @property
-    def seconds(self) -> float:
-        """Wall-clock time that is left; workers start beside one another, on as many processors as there are."""
-        left = self.cases - self.kept
-        at_once = max(1, min(self.workers, cores(), left))
-        return left * self.case_s / at_once + (self.start_s if left else 0.0)
-
-
-def estimate_study(
-    plan: StudyPlan,
-    *,
-    out: str | Path | None = None,
-    workers: int | None = None,
-    shard: tuple[int, int] = (1, 1),
-) -> StudyCost:
-    """Time three cases of a study, from its beginning, middle and end; nothing is kept.
-
-    Raises
-    ------
-    BadInput
-        for a folder that holds another study.
-    """
-    known = (
-        open_read(Path(out), plan).finished()
-        if out is not None and (Path(out) / MANIFEST).exists()
-        else {}
-    )
-    share = _share(plan, shard)
-    if not share:
-        return StudyCost(0, 0, 0.0, 0, workers or cores())
-    chosen = [share[round(part * (len(share) - 1))].overrides for part in (0.0, 0.5, 1.0)]
-    _, first = timed_batch(plan.case, plan.kind, [chosen[1]])  # loads and compiles
-    _, seconds = timed_batch(plan.case, plan.kind, chosen)
-    kept = sum(case.id in known for case in share)
-    case_s = seconds / len(chosen)
-    start_s = PROCESS_S + max(0.0, first - case_s)
-    return StudyCost(len(share), kept, case_s, len(chosen), workers or cores(), start_s)
-
-
-def _share(plan: StudyPlan, shard: tuple[int, int]) -> list[StudyCase]:
+def shard_cases(plan: StudyPlan, shard: tuple[int, int]) -> list[StudyCase]:
+    """Return the cases of a shard (k, n): every n-th, starting with the k-th."""
     return [case for case in plan.cases if case.number % shard[1] == shard[0] - 1]

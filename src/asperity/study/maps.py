@@ -1,7 +1,7 @@
-"""Maps of a study's cases: a zarr group a case, one chunk a map, for other tools too.
+"""Maps of a study's cases in zarr: one group per case, one chunk per map, readable by other tools.
 
-A group carries a digest of all its maps and the case that they are of; each chunk has a checksum
-besides, by which other readers notice damage. Which cases a folder holds is left to `store`.
+A group stores a digest of its maps and case; each chunk has a checksum, so that other readers
+detect damage too. `store` knows the cases of a folder.
 """
 
 from collections.abc import Mapping
@@ -18,20 +18,20 @@ from asperity.core.third_party import first_line
 
 MAPS = "fields.zarr"
 _SEAL, _STUDY = "asperity_sha256", "asperity_study"  # attributes of a group
-REMEDY = "delete its group and part, and the case is computed again"
+REMEDY = "delete its group and part; the case is then computed again"
 
 
 def require_zarr() -> Any:
-    """The zarr library; BadInput where it is not installed."""
+    """Import zarr; BadInput if it is not installed."""
     try:
         import zarr
     except ModuleNotFoundError:
-        raise BadInput("keeping fields needs zarr; pip install 'asperity[study]'") from None
+        raise BadInput("storing fields needs zarr; pip install 'asperity[study]'") from None
     return zarr
 
 
 def write_maps(folder: Path, study: str, case_id: str, maps: Mapping[str, Field]) -> None:
-    """Keep the maps of a case in a study's folder, the digest last; `AsperityError` if the system refuses to write."""
+    """Write the maps of a case, the digest last; `AsperityError` if the system refuses to write."""
     zarr, path = require_zarr(), folder / MAPS
     codecs = (zarr.codecs.ZstdCodec(), zarr.codecs.Crc32cCodec())
     try:
@@ -46,11 +46,11 @@ def write_maps(folder: Path, study: str, case_id: str, maps: Mapping[str, Field]
 
 
 def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
-    """The maps of a case as they were kept; UnreadableFile where there are none, or others."""
+    """Read the maps of a case; UnreadableFile if there are none, or they belong to another case."""
     zarr, path = require_zarr(), folder / MAPS / case_id
     if not path.is_dir():
         raise UnreadableFile(
-            f"{folder} keeps no maps of case {case_id}; name them with --fields when it is computed"
+            f"{folder} has no maps of case {case_id}; request them with --fields when computing it"
         )
     try:
         group = zarr.open_group(path, mode="r", zarr_format=3)
@@ -63,7 +63,7 @@ def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
         raise UnreadableFile(f"{path} is damaged ({first_line(error)}); {REMEDY}") from error
     if about.get(_SEAL) != _sealed(study, case_id, maps):
         raise UnreadableFile(
-            f"{path} is damaged, or of another study: its digest is of other content; {REMEDY}"
+            f"{path} is damaged or belongs to another study (digest mismatch); {REMEDY}"
         )
     return maps
 

@@ -1,4 +1,4 @@
-"""What a study shows: rows that may be used, its curve or axes, contacts to map, tables, and why cases failed."""
+"""Overview of a study for reports: valid rows, curve or axes, mapped contacts, tables, failures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,19 +22,19 @@ from asperity.paper import (
 )
 from asperity.results import Run, solve_case
 from asperity.study.axes import SweptAxis, swept_axis, varying_outputs
-from asperity.study.curve import SQ_KEY, WearCurve, curve_of, is_wear_study
+from asperity.study.curve import SQ_KEY, WearCurve, curve_from_study, is_wear_study
 from asperity.study.evaluate import BOTH_PRESETS, DONE
 from asperity.study.execute import StudyResult
 from asperity.study.plan import SEED_KEYS, as_written
 
-MOST_MAPS = 8  # the paper's Figs 5 and 6 have eight
-MOST_REASONS = 10
-MOST_NAMED = 5  # failed cases named for one reason
-SHOWS = 5e-4  # a difference between shares that a map's percentages would show
+MAX_MAPS = 8  # as in the paper's Figs 5 and 6
+MAX_REASONS = 10
+MAX_NAMED = 5  # failed points named per reason
+VISIBLE_DIFFERENCE = 5e-4  # of CLR, visible in a map's percentages
 
 
 class FailureReason(NamedTuple):
-    """Why cases failed, how many, and which."""
+    """A reason of failure, the number of cases and their points."""
 
     text: str
     number: int
@@ -43,13 +43,13 @@ class FailureReason(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyOverview:
-    """What a study shows; what is missing, failed or did not converge is left out of every mean.
+    """Contents of a study's report; missing and failed cases are left out of every mean.
 
     Parameters
     ----------
     result : with at least one computed case; BadInput otherwise
-    stated_anchors : what a study of Sq should meet; None: the paper's printed numbers, if the case is its contact
-    progress : called with what is being solved
+    stated_anchors : anchors for a study of Sq; None: the paper's, if the case is its contact
+    progress : called with a label of the contact being solved
     """
 
     result: StudyResult
@@ -65,18 +65,20 @@ class StudyOverview:
 
     @cached_property
     def used(self) -> pandas.DataFrame:
-        """The rows that may be used."""
+        """The rows of converged cases."""
         rows: pandas.DataFrame = self.result.table[self.result.table["status"] == DONE]
         return rows
 
     @cached_property
     def curve(self) -> WearCurve | None:
-        """The wear curve of a study of Sq alone."""
-        return curve_of(self.result) if len(self.used) and is_wear_study(self.result) else None
+        """The wear curve, if the study varies only Sq."""
+        return (
+            curve_from_study(self.result) if len(self.used) and is_wear_study(self.result) else None
+        )
 
     @property
     def papers(self) -> bool:
-        """Whether the paper's printed numbers stand beside the study's."""
+        """True if the study is compared with the paper's printed numbers."""
         return (
             self.stated_anchors is None
             and self.curve is not None
@@ -85,7 +87,7 @@ class StudyOverview:
 
     @cached_property
     def anchors(self) -> tuple[Anchor, ...]:
-        """What the curve should meet."""
+        """Anchors to compare the curve with."""
         if self.stated_anchors is not None:
             return tuple(self.stated_anchors)
         known = (
@@ -97,18 +99,18 @@ class StudyOverview:
 
     @cached_property
     def axes(self) -> list[SweptAxis]:
-        """The swept quantities over the rows that may be used; those with one value are none."""
+        """The swept quantities with more than one value, over the valid rows."""
         keys = [key for key in self.result.plan.axes if key not in SEED_KEYS]
         swept = [swept_axis(self.result.plan, self.used, key) for key in keys]
-        return [axis for axis in swept if axis.places.size > 1]
+        return [axis for axis in swept if axis.distinct.size > 1]
 
     @cached_property
     def outputs(self) -> list[str]:
-        """The columns that are shown of the rows."""
+        """Columns of the table to show."""
         return varying_outputs(self.used)
 
     def verdict(self) -> str:
-        """One sentence: where the study's outputs go."""
+        """Return one sentence on the ranges of the study's outputs."""
         if self.curve is not None:
             return self.curve.verdict()
         failed, total = self.result.failed, len(self.result.table)
@@ -117,7 +119,8 @@ class StudyOverview:
             if key in ("clr", "crf_sound_hz", "crf_hz"):
                 entry = quantity(key)
                 values = self.used[key] * entry.factor
-                sentence += f"; {entry.symbol} from {values.min():.4g} to {values.max():.4g} {entry.display}"
+                span = f"{values.min():.4g} to {values.max():.4g} {entry.display}"
+                sentence += f"; {entry.symbol} from {span}"
         return (
             f"{failed} OF {total} CASES FAILED and are left out: {sentence}."
             if failed
@@ -125,15 +128,15 @@ class StudyOverview:
         )
 
     # Maps
-    # ------------------------------------------------------------------------------------------------------------
+    # ----------------------------------------------------------------------
 
     @cached_property
     def mapped(self) -> list[int]:
-        """The numbers of the cases whose maps are shown: one surface of a few levels, evenly over Sq."""
+        """Numbers of the cases to map: one surface at a few levels, evenly spaced in Sq."""
         if self.curve is None:
             return []
-        wanted = np.linspace(self.curve.sq[0], self.curve.sq[-1], MOST_MAPS)
-        levels = {float(self.curve.sq[np.argmin(np.abs(self.curve.sq - sq))]) for sq in wanted}
+        spaced = np.linspace(self.curve.sq[0], self.curve.sq[-1], MAX_MAPS)
+        levels = {float(self.curve.sq[np.argmin(np.abs(self.curve.sq - sq))]) for sq in spaced}
         firsts = (
             self.used[self.used[SQ_KEY].isin(levels)].groupby(SQ_KEY, sort=True)["number"].first()
         )
@@ -141,102 +144,101 @@ class StudyOverview:
 
     @cached_property
     def runs(self) -> list[Run] | str:
-        """The mapped cases, solved anew with the seeds they had; or why they cannot be."""
+        """The mapped cases, solved again with their seeds; or the reason why they cannot be."""
         runs = []
-        for place, number in enumerate(self.mapped, 1):
+        for count, number in enumerate(self.mapped, 1):
             if self.progress is not None:
-                self.progress(f"map {place} of {len(self.mapped)}")
+                self.progress(f"map {count} of {len(self.mapped)}")
             try:
                 case = self.result.plan.case.with_overrides(
                     self.result.plan.cases[number].overrides
                 )
-                with threadpool_limits(
-                    1
-                ):  # as in the study, so that it is the same to the last bit
+                with threadpool_limits(1):  # as in the study, for bit-identical results
                     runs.append(solve_case(case, strict=False))
             except AsperityError as refusal:
                 return f"No maps of surface and contact: {refusal}."
         return runs
 
-    # What to read before the numbers
-    # ---------------------------------------------------------------------------------
+    # Notes
+    # ----------------------------------------------------------------------
 
     @cached_property
     def notes(self) -> list[str]:
-        """Sentences to read before the numbers."""
+        """Sentences that qualify the numbers."""
         notes = list(version_notes(self.result.versions))
         if self.result.missing:
             share = f"{self.result.missing} of {len(self.result.plan.cases)} cases"
             notes.append(f"{share} have not been computed yet: run the study again.")
         if self.result.plan.realisations == 1:
             notes.append(
-                "One surface a point: other seeds give other numbers, and there is no interval of them."
+                "One surface per point: results vary with the seed; intervals need several seeds."
             )
         notes += [self.runs] if isinstance(self.runs, str) else self._changed_maps(self.runs)
         columns = {name: f"crf_{name}_hz" for name in BOTH_PRESETS if f"crf_{name}_hz" in self.used}
-        silent = {name: self.used[column].isna().sum() for name, column in columns.items()}
-        if self.curve is not None and not silent:
-            notes.append("The case has no [vibration]: there is no contact resonance to show.")
-        if any(silent.values()):
+        missing = {name: self.used[column].isna().sum() for name, column in columns.items()}
+        if self.curve is not None and not missing:
+            notes.append("The case has no [vibration], so there is no contact resonance.")
+        if any(missing.values()):
             counts = ", ".join(
-                f"{count} with the vibration preset {name}" for name, count in silent.items()
+                f"{count} with the vibration preset {name}" for name, count in missing.items()
             )
             notes.append(
-                f"No contact resonance was found in some of the {len(self.used)} cases ({counts}); means of CRF and "
-                "CRFA leave them out."
+                f"No contact resonance was found in some of the {len(self.used)} cases ({counts}); "
+                "means of CRF and CRFA leave them out."
             )
         return notes
 
     def _changed_maps(self, runs: Sequence[Run]) -> list[str]:
-        """Which maps are not of the contacts in the table."""
+        """Return a note for each map that differs from the contact in the table."""
         mapped = self.used[self.used["number"].isin(self.mapped)]
         shares, share = (mapped["clr"] if len(mapped) else ()), quantity("clr")
         return [
-            f"The contact mapped at Sq {run.state.sq * 1e6:.3g} µm, solved anew, has a CLR of "
-            f"{share.text(run.state.clr)} and {share.text(clr)} in the study's table: other versions made that."
+            f"The contact mapped at Sq {run.state.sq * 1e6:.3g} µm has a CLR of "
+            f"{share.text(run.state.clr)} when solved again, but {share.text(clr)} in the study's "
+            "table, which other versions computed."
             for clr, run in zip(shares, runs, strict=True)
-            if abs(run.state.clr - clr) > SHOWS
+            if abs(run.state.clr - clr) > VISIBLE_DIFFERENCE
         ]
 
     @cached_property
     def reasons(self) -> list[FailureReason]:
-        """Why cases failed, the commonest first."""
+        """Reasons of failure, the most frequent first."""
         reasons = []
         for (status, text), rows in self.result.failures.groupby(["status", "reason"], sort=False):
             points = rows["point"].value_counts(sort=False)
             names = [
                 self._point_in_words(int(str(point)), count)
-                for point, count in points.head(MOST_NAMED).items()
+                for point, count in points.head(MAX_NAMED).items()
             ]
             more = (
                 f"; and {len(points) - len(names)} more points" if len(points) > len(names) else ""
             )
             reasons.append(FailureReason(f"{status}: {text}", len(rows), "; ".join(names) + more))
         reasons.sort(key=lambda reason: -reason.number)
-        rest = reasons[MOST_REASONS:]
+        rest = reasons[MAX_REASONS:]
         if rest:
             number = sum(reason.number for reason in rest)
             return [
-                *reasons[:MOST_REASONS],
+                *reasons[:MAX_REASONS],
                 FailureReason(f"{len(rest)} other reasons", number, "in failures.csv"),
             ]
         return reasons
 
     def _point_in_words(self, point: int, cases: int) -> str:
-        """The swept values of a point, and how many of its surfaces are meant where it has several."""
+        """Return the swept values of a point, and the number of its surfaces if it has several."""
         values = self.result.plan.points[point]
         words = (
             ", ".join(f"{key} {as_written(value)}" for key, value in values.items()) or "its case"
         )
-        several = self.result.plan.realisations
-        return words if several == 1 else f"{words} ({cases} of {several} surfaces)"
+        surfaces = self.result.plan.realisations
+        return words if surfaces == 1 else f"{words} ({cases} of {surfaces} surfaces)"
 
     # Tables
-    # ----------------------------------------------------------------------------------------------------------
+    # ----------------------------------------------------------------------
 
     @cached_property
     def tables(self) -> dict[str, pandas.DataFrame]:
-        """Every table by its file's name, in SI but for columns whose name has another unit."""
+        """Tables by file name, in SI units except for columns whose name has another unit."""
         tables = {"cases": self.result.table, "failures": self.result.failures}
         if self.curve is None:
             return {**tables, "points": self._points()}
@@ -251,7 +253,7 @@ class StudyOverview:
         return tables
 
     def _points(self) -> pandas.DataFrame:
-        """A row a point: how many cases may be used, mean and standard deviation of each output."""
+        """Return one row per point: number of valid cases, mean and deviation of each output."""
         keys = [key for key in self.result.plan.axes if key in self.used]
         groups = self.used.groupby("point", sort=True)
         table = groups[keys].first() if keys else groups[["status"]].first()[[]]

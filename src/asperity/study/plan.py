@@ -1,7 +1,6 @@
-"""Which cases a study consists of: points from lists, ranges, products or a Latin hypercube; seeds; ids.
+"""Plan of a study: points from lists, ranges, products or a Latin hypercube; seeds; ids.
 
-A case's id is the hash of everything that decides its result, so that the same case is the same
-file anywhere.
+A case's id is the hash of everything that affects its result.
 """
 
 import hashlib
@@ -23,11 +22,11 @@ from asperity.core.errors import BadInput, UnreadableFile
 
 PlanKind: TypeAlias = StudyKind | Literal["surfaces", "still"]
 SEED_KEYS = ("surface.seed", "vibration.seed")
-MOST_CASES = 10_000_000
-DIGITS = 9  # of a sampled value
-FOR_RUNS = "motion"  # the section that only `asperity run` reads
-# keys that may change which seeds a case has, and which files its surface is read from
-_OF_SURFACES = (
+MAX_CASES = 10_000_000
+DIGITS = 9  # significant digits of a sampled value
+RUN_SECTION = "motion"  # the section that only `asperity run` reads
+# keys that may change the seeds of a case and the files of its surface
+_SURFACE_KEYS = (
     "surface",
     "surface.kind",
     "surface.file",
@@ -35,11 +34,11 @@ _OF_SURFACES = (
     "surface.second.kind",
     "surface.second.file",
 )
-SHAPING = frozenset({*_OF_SURFACES, "vibration"})
+SHAPING = frozenset({*_SURFACE_KEYS, "vibration"})
 
 
 class StudyCase(NamedTuple):
-    """One case of a study: its place in the plan, what it replaces in the study's case, its id."""
+    """One case of a study: its position in the plan, its overrides of the shared case, its id."""
 
     number: int
     point: int
@@ -50,21 +49,21 @@ class StudyCase(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyPlan:
-    """What a study computes.
+    """The cases that a study computes.
 
     Parameters
     ----------
-    case : what all cases share, without [study]
+    case : shared by all cases, without [study]
     axes : the swept keys, such as "surface.sq"
-    points : replaced values by key, as a case file writes them
-    realisations : surfaces (and vibration records) a point
-    kind : "solve", a contact each; "shake", its own stiffness and damping too; "vibrate", the vibration model alone;
-        "still", a contact each with its own stiffness and no record; "surfaces", means and intervals over the surfaces
-        that [solver] asks for
-    seeding : "independent", every case has seeds of its own; "common", the k-th realisation has the same at every
-        point, which lets differences between points show with fewer of them
-    seeds : the surfaces' seeds in place of ones drawn for the study
-    ids : of the cases, where they were computed by an asperity whose case file had other keys
+    points : overrides by key, as in a case file
+    realisations : surfaces (and vibration records) per point
+    kind : "solve", the contact; "shake", also its dynamic stiffness and damping; "vibrate", only
+        the vibration model; "still", the contact with its dynamic stiffness but no vibration
+        record; "surfaces", means and intervals over the surfaces set in [solver]
+    seeding : "independent", every case has its own seeds; "common", the k-th realisation has the
+        same seeds at every point, so that differences between points need fewer of them
+    seeds : seeds of the surfaces, instead of drawn ones
+    ids : of the cases, if computed by a version of asperity whose case file had other keys
     """
 
     case: Case
@@ -78,31 +77,30 @@ class StudyPlan:
 
     @cached_property
     def cases(self) -> tuple[StudyCase, ...]:
-        """Every case, in order: all realisations of a point, then the next point."""
+        """All cases in order: all realisations of a point, then the next point."""
         return tuple(self._cases())
 
     @cached_property
     def _fixed(self) -> dict[str, Any]:
-        stated = (
-            (k, v) for k, v in _entries(self.case.contents) if k != "infer"
-        )  # it changes no contact
+        # [infer] does not change a contact
+        stated = ((k, v) for k, v in _entries(self.case.contents) if k != "infer")
         values = {key: to_si(value) for key, value in stated if not isinstance(value, Section)}
         return {"kind": self.kind, "surface file": self.surface_digest, **values}
 
     @cached_property
     def surface_digest(self) -> str | None:
-        """Hash of the measured surface's file, of the stored roughness, or None: a case file does not hold them."""
+        """Hash of the surface file or the stored roughness, which the case file lacks; or None."""
         return _surface_digest(self.case)
 
     @cached_property
     def design(self) -> str:
-        """Hash of all that the cases share."""
+        """Hash of everything that the cases share."""
         return _hash(self._fixed)
 
     def _cases(self) -> Iterator[StudyCase]:
         base = int(getattr(self.case.contents.surface, "seed", None) or 0)
         number = 0
-        for place, point in enumerate(self.points):
+        for position, point in enumerate(self.points):
             plain = {key: to_si(value) for key, value in point.items()}
             shaped = self.case if SHAPING.isdisjoint(point) else self.case.with_overrides(point)
             seeded = [
@@ -131,22 +129,23 @@ class StudyPlan:
                     if key in seeded
                 }
                 name = _hash({**shared, **chosen})[:16] if self.ids is None else self.ids[number]
-                yield StudyCase(number, place, realisation, {**point, **chosen}, name)
+                yield StudyCase(number, position, realisation, {**point, **chosen}, name)
                 number += 1
 
 
 def plan_study(case: Case) -> StudyPlan:
-    """The plan that a case's [study] states.
+    """Return the plan defined by a case's [study].
 
     Raises
     ------
     BadInput
-        for a case without [study]; a swept key or value that the case file would be refused for; too many cases.
+        for a case without [study]; a swept key or value that is invalid in a case file; too many
+        cases.
     """
     section = case.contents.study
     if section is None:
         raise BadInput(
-            f"{case.source}: study is missing; add [study] with what is varied, such as "
+            f"{case.source}: study is missing; add [study] with the quantity to vary, such as "
             'sq = { from = "0.5 um", to = "4 um", step = "0.5 um" }'
         )
     if not section.axes and section.seeds == 1:
@@ -154,12 +153,14 @@ def plan_study(case: Case) -> StudyPlan:
     keys = {full_key(case, name): (name, values) for name, values in section.axes.items()}
     if len(keys) < len(section.axes):
         raise BadInput(
-            f"{case.source}: study sweeps one quantity twice; the keys are {', '.join(section.axes)}"
+            f"{case.source}: study sweeps one quantity twice; "
+            f"the keys are {', '.join(section.axes)}"
         )
     for key, part in permutations(keys, 2):
         if part.startswith(f"{key}."):
             raise BadInput(
-                f"{case.source}: study sweeps {key} and {part}, a part of it; write {part} in its tables"
+                f"{case.source}: study sweeps {key} and {part}, a part of it; "
+                f"write {part} in its tables"
             )
     count = math.prod(
         len(values) if isinstance(values, tuple) else _range_size(case, name, values)
@@ -167,9 +168,9 @@ def plan_study(case: Case) -> StudyPlan:
     )
     seeds = section.seeds
     cases = (section.samples or count) * (seeds if isinstance(seeds, int) else len(seeds))
-    if cases > MOST_CASES:
-        remedy = "widen its steps, or take samples"
-        raise BadInput(f"{case.source}: study has {cases} cases, more than {MOST_CASES}; {remedy}")
+    if cases > MAX_CASES:
+        remedy = "use larger steps, or samples"
+        raise BadInput(f"{case.source}: study has {cases} cases, more than {MAX_CASES}; {remedy}")
     if section.samples is None:
         swept = (
             v if isinstance(v, tuple) else tuple(_range(case, name, v)) for name, v in keys.values()
@@ -192,20 +193,21 @@ def plan_points(
     kind: PlanKind = "solve",
     seeding: Seeding = "independent",
 ) -> StudyPlan:
-    """A plan of points of one's own.
+    """Return a plan of explicitly given points.
 
     Parameters
     ----------
-    case : what all cases share; its [study] is left aside
-    points : values by dotted key, as a case file writes them: {"surface.sq": "0.5 um", "contact.load": "200 N"}
-    axes : the swept keys; by default all that the points name
-    seeds : realisations a point, or the surfaces' seeds
+    case : shared by all cases; its [study] is ignored
+    points : values by dotted key, as in a case file, such as
+        {"surface.sq": "0.5 um", "contact.load": "200 N"}
+    axes : the swept keys; by default all keys of the points
+    seeds : number of realisations per point, or the seeds of the surfaces
     kind, seeding : see `StudyPlan`
 
     Raises
     ------
     BadInput
-        for a value that the case file would be refused for.
+        for a value that is invalid in a case file.
     """
     if not points:
         raise BadInput("a study needs at least one point, got none")
@@ -222,7 +224,7 @@ def plan_points(
 
 
 def _require_values(case: Case, axes: Sequence[str], points: Sequence[Mapping[str, Any]]) -> None:
-    """Refuse now what would fail in every case that has it. Of many values of a quantity, the extremes are asked."""
+    """Raise BadInput for an invalid value; of many values of a quantity, check the extremes."""
     for key in axes:
         values = {json.dumps(to_si(point[key])): point[key] for point in points if key in point}
         chosen = list(values.values())
@@ -233,53 +235,55 @@ def _require_values(case: Case, axes: Sequence[str], points: Sequence[Mapping[st
 
 
 def _require_distinct(case: Case, points: Sequence[Mapping[str, Any]]) -> None:
-    """Refuse a point that is there twice: its cases are the same, and would count as independent ones."""
+    """Raise BadInput for a duplicate point, whose cases would count as independent ones."""
     seen = set()
     for point in points:
         plain = json.dumps({key: to_si(value) for key, value in point.items()}, sort_keys=True)
         if plain in seen:
-            where = ", ".join(f"{key} = {as_written(value)}" for key, value in point.items())
-            remedy = "write each value once, and ask for more surfaces by seeds"
-            raise BadInput(f"{case.source}: study has the point {where} twice; {remedy}")
+            text = ", ".join(f"{key} = {as_written(value)}" for key, value in point.items())
+            remedy = "write each value once, and set seeds for more surfaces"
+            raise BadInput(f"{case.source}: study has the point {text} twice; {remedy}")
         seen.add(plain)
 
 
 def full_key(case: Case, name: str, section: str = "study") -> str:
-    """The dotted key that a name in [study], or in another section, means: itself, or the one key that ends so.
+    """Return the dotted key of a name in [study] or another section: itself, or its unique match.
 
     Raises
     ------
     BadInput
-        for a name that no key of the case has, or several.
+        for a name that matches no key of the case, or several.
     """
     entries = [
         (k, v)
         for k, v in _entries(case.contents)
-        if k.partition(".")[0] not in ("study", "infer", FOR_RUNS)
+        if k.partition(".")[0] not in ("study", "infer", RUN_SECTION)
     ]
     tables = [key for key, value in entries if isinstance(value, Section)]
     keys = [key for key, value in entries if not isinstance(value, Section)]
-    if name.partition(".")[0] == FOR_RUNS:
+    if name.partition(".")[0] == RUN_SECTION:
         raise BadInput(
-            f"{case.source}: {section}.{name} changes nothing in a study; [{FOR_RUNS}] is for asperity run"
+            f"{case.source}: {section}.{name} has no effect in a study; "
+            f"[{RUN_SECTION}] is for asperity run"
         )
     if name in (*keys, *tables):
         return name
-    meant = [key for key in keys if key.rpartition(".")[2] == name]
-    meant = meant or [key for key in tables if key.rpartition(".")[2] == name]
-    if len(meant) == 1:
-        return meant[0]
-    if meant:
+    matches = [key for key in keys if key.rpartition(".")[2] == name]
+    matches = matches or [key for key in tables if key.rpartition(".")[2] == name]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
         raise BadInput(
-            f"{case.source}: {section}.{name} could mean {' or '.join(meant)}; write one of them"
+            f"{case.source}: {section}.{name} could mean {' or '.join(matches)}; write one of them"
         )
-    near = get_close_matches(name, [*tables, *keys, *(key.rpartition(".")[2] for key in keys)], n=1)
-    remedy = f"did you mean {near[0]}?" if near else "name one such as surface.sq or contact.load"
+    known = [*tables, *keys, *(key.rpartition(".")[2] for key in keys)]
+    close = get_close_matches(name, known, n=1)
+    remedy = f"did you mean {close[0]}?" if close else "name one such as surface.sq or contact.load"
     raise BadInput(f"{case.source}: {section}.{name} is not a key of the case; {remedy}")
 
 
 def _entries(section: Section, parents: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
-    """Every key of a case with its value: tables, and what is in them."""
+    """Yield every key of a case with its value, tables and their entries."""
     for name, entry in type(section).model_fields.items():
         keys, value = (*parents, entry.alias or name), getattr(section, name)
         yield ".".join(keys), value
@@ -288,25 +292,25 @@ def _entries(section: Section, parents: tuple[str, ...] = ()) -> Iterator[tuple[
 
 
 def as_written(value: Any) -> str:
-    """A value of a case file in words."""
+    """Return a value of a case file as text."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key} = {as_written(entry)}" for key, entry in value.items()) + "}"
     return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
 # Ranges
-# --------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------
 
 
 class _Span(NamedTuple):
-    """A range read: its ends in the unit of `from`."""
+    """A range: its ends in the unit of `from`."""
 
     low: Decimal
     high: Decimal
     unit: str
 
     def text(self, number: Decimal) -> str | float | int:
-        """A value of the range as a case file writes it."""
+        """Return a value of the range as in a case file."""
         if self.unit:
             return f"{number:f} {self.unit}"
         return int(number) if number == int(number) and self.low == int(self.low) else float(number)
@@ -320,7 +324,8 @@ def _span(case: Case, name: str, section: RangeSection) -> _Span:
         raise BadInput(f"{case.source}: study.{name} {error}") from None
     if high < low:
         raise BadInput(
-            f"{case.source}: study.{name} must go upwards, got from {section.start} to {section.to}"
+            f"{case.source}: study.{name} must be ascending, "
+            f"got from {section.start} to {section.to}"
         )
     if section.scale == "log" and low <= 0:
         raise BadInput(
@@ -332,13 +337,13 @@ def _span(case: Case, name: str, section: RangeSection) -> _Span:
 def _step(case: Case, name: str, section: RangeSection, span: _Span) -> Decimal:
     if (section.step is None) == (section.count is None):
         raise BadInput(
-            f"{case.source}: study.{name} needs either step or count; or give study.samples"
+            f"{case.source}: study.{name} needs either step or count; or set study.samples"
         )
     if section.count is not None:
         return Decimal(0)
     if section.scale == "log":
         raise BadInput(
-            f"{case.source}: study.{name} has a step, which a log scale has not; give count"
+            f"{case.source}: study.{name} has a step, which a log scale does not use; give count"
         )
     try:
         step = split_amount(section.step, span.unit)[0]
@@ -368,7 +373,7 @@ def _range(case: Case, name: str, section: RangeSection) -> Iterator[str | float
 
 
 def _between(span: _Span, share: float, scale: str) -> Decimal:
-    """The value at a share of the way; the ends are met exactly."""
+    """Return the value at a share of the range; the ends are exact."""
     if share in (0.0, 1.0):
         return span.high if share else span.low
     low, high = float(span.low), float(span.high)
@@ -379,12 +384,11 @@ def _between(span: _Span, share: float, scale: str) -> Decimal:
 def _sampled(
     case: Case, keys: Mapping[str, tuple[str, Any]], samples: int, sample_seed: int
 ) -> list[dict[str, Any]]:
-    """Points of a Latin hypercube: over ranges evenly, over lists entry by entry."""
+    """Return points of a Latin hypercube over ranges and lists."""
     shares = scipy.stats.qmc.LatinHypercube(len(keys), rng=sample_seed).random(samples)
     points: list[dict[str, Any]] = [{} for _ in range(samples)]
-    for column, (key, (name, values)) in enumerate(
-        sorted(keys.items())
-    ):  # a restated case has another order
+    # sorted, since the order of keys may differ in an equivalent case
+    for column, (key, (name, values)) in enumerate(sorted(keys.items())):
         for point, share in zip(points, shares[:, column], strict=True):
             if isinstance(values, tuple):
                 point[key] = values[int(share * len(values))]
@@ -395,7 +399,7 @@ def _sampled(
 
 
 # Identity
-# ------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------
 
 
 def _has_seed(case: Case, key: str) -> bool:
@@ -405,7 +409,7 @@ def _has_seed(case: Case, key: str) -> bool:
 
 
 def _states(point: Mapping[str, Any], key: str) -> bool:
-    """Whether a point says itself which seed is meant: by the key, or in a whole table."""
+    """Return True if a point sets the seed, by its key or in a whole table."""
     section, name = key.split(".")
     table = point.get(section)
     return key in point or (isinstance(table, Mapping) and name in table)

@@ -1,7 +1,6 @@
-"""A quantity of a case that may lie anywhere in a range: how it is written, and what a share of the way is.
+"""Ranges of a case's quantities, shared by sensitivity analysis and calibration.
 
-`sensitivity` and `calibration` both ask what a case does as several of its quantities move.
-`OPEN_RANGES` are those that the paper leaves open, each with the reason for its ends.
+`OPEN_RANGES` are the quantities that the paper does not state, each with the reason for its ends.
 """
 
 import math
@@ -14,13 +13,11 @@ from typing import Any
 from asperity.case import Case, split_amount
 from asperity.core.errors import BadInput
 
-# a range whose ends are positive and differ by more than this factor is gone through in its
-# logarithm
-LOG_FROM = 2.0
-DIGITS = 4  # of a value in a range: no curve tells more
+LOG_FROM = 2.0  # ratio of positive ends from which on a range is sampled in its logarithm
+DIGITS = 4  # significant digits of a value in a range
 FEWEST_CELLS = 8
 LENGTH_KEY = "surface.correlation_length"
-_ENTRY = re.compile(r"(?P<key>.+)\[(?P<place>\d+)\]")
+_ENTRY = re.compile(r"(?P<key>.+)\[(?P<index>\d+)\]")
 
 
 @dataclass(frozen=True)
@@ -29,10 +26,10 @@ class ParameterRange:
 
     Parameters
     ----------
-    key : dotted key of the case; an entry of a pair with its place, "grid.x[0]"
+    key : dotted key of the case; an entry of a pair with its index, "grid.x[0]"
     low, high : the ends, in `unit`
-    unit : as a case file writes it, "GPa"; "" for a plain number
-    reason : why these ends, a phrase
+    unit : as in a case file, "GPa"; "" for a plain number
+    reason : reason for the ends, a phrase
     """
 
     key: str
@@ -44,29 +41,29 @@ class ParameterRange:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
             raise BadInput(
-                f"{self.key} must have a range that goes upwards, got {self.low:g} to {self.high:g}"
+                f"{self.key} must have an ascending range, got {self.low:g} to {self.high:g}"
             )
 
     @property
     def log(self) -> bool:
-        """Whether shares of the way are taken in the logarithm."""
+        """True if shares are taken in the logarithm."""
         return self.low > 0.0 and self.high / self.low >= LOG_FROM
 
     def value(self, share: float) -> float:
-        """The value at a share of the way, 0 to 1, in the range's unit."""
+        """Return the value at a share of the range, 0 to 1, in the range's unit."""
         value = self.low + share * (self.high - self.low)
         if self.log:
             value = self.low * (self.high / self.low) ** share
         return float(f"{value:.{DIGITS}g}")
 
     def share(self, value: float) -> float:
-        """How far along the range a value in its unit lies; not bounded to 0 and 1."""
+        """Return the share of the range at a value in its unit; not clipped to 0 and 1."""
         if self.log:
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
 
     def written(self, share: float) -> str | float:
-        """The value at a share of the way as a case file writes it."""
+        """Return the value at a share of the range as in a case file."""
         value = self.value(share)
         return f"{value:g} {self.unit}" if self.unit else value
 
@@ -121,9 +118,9 @@ OPEN_RANGES = (
 
 
 def parse_range(text: str) -> ParameterRange:
-    """A range as the command line has it, `KEY=LOW..HIGH`, such as "material.hardness=0.65 GPa..3 GPa".
+    """Parse a range `KEY=LOW..HIGH`, such as "material.hardness=0.65 GPa..3 GPa".
 
-    `BadInput` for what is no such text, or has ends of different kinds or the wrong way round.
+    `BadInput` for malformed text, ends of different dimensions or a descending range.
     """
     key, equals, ends = (part.strip() for part in text.partition("="))
     low, dots, high = (part.strip() for part in ends.partition(".."))
@@ -147,17 +144,17 @@ def _number_or_text(text: str) -> object:
 
 
 def open_ranges(
-    case: Case, wanted: Sequence[ParameterRange] = OPEN_RANGES
+    case: Case, candidates: Sequence[ParameterRange] = OPEN_RANGES
 ) -> tuple[ParameterRange, ...]:
-    """Those of `wanted` that the case has a key for; lengths of roughness kept to what its grid can carry."""
-    ranges = [entry for entry in wanted if _has(case, entry.key)]
+    """Return the ranges whose key the case has; its grid limits the correlation length."""
+    ranges = [entry for entry in candidates if _has(case, entry.key)]
     ranges = [
         entry
         for entry in ranges
         if entry_of(entry.key)[1] is None or stated_value(case, entry.key) is not None
     ]
     return tuple(
-        _carried(case, entry, ranges) if entry.key == LENGTH_KEY else entry for entry in ranges
+        _resolved(case, entry, ranges) if entry.key == LENGTH_KEY else entry for entry in ranges
     )
 
 
@@ -170,31 +167,29 @@ def _has(case: Case, key: str) -> bool:
     return True
 
 
-def _carried(
+def _resolved(
     case: Case, lengths: ParameterRange, others: Sequence[ParameterRange]
 ) -> ParameterRange:
-    """Two cells at least and half the domain at most, on every grid in the ranges."""
+    """Limit lengths to at least two cells and at most half the domain, on every grid."""
     inlets = [
         entry.value(share) for entry in others if entry.key == "grid.x[0]" for share in (0.0, 1.0)
     ]
     grid = case.grid
     a, upper = case.conditions.hertz.half_widths[0], grid.upper[0]
-    along = [upper - inlet * a for inlet in inlets] or [grid.extent[0]]
-    fewest = (
-        grid.cells[0] * min(along) / max(along)
-    )  # cells go along, to a whole even number: one may be missing
+    extents = [upper - inlet * a for inlet in inlets] or [grid.extent[0]]
+    # the number of cells follows the domain, rounded to an even number: one may be missing
+    fewest = grid.cells[0] * min(extents) / max(extents)
     widened = fewest / (fewest - 1.0) if inlets else 1.0
-    coarsest = 1e6 * max(
-        widened * max(along) / grid.cells[0], grid.spacing[1]
-    )  # um, as the length's range
-    shortest = 1e6 * min(*along, grid.extent[1])
+    # in um, as the range of the length
+    coarsest = 1e6 * max(widened * max(extents) / grid.cells[0], grid.spacing[1])
+    shortest = 1e6 * min(*extents, grid.extent[1])
     low, high = max(lengths.low, 2.0 * coarsest), min(lengths.high, 0.49 * shortest)
     if low >= high:
         reason = (
-            f"the grid carries no correlation length from {lengths.low:g} to {lengths.high:g} um"
+            f"the grid resolves no correlation length from {lengths.low:g} to {lengths.high:g} um"
         )
         raise BadInput(f"{case.source}: {reason}; use more cells or a larger domain")
-    step = 10.0 ** (math.floor(math.log10(low)) - 2)  # three digits, which the grid still carries
+    step = 10.0 ** (math.floor(math.log10(low)) - 2)  # three digits, rounded up to stay resolved
     return replace(
         lengths, low=float(f"{math.ceil(low / step) * step:.6g}"), high=float(f"{_down(high):.6g}")
     )
@@ -206,46 +201,46 @@ def _down(value: float) -> float:
 
 
 def entry_of(key: str) -> tuple[str, int | None]:
-    """The case's key, and the place in its pair where the key names one: "grid.x[0]" is ("grid.x", 0)."""
+    """Split a key into the case's key and the index in its pair: "grid.x[0]" is ("grid.x", 0)."""
     entry = _ENTRY.fullmatch(key)
-    return (entry["key"], int(entry["place"])) if entry else (key, None)
+    return (entry["key"], int(entry["index"])) if entry else (key, None)
 
 
 def stated_value(case: Case, key: str) -> Any:
-    """What the case states for a dotted key, as a case file writes it; None where it states nothing."""
-    name, place = entry_of(key)
+    """Return the value that the case states for a dotted key, or None."""
+    name, index = entry_of(key)
     value: Any = tomllib.loads(case.text)
     for part in name.split("."):
         value = value.get(part) if isinstance(value, Mapping) else None
-    if place is None or value is None:
+    if index is None or value is None:
         return value
-    return value[place] if isinstance(value, list) and place < len(value) else None
+    return value[index] if isinstance(value, list) and index < len(value) else None
 
 
 def overrides_at(
     case: Case, ranges: Sequence[ParameterRange], shares: Iterable[float]
 ) -> dict[str, Any]:
-    """The case's overrides at a share of the way through each range.
+    """Return the case's overrides at a share of each range.
 
-    Where the domain is moved along x or y, its cells go with it, so that their size stays that of
-    the case's cells on the widest domain in the ranges.
+    If the domain changes along x or y, the number of cells changes with it, so that their size
+    stays that of the case's cells on the widest domain in the ranges.
     """
     overrides: dict[str, Any] = {}
     for entry, share in zip(ranges, map(float, shares), strict=True):
-        key, place = entry_of(entry.key)
-        if place is None:
+        key, index = entry_of(entry.key)
+        if index is None:
             overrides[key] = entry.written(share)
         else:
             whole = overrides.get(key, stated_value(case, key))
             overrides[key] = [
-                entry.written(share) if i == place else value for i, value in enumerate(whole)
+                entry.written(share) if i == index else value for i, value in enumerate(whole)
             ]
     cells = list(case.grid.cells)
     for axis, key in enumerate(("grid.x", "grid.y")):
         if key in overrides and cells[axis] > 1:
-            reach = overrides[key][1] - overrides[key][0]
+            extent = overrides[key][1] - overrides[key][0]
             cells[axis] = max(
-                2 * round(cells[axis] * reach / _widest(case, ranges, key) / 2), FEWEST_CELLS
+                2 * round(cells[axis] * extent / _widest(case, ranges, key) / 2), FEWEST_CELLS
             )
     if tuple(cells) != case.grid.cells:
         overrides["grid.cells"] = cells
@@ -255,19 +250,20 @@ def overrides_at(
 def _widest(case: Case, ranges: Sequence[ParameterRange], key: str) -> float:
     low, high = (float(value) for value in stated_value(case, key))
     for entry in ranges:
-        name, place = entry_of(entry.key)
-        if name == key and place is not None:
-            low, high = (entry.low, high) if place == 0 else (low, entry.high)
+        name, index = entry_of(entry.key)
+        if name == key and index is not None:
+            low, high = (entry.low, high) if index == 0 else (low, entry.high)
     return high - low
 
 
 def require_ranges(
     case: Case, ranges: Sequence[ParameterRange], reserved: Mapping[str, str]
 ) -> None:
-    """Refuse ranges named twice, of a `reserved` key (the value says why) or that the case would refuse, and none."""
+    """Raise BadInput for no range, duplicates, a `reserved` key or an invalid range."""
     if not ranges:
         raise BadInput(
-            f"{case.source}: nothing is varied; name a range such as 'material.hardness=0.65 GPa..3 GPa'"
+            f"{case.source}: nothing is varied; "
+            "name a range such as 'material.hardness=0.65 GPa..3 GPa'"
         )
     keys = [entry.key for entry in ranges]
     for key in keys:
@@ -277,16 +273,16 @@ def require_ranges(
             raise BadInput(f"{key} is varied twice; name it once")
         if entry_of(key)[1] is not None and stated_value(case, key) is None:
             raise BadInput(
-                f"{case.source}: {key} is no entry of the case; name one such as grid.x[0]"
+                f"{case.source}: {key} is not an entry of the case; name one such as grid.x[0]"
             )
     for number in range(len(ranges)):
         for end in (0.0, 1.0):
-            shares = [end if place == number else 0.5 for place in range(len(ranges))]
+            shares = [end if other == number else 0.5 for other in range(len(ranges))]
             case.with_overrides(overrides_at(case, ranges, shares))
 
 
 def at_cells(case: Case, cells: int | None) -> Case:
-    """The case on `cells` x `cells` cells; None: as it is. An axis of one cell keeps it."""
+    """Return the case on `cells` x `cells` cells (None: unchanged); single cells stay single."""
     if cells is None:
         return case
     if cells < FEWEST_CELLS:

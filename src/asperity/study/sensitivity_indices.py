@@ -1,4 +1,4 @@
-"""Samples of a unit cube and what moves an outcome over them, by SALib: Morris' effects, Sobol's variances."""
+"""Sampling designs and sensitivity indices from SALib: Morris' effects, Sobol's variances."""
 
 import math
 from typing import Any, Literal, NamedTuple
@@ -9,25 +9,23 @@ from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput
 
 SensitivityMethod = Literal["morris", "sobol"]
-SIZES: dict[SensitivityMethod, int] = {
-    "morris": 12,
-    "sobol": 64,
-}  # trajectories; base samples, a power of two
-MEASURES: dict[SensitivityMethod, dict[str, str]] = {  # and what SALib calls them
+# default number of trajectories and of base samples (a power of two)
+SIZES: dict[SensitivityMethod, int] = {"morris": 12, "sobol": 64}
+MEASURES: dict[SensitivityMethod, dict[str, str]] = {  # our names and SALib's
     "morris": {name: name for name in ("mu", "mu_star", "mu_star_conf", "sigma")},
     "sobol": {"s1": "S1", "s1_conf": "S1_conf", "st": "ST", "st_conf": "ST_conf"},
 }
-LEVELS = 4  # places a factor of Morris' design can take
+LEVELS = 4  # values of a factor in Morris' design
 CONFIDENCE = 0.95  # of SALib's intervals
-RESAMPLING = 1  # seed of their bootstrap; SALib takes 0 for none
-FEWEST_BLOCKS = 2  # of the sample, that effects can be told from
-ROUNDING = 1e-9  # relative difference that nothing has made
+RESAMPLING = 1  # seed of their bootstrap; SALib treats 0 as none
+FEWEST_BLOCKS = 2  # complete blocks of the sample needed for indices
+ROUNDING = 1e-9  # relative difference attributed to rounding
 
 
 class SampleDesign(NamedTuple):
     """Points to evaluate, as shares 0 to 1 of each factor's range, shape (points, factors).
 
-    Runs of `block` points stand or fall together: without one of them the rest says nothing.
+    Points are used in blocks of `block`; a block with a missing outcome is left out.
     """
 
     method: SensitivityMethod
@@ -38,7 +36,7 @@ class SampleDesign(NamedTuple):
 def sample_design(
     method: SensitivityMethod, factors: int, size: int, seed: int = 0
 ) -> SampleDesign:
-    """Morris' trajectories or Saltelli's sample over the unit cube; `BadInput` for a size that cannot be."""
+    """Draw Morris' trajectories or Saltelli's sample; `BadInput` for an unusable size."""
     try:
         import SALib  # noqa: F401
     except ModuleNotFoundError:
@@ -57,7 +55,7 @@ def sample_design(
     if size & (size - 1):
         nearest = 2 ** round(math.log2(size))
         raise BadInput(
-            f"samples of the method sobol must be a power of two, got {size}; take {nearest}"
+            f"samples of the method sobol must be a power of two, got {size}; use {nearest}"
         )
     from SALib.sample import sobol
 
@@ -66,16 +64,14 @@ def sample_design(
 
 
 def indices(design: SampleDesign, outcome: Field) -> dict[str, Field]:
-    """Each factor's effect on an outcome of shape (points,), by SALib; blocks that hold a nan are left out.
+    """Compute each factor's effect on an outcome of shape (points,); blocks with nan are left out.
 
     Returns `mu`, `mu_star`, `mu_star_conf`, `sigma`, or `s1`, `s1_conf`, `st`, `st_conf`, of shape
-    (factors,); `AsperityError` if fewer than two blocks are left.
+    (factors,); `AsperityError` if fewer than two blocks remain.
     """
     whole = np.isfinite(outcome.reshape(-1, design.block)).all(axis=1)
     if np.count_nonzero(whole) < FEWEST_BLOCKS:
-        raise AsperityError(
-            "too many contacts failed to say what moves the curves; narrow the ranges"
-        )
+        raise AsperityError("too many contacts failed to rank the factors; narrow the ranges")
     kept = np.repeat(whole, design.block)
     values, shares = outcome[kept], design.shares[kept]
     names = MEASURES[design.method]

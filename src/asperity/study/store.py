@@ -1,7 +1,7 @@
-"""What a study leaves on disk, and how it comes back: manifest first, then a part a finished batch, each written whole.
+"""Storage of a study: a manifest, then one part per finished batch, each written atomically.
 
-A part is a small parquet table under a temporary name, flushed and renamed, so that a crash at any
-moment leaves only whole ones; what the manifest promises and no part holds is still to be
+A part is a small parquet table written under a temporary name, flushed and renamed, so that a
+crash leaves only complete parts. Cases of the manifest that are in no part are still to be
 computed.
 """
 
@@ -35,22 +35,22 @@ from asperity.study.evaluate import Row
 from asperity.study.maps import read_maps, write_maps
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 
-FORMAT = 2  # counts up when a reader of the format before could not read the folder
+FORMAT = 2  # increases when readers of the previous format cannot read the folder
 PARTS, TABLE = "parts", "table.parquet"
-LEFT_BEHIND_S = 3600.0  # age of a temporary file that no shard elsewhere can still be writing
+STALE_S = 3600.0  # age from which on no other shard can still be writing a temporary file
 _LEADING = ("case_id", "number", "point", "realisation", "status", "reason")
 
 
 @dataclass(frozen=True)
-class Store:
-    """A study's folder. Made by `open_store`, which holds its lock."""
+class StudyFolder:
+    """A study's folder. Opened for writing by `open_study_folder`, which locks it."""
 
     folder: Path
     plan: StudyPlan
-    design: str  # as the folder has it: of another asperity, perhaps not the plan's
+    design: str  # as stored; may differ from the plan's if written by another version of asperity
 
     def finished(self) -> dict[str, tuple[str, int]]:
-        """Status and attempt of every case that some part holds."""
+        """Return status and attempt of every stored case."""
         newest: dict[str, tuple[str, int]] = {}
         for path in self._parts():
             part = self._read_part(path).select(["case_id", "status", "attempt"]).to_pydict()
@@ -59,22 +59,22 @@ class Store:
                     newest[case_id] = status, attempt
         return newest
 
-    def keep(self, rows: Sequence[Row], maps: Mapping[str, Mapping[str, Field]]) -> None:
-        """Write a finished batch: its fields first, then its rows; `AsperityError` if the system refuses to write."""
+    def write_batch(self, rows: Sequence[Row], maps: Mapping[str, Mapping[str, Field]]) -> None:
+        """Write a finished batch, fields first; `AsperityError` if the system refuses to write."""
         for case_id, fields in maps.items():
             if fields:
                 write_maps(self.folder, self.design, case_id, fields)
         names = hashlib.sha256(
             "".join(f"{row['case_id']}{row['attempt']}" for row in rows).encode()
         ).hexdigest()
-        self._write(self.folder / PARTS / f"{names[:20]}.parquet", table_of(rows))
+        self._write(self.folder / PARTS / f"{names[:20]}.parquet", rows_table(rows))
 
     def maps(self, case_id: str) -> dict[str, Field]:
-        """The maps kept of a case; UnreadableFile where there are none, or they are damaged."""
+        """Read the maps of a case; UnreadableFile if there are none or they are damaged."""
         return read_maps(self.folder, self.design, case_id)
 
     def merge(self) -> Path:
-        """Write what is finished as one table, in the order of the plan, and return its path."""
+        """Write all finished cases as one table, in the order of the plan; return its path."""
         path = self.folder / TABLE
         table = pyarrow.Table.from_pandas(self.table(), preserve_index=False)
         about = {"asperity": version("asperity"), "case": self.plan.case.text}
@@ -83,17 +83,17 @@ class Store:
 
     @property
     def merged(self) -> Path | None:
-        """The merged table, where it has been written."""
+        """Path of the merged table, if it has been written."""
         path = self.folder / TABLE
         return path if path.exists() else None
 
     def table(self) -> pandas.DataFrame:
-        """What is finished, a row a case in the order of the plan."""
-        return in_order([self._read_part(path) for path in self._parts()], self.plan)
+        """Return one row per finished case, in the order of the plan."""
+        return ordered_table([self._read_part(path) for path in self._parts()], self.plan)
 
-    def take_from(self, other: Path) -> None:
-        """Copy the parts of another folder of the same study (a shard computed elsewhere)."""
-        for path in open_read(other, self.plan)._parts():
+    def import_parts(self, other: Path) -> None:
+        """Copy the parts of another folder of the same study, such as a shard."""
+        for path in read_study_folder(other, self.plan)._parts():
             target = self.folder / PARTS / path.name
             if not target.exists():
                 write_bytes(target, path.read_bytes())
@@ -102,23 +102,25 @@ class Store:
         return sorted((self.folder / PARTS).glob("*.parquet"))
 
     def _read_part(self, path: Path) -> pyarrow.Table:
-        return read_table(path, self.design, "delete it, and its cases are computed again")
+        return read_table(path, self.design, "delete it; its cases are then computed again")
 
     def _write(self, path: Path, table: pyarrow.Table) -> None:
         try:
             write_table(path, table, self.design)
         except AsperityError as refused:
             raise type(refused)(
-                f"{refused}; finished cases are kept, make room and run the study again"
+                f"{refused}; finished cases are kept, free space and run the study again"
             ) from refused
 
 
 @contextmanager
-def open_store(folder: Path, plan: StudyPlan, shard: tuple[int, int]) -> Iterator[Store]:
-    """A study's folder, made or found, with its manifest written, held against a second process that computes there.
+def open_study_folder(
+    folder: Path, plan: StudyPlan, shard: tuple[int, int]
+) -> Iterator[StudyFolder]:
+    """Create or open a study's folder for writing, write its manifest and lock it.
 
-    `BadInput` for a folder that cannot be written to, that holds another study, or that another
-    process is working in; `AsperityError` if the system refuses to write, as on a full disk.
+    `BadInput` for a folder that cannot be written to, holds another study, or is in use by another
+    process; `AsperityError` if the system refuses to write, as on a full disk.
     """
     make_folder(folder)
     manifest = folder / MANIFEST
@@ -130,42 +132,42 @@ def open_store(folder: Path, plan: StudyPlan, shard: tuple[int, int]) -> Iterato
         )
     make_folder(folder / PARTS)
     require_writable(manifest)
-    with ExitStack() as held:
-        _hold(folder, shard, held)
-        for left in (folder / PARTS).glob(".*.part"):
-            if shard == (1, 1) or time.time() - left.stat().st_mtime > LEFT_BEHIND_S:
-                left.unlink(missing_ok=True)
+    with ExitStack() as locks:
+        _lock(folder, shard, locks)
+        for stale in (folder / PARTS).glob(".*.part"):
+            if shard == (1, 1) or time.time() - stale.stat().st_mtime > STALE_S:
+                stale.unlink(missing_ok=True)
         write_json(manifest, _manifest(plan, folder))
-        yield Store(folder, plan, plan.design)
+        yield StudyFolder(folder, plan, plan.design)
 
 
-def open_read(folder: Path, plan: StudyPlan) -> Store:
-    """A study's folder to read from; BadInput where it holds another study than `plan`."""
+def read_study_folder(folder: Path, plan: StudyPlan) -> StudyFolder:
+    """Open a study's folder for reading; BadInput if it holds another study than `plan`."""
     _require_same(plan, folder)
-    return Store(folder, plan, plan.design)
+    return StudyFolder(folder, plan, plan.design)
 
 
-def _hold(folder: Path, shard: tuple[int, int], held: ExitStack) -> None:
-    """Lock the folder: a whole study against everybody, a shard against itself and a whole study."""
+def _lock(folder: Path, shard: tuple[int, int], locks: ExitStack) -> None:
+    """Lock the folder: a whole study exclusively, a shard against itself and a whole study."""
     whole, own = folder / ".whole.lock", folder / f".shard-{shard[0]}-of-{shard[1]}.lock"
     try:
         if shard == (1, 1):
             for lock in (whole, *folder.glob(".shard-*.lock")):
-                held.enter_context(filelock.FileLock(lock, timeout=0))
+                locks.enter_context(filelock.FileLock(lock, timeout=0))
         else:
             with filelock.FileLock(whole, timeout=1):
-                held.enter_context(filelock.FileLock(own, timeout=0))
+                locks.enter_context(filelock.FileLock(own, timeout=0))
     except filelock.Timeout:
         raise BadInput(
-            f"another process computes this study in {folder}; wait for it, or stop it"
+            f"another process computes this study in {folder}; wait for it or stop it"
         ) from None
     except OSError as error:
         raise BadInput(f"cannot write into {folder}: {error.strerror}; choose another") from None
 
 
-def open_kept(folder: Path) -> Store:
-    """A study as its folder keeps it; `UnreadableFile` if it holds no study, or its manifest is damaged."""
-    manifest = manifest_of(folder)
+def load_study_folder(folder: Path) -> StudyFolder:
+    """Load a study's folder; `UnreadableFile` if it holds no study or its manifest is damaged."""
+    manifest = study_manifest(folder)
     try:
         home = (folder / manifest["case_folder"]).resolve()
         case = load_case(manifest["case"], folder=home, name=manifest["source"])
@@ -180,20 +182,19 @@ def open_kept(folder: Path) -> Store:
         ids = tuple(manifest["ids"])
         if len(ids) != len(plan.points) * plan.realisations:
             raise KeyError("ids")
-        with suppress(UnreadableFile):  # the measured surface need not be at hand
+        with suppress(UnreadableFile):  # the measured surface need not be available
+            # a different design comes from a version of asperity with other case keys
             if plan.design == manifest["design"] and ids != tuple(case.id for case in plan.cases):
-                raise KeyError(
-                    "ids"
-                )  # another design is that of an asperity whose case file had other keys
-        return Store(folder, replace(plan, ids=ids), manifest["design"])
+                raise KeyError("ids")
+        return StudyFolder(folder, replace(plan, ids=ids), manifest["design"])
     except KeyError:
         raise UnreadableFile(
             f"{folder / MANIFEST} is damaged; compute the study into another folder"
         ) from None
 
 
-def manifest_of(folder: Path) -> dict[str, Any]:
-    """What a study's folder says of itself."""
+def study_manifest(folder: Path) -> dict[str, Any]:
+    """Read the manifest of a study's folder."""
     return read_manifest(folder, of="study", layout=FORMAT)
 
 
@@ -213,27 +214,27 @@ def _manifest(plan: StudyPlan, folder: Path) -> dict[str, Any]:
 
 
 def _require_same(plan: StudyPlan, folder: Path) -> None:
-    """Levels and seeds may be added to a study; what all its cases share may not change under it."""
-    manifest = manifest_of(folder)
+    """Raise BadInput if the folder's study shares another case; points and seeds may be added."""
+    manifest = study_manifest(folder)
     require_same_version(manifest, folder)
     if manifest.get("design") != plan.design:
-        remedy = "choose another folder, or the case as it was"
+        remedy = "choose another folder, or restore the case"
         raise BadInput(f"{folder} holds a study of another case than {plan.case.source}; {remedy}")
 
 
 # Tables
-# --------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------
 
 
-def table_of(rows: Iterable[Row]) -> pyarrow.Table:
-    """Rows as a table; a row may lack what another has."""
+def rows_table(rows: Iterable[Row]) -> pyarrow.Table:
+    """Return rows as a table; missing entries become null."""
     rows = list(rows)
     names = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     return pyarrow.Table.from_pydict({name: [row.get(name) for row in rows] for name in names})
 
 
-def in_order(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFrame:
-    """Finished rows behind the plan's own columns, by case number; of a case computed twice, the last attempt."""
+def ordered_table(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFrame:
+    """Return finished rows by case number, the plan's columns first; the last attempt counts."""
     planned = pandas.DataFrame(
         [(case.id, case.number, case.point, case.realisation) for case in plan.cases],
         columns=list(_LEADING[:4]),
@@ -241,7 +242,7 @@ def in_order(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFram
     for key in (*plan.axes, *(seed for seed in SEED_KEYS if seed not in plan.axes)):
         values = [to_si(case.overrides.get(key)) for case in plan.cases]
         if any(value is not None for value in values):
-            planned[key] = _of_one_type(values)
+            planned[key] = _uniform_type(values)
     for seed in SEED_KEYS:
         if seed in planned:
             planned[seed] = planned[seed].astype(
@@ -251,17 +252,15 @@ def in_order(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFram
         fewest_last = sorted(parts, key=lambda part: part.num_columns, reverse=True)
         table = pyarrow.concat_tables(fewest_last, promote_options="permissive")
         for place, column in enumerate(table.schema):
-            if pyarrow.types.is_null(column.type):  # a number that no case has
+            if pyarrow.types.is_null(column.type):  # no case has this number
                 table = table.set_column(place, column.name, table.column(place).cast("float64"))
         runs = table.select(["case_id", "attempt"]).to_pandas()
         last = (
             runs.sort_values("attempt", kind="stable").drop_duplicates("case_id", keep="last").index
         )
         finished = table.take(sorted(last)).drop_columns("attempt").to_pandas()
-        if "converged" in finished:
-            finished["converged"] = finished["converged"].eq(
-                True
-            )  # what failed before it was solved did not converge
+        if "converged" in finished:  # a case that failed before the solver did not converge
+            finished["converged"] = finished["converged"].eq(True)
     else:
         finished = pandas.DataFrame({"case_id": [], "status": [], "reason": []}, dtype=str)
     merged = planned.merge(finished, on="case_id", how="inner").sort_values(
@@ -271,9 +270,9 @@ def in_order(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFram
     return merged[[*_LEADING, *rest]]
 
 
-def _of_one_type(values: Sequence[Any]) -> list[Any]:
-    """A swept quantity as a column: numbers, or text (JSON for pairs and tables) where some value is no number."""
-    if any(isinstance(value, list) for value in values):  # an even pair has become one number
+def _uniform_type(values: Sequence[Any]) -> list[Any]:
+    """Return a swept quantity as numbers, or as text (JSON for pairs and tables) if any is not."""
+    if any(isinstance(value, list) for value in values):  # a pair of equal values became one number
         values = [[value, value] if isinstance(value, int | float) else value for value in values]
     if all(value is None or isinstance(value, int | float) for value in values):
         return list(values)

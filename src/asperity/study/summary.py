@@ -1,14 +1,15 @@
-"""What a study, or the estimate of its cost, comes to: in a sentence, and as numbers."""
+"""Verdict and JSON output of a study and of its cost estimate."""
 
 from typing import Any
 
-from asperity.study.curve import WearCurve, curve_of, is_wear_study
-from asperity.study.execute import StudyCost, StudyResult
+from asperity.study.cost import StudyCost
+from asperity.study.curve import WearCurve, curve_from_study, is_wear_study
+from asperity.study.execute import StudyResult
 from asperity.study.plan import StudyPlan
 
 
 def study_verdict(result: StudyResult) -> str:
-    """How much of the study there is, and what it says."""
+    """Return the number of cases and failures, and the verdict of a finished wear curve."""
     of_all = f" of {len(result.plan.cases)}" if result.missing else ""
     sentence = f"{len(result.table)}{of_all} cases, {result.failed or 'none'} failed"
     if result.computed:
@@ -20,7 +21,7 @@ def study_verdict(result: StudyResult) -> str:
 
 
 def study_scalars(result: StudyResult) -> dict[str, Any]:
-    """What `asperity study --json` prints."""
+    """Return the JSON output of `asperity study`."""
     scalars: dict[str, Any] = {
         "verdict": study_verdict(result),
         "cases": len(result.table),
@@ -47,19 +48,24 @@ def study_scalars(result: StudyResult) -> dict[str, Any]:
 
 
 def finished_curve(result: StudyResult) -> WearCurve | None:
-    """The wear curve of what is there of a study of Sq alone, if any of it did not fail."""
-    return curve_of(result) if is_wear_study(result) and len(result.table) > result.failed else None
+    """Return the wear curve of a study of Sq with at least one successful case, else None."""
+    return (
+        curve_from_study(result)
+        if is_wear_study(result) and len(result.table) > result.failed
+        else None
+    )
 
 
 def estimate_verdict(cost: StudyCost) -> str:
-    """How many cases, and how long they will take."""
+    """Return the number of cases and the estimated time."""
     workers = "worker" if cost.workers == 1 else "workers"
     time = duration_text(cost.seconds)
-    return f"{cost.cases} cases, {cost.kept} of them kept already: about {time} on {cost.workers} {workers}."
+    finished = f"{cost.cases} cases, {cost.kept} of them already computed"
+    return f"{finished}: about {time} on {cost.workers} {workers}."
 
 
 def estimate_scalars(plan: StudyPlan, cost: StudyCost) -> dict[str, Any]:
-    """What `asperity study --dry-run --json` prints."""
+    """Return the JSON output of `asperity study --dry-run`."""
     return {
         "verdict": estimate_verdict(cost),
         "cases": cost.cases,
@@ -73,7 +79,7 @@ def estimate_scalars(plan: StudyPlan, cost: StudyCost) -> dict[str, Any]:
 
 
 def duration_text(seconds: float) -> str:
-    """A time as people plan with it: 4.2 s, 37 s, 12 min, 3.1 h."""
+    """Return a duration with two or three digits: 4.2 s, 37 s, 12 min, 3.1 h."""
     if seconds < 100:
         return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

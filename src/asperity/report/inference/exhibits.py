@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
-from asperity.inference import CRUCIAL, Design, Inference
+from asperity.inference import KEY_QUANTITIES, Design, Inference
 from asperity.report.base import Exhibit
 from asperity.report.drawing import legend_below, panels_in_rows
 from asperity.report.style import BLUE, GREY, VERMILION, Medium
@@ -106,7 +106,7 @@ def pairs(found: Inference) -> Exhibit:
 
 
 def _most_alike(values: dict[str, Field], keys: Sequence[str]) -> list[tuple[str, str]]:
-    chosen = [(CRUCIAL[1], CRUCIAL[0])] if CRUCIAL[1] in values else []
+    chosen = [(KEY_QUANTITIES[1], KEY_QUANTITIES[0])] if KEY_QUANTITIES[1] in values else []
     alike = np.abs(np.corrcoef(np.log(np.maximum(np.array([values[key] for key in keys]), 1e-300))))
     both = [(alike[i, j], keys[i], keys[j]) for i in range(len(keys)) for j in range(i)]
     ranked = sorted(both, key=lambda entry: -float(np.nan_to_num(entry[0])))
@@ -120,7 +120,7 @@ def predicted(found: Inference) -> Exhibit:
         for place, point in enumerate(found.forward.points)
         if not np.isnan(point.crf.value)
     ]
-    again = np.exp(found.heard_again())
+    again = np.exp(found.posterior_predictive())
 
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(3.4)

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from asperity.core.quantities import quantity
-from asperity.inference import CRUCIAL, Design, Forecast, Inference, PointEstimates
+from asperity.inference import KEY_QUANTITIES, Design, Forecast, Inference, PointEstimates
 from asperity.report.base import Tile, heading, render, write_page
 from asperity.report.forecast import ahead
 from asperity.report.inference import exhibits
@@ -59,7 +59,7 @@ def render_inference_page(
                 quantity(key).number(known[key].median),
                 f"({quantity(key).interval(known[key].low, known[key].high)})",
             )
-            for key in CRUCIAL
+            for key in KEY_QUANTITIES
             if key in known
         ],
         warnings=found.warnings(),
@@ -69,7 +69,7 @@ def render_inference_page(
         following=exhibits.following(found).picture(),
         lines=_lines(found),
         heads=PointEstimates.HEADS,
-        points=[one.cells() for one in found.at_points()],
+        points=[one.cells() for one in found.point_estimates()],
         forecast=forecast,
         design=design,
         ahead=None if forecast is None else ahead(forecast.bands, forecast.x_name or "x").picture(),

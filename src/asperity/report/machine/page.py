@@ -106,8 +106,8 @@ def _rated(rating: Rating) -> _RatingView:
     entry = quantity(rating.key)
     if rating.reason:
         value = f"not rated: {rating.reason}"
-    elif rating.alone is not None:
-        value = entry.text(rating.alone)
+    elif rating.machine_value is not None:
+        value = entry.text(rating.machine_value)
     else:
         known = {name: number for name, number in rating.values.items() if number is not None}
         value = (

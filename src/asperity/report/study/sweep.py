@@ -156,7 +156,7 @@ def _write_cells(axes: Axes, cells: Field, shade: Any) -> None:
 
 def _tick(side: Any, axis: SweptAxis) -> None:
     """The values at cell centres, thinned out where they are many."""
-    places = axis.places
+    places = axis.distinct
     step = -(-places.size // 6)
     side.set_ticks(
         np.arange(places.size)[::step], [place_in_words(axis, value) for value in places[::step]]
