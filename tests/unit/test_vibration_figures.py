@@ -47,7 +47,7 @@ def test_the_load_trend_vanishes_with_fine_sampling():
         "20 kHz",
         "50 kHz",
         "200 kHz",
-        "not sampled",
+        "continuous",
     ]
     falls = [values[0] / values[-1] for values in drawn.values()]
     assert falls[0] > 5.0

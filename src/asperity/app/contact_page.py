@@ -133,7 +133,7 @@ class ContactView:
         self.drop.close()
 
     # What is shown
-    # ---------------------------------------------------------------------------------------------------
+    # ---------------------------------------------------------------------------------
 
     def draw(self) -> None:
         """Draw the desk as it is now."""
@@ -203,7 +203,7 @@ class ContactView:
         self.said.text = sentences(lines, "alarm")
 
     # What is turned
-    # --------------------------------------------------------------------------------------------------
+    # ---------------------------------------------------------------------------------
 
     def _build_knobs(self) -> None:
         """A widget for every knob of the opened case that is shown, under the headings of their groups."""
@@ -248,7 +248,7 @@ class ContactView:
             self.desk.pin()
 
     # What is dropped and taken away
-    # ----------------------------------------------------------------------------------
+    # ---------------------------------------------------------------------------------
 
     def _surface_came(self, path: Path) -> None:
         self._say()

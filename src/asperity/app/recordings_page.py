@@ -129,7 +129,7 @@ class RecordingsView:
         self.one.add_layout(self._crf)
 
     # What is read
-    # ----------------------------------------------------------------------------------------------------
+    # ---------------------------------------------------------------------------------
 
     def stated(self) -> Stated:
         """What was typed; BadInput for what cannot be meant."""
@@ -208,7 +208,7 @@ class RecordingsView:
             self.look()  # more has come while these were read
 
     # What is shown
-    # ---------------------------------------------------------------------------------------------------
+    # ---------------------------------------------------------------------------------
 
     def _say(self, sentence: str) -> None:
         self.status.text = sentences([f"{sentence.rstrip('.')}."], "alarm")
