@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import x3pio
 
-from asperity.app.inputs import knobs_of
-from asperity.app.opening import paper
+from asperity.app.inputs import case_inputs
+from asperity.app.opening import default_case
 from support.browser import Visit, chromium, click_mark, expect, require_operable, serving
 
 uploads = pytest.importorskip("asperity.app.uploads", reason="the extra page is not installed")
@@ -111,9 +111,9 @@ def tile(page, name="CLR"):
 
 
 def changed(page, text, name="CLR"):
-    """Wait until a tile says something else, and that is no coarse answer."""
+    """Wait until a tile says something else, and that is no coarse solution."""
     expect(tile(page, name)).not_to_have_text(text, use_inner_text=True)
-    expect(tile(page, name)).not_to_contain_text("coarse answer")
+    expect(tile(page, name)).not_to_contain_text("coarse solution")
 
 
 def holds(page, text):
@@ -171,7 +171,8 @@ def test_a_slider_turns_by_the_keyboard_and_says_its_value(visit):
     page = visit.solved()
     handles = page.get_by_role("slider").all()
     assert len(handles) == sum(
-        not (knob.more or knob.choices) for knob in knobs_of(paper()).values()
+        not (case_input.more or case_input.choices)
+        for case_input in case_inputs(default_case()).values()
     )
     assert all(handle.get_attribute("aria-label") for handle in handles)
     assert page.get_by_role("slider", name="Load, F").get_attribute("aria-valuetext") == "500 N"
@@ -193,15 +194,15 @@ def test_every_control_is_named_and_reached_by_the_keyboard(visit):
 def test_a_wrong_value_is_named_beside_its_knob(visit):
     page = visit.solved()
     box = turn(page, "Composite roughness, Sq", "2")
-    sentence = page.get_by_text(
+    message = page.get_by_text(
         'surface.sq must be a length such as "5.4 mm", got the bare number 2'
     )
-    sentence.wait_for()
-    below, above = sentence.bounding_box(), box.bounding_box()
+    message.wait_for()
+    below, above = message.bounding_box(), box.bounding_box()
     assert 0 < below["y"] - above["y"] < 120
     expect(page.locator(".block.film")).not_to_have_css("opacity", "1")
     turn(page, "Composite roughness, Sq", "1 um")
-    sentence.wait_for(state="hidden")
+    message.wait_for(state="hidden")
     expect(page.locator(".block.film")).to_have_css("opacity", "1")
 
 
