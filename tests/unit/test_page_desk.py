@@ -70,33 +70,33 @@ def run():
 
 
 @pytest.fixture(scope="module")
-def answer(run):
+def result(run):
     return result_of_run(run, 0.1)
 
 
-def desk_of(overrides=MUTE):
+def session_of(overrides=MUTE):
     drawn = []
     queue = AtOnce()
     session = ContactSession(
         Settings(papers_case().with_overrides(overrides)),
         queue,
-        lambda: drawn.append(session.answer),
+        lambda: drawn.append(session.result),
     )
     return session, queue, drawn
 
 
-def test_an_answer_is_what_the_run_says(run, answer):
+def test_an_answer_is_what_the_run_says(run, result):
     summary = run.summary()
-    assert {key: answer.row[key] for key in TILES} == {key: summary[key] for key in TILES}
-    np.testing.assert_allclose(answer.pressure, run.solution.pressure, rtol=1e-6)
-    np.testing.assert_array_equal(answer.cells == TOUCHING, run.solution.in_contact)
-    np.testing.assert_array_equal(answer.cells == CAVITATED, run.solution.cavitated)
-    assert answer.verdict == run.verdict()
-    assert set(run.notes) <= set(answer.notes)
+    assert {key: result.row[key] for key in TILES} == {key: summary[key] for key in TILES}
+    np.testing.assert_allclose(result.pressure, run.solution.pressure, rtol=1e-6)
+    np.testing.assert_array_equal(result.cells == TOUCHING, run.solution.in_contact)
+    np.testing.assert_array_equal(result.cells == CAVITATED, run.solution.cavitated)
+    assert result.verdict == run.verdict()
+    assert set(run.notes) <= set(result.notes)
 
 
-def test_tiles_have_the_intervals_that_the_verdict_has(run, answer):
-    uncertainties = {tile.key: tile.uncertainty for tile in answer.tiles}
+def test_tiles_have_the_intervals_that_the_verdict_has(run, result):
+    uncertainties = {tile.key: tile.uncertainty for tile in result.tiles}
     assert uncertainties["clr"] in run.verdict()
     assert uncertainties["crf_hz"] in run.verdict()
     assert uncertainties["car"].startswith("± ")
@@ -108,25 +108,25 @@ def test_tiles_have_the_intervals_that_the_verdict_has(run, answer):
     )
 
 
-def test_a_grid_that_cannot_tell_says_so_in_the_tiles(answer):
-    assert {tile.key: tile.uncertainty for tile in replace(answer, determined=False).tiles}[
+def test_a_grid_that_cannot_tell_says_so_in_the_tiles(result):
+    assert {tile.key: tile.uncertainty for tile in replace(result, determined=False).tiles}[
         "clr"
     ] == NOT_DETERMINED
-    unknown = replace(answer, row={**answer.row, "clr_low": None})
+    unknown = replace(result, row={**result.row, "clr_low": None})
     assert {tile.key: tile.uncertainty for tile in unknown.tiles}["clr"] == NOT_DETERMINED
-    wide = replace(answer, row={**answer.row, "car": 0.002, "car_error": 0.069})
+    wide = replace(result, row={**result.row, "car": 0.002, "car_error": 0.069})
     assert {tile.key: tile.uncertainty for tile in wide.tiles}[
         "car"
     ] == "0.0 to 7.1 %"  # and nothing below
-    silent = replace(answer, row={**answer.row, "crf_hz": None})
+    silent = replace(result, row={**result.row, "crf_hz": None})
     assert {tile.key: (tile.value, tile.uncertainty) for tile in silent.tiles}["crf_hz"] == (
         "–",
         "",
     )
 
 
-def test_the_spectrum_is_the_runs_near_its_band(run, answer):
-    spectrum, full = answer.spectrum, run.vibration.spectrum
+def test_the_spectrum_is_the_runs_near_its_band(run, result):
+    spectrum, full = result.spectrum, run.vibration.spectrum
     assert spectrum.crf_hz == run.vibration.resonance.crf_hz
     assert spectrum.frequency.size <= 500
     near = (full.frequency_hz >= spectrum.frequency[0]) & (
@@ -139,15 +139,15 @@ def test_the_spectrum_is_the_runs_near_its_band(run, answer):
     )
 
 
-def test_titles_that_follow_what_is_tried_have_room_on_a_phone(answer):
+def test_titles_that_follow_what_is_tried_have_room_on_a_phone(result):
     pytest.importorskip("panel")
     from asperity.app.contact_page import _spectrum_title
     from asperity.app.figures import TrialFigures
 
     trials = TrialFigures(lambda _: None)
-    titles = [_spectrum_title(answer), trials.share.title.text, trials.crf.title.text]
+    titles = [_spectrum_title(result), trials.share.title.text, trials.crf.title.text]
     assert titles[0].startswith("CRF ")
-    assert f"fitted to ± {answer.spectrum.crf_std_hz:.1f} Hz" in titles[0]
+    assert f"fitted to ± {result.spectrum.crf_std_hz:.1f} Hz" in titles[0]
     assert max(map(len, titles)) <= 36  # of 390 pixels
 
 
@@ -164,19 +164,19 @@ def test_hertzs_pressure_carries_the_load():
     assert not ellipse_pressure(x, 2.0, (1.0, 2.0), 3.0).any()
 
 
-def test_a_line_contacts_profile_is_one_all_along(answer):
+def test_a_line_contacts_profile_is_one_all_along(result):
     conditions = papers_case().conditions
     np.testing.assert_allclose(
-        answer.hertz(0),
-        line_pressure(answer.x, conditions.hertz.half_widths[0], conditions.hertz.p_max),
+        result.hertz(0),
+        line_pressure(result.x, conditions.hertz.half_widths[0], conditions.hertz.p_max),
     )
 
 
 def test_a_coarse_answer_comes_first_and_the_full_one_after_it():
-    session, _, drawn = desk_of()
+    session, _, drawn = session_of()
     session.solve()
-    shown = list({id(answer): answer for answer in drawn if answer is not None}.values())
-    assert [answer.coarse for answer in shown] == [True, False]
+    shown = list({id(result): result for result in drawn if result is not None}.values())
+    assert [result.coarse for result in shown] == [True, False]
     coarse, full = shown
     assert coarse.gap.shape == (48, 32)
     assert full.gap.shape == (96, 64)
@@ -223,7 +223,7 @@ def test_a_coarse_answer_that_takes_too_many_steps_is_sought_on_fewer_cells(monk
 
 
 def test_cells_that_are_too_few_only_for_a_coarse_answer_refuse_nothing():
-    session, _, _ = desk_of({**MUTE, "grid.x": [-9.0, 3.0], "grid.cells": [96, 64]})
+    session, _, _ = session_of({**MUTE, "grid.x": [-9.0, 3.0], "grid.cells": [96, 64]})
     session.solve()
     assert work.solve_coarsely(NOBODY, session.settings.case, None) == work.CoarseResult(None, None)
     assert session.status.startswith("Solved on 96 × 64 cells")
@@ -237,7 +237,7 @@ def test_a_contact_on_few_cells_has_no_coarse_answer():
 
 
 def test_what_is_shown_is_old_until_its_answer_has_come():
-    session, queue, _ = desk_of()
+    session, queue, _ = session_of()
     session.solve()
     assert not session.stale
     queue.held = True
@@ -263,13 +263,13 @@ def test_where_there_is_room_the_full_answer_does_not_wait_for_the_coarse_one(fi
     assert (len(coarsely.kept), len(fully.kept)) == (1, 1)
     if first == "coarse":
         coarsely.go()
-        assert (session.answer.coarse, session.pending, len(fully.kept)) == (True, True, 1)
+        assert (session.result.coarse, session.pending, len(fully.kept)) == (True, True, 1)
         fully.go()
     else:
         fully.go()
         assert not session.pending
         coarsely.go()
-    assert (session.answer.coarse, session.pending, len(session.trials)) == (False, False, 1)
+    assert (session.result.coarse, session.pending, len(session.trials)) == (False, False, 1)
     assert (coarsely.kept, fully.kept) == ([], [])
 
 
@@ -287,8 +287,8 @@ def test_an_answer_to_what_was_set_before_is_none_to_what_is_set_now():
     assert (session.pending, session.trials) == (True, [])
     coarsely.go()
     fully.go()
-    assert (session.pending, session.answer.text) == (False, session.settings.case.text)
-    assert "600 N" in session.answer.text
+    assert (session.pending, session.result.text) == (False, session.settings.case.text)
+    assert "600 N" in session.result.text
 
 
 def test_without_room_the_full_answer_is_asked_for_after_the_coarse_one():
@@ -303,16 +303,16 @@ def test_without_room_the_full_answer_is_asked_for_after_the_coarse_one():
     coarsely.go()
     assert len(fully.kept) == 1
     fully.go()
-    assert not session.answer.coarse
+    assert not session.result.coarse
 
 
 def test_a_wrong_value_keeps_its_sentence_and_marks_the_picture_until_it_is_mended():
-    session, _, _ = desk_of()
+    session, _, _ = session_of()
     session.solve()
-    before = session.answer
+    before = session.result
     session.change("contact.load", "600")
     assert "bare number 600" in session.rejected["contact.load"].message
-    assert session.answer is before
+    assert session.result is before
     assert session.stale
     session.change("contact.load", "500 N")  # as it was
     assert not session.rejected
@@ -320,13 +320,13 @@ def test_a_wrong_value_keeps_its_sentence_and_marks_the_picture_until_it_is_mend
 
 
 def test_a_contact_that_is_not_solved_says_so(monkeypatch):
-    session, _, _ = desk_of({**MUTE, "solver.max_iterations": 1})
+    session, _, _ = session_of({**MUTE, "solver.max_iterations": 1})
     session.solve()
     assert session.status.startswith("NOT CONVERGED, do not use: out of iterations")
     assert session.trials == []
     monkeypatch.setattr(work, "TIME_LIMIT_S", -1.0)
     session.change("contact.load", "900 N")
-    assert session.status.startswith("Not solved: The contact was given up")
+    assert session.status.startswith("Not solved: No solution within")
     assert session.stale
 
 
@@ -337,26 +337,26 @@ def test_values_beyond_all_reckoning_are_a_sentence():
     refused = run_job(divided, NOBODY)
     assert isinstance(refused, JobFailure)
     assert refused.message.startswith(
-        "The values lie too far from any contact to be reckoned with (division by zero)"
+        "These values cannot be solved (division by zero). Undo the last change."
     )
 
 
 def test_a_contact_that_its_grid_cannot_carry_says_so():
-    session, _, _ = desk_of()
+    session, _, _ = session_of()
     session.change("surface.correlation_length.0", "3 um")
     assert session.status.startswith("Not solved: paper.toml: surface: ")
-    assert session.answer is None
+    assert session.result is None
 
 
 def test_what_is_pinned_stays_to_compare_with():
-    session, queue, _ = desk_of()
+    session, queue, _ = session_of()
     session.solve()
-    pinned = session.answer
+    pinned = session.result
     session.pin()
     session.change("contact.load", "900 N")
     assert session.pinned is pinned
-    change = session.answer.row["clr"] - pinned.row["clr"]
-    assert difference("clr", session.answer.row["clr"], pinned.row["clr"]).startswith(
+    change = session.result.row["clr"] - pinned.row["clr"]
+    assert difference("clr", session.result.row["clr"], pinned.row["clr"]).startswith(
         "+" if change >= 0 else "−"
     )
     assert difference("crf_hz", None, 3.0) == "–"
@@ -369,12 +369,12 @@ def test_what_is_pinned_stays_to_compare_with():
 
 
 def test_what_was_tried_lies_in_the_trail_once_and_comes_back():
-    session, _, _ = desk_of()
+    session, _, _ = session_of()
     session.solve()
     session.change("surface.sq", "2 um")
     session.change("contact.load", "900")
     assert [trial.sq for trial in session.trials] == pytest.approx([1e-6, 2e-6])
-    assert session.trials[1].clr == session.answer.row["clr"]
+    assert session.trials[1].clr == session.result.row["clr"]
     session.go_back(0)
     assert session.settings.case.contents.surface.sq == 1e-6
     assert not session.rejected
@@ -382,18 +382,18 @@ def test_what_was_tried_lies_in_the_trail_once_and_comes_back():
 
 
 def test_an_address_is_gone_to():
-    session, _, _ = desk_of()
+    session, _, _ = session_of()
     turned = session.settings.with_value("contact.load", "700 N")
     assert session.go_to(turned.address) == []
-    assert session.answer.text == turned.case.text
+    assert session.result.text == turned.case.text
 
 
 def test_a_desk_that_closes_holds_nothing():
-    session, _, _ = desk_of()
+    session, _, _ = session_of()
     session.solve()
     session.pin()
     session.close()
-    assert (session.answer, session.pinned, session.trials) == (None, None, [])
+    assert (session.result, session.pinned, session.trials) == (None, None, [])
 
 
 def test_a_dropped_surface_takes_the_place_of_the_cases_own(tmp_path):
@@ -407,7 +407,7 @@ def test_a_dropped_surface_takes_the_place_of_the_cases_own(tmp_path):
     assert surface_key(f"held={held}") == held
     assert len(steps) > 3
     text = take.case_text(case)
-    assert "# ring.x3p lies beside this file." in text
+    assert "# Needs ring.x3p in the same folder." in text
     assert str(tmp_path) not in text
     assert load_case(text, folder=tmp_path).surface().sq == case.surface().sq
 
@@ -472,11 +472,11 @@ def test_the_report_is_our_own_page():
     assert "Content-Security-Policy" in text
 
 
-def test_a_kept_run_is_opened_as_it_was_solved(tmp_path, run, answer):
+def test_a_kept_run_is_opened_as_it_was_solved(tmp_path, run, result):
     run.save(tmp_path / "run.nc")
     opened = open_page(tmp_path / "run.nc")
     assert opened.kind == "contact"
-    assert json.dumps(opened.answer.row) == json.dumps(answer.row)
+    assert json.dumps(opened.result.row) == json.dumps(result.row)
     assert opened.case.stored is not None
     turned = Settings(opened.case).with_value("contact.slip", "0.4")
     np.testing.assert_array_equal(turned.case.surface().heights, run.solution.surface.heights)

@@ -113,7 +113,7 @@ def test_what_arrives_may_ask_for_more():
 def test_what_fails_is_a_sentence(caplog):
     failed: Future = Future()
     failed.set_exception(ZeroDivisionError("inside"))
-    assert "a mistake of ours" in job_outcome(failed).message
+    assert "Internal error" in job_outcome(failed).message
     assert "inside" in caplog.text
     died: Future = Future()
     died.set_exception(BrokenProcessPool())
@@ -139,7 +139,7 @@ def test_a_solve_stops_where_nobody_waits(monkeypatch):
 def test_a_solve_is_given_up_after_its_time(monkeypatch):
     monkeypatch.setattr(work, "TIME_LIMIT_S", -1.0)
     case = papers_case().with_overrides(SMALL)
-    assert "given up" in run_job(work.solve_fully, Ticket(-1, 0), case).message
+    assert "No solution within" in run_job(work.solve_fully, Ticket(-1, 0), case).message
 
 
 def test_more_cells_than_the_page_solves_are_refused_where_the_case_chooses_them(monkeypatch):
@@ -150,10 +150,10 @@ def test_more_cells_than_the_page_solves_are_refused_where_the_case_chooses_them
 
 @pytest.fixture(scope="module")
 def worker_pool():
-    made = WorkerPool(1)
-    made.warm_up()
-    yield made
-    made.close()
+    plot = WorkerPool(1)
+    plot.warm_up()
+    yield plot
+    plot.close()
 
 
 def test_processes_warm_up_and_solve(worker_pool):

@@ -43,7 +43,9 @@ def test_others_are_let_in_with_a_password_only(monkeypatch, address, password):
     monkeypatch.delenv(PASSWORD, raising=False)
     if password is not None:
         monkeypatch.setenv(PASSWORD, password)
-    with pytest.raises(BadInput, match=f"--listen {address} lets others in, who need a password"):
+    with pytest.raises(
+        BadInput, match=f"--listen {address} allows remote access, which requires a password"
+    ):
         password_for(address)
     monkeypatch.setenv(PASSWORD, "long enough")
     assert password_for(address) == "long enough"
@@ -127,9 +129,9 @@ def test_what_is_too_large_or_damaged_is_not_taken(pieces):
 def test_what_is_shown_is_escaped():
     assert sentences(["<script>"], '"') == '<p class="&#34;">&lt;script&gt;</p>'
     shown = SimpleNamespace(key="clr", name="<b>", value="<i>", uncertainty="<u>")
-    answer = SimpleNamespace(converged=True, row={})
-    assert "<b>" not in tiles([shown], answer, None, stale=False)
-    assert "<dt>&lt;b&gt;</dt>" in tiles([shown], answer, None, stale=False)
+    result = SimpleNamespace(converged=True, row={})
+    assert "<b>" not in tiles([shown], result, None, stale=False)
+    assert "<dt>&lt;b&gt;</dt>" in tiles([shown], result, None, stale=False)
 
 
 def test_the_page_is_opened_with_what_is_named(tmp_path):

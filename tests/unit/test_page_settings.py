@@ -60,16 +60,16 @@ def test_every_position_of_every_slider_is_a_value_of_its_knob(name):
             continue
         first, last = case_input.positions
         for position in range(first, last + 1):
-            assert case_input.position(case_input.at(position)) == position, (key, position)
+            assert case_input.position(case_input.value_text(position)) == position, (key, position)
         turned = case.with_overrides(
-            overrides(case, {key: case_input.at(case_input.position(case_input.text))})
+            overrides(case, {key: case_input.value_text(case_input.position(case_input.text))})
         )
         assert turned.conditions == case.conditions, key
 
 
 def test_a_slider_goes_a_decade_up_and_down_from_the_cases_own_value(settings):
     load = settings.inputs["contact.load"]
-    assert [load.at(place) for place in (load.positions[0], 0, load.positions[1])] == [
+    assert [load.value_text(place) for place in (load.positions[0], 0, load.positions[1])] == [
         "50 N",
         "500 N",
         "5000 N",
@@ -107,7 +107,7 @@ def test_cells_are_typed_as_people_write_them(settings):
             "material.boundary_friction must be less than or equal to 2, got 5",
         ),
         ("grid.cells", "1024 x 1024", "grid.cells must be at most 262144 in all on this page"),
-        ("contact.load", "1" * 300, "is 300 characters long"),
+        ("contact.load", "1" * 300, "value of 300 characters"),
     ],
 )
 def test_a_wrong_value_is_refused_in_the_case_files_own_sentence(settings, key, text, says):
@@ -142,17 +142,19 @@ def test_a_link_of_another_case_says_so(settings):
     other = Settings(load_case(EXAMPLES / "ball-on-disc.toml")).with_value("contact.load", "20 N")
     back, notes = settings.from_address(other.address)
     assert back.case.conditions.load == 20.0
-    assert notes == ["The link was made with another case; what it turned is turned here."]
+    assert notes == ["The link was made with another case; its changes are applied here."]
 
 
 def test_a_link_of_a_dropped_surface_is_of_one_that_is_held(settings):
     dropped = Settings(settings.opened, dropped="ring.x3p", held="0" * 32)
     _, notes = settings.from_address(dropped.address)
     assert notes == [
-        "The link was made with the dropped surface ring.x3p, held no more; drop it again."
+        "The link uses the dropped surface ring.x3p, which is no longer stored; drop it again."
     ]
     _, notes = settings.from_address("dropped=x&held=../../../etc")
-    assert notes == ["The link was made with the dropped surface x, held no more; drop it again."]
+    assert notes == [
+        "The link uses the dropped surface x, which is no longer stored; drop it again."
+    ]
     back, notes = dropped.from_address(dropped.with_value("contact.load", "700 N").address)
     assert notes == []
     assert (back.dropped, back.held, back.changes) == (

@@ -106,8 +106,8 @@ def test_a_study_is_shown_by_its_rows_and_means(study):
 def test_a_point_of_a_study_becomes_its_contact(study):
     study = open_study(NOBODY, study)
     for row, number in enumerate(study.numbers):
-        answer = solve_row(NOBODY, study, number)
-        assert answer.row["clr"] == pytest.approx(study.outputs["clr"][row], abs=1e-12)
+        result = solve_row(NOBODY, study, number)
+        assert result.row["clr"] == pytest.approx(study.outputs["clr"][row], abs=1e-12)
 
 
 def test_a_history_is_shown_by_its_steps_and_maps(tmp_path):

@@ -696,10 +696,7 @@ def test_a_run_in_pure_rolling_and_one_without_friction_say_so(monkeypatch):
 
     monkeypatch.setattr("asperity.results.run.friction_and_heat", refuse)
     unsettled = Page(page.render_page([run_like()]))
-    assert (
-        "No friction and temperature figures: friction and temperature did not"
-        in unsettled.text
-    )
+    assert "No friction and temperature figures: friction and temperature did not" in unsettled.text
     assert (
         next(row[1] for row in unsettled.rows if row[0].startswith("Friction coefficient")) == "–"
     )

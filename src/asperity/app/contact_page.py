@@ -107,10 +107,10 @@ class ContactView:
         )
         self._build_knobs()
 
-    def begin(self, query: str, answer: ContactResult | None = None) -> None:
+    def begin(self, query: str, result: ContactResult | None = None) -> None:
         """Show a stored result, or solve the contact that the address describes."""
-        if answer is not None and not query:
-            self.session.open(self.session.settings, answer)
+        if result is not None and not query:
+            self.session.open(self.session.settings, result)
             return
         held = surface_key(query)
         case = self._surfaces.load(held, self.drop.folder) if held else None
@@ -119,11 +119,11 @@ class ContactView:
             self._build_knobs()
         self._say(*self.session.go_to(query))
 
-    def furnish(self) -> None:
+    def create_next_figure(self) -> None:
         """Create the next figure and schedule the one after it, to keep the server responsive."""
         if self._pending_figures:
             self._pending_figures.pop(0)()
-            self._deliver(self.furnish)
+            self._deliver(self.create_next_figure)
         else:
             self.draw()
 
@@ -149,7 +149,7 @@ class ContactView:
         )
         kind = (
             "alarm"
-            if session.problem or (session.answer is not None and not session.answer.converged)
+            if session.problem or (session.result is not None and not session.result.converged)
             else "soft"
         )
         status = session.status if session.stale or not self._pending_figures else "Drawing ..."
@@ -160,24 +160,24 @@ class ContactView:
                 rejected.message if rejected else "",
             )
         self.stale_mark.show(session.stale)
-        if session.answer is not None:
+        if session.result is not None:
             self.tiles.text = tiles(
-                session.answer.tiles, session.answer, session.pinned, stale=session.pending
+                session.result.tiles, session.result, session.pinned, stale=session.pending
             )
-            if (session.answer, session.pinned) != self._drawn:
-                self._draw_answer(session.answer, session.pinned)
-                self._drawn = (session.answer, session.pinned)
+            if (session.result, session.pinned) != self._drawn:
+                self._draw_result(session.result, session.pinned)
+                self._drawn = (session.result, session.pinned)
         self.pin.label = "Unpin" if session.pinned is not None else "Pin to compare"
         self.status.text = sentences(
             [f"{loading}{status}"], kind
         )  # last: a screen reader announces it when the page is complete
 
-    def _draw_answer(self, answer: ContactResult, pinned: ContactResult | None) -> None:
-        self.maps.show(answer, pinned)
-        if answer.coarse:
+    def _draw_result(self, result: ContactResult, pinned: ContactResult | None) -> None:
+        self.maps.show(result, pinned)
+        if result.coarse:
             return
-        self.verdict.text = sentences([answer.verdict], "" if answer.converged else "alarm")
-        self.notes.text = notes(answer.notes)
+        self.verdict.text = sentences([result.verdict], "" if result.converged else "alarm")
+        self.notes.text = notes(result.notes)
         self._draw_spectrum()
         self._draw_trials()
         self._set_address(self.session.settings.address)
@@ -193,12 +193,12 @@ class ContactView:
         self._draw_trials()
 
     def _draw_spectrum(self) -> None:
-        answer, pinned = self.session.answer, self.session.pinned
-        if self._spectrum is not None and answer is not None and not answer.coarse:
+        result, pinned = self.session.result, self.session.pinned
+        if self._spectrum is not None and result is not None and not result.coarse:
             self._spectrum.show(
-                answer.spectrum,
+                result.spectrum,
                 None if pinned is None else pinned.spectrum,
-                _spectrum_title(answer),
+                _spectrum_title(result),
             )
 
     def _draw_trials(self) -> None:
@@ -292,9 +292,9 @@ class ContactView:
             self.download.offer(export.REPORT, "text/html", result)
 
 
-def _spectrum_title(answer: ContactResult) -> str:
+def _spectrum_title(result: ContactResult) -> str:
     """Return the title of the spectrum: the resonance, or why there is none."""
-    spectrum = answer.spectrum
+    spectrum = result.spectrum
     if spectrum is None:
         return "No vibration requested"
     if spectrum.crf_hz is None:

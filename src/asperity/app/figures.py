@@ -37,7 +37,7 @@ ASPECT_RANGE = (0.9, 2.0)  # of maps, width over height
 MAP_SHARE = 0.8  # of a figure's width, the rest being axes
 
 
-def shown(key: str, values: Any) -> Any:
+def to_display(key: str, values: Any) -> Any:
     """Convert stored values of a quantity to its display unit."""
     return np.asarray(values) * quantity(key).factor
 
@@ -49,7 +49,7 @@ def plain_figure(
 
     `label` is its name for screen readers; `tapped` makes its markers clickable.
     """
-    made = figure(
+    plot = figure(
         height=height,
         sizing_mode="stretch_width",
         x_axis_label=quantity(x).axis if x else "",
@@ -60,16 +60,16 @@ def plain_figure(
         min_border=2,
         **settings,
     )
-    made.toolbar.logo = None
-    made.toolbar.autohide = True
-    return made
+    plot.toolbar.logo = None
+    plot.toolbar.autohide = True
+    return plot
 
 
-def _key_above(made: Any) -> Any:
+def _key_above(plot: Any) -> Any:
     """Move the legend above the figure; hide and return its last entry."""
-    legend = made.legend[0]
-    made.center.remove(legend)
-    made.add_layout(legend, "above")
+    legend = plot.legend[0]
+    plot.center.remove(legend)
+    plot.add_layout(legend, "above")
     legend.update(
         orientation="horizontal",
         location="left",
@@ -97,7 +97,7 @@ class MapFigures:
         self.compares = False
 
     def _map(self, title: str, palette: Sequence[str], key: str) -> Any:
-        made = plain_figure(
+        plot = plain_figure(
             "x_m",
             "y_m",
             label=title,
@@ -106,19 +106,19 @@ class MapFigures:
             y_range=self.y,
             min_height=HEIGHT,
         )
-        made.update(sizing_mode="scale_width", aspect_ratio=ASPECT_RANGE[1])
-        made.add_tools(CrosshairTool(overlay=[self.across, self.along]))
+        plot.update(sizing_mode="scale_width", aspect_ratio=ASPECT_RANGE[1])
+        plot.add_tools(CrosshairTool(overlay=[self.across, self.along]))
         mapper = LinearColorMapper(
             palette=palette, low=0.0, high=1.0
         )  # initial range, which reserves space for the labels
         source = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
-        image = made.image("image", "x", "y", "dw", "dh", source=source, color_mapper=mapper)
+        image = plot.image("image", "x", "y", "dw", "dh", source=source, color_mapper=mapper)
         overlay = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
-        made.image_rgba("image", "x", "y", "dw", "dh", source=overlay)
+        plot.image_rgba("image", "x", "y", "dw", "dh", source=overlay)
         zone = ColumnDataSource({"x": [], "y": []})
-        made.line("x", "y", source=zone, color="white", line_dash="dashed")
+        plot.line("x", "y", source=zone, color="white", line_dash="dashed")
         cut = Span(dimension="width", line_color="white", line_dash="dotdash", line_width=1)
-        made.add_layout(cut)
+        plot.add_layout(cut)
         bar = ColorBar(
             color_mapper=mapper,
             title=quantity(key).label,
@@ -129,53 +129,53 @@ class MapFigures:
             major_label_text_color=TYPE,
             background_fill_alpha=0,
         )
-        made.add_layout(bar, "below")
+        plot.add_layout(bar, "below")
         unit = quantity(key).display
-        made.add_tools(
+        plot.add_tools(
             HoverTool(
                 renderers=[image], tooltips=[(quantity(key).short, f"@image{{0.000}} {unit}")]
             )
         )
-        made.on_event(Tap, lambda event: self._cut_at(event.y))
-        made.tags = [
+        plot.on_event(Tap, lambda event: self._cut_at(event.y))
+        plot.tags = [
             {"mapper": mapper, "source": source, "overlay": overlay, "zone": zone, "cut": cut}
         ]
-        return made
+        return plot
 
-    def show(self, answer: ContactMaps, pinned: ContactMaps | None) -> None:
+    def show(self, result: ContactMaps, pinned: ContactMaps | None) -> None:
         """Draw a result, and its film minus a pinned one on the same grid (`compares`)."""
-        (x0, x1), (y0, y1) = ((shown("x_m", end) for end in ends) for ends in answer.extent)
+        (x0, x1), (y0, y1) = ((to_display("x_m", end) for end in ends) for ends in result.extent)
         self.x.update(start=x0, end=x1, reset_start=x0, reset_end=x1)
         self.y.update(start=y0, end=y1, reset_start=y0, reset_end=y1)
-        self.compares = pinned is not None and pinned.gap.shape == answer.gap.shape
+        self.compares = pinned is not None and pinned.gap.shape == result.gap.shape
         if self.compares and self.change is None:
             self.change = self._map("Film minus pinned film", CHANGES, "gap")
         low, high = ASPECT_RANGE
         shape = MAP_SHARE * min(max(float((x1 - x0) / (y1 - y0)), low), high)
-        for made in self._figures():
-            made.aspect_ratio = shape
+        for plot in self._figures():
+            plot.aspect_ratio = shape
         place = {"x": [x0], "y": [y0], "dw": [x1 - x0], "dh": [y1 - y0]}
-        marks = _state_colours(answer)
+        marks = _state_colours(result)
         self._fill(
             self.film,
-            shown("gap", answer.gap),
-            (0.0, shown("gap", answer.gap_top) or 1.0),
+            to_display("gap", result.gap),
+            (0.0, to_display("gap", result.gap_top) or 1.0),
             place,
             marks,
         )
-        largest = max(float(answer.pressure.max()), answer.hertz_pressure)
+        largest = max(float(result.pressure.max()), result.hertz_pressure)
         self._fill(
             self.pressure,
-            shown("pressure", answer.pressure),
-            (0.0, shown("pressure", largest)),
+            to_display("pressure", result.pressure),
+            (0.0, to_display("pressure", largest)),
             place,
             None,
         )
-        zone = _hertz_outline(answer, (y0, y1))
-        for made in self._figures():
-            made.tags[0]["zone"].data = zone
+        zone = _hertz_outline(result, (y0, y1))
+        for plot in self._figures():
+            plot.tags[0]["zone"].data = zone
         if self.compares and pinned is not None:
-            change = shown("gap", answer.gap - pinned.gap)
+            change = to_display("gap", result.gap - pinned.gap)
             limit = float(np.percentile(np.abs(change), 98.0)) or 1.0
             self._fill(self.change, change, (-limit, limit), place, None)
 
@@ -184,24 +184,24 @@ class MapFigures:
 
     def cut(self, y: float) -> None:
         """Mark the line of the section at y [m]."""
-        for made in self._figures():
-            made.tags[0]["cut"].location = float(shown("y_m", y))
+        for plot in self._figures():
+            plot.tags[0]["cut"].location = float(to_display("y_m", y))
 
     @staticmethod
     def _fill(
-        made: Any, values: Any, ends: tuple[float, float], place: dict[str, Any], marks: Any
+        plot: Any, values: Any, ends: tuple[float, float], place: dict[str, Any], marks: Any
     ) -> None:
-        parts = made.tags[0]
+        parts = plot.tags[0]
         parts["mapper"].update(low=float(ends[0]), high=float(ends[1]))
         parts["source"].data = {"image": [np.ascontiguousarray(values.T, np.float32)], **place}
         if marks is not None:
             parts["overlay"].data = {"image": [marks], **place}
 
 
-def _state_colours(answer: ContactMaps) -> Any:
+def _state_colours(result: ContactMaps) -> Any:
     """Return contact and cavitation as colours over the film, shape (ny, nx)."""
-    colours = np.zeros((*answer.cells.T.shape, 4), np.uint8)
-    cells = answer.cells.T
+    colours = np.zeros((*result.cells.T.shape, 4), np.uint8)
+    cells = result.cells.T
     colours[cells == TOUCHING] = (*CONTACT, 255)
     cavitated = cells == CAVITATED
     i, j = np.indices(cells.shape, sparse=True)
@@ -210,10 +210,10 @@ def _state_colours(answer: ContactMaps) -> Any:
     return colours.view(np.uint32).reshape(cells.shape)
 
 
-def _hertz_outline(answer: ContactMaps, ends: tuple[float, float]) -> dict[str, Any]:
+def _hertz_outline(result: ContactMaps, ends: tuple[float, float]) -> dict[str, Any]:
     """Return the outline of the smooth, dry contact in the display unit."""
-    a, b = (shown("x_m", half) for half in answer.half_widths)
-    if answer.endless:
+    a, b = (to_display("x_m", half) for half in result.half_widths)
+    if result.endless:
         return {"x": [-a, -a, np.nan, a, a], "y": [ends[0], ends[1], np.nan, ends[0], ends[1]]}
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
     return {"x": a * np.cos(angle), "y": b * np.sin(angle)}
@@ -235,11 +235,11 @@ class SectionFigures:
             height=SECTION_HEIGHT,
             x_range=maps.x,
         )
-        for made in (self.pressure, self.film):
-            made.add_tools(
+        for plot in (self.pressure, self.film):
+            plot.add_tools(
                 CrosshairTool(overlay=[Span(dimension="width", line_dash="dotted"), maps.along])
             )
-            made.y_range = Range1d(0.0, 1.0)
+            plot.y_range = Range1d(0.0, 1.0)
         self.now, self.then = (
             ColumnDataSource({"x": [], "p": [], "hertz": [], "h": [], "touch": []}) for _ in "ab"
         )
@@ -263,15 +263,15 @@ class SectionFigures:
         self.film.line(
             "x", "h", source=self.then, color=VERMILION, line_dash="dotted", legend_label="pinned"
         )
-        self._pinned = [_key_above(made) for made in (self.pressure, self.film)]
+        self._pinned = [_key_above(plot) for plot in (self.pressure, self.film)]
 
-    def show(self, answer: ContactMaps, pinned: ContactMaps | None, y: float) -> None:
+    def show(self, result: ContactMaps, pinned: ContactMaps | None, y: float) -> None:
         """Draw the section at y [m]."""
-        row = answer.nearest_row(y)
+        row = result.nearest_row(y)
         self.pressure.title.text = (
-            f"Section along rolling, y = {quantity('y_m').text(float(answer.y[row]))}"
+            f"Section along rolling, y = {quantity('y_m').text(float(result.y[row]))}"
         )
-        self.now.data = self._line(answer, row)
+        self.now.data = self._line(result, row)
         self.then.data = (
             self._line(pinned, pinned.nearest_row(y))
             if pinned is not None
@@ -279,20 +279,22 @@ class SectionFigures:
         )
         for item in self._pinned:
             item.visible = pinned is not None
-        pressures = [answer.pressure[:, row].max(), answer.hertz_pressure]
-        self.pressure.y_range.update(start=0.0, end=1.12 * float(shown("pressure", max(pressures))))
-        inside = np.abs(answer.x) <= 1.2 * answer.half_widths[0]
-        top = float(answer.gap[inside, row].max()) if inside.any() else float(answer.gap.max())
-        self.film.y_range.update(start=0.0, end=1.2 * float(shown("gap", top)) or 1.0)
+        pressures = [result.pressure[:, row].max(), result.hertz_pressure]
+        self.pressure.y_range.update(
+            start=0.0, end=1.12 * float(to_display("pressure", max(pressures)))
+        )
+        inside = np.abs(result.x) <= 1.2 * result.half_widths[0]
+        top = float(result.gap[inside, row].max()) if inside.any() else float(result.gap.max())
+        self.film.y_range.update(start=0.0, end=1.2 * float(to_display("gap", top)) or 1.0)
 
     @staticmethod
-    def _line(answer: ContactMaps, row: int) -> dict[str, Any]:
-        touching = np.where(answer.cells[:, row] == TOUCHING, 0.0, np.nan)
+    def _line(result: ContactMaps, row: int) -> dict[str, Any]:
+        touching = np.where(result.cells[:, row] == TOUCHING, 0.0, np.nan)
         return {
-            "x": shown("x_m", answer.x),
-            "p": shown("pressure", answer.pressure[:, row]),
-            "hertz": shown("pressure", answer.hertz(row)),
-            "h": shown("gap", answer.gap[:, row]),
+            "x": to_display("x_m", result.x),
+            "p": to_display("pressure", result.pressure[:, row]),
+            "hertz": to_display("pressure", result.hertz(row)),
+            "h": to_display("gap", result.gap[:, row]),
             "touch": touching,
         }
 
@@ -387,17 +389,17 @@ class TrialFigures:
         )
 
     def _plane(self, x: str, y: str, x_column: str, y_column: str, label: str) -> Any:
-        made = plain_figure(x, y, label=label, title=label, height=TRIALS_HEIGHT, tapped=True)
-        made.scatter(x_column, y_column, source=self.source, size=10, color=BLUE, alpha="alpha")
+        plot = plain_figure(x, y, label=label, title=label, height=TRIALS_HEIGHT, tapped=True)
+        plot.scatter(x_column, y_column, source=self.source, size=10, color=BLUE, alpha="alpha")
         highlight: dict[str, Any] = {"line_color": VERMILION, "fill_alpha": 0, "line_width": 2}
-        made.scatter(x_column, y_column, source=self.last, size=15, **highlight)
-        return made
+        plot.scatter(x_column, y_column, source=self.last, size=15, **highlight)
+        return plot
 
     def show(self, trials: Sequence[Trial]) -> None:
         """Draw all earlier results."""
         rows = {
-            "sq": [float(shown("sq_m", trial.sq)) for trial in trials],
-            "clr": [float(shown("clr", trial.clr)) for trial in trials],
+            "sq": [float(to_display("sq_m", trial.sq)) for trial in trials],
+            "clr": [float(to_display("clr", trial.clr)) for trial in trials],
             "crf": [np.nan if trial.crf_hz is None else trial.crf_hz for trial in trials],
         }
         alpha = [0.9 if trial.determined else 0.35 for trial in trials]

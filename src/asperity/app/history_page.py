@@ -7,7 +7,7 @@ from typing import Any
 from bokeh.models import Column, ColumnDataSource, Range1d, Slider, Span
 
 from asperity.app.contact_jobs import JobFailure
-from asperity.app.figures import BLUE, VERMILION, plain_figure, shown
+from asperity.app.figures import BLUE, VERMILION, plain_figure, to_display
 from asperity.app.folder_jobs import HistoryData, open_history
 from asperity.app.jobs import JobQueue, WorkerPool
 from asperity.app.map_images import MapImages
@@ -84,17 +84,20 @@ class HistoryView:
         time_range = Range1d(float(time[0]), float(time[-1]) or 1.0)
         figures = []
         for key, values in history.curves.items():
-            made = plain_figure(
+            plot = plain_figure(
                 "", key, label=f"{quantity(key).title} over time", height=170, x_range=time_range
             )
-            made.line(
-                "x", "y", source=ColumnDataSource({"x": time, "y": shown(key, values)}), color=BLUE
+            plot.line(
+                "x",
+                "y",
+                source=ColumnDataSource({"x": time, "y": to_display(key, values)}),
+                color=BLUE,
             )
             self._now.append(
                 Span(dimension="height", line_color=VERMILION, line_dash="dashed", location=0.0)
             )
-            made.add_layout(self._now[-1])
-            figures.append(made)
+            plot.add_layout(self._now[-1])
+            figures.append(plot)
         if figures:
             figures[-1].xaxis.axis_label = clock.axis
         self.curves.children = figures

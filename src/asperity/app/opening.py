@@ -20,13 +20,13 @@ DEFAULT_GRID = {"grid.cells": [192, 128]}  # 128 x 128 cells do not determine th
 class OpenedPage:
     """First page, its name, the contact's case, and the path of a folder.
 
-    `answer` is the result of a stored run. `stated` is True if the user named the case.
+    `result` is the result of a stored run. `stated` is True if the user named the case.
     """
 
     kind: str
     name: str
     case: Case
-    answer: ContactResult | None = None
+    result: ContactResult | None = None
     path: Path | None = None
     stated: bool = False
 
@@ -60,8 +60,8 @@ def open_page(path: Path | None) -> OpenedPage:
     if not path.exists():
         raise UnreadableFile(f"{path} does not exist; check its name")
     if path.suffix == ".nc":
-        case, answer = open_run(path)
-        return OpenedPage(kind="contact", name=name, case=case, answer=answer, stated=True)
+        case, result = open_run(path)
+        return OpenedPage(kind="contact", name=name, case=case, result=result, stated=True)
     case = load_case(path)
     if case.contents.grid.cells != "auto":
         limit_cells(case.source, case.contents.grid.cells)

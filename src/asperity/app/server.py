@@ -59,7 +59,7 @@ def _is_local(address: str) -> bool:
 
 
 def password_for(address: str) -> str | None:
-    """Return the password for remote access, None for a local address; BadInput if it is missing."""
+    """Return the password for remote access, None for a local address; BadInput if missing."""
     if _is_local(address):
         return None
     password = os.environ.get(PASSWORD, "")
@@ -126,9 +126,11 @@ class PageSite:
             self.surfaces,
         )
         parts, sections = contact.layout(view)
-        view.begin(_query(), self.opened.answer)
-        _document().on_event("document_ready", lambda _event: view.furnish())
-        _document().add_timeout_callback(view.furnish, READY_MS)  # in case the event never arrives
+        view.begin(_query(), self.opened.result)
+        _document().on_event("document_ready", lambda _event: view.create_next_figure())
+        _document().add_timeout_callback(
+            view.create_next_figure, READY_MS
+        )  # in case the event never arrives
         _document().js_on_event("document_ready", view.stale_mark.update_page)
         panel.state.on_session_destroyed(lambda _context: view.close())
         return self._page("contact", "Contact", parts, sections)

@@ -48,7 +48,7 @@ class ContactSession:
     ) -> None:
         self.settings = settings
         self.rejected: dict[str, RejectedValue] = {}
-        self.answer: ContactResult | None = None
+        self.result: ContactResult | None = None
         self.problem = ""
         self.pinned: ContactResult | None = None
         self.trials: list[Trial] = []
@@ -60,26 +60,26 @@ class ContactSession:
     @property
     def status(self) -> str:
         """State of the solution as a sentence."""
-        if self.pending and self.answer is None:
+        if self.pending and self.result is None:
             return "Solving the first contact ..."
         if self.pending:
             return (
                 "Coarse solution, refining ..."
-                if self.answer and self._is_current
+                if self.result and self._is_current
                 else "Solving ..."
             )
         if self.problem:
             return f"Not solved: {self.problem}"
-        if self.answer is None:
+        if self.result is None:
             return ""
-        if not self.answer.converged:
-            return f"NOT CONVERGED, do not use: {self.answer.explained}"
-        nx, ny = self.answer.gap.shape
-        return f"Solved on {nx} × {ny} cells in {self.answer.seconds:.2f} s"
+        if not self.result.converged:
+            return f"NOT CONVERGED, do not use: {self.result.explained}"
+        nx, ny = self.result.gap.shape
+        return f"Solved on {nx} × {ny} cells in {self.result.seconds:.2f} s"
 
     @property
     def _is_current(self) -> bool:
-        return self.answer is not None and self.answer.text == self.settings.case.text
+        return self.result is not None and self.result.text == self.settings.case.text
 
     @property
     def stale(self) -> bool:
@@ -141,19 +141,19 @@ class ContactSession:
             self.rejected.clear()
             self.solve()
 
-    def open(self, settings: Settings, answer: ContactResult | None = None) -> None:
+    def open(self, settings: Settings, result: ContactResult | None = None) -> None:
         """Start with another case, such as one with a dropped surface, and its result if known."""
         self.settings, self._start = settings, None
         self.rejected.clear()
-        if answer is None:
+        if result is None:
             self.solve()
         else:
-            self._receive_full(answer)
+            self._receive_full(result)
 
     def pin(self) -> None:
         """Pin the current result for comparison, if there is one."""
-        if self.answer is not None and not self.stale:
-            self.pinned = self.answer
+        if self.result is not None and not self.stale:
+            self.pinned = self.result
             self._changed()
 
     def unpin(self) -> None:
@@ -166,19 +166,19 @@ class ContactSession:
         self._queue.close()
         if self._full_queue is not None:
             self._full_queue.close()
-        self.answer = self.pinned = self._start = None
+        self.result = self.pinned = self._start = None
         self.trials.clear()
 
-    def _receive_coarse(self, job_outcome: Any) -> None:
-        if isinstance(job_outcome, JobFailure):
-            self._fail(job_outcome)
+    def _receive_coarse(self, outcome: Any) -> None:
+        if isinstance(outcome, JobFailure):
+            self._fail(outcome)
             return
-        assert isinstance(job_outcome, CoarseResult)
-        if job_outcome.solution is not None:
-            self._start = job_outcome.solution
+        assert isinstance(outcome, CoarseResult)
+        if outcome.solution is not None:
+            self._start = outcome.solution
         if not self.pending:
             return  # the full result arrived first
-        self.answer = job_outcome.result or self.answer
+        self.result = outcome.result or self.result
         if not self._full_submitted:
             self._solve_fully(self._full_queue or self._queue)
         self._changed()
@@ -188,7 +188,7 @@ class ContactSession:
             self._fail(result)
             return
         assert isinstance(result, ContactResult)
-        self.answer, self.pending = result, False
+        self.result, self.pending = result, False
         if result.converged:
             row = result.row
             trial = Trial(

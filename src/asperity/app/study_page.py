@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from asperity.app.contact_jobs import JobFailure
 from asperity.app.contact_result import ContactResult
-from asperity.app.figures import BLUE, VERMILION, plain_figure, shown
+from asperity.app.figures import BLUE, VERMILION, plain_figure, to_display
 from asperity.app.folder_jobs import StudyData, open_study, solve_row
 from asperity.app.jobs import JobQueue, WorkerPool
 from asperity.app.map_images import MapImages
@@ -132,14 +132,14 @@ class StudyView:
         self._points.selected.indices = []
         self._points.data = {
             "x": study.values[axis.key][known],
-            "y": shown(entry.key, column[known]),
+            "y": to_display(entry.key, column[known]),
         }
         x, mean, low, high = study.means[axis.key, entry.key]
         lows, highs = (np.where(np.isfinite(ends), ends, mean) for ends in (low, high))
         parts: Mapping[str, Any] = {"mean": mean, "low": lows, "high": highs}
         self._means.data = {
             "x": x,
-            **{name: shown(entry.key, values) for name, values in parts.items()},
+            **{name: to_display(entry.key, values) for name, values in parts.items()},
         }
         self.figure.xaxis.axis_label = (
             f"{axis.key} [{in_print(axis.unit)}]" if axis.unit else axis.key

@@ -23,16 +23,21 @@ from asperity.core.quantities import in_print
 LOOK = """
 :host { color: var(--ink); font: inherit; }
 .bk-clearfix { display: block; width: 100%; }
-.bk-input { color: var(--ink); background: var(--paper); border: 1px solid var(--line); border-radius: 4px; }
+.bk-input { color: var(--ink); background: var(--paper); border: 1px solid var(--line);
+  border-radius: 4px; }
 .bk-input, .bk-btn { font: inherit; }
 .bk-input:focus { border-color: var(--accent); box-shadow: none; outline: 2px solid var(--accent); }
 .bk-input-group label, label { color: var(--ink); font-size: .88rem; }
-.bk-btn { color: var(--ink); background: var(--wash); border: 1px solid var(--line); border-radius: 4px; }
-.bk-btn:hover:enabled, .bk-btn:active { color: var(--ink); background: var(--line); border-color: var(--soft); }
+.bk-btn { color: var(--ink); background: var(--wash); border: 1px solid var(--line);
+  border-radius: 4px; }
+.bk-btn:hover:enabled, .bk-btn:active { color: var(--ink); background: var(--line); border-color:
+  var(--soft); }
 .bk-description > .bk-icon { background-color: var(--soft); }
-select:not([multiple]).bk-input { background: var(--paper) var(--arrow) right .5em center / 8px 6px no-repeat; }
+select:not([multiple]).bk-input { background: var(--paper) var(--arrow) right .5em center / 8px
+  6px no-repeat; }
 .bk-btn:focus-visible, .noUi-handle:focus-visible { outline: 2px solid var(--accent); }
-.noUi-target { background: var(--wash); border-color: var(--line); } .noUi-connect { background: var(--accent); }
+.noUi-target { background: var(--wash); border-color: var(--line); } .noUi-connect { background:
+  var(--accent); }
 .noUi-handle { background: var(--paper); border: 2px solid var(--accent); box-shadow: none; }
 """
 INHERIT = ":host { font: inherit; }"  # for containers
@@ -57,8 +62,10 @@ TILE_STYLES = """
 dl { display: grid; grid-template-columns: repeat(4, minmax(0, 1fr)); gap: 8px; margin: 0; }
 dl div { background: var(--wash); border-radius: 4px; padding: 6px 10px; }
 dt { font-size: .78rem; line-height: 1.25; color: var(--soft); }
-dd { margin: 1px 0 0; font-size: 1.22rem; font-weight: 650; font-variant-numeric: tabular-nums; line-height: 1.25; }
-dd small { display: block; font-size: .78rem; font-weight: 400; color: var(--soft); min-height: 1.25em; }
+dd { margin: 1px 0 0; font-size: 1.22rem; font-weight: 650; font-variant-numeric: tabular-nums;
+  line-height: 1.25; }
+dd small { display: block; font-size: .78rem; font-weight: 400; color: var(--soft); min-height:
+  1.25em; }
 dd small.difference { color: var(--accent); }
 dd span { font-size: .95rem; font-weight: 500; white-space: nowrap; }
 dl.stale dd { opacity: .45; } dl.wrong { outline: 3px solid var(--alarm); }
@@ -72,8 +79,10 @@ dl.stale dd { opacity: .45; } dl.wrong { outline: 3px solid var(--alarm); }
 
 TABLE = """
 div { overflow-x: auto; }
-table { border-collapse: collapse; width: 100%; font-size: .86rem; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; vertical-align: top; padding: 4px 12px 4px 0; border-bottom: 1px solid var(--line); }
+table { border-collapse: collapse; width: 100%; font-size: .86rem; font-variant-numeric:
+  tabular-nums; }
+th, td { text-align: left; vertical-align: top; padding: 4px 12px 4px 0; border-bottom: 1px solid
+  var(--line); }
 tbody th { font-weight: 600; overflow-wrap: anywhere; }
 """
 
@@ -97,7 +106,7 @@ def notes(lines: Sequence[str]) -> Markup:
 
 def tiles(
     result_tiles: Sequence[ResultTile],
-    answer: ContactResult,
+    result: ContactResult,
     pinned: ContactResult | None,
     *,
     stale: bool,
@@ -107,12 +116,12 @@ def tiles(
     for tile in result_tiles:
         comparison = ""
         if pinned is not None:
-            text = difference(tile.key, answer.row.get(tile.key), pinned.row.get(tile.key))
+            text = difference(tile.key, result.row.get(tile.key), pinned.row.get(tile.key))
             comparison = Markup('<small class="difference">{} vs. pinned</small>').format(text)
         number, _, unit = tile.value.partition(" ")
         html = Markup("<div><dt>{}</dt><dd>{} <span>{}</span><small>{}</small>{}</dd></div>")
         parts.append(html.format(tile.name, number, unit, tile.uncertainty, comparison))
-    kind = "stale" if stale else "" if answer.converged else "wrong"
+    kind = "stale" if stale else "" if result.converged else "wrong"
     return Markup('<dl class="{}">{}</dl>').format(kind, Markup("").join(parts))
 
 
