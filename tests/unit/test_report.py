@@ -494,6 +494,15 @@ def test_silent_dry_and_deaf_runs_have_a_page_too():
     assert "cavitated" not in unquote(shown.images()[0]["src"])
 
 
+def test_every_report_has_its_template():
+    folder = Path(base.__file__).parent
+    names = re.findall(
+        r'render\(\s*"(\S+)"', "".join(path.read_text("utf-8") for path in folder.rglob("page.py"))
+    )
+    assert len(names) == 7
+    assert [name for name in names if not (folder / name).is_file()] == []
+
+
 def test_same_run_gives_the_same_bytes(tmp_path, single):
     out = write_report([run_like(notes=("filled 0.2 % missing cells",))], tmp_path / "report.html")
     assert out.read_text("utf-8") == single.html
@@ -553,7 +562,7 @@ def test_prose_is_set_as_in_print(written, shown):
 @pytest.mark.usefixtures("unprinted")
 def test_load_on_capped_oil_is_not_hidden():
     shown = page.render_page([run_like(capped_oil_load_ratio=0.5)])
-    assert "without touching carry 50.0\N{NO-BREAK SPACE}% of the load" in shown
+    assert "without contact carry 50.0\N{NO-BREAK SPACE}% of the load" in shown
 
 
 # Figures -------------------------------------------------------------------------------------------------------------

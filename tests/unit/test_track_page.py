@@ -30,7 +30,7 @@ def failing(tmp_path_factory):
 def acted(track):
     """The block for who must act, by its headings."""
     html = render_track_page(track)
-    block = html.partition('<dl class="act">')[2].partition("</dl>")[0]
+    block = html.partition('<dl class="actions">')[2].partition("</dl>")[0]
     return dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", block))
 
 
