@@ -104,11 +104,11 @@ def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tm
         page.get_by_label("Contact of the study").select_option(index=4)
         page.get_by_text(re.compile(r"^surface.sq 1.5\sµm.*asperities carry")).wait_for()
         require_operable(page)
-        click_mark(page, "A study's results over what was swept", 1)
+        click_mark(page, "Outputs of the study over a swept quantity", 1)
         page.get_by_text(
             re.compile(r"^surface.sq 0.5\sµm, surface.seed .*asperities carry")
         ).wait_for()
-        click_mark(page, "A study's results over what was swept", 3)
+        click_mark(page, "Outputs of the study over a swept quantity", 3)
         page.get_by_text(re.compile(r"^surface.sq 1.5\sµm.*asperities carry")).wait_for()
         clr = page.locator("dl div", has_text="CLR").locator("dd").first.inner_text()
         page.get_by_role("link", name="Open with its inputs").click()

@@ -158,7 +158,7 @@ def worker_pool():
 
 def test_processes_warm_up_and_solve(worker_pool):
     assert wait_until_warm(worker_pool, 120.0)
-    came: queue.JobQueue = queue.JobQueue()
+    came: queue.Queue = queue.Queue()
     line = JobQueue(worker_pool, came.put)
     answers = []
     line.submit((work.solve_fully, (papers_case().with_overrides(SMALL),)), answers.append)

@@ -90,12 +90,12 @@ def study(tmp_path_factory):
 
 
 def test_a_study_is_shown_by_its_rows_and_means(study):
-    study = open_study(NOBODY, study)
+    data = open_study(NOBODY, study)
     table = load_study(study).table
-    assert [axis.key for axis in study.axes] == ["surface.sq"]
-    assert study.axes[0].unit == "um"
-    np.testing.assert_array_equal(study.outputs["clr"], table["clr"])
-    x, mean, low, high = study.means["surface.sq", "clr"]
+    assert [axis.key for axis in data.axes] == ["surface.sq"]
+    assert data.axes[0].unit == "um"
+    np.testing.assert_array_equal(data.outputs["clr"], table["clr"])
+    x, mean, low, high = data.means["surface.sq", "clr"]
     np.testing.assert_allclose(x, [0.5, 1.5])
     np.testing.assert_allclose(mean, table.groupby("surface.sq", sort=False)["clr"].mean())
     assert (low <= mean).all()  # at 0.5 um no asperity touches on either surface
@@ -104,10 +104,10 @@ def test_a_study_is_shown_by_its_rows_and_means(study):
 
 
 def test_a_point_of_a_study_becomes_its_contact(study):
-    study = open_study(NOBODY, study)
-    for row, number in enumerate(study.numbers):
+    data = open_study(NOBODY, study)
+    for row, number in enumerate(data.numbers):
         result = solve_row(NOBODY, study, number)
-        assert result.row["clr"] == pytest.approx(study.outputs["clr"][row], abs=1e-12)
+        assert result.row["clr"] == pytest.approx(data.outputs["clr"][row], abs=1e-12)
 
 
 def test_a_history_is_shown_by_its_steps_and_maps(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_study_report import PAPERS, figure_of, made, page_of, with_knee, without_maps
 
-from asperity.report.study.dynamic import damping_over_roughness, rank_correlation, clr_correlations
+from asperity.report.study.dynamic import clr_correlations, damping_over_roughness, rank_correlation
 from asperity.report.study.page import study_exhibits
 from asperity.report.study.sweep import sweep_exhibits
 from asperity.report.style import ON_PAPER
