@@ -63,7 +63,7 @@ def test_a_track_foretells_and_the_forecast_is_an_alarm(asp, asked):
     assert said["verdict"].startswith("ALARM since 6.h5: CLR rises above 75.0 % within")
     page = Path("track.html").read_text("utf-8")
     assert "CLR rises above" in page
-    assert (page.count('id="ahead"'), page.count("its forecast with the limit")) == (1, 1)
+    assert (page.count('id="ahead"'), page.count("its forecast and the limit")) == (1, 1)
     code, out, _ = asp(
         "track", *asked, *LIMIT, "--acknowledge", "last", "--report", "silent.html", "--json"
     )
@@ -75,7 +75,7 @@ def test_a_track_foretells_and_the_forecast_is_an_alarm(asp, asked):
     }
     assert said["verdict"].endswith(said["forecast"]["sentence"])
     page = Path("silent.html").read_text("utf-8")
-    assert (page.count('id="ahead"'), page.count("its forecast with the limit")) == (
+    assert (page.count('id="ahead"'), page.count("its forecast and the limit")) == (
         1,
         0,
     )  # said, not drawn

@@ -280,13 +280,13 @@ def test_a_page_shows_what_was_heard(tmp_path):
     )
     text = path.read_text("utf-8")
     for words in (
-        "In time",
-        "What keeps CLR below a value",
+        "Forecast",
+        "Design changes for a low CLR",
         "stays below 30.0",
         "Verdict",
         "A note of its own.",
-        "Against what was heard",
-        "to run next",
+        "Observed and predicted",
+        "recommended next",
         "hertz-point",
     ):
         assert words in text

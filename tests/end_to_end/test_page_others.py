@@ -84,9 +84,9 @@ def test_a_folder_is_watched(browser, tmp_path, rig):
     with serving(tmp_path, str(folder)) as server:
         visit = Visit(browser, server)
         page = visit.go("recordings")
-        page.get_by_text("6 recordings read; the folder is watched.").wait_for()
+        page.get_by_text("6 recordings read; the folder is being watched.").wait_for()
         shutil.copy2(files[6], folder)
-        page.get_by_text("7 recordings read; the folder is watched.").wait_for()
+        page.get_by_text("7 recordings read; the folder is being watched.").wait_for()
         visit.close()
 
 
@@ -101,17 +101,17 @@ def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tm
         visit = Visit(browser, server)
         page = visit.go("study")
         page.get_by_text("Click a point to see its contact.").wait_for()
-        page.get_by_label("A contact of the study").select_option(index=4)
+        page.get_by_label("Contact of the study").select_option(index=4)
         page.get_by_text(re.compile(r"^surface.sq 1.5\sµm.*asperities carry")).wait_for()
         require_operable(page)
-        click_mark(page, "A study's results over what was swept", 1)
+        click_mark(page, "Outputs of the study over a swept quantity", 1)
         page.get_by_text(
             re.compile(r"^surface.sq 0.5\sµm, surface.seed .*asperities carry")
         ).wait_for()
-        click_mark(page, "A study's results over what was swept", 3)
+        click_mark(page, "Outputs of the study over a swept quantity", 3)
         page.get_by_text(re.compile(r"^surface.sq 1.5\sµm.*asperities carry")).wait_for()
         clr = page.locator("dl div", has_text="CLR").locator("dd").first.inner_text()
-        page.get_by_role("link", name="Turn its knobs").click()
+        page.get_by_role("link", name="Open with its inputs").click()
         page.wait_for_url(re.compile("/contact[?]"))
         page.get_by_text("Solved on 32 × 24 cells").wait_for()
         expect(page.get_by_role("textbox", name="Composite roughness, Sq")).to_have_value("1.5 um")
@@ -156,7 +156,7 @@ def test_others_have_to_know_the_password(browser, tmp_path):
         assert page.url.split("?")[0].endswith("/login")
         page.locator("input[type=password]").fill("wrong one")
         page.keyboard.press("Enter")
-        page.get_by_text("That is not the password.").wait_for()
+        page.get_by_text("Wrong password.").wait_for()
         assert page.get_by_role("textbox", name="Load, F").count() == 0
         page.goto(f"http://{server.host}/contact")
         page.locator("input[type=password]").fill("long enough")

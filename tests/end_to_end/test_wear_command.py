@@ -75,12 +75,12 @@ def test_json_holds_the_contract(asp, worn_case):
         assert said[key] == [table[key].iloc[0], table[key].iloc[-1]]
     assert [Path(name).is_file() for name in said["surfaces"]] == [True] * 4
     page = (worn_case / "w.html").read_text("utf-8")
-    assert "A contact that wears" in page
+    assert "Wear of a contact" in page
     shown = json.loads(page.split('id="data">')[1].split("</script>")[0])
     assert (
-        len(shown["frames"]) == len(shown["words"]) == said["jumps"] + 1
+        len(shown["frames"]) == len(shown["captions"]) == said["jumps"] + 1
     )  # fewer than are thinned out
-    assert shown["words"][-1].startswith("after 1 h, at ")
+    assert shown["captions"][-1].startswith("after 1 h, at ")
     again = json.loads(
         asp("wear", "wear.toml", "--hours", "1", "--out", "worn", "--json", *COARSE)[1]
     )

@@ -142,7 +142,7 @@ class Visit:
     def solved(self, path: str = "contact"):
         """Visit a contact and wait until it is solved."""
         page = self.go(path)
-        page.get_by_text(re.compile("^(Warming up.*)?Solved on")).wait_for()
+        page.get_by_text(re.compile("^(Loading the solver.*)?Solved on")).wait_for()
         return page
 
     def close(self):

@@ -89,7 +89,7 @@ def test_the_page_shows_it_with_the_resonance_marked(run, tmp_path):
     assert "Stiffness and damping of the solved contact" in page
     above, below = stiffness_over_frequency(run).figure().axes
     own = run.own_resonance.elastic
-    (mark,) = [line for line in above.get_lines() if line.get_label() == "where the mass resonates"]
+    (mark,) = [line for line in above.get_lines() if line.get_label() == "resonance of the mass"]
     assert mark.get_xydata()[0] == pytest.approx((own.frequency_hz, 1e-6 * own.stiffness))
     assert "N s/m" in below.get_ylabel()
 

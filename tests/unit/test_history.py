@@ -385,7 +385,7 @@ def test_passes_are_told_apart_where_surfaces_are_flattened():
     assert passes["track_sq_m"][0] == table["track_sq_m"].loc[48]
     assert passes["flattened_m"][1] > passes["flattened_m"][0] > 0.0
     assert len(done.scalars()["passes"]) == 2
-    assert "Running-in, a point a pass" in render_motion_page(done)
+    assert "Running-in, one point per pass" in render_motion_page(done)
     json.dumps(done.scalars(), allow_nan=False)
 
 
@@ -396,9 +396,9 @@ def test_the_page_has_every_map_and_loads_nothing(history):
     page = render_motion_page(history)
     assert page == render_motion_page(history)
     data = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
-    assert len(data["frames"]) == len(data["words"]) == 3
+    assert len(data["frames"]) == len(data["captions"]) == 3
     assert data["size"] == [48, 32]
-    assert "step 10 of 12" in data["words"][2]
+    assert "step 10 of 12" in data["captions"][2]
     beside_the_data = re.sub(r'"data:[^"]*"', '"#"', page)
     assert not re.findall(r"""(?:src|href)=["'](?!#)|url\(|@import|fetch\(""", beside_the_data)
     assert all(uri.startswith("data:image/png;base64,") for uri in data["frames"])
@@ -409,11 +409,11 @@ def test_a_picture_shows_what_the_step_has(history):
 
     from PIL import Image
 
-    from asperity.report.animated_maps import frame_picture, ranges
+    from asperity.report.animated_maps import encode_frame, ranges
     from asperity.report.style import CONTACT_COLOUR
 
     frame = history.frames[1]
-    packed, (width, height) = frame_picture(frame, ranges(history.case, history.frames))
+    packed, (width, height) = encode_frame(frame, ranges(history.case, history.frames))
     pixels = np.asarray(Image.open(BytesIO(packed)).convert("RGB"))
     assert pixels.shape == (3 * height, width, 3)
     yellow = np.array([int(CONTACT_COLOUR[k : k + 2], 16) for k in (1, 3, 5)])

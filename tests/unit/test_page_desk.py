@@ -12,19 +12,19 @@ import x3pio
 
 from asperity.app import contact_jobs as work
 from asperity.app import export as take
-from asperity.app.contact_jobs import Refused, Ticket, told
+from asperity.app.contact_jobs import JobFailure, Ticket, run_job
 from asperity.app.contact_result import (
+    CAVITATED,
     NOT_DETERMINED,
-    RUPTURED,
     TILES,
     TOUCHING,
-    answer_of,
     difference,
+    result_of_run,
 )
 from asperity.app.opening import open_page
-from asperity.app.session import Desk
-from asperity.app.settings import Settings, held_in
-from asperity.app.surface_store import Shelf
+from asperity.app.session import ContactSession
+from asperity.app.settings import Settings, surface_key
+from asperity.app.surface_store import SurfaceStore
 from asperity.case import load_case
 from asperity.contact.hertz import ellipse_pressure, line_pressure
 from asperity.ehl import Options, solve_contact
@@ -49,7 +49,7 @@ class AtOnce:
     def busy(self):
         return bool(self.kept)
 
-    def ask(self, wish, arrived):
+    def submit(self, wish, arrived):
         self.kept.append((wish, arrived))
         while self.kept and not self.held and not self.going:
             self.go()
@@ -57,7 +57,7 @@ class AtOnce:
     def go(self):
         (function, arguments), arrived = self.kept.pop(0)
         self.going = True
-        arrived(told(function, NOBODY, *arguments))
+        arrived(run_job(function, NOBODY, *arguments))
         self.going = False
 
     def close(self):
@@ -70,73 +70,84 @@ def run():
 
 
 @pytest.fixture(scope="module")
-def answer(run):
-    return answer_of(run, 0.1)
+def result(run):
+    return result_of_run(run, 0.1)
 
 
-def desk_of(overrides=MUTE):
+def session_of(overrides=MUTE):
     drawn = []
     queue = AtOnce()
-    desk = Desk(
-        Settings(papers_case().with_overrides(overrides)), queue, lambda: drawn.append(desk.answer)
+    session = ContactSession(
+        Settings(papers_case().with_overrides(overrides)),
+        queue,
+        lambda: drawn.append(session.result),
     )
-    return desk, queue, drawn
+    return session, queue, drawn
 
 
-def test_an_answer_is_what_the_run_says(run, answer):
+def test_an_answer_is_what_the_run_says(run, result):
     summary = run.summary()
-    assert {key: answer.row[key] for key in TILES} == {key: summary[key] for key in TILES}
-    np.testing.assert_allclose(answer.pressure, run.solution.pressure, rtol=1e-6)
-    np.testing.assert_array_equal(answer.cells == TOUCHING, run.solution.in_contact)
-    np.testing.assert_array_equal(answer.cells == RUPTURED, run.solution.cavitated)
-    assert answer.verdict == run.verdict()
-    assert set(run.notes) <= set(answer.notes)
+    assert {key: result.row[key] for key in TILES} == {key: summary[key] for key in TILES}
+    np.testing.assert_allclose(result.pressure, run.solution.pressure, rtol=1e-6)
+    np.testing.assert_array_equal(result.cells == TOUCHING, run.solution.in_contact)
+    np.testing.assert_array_equal(result.cells == CAVITATED, run.solution.cavitated)
+    assert result.verdict == run.verdict()
+    assert set(run.notes) <= set(result.notes)
 
 
-def test_tiles_have_the_intervals_that_the_verdict_has(run, answer):
-    doubts = {tile.key: tile.doubt for tile in answer.tiles}
-    assert doubts["clr"] in run.verdict()
-    assert doubts["crf_hz"] in run.verdict()
-    assert doubts["car"].startswith("± ")
-    assert doubts["lambda_ratio"] == ""  # by a formula
-    assert doubts["friction_coefficient"] == doubts["flash_temperature_max_k"] == NOT_DETERMINED
+def test_tiles_have_the_intervals_that_the_verdict_has(run, result):
+    uncertainties = {tile.key: tile.uncertainty for tile in result.tiles}
+    assert uncertainties["clr"] in run.verdict()
+    assert uncertainties["crf_hz"] in run.verdict()
+    assert uncertainties["car"].startswith("± ")
+    assert uncertainties["lambda_ratio"] == ""  # by a formula
+    assert (
+        uncertainties["friction_coefficient"]
+        == uncertainties["flash_temperature_max_k"]
+        == NOT_DETERMINED
+    )
 
 
-def test_a_grid_that_cannot_tell_says_so_in_the_tiles(answer):
-    assert {tile.key: tile.doubt for tile in replace(answer, determined=False).tiles}[
+def test_a_grid_that_cannot_tell_says_so_in_the_tiles(result):
+    assert {tile.key: tile.uncertainty for tile in replace(result, determined=False).tiles}[
         "clr"
     ] == NOT_DETERMINED
-    unknown = replace(answer, row={**answer.row, "clr_low": None})
-    assert {tile.key: tile.doubt for tile in unknown.tiles}["clr"] == NOT_DETERMINED
-    wide = replace(answer, row={**answer.row, "car": 0.002, "car_error": 0.069})
-    assert {tile.key: tile.doubt for tile in wide.tiles}[
+    unknown = replace(result, row={**result.row, "clr_low": None})
+    assert {tile.key: tile.uncertainty for tile in unknown.tiles}["clr"] == NOT_DETERMINED
+    wide = replace(result, row={**result.row, "car": 0.002, "car_error": 0.069})
+    assert {tile.key: tile.uncertainty for tile in wide.tiles}[
         "car"
     ] == "0.0 to 7.1 %"  # and nothing below
-    silent = replace(answer, row={**answer.row, "crf_hz": None})
-    assert {tile.key: (tile.value, tile.doubt) for tile in silent.tiles}["crf_hz"] == ("–", "")
-
-
-def test_the_spectrum_is_the_runs_near_its_band(run, answer):
-    sound, spectrum = answer.sound, run.vibration.spectrum
-    assert sound.crf_hz == run.vibration.resonance.crf_hz
-    assert sound.frequency.size <= 500
-    near = (spectrum.frequency_hz >= sound.frequency[0]) & (
-        spectrum.frequency_hz <= sound.frequency[-1]
+    silent = replace(result, row={**result.row, "crf_hz": None})
+    assert {tile.key: (tile.value, tile.uncertainty) for tile in silent.tiles}["crf_hz"] == (
+        "–",
+        "",
     )
-    assert sound.density.mean() == pytest.approx(spectrum.density[near].mean(), rel=0.02)
-    peak = sound.frequency[np.argmax(sound.curve)]
-    assert peak == pytest.approx(sound.crf_hz, abs=2.0 * float(np.diff(sound.frequency[:2])[0]))
 
 
-def test_titles_that_follow_what_is_tried_have_room_on_a_phone(answer):
+def test_the_spectrum_is_the_runs_near_its_band(run, result):
+    spectrum, full = result.spectrum, run.vibration.spectrum
+    assert spectrum.crf_hz == run.vibration.resonance.crf_hz
+    assert spectrum.frequency.size <= 500
+    near = (full.frequency_hz >= spectrum.frequency[0]) & (
+        full.frequency_hz <= spectrum.frequency[-1]
+    )
+    assert spectrum.density.mean() == pytest.approx(full.density[near].mean(), rel=0.02)
+    peak = spectrum.frequency[np.argmax(spectrum.curve)]
+    assert peak == pytest.approx(
+        spectrum.crf_hz, abs=2.0 * float(np.diff(spectrum.frequency[:2])[0])
+    )
+
+
+def test_titles_that_follow_what_is_tried_have_room_on_a_phone(result):
     pytest.importorskip("panel")
-    from asperity.app.contact_page import _heard
-    from asperity.app.figures import Trail
+    from asperity.app.contact_page import _spectrum_title
+    from asperity.app.figures import TrialFigures
 
-    trail = Trail(lambda _: None)
-    titles = [_heard(answer), trail.share.title.text, trail.pitch.title.text]
+    trials = TrialFigures(lambda _: None)
+    titles = [_spectrum_title(result), trials.share.title.text, trials.crf.title.text]
     assert titles[0].startswith("CRF ")
-    assert f"fitted to ± {answer.sound.crf_std_hz:.1f} Hz" in titles[0]
+    assert f"fitted to ± {result.spectrum.crf_std_hz:.1f} Hz" in titles[0]
     assert max(map(len, titles)) <= 36  # of 390 pixels
 
 
@@ -153,24 +164,24 @@ def test_hertzs_pressure_carries_the_load():
     assert not ellipse_pressure(x, 2.0, (1.0, 2.0), 3.0).any()
 
 
-def test_a_line_contacts_profile_is_one_all_along(answer):
+def test_a_line_contacts_profile_is_one_all_along(result):
     conditions = papers_case().conditions
     np.testing.assert_allclose(
-        answer.hertz(0),
-        line_pressure(answer.x, conditions.hertz.half_widths[0], conditions.hertz.p_max),
+        result.hertz(0),
+        line_pressure(result.x, conditions.hertz.half_widths[0], conditions.hertz.p_max),
     )
 
 
 def test_a_coarse_answer_comes_first_and_the_full_one_after_it():
-    desk, _, drawn = desk_of()
-    desk.solve()
-    shown = list({id(answer): answer for answer in drawn if answer is not None}.values())
-    assert [answer.coarse for answer in shown] == [True, False]
+    session, _, drawn = session_of()
+    session.solve()
+    shown = list({id(result): result for result in drawn if result is not None}.values())
+    assert [result.coarse for result in shown] == [True, False]
     coarse, full = shown
     assert coarse.gap.shape == (48, 32)
     assert full.gap.shape == (96, 64)
     assert coarse.row["clr"] == pytest.approx(full.row["clr"], abs=0.15)
-    assert all(tile.doubt in ("coarse answer", "") for tile in coarse.tiles)
+    assert all(tile.uncertainty in ("coarse solution", "") for tile in coarse.tiles)
 
 
 def test_a_coarse_answer_goes_on_from_the_one_before():
@@ -180,7 +191,7 @@ def test_a_coarse_answer_goes_on_from_the_one_before():
     cold = work.solve_coarsely(NOBODY, turned, None)
     warm = work.solve_coarsely(NOBODY, turned, first.solution)
     assert warm.solution.convergence.iterations < cold.solution.convergence.iterations / 2
-    assert warm.answer.row["clr"] == pytest.approx(cold.answer.row["clr"], abs=0.02)
+    assert warm.result.row["clr"] == pytest.approx(cold.result.row["clr"], abs=0.02)
     other = case.with_overrides({"surface.seed": 99})
     assert work.solve_coarsely(NOBODY, other, first.solution).solution.convergence.iterations == (
         work.solve_coarsely(NOBODY, other, None).solution.convergence.iterations
@@ -196,7 +207,7 @@ def test_a_coarse_answer_is_the_averaged_surfaces():
     np.testing.assert_allclose(coarse.solution.surface.heights, heights)
     alone = Surface(heights, coarse.solution.grid)
     solved = solve_contact(case.conditions, case.lubricant, alone, options=Options())
-    assert coarse.answer.row["clr"] == pytest.approx(contact_state(solved).clr, abs=2e-3)
+    assert coarse.result.row["clr"] == pytest.approx(contact_state(solved).clr, abs=2e-3)
 
 
 def test_a_coarse_answer_that_takes_too_many_steps_is_sought_on_fewer_cells(monkeypatch):
@@ -204,179 +215,185 @@ def test_a_coarse_answer_that_takes_too_many_steps_is_sought_on_fewer_cells(monk
     monkeypatch.setattr(work, "COLD_STEPS", 200)
     assert work.solve_coarsely(NOBODY, case, None).solution.grid.cells == (64, 64)
     monkeypatch.setattr(work, "COLD_STEPS", 2)
-    monkeypatch.setattr(work, "COARSER", 48 * 48)
-    monkeypatch.setattr(work, "COARSE", 80 * 80)
+    monkeypatch.setattr(work, "COARSEST_CELLS", 48 * 48)
+    monkeypatch.setattr(work, "COARSE_CELLS", 80 * 80)
     assert work.solve_coarsely(NOBODY, case, None).solution.grid.cells == (32, 32)
-    monkeypatch.setattr(work, "COARSER_STEPS", 2)
-    assert work.solve_coarsely(NOBODY, case, None) == work.Coarse(None, None)
+    monkeypatch.setattr(work, "COARSEST_STEPS", 2)
+    assert work.solve_coarsely(NOBODY, case, None) == work.CoarseResult(None, None)
 
 
 def test_cells_that_are_too_few_only_for_a_coarse_answer_refuse_nothing():
-    desk, _, _ = desk_of({**MUTE, "grid.x": [-9.0, 3.0], "grid.cells": [96, 64]})
-    desk.solve()
-    assert work.solve_coarsely(NOBODY, desk.settings.case, None) == work.Coarse(None, None)
-    assert desk.status.startswith("Solved on 96 × 64 cells")
+    session, _, _ = session_of({**MUTE, "grid.x": [-9.0, 3.0], "grid.cells": [96, 64]})
+    session.solve()
+    assert work.solve_coarsely(NOBODY, session.settings.case, None) == work.CoarseResult(None, None)
+    assert session.status.startswith("Solved on 96 × 64 cells")
 
 
 def test_a_contact_on_few_cells_has_no_coarse_answer():
     coarse = work.solve_coarsely(
         NOBODY, papers_case().with_overrides({**MUTE, "grid.cells": [64, 64]}), None
     )
-    assert coarse == work.Coarse(None, None)
+    assert coarse == work.CoarseResult(None, None)
 
 
 def test_what_is_shown_is_old_until_its_answer_has_come():
-    desk, queue, _ = desk_of()
-    desk.solve()
-    assert not desk.stale
+    session, queue, _ = session_of()
+    session.solve()
+    assert not session.stale
     queue.held = True
-    desk.turn("contact.load", "600 N")
-    assert desk.stale
-    assert desk.status == "Solving ..."
+    session.change("contact.load", "600 N")
+    assert session.stale
+    assert session.status == "Solving ..."
     queue.go()
-    assert desk.status == "Coarse answer, solving in full ..."
-    assert desk.stale
+    assert session.status == "Coarse solution, refining ..."
+    assert session.stale
     queue.go()
-    assert not desk.stale
-    assert desk.status.startswith("Solved on 96 × 64 cells")
+    assert not session.stale
+    assert session.status.startswith("Solved on 96 × 64 cells")
 
 
 @pytest.mark.parametrize("first", ["coarse", "full"])
 def test_where_there_is_room_the_full_answer_does_not_wait_for_the_coarse_one(first):
     coarsely, fully = AtOnce(), AtOnce()
     coarsely.held = fully.held = fully.has_room = True
-    desk = Desk(Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully)
-    desk.solve()
+    session = ContactSession(
+        Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully
+    )
+    session.solve()
     assert (len(coarsely.kept), len(fully.kept)) == (1, 1)
     if first == "coarse":
         coarsely.go()
-        assert (desk.answer.coarse, desk.pending, len(fully.kept)) == (True, True, 1)
+        assert (session.result.coarse, session.pending, len(fully.kept)) == (True, True, 1)
         fully.go()
     else:
         fully.go()
-        assert not desk.pending
+        assert not session.pending
         coarsely.go()
-    assert (desk.answer.coarse, desk.pending, len(desk.trail)) == (False, False, 1)
+    assert (session.result.coarse, session.pending, len(session.trials)) == (False, False, 1)
     assert (coarsely.kept, fully.kept) == ([], [])
 
 
 def test_an_answer_to_what_was_set_before_is_none_to_what_is_set_now():
     coarsely, fully = AtOnce(), AtOnce()
     coarsely.held = fully.held = fully.has_room = True
-    desk = Desk(Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully)
-    desk.solve()
+    session = ContactSession(
+        Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully
+    )
+    session.solve()
     coarsely.go()
     fully.has_room = False  # busy with what was set before
-    desk.turn("contact.load", "600 N")
+    session.change("contact.load", "600 N")
     fully.go()
-    assert (desk.pending, desk.trail) == (True, [])
+    assert (session.pending, session.trials) == (True, [])
     coarsely.go()
     fully.go()
-    assert (desk.pending, desk.answer.text) == (False, desk.settings.case.text)
-    assert "600 N" in desk.answer.text
+    assert (session.pending, session.result.text) == (False, session.settings.case.text)
+    assert "600 N" in session.result.text
 
 
 def test_without_room_the_full_answer_is_asked_for_after_the_coarse_one():
     coarsely, fully = AtOnce(), AtOnce()
     coarsely.held = fully.held = True
     fully.has_room = False
-    desk = Desk(Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully)
-    desk.solve()
+    session = ContactSession(
+        Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully
+    )
+    session.solve()
     assert fully.kept == []
     coarsely.go()
     assert len(fully.kept) == 1
     fully.go()
-    assert not desk.answer.coarse
+    assert not session.result.coarse
 
 
 def test_a_wrong_value_keeps_its_sentence_and_marks_the_picture_until_it_is_mended():
-    desk, _, _ = desk_of()
-    desk.solve()
-    before = desk.answer
-    desk.turn("contact.load", "600")
-    assert "bare number 600" in desk.refusals["contact.load"].sentence
-    assert desk.answer is before
-    assert desk.stale
-    desk.turn("contact.load", "500 N")  # as it was
-    assert not desk.refusals
-    assert not desk.stale
+    session, _, _ = session_of()
+    session.solve()
+    before = session.result
+    session.change("contact.load", "600")
+    assert "bare number 600" in session.rejected["contact.load"].message
+    assert session.result is before
+    assert session.stale
+    session.change("contact.load", "500 N")  # as it was
+    assert not session.rejected
+    assert not session.stale
 
 
 def test_a_contact_that_is_not_solved_says_so(monkeypatch):
-    desk, _, _ = desk_of({**MUTE, "solver.max_iterations": 1})
-    desk.solve()
-    assert desk.status.startswith("NOT CONVERGED, do not use: out of iterations")
-    assert desk.trail == []
-    monkeypatch.setattr(work, "LONGEST_S", -1.0)
-    desk.turn("contact.load", "900 N")
-    assert desk.status.startswith("Not solved: The contact was given up")
-    assert desk.stale
+    session, _, _ = session_of({**MUTE, "solver.max_iterations": 1})
+    session.solve()
+    assert session.status.startswith("NOT CONVERGED, do not use: out of iterations")
+    assert session.trials == []
+    monkeypatch.setattr(work, "TIME_LIMIT_S", -1.0)
+    session.change("contact.load", "900 N")
+    assert session.status.startswith("Not solved: No solution within")
+    assert session.stale
 
 
 def test_values_beyond_all_reckoning_are_a_sentence():
     def divided(ticket):  # noqa: ARG001
         return 1 / 0
 
-    refused = told(divided, NOBODY)
-    assert isinstance(refused, Refused)
-    assert refused.sentence.startswith(
-        "The values lie too far from any contact to be reckoned with (division by zero)"
+    refused = run_job(divided, NOBODY)
+    assert isinstance(refused, JobFailure)
+    assert refused.message.startswith(
+        "These values cannot be solved (division by zero). Undo the last change."
     )
 
 
 def test_a_contact_that_its_grid_cannot_carry_says_so():
-    desk, _, _ = desk_of()
-    desk.turn("surface.correlation_length.0", "3 um")
-    assert desk.status.startswith("Not solved: paper.toml: surface: ")
-    assert desk.answer is None
+    session, _, _ = session_of()
+    session.change("surface.correlation_length.0", "3 um")
+    assert session.status.startswith("Not solved: paper.toml: surface: ")
+    assert session.result is None
 
 
 def test_what_is_pinned_stays_to_compare_with():
-    desk, queue, _ = desk_of()
-    desk.solve()
-    pinned = desk.answer
-    desk.pin()
-    desk.turn("contact.load", "900 N")
-    assert desk.pinned is pinned
-    change = desk.answer.row["clr"] - pinned.row["clr"]
-    assert difference("clr", desk.answer.row["clr"], pinned.row["clr"]).startswith(
+    session, queue, _ = session_of()
+    session.solve()
+    pinned = session.result
+    session.pin()
+    session.change("contact.load", "900 N")
+    assert session.pinned is pinned
+    change = session.result.row["clr"] - pinned.row["clr"]
+    assert difference("clr", session.result.row["clr"], pinned.row["clr"]).startswith(
         "+" if change >= 0 else "−"
     )
     assert difference("crf_hz", None, 3.0) == "–"
     queue.held = True
-    desk.turn("contact.load", "800 N")
-    desk.pin()  # not what is old
-    assert desk.pinned is pinned
-    desk.unpin()
-    assert desk.pinned is None
+    session.change("contact.load", "800 N")
+    session.pin()  # not what is old
+    assert session.pinned is pinned
+    session.unpin()
+    assert session.pinned is None
 
 
 def test_what_was_tried_lies_in_the_trail_once_and_comes_back():
-    desk, _, _ = desk_of()
-    desk.solve()
-    desk.turn("surface.sq", "2 um")
-    desk.turn("contact.load", "900")
-    assert [tried.sq for tried in desk.trail] == pytest.approx([1e-6, 2e-6])
-    assert desk.trail[1].clr == desk.answer.row["clr"]
-    desk.go_back(0)
-    assert desk.settings.case.contents.surface.sq == 1e-6
-    assert not desk.refusals
-    assert len(desk.trail) == 2
+    session, _, _ = session_of()
+    session.solve()
+    session.change("surface.sq", "2 um")
+    session.change("contact.load", "900")
+    assert [trial.sq for trial in session.trials] == pytest.approx([1e-6, 2e-6])
+    assert session.trials[1].clr == session.result.row["clr"]
+    session.go_back(0)
+    assert session.settings.case.contents.surface.sq == 1e-6
+    assert not session.rejected
+    assert len(session.trials) == 2
 
 
 def test_an_address_is_gone_to():
-    desk, _, _ = desk_of()
-    turned = desk.settings.turned("contact.load", "700 N")
-    assert desk.go_to(turned.address) == []
-    assert desk.answer.text == turned.case.text
+    session, _, _ = session_of()
+    turned = session.settings.with_value("contact.load", "700 N")
+    assert session.go_to(turned.address) == []
+    assert session.result.text == turned.case.text
 
 
 def test_a_desk_that_closes_holds_nothing():
-    desk, _, _ = desk_of()
-    desk.solve()
-    desk.pin()
-    desk.close()
-    assert (desk.answer, desk.pinned, desk.trail) == (None, None, [])
+    session, _, _ = session_of()
+    session.solve()
+    session.pin()
+    session.close()
+    assert (session.result, session.pinned, session.trials) == (None, None, [])
 
 
 def test_a_dropped_surface_takes_the_place_of_the_cases_own(tmp_path):
@@ -387,17 +404,17 @@ def test_a_dropped_surface_takes_the_place_of_the_cases_own(tmp_path):
     )
     assert case.contents.surface.name == "ring.x3p"
     assert steps[0] == "Measured surface ring.x3p:"
-    assert held_in(f"held={held}") == held
+    assert surface_key(f"held={held}") == held
     assert len(steps) > 3
     text = take.case_text(case)
-    assert "# ring.x3p lies beside this file." in text
+    assert "# Needs ring.x3p in the same folder." in text
     assert str(tmp_path) not in text
     assert load_case(text, folder=tmp_path).surface().sq == case.surface().sq
 
 
 def test_a_dropped_surface_is_held_for_links_and_the_oldest_goes(tmp_path, monkeypatch):
     rng = np.random.default_rng(5)
-    session, other, shelf = tmp_path / "one", tmp_path / "other", Shelf()
+    session, other, surfaces = tmp_path / "one", tmp_path / "other", SurfaceStore()
     session.mkdir(), other.mkdir()
     keys = []
     for number in range(3):
@@ -413,17 +430,17 @@ def test_a_dropped_surface_is_held_for_links_and_the_oldest_goes(tmp_path, monke
             NOBODY, papers_case().with_overrides(MUTE), folder / "ring.x3p"
         )
         keys.append(key)
-        monkeypatch.setattr("asperity.app.surface_store.MOST_HELD", 2)
-        shelf.put(key, case)
+        monkeypatch.setattr("asperity.app.surface_store.MAX_SURFACES", 2)
+        surfaces.add(key, case)
     assert len(set(keys)) == 3
-    assert shelf.lend(keys[0], other) is None
+    assert surfaces.load(keys[0], other) is None
     shutil.rmtree(session)  # the session that dropped it has gone
-    lent = shelf.lend(keys[2], other)
+    lent = surfaces.load(keys[2], other)
     assert lent.text == case.text
     assert lent.folder.parent == other
-    shelf.close()
+    surfaces.close()
     assert lent.surface().sq > 0.0  # whose session goes on
-    assert shelf.lend(keys[2], other) is None
+    assert surfaces.load(keys[2], other) is None
 
 
 @pytest.mark.parametrize(
@@ -431,17 +448,17 @@ def test_a_dropped_surface_is_held_for_links_and_the_oldest_goes(tmp_path, monke
 )
 def test_a_damaged_surface_is_a_sentence(tmp_path, content):
     (tmp_path / "ring.x3p").write_bytes(content)
-    refused = told(
+    refused = run_job(
         work.open_surface, NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p"
     )
-    assert isinstance(refused, Refused)
-    assert "ring.x3p" in refused.sentence
+    assert isinstance(refused, JobFailure)
+    assert "ring.x3p" in refused.message
 
 
 def test_what_is_taken_away_solves_to_the_same_numbers(tmp_path):
     case = papers_case().with_overrides(MUTE)
     (tmp_path / take.CASE_FILE).write_text(take.case_text(case), "utf-8")
-    (tmp_path / take.SCRIPT).write_text(take.python_lines(), "utf-8")
+    (tmp_path / take.SCRIPT).write_text(take.python_script(), "utf-8")
     said = subprocess.run(
         [sys.executable, take.SCRIPT], cwd=tmp_path, capture_output=True, text=True, check=True
     )
@@ -455,11 +472,11 @@ def test_the_report_is_our_own_page():
     assert "Content-Security-Policy" in text
 
 
-def test_a_kept_run_is_opened_as_it_was_solved(tmp_path, run, answer):
+def test_a_kept_run_is_opened_as_it_was_solved(tmp_path, run, result):
     run.save(tmp_path / "run.nc")
     opened = open_page(tmp_path / "run.nc")
     assert opened.kind == "contact"
-    assert json.dumps(opened.answer.row) == json.dumps(answer.row)
+    assert json.dumps(opened.result.row) == json.dumps(result.row)
     assert opened.case.stored is not None
-    turned = Settings(opened.case).turned("contact.slip", "0.4")
+    turned = Settings(opened.case).with_value("contact.slip", "0.4")
     np.testing.assert_array_equal(turned.case.surface().heights, run.solution.surface.heights)

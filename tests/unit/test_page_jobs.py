@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 from asperity.app import contact_jobs as work
-from asperity.app.contact_jobs import Refused, Superseded, Ticket, told
-from asperity.app.jobs import Queue, Workshop, outcome, wait_until_warm
+from asperity.app.contact_jobs import JobFailure, Superseded, Ticket, run_job
+from asperity.app.jobs import JobQueue, WorkerPool, job_outcome, wait_until_warm
 from asperity.core.errors import BadInput
 from asperity.paper import papers_case
 
@@ -23,7 +23,7 @@ class Bench:
     def __init__(self, slots=8):
         self.newest, self._free, self.begun = [0] * slots, list(range(slots)), []
 
-    def slot(self):
+    def acquire_slot(self):
         return self._free.pop() if self._free else -1
 
     def release(self, slot):
@@ -38,17 +38,17 @@ class Bench:
 
 @pytest.mark.parametrize("running", [0, 1, 2])
 def test_a_workshop_has_room_while_a_worker_has_nothing_to_do(monkeypatch, running):
-    workshop, futures = Workshop(workers=2), [Future() for _ in range(running)]
+    worker_pool, futures = WorkerPool(workers=2), [Future() for _ in range(running)]
     waiting = iter(futures)
     monkeypatch.setattr(
-        workshop, "_pool", SimpleNamespace(submit=lambda *_arguments: next(waiting))
+        worker_pool, "_pool", SimpleNamespace(submit=lambda *_arguments: next(waiting))
     )
     for _ in futures:
-        workshop.submit(str)
-    assert workshop.has_room == (running < 2)
+        worker_pool.submit(str)
+    assert worker_pool.has_room == (running < 2)
     for future in futures:
         future.set_result("")
-    assert workshop.has_room
+    assert worker_pool.has_room
 
 
 def at_once(function):
@@ -57,9 +57,9 @@ def at_once(function):
 
 def test_one_piece_of_work_at_a_time_and_the_newest_wins():
     bench, came = Bench(), []
-    line = Queue(bench, at_once)
+    line = JobQueue(bench, at_once)
     for wish in "abcd":
-        line.ask((str, (wish,)), came.append)
+        line.submit((str, (wish,)), came.append)
     assert [arguments[1] for _, arguments, _ in bench.begun] == ["a"]
     bench.begun[0][2].set_result("a done")
     assert [arguments[1] for _, arguments, _ in bench.begun] == ["a", "d"]
@@ -71,39 +71,39 @@ def test_one_piece_of_work_at_a_time_and_the_newest_wins():
 
 def test_a_worker_is_told_what_is_wanted_no_more():
     bench = Bench()
-    line = Queue(bench, at_once)
-    line.ask((str, ()), print)
+    line = JobQueue(bench, at_once)
+    line.submit((str, ()), print)
     ticket = bench.begun[0][1][0]
     assert bench.newest[ticket.slot] == ticket.number
-    line.ask((str, ()), print)
+    line.submit((str, ()), print)
     assert bench.newest[ticket.slot] > ticket.number
 
 
 def test_a_session_that_closes_gives_its_place_back_and_hears_nothing_more():
     bench, came = Bench(slots=1), []
-    line = Queue(bench, at_once)
-    line.ask((str, ()), came.append)
+    line = JobQueue(bench, at_once)
+    line.submit((str, ()), came.append)
     ticket = bench.begun[0][1][0]
     line.close()
     assert bench.newest[ticket.slot] > ticket.number
     bench.begun[0][2].set_result("late")
-    line.ask((str, ()), came.append)
+    line.submit((str, ()), came.append)
     assert came == []
     assert len(bench.begun) == 1
-    assert Queue(bench, at_once)._slot == 0
+    assert JobQueue(bench, at_once)._slot == 0
 
 
 def test_without_a_free_place_work_is_done_all_the_same():
     bench = Bench(slots=0)
-    Queue(bench, at_once).ask((str, ()), print)
+    JobQueue(bench, at_once).submit((str, ()), print)
     assert bench.begun[0][1][0].slot == -1
 
 
 def test_what_arrives_may_ask_for_more():
     bench, came = Bench(), []
-    line = Queue(bench, at_once)
-    line.ask(
-        (str, ("a",)), lambda result: (came.append(result), line.ask((str, ("b",)), came.append))
+    line = JobQueue(bench, at_once)
+    line.submit(
+        (str, ("a",)), lambda result: (came.append(result), line.submit((str, ("b",)), came.append))
     )
     bench.begun[0][2].set_result(1)
     bench.begun[1][2].set_result(2)
@@ -113,11 +113,11 @@ def test_what_arrives_may_ask_for_more():
 def test_what_fails_is_a_sentence(caplog):
     failed: Future = Future()
     failed.set_exception(ZeroDivisionError("inside"))
-    assert "a mistake of ours" in outcome(failed).sentence
+    assert "Internal error" in job_outcome(failed).message
     assert "inside" in caplog.text
     died: Future = Future()
     died.set_exception(BrokenProcessPool())
-    assert "A worker process died" in outcome(died).sentence
+    assert "A worker process died" in job_outcome(died).message
 
 
 def refuse():
@@ -125,50 +125,52 @@ def refuse():
 
 
 def test_what_is_refused_travels_as_a_sentence():
-    assert told(refuse) == Refused("contact.load must be a force.")
+    assert run_job(refuse) == JobFailure("contact.load must be a force.")
 
 
 def test_a_solve_stops_where_nobody_waits(monkeypatch):
     monkeypatch.setattr(work, "_newest", [5])
     case = papers_case().with_overrides(SMALL)
-    assert isinstance(told(work.solve_fully, Ticket(0, 4), case), Superseded)
-    assert told(work.solve_fully, Ticket(0, 5), case).converged
-    assert told(work.solve_fully, Ticket(-1, 4), case).converged
+    assert isinstance(run_job(work.solve_fully, Ticket(0, 4), case), Superseded)
+    assert run_job(work.solve_fully, Ticket(0, 5), case).converged
+    assert run_job(work.solve_fully, Ticket(-1, 4), case).converged
 
 
 def test_a_solve_is_given_up_after_its_time(monkeypatch):
-    monkeypatch.setattr(work, "LONGEST_S", -1.0)
+    monkeypatch.setattr(work, "TIME_LIMIT_S", -1.0)
     case = papers_case().with_overrides(SMALL)
-    assert "given up" in told(work.solve_fully, Ticket(-1, 0), case).sentence
+    assert "No solution within" in run_job(work.solve_fully, Ticket(-1, 0), case).message
 
 
 def test_more_cells_than_the_page_solves_are_refused_where_the_case_chooses_them(monkeypatch):
-    monkeypatch.setattr("asperity.app.settings.MOST_CELLS", 100)
+    monkeypatch.setattr("asperity.app.settings.MAX_CELLS", 100)
     case = papers_case().with_overrides({**SMALL, "grid.cells": "auto"})
-    assert "at most 100 in all" in told(work.solve_fully, Ticket(-1, 0), case).sentence
+    assert "at most 100 in all" in run_job(work.solve_fully, Ticket(-1, 0), case).message
 
 
 @pytest.fixture(scope="module")
-def workshop():
-    made = Workshop(1)
-    made.warm()
-    yield made
-    made.close()
+def worker_pool():
+    plot = WorkerPool(1)
+    plot.warm_up()
+    yield plot
+    plot.close()
 
 
-def test_processes_warm_up_and_solve(workshop):
-    assert wait_until_warm(workshop, 120.0)
+def test_processes_warm_up_and_solve(worker_pool):
+    assert wait_until_warm(worker_pool, 120.0)
     came: queue.Queue = queue.Queue()
-    line = Queue(workshop, came.put)
+    line = JobQueue(worker_pool, came.put)
     answers = []
-    line.ask((work.solve_fully, (papers_case().with_overrides(SMALL),)), answers.append)
+    line.submit((work.solve_fully, (papers_case().with_overrides(SMALL),)), answers.append)
     came.get(timeout=60)()
     assert answers[0].converged
     assert answers[0].gap.shape == (48, 32)
     line.close()
 
 
-def test_a_worker_that_dies_is_replaced(workshop):
+def test_a_worker_that_dies_is_replaced(worker_pool):
     with pytest.raises(BrokenProcessPool):
-        workshop.submit(os._exit, 1).result(timeout=60)
-    assert workshop.submit(refuse).result(timeout=120) == Refused("contact.load must be a force.")
+        worker_pool.submit(os._exit, 1).result(timeout=60)
+    assert worker_pool.submit(refuse).result(timeout=120) == JobFailure(
+        "contact.load must be a force."
+    )

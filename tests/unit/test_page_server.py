@@ -13,7 +13,7 @@ pytest.importorskip("panel", reason="the extra page is not installed")
 
 from asperity.app import open_page
 from asperity.app.server import PASSWORD, origins, password_for, require_free
-from asperity.app.uploads import Drop, safe_name
+from asperity.app.uploads import FileDrop, safe_name
 from asperity.app.widgets import sentences, tiles
 
 NAMES = {
@@ -43,7 +43,9 @@ def test_others_are_let_in_with_a_password_only(monkeypatch, address, password):
     monkeypatch.delenv(PASSWORD, raising=False)
     if password is not None:
         monkeypatch.setenv(PASSWORD, password)
-    with pytest.raises(BadInput, match=f"--listen {address} lets others in, who need a password"):
+    with pytest.raises(
+        BadInput, match=f"--listen {address} allows remote access, which requires a password"
+    ):
         password_for(address)
     monkeypatch.setenv(PASSWORD, "long enough")
     assert password_for(address) == "long enough"
@@ -78,7 +80,11 @@ def test_a_dropped_files_name_is_only_a_name(name):
 
 def drop_of(limit):
     paths, said = [], []
-    return Drop(limit=limit, arrived=paths.append, refused=said.append, several=True), paths, said
+    return (
+        FileDrop(limit=limit, on_file=paths.append, on_error=said.append, several=True),
+        paths,
+        said,
+    )
 
 
 def piece(number, total, data, name="a.csv"):
@@ -122,10 +128,10 @@ def test_what_is_too_large_or_damaged_is_not_taken(pieces):
 
 def test_what_is_shown_is_escaped():
     assert sentences(["<script>"], '"') == '<p class="&#34;">&lt;script&gt;</p>'
-    shown = SimpleNamespace(key="clr", name="<b>", value="<i>", doubt="<u>")
-    answer = SimpleNamespace(converged=True, row={})
-    assert "<b>" not in tiles([shown], answer, None, old=False)
-    assert "<dt>&lt;b&gt;</dt>" in tiles([shown], answer, None, old=False)
+    shown = SimpleNamespace(key="clr", name="<b>", value="<i>", uncertainty="<u>")
+    result = SimpleNamespace(converged=True, row={})
+    assert "<b>" not in tiles([shown], result, None, stale=False)
+    assert "<dt>&lt;b&gt;</dt>" in tiles([shown], result, None, stale=False)
 
 
 def test_the_page_is_opened_with_what_is_named(tmp_path):

@@ -5,11 +5,11 @@ import os
 import numpy as np
 import pytest
 
-from asperity.app.contact_jobs import Refused, Ticket, told
-from asperity.app.contact_result import RUPTURED, TOUCHING
+from asperity.app.contact_jobs import JobFailure, Ticket, run_job
+from asperity.app.contact_result import CAVITATED, TOUCHING
 from asperity.app.folder_jobs import open_history, open_study, solve_row
 from asperity.app.opening import open_page
-from asperity.app.recording_jobs import Stated, hear_files, hear_folder
+from asperity.app.recording_jobs import RecordingInputs, track_files, track_folder
 from asperity.core.signals import Signal
 from asperity.monitoring import TrackSettings, track_recordings
 from asperity.paper import papers_case
@@ -44,39 +44,39 @@ def recordings(folder):
 
 def test_dropped_recordings_are_heard_as_track_hears_them(rig):
     paths = sorted(rig.glob("*.npy"))
-    heard = hear_files(NOBODY, paths, Stated(rate_hz=2e4, unit="m/s^2"), None)
+    series = track_files(NOBODY, paths, RecordingInputs(rate_hz=2e4, unit="m/s^2"), None)
     track = track_recordings(paths, TrackSettings(rate_hz=2e4, unit="m/s^2"))
-    assert heard.verdict == track.verdict()
-    assert [row["crf_hz"] for row in heard.rows] == [
+    assert series.verdict == track.verdict()
+    assert [row["crf_hz"] for row in series.rows] == [
         row.row()["crf_hz"] for row in track.recordings
     ]
-    assert [row["file"] for row in heard.rows] == [path.name for path in paths]
-    assert heard.levels.shape == (7, heard.frequency.size)
-    loudest = heard.frequency[
-        np.argmax(np.where(heard.frequency > 2e3, heard.levels, -np.inf), axis=1)
+    assert [row["file"] for row in series.rows] == [path.name for path in paths]
+    assert series.levels.shape == (7, series.frequency.size)
+    loudest = series.frequency[
+        np.argmax(np.where(series.frequency > 2e3, series.levels, -np.inf), axis=1)
     ]
-    np.testing.assert_allclose(loudest, [row["crf_hz"] for row in heard.rows], atol=60.0)
+    np.testing.assert_allclose(loudest, [row["crf_hz"] for row in series.rows], atol=60.0)
 
 
 def test_a_recording_that_does_not_say_its_rate_is_refused_in_the_pages_words(rig):
-    refused = told(hear_files, NOBODY, sorted(rig.glob("*.npy"))[:1], Stated(), None)
-    assert isinstance(refused, Refused)
-    assert "give the sampling rate" in refused.sentence
-    assert "give rate_hz" not in refused.sentence
+    refused = run_job(track_files, NOBODY, sorted(rig.glob("*.npy"))[:1], RecordingInputs(), None)
+    assert isinstance(refused, JobFailure)
+    assert "give the sampling rate" in refused.message
+    assert "give rate_hz" not in refused.message
 
 
 def test_a_folder_is_read_once_and_grows(rig, tmp_path):
     folder = tmp_path / "arriving"
     folder.mkdir()
-    stated = Stated(rate_hz=2e4, unit="m/s^2", band_hz=(2e3, 4e3))
-    assert hear_folder(NOBODY, folder, tmp_path / "memory", stated, None) is None
+    stated = RecordingInputs(rate_hz=2e4, unit="m/s^2", band_hz=(2e3, 4e3))
+    assert track_folder(NOBODY, folder, tmp_path / "memory", stated, None) is None
     for number, path in enumerate(sorted(rig.glob("*.npy"))[:3], 1):
         arrived = folder / path.name
         arrived.write_bytes(path.read_bytes())
         os.utime(arrived, (1e9 + number, 1e9 + number))
-        heard = hear_folder(NOBODY, folder, tmp_path / "memory", stated, None)
-        assert len(heard.rows) == number
-    assert heard.band_hz == (2e3, 4e3)
+        series = track_folder(NOBODY, folder, tmp_path / "memory", stated, None)
+        assert len(series.rows) == number
+    assert series.band_hz == (2e3, 4e3)
 
 
 @pytest.fixture(scope="module")
@@ -90,12 +90,12 @@ def study(tmp_path_factory):
 
 
 def test_a_study_is_shown_by_its_rows_and_means(study):
-    swept = open_study(NOBODY, study)
+    data = open_study(NOBODY, study)
     table = load_study(study).table
-    assert [axis.key for axis in swept.axes] == ["surface.sq"]
-    assert swept.axes[0].unit == "um"
-    np.testing.assert_array_equal(swept.outputs["clr"], table["clr"])
-    x, mean, low, high = swept.means["surface.sq", "clr"]
+    assert [axis.key for axis in data.axes] == ["surface.sq"]
+    assert data.axes[0].unit == "um"
+    np.testing.assert_array_equal(data.outputs["clr"], table["clr"])
+    x, mean, low, high = data.means["surface.sq", "clr"]
     np.testing.assert_allclose(x, [0.5, 1.5])
     np.testing.assert_allclose(mean, table.groupby("surface.sq", sort=False)["clr"].mean())
     assert (low <= mean).all()  # at 0.5 um no asperity touches on either surface
@@ -104,34 +104,34 @@ def test_a_study_is_shown_by_its_rows_and_means(study):
 
 
 def test_a_point_of_a_study_becomes_its_contact(study):
-    swept = open_study(NOBODY, study)
-    for row, number in enumerate(swept.numbers):
-        answer = solve_row(NOBODY, study, number)
-        assert answer.row["clr"] == pytest.approx(swept.outputs["clr"][row], abs=1e-12)
+    data = open_study(NOBODY, study)
+    for row, number in enumerate(data.numbers):
+        result = solve_row(NOBODY, study, number)
+        assert result.row["clr"] == pytest.approx(data.outputs["clr"][row], abs=1e-12)
 
 
 def test_a_history_is_shown_by_its_steps_and_maps(tmp_path):
     kept = run_history(papers_case().with_overrides(SMALL), out=tmp_path / "moving", steps=6)
-    moved = open_history(NOBODY, tmp_path / "moving")
-    assert moved.verdict == kept.verdict()
-    np.testing.assert_array_equal(moved.curves["clr"], kept.table["clr"])
-    assert moved.names == tuple(f"Step {frame.number}" for frame in kept.frames)
-    assert moved.clock == "time_s"
-    for picture, frame in zip(moved.pictures, kept.frames, strict=True):
-        np.testing.assert_array_equal(picture.cells == TOUCHING, frame.in_contact)
-        assert not (picture.pressure[picture.cells == RUPTURED] > 0.0).any()
+    history = open_history(NOBODY, tmp_path / "moving")
+    assert history.verdict == kept.verdict()
+    np.testing.assert_array_equal(history.curves["clr"], kept.table["clr"])
+    assert history.names == tuple(f"Step {frame.number}" for frame in kept.frames)
+    assert history.clock == "time_s"
+    for contact_maps, frame in zip(history.maps, kept.frames, strict=True):
+        np.testing.assert_array_equal(contact_maps.cells == TOUCHING, frame.in_contact)
+        assert not (contact_maps.pressure[contact_maps.cells == CAVITATED] > 0.0).any()
     assert open_page(tmp_path / "moving").kind == "history"
 
 
 def test_a_contact_that_wears_is_shown_by_its_hours_and_maps(tmp_path):
     kept = run_wear(worn_case(FEW), hours=0.2, out=tmp_path / "worn")
-    moved = open_history(NOBODY, tmp_path / "worn")
-    assert (moved.verdict, moved.clock) == (kept.verdict(), "hours")
-    np.testing.assert_array_equal(moved.curves["sq_m"], kept.table["sq_m"])
-    np.testing.assert_array_equal(moved.time, kept.table["hours"])
-    assert moved.times == tuple(frame.hours for frame in kept.frames)
-    for picture, frame in zip(moved.pictures, kept.frames, strict=True):
-        np.testing.assert_array_equal(picture.cells == TOUCHING, frame.in_contact)
+    history = open_history(NOBODY, tmp_path / "worn")
+    assert (history.verdict, history.clock) == (kept.verdict(), "hours")
+    np.testing.assert_array_equal(history.curves["sq_m"], kept.table["sq_m"])
+    np.testing.assert_array_equal(history.time, kept.table["hours"])
+    assert history.times == tuple(frame.hours for frame in kept.frames)
+    for contact_maps, frame in zip(history.maps, kept.frames, strict=True):
+        np.testing.assert_array_equal(contact_maps.cells == TOUCHING, frame.in_contact)
     assert open_page(tmp_path / "worn").kind == "history"
 
 
@@ -139,5 +139,5 @@ def test_a_folder_that_is_damaged_is_a_sentence(study, tmp_path):
     (tmp_path / "manifest.json").write_text(
         (study / "manifest.json").read_text("utf-8")[:200], "utf-8"
     )
-    assert isinstance(told(open_study, NOBODY, tmp_path), Refused)
-    assert isinstance(told(open_history, NOBODY, tmp_path), Refused)
+    assert isinstance(run_job(open_study, NOBODY, tmp_path), JobFailure)
+    assert isinstance(run_job(open_history, NOBODY, tmp_path), JobFailure)

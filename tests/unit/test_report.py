@@ -285,7 +285,7 @@ def test_conditions_are_those_of_the_paper(single):
     rows = dict(row for row in single.rows if len(row) == 2)
     assert rows["Load"] == "500 N (50 N/mm)"
     assert (
-        rows["Hertz (smooth, dry)"] == "half-width a = 55.93 µm, largest pressure 0.5691 GPa"
+        rows["Hertz (smooth, dry)"] == "half-width a = 55.93 µm, maximum pressure 0.5691 GPa"
     )  # physics of the paper
     assert rows["Reduced modulus"] == "E* = 109.89 GPa (E′ = 2 E* = 219.78 GPa)"
     assert rows["Viscosity law"] == "barus, η₀ = 0.096 Pa s, α = 18.2 1/GPa"
@@ -359,7 +359,7 @@ def test_several_runs_are_drawn_against_roughness(single, several):
     def drawn(shown, title):
         return sum(title in unquote(image["src"]) for image in shown.images())
 
-    for title in ("Load and area share of asperities", ">Contact resonance frequency<"):
+    for title in ("Asperity load and area share", ">Contact resonance frequency<"):
         assert drawn(single, title) == 0
         assert drawn(several, title) == 1
     assert drawn(several, "Film thickness") == 3
@@ -405,7 +405,7 @@ def test_figures_carry_their_error_where_it_shows():
 def test_runs_of_one_roughness_are_not_drawn_against_it():
     shown = Page(page.render_page([run_like(), run_like()]))
     assert not any(
-        "Load and area share of asperities" in unquote(image["src"]) for image in shown.images()
+        "Asperity load and area share" in unquote(image["src"]) for image in shown.images()
     )
     assert "2 runs, Sq 1.25 µm" in shown.text
 
@@ -423,7 +423,7 @@ def test_page_can_be_read_without_seeing_it(several):
 def test_says_what_was_done_what_is_left_out_and_whom_to_cite(single):
     assert "Filled 0.2\N{NO-BREAK SPACE}% missing cells" in single.text
     for limit in (
-        "Oil is not conserved",
+        "Cavities are refilled",
         "A snapshot",
         "Isothermal",
         "Newtonian",
@@ -433,6 +433,36 @@ def test_says_what_was_done_what_is_left_out_and_whom_to_cite(single):
         assert limit in single.text
     assert "10.3390/lubricants13020078" in single.text
     assert run_like().case.text in single.text
+
+
+@pytest.mark.usefixtures("unprinted")
+@pytest.mark.parametrize(
+    ("model", "stated", "not_stated"),
+    [
+        ("unified", "Oil is not conserved.", ("Cavities are refilled.", "Mass-conserving")),
+        ("paper", "Oil is not conserved.", ("Cavities are refilled.", "Mass-conserving")),
+        ("mixed", "Cavities are refilled.", ("Oil is not conserved.", "Mass-conserving")),
+        (
+            "conserving",
+            "Mass-conserving cavitation.",
+            ("Oil is not conserved.", "Cavities are refilled.", "created"),
+        ),
+    ],
+)
+def test_limits_state_the_oil_balance_of_the_model(model, stated, not_stated):
+    text = Page(page.render_page([run_like(f'model = "{model}"\n{CASE}')])).text
+    limits = text[text.rindex("\nLimits\n") :]
+    assert stated in limits
+    assert not any(sentence in limits for sentence in not_stated)
+    assert "69.4\N{NO-BREAK SPACE}% of the oil carried through the Hertz zone" in limits
+
+
+@pytest.mark.usefixtures("unprinted")
+def test_limits_of_several_models_are_stated_once_each():
+    runs = [run_like(f'model = "{model}"\n{CASE}') for model in ("mixed", "mixed", "conserving")]
+    text = Page(page.render_page(runs)).text
+    limits = text[text.rindex("\nLimits\n") :]
+    assert limits.count("Cavities are refilled.") == limits.count("Mass-conserving") == 1
 
 
 @pytest.mark.usefixtures("unprinted")
@@ -451,16 +481,27 @@ def test_silent_dry_and_deaf_runs_have_a_page_too():
         'kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', 'kind = "flat"'
     )
     silent = Page(page.render_page([run_like(smooth, sq=0.0, clr=0.0, car=0.0, lambda_ratio=None)]))
-    assert "There is no spectrum to show" in silent.text
-    assert next(row for row in silent.rows if row[0].startswith("Lambda ratio"))[1] == "–"
+    assert "No spectrum" in silent.text
+    assert next(row for row in silent.rows if row[0].startswith("Film ratio"))[1] == "–"
     assert next(row for row in silent.rows if row[0].startswith("Contact resonance"))[1] == "–"
 
     dry = re.sub(r"\[lubricant\].*?(?=\[surface\])", "", CASE, flags=re.DOTALL)
     deaf = 'lubricant = "none"\n' + dry.split("[vibration]")[0]
     shown = Page(page.render_page([run_like(deaf, lambda_ratio=None, mass_flux_imbalance=0.0)]))
     assert "none: dry contact" in shown.text
-    assert "Oil is not conserved" not in shown.text
+    limits = shown.text[shown.text.rindex("\nLimits\n") :]
+    assert "The contact is dry" in limits
+    assert not any(words in limits for words in ("conserv", "refilled", "A snapshot"))
     assert "cavitated" not in unquote(shown.images()[0]["src"])
+
+
+def test_every_report_has_its_template():
+    folder = Path(base.__file__).parent
+    names = re.findall(
+        r'render\(\s*"(\S+)"', "".join(path.read_text("utf-8") for path in folder.rglob("page.py"))
+    )
+    assert len(names) == 7
+    assert [name for name in names if not (folder / name).is_file()] == []
 
 
 def test_same_run_gives_the_same_bytes(tmp_path, single):
@@ -522,7 +563,7 @@ def test_prose_is_set_as_in_print(written, shown):
 @pytest.mark.usefixtures("unprinted")
 def test_load_on_capped_oil_is_not_hidden():
     shown = page.render_page([run_like(capped_oil_load_ratio=0.5)])
-    assert "without touching carry 50.0\N{NO-BREAK SPACE}% of the load" in shown
+    assert "without contact carry 50.0\N{NO-BREAK SPACE}% of the load" in shown
 
 
 # Figures -------------------------------------------------------------------------------------------------------------
@@ -668,10 +709,7 @@ def test_a_run_in_pure_rolling_and_one_without_friction_say_so(monkeypatch):
 
     monkeypatch.setattr("asperity.results.run.friction_and_heat", refuse)
     unsettled = Page(page.render_page([run_like()]))
-    assert (
-        "There is no friction and no temperature to show: friction and temperature did not"
-        in unsettled.text
-    )
+    assert "No friction and temperature figures: friction and temperature did not" in unsettled.text
     assert (
         next(row[1] for row in unsettled.rows if row[0].startswith("Friction coefficient")) == "–"
     )

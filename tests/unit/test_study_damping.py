@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_study_report import PAPERS, figure_of, made, page_of, with_knee, without_maps
 
-from asperity.report.study.dynamic import over_roughness, rank_correlation, told_by
+from asperity.report.study.dynamic import clr_correlations, damping_over_roughness, rank_correlation
 from asperity.report.study.page import study_exhibits
 from asperity.report.study.sweep import sweep_exhibits
 from asperity.report.style import ON_PAPER
@@ -28,7 +28,7 @@ def shaken(*, seeds=5):
 def test_damping_and_stiffness_stand_over_sq_with_their_intervals():
     result = shaken()
     curve = curve_from_study(result)
-    above, below = figure_of(over_roughness, result).axes
+    above, below = figure_of(damping_over_roughness, result).axes
     (mean,) = [line for line in above.get_lines() if line.get_label() == "yielded cells elastic"]
     assert mean.get_ydata() == pytest.approx(curve.mean("contact_damping_ratio"))
     assert "damping ratio" in above.get_ylabel()
@@ -38,11 +38,11 @@ def test_damping_and_stiffness_stand_over_sq_with_their_intervals():
 
 def test_the_load_share_stands_over_each_indicator_with_its_rank_correlation():
     result = shaken()
-    panels = figure_of(told_by, result).axes
+    panels = figure_of(clr_correlations, result).axes
     assert [panel.get_xlabel() for panel in panels[:3]] == ["CRF, sound [Hz]", "k [N/µm]", "ζ"]
     found = {panel.get_xlabel(): panel.collections[0].get_offsets() for panel in panels[:3]}
     assert len(found["ζ"]) == len(result.table) - 1
-    exhibit = told_by(StudyOverview(result), curve_from_study(result))
+    exhibit = clr_correlations(StudyOverview(result), curve_from_study(result))
     for key in ("contact_damping_ratio", "contact_stiffness_n_m", "crf_sound_hz"):
         rank = rank_correlation(result.table, key)
         assert f"{rank:+.2f}".replace("-", "−") in exhibit.caption
@@ -64,7 +64,7 @@ def test_the_rank_correlation_is_that_of_ranks():
 def test_page_and_levels_have_them_and_a_study_that_did_not_shake_has_none():
     result = shaken()
     names = [exhibit.name for exhibit in study_exhibits(without_maps(result))]
-    assert names[-2:] == ["damping", "told"]
+    assert names[-2:] == ["damping", "load-share-correlations"]
     summary = curve_from_study(result).summary()
     assert summary["contact_damping_ratio"].to_numpy() == pytest.approx(
         curve_from_study(result).mean("contact_damping_ratio")
@@ -78,8 +78,8 @@ def test_page_and_levels_have_them_and_a_study_that_did_not_shake_has_none():
     assert "Contact damping ratio" in page.text
     still = with_knee()
     names = [exhibit.name for exhibit in study_exhibits(without_maps(still))]
-    assert not {"damping", "told"} & set(names)
-    assert "Contact damping ratio" not in page_of(without_maps(still)).text
+    assert not {"damping", "load-share-correlations"} & set(names)
+    assert "Damping ratio of the contact" not in page_of(without_maps(still)).text
 
 
 def test_any_other_study_shows_the_damping_as_an_output():

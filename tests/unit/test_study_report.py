@@ -24,7 +24,7 @@ from asperity.report import write_study_report
 from asperity.report.study import contacts
 from asperity.report.study.curve import resonance, rig, shares
 from asperity.report.study.page import render_study_page, study_exhibits
-from asperity.report.study.sweep import against
+from asperity.report.study.sweep import output_curves
 from asperity.report.study.tables import anchor_rows
 from asperity.report.style import CONTACT_COLOUR, ON_PAGE, ON_PAPER
 from asperity.study import (
@@ -344,11 +344,11 @@ def test_a_smooth_curve_has_no_stages(wear):
 def test_rings_of_the_rig_stand_beside_the_prediction():
     curve = curve_from_study(with_knee(2.5, scatter_hz=0.01))
     axes = rig(curve, "sound").figure(ON_PAPER).axes[0]
-    ours = points_of(axes, "ours at a ring's Sq")
+    ours = points_of(axes, "study at a ring's Sq")
     sq = np.array(RINGS_UM)
     expected = 2800.0 + 400.0 * np.minimum(sq, 2.5) + 20.0 * np.maximum(sq - 2.5, 0.0)
     assert ours == pytest.approx(np.column_stack([sq, expected]), rel=1e-4)
-    (container,) = [one for one in axes.containers if one.get_label() == "ours at a ring's Sq"]
+    (container,) = [one for one in axes.containers if one.get_label() == "study at a ring's Sq"]
     sideways = container[2][0].get_segments()
     assert [bar[1, 0] - bar[0, 0] for bar in sideways] == pytest.approx(
         2.0 * np.array(RINGS_STD_UM)
@@ -504,7 +504,7 @@ def test_many_cases_are_a_picture():
     sq = np.linspace(0.5, 3.0, 4000)
     study = made([{"surface.sq": f"{value:.6f} um"} for value in sq], clr=sq / 4.0, car=sq / 5.0)
     axis = swept_axis(study.plan, study.table, "surface.sq")
-    figure = against(StudyOverview(study), axis).figure(ON_PAGE)
+    figure = output_curves(StudyOverview(study), axis).figure(ON_PAGE)
     drawing = io.BytesIO()
     figure.savefig(drawing, format="svg")
     assert drawing.tell() < 200_000  # 8000 dots as drawings take a megabyte

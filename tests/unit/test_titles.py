@@ -54,13 +54,13 @@ def test_both_titles_of_a_friction_curve_are_read_whole(curve, tmp_path):
     write_figure(figure, tmp_path / "stribeck.png")
     assert all_readable(figure)
     (first, second) = (axes._left_title.get_text() for axes in figure.axes)
-    assert first.replace("\n", " ") == "Stribeck curve: friction, Sq 0.3 µm, heat fed back"
-    assert second.replace("\n", " ") == "Stribeck curve: temperature, Sq 0.3 µm, heat fed back"
+    assert first.replace("\n", " ") == "Stribeck curve: friction, Sq 0.3 µm, thermal feedback"
+    assert second.replace("\n", " ") == "Stribeck curve: temperature, Sq 0.3 µm, thermal feedback"
 
 
 @pytest.mark.parametrize("extent", [(1.0, 3.0), (1.0, 1.0), (3.0, 1.0)])
 @pytest.mark.parametrize(
-    "title", ["Film thickness", "Shear stress (colours by its square root), friction 0.0394"]
+    "title", ["Film thickness", "Shear stress (square-root scale), friction 0.0394"]
 )
 def test_the_title_of_a_map_is_read_whole_however_narrow_the_map(extent, title):
     with ON_PAGE.drawing():

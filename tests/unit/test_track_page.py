@@ -9,7 +9,7 @@ import pytest
 from asperity.monitoring import TrackSettings, track_recordings
 from asperity.report.style import ON_PAGE
 from asperity.report.track.exhibits import levels, trend
-from asperity.report.track.page import NEXT, render_track_page
+from asperity.report.track.page import ACTIONS, render_track_page
 from asperity.trend import ALARM_STATES
 
 BAND = (2000.0, 4000.0)
@@ -30,22 +30,22 @@ def failing(tmp_path_factory):
 def acted(track):
     """The block for who must act, by its headings."""
     html = render_track_page(track)
-    block = html.partition('<dl class="act">')[2].partition("</dl>")[0]
+    block = html.partition('<dl class="actions">')[2].partition("</dl>")[0]
     return dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", block))
 
 
 def test_who_must_act_reads_what_since_when_how_sure_and_what_next(failing):
     said = acted(failing)
-    assert list(said) == ["What", "Since", "Last heard", "Severity", "How sure", "What next"]
+    assert list(said) == ["Finding", "Since", "Last recording", "Severity", "Confidence", "Action"]
     assert re.fullmatch(
-        r"The level \(rms\) rose to [\d.]+ times its baseline since [\d.]+ h\.", said["What"]
+        r"The level \(rms\) rose to [\d.]+ times what it was since [\d.]+ h\.", said["Finding"]
     )
     first = failing.recordings[failing.alarm.since]
     assert first.reading.started.replace("T", " ") in said["Since"]
-    assert said["Last heard"].endswith("2024-01-02 11:00:00")
+    assert said["Last recording"].endswith("2024-01-02 11:00:00")
     assert "velocity not determined" in said["Severity"].lower()
-    assert said["How sure"] == "Set to be said without wear once in 1000 recordings."
-    assert said["What next"].startswith("Look for what grew")
+    assert said["Confidence"] == "False-alarm rate: one in 1000 recordings."
+    assert said["Action"].startswith("Find the source of the increase")
 
 
 def test_levels_are_drawn_over_their_first_beside_the_least_that_alarms(failing):
@@ -57,12 +57,12 @@ def test_levels_are_drawn_over_their_first_beside_the_least_that_alarms(failing)
     ]
     figure = levels(replace(failing, recordings=tuple(struck))).draw(ON_PAGE)
     drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in figure.axes[0].get_lines()}
-    assert set(drawn) == {"rms", "kurtosis", "envelope BPFO", "least that alarms"}
+    assert set(drawn) == {"rms", "kurtosis", "envelope BPFO", "alarm threshold"}
     assert drawn["rms"][-1] == pytest.approx(20.0, rel=0.1)
     assert drawn["envelope BPFO"][-1] == pytest.approx(1.1**31.5, rel=0.01)
     assert drawn["kurtosis"] == pytest.approx(np.ones(36), abs=0.2)
-    assert drawn["least that alarms"][0] == pytest.approx(2.0)
-    assert "Levels, bands, rates of faults" in render_track_page(failing)
+    assert drawn["alarm threshold"][0] == pytest.approx(2.0)
+    assert "Levels, bands and fault frequencies" in render_track_page(failing)
     assert levels(replace(failing, recordings=failing.recordings[:1])) is None
 
 
@@ -80,7 +80,7 @@ def test_a_crf_that_conditions_explain_is_drawn_without_them(failing):
     (shown,) = (
         line
         for line in trend(track).draw(ON_PAGE).axes[0].get_lines()
-        if line.get_label() == "at the first load, speed, temperature"
+        if line.get_label() == "corrected to reference conditions"
     )
     assert np.asarray(shown.get_ydata()) == pytest.approx(np.full(35, 3e3))
 
@@ -88,7 +88,7 @@ def test_a_crf_that_conditions_explain_is_drawn_without_them(failing):
 @pytest.mark.parametrize("state", [state for state in ALARM_STATES if state != "alarm"])
 def test_every_state_has_something_to_do(failing, state):
     said = acted(replace(failing, alarm=replace(failing.alarm, state=state, raised_by="")))
-    assert said["What next"] == NEXT[state].replace("'", "&#39;")
+    assert said["Action"] == ACTIONS[state].replace("'", "&#39;")
 
 
 @pytest.mark.parametrize(

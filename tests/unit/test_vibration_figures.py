@@ -47,7 +47,7 @@ def test_the_load_trend_vanishes_with_fine_sampling():
         "20 kHz",
         "50 kHz",
         "200 kHz",
-        "not sampled",
+        "continuous",
     ]
     falls = [values[0] / values[-1] for values in drawn.values()]
     assert falls[0] > 5.0
@@ -73,7 +73,7 @@ def test_table_1_is_drawn_with_its_printed_values(tmp_path):
     figure = table1_figure(rows)
     height = figure.get_axes()[1]
     assert "height^2.0" in height.get_title("left")
-    printed = next(line for line in height.get_lines() if line.get_label() == "printed")
+    printed = next(line for line in height.get_lines() if line.get_label() == "paper")
     assert list(printed.get_ydata()) == [0.16, 0.64, 1.45, 2.58]
     path = write_figure(figure, tmp_path / "table1.png")
     assert path.read_bytes().startswith(b"\x89PNG")

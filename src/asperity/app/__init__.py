@@ -1,4 +1,4 @@
-"""The live page: controls and figures of a contact, a study and recordings in the browser."""
+"""Live page: inputs and figures of a contact, a study, a history or recordings in the browser."""
 
 import lazy_loader
 

@@ -1,6 +1,6 @@
-from .contact_result import Answer as Answer
-from .contact_result import Sound as Sound
-from .contact_result import Tile as Tile
-from .opening import Opened as Opened
+from .contact_result import ContactResult as ContactResult
+from .contact_result import ResonanceSpectrum as ResonanceSpectrum
+from .contact_result import ResultTile as ResultTile
+from .opening import OpenedPage as OpenedPage
 from .opening import open_page as open_page
 from .server import serve_page as serve_page

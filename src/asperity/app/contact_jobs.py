@@ -1,7 +1,7 @@
-"""What worker processes do for the page: contacts coarsely and in full, reports; what is refused comes back as told.
+"""Jobs of worker processes: coarse and full solutions, reports, dropped surfaces.
 
-A worker asks between steps of the solver whether its answer is still wanted, and stops where a
-newer one is.
+Between solver steps a worker checks whether its job has been superseded, and stops if so. Errors
+are returned as `JobFailure`.
 """
 
 import hashlib
@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from asperity.app.contact_result import Answer, answer_of, coarse_answer
-from asperity.app.settings import require_few
+from asperity.app.contact_result import ContactResult, coarse_result, result_of_run
+from asperity.app.settings import limit_cells
 from asperity.case import Case
 from asperity.contact.grid import Grid
 from asperity.core.errors import AsperityError, BadInput
@@ -30,142 +30,147 @@ from asperity.surface import Surface
 
 ReportWriter = Callable[
     [Sequence[Run], Path], Path
-]  # `asperity.report.write_report`, which the command line hands in
+]  # `asperity.report.write_report`, passed in by the command line
 
-COARSE = 64 * 64  # cells, at most, of a coarse answer
-COARSER = 32 * 32  # cells, at most, where those are not solved in the steps that they are given
-COARSE_TOLERANCE, WARM_STEPS, COLD_STEPS, COARSER_STEPS = 1e-2, 14, 40, 150
-ALIKE = 0.9  # correlation with the roughness before, from which on its solution is the nearer start
-LONGEST_S = 60.0  # that a contact is worked on
+COARSE_CELLS = 64 * 64  # largest number of cells of a coarse solution
+COARSEST_CELLS = 32 * 32  # the same, if that one does not converge within its steps
+COARSE_TOLERANCE, WARM_STEPS, COLD_STEPS, COARSEST_STEPS = 1e-2, 14, 40, 150
+MIN_CORRELATION = 0.9  # of two roughnesses for a warm start
+TIME_LIMIT_S = 60.0  # for one contact
 
 
 class Superseded(NamedTuple):
-    """An answer that nobody waits for any more."""
+    """Outcome of a job that a newer one has replaced."""
 
 
-class Refused(NamedTuple):
-    """What could not be done, in a sentence."""
+class JobFailure(NamedTuple):
+    """Outcome of a job that failed, with a message for the user."""
 
-    sentence: str
+    message: str
 
 
 class Ticket(NamedTuple):
-    """Who asks, and how often it has asked: a later number makes this one superfluous; a slot below 0 is nobody's."""
+    """Session slot and job number; a higher number in the slot supersedes the job.
+
+    A negative slot is never superseded.
+    """
 
     slot: int
     number: int
 
 
-class _Unwanted(Exception):
-    """Raised between two steps of the solver, where nobody waits for its answer."""
+class _SupersededError(Exception):
+    """Raised between solver steps when the job has been superseded."""
 
 
-class _TooLong(Exception):
-    """Raised between two steps of the solver, where it has taken longer than anybody waits."""
+class _TimeLimitError(Exception):
+    """Raised between solver steps when the time limit is exceeded."""
 
 
-class _TooMany(Exception):
-    """Raised between two steps of the solver, where it has taken as many as it was given."""
+class _StepLimitError(Exception):
+    """Raised between solver steps when the step limit is reached."""
 
 
 @dataclass(frozen=True)
-class Coarse:
-    """A coarse answer, and the solution that the next one starts from; neither where it could not be had in time."""
+class CoarseResult:
+    """A coarse result and its solution as warm start; both None if it did not converge in time."""
 
-    answer: Answer | None
+    result: ContactResult | None
     solution: ContactSolution | None
 
 
-_newest: Any = None  # the latest number of every slot, shared with the page's process
+_newest: Any = None  # latest job number of each slot, shared with the server process
 
 
 def set_up(newest: Any) -> None:
-    """Begin as a worker of the page: one thread, ends with its parent, hears what is no longer wanted."""
+    """Initialise a worker process: one thread, ends with its parent, shares the job numbers."""
     global _newest
     set_up_worker()
     _newest = newest
     threadpool_limits(1)
 
 
-def _hook(ticket: Ticket, seconds: float, steps: float = math.inf) -> Callable[[Iteration], None]:
-    """What the solver calls after every step."""
-    end, taken = time.monotonic() + seconds, itertools.count(1)
+def _progress_hook(
+    ticket: Ticket, seconds: float, steps: float = math.inf
+) -> Callable[[Iteration], None]:
+    """Return a callback for the solver that stops it at a limit or when superseded."""
+    end, step_numbers = time.monotonic() + seconds, itertools.count(1)
 
-    def asked(step: Iteration) -> None:  # noqa: ARG001 - only that there was one
-        if next(taken) > steps:
-            raise _TooMany
+    def check(step: Iteration) -> None:  # noqa: ARG001 - only its occurrence matters
+        if next(step_numbers) > steps:
+            raise _StepLimitError
         if _newest is not None and ticket.slot >= 0 and _newest[ticket.slot] != ticket.number:
-            raise _Unwanted
+            raise _SupersededError
         if time.monotonic() > end:
-            raise _TooLong
+            raise _TimeLimitError
 
-    return asked
+    return check
 
 
-def told(work: Callable[..., Any], *arguments: Any) -> Any:
-    """What a piece of work gives; what it refuses comes back as a sentence, as not every error can travel."""
+def run_job(work: Callable[..., Any], *arguments: Any) -> Any:
+    """Run a job; return errors as `JobFailure`, because not every exception can be pickled."""
     try:
         return work(*arguments)
-    except _Unwanted:
+    except _SupersededError:
         return Superseded()
-    except _TooLong:
-        spent = f"The contact was given up after {LONGEST_S:.0f} s without a solution"
-        return Refused(f"{spent}; asperity solve takes as long as it needs.")
-    except AsperityError as refusal:
-        return Refused(f"{str(refusal).rstrip('.')}.")
-    except (ArithmeticError, np.linalg.LinAlgError) as failure:
-        return Refused(
-            f"The values lie too far from any contact to be reckoned with ({failure}); turn them back."
+    except _TimeLimitError:
+        return JobFailure(
+            f"No solution within {TIME_LIMIT_S:.0f} s. Use asperity solve, which has no time limit."
         )
+    except AsperityError as error:
+        return JobFailure(f"{str(error).rstrip('.')}.")
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        return JobFailure(f"These values cannot be solved ({error}). Undo the last change.")
     except MemoryError:
-        return Refused("There is not memory enough for that; ask for less.")
+        return JobFailure("Not enough memory. Use a coarser grid.")
 
 
-def warm() -> float:
-    """Solve a small contact, so that everything is loaded and compiled; the seconds that it took."""
+def warm_up() -> float:
+    """Solve a small contact to load and compile everything; return the time [s]."""
     began = time.perf_counter()
     small = papers_case().with_overrides(
         {"grid.cells": [64, 64], "surface.correlation_length": "40 um"}
     )
-    answer_of(solve_case(small, strict=False), 0.0)
+    result_of_run(solve_case(small, strict=False), 0.0)
     return time.perf_counter() - began
 
 
-def solve_fully(ticket: Ticket, case: Case) -> Answer:
-    """The contact on the case's own grid, with its error bars."""
+def solve_fully(ticket: Ticket, case: Case) -> ContactResult:
+    """Solve the contact on the grid of its case, with error bars."""
     began = time.perf_counter()
-    require_few(case.source, case.grid.cells)
-    run = solve_case(case, strict=False, progress=_hook(ticket, LONGEST_S))
-    return answer_of(run, time.perf_counter() - began)
+    limit_cells(case.source, case.grid.cells)
+    run = solve_case(case, strict=False, progress=_progress_hook(ticket, TIME_LIMIT_S))
+    return result_of_run(run, time.perf_counter() - began)
 
 
-def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) -> Coarse:
-    """The same contact on fewer cells, from the coarse solution before; nothing where the grid is so coarse itself.
+def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) -> CoarseResult:
+    """Solve the contact on fewer cells; the result is empty if its own grid is as coarse.
 
-    An attempt that takes more than its steps makes room for the next: without a start, then on
-    fewer cells still.
+    Attempts with a limited number of steps, in this order: warm start from `start`, cold start,
+    cold start on still fewer cells.
     """
     began = time.perf_counter()
-    require_few(case.source, case.grid.cells)
-    whole = case.surface()
-    surface, coarser = _coarser(whole, COARSE), _coarser(whole, COARSER)
+    limit_cells(case.source, case.grid.cells)
+    fine = case.surface()
+    coarse, coarsest = _coarsen(fine, COARSE_CELLS), _coarsen(fine, COARSEST_CELLS)
     attempts: list[tuple[Surface | None, ContactSolution | None, int]]
-    attempts = [(surface, None, COLD_STEPS), (coarser, None, COARSER_STEPS)]
-    if start is not None and surface is not None and _alike(start.surface, surface):
-        attempts.insert(0, (surface, start, WARM_STEPS))
-    for cells, beginning, steps in attempts:
-        if surface is None or cells is None:
+    attempts = [(coarse, None, COLD_STEPS), (coarsest, None, COARSEST_STEPS)]
+    if start is not None and coarse is not None and _are_similar(start.surface, coarse):
+        attempts.insert(0, (coarse, start, WARM_STEPS))
+    for surface, warm_start, steps in attempts:
+        if coarse is None or surface is None:
             continue
-        solution = _attempt(ticket, case, cells, beginning, steps)
+        solution = _attempt(ticket, case, surface, warm_start, steps)
         if solution is not None:
-            return Coarse(coarse_answer(solution, case.text, time.perf_counter() - began), solution)
-    return Coarse(None, None)
+            result = coarse_result(solution, case.text, time.perf_counter() - began)
+            return CoarseResult(result, solution)
+    return CoarseResult(None, None)
 
 
 def _attempt(
     ticket: Ticket, case: Case, surface: Surface, start: ContactSolution | None, steps: int
 ) -> ContactSolution | None:
-    """A coarse solution in at most so many steps of the solver; None where that, or so few cells, are not enough."""
+    """Solve with a step limit; None if it does not converge or the grid is too coarse."""
     try:
         solution = solve_contact(
             case.conditions,
@@ -174,60 +179,59 @@ def _attempt(
             options=replace(case.options, tolerance=max(COARSE_TOLERANCE, case.options.tolerance)),
             start=start,
             strict=False,
-            progress=_hook(ticket, LONGEST_S, steps),
+            progress=_progress_hook(ticket, TIME_LIMIT_S, steps),
         )
-    except (
-        _TooMany,
-        BadInput,
-    ):  # what the contact is refused for on its own cells is said when it is solved on them
+    except (_StepLimitError, BadInput):  # the full solution reports bad input
         return None
     return solution if solution.convergence.converged else None
 
 
-def _alike(before: Surface, surface: Surface) -> bool:
-    """Whether two surfaces have their hills in the same places, so that the contact before is near."""
+def _are_similar(before: Surface, surface: Surface) -> bool:
+    """Return True if two surfaces correlate enough for a warm start."""
     if before.grid.cells != surface.grid.cells:
         return False
     if before.sq == 0.0 or surface.sq == 0.0:
         return before.sq == surface.sq
-    return bool(np.corrcoef(before.heights.ravel(), surface.heights.ravel())[0, 1] > ALIKE)
+    return bool(
+        np.corrcoef(before.heights.ravel(), surface.heights.ravel())[0, 1] > MIN_CORRELATION
+    )
 
 
-def _coarser(surface: Surface, most: int) -> Surface | None:
-    """The surface on cells put together two by two until there are few, each with their mean, as the solver does it."""
-    grid, together = surface.grid, 1
+def _coarsen(surface: Surface, max_cells: int) -> Surface | None:
+    """Average a surface over 2 x 2 cells repeatedly until at most `max_cells` remain."""
+    grid, factor = surface.grid, 1
     nx, ny = grid.cells
-    while (nx // together) * (ny // together) > most and nx % (2 * together) == ny % (
-        2 * together
+    while (nx // factor) * (ny // factor) > max_cells and nx % (2 * factor) == ny % (
+        2 * factor
     ) == 0:
-        together *= 2
-    if together == 1:
+        factor *= 2
+    if factor == 1:
         return None
-    cells = (nx // together, ny // together)
-    heights = surface.heights.reshape(cells[0], together, cells[1], together).mean(axis=(1, 3))
+    cells = (nx // factor, ny // factor)
+    heights = surface.heights.reshape(cells[0], factor, cells[1], factor).mean(axis=(1, 3))
     return Surface(
         np.ascontiguousarray(heights), Grid(cells, grid.lower, grid.upper, periodic=grid.periodic)
     )
 
 
-def open_run(path: Path) -> tuple[Case, Answer]:
-    """A kept run: its case, with the roughness that was solved, and what the page shows of it."""
+def open_run(path: Path) -> tuple[Case, ContactResult]:
+    """Load a stored run; return its case and result."""
     run = load_run(path)
-    return run.case, answer_of(run, run.solution.convergence.seconds)
+    return run.case, result_of_run(run, run.solution.convergence.seconds)
 
 
 def make_report(ticket: Ticket, case: Case, write: ReportWriter) -> str:
-    """The page that `write` makes of the contact, as text."""
-    run = solve_case(case, strict=False, progress=_hook(ticket, LONGEST_S))
+    """Solve the contact and return its HTML report."""
+    run = solve_case(case, strict=False, progress=_progress_hook(ticket, TIME_LIMIT_S))
     with TemporaryDirectory() as folder:
         return write([run], Path(folder) / "report.html").read_text("utf-8")
 
 
 def open_surface(ticket: Ticket, case: Case, path: Path) -> tuple[Case, str, tuple[str, ...]]:  # noqa: ARG001
-    """The case with a dropped surface in place of its own, what it is held by, and what was done to it."""
-    moved = replace(case, folder=path.parent, stored=None, stored_notes=())
-    changed = moved.with_overrides({"surface": {"file": path.name}})
-    require_few(changed.source, changed.grid.cells)
+    """Return the case with a dropped surface, its key, and the processing steps of the surface."""
+    relocated = replace(case, folder=path.parent, stored=None, stored_notes=())
+    changed = relocated.with_overrides({"surface": {"file": path.name}})
+    limit_cells(changed.source, changed.grid.cells)
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256")
     digest.update(changed.text.encode())

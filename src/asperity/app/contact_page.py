@@ -1,4 +1,4 @@
-"""The page of a contact: knobs beside what becomes of them, drawn anew whenever the desk changes."""
+"""Page of a contact: inputs and results, redrawn whenever the session changes."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,25 +6,25 @@ from typing import Any
 
 from bokeh.models import Column
 
-from asperity.app import export as take
-from asperity.app.contact_jobs import Refused, ReportWriter, make_report, open_surface
-from asperity.app.contact_result import Answer
-from asperity.app.figures import SPECTRUM_HEIGHT, TRAIL_HEIGHT, Spectrum, Trail
-from asperity.app.jobs import Queue, Workshop
-from asperity.app.map_images import Pictures, place
-from asperity.app.session import Desk
-from asperity.app.settings import Settings, held_in
-from asperity.app.surface_store import Shelf
-from asperity.app.uploads import Drop
+from asperity.app import export
+from asperity.app.contact_jobs import JobFailure, ReportWriter, make_report, open_surface
+from asperity.app.contact_result import ContactResult
+from asperity.app.figures import SPECTRUM_HEIGHT, TRIALS_HEIGHT, SpectrumFigure, TrialFigures
+from asperity.app.jobs import JobQueue, WorkerPool
+from asperity.app.map_images import MapImages, placeholder
+from asperity.app.session import ContactSession
+from asperity.app.settings import Settings, surface_key
+from asperity.app.surface_store import SurfaceStore
+from asperity.app.uploads import FileDrop
 from asperity.app.widgets import (
     DROP,
     INHERIT,
     LOOK,
     MAP_KEY,
     TILE_STYLES,
-    Handout,
-    KnobWidget,
-    OldMark,
+    Download,
+    InputWidget,
+    StaleMark,
     button,
     button_row,
     notes,
@@ -35,307 +35,313 @@ from asperity.app.widgets import (
 from asperity.case import Case
 from asperity.core.quantities import quantity
 
-HELD_SO_LONG = "The address brings it back as long as this server runs."
+LINK_NOTE = "The link to this page remains valid while the server runs."
 SURFACE_LIMIT = 300_000_000  # bytes of a measured surface
 
 
 class ContactView:
-    """One user's contact with its widgets.
+    """Contact of one visitor with its widgets.
 
     Parameters
     ----------
     settings : the opened case
-    workshop : solves
+    workshop : runs the jobs
     deliver : calls a function under the document's lock
-    set_address : puts a query into the browser's address
-    write_report : makes a run's page
-    shelf : holds surfaces that are dropped
+    set_address : sets the query of the browser's address
+    write_report : writes the report of a run
+    shelf : stores dropped surfaces
     """
 
     def __init__(
         self,
         settings: Settings,
-        workshop: Workshop,
+        worker_pool: WorkerPool,
         deliver: Callable[[Callable[[], None]], None],
         set_address: Callable[[str], None],
         write_report: ReportWriter,
-        shelf: Shelf,
+        surfaces: SurfaceStore,
     ) -> None:
-        self._shelf = shelf
+        self._surfaces = surfaces
         self._set_address, self._write_report = set_address, write_report
-        self._workshop, self._deliver = workshop, deliver
-        self.desk = Desk(settings, Queue(workshop, deliver), self.draw, Queue(workshop, deliver))
-        self._side = Queue(workshop, deliver)
-        self.pictures = Pictures()
-        self.hearing, self.share, self.pitch = (
-            place(SPECTRUM_HEIGHT),
-            place(TRAIL_HEIGHT),
-            place(TRAIL_HEIGHT),
+        self._worker_pool, self._deliver = worker_pool, deliver
+        self.session = ContactSession(
+            settings, JobQueue(worker_pool, deliver), self.draw, JobQueue(worker_pool, deliver)
         )
-        self._spectrum: Spectrum | None = None
-        self._trail: Trail | None = None
-        self._unmade = [*self.pictures.steps(), self._make_spectrum, self._make_trail]
-        self.status, self.verdict, self.notes, self.said = (text_block() for _ in range(4))
+        self._side_jobs = JobQueue(worker_pool, deliver)
+        self.maps = MapImages()
+        self.spectrum, self.share, self.resonance = (
+            placeholder(SPECTRUM_HEIGHT),
+            placeholder(TRIALS_HEIGHT),
+            placeholder(TRIALS_HEIGHT),
+        )
+        self._spectrum: SpectrumFigure | None = None
+        self._trials: TrialFigures | None = None
+        self._pending_figures = [*self.maps.steps(), self._make_spectrum, self._make_trials]
+        self.status, self.verdict, self.notes, self.message = (text_block() for _ in range(4))
         self.tiles = text_block(TILE_STYLES)
-        self.old = OldMark(self.status)
-        self.handout = Handout()
-        self.knobs: dict[str, KnobWidget] = {}
+        self.stale_mark = StaleMark(self.status)
+        self.download = Download()
+        self.inputs: dict[str, InputWidget] = {}
         self._built: Case | None = None
-        self.knob_column = Column(sizing_mode="stretch_width", stylesheets=[INHERIT])
+        self.input_column = Column(sizing_mode="stretch_width", stylesheets=[INHERIT])
         self._more = False
-        self._drawn: tuple[Answer, Answer | None] | None = None
-        self.drop = Drop(
+        self._drawn: tuple[ContactResult, ContactResult | None] | None = None
+        self.drop = FileDrop(
             limit=SURFACE_LIMIT,
-            arrived=self._surface_came,
-            refused=self._say,
+            on_file=self._surface_dropped,
+            on_error=self._say,
             several=False,
-            name="Measured surface, dropped here",
+            name="Drop a measured surface here",
             sizing_mode="stretch_width",
             margin=0,
             stylesheets=[LOOK, DROP],
         )
-        self.more = button("More knobs", self._show_more)
+        self.more = button("More inputs", self._show_more)
         self.pin = button("Pin to compare", self._pin)
         self.report = button("Report", self._make_report)
-        self.take = button_row(
+        self.buttons = button_row(
             self.pin,
             button("Case file", self._give_case),
-            button("Python lines", self._give_script),
+            button("Python script", self._give_script),
             self.report,
         )
         self._build_knobs()
 
-    def begin(self, query: str, answer: Answer | None = None) -> None:
-        """Solve what the address says, or show what is solved already."""
-        if answer is not None and not query:
-            self.desk.open(self.desk.settings, answer)
+    def begin(self, query: str, result: ContactResult | None = None) -> None:
+        """Show a stored result, or solve the contact that the address describes."""
+        if result is not None and not query:
+            self.session.open(self.session.settings, result)
             return
-        held = held_in(query)
-        case = self._shelf.lend(held, self.drop.folder) if held else None
+        held = surface_key(query)
+        case = self._surfaces.load(held, self.drop.folder) if held else None
         if case is not None:
-            self.desk.settings = Settings(case, dropped=case.contents.surface.name, held=held)
+            self.session.settings = Settings(case, dropped=case.contents.surface.name, held=held)
             self._build_knobs()
-        self._say(*self.desk.go_to(query))
+        self._say(*self.session.go_to(query))
 
-    def furnish(self) -> None:
-        """Make the next figure and ask for the one after it; between them others are served."""
-        if self._unmade:
-            self._unmade.pop(0)()
-            self._deliver(self.furnish)
+    def create_next_figure(self) -> None:
+        """Create the next figure and schedule the one after it, to keep the server responsive."""
+        if self._pending_figures:
+            self._pending_figures.pop(0)()
+            self._deliver(self.create_next_figure)
         else:
             self.draw()
 
     def close(self) -> None:
-        """Give back what the session took."""
-        self._unmade.clear()
-        self.desk.close()
-        self._side.close()
+        """Release the resources of the visit."""
+        self._pending_figures.clear()
+        self.session.close()
+        self._side_jobs.close()
         self.drop.close()
 
-    # What is shown
-    # ---------------------------------------------------------------------------------------------------
+    # Results
+    # ---------------------------------------------------------------------------------
 
     def draw(self) -> None:
-        """Draw the desk as it is now."""
-        desk = self.desk
-        if desk.settings.opened is not self._built:
+        """Draw the current state of the session."""
+        session = self.session
+        if session.settings.opened is not self._built:
             self._build_knobs()
-        warming = (
+        loading = (
             ""
-            if self._workshop.is_warm
-            else "Warming up: the solver is loaded, and compiled the first time. "
+            if self._worker_pool.is_warm
+            else "Loading the solver (the first time, it is also compiled). "
         )
         kind = (
             "alarm"
-            if desk.problem or (desk.answer is not None and not desk.answer.converged)
+            if session.problem or (session.result is not None and not session.result.converged)
             else "soft"
         )
-        status = desk.status if desk.stale or not self._unmade else "Drawing ..."
-        for key, widget in self.knobs.items():
-            refusal = desk.refusals.get(key)
+        status = session.status if session.stale or not self._pending_figures else "Drawing ..."
+        for key, widget in self.inputs.items():
+            rejected = session.rejected.get(key)
             widget.show(
-                refusal.text if refusal else desk.settings.text(key),
-                refusal.sentence if refusal else "",
+                rejected.text if rejected else session.settings.text(key),
+                rejected.message if rejected else "",
             )
-        self.old.show(desk.stale)
-        if desk.answer is not None:
-            self.tiles.text = tiles(desk.answer.tiles, desk.answer, desk.pinned, old=desk.pending)
-            if (desk.answer, desk.pinned) != self._drawn:
-                self._draw_answer(desk.answer, desk.pinned)
-                self._drawn = (desk.answer, desk.pinned)
-        self.pin.label = "Unpin" if desk.pinned is not None else "Pin to compare"
+        self.stale_mark.show(session.stale)
+        if session.result is not None:
+            self.tiles.text = tiles(
+                session.result.tiles, session.result, session.pinned, stale=session.pending
+            )
+            if (session.result, session.pinned) != self._drawn:
+                self._draw_result(session.result, session.pinned)
+                self._drawn = (session.result, session.pinned)
+        self.pin.label = "Unpin" if session.pinned is not None else "Pin to compare"
         self.status.text = sentences(
-            [f"{warming}{status}"], kind
-        )  # last: who hears it finds everything there
+            [f"{loading}{status}"], kind
+        )  # last: a screen reader announces it when the page is complete
 
-    def _draw_answer(self, answer: Answer, pinned: Answer | None) -> None:
-        self.pictures.show(answer, pinned)
-        if answer.coarse:
+    def _draw_result(self, result: ContactResult, pinned: ContactResult | None) -> None:
+        self.maps.show(result, pinned)
+        if result.coarse:
             return
-        self.verdict.text = sentences([answer.verdict], "" if answer.converged else "alarm")
-        self.notes.text = notes(answer.notes)
+        self.verdict.text = sentences([result.verdict], "" if result.converged else "alarm")
+        self.notes.text = notes(result.notes)
         self._draw_spectrum()
-        self._draw_trail()
-        self._set_address(self.desk.settings.address)
+        self._draw_trials()
+        self._set_address(self.session.settings.address)
 
     def _make_spectrum(self) -> None:
-        self._spectrum = Spectrum()
-        self.hearing.children = [self._spectrum.figure]
+        self._spectrum = SpectrumFigure()
+        self.spectrum.children = [self._spectrum.figure]
         self._draw_spectrum()
 
-    def _make_trail(self) -> None:
-        self._trail = Trail(self._again)
-        self.share.children, self.pitch.children = [self._trail.share], [self._trail.pitch]
-        self._draw_trail()
+    def _make_trials(self) -> None:
+        self._trials = TrialFigures(self._restore)
+        self.share.children, self.resonance.children = [self._trials.share], [self._trials.crf]
+        self._draw_trials()
 
     def _draw_spectrum(self) -> None:
-        answer, pinned = self.desk.answer, self.desk.pinned
-        if self._spectrum is not None and answer is not None and not answer.coarse:
+        result, pinned = self.session.result, self.session.pinned
+        if self._spectrum is not None and result is not None and not result.coarse:
             self._spectrum.show(
-                answer.sound, None if pinned is None else pinned.sound, _heard(answer)
+                result.spectrum,
+                None if pinned is None else pinned.spectrum,
+                _spectrum_title(result),
             )
 
-    def _draw_trail(self) -> None:
-        if self._trail is not None:
-            self._trail.show(self.desk.trail)
+    def _draw_trials(self) -> None:
+        if self._trials is not None:
+            self._trials.show(self.session.trials)
 
     def _say(self, *lines: str) -> None:
-        self.said.text = sentences(lines, "alarm")
+        self.message.text = sentences(lines, "alarm")
 
-    # What is turned
-    # --------------------------------------------------------------------------------------------------
+    # Inputs
+    # ---------------------------------------------------------------------------------
 
     def _build_knobs(self) -> None:
-        """A widget for every knob of the opened case that is shown, under the headings of their groups."""
-        if self.desk.settings.opened is not self._built:
-            self._built = self.desk.settings.opened
-            self.knobs.clear()
+        """Create the widgets of the visible inputs, grouped under headings."""
+        if self.session.settings.opened is not self._built:
+            self._built = self.session.settings.opened
+            self.inputs.clear()
         children: list[Any] = []
         group = ""
-        for key, knob in self.desk.settings.knobs.items():
-            if knob.more and not self._more:
+        for key, case_input in self.session.settings.inputs.items():
+            if case_input.more and not self._more:
                 continue
-            if key not in self.knobs:
-                self.knobs[key] = KnobWidget(knob, self._turned)
-            widget = self.knobs[key]
-            if knob.group != group:
-                group = knob.group
+            if key not in self.inputs:
+                self.inputs[key] = InputWidget(case_input, self._change)
+            widget = self.inputs[key]
+            if case_input.group != group:
+                group = case_input.group
                 heading = text_block("h3 { font-size: .95rem; margin: 12px 0 2px; }")
                 heading.text = f"<h3>{group}</h3>"
                 children.append(heading)
             children.append(widget.model)
-        self.knob_column.children = children
+        self.input_column.children = children
 
-    def _turned(self, key: str, text: str) -> None:
+    def _change(self, key: str, text: str) -> None:
         self._say()
-        self.desk.turn(key, text)
+        self.session.change(key, text)
 
     def _show_more(self) -> None:
         self._more = not self._more
-        self.more.label = "Fewer knobs" if self._more else "More knobs"
+        self.more.label = "Fewer inputs" if self._more else "More inputs"
         self._build_knobs()
         self.draw()
 
-    def _again(self, number: int) -> None:
-        """Go back to a setting that was tried."""
+    def _restore(self, number: int) -> None:
+        """Restore the settings of an earlier result."""
         self._say()
-        self.desk.go_back(number)
+        self.session.go_back(number)
 
     def _pin(self) -> None:
-        if self.desk.pinned is not None:
-            self.desk.unpin()
+        if self.session.pinned is not None:
+            self.session.unpin()
         else:
-            self.desk.pin()
+            self.session.pin()
 
-    # What is dropped and taken away
-    # ----------------------------------------------------------------------------------
+    # Uploads and downloads
+    # ---------------------------------------------------------------------------------
 
-    def _surface_came(self, path: Path) -> None:
+    def _surface_dropped(self, path: Path) -> None:
         self._say()
-        case = self.desk.settings.case
-        self._side.ask((open_surface, (case, path)), self._surface_read)
+        case = self.session.settings.case
+        self._side_jobs.submit((open_surface, (case, path)), self._surface_read)
 
     def _surface_read(self, result: Any) -> None:
-        if isinstance(result, Refused):
-            self._say(result.sentence)
+        if isinstance(result, JobFailure):
+            self._say(result.message)
             return
         case, held, steps = result
-        self._shelf.put(held, case)
-        self.said.text = sentences((*steps, HELD_SO_LONG), "soft")
-        self.desk.open(Settings(case, dropped=case.contents.surface.name, held=held))
+        self._surfaces.add(held, case)
+        self.message.text = sentences((*steps, LINK_NOTE), "soft")
+        self.session.open(Settings(case, dropped=case.contents.surface.name, held=held))
 
     def _give_case(self) -> None:
-        self.handout.give(
-            take.CASE_FILE, "application/toml", take.case_text(self.desk.settings.case)
+        self.download.offer(
+            export.CASE_FILE, "application/toml", export.case_text(self.session.settings.case)
         )
 
     def _give_script(self) -> None:
-        self.handout.give(take.SCRIPT, "text/x-python", take.python_lines())
+        self.download.offer(export.SCRIPT, "text/x-python", export.python_script())
 
     def _make_report(self) -> None:
-        self.report.disabled, self.report.label = True, "Report is made ..."
-        self._side.ask(
-            (make_report, (self.desk.settings.case, self._write_report)), self._report_made
+        self.report.disabled, self.report.label = True, "Writing report ..."
+        self._side_jobs.submit(
+            (make_report, (self.session.settings.case, self._write_report)), self._report_made
         )
 
     def _report_made(self, result: Any) -> None:
         self.report.disabled, self.report.label = False, "Report"
-        if isinstance(result, Refused):
-            self._say(result.sentence)
+        if isinstance(result, JobFailure):
+            self._say(result.message)
         else:
-            self.handout.give(take.REPORT, "text/html", result)
+            self.download.offer(export.REPORT, "text/html", result)
 
 
-def _heard(answer: Answer) -> str:
-    """What the spectrum says, as its title."""
-    sound = answer.sound
-    if sound is None:
-        return "No vibration asked for"
-    if sound.crf_hz is None:
-        return f"No contact resonance: {sound.reason}"
+def _spectrum_title(result: ContactResult) -> str:
+    """Return the title of the spectrum: the resonance, or why there is none."""
+    spectrum = result.spectrum
+    if spectrum is None:
+        return "No vibration requested"
+    if spectrum.crf_hz is None:
+        return f"No contact resonance: {spectrum.reason}"
     crf = quantity("crf_hz")
-    fitted = f", fitted to ± {crf.text(sound.crf_std_hz)}" if sound.crf_std_hz is not None else ""
-    return f"{crf.named(sound.crf_hz)}{fitted}"
+    fitted = (
+        f", fitted to ± {crf.text(spectrum.crf_std_hz)}" if spectrum.crf_std_hz is not None else ""
+    )
+    return f"{crf.named(spectrum.crf_hz)}{fitted}"
 
 
 def layout(view: ContactView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """The parts of the page by name, and the sections that they stand in."""
+    """Return the parts of the page by name, and the sections that contain them."""
     parts = {
-        "knobs": view.knob_column,
+        "inputs": view.input_column,
         "more": view.more,
         "drop": view.drop,
         "status": view.status,
         "verdict": view.verdict,
-        "said": view.said,
+        "message": view.message,
         "tiles": view.tiles,
-        "take": view.take,
-        "film": view.pictures.film,
-        "pressure": view.pictures.pressure,
-        "change": view.pictures.change,
-        "cut": Column(
-            view.pictures.cut_pressure, view.pictures.cut_film, sizing_mode="stretch_width"
-        ),
-        "spectrum": view.hearing,
+        "buttons": view.buttons,
+        "film": view.maps.film,
+        "pressure": view.maps.pressure,
+        "change": view.maps.change,
+        "cut": Column(view.maps.cut_pressure, view.maps.cut_film, sizing_mode="stretch_width"),
+        "spectrum": view.spectrum,
         "share": view.share,
-        "pitch": view.pitch,
+        "resonance": view.resonance,
         "notes": view.notes,
-        "handout": view.handout.model,
+        "download": view.download.model,
     }
-    knobs: list[dict[str, Any]] = [{"names": [name]} for name in ("knobs", "more", "drop")]
-    shown: list[dict[str, Any]] = [
+    inputs: list[dict[str, Any]] = [{"names": [name]} for name in ("inputs", "more", "drop")]
+    results: list[dict[str, Any]] = [
         {"names": ["status"], "live": True, "first": True},
-        {"names": ["said"], "live": True, "first": True},
+        {"names": ["message"], "live": True, "first": True},
         {"names": ["tiles"], "first": True},
         {"names": ["verdict"]},
-        {"names": ["take"]},
+        {"names": ["buttons"]},
         {"names": ["film", "pressure"], "key": MAP_KEY, "first": True},
         {"names": ["change"]},
         {"names": ["cut", "spectrum"]},
-        {"names": ["share", "pitch"], "heading": "What was tried"},
+        {"names": ["share", "resonance"], "heading": "Earlier results"},
         {"names": ["notes"]},
-        {"names": ["handout"]},
+        {"names": ["download"]},
     ]
     return parts, [
-        {"kind": "knobs", "label": "Knobs", "blocks": knobs},
-        {"kind": "shown", "label": "The contact", "blocks": shown},
+        {"kind": "inputs", "label": "Inputs", "blocks": inputs},
+        {"kind": "results", "label": "Contact", "blocks": results},
     ]

@@ -1,6 +1,6 @@
-"""Answer: what the page shows of a solved contact, read off a run; small enough to travel between processes.
+"""Result of a contact as the page shows it, small enough to send between processes.
 
-Nothing is worked out here that is not in the run, its quantities or Hertz's closed forms.
+All values come from the run, its quantities or the closed forms of Hertz.
 """
 
 from dataclasses import dataclass
@@ -27,33 +27,33 @@ TILES = (
     "crf_hz",
     "crfa",
 )
-OPEN, TOUCHING, RUPTURED = 0, 1, 2  # what a cell is
+OPEN, TOUCHING, CAVITATED = 0, 1, 2  # state of a cell
 NOT_DETERMINED = "± not determined"
-BY_FORMULA = ("lambda_ratio",)  # of the tiles: what no solution enters
-MOST_POINTS = 500  # of a spectrum's curve
-CLEAR_SHARE = 99.0  # per cent of the Hertz zone's gaps that a map's colours show
+BY_FORMULA = ("lambda_ratio",)  # tiles that do not depend on a solution
+MAX_POINTS = 500  # of a curve of the spectrum
+GAP_PERCENTILE = 99.0  # of the Hertz zone, where the colours of a film map end
 
 
-class Tile(NamedTuple):
-    """A number that stands out: its key, its value with unit, and what is known of its doubt."""
+class ResultTile(NamedTuple):
+    """A highlighted number: key, value with unit, and uncertainty."""
 
     key: str
     value: str
-    doubt: str
+    uncertainty: str
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Title of the quantity."""
         title = quantity(self.key).title
         return f"{title[:1].upper()}{title[1:]}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sound:
-    """The spectrum about the searched band, with the line fitted to it; `reason` says why there is none.
+class ResonanceSpectrum:
+    """Spectrum around the search band with the fitted resonance; `reason` if there is none.
 
-    Frequencies [Hz], densities [(m/s^2)^2/Hz]; `curve` is empty where the method fits none, and
-    the whole is where no asperity touches.
+    Frequencies [Hz], densities [(m/s^2)^2/Hz]. `curve` is empty if the method fits none; all arrays
+    are empty if no asperity touches.
     """
 
     frequency: Field
@@ -67,11 +67,11 @@ class Sound:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Picture:
-    """Maps of a contact as the page shows them.
+class ContactMaps:
+    """Maps of a contact.
 
-    `x` and `y` [m] are cell centres, `gap` [m], `pressure` [Pa] and `cells` (`OPEN`, `TOUCHING`,
-    `RUPTURED`) have shape (nx, ny). `gap_top` is where the colours of a film map end [m].
+    `x` and `y` [m] are cell centres; `gap` [m], `pressure` [Pa] and `cells` (`OPEN`, `TOUCHING`,
+    `CAVITATED`) have shape (nx, ny). `gap_top` is the upper end of the colours of the film [m].
     """
 
     x: Field
@@ -85,22 +85,22 @@ class Picture:
     hertz_pressure: float
     endless: bool
 
-    def line(self, y: float) -> int:
-        """The row of cells nearest to y [m]."""
+    def nearest_row(self, y: float) -> int:
+        """Return the row of cells nearest to y [m]."""
         return int(np.argmin(np.abs(self.y - y)))
 
     def hertz(self, row: int) -> Field:
-        """Hertz's pressure of the smooth, dry contact along that row of cells [Pa]."""
+        """Return the Hertz pressure of the smooth, dry contact along a row of cells [Pa]."""
         y = 0.0 if self.endless else float(self.y[row])
         return ellipse_pressure(self.x, y, self.half_widths, self.hertz_pressure)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Answer(Picture):
-    """A solved contact as the page shows it.
+class ContactResult(ContactMaps):
+    """A solved contact.
 
-    `row` holds numbers by their keys in the catalogue, SI. `coarse` is an answer on fewer cells,
-    which is shown until the full one has come, and has no error bar.
+    `row` holds numbers by their keys in the catalogue, SI. A `coarse` result, on fewer cells and
+    without error bars, is shown until the full one has arrived.
     """
 
     text: str
@@ -112,23 +112,23 @@ class Answer(Picture):
     notes: tuple[str, ...]
     row: dict[str, Any]
     seconds: float
-    sound: Sound | None = None
+    spectrum: ResonanceSpectrum | None = None
 
     @property
-    def tiles(self) -> list[Tile]:
-        """The numbers that stand out, each with its interval, or that it is not determined."""
+    def tiles(self) -> list[ResultTile]:
+        """Highlighted numbers with their uncertainties."""
         return [
-            Tile(key, quantity(key).text(self.row.get(key)), self.doubt(quantity(key)))
+            ResultTile(key, quantity(key).text(self.row.get(key)), self.uncertainty(quantity(key)))
             for key in TILES
         ]
 
-    def doubt(self, entry: Quantity) -> str:
-        """The interval of a number of this contact, its error bar, or that neither is known."""
+    def uncertainty(self, entry: Quantity) -> str:
+        """Return interval or error bar of a number, or that it is not determined."""
         value = self.row.get(entry.key)
         if value is None:
             return ""
         if self.coarse:
-            return "coarse answer"
+            return "coarse solution"
         if entry.ends[0] in self.row:
             low, high = (self.row.get(end) for end in entry.ends)
             if low is None or high is None or not self.determined:
@@ -138,27 +138,27 @@ class Answer(Picture):
             deviation = self.row.get(entry.deviation)
             if deviation is None:
                 return NOT_DETERMINED
-            left = entry.clipped_interval(value, deviation)
-            if left is not None:
-                return entry.interval(*left)
+            bounded = entry.clipped_interval(value, deviation)
+            if bounded is not None:
+                return entry.interval(*bounded)
             _, _, spread = entry.number(value, deviation).partition(" ± ")
             return f"± {spread.rstrip(')')} {entry.display}".rstrip() if spread else ""
         return "" if entry.key in BY_FORMULA else NOT_DETERMINED
 
 
 def numbers_of(run: Run) -> dict[str, Any]:
-    """The page's numbers of a run, with what is known of their doubt; nothing that takes longer than the contact."""
-    shown = [quantity(key) for key in TILES]
-    deviations = [quantity(entry.deviation) for entry in shown if entry.deviation]
-    return read(run, [*shown, *deviations, quantity("sq_m"), *lines(UNCERTAINTY)])
+    """Return the numbers of a run that the page shows, with their uncertainties."""
+    tiles = [quantity(key) for key in TILES]
+    deviations = [quantity(entry.deviation) for entry in tiles if entry.deviation]
+    return read(run, [*tiles, *deviations, quantity("sq_m"), *lines(UNCERTAINTY)])
 
 
-def answer_of(run: Run, seconds: float) -> Answer:
-    """A run as the page shows it; `seconds` is what solving it took."""
+def result_of_run(run: Run, seconds: float) -> ContactResult:
+    """Return the result of a run that took `seconds` to solve."""
     notes = list(run.notes)
     if run.friction_failure is not None:
-        notes.append(f"No friction and no temperature: {run.friction_failure}.")
-    return _answer(
+        notes.append(f"No friction and temperature: {run.friction_failure}.")
+    return _build_result(
         run.solution,
         run.case.text,
         numbers_of(run),
@@ -167,14 +167,14 @@ def answer_of(run: Run, seconds: float) -> Answer:
         verdict=run.verdict(),
         notes=tuple(notes),
         seconds=seconds,
-        sound=_sound(run),
+        spectrum=_resonance_spectrum(run),
     )
 
 
-def coarse_answer(solution: ContactSolution, text: str, seconds: float) -> Answer:
-    """A solution on few cells as the page shows it at first: maps, and numbers that take no time."""
+def coarse_result(solution: ContactSolution, text: str, seconds: float) -> ContactResult:
+    """Return the result of a coarse solution: maps, and numbers that are quick to compute."""
     state: ContactState = contact_state(solution)
-    return _answer(
+    return _build_result(
         solution,
         text,
         {"clr": state.clr, "car": state.car, "h_central_m": state.h_central, "sq_m": state.sq},
@@ -183,12 +183,14 @@ def coarse_answer(solution: ContactSolution, text: str, seconds: float) -> Answe
         verdict="",
         notes=(),
         seconds=seconds,
-        sound=None,
+        spectrum=None,
     )
 
 
-def _answer(solution: ContactSolution, text: str, row: dict[str, Any], **told: Any) -> Answer:
-    drawn = picture_parts(
+def _build_result(
+    solution: ContactSolution, text: str, row: dict[str, Any], **fields: Any
+) -> ContactResult:
+    maps = map_fields(
         solution.conditions,
         solution.grid,
         solution.gap,
@@ -197,27 +199,27 @@ def _answer(solution: ContactSolution, text: str, row: dict[str, Any], **told: A
         solution.cavitated,
     )
     convergence = solution.convergence
-    return Answer(
+    return ContactResult(
         text=text,
         row=row,
         converged=convergence.converged,
         explained=convergence.explain(),
-        **drawn,
-        **told,
+        **maps,
+        **fields,
     )
 
 
-def picture_parts(
+def map_fields(
     conditions: ContactConditions,
     grid: Grid,
     gap: Field,
     pressure: Field,
     touching: Mask,
-    ruptured: Mask,
+    cavitated: Mask,
 ) -> dict[str, Any]:
-    """What a `Picture` is made of: fields in single precision, and Hertz's contact."""
+    """Return the fields of `ContactMaps`, in single precision."""
     cells = np.full(grid.cells, OPEN, np.uint8)
-    cells[ruptured] = RUPTURED
+    cells[cavitated] = CAVITATED
     cells[touching] = TOUCHING
     zone = gap[hertz_zone(conditions, grid)]
     return {
@@ -227,54 +229,56 @@ def picture_parts(
         "gap": gap.astype(np.float32),
         "pressure": pressure.astype(np.float32),
         "cells": cells,
-        "gap_top": float(np.percentile(zone, CLEAR_SHARE)) if zone.size else 0.0,
+        "gap_top": float(np.percentile(zone, GAP_PERCENTILE)) if zone.size else 0.0,
         "half_widths": conditions.hertz.half_widths,
         "hertz_pressure": conditions.hertz.p_max,
         "endless": conditions.endless,
     }
 
 
-def _sound(run: Run) -> Sound | None:
-    """The spectrum near the band, with means of neighbours where it has more lines than are seen."""
+def _resonance_spectrum(run: Run) -> ResonanceSpectrum | None:
+    """Return the spectrum around the band, averaged over neighbouring lines if there are many."""
     vibration = run.vibration
     if vibration is None:
         return None
     (low, high), resonance = vibration.band_hz, vibration.resonance
-    about: dict[str, Any] = {
+    band: dict[str, Any] = {
         "band_hz": vibration.band_hz,
         "full_load_crf_hz": vibration.full_load_crf_hz,
     }
-    none = np.empty(0)
+    empty = np.empty(0)
     if vibration.spectrum is None:
-        return Sound(frequency=none, density=none, curve=none, reason=resonance.reason, **about)
+        return ResonanceSpectrum(
+            frequency=empty, density=empty, curve=empty, reason=resonance.reason, **band
+        )
     margin = 0.35 * (high - low)
     spectrum = vibration.spectrum
-    near = (spectrum.frequency_hz >= low - margin) & (spectrum.frequency_hz <= high + margin)
-    together = max(1, -(-int(np.count_nonzero(near)) // MOST_POINTS))
+    inside = (spectrum.frequency_hz >= low - margin) & (spectrum.frequency_hz <= high + margin)
+    group_size = max(1, -(-int(np.count_nonzero(inside)) // MAX_POINTS))
     frequency, density = (
-        _means(values[near], together) for values in (spectrum.frequency_hz, spectrum.density)
+        group_means(values[inside], group_size)
+        for values in (spectrum.frequency_hz, spectrum.density)
     )
-    curve = resonance.curve(frequency) if np.isfinite(resonance.damping_ratio) else none
+    curve = resonance.curve(frequency) if np.isfinite(resonance.damping_ratio) else empty
     found = resonance.found
-    return Sound(
+    return ResonanceSpectrum(
         frequency=frequency,
         density=density,
         curve=curve,
         crf_hz=resonance.crf_hz if found else None,
         crf_std_hz=resonance.crf_std if found and np.isfinite(resonance.crf_std) else None,
         reason=resonance.reason,
-        **about,
+        **band,
     )
 
 
-def _means(values: Field, together: int) -> Field:
-    return np.asarray(
-        values[: values.size // together * together].reshape(-1, together).mean(axis=1)
-    )
+def group_means(values: Field, size: int) -> Field:
+    """Return the means of groups of `size` neighbours; an incomplete last group is dropped."""
+    return np.asarray(values[: values.size // size * size].reshape(-1, size).mean(axis=1))
 
 
 def difference(key: str, value: Any, pinned: Any) -> str:
-    """How far a number lies from that of a pinned contact, with its unit; a dash where one of them has none."""
+    """Return the difference of a number to the pinned contact's, with unit; a dash if unknown."""
     if value is None or pinned is None:
         return NO_VALUE
     entry = quantity(key)

@@ -1,4 +1,4 @@
-"""What is taken away from the page: the case file, and Python lines that solve it again."""
+"""Downloads of the page: the case file, and a Python script that solves it."""
 
 from asperity.case import Case
 
@@ -6,26 +6,28 @@ CASE_FILE, SCRIPT, REPORT = "contact.toml", "contact.py", "contact.html"
 
 
 def case_text(case: Case) -> str:
-    """The case file of what is shown."""
-    beside = "".join(
-        f"# {part.name} lies beside this file.\n"
+    """Return the case file of the current settings."""
+    files = "".join(
+        f"# Needs {part.name} in the same folder.\n"
         for part in case.contents.surface.parts.values()
         if hasattr(part, "file")
     )
-    kept = (
+    stored = (
         ""
         if case.stored is None
-        else "# The run it came from holds its roughness; asperity report reads that.\n"
+        else "# The roughness is stored in the original run; asperity report reads it.\n"
     )
-    head = f"# From asperity's live page: `asperity solve {CASE_FILE} --surfaces 1` solves what it showed.\n"
-    return f"{head}{beside}{kept}{case.text}"
+    head = (
+        f"# From the live page of asperity. To reproduce: asperity solve {CASE_FILE} --surfaces 1\n"
+    )
+    return f"{head}{files}{stored}{case.text}"
 
 
-def python_lines() -> str:
-    """A script that solves the case file beside it, with the page's numbers."""
+def python_script() -> str:
+    """Return a Python script that solves the case file in its folder."""
     return "\n".join(
         [
-            '"""Solves the contact that asperity\'s live page showed; the case file lies beside this script."""',
+            '"""Solve the contact shown by the live page of asperity."""',
             "",
             "from pathlib import Path",
             "",
@@ -34,7 +36,8 @@ def python_lines() -> str:
             f'case = load_case(Path(__file__).with_name("{CASE_FILE}"))',
             "run = solve_case(case)",
             "print(run.verdict())",
-            'print(f"CLR {run.state.clr:.4f}, CAR {run.state.car:.4f}, film {run.state.h_central:.4g} m")',
+            "state = run.state",
+            'print(f"CLR {state.clr:.4f}, CAR {state.car:.4f}, film {state.h_central:.4g} m")',
             "",
         ]
     )

@@ -1,8 +1,7 @@
-"""Figures of a contact that follow its answers: maps, a cut along rolling, the spectrum, the trail of what was tried.
+"""Figures of a contact: maps, a section along rolling, the spectrum, earlier results.
 
-Axes are named by the catalogue; colours of lines and marks are those of the report's figures. What
-is paper and what is ink comes from the page's style sheet, so that light and dark need no figure
-redrawn.
+Axis labels come from the catalogue; colours match the report. Background and text colours come from
+the style sheet, so that switching between light and dark redraws nothing.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,36 +22,34 @@ from bokeh.models import (
 from bokeh.palettes import Inferno256, RdBu11, Viridis256, interp_palette
 from bokeh.plotting import figure
 
-from asperity.app.contact_result import RUPTURED, TOUCHING, Picture, Sound
-from asperity.app.session import Tried
+from asperity.app.contact_result import CAVITATED, TOUCHING, ContactMaps, ResonanceSpectrum
+from asperity.app.session import Trial
 from asperity.core.quantities import quantity
 
 BLUE, VERMILION, GREEN, GREY = "#2b8fd0", "#d55e00", "#00a577", "#808893"
-FILMS = Viridis256[:208]  # without its yellow, which is that of contact
-CHANGES = interp_palette(RdBu11, 256)  # thinner is blue, thicker red
+FILMS = Viridis256[:208]  # without yellow, the colour of contact
+CHANGES = interp_palette(RdBu11, 256)  # thinner: blue, thicker: red
 CONTACT, CAVITY = (0xF7, 0xDC, 0x4A), (0x5B, 0x6B, 0x86)
-# of keys and colour bars, which take no ink from the style sheet: legible on light and on dark
+# text of legends and colour bars, which ignore the style sheet: legible on light and dark
 TYPE = "#74818f"
-HEIGHT, CUT_HEIGHT, SPECTRUM_HEIGHT, TRAIL_HEIGHT = 300, 250, 480, 240
-SHAPES, BESIDE = (
-    (0.9, 2.0),
-    0.8,
-)  # widths of maps over their heights; of that, what axes and colour bar leave
+HEIGHT, SECTION_HEIGHT, SPECTRUM_HEIGHT, TRIALS_HEIGHT = 300, 250, 480, 240
+ASPECT_RANGE = (0.9, 2.0)  # of maps, width over height
+MAP_SHARE = 0.8  # of a figure's width, the rest being axes
 
 
-def shown(key: str, values: Any) -> Any:
-    """Stored values of a quantity in its display unit."""
+def to_display(key: str, values: Any) -> Any:
+    """Convert stored values of a quantity to its display unit."""
     return np.asarray(values) * quantity(key).factor
 
 
 def plain_figure(
     x: str, y: str, *, label: str, height: int = HEIGHT, tapped: bool = False, **settings: Any
 ) -> Any:
-    """An empty figure whose axes are named by the catalogue; `label` is what a screen reader calls it.
+    """Create an empty figure with axis labels from the catalogue.
 
-    `tapped`: marks in it may be clicked.
+    `label` is its name for screen readers; `tapped` makes its markers clickable.
     """
-    made = figure(
+    plot = figure(
         height=height,
         sizing_mode="stretch_width",
         x_axis_label=quantity(x).axis if x else "",
@@ -63,17 +60,17 @@ def plain_figure(
         min_border=2,
         **settings,
     )
-    made.toolbar.logo = None
-    made.toolbar.autohide = True
-    return made
+    plot.toolbar.logo = None
+    plot.toolbar.autohide = True
+    return plot
 
 
-def _key_above(made: Any) -> Any:
-    """Move a figure's key above it, where it hides nothing; its last entry, which is not always shown."""
-    key = made.legend[0]
-    made.center.remove(key)
-    made.add_layout(key, "above")
-    key.update(
+def _key_above(plot: Any) -> Any:
+    """Move the legend above the figure; hide and return its last entry."""
+    legend = plot.legend[0]
+    plot.center.remove(legend)
+    plot.add_layout(legend, "above")
+    legend.update(
         orientation="horizontal",
         location="left",
         border_line_alpha=0,
@@ -81,26 +78,26 @@ def _key_above(made: Any) -> Any:
         padding=0,
         label_text_color=TYPE,
     )
-    key.items[-1].visible = False
-    return key.items[-1]
+    legend.items[-1].visible = False
+    return legend.items[-1]
 
 
-class Maps:
-    """Film and pressure of a contact on the same axes, with linked cursors, and where the cut runs."""
+class MapFigures:
+    """Maps of film and pressure with common axes, linked cursors and the line of the section."""
 
     def __init__(self, cut_at: Callable[[float], None]) -> None:
         self._cut_at = cut_at
         self.x, self.y = Range1d(), Range1d()
         self.across, self.along = (
-            Span(dimension=way, line_dash="dotted") for way in ("width", "height")
+            Span(dimension=dimension, line_dash="dotted") for dimension in ("width", "height")
         )
         self.film = self._map("Film thickness, contact and cavitation", FILMS, "gap")
         self.pressure = self._map("Pressure", Inferno256, "pressure")
-        self.change: Any = None  # until something is pinned
+        self.change: Any = None  # created when a contact is pinned
         self.compares = False
 
     def _map(self, title: str, palette: Sequence[str], key: str) -> Any:
-        made = plain_figure(
+        plot = plain_figure(
             "x_m",
             "y_m",
             label=title,
@@ -109,19 +106,19 @@ class Maps:
             y_range=self.y,
             min_height=HEIGHT,
         )
-        made.update(sizing_mode="scale_width", aspect_ratio=SHAPES[1])
-        made.add_tools(CrosshairTool(overlay=[self.across, self.along]))
+        plot.update(sizing_mode="scale_width", aspect_ratio=ASPECT_RANGE[1])
+        plot.add_tools(CrosshairTool(overlay=[self.across, self.along]))
         mapper = LinearColorMapper(
             palette=palette, low=0.0, high=1.0
-        )  # with numbers, for which the bar takes room
+        )  # initial range, which reserves space for the labels
         source = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
-        image = made.image("image", "x", "y", "dw", "dh", source=source, color_mapper=mapper)
-        over = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
-        made.image_rgba("image", "x", "y", "dw", "dh", source=over)
+        image = plot.image("image", "x", "y", "dw", "dh", source=source, color_mapper=mapper)
+        overlay = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
+        plot.image_rgba("image", "x", "y", "dw", "dh", source=overlay)
         zone = ColumnDataSource({"x": [], "y": []})
-        made.line("x", "y", source=zone, color="white", line_dash="dashed")
+        plot.line("x", "y", source=zone, color="white", line_dash="dashed")
         cut = Span(dimension="width", line_color="white", line_dash="dotdash", line_width=1)
-        made.add_layout(cut)
+        plot.add_layout(cut)
         bar = ColorBar(
             color_mapper=mapper,
             title=quantity(key).label,
@@ -132,114 +129,117 @@ class Maps:
             major_label_text_color=TYPE,
             background_fill_alpha=0,
         )
-        made.add_layout(bar, "below")
+        plot.add_layout(bar, "below")
         unit = quantity(key).display
-        made.add_tools(
+        plot.add_tools(
             HoverTool(
                 renderers=[image], tooltips=[(quantity(key).short, f"@image{{0.000}} {unit}")]
             )
         )
-        made.on_event(Tap, lambda event: self._cut_at(event.y))
-        made.tags = [{"mapper": mapper, "source": source, "over": over, "zone": zone, "cut": cut}]
-        return made
+        plot.on_event(Tap, lambda event: self._cut_at(event.y))
+        plot.tags = [
+            {"mapper": mapper, "source": source, "overlay": overlay, "zone": zone, "cut": cut}
+        ]
+        return plot
 
-    def show(self, answer: Picture, pinned: Picture | None) -> None:
-        """Draw an answer, and how its film differs from a pinned one if that is on the same cells: `compares`."""
-        (x0, x1), (y0, y1) = ((shown("x_m", end) for end in ends) for ends in answer.extent)
+    def show(self, result: ContactMaps, pinned: ContactMaps | None) -> None:
+        """Draw a result, and its film minus a pinned one on the same grid (`compares`)."""
+        (x0, x1), (y0, y1) = ((to_display("x_m", end) for end in ends) for ends in result.extent)
         self.x.update(start=x0, end=x1, reset_start=x0, reset_end=x1)
         self.y.update(start=y0, end=y1, reset_start=y0, reset_end=y1)
-        self.compares = pinned is not None and pinned.gap.shape == answer.gap.shape
+        self.compares = pinned is not None and pinned.gap.shape == result.gap.shape
         if self.compares and self.change is None:
-            self.change = self._map("Film less the pinned film", CHANGES, "gap")
-        shape = BESIDE * min(max(float((x1 - x0) / (y1 - y0)), SHAPES[0]), SHAPES[1])
-        for made in self._made():
-            made.aspect_ratio = shape
+            self.change = self._map("Film minus pinned film", CHANGES, "gap")
+        low, high = ASPECT_RANGE
+        shape = MAP_SHARE * min(max(float((x1 - x0) / (y1 - y0)), low), high)
+        for plot in self._figures():
+            plot.aspect_ratio = shape
         place = {"x": [x0], "y": [y0], "dw": [x1 - x0], "dh": [y1 - y0]}
-        marks = _marks(answer)
+        marks = _state_colours(result)
         self._fill(
             self.film,
-            shown("gap", answer.gap),
-            (0.0, shown("gap", answer.gap_top) or 1.0),
+            to_display("gap", result.gap),
+            (0.0, to_display("gap", result.gap_top) or 1.0),
             place,
             marks,
         )
-        largest = max(float(answer.pressure.max()), answer.hertz_pressure)
+        largest = max(float(result.pressure.max()), result.hertz_pressure)
         self._fill(
             self.pressure,
-            shown("pressure", answer.pressure),
-            (0.0, shown("pressure", largest)),
+            to_display("pressure", result.pressure),
+            (0.0, to_display("pressure", largest)),
             place,
             None,
         )
-        zone = _hertz_outline(answer, (y0, y1))
-        for made in self._made():
-            made.tags[0]["zone"].data = zone
+        zone = _hertz_outline(result, (y0, y1))
+        for plot in self._figures():
+            plot.tags[0]["zone"].data = zone
         if self.compares and pinned is not None:
-            change = shown("gap", answer.gap - pinned.gap)
-            reach = float(np.percentile(np.abs(change), 98.0)) or 1.0
-            self._fill(self.change, change, (-reach, reach), place, None)
+            change = to_display("gap", result.gap - pinned.gap)
+            limit = float(np.percentile(np.abs(change), 98.0)) or 1.0
+            self._fill(self.change, change, (-limit, limit), place, None)
 
-    def _made(self) -> list[Any]:
+    def _figures(self) -> list[Any]:
         return [self.film, self.pressure, *([] if self.change is None else [self.change])]
 
     def cut(self, y: float) -> None:
-        """Mark where the cut runs [m]."""
-        for made in self._made():
-            made.tags[0]["cut"].location = float(shown("y_m", y))
+        """Mark the line of the section at y [m]."""
+        for plot in self._figures():
+            plot.tags[0]["cut"].location = float(to_display("y_m", y))
 
     @staticmethod
     def _fill(
-        made: Any, values: Any, ends: tuple[float, float], place: dict[str, Any], marks: Any
+        plot: Any, values: Any, ends: tuple[float, float], place: dict[str, Any], marks: Any
     ) -> None:
-        parts = made.tags[0]
+        parts = plot.tags[0]
         parts["mapper"].update(low=float(ends[0]), high=float(ends[1]))
         parts["source"].data = {"image": [np.ascontiguousarray(values.T, np.float32)], **place}
         if marks is not None:
-            parts["over"].data = {"image": [marks], **place}
+            parts["overlay"].data = {"image": [marks], **place}
 
 
-def _marks(answer: Picture) -> Any:
-    """Contact and cavitation as colours over the film, shape (ny, nx)."""
-    colours = np.zeros((*answer.cells.T.shape, 4), np.uint8)
-    cells = answer.cells.T
+def _state_colours(result: ContactMaps) -> Any:
+    """Return contact and cavitation as colours over the film, shape (ny, nx)."""
+    colours = np.zeros((*result.cells.T.shape, 4), np.uint8)
+    cells = result.cells.T
     colours[cells == TOUCHING] = (*CONTACT, 255)
-    ruptured = cells == RUPTURED
+    cavitated = cells == CAVITATED
     i, j = np.indices(cells.shape, sparse=True)
-    colours[ruptured] = (*CAVITY, 150)
-    colours[ruptured & ((i + j) % 6 < 2)] = (*CAVITY, 235)
+    colours[cavitated] = (*CAVITY, 150)
+    colours[cavitated & ((i + j) % 6 < 2)] = (*CAVITY, 235)
     return colours.view(np.uint32).reshape(cells.shape)
 
 
-def _hertz_outline(answer: Picture, ends: tuple[float, float]) -> dict[str, Any]:
-    """The outline of the smooth, dry contact, in the maps' unit."""
-    a, b = (shown("x_m", half) for half in answer.half_widths)
-    if answer.endless:
+def _hertz_outline(result: ContactMaps, ends: tuple[float, float]) -> dict[str, Any]:
+    """Return the outline of the smooth, dry contact in the display unit."""
+    a, b = (to_display("x_m", half) for half in result.half_widths)
+    if result.endless:
         return {"x": [-a, -a, np.nan, a, a], "y": [ends[0], ends[1], np.nan, ends[0], ends[1]]}
-    turn = np.linspace(0.0, 2.0 * np.pi, 200)
-    return {"x": a * np.cos(turn), "y": b * np.sin(turn)}
+    angle = np.linspace(0.0, 2.0 * np.pi, 200)
+    return {"x": a * np.cos(angle), "y": b * np.sin(angle)}
 
 
-class Cut:
-    """Pressure and film along rolling, with Hertz's pressure, and those of a pinned contact."""
+class SectionFigures:
+    """Section along rolling: pressure, Hertz pressure and film, with those of a pinned contact."""
 
-    def __init__(self, maps: Maps) -> None:
-        label = "Cut along rolling: pressure with Hertz's pressure"
+    def __init__(self, maps: MapFigures) -> None:
+        label = "Section along rolling: pressure and Hertz pressure"
         self.pressure = plain_figure(
-            "", "pressure", label=label, title="Cut", height=CUT_HEIGHT, x_range=maps.x
+            "", "pressure", label=label, title="Section", height=SECTION_HEIGHT, x_range=maps.x
         )
         self.film = plain_figure(
             "x_m",
             "gap",
-            label="Cut along rolling: film",
-            title="Film in the cut",
-            height=CUT_HEIGHT,
+            label="Section along rolling: film",
+            title="Film thickness in the section",
+            height=SECTION_HEIGHT,
             x_range=maps.x,
         )
-        for made in (self.pressure, self.film):
-            made.add_tools(
+        for plot in (self.pressure, self.film):
+            plot.add_tools(
                 CrosshairTool(overlay=[Span(dimension="width", line_dash="dotted"), maps.along])
             )
-            made.y_range = Range1d(0.0, 1.0)
+            plot.y_range = Range1d(0.0, 1.0)
         self.now, self.then = (
             ColumnDataSource({"x": [], "p": [], "hertz": [], "h": [], "touch": []}) for _ in "ab"
         )
@@ -263,42 +263,44 @@ class Cut:
         self.film.line(
             "x", "h", source=self.then, color=VERMILION, line_dash="dotted", legend_label="pinned"
         )
-        self._pinned = [_key_above(made) for made in (self.pressure, self.film)]
+        self._pinned = [_key_above(plot) for plot in (self.pressure, self.film)]
 
-    def show(self, answer: Picture, pinned: Picture | None, y: float) -> None:
-        """Draw the cut at y [m]."""
-        row = answer.line(y)
+    def show(self, result: ContactMaps, pinned: ContactMaps | None, y: float) -> None:
+        """Draw the section at y [m]."""
+        row = result.nearest_row(y)
         self.pressure.title.text = (
-            f"Cut along rolling at y = {quantity('y_m').text(float(answer.y[row]))}"
+            f"Section along rolling, y = {quantity('y_m').text(float(result.y[row]))}"
         )
-        self.now.data = self._line(answer, row)
+        self.now.data = self._line(result, row)
         self.then.data = (
-            self._line(pinned, pinned.line(y))
+            self._line(pinned, pinned.nearest_row(y))
             if pinned is not None
             else {key: [] for key in self.now.data}
         )
         for item in self._pinned:
             item.visible = pinned is not None
-        pressures = [answer.pressure[:, row].max(), answer.hertz_pressure]
-        self.pressure.y_range.update(start=0.0, end=1.12 * float(shown("pressure", max(pressures))))
-        inside = np.abs(answer.x) <= 1.2 * answer.half_widths[0]
-        top = float(answer.gap[inside, row].max()) if inside.any() else float(answer.gap.max())
-        self.film.y_range.update(start=0.0, end=1.2 * float(shown("gap", top)) or 1.0)
+        pressures = [result.pressure[:, row].max(), result.hertz_pressure]
+        self.pressure.y_range.update(
+            start=0.0, end=1.12 * float(to_display("pressure", max(pressures)))
+        )
+        inside = np.abs(result.x) <= 1.2 * result.half_widths[0]
+        top = float(result.gap[inside, row].max()) if inside.any() else float(result.gap.max())
+        self.film.y_range.update(start=0.0, end=1.2 * float(to_display("gap", top)) or 1.0)
 
     @staticmethod
-    def _line(answer: Picture, row: int) -> dict[str, Any]:
-        touching = np.where(answer.cells[:, row] == TOUCHING, 0.0, np.nan)
+    def _line(result: ContactMaps, row: int) -> dict[str, Any]:
+        touching = np.where(result.cells[:, row] == TOUCHING, 0.0, np.nan)
         return {
-            "x": shown("x_m", answer.x),
-            "p": shown("pressure", answer.pressure[:, row]),
-            "hertz": shown("pressure", answer.hertz(row)),
-            "h": shown("gap", answer.gap[:, row]),
+            "x": to_display("x_m", result.x),
+            "p": to_display("pressure", result.pressure[:, row]),
+            "hertz": to_display("pressure", result.hertz(row)),
+            "h": to_display("gap", result.gap[:, row]),
             "touch": touching,
         }
 
 
-class Spectrum:
-    """The spectrum about the searched band with the fitted resonance, and a pinned contact's."""
+class SpectrumFigure:
+    """Spectrum around the search band with the fitted resonance, and a pinned contact's."""
 
     def __init__(self) -> None:
         self.figure = plain_figure(
@@ -340,58 +342,66 @@ class Spectrum:
         )
         self._pinned = _key_above(self.figure)
 
-    def show(self, sound: Sound | None, pinned: Sound | None, words: str) -> None:
-        """Draw a spectrum, or say why there is none."""
-        self.figure.title.text = words
-        if sound is None or not sound.frequency.size:
+    def show(
+        self, spectrum: ResonanceSpectrum | None, pinned: ResonanceSpectrum | None, title: str
+    ) -> None:
+        """Draw a spectrum; the title states the resonance or why there is none."""
+        self.figure.title.text = title
+        if spectrum is None or not spectrum.frequency.size:
             self.now.data = self.fit.data = {"f": [], "s": []}
             self.crf.visible = self.deviation.visible = self.full_load.visible = False
         else:
-            self.now.data = {"f": sound.frequency, "s": sound.density}
+            self.now.data = {"f": spectrum.frequency, "s": spectrum.density}
             self.fit.data = (
-                {"f": sound.frequency, "s": sound.curve} if sound.curve.size else {"f": [], "s": []}
+                {"f": spectrum.frequency, "s": spectrum.curve}
+                if spectrum.curve.size
+                else {"f": [], "s": []}
             )
-            self.band.update(left=sound.band_hz[0], right=sound.band_hz[1])
-            self.full_load.update(location=sound.full_load_crf_hz, visible=True)
-            self.crf.visible = sound.crf_hz is not None
-            self.deviation.visible = sound.crf_std_hz is not None
-            if sound.crf_hz is not None:
-                self.crf.location = sound.crf_hz
-                reach = 2.0 * (sound.crf_std_hz or 0.0)
-                self.deviation.update(left=sound.crf_hz - reach, right=sound.crf_hz + reach)
-        has = pinned is not None and pinned.curve.size
+            self.band.update(left=spectrum.band_hz[0], right=spectrum.band_hz[1])
+            self.full_load.update(location=spectrum.full_load_crf_hz, visible=True)
+            self.crf.visible = spectrum.crf_hz is not None
+            self.deviation.visible = spectrum.crf_std_hz is not None
+            if spectrum.crf_hz is not None:
+                self.crf.location = spectrum.crf_hz
+                half_width = 2.0 * (spectrum.crf_std_hz or 0.0)
+                self.deviation.update(
+                    left=spectrum.crf_hz - half_width, right=spectrum.crf_hz + half_width
+                )
+        has_curve = pinned is not None and pinned.curve.size
         self.then.data = (
-            {"f": pinned.frequency, "s": pinned.curve} if has and pinned else {"f": [], "s": []}
+            {"f": pinned.frequency, "s": pinned.curve}
+            if has_curve and pinned
+            else {"f": [], "s": []}
         )
-        self._pinned.visible = bool(has)
+        self._pinned.visible = bool(has_curve)
 
 
-class Trail:
-    """What was tried, in the planes of roughness, load share and resonance; the last setting stands out."""
+class TrialFigures:
+    """Earlier results: load share and resonance over roughness; the latest is highlighted."""
 
     def __init__(self, chosen: Callable[[int], None]) -> None:
         self.source = ColumnDataSource({"sq": [], "clr": [], "crf": [], "alpha": []})
         self.last = ColumnDataSource({"sq": [], "clr": [], "crf": []})
         self.share = self._plane("sq_m", "clr", "sq", "clr", "Load share over roughness")
-        self.pitch = self._plane("sq_m", "crf_hz", "sq", "crf", "Resonance over roughness")
+        self.crf = self._plane("sq_m", "crf_hz", "sq", "crf", "Resonance over roughness")
         self.source.selected.on_change(
             "indices", lambda _name, _old, new: chosen(new[0]) if new else None
         )
 
-    def _plane(self, x: str, y: str, across: str, up: str, label: str) -> Any:
-        made = plain_figure(x, y, label=label, title=label, height=TRAIL_HEIGHT, tapped=True)
-        made.scatter(across, up, source=self.source, size=10, color=BLUE, alpha="alpha")
-        made.scatter(
-            across, up, source=self.last, size=15, line_color=VERMILION, fill_alpha=0, line_width=2
-        )
-        return made
+    def _plane(self, x: str, y: str, x_column: str, y_column: str, label: str) -> Any:
+        plot = plain_figure(x, y, label=label, title=label, height=TRIALS_HEIGHT, tapped=True)
+        plot.scatter(x_column, y_column, source=self.source, size=10, color=BLUE, alpha="alpha")
+        highlight: dict[str, Any] = {"line_color": VERMILION, "fill_alpha": 0, "line_width": 2}
+        plot.scatter(x_column, y_column, source=self.last, size=15, **highlight)
+        return plot
 
-    def show(self, trail: Sequence[Tried]) -> None:
-        """Draw all that was tried."""
+    def show(self, trials: Sequence[Trial]) -> None:
+        """Draw all earlier results."""
         rows = {
-            "sq": [float(shown("sq_m", tried.sq)) for tried in trail],
-            "clr": [float(shown("clr", tried.clr)) for tried in trail],
-            "crf": [np.nan if tried.crf_hz is None else tried.crf_hz for tried in trail],
+            "sq": [float(to_display("sq_m", trial.sq)) for trial in trials],
+            "clr": [float(to_display("clr", trial.clr)) for trial in trials],
+            "crf": [np.nan if trial.crf_hz is None else trial.crf_hz for trial in trials],
         }
-        self.source.data = {**rows, "alpha": [0.9 if tried.determined else 0.35 for tried in trail]}
+        alpha = [0.9 if trial.determined else 0.35 for trial in trials]
+        self.source.data = {**rows, "alpha": alpha}
         self.last.data = {key: values[-1:] for key, values in rows.items()}

@@ -1,4 +1,4 @@
-"""What workers do with studies and histories: read their folders, and make of them what the page shows."""
+"""Jobs of worker processes: read the folders of studies and histories for the page."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from asperity.app.contact_jobs import Ticket, solve_fully
-from asperity.app.contact_result import Answer, Picture, picture_parts
+from asperity.app.contact_result import ContactMaps, ContactResult, map_fields
 from asperity.case import Case
 from asperity.core.arrays import Field
 from asperity.simulation import (
@@ -21,20 +21,20 @@ from asperity.simulation import (
 )
 from asperity.study import StudyOverview, StudyResult, group_means, load_study
 
-MOST_FRAMES = 60  # steps of a history whose maps are shown
-OF_WEAR = (
+MAX_FRAMES = 60  # steps of a history whose maps are shown
+WEAR_CURVES = (
     "sq_m",
     "clr",
     "worn_depth_1_m",
     "worn_depth_2_m",
     "friction_coefficient",
     "crf_hz",
-)  # what of a worn one's
-OF_STEPS = ("clr", "car", "h_central_m", "friction_coefficient")  # what a history's curves show
+)
+MOTION_CURVES = ("clr", "car", "h_central_m", "friction_coefficient")
 
 
-class Scatter(NamedTuple):
-    """A swept quantity: its key, unit, the names of its places where it is no number, and whether it crowds low."""
+class StudyAxis(NamedTuple):
+    """A swept quantity: key, unit, names of its values if not numeric, logarithmic or not."""
 
     key: str
     unit: str
@@ -43,26 +43,26 @@ class Scatter(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Swept:
+class StudyData:
     """A study as the page shows it.
 
-    `axes` are what was swept, `values` their numbers by key, (rows,); `outputs` columns of the
-    table by key, (rows,), SI, and `numbers` the number of each row's case. `means` are x, mean,
-    low and high by axis and output.
+    `axes` are the swept quantities, `values` their numbers by key, (rows,); `outputs` columns of
+    the table by key, (rows,), SI; `numbers` the case number of each row; `means` x, mean, low and
+    high by axis and output.
     """
 
     verdict: str
     notes: tuple[str, ...]
-    axes: tuple[Scatter, ...]
+    axes: tuple[StudyAxis, ...]
     values: dict[str, Field]
     outputs: dict[str, Field]
     numbers: tuple[int, ...]
     means: dict[tuple[str, str], tuple[Field, Field, Field, Field]]
-    changed: tuple[dict[str, Any], ...]  # of each row, what its case differs in, by key
+    changed: tuple[dict[str, Any], ...]  # overrides of each row's case, by key
 
 
-def open_study(ticket: Ticket, folder: Path) -> Swept:  # noqa: ARG001
-    """A study's rows that may be used, with their means."""
+def open_study(ticket: Ticket, folder: Path) -> StudyData:  # noqa: ARG001
+    """Load a study: its usable rows and their means."""
     overview = StudyOverview(_study(folder, _stamp(folder)))
     axes = overview.axes
     outputs = {key: overview.used[key].to_numpy(dtype=float) for key in overview.outputs}
@@ -79,7 +79,7 @@ def open_study(ticket: Ticket, folder: Path) -> Swept:  # noqa: ARG001
     notes = (
         (f"{missing} of {len(plan.cases)} cases have not been computed yet.",) if missing else ()
     )
-    return Swept(
+    return StudyData(
         verdict=overview.verdict(),
         notes=(
             *notes,
@@ -88,7 +88,7 @@ def open_study(ticket: Ticket, folder: Path) -> Swept:  # noqa: ARG001
                 for reason in overview.reasons
             ),
         ),
-        axes=tuple(Scatter(axis.key, axis.unit, axis.names, axis.logarithmic) for axis in axes),
+        axes=tuple(StudyAxis(axis.key, axis.unit, axis.names, axis.logarithmic) for axis in axes),
         values={axis.key: axis.values for axis in axes},
         outputs=outputs,
         numbers=numbers,
@@ -97,28 +97,27 @@ def open_study(ticket: Ticket, folder: Path) -> Swept:  # noqa: ARG001
     )
 
 
-def solve_row(ticket: Ticket, folder: Path, number: int) -> Answer:
-    """The contact of one case of a study, solved anew."""
+def solve_row(ticket: Ticket, folder: Path, number: int) -> ContactResult:
+    """Solve the contact of one case of a study."""
     plan = _study(folder, _stamp(folder)).plan
     return solve_fully(ticket, plan.case.with_overrides(plan.cases[number].overrides))
 
 
 def _stamp(folder: Path) -> float:
-    """When a folder last changed."""
+    """Return the time of the last change in a folder."""
     return max(path.stat().st_mtime for path in (folder, *folder.iterdir()))
 
 
 @lru_cache(maxsize=2)
-def _study(folder: Path, stamp: float) -> StudyResult:  # noqa: ARG001 - one that has grown is read anew
+def _study(folder: Path, stamp: float) -> StudyResult:  # noqa: ARG001 - invalidates the cache
     return load_study(folder)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Moved:
-    """A history as the page shows it: curves over time, SI by key, and maps of some moments.
+class HistoryData:
+    """A history as the page shows it: curves over time, SI by key, and maps at some times.
 
-    `clock` is the key of the quantity that time is; `times` the moments that have maps, `names`
-    what they are called.
+    `clock` is the key of the time quantity; `times` and `names` belong to the maps.
     """
 
     verdict: str
@@ -128,51 +127,51 @@ class Moved:
     curves: dict[str, Field]
     names: tuple[str, ...]
     times: tuple[float, ...]
-    pictures: tuple[Picture, ...]
+    maps: tuple[ContactMaps, ...]
 
 
-def open_history(ticket: Ticket, folder: Path) -> Moved:  # noqa: ARG001
-    """A history's curves, and maps evenly over its steps; of a contact that wears, over its hours."""
+def open_history(ticket: Ticket, folder: Path) -> HistoryData:  # noqa: ARG001
+    """Load a history of motion or wear: its curves, and maps evenly spaced over its steps."""
     if is_wear_folder(folder):
-        return _worn(load_wear(folder))
+        return _wear_data(load_wear(folder))
     history = load_history(folder)
-    every = -(-len(history.frames) // MOST_FRAMES) if history.frames else 1
-    frames = history.frames[::every]
+    stride = -(-len(history.frames) // MAX_FRAMES) if history.frames else 1
+    frames = history.frames[::stride]
     table = history.table
-    return Moved(
+    return HistoryData(
         verdict=history.verdict(),
         notes=history.notes,
         clock="time_s",
         time=table["time_s"].to_numpy(dtype=float),
-        curves={key: table[key].to_numpy(dtype=float) for key in OF_STEPS if key in table},
+        curves={key: table[key].to_numpy(dtype=float) for key in MOTION_CURVES if key in table},
         names=tuple(f"Step {frame.number}" for frame in frames),
         times=tuple(frame.time for frame in frames),
-        pictures=tuple(_picture(history.case, frame) for frame in frames),
+        maps=tuple(_picture(history.case, frame) for frame in frames),
     )
 
 
-def _worn(history: WearHistory) -> Moved:
+def _wear_data(history: WearHistory) -> HistoryData:
     table = history.table
-    return Moved(
+    return HistoryData(
         verdict=history.verdict(),
         notes=history.notes,
         clock="hours",
         time=table["hours"].to_numpy(dtype=float),
         curves={
             key: table[key].to_numpy(dtype=float)
-            for key in OF_WEAR
+            for key in WEAR_CURVES
             if bool(table[key].notna().any())
         },
-        names=tuple(f"Jump {frame.number}" for frame in history.frames),
+        names=tuple(f"Wear step {frame.number}" for frame in history.frames),
         times=tuple(frame.hours for frame in history.frames),
-        pictures=tuple(_picture(history.case, frame) for frame in history.frames),
+        maps=tuple(_picture(history.case, frame) for frame in history.frames),
     )
 
 
-def _picture(case: Case, frame: MotionFrame | WearFrame) -> Picture:
-    """The maps of a moment; cells without pressure or contact have ruptured, as in a contact at rest."""
+def _picture(case: Case, frame: MotionFrame | WearFrame) -> ContactMaps:
+    """Return the maps of a frame; cells without pressure or contact are cavitated."""
     touching = frame.in_contact
-    ruptured = (frame.pressure <= 0.0) & ~touching & (case.lubricant is not None)
-    return Picture(
-        **picture_parts(case.conditions, case.grid, frame.gap, frame.pressure, touching, ruptured)
+    cavitated = (frame.pressure <= 0.0) & ~touching & (case.lubricant is not None)
+    return ContactMaps(
+        **map_fields(case.conditions, case.grid, frame.gap, frame.pressure, touching, cavitated)
     )

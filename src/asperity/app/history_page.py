@@ -1,4 +1,4 @@
-"""The page of a history, or of wear: maps that move with a slider over the steps or hours, and curves over time."""
+"""Page of a history of motion or wear: maps with a slider, and curves over time."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,24 +6,24 @@ from typing import Any
 
 from bokeh.models import Column, ColumnDataSource, Range1d, Slider, Span
 
-from asperity.app.contact_jobs import Refused
-from asperity.app.figures import BLUE, VERMILION, plain_figure, shown
-from asperity.app.folder_jobs import Moved, open_history
-from asperity.app.jobs import Queue, Workshop
-from asperity.app.map_images import Pictures
+from asperity.app.contact_jobs import JobFailure
+from asperity.app.figures import BLUE, VERMILION, plain_figure, to_display
+from asperity.app.folder_jobs import HistoryData, open_history
+from asperity.app.jobs import JobQueue, WorkerPool
+from asperity.app.map_images import MapImages
 from asperity.app.widgets import BAR, LOOK, button, notes, sentences, text_block
 from asperity.core.quantities import quantity
 
 
 class HistoryView:
-    """One user's look at a history, with its widgets."""
+    """History of one visitor with its widgets."""
 
     def __init__(
-        self, folder: Path, workshop: Workshop, deliver: Callable[[Callable[[], None]], None]
+        self, folder: Path, worker_pool: WorkerPool, deliver: Callable[[Callable[[], None]], None]
     ) -> None:
         self._folder = folder
-        self._queue = Queue(workshop, deliver)
-        self.moved: Moved | None = None
+        self._queue = JobQueue(worker_pool, deliver)
+        self.history: HistoryData | None = None
         self.playing = False
         self.status, self.verdict, self.notes = (text_block() for _ in range(3))
         self.step = Slider(
@@ -41,96 +41,100 @@ class HistoryView:
         )
         self.step.on_change("value", lambda _name, _old, new: self._show(int(new)))
         self.play = button("Play", self._toggle)
-        self.pictures = Pictures()
+        self.maps = MapImages()
         self.curves = Column(sizing_mode="stretch_width")
         self._now: list[Span] = []
 
     def begin(self) -> None:
-        """Read the history."""
+        """Start reading the history."""
         self.status.text = sentences(["Reading the history ..."], "soft")
-        self._queue.ask((open_history, (self._folder,)), self._read)
+        self._queue.submit((open_history, (self._folder,)), self._read)
 
     def close(self) -> None:
-        """Give back what the session took."""
+        """Release the resources of the visit."""
         self._queue.close()
-        self.moved = None
+        self.history = None
 
     def advance(self) -> None:
-        """Go one kept step on while it plays, and from the last to the first."""
-        if self.playing and self.moved is not None and self.moved.pictures:
-            self.step.value = (int(self.step.value) + 1) % len(self.moved.pictures)
+        """Advance by one frame while playing, in a loop."""
+        if self.playing and self.history is not None and self.history.maps:
+            self.step.value = (int(self.step.value) + 1) % len(self.history.maps)
 
     def _toggle(self) -> None:
         self.playing = not self.playing
         self.play.label = "Stop" if self.playing else "Play"
 
     def _read(self, result: Any) -> None:
-        if isinstance(result, Refused):
-            self.status.text = sentences([result.sentence], "alarm")
+        if isinstance(result, JobFailure):
+            self.status.text = sentences([result.message], "alarm")
             return
-        moved: Moved = result
-        self.moved = moved
-        self.verdict.text, self.notes.text = sentences([moved.verdict]), notes(moved.notes)
-        self._draw_curves(moved)
-        if not moved.pictures:
-            self.status.text = sentences(["No maps were kept of this history."], "soft")
+        history: HistoryData = result
+        self.history = history
+        self.verdict.text, self.notes.text = sentences([history.verdict]), notes(history.notes)
+        self._draw_curves(history)
+        if not history.maps:
+            self.status.text = sentences(["This history has no stored maps."], "soft")
             return
-        self.step.update(start=0, end=max(1, len(moved.pictures) - 1))
+        self.step.update(start=0, end=max(1, len(history.maps) - 1))
         self._show(0)
 
-    def _draw_curves(self, moved: Moved) -> None:
-        clock = quantity(moved.clock)
-        time = moved.time * clock.factor
-        across = Range1d(float(time[0]), float(time[-1]) or 1.0)
+    def _draw_curves(self, history: HistoryData) -> None:
+        clock = quantity(history.clock)
+        time = history.time * clock.factor
+        time_range = Range1d(float(time[0]), float(time[-1]) or 1.0)
         figures = []
-        for key, values in moved.curves.items():
-            made = plain_figure(
-                "", key, label=f"{quantity(key).title} over time", height=170, x_range=across
+        for key, values in history.curves.items():
+            plot = plain_figure(
+                "", key, label=f"{quantity(key).title} over time", height=170, x_range=time_range
             )
-            made.line(
-                "x", "y", source=ColumnDataSource({"x": time, "y": shown(key, values)}), color=BLUE
+            plot.line(
+                "x",
+                "y",
+                source=ColumnDataSource({"x": time, "y": to_display(key, values)}),
+                color=BLUE,
             )
             self._now.append(
                 Span(dimension="height", line_color=VERMILION, line_dash="dashed", location=0.0)
             )
-            made.add_layout(self._now[-1])
-            figures.append(made)
+            plot.add_layout(self._now[-1])
+            figures.append(plot)
         if figures:
             figures[-1].xaxis.axis_label = clock.axis
         self.curves.children = figures
 
     def _show(self, place: int) -> None:
-        """Draw the maps of a kept step."""
-        moved = self.moved
-        if moved is None or not 0 <= place < len(moved.pictures):
+        """Draw the maps of a frame."""
+        history = self.history
+        if history is None or not 0 <= place < len(history.maps):
             return
-        clock = quantity(moved.clock)
-        at = moved.times[place] * clock.factor
-        told = f"{moved.names[place]}, {at:.4g} {clock.display}, map {place + 1} of {len(moved.pictures)}"
-        self.step.tags = ["Step", moved.names[place]]
-        self.pictures.make()
-        self.pictures.show(moved.pictures[place])
+        clock = quantity(history.clock)
+        time = history.times[place] * clock.factor
+        position = f"map {place + 1} of {len(history.maps)}"
+        caption = f"{history.names[place]}, {time:.4g} {clock.display}, {position}"
+        self.step.tags = ["Step", history.names[place]]
+        self.maps.make()
+        self.maps.show(history.maps[place])
         for mark in self._now:
-            mark.location = at
-        self.status.text = sentences([told], "soft")
+            mark.location = time
+        self.status.text = sentences([caption], "soft")
 
 
 def layout(view: HistoryView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """The parts of the page by name, and the sections that they stand in."""
+    """Return the parts of the page by name, and the sections that contain them."""
     parts = {
         "step": view.step,
         "play": view.play,
         "status": view.status,
         "verdict": view.verdict,
-        "film": view.pictures.film,
-        "pressure": view.pictures.pressure,
-        "cutpressure": view.pictures.cut_pressure,
-        "cutfilm": view.pictures.cut_film,
+        "film": view.maps.film,
+        "pressure": view.maps.pressure,
+        "cutpressure": view.maps.cut_pressure,
+        "cutfilm": view.maps.cut_film,
         "curves": view.curves,
         "notes": view.notes,
     }
-    key = (("touching", "asperity contact"), ("ruptured", "no pressure"), ("hertz", "Hertz zone"))
-    shown_parts = [
+    key = (("touching", "asperity contact"), ("cavitated", "no pressure"), ("hertz", "Hertz zone"))
+    results = [
         {"names": ["verdict"], "first": True},
         {"names": ["status"], "live": True, "first": True},
         {"names": ["film", "pressure"], "key": key, "first": True},
@@ -140,9 +144,9 @@ def layout(view: HistoryView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     ]
     return parts, [
         {
-            "kind": "knobs",
+            "kind": "inputs",
             "label": "Steps",
             "blocks": [{"names": ["step"], "heading": "Steps"}, {"names": ["play"]}],
         },
-        {"kind": "shown", "label": "The history", "blocks": shown_parts},
+        {"kind": "results", "label": "History", "blocks": results},
     ]

@@ -1,60 +1,62 @@
-"""Pictures: maps of a contact and a cut through them, in places that are kept until they are made.
+"""Maps and section of a contact, with placeholders until they are created.
 
-Figures are most of a page's models. They are made when the page is there already, so that nobody
-waits for them.
+The figures are created after the page has loaded, because they take most of the time.
 """
 
 from collections.abc import Callable, Iterator
 
 from bokeh.models import Column
 
-from asperity.app.contact_result import Picture
-from asperity.app.figures import CUT_HEIGHT, HEIGHT, Cut, Maps
+from asperity.app.contact_result import ContactMaps
+from asperity.app.figures import HEIGHT, SECTION_HEIGHT, MapFigures, SectionFigures
 from asperity.core.quantities import quantity
 
 
-def place(height: int) -> Column:
-    """Where a figure will stand, so that nothing moves when it comes."""
+def placeholder(height: int) -> Column:
+    """Reserve the space of a figure, so that the page does not shift when it arrives."""
     return Column(sizing_mode="stretch_width", min_height=height)
 
 
-class Pictures:
-    """Maps and a cut, drawn as far as they are made; a click on a map moves the cut."""
+class MapImages:
+    """Maps and section of a contact; a click on a map moves the section."""
 
     def __init__(self) -> None:
-        self.film, self.pressure = place(HEIGHT), place(HEIGHT)
+        self.film, self.pressure = placeholder(HEIGHT), placeholder(HEIGHT)
         self.change = Column(sizing_mode="stretch_width", visible=False)
-        self.cut_pressure, self.cut_film = place(CUT_HEIGHT), place(CUT_HEIGHT)
-        self._maps: Maps | None = None
-        self._cut: Cut | None = None
-        self._shown: tuple[Picture, Picture | None] | None = None
+        self.cut_pressure, self.cut_film = (
+            placeholder(SECTION_HEIGHT),
+            placeholder(SECTION_HEIGHT),
+        )
+        self._maps: MapFigures | None = None
+        self._cut: SectionFigures | None = None
+        self._shown: tuple[ContactMaps, ContactMaps | None] | None = None
         self._y = 0.0
 
     def steps(self) -> Iterator[Callable[[], None]]:
-        """What is to be done to make them, one after another."""
+        """Yield the functions that create the figures, in order."""
         yield self._make_maps
         yield self._make_cut
 
     def make(self) -> None:
-        """Make them, where they are not yet."""
+        """Create the figures if they do not exist yet."""
         if self._cut is None:
             for step in self.steps():
                 step()
 
-    def show(self, picture: Picture, pinned: Picture | None = None) -> None:
-        """Draw a contact, and how it differs from a pinned one."""
-        self._shown = picture, pinned
+    def show(self, contact_maps: ContactMaps, pinned: ContactMaps | None = None) -> None:
+        """Draw a contact, and its difference to a pinned one."""
+        self._shown = contact_maps, pinned
         self._draw_maps()
         self._draw_cut()
 
     def _make_maps(self) -> None:
-        self._maps = Maps(self._cut_at)
+        self._maps = MapFigures(self._cut_at)
         self.film.children, self.pressure.children = [self._maps.film], [self._maps.pressure]
         self._draw_maps()
 
     def _make_cut(self) -> None:
         assert self._maps is not None
-        self._cut = Cut(self._maps)
+        self._cut = SectionFigures(self._maps)
         self.cut_pressure.children, self.cut_film.children = [self._cut.pressure], [self._cut.film]
         self._draw_cut()
 
@@ -70,10 +72,10 @@ class Pictures:
     def _draw_cut(self) -> None:
         if self._maps is None or self._cut is None or self._shown is None:
             return
-        picture, pinned = self._shown
-        self._y = float(picture.y[picture.line(self._y)])
+        contact_maps, pinned = self._shown
+        self._y = float(contact_maps.y[contact_maps.nearest_row(self._y)])
         self._maps.cut(self._y)
-        self._cut.show(picture, pinned, self._y)
+        self._cut.show(contact_maps, pinned, self._y)
 
     def _cut_at(self, y: float) -> None:
         self._y = y / quantity("y_m").factor

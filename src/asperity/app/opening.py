@@ -1,11 +1,11 @@
-"""What the page is opened with: a case, a kept run, the folder of a study, a history, wear or recordings; nothing."""
+"""Opening of the page with a case, a run, or the folder of a study, history or recordings."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from asperity.app.contact_jobs import open_run
-from asperity.app.contact_result import Answer
-from asperity.app.settings import require_few
+from asperity.app.contact_result import ContactResult
+from asperity.app.settings import limit_cells
 from asperity.case import Case, load_case
 from asperity.core.errors import UnreadableFile
 from asperity.core.storage import MANIFEST
@@ -13,58 +13,56 @@ from asperity.paper import papers_case
 from asperity.simulation import is_history_folder, is_wear_folder, load_history, load_wear
 from asperity.study import load_study
 
-FIRST = {
-    "grid.cells": [192, 128]
-}  # of the paper's contact, where nothing is named; 128 x 128 cannot tell its CLR
+DEFAULT_GRID = {"grid.cells": [192, 128]}  # 128 x 128 cells do not determine the paper's CLR
 
 
 @dataclass(frozen=True, kw_only=True)
-class Opened:
-    """What is looked at: which page comes first, its name, the contact, and the path of what else there is.
+class OpenedPage:
+    """First page, its name, the contact's case, and the path of a folder.
 
-    `answer` is the contact's where it is solved already. `stated` says whether the case was named,
-    and not the paper's.
+    `result` is the result of a stored run. `stated` is True if the user named the case.
     """
 
     kind: str
     name: str
     case: Case
-    answer: Answer | None = None
+    result: ContactResult | None = None
     path: Path | None = None
     stated: bool = False
 
 
-def paper() -> Case:
-    """The paper's contact on cells that are solved while one waits."""
-    return papers_case().with_overrides(FIRST)
+def default_case() -> Case:
+    """Return the contact of the paper on a grid that is quick to solve."""
+    return papers_case().with_overrides(DEFAULT_GRID)
 
 
-def open_page(what: Path | None) -> Opened:
-    """Read what the page is opened with.
+def open_page(path: Path | None) -> OpenedPage:
+    """Open a case file, a run file or a folder; the contact of the paper for None.
 
     Raises
     ------
     UnreadableFile
-        for a path that leads nowhere, or to a file that is neither a case nor a run.
+        if the path does not exist, or is neither a case nor a run.
     BadInput
-        for a case that is refused.
+        for an invalid case.
     """
-    if what is None:
-        return Opened(kind="contact", name="the paper's contact", case=paper())
-    if what.is_dir():
-        if is_history_folder(what):
-            return Opened(kind="history", name=what.name, case=load_history(what).case, path=what)
-        if is_wear_folder(what):
-            return Opened(kind="history", name=what.name, case=load_wear(what).case, path=what)
-        if (what / MANIFEST).is_file():
-            return Opened(kind="study", name=what.name, case=load_study(what).plan.case, path=what)
-        return Opened(kind="recordings", name=what.name, case=paper(), path=what)
-    if not what.exists():
-        raise UnreadableFile(f"{what} does not exist; check its name")
-    if what.suffix == ".nc":
-        case, answer = open_run(what)
-        return Opened(kind="contact", name=what.name, case=case, answer=answer, stated=True)
-    case = load_case(what)
+    if path is None:
+        return OpenedPage(kind="contact", name="contact of the paper", case=default_case())
+    name = path.name
+    if path.is_dir():
+        if is_history_folder(path):
+            return OpenedPage(kind="history", name=name, case=load_history(path).case, path=path)
+        if is_wear_folder(path):
+            return OpenedPage(kind="history", name=name, case=load_wear(path).case, path=path)
+        if (path / MANIFEST).is_file():
+            return OpenedPage(kind="study", name=name, case=load_study(path).plan.case, path=path)
+        return OpenedPage(kind="recordings", name=name, case=default_case(), path=path)
+    if not path.exists():
+        raise UnreadableFile(f"{path} does not exist; check its name")
+    if path.suffix == ".nc":
+        case, result = open_run(path)
+        return OpenedPage(kind="contact", name=name, case=case, result=result, stated=True)
+    case = load_case(path)
     if case.contents.grid.cells != "auto":
-        require_few(case.source, case.contents.grid.cells)
-    return Opened(kind="contact", name=what.name, case=case, stated=True)
+        limit_cells(case.source, case.contents.grid.cells)
+    return OpenedPage(kind="contact", name=name, case=case, stated=True)

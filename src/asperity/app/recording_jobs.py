@@ -1,4 +1,4 @@
-"""What workers do with recordings: a series or a folder read, judged and made small enough to be drawn."""
+"""Jobs of worker processes: track dropped recordings or a watched folder for the page."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from asperity.app.contact_jobs import Ticket
+from asperity.app.contact_result import group_means
 from asperity.case import Case
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
@@ -20,9 +21,9 @@ from asperity.monitoring import (
     watch_folder,
 )
 
-MOST_LINES = 600  # of a spectrum that is drawn
-MOST_ROWS = 400  # recordings of a waterfall
-SETTLE_S = 2.0  # for which a file must have stayed as it is
+MAX_LINES = 600  # of a spectrum
+MAX_ROWS = 400  # recordings of a waterfall
+SETTLE_S = 2.0  # time for which a file must not have changed
 FIELDS = {
     "give rate_hz": "give the sampling rate",
     "give case or band_hz": "give the band",
@@ -30,8 +31,8 @@ FIELDS = {
 }
 
 
-class Stated(NamedTuple):
-    """What was typed about the recordings; None leaves it to the files."""
+class RecordingInputs(NamedTuple):
+    """Typed properties of the recordings; None: as stated by the files."""
 
     rate_hz: float | None = None
     unit: str | None = None
@@ -39,8 +40,8 @@ class Stated(NamedTuple):
     band_hz: tuple[float, float] | None = None
 
 
-class Ear(NamedTuple):
-    """A recording's spectrum as it is drawn: frequencies [Hz], density, the fitted curve (empty without one)."""
+class RecordingSpectrum(NamedTuple):
+    """Spectrum of a recording: frequencies [Hz], density and fitted curve (empty without fit)."""
 
     frequency: Field
     density: Field
@@ -49,12 +50,12 @@ class Ear(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Heard:
+class RecordingSeries:
     """A series of recordings as the page shows it.
 
-    `rows` as `asperity track --json` has them. `levels` [dB over the recording's median], shape
-    (recordings, lines) at `frequency` [Hz]; `ears` a spectrum each, None for a file without one.
-    `split` and its interval, in units of x, are None where no stage was told.
+    `rows` are those of `asperity track --json`; `levels` [dB over the recording's median], shape
+    (recordings, lines) at `frequency` [Hz]; `spectra` one per recording, None for a file without.
+    `split` and its interval, in units of x, are None without a split.
     """
 
     verdict: str
@@ -67,33 +68,41 @@ class Heard:
     interval: tuple[float, float] | None
     frequency: Field
     levels: Field
-    ears: tuple[Ear | None, ...]
+    spectra: tuple[RecordingSpectrum | None, ...]
     notes: tuple[str, ...]
     waiting: int = 0
 
 
-def hear_files(ticket: Ticket, paths: Sequence[Path], stated: Stated, case: Case | None) -> Heard:  # noqa: ARG001
-    """Recordings that were dropped, judged as one series."""
+def track_files(
+    ticket: Ticket,  # noqa: ARG001
+    paths: Sequence[Path],
+    stated: RecordingInputs,
+    case: Case | None,
+) -> RecordingSeries:
+    """Track dropped recordings as one series."""
     try:
         track = track_recordings(
             paths,
             TrackSettings(**stated._asdict()),
             case=case,
         )
-    except BadInput as refusal:
-        raise BadInput(_on_the_page(str(refusal))) from None
-    return heard_of(track)
+    except BadInput as error:
+        raise BadInput(_name_page_fields(str(error))) from None
+    return series_of_track(track)
 
 
-def hear_folder(
+def track_folder(
     ticket: Ticket,  # noqa: ARG001
     folder: Path,
     memory: Path,
-    stated: Stated,
+    stated: RecordingInputs,
     case: Case | None,
-) -> Heard | None:
-    """A folder as it is now, what was read before kept in `memory`; None as long as nothing of it can be read."""
-    looks = watch_folder(
+) -> RecordingSeries | None:
+    """Track a folder in its current state; None without readable recordings.
+
+    `memory` is the folder that keeps what was read before.
+    """
+    updates = watch_folder(
         folder,
         memory,
         TrackSettings(**stated._asdict()),
@@ -101,25 +110,26 @@ def hear_folder(
         case=case,
     )
     try:
-        update = next(looks)
-    except BadInput as refusal:
-        raise BadInput(_on_the_page(str(refusal))) from None
-    return None if update.track is None else heard_of(update.track, update.waiting)
+        update = next(updates)
+    except BadInput as error:
+        raise BadInput(_name_page_fields(str(error))) from None
+    return None if update.track is None else series_of_track(update.track, update.waiting)
 
 
-def _on_the_page(sentence: str) -> str:
-    for asked, field in FIELDS.items():
-        sentence = sentence.replace(asked, field)
-    return sentence
+def _name_page_fields(message: str) -> str:
+    """Replace names of arguments in a message by names of fields of the page."""
+    for argument, field in FIELDS.items():
+        message = message.replace(argument, field)
+    return message
 
 
-def heard_of(track: Track, waiting: int = 0) -> Heard:
-    """A track as the page shows it."""
+def series_of_track(track: Track, waiting: int = 0) -> RecordingSeries:
+    """Return a track as the page shows it."""
     stages = track.stages
     found = stages is not None and stages.found
-    ears = tuple(map(_ear, track.recordings))
-    frequency, levels = _waterfall(ears)
-    return Heard(
+    spectra = tuple(map(_spectrum, track.recordings))
+    frequency, levels = _waterfall(spectra)
+    return RecordingSeries(
         verdict=track.verdict(),
         alarm=track.alarm.state,
         rows=tuple(
@@ -132,47 +142,41 @@ def heard_of(track: Track, waiting: int = 0) -> Heard:
         interval=stages.interval if found and stages is not None else None,
         frequency=frequency,
         levels=levels,
-        ears=ears,
-        notes=tuple(map(_on_the_page, (*track.problems, *track.notes))),
+        spectra=spectra,
+        notes=tuple(map(_name_page_fields, (*track.problems, *track.notes))),
         waiting=waiting,
     )
 
 
-def _ear(recording: TrackedRecording) -> Ear | None:
-    """A recording's spectrum, the means of neighbours where it has more lines than are seen."""
+def _spectrum(recording: TrackedRecording) -> RecordingSpectrum | None:
+    """Return the spectrum of a recording, averaged over neighbouring lines if there are many."""
     spectrum = recording.reading.spectrum if recording.clean is None else recording.clean.spectrum
     if spectrum is None:
         return None
-    together = -(-spectrum.density.size // MOST_LINES)
+    group_size = -(-spectrum.density.size // MAX_LINES)
     frequency, density = (
-        _means(values, together) for values in (spectrum.frequency_hz, spectrum.density)
+        group_means(values, group_size) for values in (spectrum.frequency_hz, spectrum.density)
     )
     resonance = recording.resonance
     low, high = resonance.band_hz
     inside = (frequency >= low) & (frequency <= high)
     fitted = resonance.found and np.isfinite(resonance.damping_ratio)
     curve = np.where(inside, resonance.curve(frequency), np.nan) if fitted else np.empty(0)
-    return Ear(frequency, density, curve, spectrum.unit)
+    return RecordingSpectrum(frequency, density, curve, spectrum.unit)
 
 
-def _means(values: Field, together: int) -> Field:
-    return np.asarray(
-        values[: values.size // together * together].reshape(-1, together).mean(axis=1)
-    )
-
-
-def _waterfall(ears: Sequence[Ear | None]) -> tuple[Field, Field]:
-    """Frequencies [Hz] and levels over each recording's median [dB], on the first spectrum's frequencies."""
-    first = next((ear for ear in ears if ear is not None), None)
+def _waterfall(spectra: Sequence[RecordingSpectrum | None]) -> tuple[Field, Field]:
+    """Return the first spectrum's frequencies [Hz] and levels over each median [dB]."""
+    first = next((spectrum for spectrum in spectra if spectrum is not None), None)
     if first is None:
         return np.empty(0), np.empty((0, 0))
-    every = -(-len(ears) // MOST_ROWS)
+    stride = -(-len(spectra) // MAX_ROWS)
     rows = []
-    for ear in ears[::every]:
-        if ear is None:
+    for spectrum in spectra[::stride]:
+        if spectrum is None:
             rows.append(np.full(first.frequency.size, np.nan))
             continue
-        density = np.interp(first.frequency, ear.frequency, ear.density)
-        typical = float(np.median(density[density > 0.0])) if (density > 0.0).any() else 1.0
-        rows.append(10.0 * np.log10(np.maximum(density / typical, 1e-6)))
+        density = np.interp(first.frequency, spectrum.frequency, spectrum.density)
+        median = float(np.median(density[density > 0.0])) if (density > 0.0).any() else 1.0
+        rows.append(10.0 * np.log10(np.maximum(density / median, 1e-6)))
     return first.frequency, np.array(rows, dtype=np.float32)

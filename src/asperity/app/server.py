@@ -1,4 +1,4 @@
-"""The server: on this machine alone unless asked otherwise, one document a visit, nothing fetched from elsewhere."""
+"""Server of the live page: local by default, one document per visit, no external resources."""
 
 import ipaddress
 import logging
@@ -23,39 +23,35 @@ from asperity.app import history_page as history
 from asperity.app import recordings_page as recordings
 from asperity.app import study_page as study
 from asperity.app.contact_jobs import ReportWriter
-from asperity.app.jobs import Workshop
-from asperity.app.opening import Opened
-from asperity.app.session_cleanup import LOOK_MS as SWEPT_MS
-from asperity.app.session_cleanup import Sweeper, settle
+from asperity.app.jobs import WorkerPool
+from asperity.app.opening import OpenedPage
+from asperity.app.session_cleanup import CLEANUP_MS, SessionSweeper, freeze_objects
 from asperity.app.settings import Settings
-from asperity.app.surface_store import Shelf
+from asperity.app.surface_store import SurfaceStore
 from asperity.core.errors import BadInput
 
-HERE = "127.0.0.1"
+LOCALHOST = "127.0.0.1"
 PORT = 5006
 PASSWORD = "ASPERITY_PAGE_PASSWORD"
-USER = "asperity"  # under whom everybody comes in; the page for the password says so
-SHORTEST = 8  # characters of a password
-LOOK_MS, FRAME_MS = 5000, 250  # between two looks at a folder, and two steps of a history
-READY_MS = (
-    4000  # after which figures are made, whether or not the browser has said that it has the page
-)
-# for a visitor that has not come yet: without the document it was sent it would see an empty page
-WAIT_MS = 120_000
-PING_S = 120  # between two questions whether a visitor is still there, who has as long to answer
-MESSAGE = 24_000_000  # bytes that a browser may send at a time
+USER = "asperity"  # common user name, fixed in the login form
+MIN_PASSWORD = 8  # characters
+FOLDER_CHECK_MS, FRAME_MS = 5000, 250  # intervals of folder checks, and of frames of a history
+READY_MS = 4000  # figures are created after this time even without a ready event
+UNUSED_MS = 120_000  # lifetime of a session before its browser connects
+PING_S = 120  # interval of keep-alive pings, and the time to answer
+MAX_MESSAGE = 24_000_000  # bytes that a browser may send at a time
 
 
 def origins(address: str, port: int) -> list[str]:
-    """Hosts whose pages may talk to the server: itself by the names that it has."""
-    names = {HERE, "localhost"} if _local(address) else {address}
+    """Return the permitted websocket origins: the names of this server."""
+    names = {LOCALHOST, "localhost"} if _is_local(address) else {address}
     if address in ("0.0.0.0", "::"):
-        names = {HERE, "localhost", socket.gethostname()}
-        names |= {str(found[4][0]) for found in socket.getaddrinfo(socket.gethostname(), None)}
+        names = {LOCALHOST, "localhost", socket.gethostname()}
+        names |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None)}
     return sorted(f"[{name}]:{port}" if ":" in name else f"{name}:{port}" for name in names)
 
 
-def _local(address: str) -> bool:
+def _is_local(address: str) -> bool:
     try:
         return ipaddress.ip_address(address).is_loopback
     except ValueError:
@@ -63,20 +59,21 @@ def _local(address: str) -> bool:
 
 
 def password_for(address: str) -> str | None:
-    """The password that others have to know; None on this machine alone. BadInput where there has to be one."""
-    if _local(address):
+    """Return the password for remote access, None for a local address; BadInput if missing."""
+    if _is_local(address):
         return None
-    given = os.environ.get(PASSWORD, "")
-    if len(given) < SHORTEST:
+    password = os.environ.get(PASSWORD, "")
+    if len(password) < MIN_PASSWORD:
         raise BadInput(
-            f"--listen {address} lets others in, who need a password; put one of at least {SHORTEST} characters into "
-            f"the environment variable {PASSWORD}, or leave --listen out"
+            f"--listen {address} allows remote access, which requires a password; set the "
+            f"environment variable {PASSWORD} to at least {MIN_PASSWORD} characters, or omit "
+            "--listen"
         )
-    return given
+    return password
 
 
 def require_free(address: str, port: int) -> int:
-    """The port, or any that is free for 0; BadInput where it cannot be had."""
+    """Return the port, or a free one for 0; raise BadInput if it is not available."""
     try:
         with socket.socket(socket.AF_INET6 if ":" in address else socket.AF_INET) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -96,15 +93,17 @@ _BLOCK: dict[str, Any] = {
     "live": False,
     "first": False,
     "key": (),
-}  # of a page, where it says no more
+}  # defaults of a block of a page
 
 
-class House:
-    """All pages of one server, and the processes that work for them."""
+class PageSite:
+    """All pages of one server, and their worker processes."""
 
-    def __init__(self, opened: Opened, workshop: Workshop, write_report: ReportWriter) -> None:
-        self.opened, self.workshop, self.write_report = opened, workshop, write_report
-        self.shelf = Shelf()
+    def __init__(
+        self, opened: OpenedPage, worker_pool: WorkerPool, write_report: ReportWriter
+    ) -> None:
+        self.opened, self.worker_pool, self.write_report = opened, worker_pool, write_report
+        self.surfaces = SurfaceStore()
         panel.extension("filedropper", notifications=False)
         self.template = files("asperity.app").joinpath("page.html.j2").read_text("utf-8")
         self.style = files("asperity.app").joinpath("style.css").read_text("utf-8")
@@ -113,70 +112,72 @@ class House:
             self.places.append((opened.kind, opened.kind.capitalize()))
 
     def close(self) -> None:
-        """Let go of what was dropped."""
-        self.shelf.close()
+        """Remove the dropped files."""
+        self.surfaces.close()
 
     def contact(self) -> Any:
-        """The page of a contact, for one visit."""
+        """Create the page of a contact for one visit."""
         view = contact.ContactView(
             Settings(self.opened.case),
-            self.workshop,
+            self.worker_pool,
             _deliver(),
             _address(),
             self.write_report,
-            self.shelf,
+            self.surfaces,
         )
         parts, sections = contact.layout(view)
-        view.begin(_query(), self.opened.answer)
-        _document().on_event("document_ready", lambda _event: view.furnish())
-        _document().add_timeout_callback(view.furnish, READY_MS)  # a browser may never say so
-        _document().js_on_event("document_ready", view.old.tell)
+        view.begin(_query(), self.opened.result)
+        _document().on_event("document_ready", lambda _event: view.create_next_figure())
+        _document().add_timeout_callback(
+            view.create_next_figure, READY_MS
+        )  # in case the event never arrives
+        _document().js_on_event("document_ready", view.stale_mark.update_page)
         panel.state.on_session_destroyed(lambda _context: view.close())
         return self._page("contact", "Contact", parts, sections)
 
     def recordings(self) -> Any:
-        """The page of recordings, for one visit."""
+        """Create the page of recordings for one visit."""
         folder = self.opened.path if self.opened.kind == "recordings" else None
         case = self.opened.case if self.opened.stated else None
-        view = recordings.RecordingsView(folder, case, self.workshop, _deliver())
+        view = recordings.RecordingsView(folder, case, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         if folder is not None:
-            _document().add_periodic_callback(view.look, LOOK_MS)
+            _document().add_periodic_callback(view.look, FOLDER_CHECK_MS)
             view.look()
         return self._page("recordings", "Recordings", *recordings.layout(view))
 
     def study(self) -> Any:
-        """The page of a study, for one visit."""
+        """Create the page of a study for one visit."""
         assert self.opened.path is not None
-        view = study.StudyView(self.opened.path, self.opened.case, self.workshop, _deliver())
+        view = study.StudyView(self.opened.path, self.opened.case, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         view.begin()
         return self._page("study", "Study", *study.layout(view))
 
     def history(self) -> Any:
-        """The page of a history, for one visit."""
+        """Create the page of a history for one visit."""
         assert self.opened.path is not None
-        view = history.HistoryView(self.opened.path, self.workshop, _deliver())
+        view = history.HistoryView(self.opened.path, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         _document().add_periodic_callback(view.advance, FRAME_MS)
         view.begin()
         return self._page("history", "History", *history.layout(view))
 
     def pages(self) -> dict[str, Callable[[], Any]]:
-        """The pages by their places."""
-        made = {
+        """Return the functions that create the pages, by path."""
+        creators = {
             "contact": self.contact,
             "recordings": self.recordings,
             "study": self.study,
             "history": self.history,
         }
-        return {name: made[name] for name, _ in self.places}
+        return {name: creators[name] for name, _ in self.places}
 
     def _page(
         self, here: str, heading: str, parts: dict[str, Any], sections: list[dict[str, Any]]
     ) -> Any:
         page, document = panel.Template(self.template, location=True), _document()
-        with document.models.freeze():  # the models are counted once, and not after every part
+        with document.models.freeze():  # update the model list once, not after every part
             for name, part in parts.items():
                 if isinstance(part, UIElement):
                     part.name = name
@@ -185,41 +186,39 @@ class House:
                     page.add_panel(name, part)
         for section in sections:
             section["blocks"] = [{**_BLOCK, **block} for block in section["blocks"]]
-        told = {
+        variables = {
             "heading": heading,
             "here": here,
             "places": self.places,
             "sections": sections,
             "style": self.style,
-        }
-        for name, value in {
-            **told,
             "kind": here,
             "foot": f"asperity {version('asperity')}, {self.opened.name}",
-        }.items():
+        }
+        for name, value in variables.items():
             page.add_variable(name, value)
         return page
 
 
-class _NobodyListens(logging.Filter):
-    """Passes over what libraries say of a visitor that left in the middle of a message."""
+class _DisconnectFilter(logging.Filter):
+    """Drops log records about visitors that disconnect during a message."""
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether a record is told."""
+        """Return True for a record to keep."""
         return not (
             record.exc_info and record.exc_info[0] in (WebSocketClosedError, StreamClosedError)
         )
 
 
-def _quieten() -> None:
-    """Let the terminal hear of mistakes, not of visitors that come and go."""
-    logging.getLogger("asyncio").addFilter(_NobodyListens())
+def _limit_logging() -> None:
+    """Log errors, not connections and disconnections."""
+    logging.getLogger("asyncio").addFilter(_DisconnectFilter())
     for name in ("bokeh.server.views.ws", "tornado.access"):
         logging.getLogger(name).setLevel(logging.ERROR)
 
 
 def _deliver() -> Callable[[Callable[[], None]], None]:
-    """What lets a function run under the lock of the document that is being made, from any thread."""
+    """Return a function that runs others under the lock of the current document, thread-safe."""
     document = _document()
 
     def deliver(function: Callable[[], None]) -> None:
@@ -230,22 +229,22 @@ def _deliver() -> Callable[[Callable[[], None]], None]:
 
 
 def _document() -> Any:
-    """The document that is being made."""
+    """Return the document of the current visit."""
     return panel.state.curdoc
 
 
 def _address() -> Callable[[str], None]:
-    """What puts a query into the address of the browser that is visiting."""
+    """Return a function that sets the query of the browser's address."""
     location = panel.state.location
 
-    def put(query: str) -> None:
+    def set_query(query: str) -> None:
         location.search = f"?{query}" if query else ""
 
-    return put
+    return set_query
 
 
 def _query() -> str:
-    """The query of the visit's address."""
+    """Return the query of the visit's address."""
     pairs = [
         (name, value.decode("utf-8", "replace"))
         for name, values in panel.state.session_args.items()
@@ -256,10 +255,10 @@ def _query() -> str:
 
 
 def serve_page(
-    opened: Opened,
+    opened: OpenedPage,
     *,
     port: int = PORT,
-    listen: str = HERE,
+    listen: str = LOCALHOST,
     ready: Callable[[str], None],
     write_report: ReportWriter,
 ) -> None:
@@ -267,33 +266,31 @@ def serve_page(
 
     Parameters
     ----------
-    opened : what is looked at
-    port : 0 for any that is free
-    listen : address to listen on; one that others can reach needs a password, in `ASPERITY_PAGE_PASSWORD`
-    ready : called with the page's address when it can be visited
-    write_report : makes the page of a run, `asperity.report.write_report`
+    opened : from `open_page`
+    port : 0 for a free one
+    listen : address to listen on; remote access needs a password in `ASPERITY_PAGE_PASSWORD`
+    ready : called with the address of the page when it is available
+    write_report : writes the report of a run, `asperity.report.write_report`
 
     Raises
     ------
     BadInput
-        for a port that is taken, an address that is none of this machine's, no password where there has to be one.
+        for a port in use, an address of another machine, or a missing password.
     """
-    _quieten()
+    _limit_logging()
     password = password_for(listen)
     port = require_free(listen, port)
-    workshop = Workshop()
-    house = House(opened, workshop, write_report)
+    worker_pool = WorkerPool()
+    site = PageSite(opened, worker_pool, write_report)
     try:
-        workshop.warm()
-        guarded: dict[str, Any] = {}
-        if (
-            password is not None
-        ):  # by a name of its own: Panel would take a password alone for a file's, if there is one
-            login = str(files("asperity.app").joinpath("login.html.j2"))
-            guarded = {"basic_auth": {USER: password}, "basic_login_template": login}
-            guarded["cookie_secret"] = secrets.token_hex(32)
+        worker_pool.warm_up()
+        login: dict[str, Any] = {}
+        if password is not None:  # with a user name: Panel may take a bare password for a file name
+            template = str(files("asperity.app").joinpath("login.html.j2"))
+            login = {"basic_auth": {USER: password}, "basic_login_template": template}
+            login["cookie_secret"] = secrets.token_hex(32)
         server = panel.serve(
-            house.pages(),
+            site.pages(),
             port=port,
             address=listen,
             websocket_origin=origins(listen, port),
@@ -303,19 +300,19 @@ def serve_page(
             title="asperity",
             use_index=False,
             extra_patterns=[("/", RedirectHandler, {"url": f"/{opened.kind}", "permanent": False})],
-            # Bokeh's own takes the session from a socket that has still to close
+            # Bokeh's keep-alive removes the session of a socket that is still closing
             keep_alive_milliseconds=0,
             websocket_ping_interval=PING_S,
-            check_unused_sessions_milliseconds=SWEPT_MS,
-            unused_session_lifetime_milliseconds=WAIT_MS,
-            websocket_max_message_size=MESSAGE,
-            **guarded,
+            check_unused_sessions_milliseconds=CLEANUP_MS,
+            unused_session_lifetime_milliseconds=UNUSED_MS,
+            websocket_max_message_size=MAX_MESSAGE,
+            **login,
         )
         server.start()
-        settle()
-        PeriodicCallback(Sweeper(server.get_sessions).look, SWEPT_MS).start()
+        freeze_objects()
+        PeriodicCallback(SessionSweeper(server.get_sessions).sweep, CLEANUP_MS).start()
         ready(f"http://{f'[{listen}]' if ':' in listen else listen}:{port}/")
         server.io_loop.start()
     finally:
-        workshop.close()
-        house.close()
+        worker_pool.close()
+        site.close()

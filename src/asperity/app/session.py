@@ -1,26 +1,25 @@
-"""Desk: one user's contact without its widgets: what is turned, what is solved, pinned and tried.
+"""Session of one visitor without widgets: settings, results, pinned contact and earlier results.
 
-A turned knob is answered twice, coarsely from the coarse solution before and in full: after that,
-or at the same time where a processor has nothing else to do. Whoever draws a desk is told when it
-changes.
+After a change the contact is solved twice: coarsely, from the previous coarse solution, and in
+full, at the same time if a worker is idle. A callback reports every change.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from asperity.app.contact_jobs import Coarse, Refused, solve_coarsely, solve_fully
-from asperity.app.contact_result import Answer
-from asperity.app.jobs import Queue
-from asperity.app.settings import Refusal, Settings
+from asperity.app.contact_jobs import CoarseResult, JobFailure, solve_coarsely, solve_fully
+from asperity.app.contact_result import ContactResult
+from asperity.app.jobs import JobQueue
+from asperity.app.settings import RejectedValue, Settings
 from asperity.ehl import ContactSolution
 
-MOST_TRIED = 200
+MAX_TRIALS = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
-    """A setting that was solved, and where it lies between roughness, load share and resonance."""
+class Trial:
+    """Settings that were solved, with roughness, load share and resonance."""
 
     settings: Settings
     sq: float
@@ -29,175 +28,176 @@ class Tried:
     determined: bool
 
 
-class Desk:
-    """A contact, its knobs and what became of it.
+class ContactSession:
+    """A contact with its settings and results.
 
     Parameters
     ----------
-    settings : what is set at first
-    queue : of coarse answers
-    changed : called whenever there is something new to draw
-    ahead : of full answers, which begins them early where it has room; None: `queue` takes them in their turn
+    settings : initial settings
+    queue : queue of coarse solutions
+    changed : called after every change
+    full_queue : queue of full solutions, started early if it has room; None: use `queue`
     """
 
     def __init__(
         self,
         settings: Settings,
-        queue: Queue,
+        queue: JobQueue,
         changed: Callable[[], None],
-        ahead: Queue | None = None,
+        full_queue: JobQueue | None = None,
     ) -> None:
         self.settings = settings
-        self.refusals: dict[str, Refusal] = {}
-        self.answer: Answer | None = None
+        self.rejected: dict[str, RejectedValue] = {}
+        self.result: ContactResult | None = None
         self.problem = ""
-        self.pinned: Answer | None = None
-        self.trail: list[Tried] = []
-        self._queue, self._changed, self._ahead = queue, changed, ahead
-        self.pending = False  # whether what is shown is not yet the contact that is asked for
-        self._begun = False  # whether the full answer is on its way
+        self.pinned: ContactResult | None = None
+        self.trials: list[Trial] = []
+        self._queue, self._changed, self._full_queue = queue, changed, full_queue
+        self.pending = False  # the full result of the current settings is not there yet
+        self._full_submitted = False
         self._start: ContactSolution | None = None
 
     @property
     def status(self) -> str:
-        """How far the contact is, in a sentence."""
-        if self.pending and self.answer is None:
+        """State of the solution as a sentence."""
+        if self.pending and self.result is None:
             return "Solving the first contact ..."
         if self.pending:
             return (
-                "Coarse answer, solving in full ..."
-                if self.answer and self._is_current
+                "Coarse solution, refining ..."
+                if self.result and self._is_current
                 else "Solving ..."
             )
         if self.problem:
             return f"Not solved: {self.problem}"
-        if self.answer is None:
+        if self.result is None:
             return ""
-        if not self.answer.converged:
-            return f"NOT CONVERGED, do not use: {self.answer.explained}"
-        nx, ny = self.answer.gap.shape
-        return f"Solved on {nx} × {ny} cells in {self.answer.seconds:.2f} s"
+        if not self.result.converged:
+            return f"NOT CONVERGED, do not use: {self.result.explained}"
+        nx, ny = self.result.gap.shape
+        return f"Solved on {nx} × {ny} cells in {self.result.seconds:.2f} s"
 
     @property
     def _is_current(self) -> bool:
-        return self.answer is not None and self.answer.text == self.settings.case.text
+        return self.result is not None and self.result.text == self.settings.case.text
 
     @property
     def stale(self) -> bool:
-        """Whether the picture is of another setting than the knobs'."""
-        return self.pending or bool(self.problem) or bool(self.refusals)
+        """True if the figures do not show the current settings."""
+        return self.pending or bool(self.problem) or bool(self.rejected)
 
     def solve(self) -> None:
-        """Have the contact solved as it is set."""
+        """Solve the contact with the current settings."""
         self.problem = ""
-        self.pending, self._begun = True, False
-        self._queue.ask(
-            (solve_coarsely, (self.settings.case, self._start)), self._if_still_set(self._coarsely)
+        self.pending, self._full_submitted = True, False
+        self._queue.submit(
+            (solve_coarsely, (self.settings.case, self._start)),
+            self._if_current(self._receive_coarse),
         )
-        if self._ahead is not None and self._ahead.has_room:
-            self._solve_fully(self._ahead)
+        if self._full_queue is not None and self._full_queue.has_room:
+            self._solve_fully(self._full_queue)
         self._changed()
 
-    def _solve_fully(self, queue: Queue) -> None:
-        self._begun = True
-        queue.ask((solve_fully, (self.settings.case,)), self._if_still_set(self._fully))
+    def _solve_fully(self, queue: JobQueue) -> None:
+        self._full_submitted = True
+        queue.submit((solve_fully, (self.settings.case,)), self._if_current(self._receive_full))
 
-    def _if_still_set(self, then: Callable[[Any], None]) -> Callable[[Any], None]:
-        """What is done with an answer, unless the knobs have been turned meanwhile: it is no answer to what is set."""
-        asked = self.settings
+    def _if_current(self, receive: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Return a callback that ignores results of settings that have changed since."""
+        submitted = self.settings
 
-        def told(result: Any) -> None:
-            if self.settings is asked:
-                then(result)
+        def callback(result: Any) -> None:
+            if self.settings is submitted:
+                receive(result)
 
-        return told
+        return callback
 
-    def turn(self, key: str, text: str) -> None:
-        """Set a knob and have the contact solved, or keep the sentence that says why it cannot be."""
-        turned = self.settings.turned(key, text)
-        if isinstance(turned, Refusal):
-            self.refusals[key] = turned
+    def change(self, key: str, text: str) -> None:
+        """Change an input and solve the contact, or store the error of an invalid value."""
+        changed = self.settings.with_value(key, text)
+        if isinstance(changed, RejectedValue):
+            self.rejected[key] = changed
             self._changed()
             return
-        refused = self.refusals.pop(key, None)
-        if turned.changes == self.settings.changes:
-            if refused is not None:
+        previous_error = self.rejected.pop(key, None)
+        if changed.changes == self.settings.changes:
+            if previous_error is not None:
                 self._changed()
             return
-        self.settings = turned
+        self.settings = changed
         self.solve()
 
     def go_to(self, query: str) -> list[str]:
-        """Set all knobs as an address says; a sentence for each part of it that was left out."""
+        """Apply the settings of an address; return a note for each part that was ignored."""
         self.settings, notes = self.settings.from_address(query)
-        self.refusals.clear()
+        self.rejected.clear()
         self.solve()
         return notes
 
     def go_back(self, number: int) -> None:
-        """Set everything as it was for a setting that was tried."""
-        if 0 <= number < len(self.trail) and self.trail[number].settings is not self.settings:
-            self.settings = self.trail[number].settings
-            self.refusals.clear()
+        """Restore the settings of an earlier result."""
+        if 0 <= number < len(self.trials) and self.trials[number].settings is not self.settings:
+            self.settings = self.trials[number].settings
+            self.rejected.clear()
             self.solve()
 
-    def open(self, settings: Settings, answer: Answer | None = None) -> None:
-        """Begin with another case, such as one with a dropped surface; `answer` where it is solved already."""
+    def open(self, settings: Settings, result: ContactResult | None = None) -> None:
+        """Start with another case, such as one with a dropped surface, and its result if known."""
         self.settings, self._start = settings, None
-        self.refusals.clear()
-        if answer is None:
+        self.rejected.clear()
+        if result is None:
             self.solve()
         else:
-            self._fully(answer)
+            self._receive_full(result)
 
     def pin(self) -> None:
-        """Keep what is shown to compare with; nothing where it is not solved."""
-        if self.answer is not None and not self.stale:
-            self.pinned = self.answer
+        """Pin the current result for comparison, if there is one."""
+        if self.result is not None and not self.stale:
+            self.pinned = self.result
             self._changed()
 
     def unpin(self) -> None:
-        """Compare with nothing."""
+        """Remove the pinned result."""
         self.pinned = None
         self._changed()
 
     def close(self) -> None:
-        """Let go of everything that takes memory."""
+        """Close the queues and release the results."""
         self._queue.close()
-        if self._ahead is not None:
-            self._ahead.close()
-        self.answer = self.pinned = self._start = None
-        self.trail.clear()
+        if self._full_queue is not None:
+            self._full_queue.close()
+        self.result = self.pinned = self._start = None
+        self.trials.clear()
 
-    def _coarsely(self, result: Any) -> None:
-        if isinstance(result, Refused):
-            self._refuse(result)
+    def _receive_coarse(self, outcome: Any) -> None:
+        if isinstance(outcome, JobFailure):
+            self._fail(outcome)
             return
-        assert isinstance(result, Coarse)
-        if result.solution is not None:
-            self._start = result.solution
+        assert isinstance(outcome, CoarseResult)
+        if outcome.solution is not None:
+            self._start = outcome.solution
         if not self.pending:
-            return  # the full answer was there before
-        self.answer = result.answer or self.answer
-        if not self._begun:
-            self._solve_fully(self._ahead or self._queue)
+            return  # the full result arrived first
+        self.result = outcome.result or self.result
+        if not self._full_submitted:
+            self._solve_fully(self._full_queue or self._queue)
         self._changed()
 
-    def _fully(self, result: Any) -> None:
-        if isinstance(result, Refused):
-            self._refuse(result)
+    def _receive_full(self, result: Any) -> None:
+        if isinstance(result, JobFailure):
+            self._fail(result)
             return
-        assert isinstance(result, Answer)
-        self.answer, self.pending = result, False
+        assert isinstance(result, ContactResult)
+        self.result, self.pending = result, False
         if result.converged:
             row = result.row
-            tried = Tried(
+            trial = Trial(
                 self.settings, row["sq_m"], row["clr"], row.get("crf_hz"), result.determined
             )
-            if all(tried.settings is not before.settings for before in self.trail):
-                self.trail = [*self.trail[1 - MOST_TRIED :], tried]
+            if all(trial.settings is not earlier.settings for earlier in self.trials):
+                self.trials = [*self.trials[1 - MAX_TRIALS :], trial]
         self._changed()
 
-    def _refuse(self, refused: Refused) -> None:
-        self.problem, self.pending = refused.sentence, False
+    def _fail(self, failure: JobFailure) -> None:
+        self.problem, self.pending = failure.message, False
         self._changed()

@@ -1,4 +1,4 @@
-"""Visits that have gone give their memory back: soon, as their models are large, and while nobody waits for it."""
+"""Cleanup of sessions whose visitor has left, soon, because their models are large."""
 
 import ctypes
 import gc
@@ -6,49 +6,49 @@ from collections.abc import Callable, Iterable
 from typing import Any
 from weakref import WeakSet
 
-LOOK_MS = 1000  # between two looks at who is there
-# after which one whose connection was lost is not waited for: a browser tries anew after a second
-GONE_MS = 4000.0
+CLEANUP_MS = 1000  # interval of the cleanup
+DISCONNECT_MS = 4000.0  # time for reconnecting; a browser retries after one second
 
 
-def settle() -> None:
-    """Take all there is now for good, so that looking for what can go is looking at what visits brought."""
+def freeze_objects() -> None:
+    """Exclude all current objects from garbage collection, so that it only examines sessions."""
     gc.collect()
     gc.freeze()
 
 
-class Sweeper:
-    """Sends sessions away whose visitor has gone, and hands on what they leave.
+class SessionSweeper:
+    """Expires sessions whose visitor has left, and frees their memory.
 
     Parameters
     ----------
-    sessions : those that there are, as Bokeh's server has them
+    sessions : returns the current sessions of Bokeh's server
     """
 
     def __init__(self, sessions: Callable[[], Iterable[Any]]) -> None:
         self._sessions = sessions
-        self._met: WeakSet[Any] = (
-            WeakSet()
-        )  # those whose visitor has come; the others' may still be on the way
-        self._here: set[str] = set()
+        self._connected: WeakSet[Any] = WeakSet()  # sessions that have had a connection
+        self._names: set[str] = set()
 
-    def look(self) -> None:
-        """See who has gone, and sweep where somebody has."""
-        here = list(self._sessions())
-        for session in here:
+    def sweep(self) -> None:
+        """Expire disconnected sessions; collect garbage if a session has ended."""
+        sessions = list(self._sessions())
+        for session in sessions:
             if session.connection_count > 0:
-                self._met.add(session)
-            elif session in self._met and session.milliseconds_since_last_unsubscribe > GONE_MS:
+                self._connected.add(session)
+            elif (
+                session in self._connected
+                and session.milliseconds_since_last_unsubscribe > DISCONNECT_MS
+            ):
                 session.request_expiration()
-        names = {str(session.id) for session in here}
-        if self._here - names:
+        names = {str(session.id) for session in sessions}
+        if self._names - names:
             gc.collect()
             _trim()
-        self._here = names
+        self._names = names
 
 
 def _trim() -> None:
-    """Let the C library give freed memory back to the system, where it is one that can be asked to."""
+    """Return freed memory to the system, if the C library supports it."""
     try:
         trim = ctypes.CDLL(None).malloc_trim
     except (AttributeError, OSError, TypeError):

@@ -1,7 +1,6 @@
-"""Settings: a case with some knobs turned, and the address that brings them back.
+"""Settings: a case with changed inputs, and the address that restores them.
 
-What stands in an address is somebody else's: every value goes through the case's own refusals, and
-a key that is no knob of the case is left out.
+An address is untrusted: every value is validated by the case, and unknown keys are ignored.
 """
 
 import re
@@ -12,42 +11,39 @@ from hashlib import sha256
 from typing import NamedTuple
 from urllib.parse import parse_qsl, urlencode
 
-from asperity.app.inputs import LONGEST, Knob, knobs_of, overrides
+from asperity.app.inputs import MAX_LENGTH, CaseInput, case_inputs, overrides
 from asperity.case import Case
 from asperity.core.errors import BadInput
 
-MOST_CELLS = 512 * 512  # that the page solves: more belongs on the command line
-MOST_PAIRS = 100  # in an address
-CASE, DROPPED, HELD = (
-    "case",
-    "dropped",
-    "held",
-)  # in an address: of which case, a dropped surface's name and its key
+MAX_CELLS = 512 * 512  # larger grids need the command line
+MAX_PAIRS = 100  # in an address
+# keys of an address: the case, and name and key of a dropped surface
+CASE, DROPPED, HELD = "case", "dropped", "held"
 
 
-class Refusal(NamedTuple):
-    """A value that a knob cannot take, and the sentence that says why."""
+class RejectedValue(NamedTuple):
+    """An invalid value of an input, with its error message."""
 
     key: str
     text: str
-    sentence: str
+    message: str
 
 
-def require_few(source: str, cells: tuple[int, int]) -> None:
-    """BadInput for more cells than the page solves."""
-    if cells[0] * cells[1] > MOST_CELLS:
+def limit_cells(source: str, cells: tuple[int, int]) -> None:
+    """Raise BadInput for more cells than the page solves."""
+    if cells[0] * cells[1] > MAX_CELLS:
         raise BadInput(
-            f"{source}: grid.cells must be at most {MOST_CELLS} in all on this page, got {cells[0]} x {cells[1]}; "
-            "take asperity solve for more"
+            f"{source}: grid.cells must be at most {MAX_CELLS} in all on this page, got "
+            f"{cells[0]} x {cells[1]}; use asperity solve for larger grids"
         )
 
 
 @dataclass(frozen=True)
 class Settings:
-    """A case and what was turned.
+    """A case and the changes of its inputs.
 
-    `opened` is the case as it was given; `changes` are texts by the keys of knobs; `dropped` is
-    the name of a surface that was dropped, `held` what the server holds it by.
+    `opened` is the case as opened; `changes` are texts by the keys of inputs; `dropped` is the name
+    of a dropped surface, `held` its key in the surface store.
     """
 
     opened: Case
@@ -57,52 +53,50 @@ class Settings:
 
     @cached_property
     def case(self) -> Case:
-        """The case with the changes; BadInput for what it refuses."""
+        """Case with the changes; raises BadInput for invalid ones."""
         if not self.changes:
             return self.opened
         case = self.opened.with_overrides(overrides(self.opened, self.changes))
-        if (
-            case.contents.grid.cells != "auto"
-        ):  # to choose cells may need a file, which is read elsewhere
-            require_few(case.source, case.contents.grid.cells)
+        if case.contents.grid.cells != "auto":  # choosing cells may read a file: left to a worker
+            limit_cells(case.source, case.contents.grid.cells)
         return case
 
     @cached_property
-    def knobs(self) -> dict[str, Knob]:
-        """The knobs of the opened case."""
-        return knobs_of(self.opened)
+    def inputs(self) -> dict[str, CaseInput]:
+        """Inputs of the opened case."""
+        return case_inputs(self.opened)
 
     def text(self, key: str) -> str:
-        """What a knob is set to."""
-        return self.changes.get(key, self.knobs[key].text)
+        """Return the value of an input."""
+        return self.changes.get(key, self.inputs[key].text)
 
-    def turned(self, key: str, text: str) -> "Settings | Refusal":
-        """With a knob set to what was typed; or why it cannot be."""
+    def with_value(self, key: str, text: str) -> "Settings | RejectedValue":
+        """Return settings with a typed value of an input, or its rejection."""
         text = text.strip()
-        if len(text) > LONGEST:
-            return Refusal(
+        if len(text) > MAX_LENGTH:
+            return RejectedValue(
                 key,
-                text[:LONGEST],
-                f"is {len(text)} characters long; a value is shorter than {LONGEST}",
+                text[:MAX_LENGTH],
+                f"value of {len(text)} characters; at most {MAX_LENGTH} are allowed",
             )
-        kept = {name: value for name, value in self.changes.items() if name != key}
+        others = {name: value for name, value in self.changes.items() if name != key}
         settings = replace(
-            self, changes=kept if text == self.knobs[key].text else {**kept, key: text}
+            self, changes=others if text == self.inputs[key].text else {**others, key: text}
         )
         try:
             _ = settings.case
-        except BadInput as refusal:
-            return Refusal(key, text, str(refusal))
+        except BadInput as error:
+            return RejectedValue(key, text, str(error))
         return settings
 
     @property
     def fingerprint(self) -> str:
-        """What the opened case is told by in an address."""
+        """Hash that identifies the opened case in an address."""
         return sha256(self.opened.text.encode()).hexdigest()[:10]
 
     @property
     def address(self) -> str:
-        """The query that brings these settings back, without its question mark; empty where nothing was turned."""
+        """Query that restores these settings, without question mark; empty without changes."""
         dropped = {DROPPED: self.dropped, HELD: self.held} if self.dropped else {}
         return (
             urlencode({CASE: self.fingerprint, **dropped, **self.changes})
@@ -111,38 +105,39 @@ class Settings:
         )
 
     def from_address(self, query: str) -> "tuple[Settings, list[str]]":
-        """The opened case with what an address says, and a sentence for each part of it that was left out."""
+        """Return the settings of an address, and a note for each part that was ignored."""
         notes: list[str] = []
-        pairs = parse_qsl(query.lstrip("?")[:20_000], max_num_fields=None)[:MOST_PAIRS]
+        pairs = parse_qsl(query.lstrip("?")[:20_000], max_num_fields=None)[:MAX_PAIRS]
         settings = replace(self, changes={})
-        gone = next((text for key, text in pairs if key == DROPPED), "")
-        if gone and (not self.held or held_in(query) != self.held):
+        surface = next((text for key, text in pairs if key == DROPPED), "")
+        if surface and (not self.held or surface_key(query) != self.held):
             notes.append(
-                f"The link was made with the dropped surface {gone[:80]}, held no more; drop it again."
+                f"The link uses the dropped surface {surface[:80]}, which is no longer stored; "
+                "drop it again."
             )
         for key, text in pairs:
             if key in (CASE, DROPPED, HELD):
-                if key == CASE and text != self.fingerprint and not gone:
+                if key == CASE and text != self.fingerprint and not surface:
                     notes.append(
-                        "The link was made with another case; what it turned is turned here."
+                        "The link was made with another case; its changes are applied here."
                     )
-            elif key not in self.knobs:
+            elif key not in self.inputs:
                 notes.append(
-                    f"The link turns {_named(key)}, which is no knob of this case; it is left out."
+                    f"The link changes {_printable(key)}, not an input of this case; ignored."
                 )
-            elif isinstance(turned := settings.turned(key, text), Settings):
-                settings = turned
+            elif isinstance(changed := settings.with_value(key, text), Settings):
+                settings = changed
             else:
-                notes.append(f"Of the link is left out: {turned.sentence}.")
+                notes.append(f"The link has an invalid value, ignored: {changed.message}.")
         return settings, notes
 
 
-def held_in(query: str) -> str:
-    """What an address says that a dropped surface is held by; empty where it says nothing that could be."""
-    given = dict(parse_qsl(query.lstrip("?")[:20_000])).get(HELD, "")
-    return given if re.fullmatch(r"[0-9a-f]{32}", given) else ""
+def surface_key(query: str) -> str:
+    """Return the key of a dropped surface in an address; empty if absent or malformed."""
+    key = dict(parse_qsl(query.lstrip("?")[:20_000])).get(HELD, "")
+    return key if re.fullmatch(r"[0-9a-f]{32}", key) else ""
 
 
-def _named(key: str) -> str:
-    """A key as a sentence names it."""
-    return key if re.fullmatch(r"[\w.\-]{1,60}", key) else "what has no name of a key"
+def _printable(key: str) -> str:
+    """Return a key if it is safe to print."""
+    return key if re.fullmatch(r"[\w.\-]{1,60}", key) else "an invalid key"

@@ -1,4 +1,4 @@
-"""The page of a study: curves with their scatter over what was swept; a point that is clicked becomes its contact."""
+"""Page of a study: outputs over the swept quantities; a click on a point solves its contact."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -8,18 +8,18 @@ import numpy as np
 from bokeh.models import Band, BasicTicker, ColumnDataSource, Select
 from markupsafe import Markup
 
-from asperity.app.contact_jobs import Refused
-from asperity.app.contact_result import Answer
-from asperity.app.figures import BLUE, VERMILION, plain_figure, shown
-from asperity.app.folder_jobs import Swept, open_study, solve_row
-from asperity.app.jobs import Queue, Workshop
-from asperity.app.map_images import Pictures
+from asperity.app.contact_jobs import JobFailure
+from asperity.app.contact_result import ContactResult
+from asperity.app.figures import BLUE, VERMILION, plain_figure, to_display
+from asperity.app.folder_jobs import StudyData, open_study, solve_row
+from asperity.app.jobs import JobQueue, WorkerPool
+from asperity.app.map_images import MapImages
 from asperity.app.settings import Settings
 from asperity.app.widgets import (
     LOOK,
     MAP_KEY,
     TILE_STYLES,
-    OldMark,
+    StaleMark,
     notes,
     sentences,
     text_block,
@@ -31,37 +31,38 @@ from asperity.study import as_written
 
 
 class StudyView:
-    """One user's look at a study, with its widgets."""
+    """Study of one visitor with its widgets."""
 
     def __init__(
         self,
         folder: Path,
         case: Case,
-        workshop: Workshop,
+        worker_pool: WorkerPool,
         deliver: Callable[[Callable[[], None]], None],
     ) -> None:
         self._folder, self._case = folder, case
-        self._queue = Queue(workshop, deliver)
-        self.swept: Swept | None = None
+        self._queue = JobQueue(worker_pool, deliver)
+        self.study: StudyData | None = None
         self._rows: list[int] = []
-        self.status, self.verdict, self.notes, self.chosen, self.way = (
+        self.status, self.verdict, self.notes, self.chosen, self.link = (
             text_block() for _ in range(5)
         )
         self.tiles = text_block(TILE_STYLES)
-        self.old = OldMark(self.chosen)
-        self._answer: Answer | None = None
+        self.stale_mark = StaleMark(self.chosen)
+        self._answer: ContactResult | None = None
         look: dict[str, Any] = {
             "sizing_mode": "stretch_width",
             "stylesheets": [LOOK],
             "margin": (0, 0, 6, 0),
         }
-        self.across, self.up = Select(title="Over", **look), Select(title="Of the contact", **look)
-        self.point = Select(title="A contact of the study", **look)
-        for choice in (self.across, self.up):
+        self.x_choice = Select(title="Swept quantity", **look)
+        self.y_choice = Select(title="Output", **look)
+        self.point = Select(title="Contact of the study", **look)
+        for choice in (self.x_choice, self.y_choice):
             choice.on_change("value", lambda _name, _old, _new: self._draw())
         self.point.on_change("value", lambda _name, _old, new: self._solve(new))
         self.figure = plain_figure(
-            "", "", label="A study's results over what was swept", height=380, tapped=True
+            "", "", label="Outputs of the study over a swept quantity", height=380, tapped=True
         )
         self._points = ColumnDataSource({"x": [], "y": []})
         self._means = ColumnDataSource({"x": [], "mean": [], "low": [], "high": []})
@@ -77,68 +78,68 @@ class StudyView:
         )
         self.figure.add_layout(band)
         self._points.selected.on_change("indices", lambda _name, _old, new: self._pick(new))
-        self.pictures = Pictures()
+        self.maps = MapImages()
 
     def begin(self) -> None:
-        """Read the study."""
+        """Start reading the study."""
         self.status.text = sentences(["Reading the study ..."], "soft")
-        self._queue.ask((open_study, (self._folder,)), self._read)
+        self._queue.submit((open_study, (self._folder,)), self._read)
 
     def close(self) -> None:
-        """Give back what the session took."""
+        """Release the resources of the visit."""
         self._queue.close()
-        self.swept = self._answer = None
+        self.study = self._answer = None
 
     def _read(self, result: Any) -> None:
-        if isinstance(result, Refused):
-            self.status.text = sentences([result.sentence], "alarm")
+        if isinstance(result, JobFailure):
+            self.status.text = sentences([result.message], "alarm")
             return
-        swept: Swept = result
-        self.swept = swept
-        self.verdict.text, self.notes.text = sentences([swept.verdict]), notes(swept.notes)
-        self._rows = list(range(len(swept.numbers)))
+        study: StudyData = result
+        self.study = study
+        self.verdict.text, self.notes.text = sentences([study.verdict]), notes(study.notes)
+        self._rows = list(range(len(study.numbers)))
         labels = [
-            (str(row), in_print(f"{swept.numbers[row]}: {self._words(row)}")) for row in self._rows
+            (str(row), in_print(f"{study.numbers[row]}: {self._words(row)}")) for row in self._rows
         ]
-        self.point.update(options=[("", "choose one"), *labels], value="")
-        if swept.axes and swept.outputs:
-            first = next(iter(swept.outputs))
-            self.across.update(options=[axis.key for axis in swept.axes], value=swept.axes[0].key)
-            self.up.update(
-                options=[(key, quantity(key).title) for key in swept.outputs], value=first
+        self.point.update(options=[("", "select"), *labels], value="")
+        if study.axes and study.outputs:
+            first = next(iter(study.outputs))
+            self.x_choice.update(options=[axis.key for axis in study.axes], value=study.axes[0].key)
+            self.y_choice.update(
+                options=[(key, quantity(key).title) for key in study.outputs], value=first
             )
             self._draw()
-        told = (
+        hint = (
             "Click a point to see its contact."
-            if swept.axes
-            else "Nothing was swept; choose a contact below."
+            if study.axes
+            else "No swept quantity; select a contact below."
         )
-        self.status.text = sentences([told], "soft")
+        self.status.text = sentences([hint], "soft")
 
     def _draw(self) -> None:
-        swept = self.swept
+        study = self.study
         if (
-            swept is None
-            or self.across.value not in swept.values
-            or self.up.value not in swept.outputs
+            study is None
+            or self.x_choice.value not in study.values
+            or self.y_choice.value not in study.outputs
         ):
             return
-        axis = next(axis for axis in swept.axes if axis.key == self.across.value)
-        entry = quantity(self.up.value)
-        column = swept.outputs[entry.key]
+        axis = next(axis for axis in study.axes if axis.key == self.x_choice.value)
+        entry = quantity(self.y_choice.value)
+        column = study.outputs[entry.key]
         known = np.flatnonzero(np.isfinite(column))
         self._rows = [int(row) for row in known]
         self._points.selected.indices = []
         self._points.data = {
-            "x": swept.values[axis.key][known],
-            "y": shown(entry.key, column[known]),
+            "x": study.values[axis.key][known],
+            "y": to_display(entry.key, column[known]),
         }
-        x, mean, low, high = swept.means[axis.key, entry.key]
+        x, mean, low, high = study.means[axis.key, entry.key]
         lows, highs = (np.where(np.isfinite(ends), ends, mean) for ends in (low, high))
         parts: Mapping[str, Any] = {"mean": mean, "low": lows, "high": highs}
         self._means.data = {
             "x": x,
-            **{name: shown(entry.key, values) for name, values in parts.items()},
+            **{name: to_display(entry.key, values) for name, values in parts.items()},
         }
         self.figure.xaxis.axis_label = (
             f"{axis.key} [{in_print(axis.unit)}]" if axis.unit else axis.key
@@ -153,92 +154,93 @@ class StudyView:
             self.point.value = str(self._rows[indices[0]])
 
     def _solve(self, row: str) -> None:
-        swept = self.swept
-        if swept is None or not row.isdigit():
+        study = self.study
+        if study is None or not row.isdigit():
             return
         number = int(row)
-        self._mark(old=True)
-        self.way.text = ""  # leads to the point before
+        self._mark(stale=True)
+        self.link.text = ""  # belongs to the previous point
         self.chosen.text = sentences([f"Solving {self._words(number)} ..."], "soft")
-        self._queue.ask(
-            (solve_row, (self._folder, swept.numbers[number])),
+        self._queue.submit(
+            (solve_row, (self._folder, study.numbers[number])),
             lambda result: self._solved(result, number),
         )
 
     def _solved(self, result: Any, row: int) -> None:
-        if isinstance(result, Refused) or self.swept is None:
-            self.chosen.text = sentences([result.sentence], "alarm")
+        if isinstance(result, JobFailure) or self.study is None:
+            self.chosen.text = sentences([result.message], "alarm")
             return
         self._answer = result
-        self._mark(old=False)
-        self.pictures.make()
-        self.pictures.show(result)
-        link = Markup('<p><a href="contact?{}">Turn its knobs</a></p>')
-        self.way.text = link.format(self._address(row))
+        self._mark(stale=False)
+        self.maps.make()
+        self.maps.show(result)
+        link = Markup('<p><a href="contact?{}">Open with its inputs</a></p>')
+        self.link.text = link.format(self._address(row))
         self.chosen.text = sentences(
             [f"{self._words(row)}: {result.verdict}"]
-        )  # last: all is there when it says so
+        )  # last: a screen reader announces it when the page is complete
 
-    def _mark(self, *, old: bool) -> None:
-        """Show the contact's numbers and pictures as those of the chosen point, or of the one before."""
+    def _mark(self, *, stale: bool) -> None:
+        """Mark numbers and maps as those of the selected point, or of the previous one."""
         if self._answer is not None:
-            self.tiles.text = tiles(self._answer.tiles, self._answer, None, old=old)
-            self.old.show(old)
+            self.tiles.text = tiles(self._answer.tiles, self._answer, None, stale=stale)
+            self.stale_mark.show(stale)
 
     def _address(self, row: int) -> str:
-        """A row's settings as an address of the contact's page; what is no knob there stays as the study has it."""
-        assert self.swept is not None
+        """Return the address of the contact page with the settings of a row."""
+        assert self.study is not None
         settings = Settings(self._case)
-        for key, value in self.swept.changed[row].items():
+        for key, value in self.study.changed[row].items():
             pair = [f"{key}.0", f"{key}.1"] if isinstance(value, list) else [key]
             for name, text in zip(
                 pair, value if isinstance(value, list) else [value], strict=False
             ):
-                if name in settings.knobs and isinstance(
-                    turned := settings.turned(name, str(text)), Settings
+                if name in settings.inputs and isinstance(
+                    changed := settings.with_value(name, str(text)), Settings
                 ):
-                    settings = turned
+                    settings = changed
         return settings.address
 
     def _words(self, row: int) -> str:
-        """What a row's case differs in."""
-        changed = {} if self.swept is None else self.swept.changed[row]
+        """Describe the overrides of a row's case."""
+        changed = {} if self.study is None else self.study.changed[row]
         return (
-            ", ".join(f"{key} {as_written(value)}" for key, value in changed.items()) or "its case"
+            ", ".join(f"{key} {as_written(value)}" for key, value in changed.items())
+            or "common case"
         )
 
 
 def layout(view: StudyView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """The parts of the page by name, and the sections that they stand in."""
+    """Return the parts of the page by name, and the sections that contain them."""
     parts = {
-        "across": view.across,
-        "up": view.up,
+        "xchoice": view.x_choice,
+        "ychoice": view.y_choice,
         "point": view.point,
         "status": view.status,
         "verdict": view.verdict,
         "curve": view.figure,
         "chosen": view.chosen,
-        "way": view.way,
+        "link": view.link,
         "tiles": view.tiles,
-        "film": view.pictures.film,
-        "pressure": view.pictures.pressure,
-        "cutpressure": view.pictures.cut_pressure,
-        "cutfilm": view.pictures.cut_film,
+        "film": view.maps.film,
+        "pressure": view.maps.pressure,
+        "cutpressure": view.maps.cut_pressure,
+        "cutfilm": view.maps.cut_film,
         "notes": view.notes,
     }
-    choices = [{"names": [name]} for name in ("across", "up", "point")]
-    shown_parts = [
+    choices = [{"names": [name]} for name in ("xchoice", "ychoice", "point")]
+    results = [
         {"names": ["verdict"], "first": True},
         {"names": ["status"], "live": True, "first": True},
         {"names": ["curve"], "first": True},
         {"names": ["chosen"], "live": True},
-        {"names": ["way"]},
+        {"names": ["link"]},
         {"names": ["tiles"]},
         {"names": ["film", "pressure"], "key": MAP_KEY},
         {"names": ["cutpressure", "cutfilm"]},
         {"names": ["notes"]},
     ]
     return parts, [
-        {"kind": "knobs", "label": "What is shown of the study", "blocks": choices},
-        {"kind": "shown", "label": "The study", "blocks": shown_parts},
+        {"kind": "inputs", "label": "Selection", "blocks": choices},
+        {"kind": "results", "label": "Study", "blocks": results},
     ]

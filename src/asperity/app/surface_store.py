@@ -1,4 +1,4 @@
-"""Shelf: surfaces that were dropped, held as long as the server runs, so that a link brings them back."""
+"""Store of dropped surfaces, kept while the server runs, so that links can restore them."""
 
 import os
 import shutil
@@ -8,54 +8,53 @@ from tempfile import TemporaryDirectory
 
 from asperity.case import Case
 
-MOST_HELD, MOST_BYTES = (
-    20,
-    1_000_000_000,
-)  # of surfaces, and of all of them together; the oldest go first
+MAX_SURFACES, MAX_BYTES = 20, 1_000_000_000  # in the store; the oldest are removed first
 
 
-class Shelf:
-    """Dropped surfaces with their cases, by what they are told by in an address."""
+class SurfaceStore:
+    """Dropped surfaces with their cases, by key."""
 
     def __init__(self) -> None:
-        self._folder = TemporaryDirectory(prefix="asperity-shelf-")
-        self._held: dict[str, Case] = {}
+        self._folder = TemporaryDirectory(prefix="asperity-surfaces-")
+        self._cases: dict[str, Case] = {}
 
-    def put(self, key: str, case: Case) -> None:
-        """Hold a case whose surface is a dropped file; the session's own file stays where it is."""
-        if key in self._held:
+    def add(self, key: str, case: Case) -> None:
+        """Store a case and a link to its dropped file."""
+        if key in self._cases:
             return
-        place = Path(self._folder.name) / key
-        place.mkdir()
-        _lay(case.folder / case.contents.surface.name, place)
-        self._held[key] = replace(case, folder=place)
-        while len(self._held) > MOST_HELD or (len(self._held) > 1 and self._size() > MOST_BYTES):
-            shutil.rmtree(self._held.pop(next(iter(self._held))).folder)
+        folder = Path(self._folder.name) / key
+        folder.mkdir()
+        _link_or_copy(case.folder / case.contents.surface.name, folder)
+        self._cases[key] = replace(case, folder=folder)
+        while len(self._cases) > MAX_SURFACES or (
+            len(self._cases) > 1 and self._size() > MAX_BYTES
+        ):
+            shutil.rmtree(self._cases.pop(next(iter(self._cases))).folder)
 
-    def lend(self, key: str, folder: Path) -> Case | None:
-        """The case held under a key, its file in a session's own folder; None where there is none any more."""
-        case = self._held.get(key)
+    def load(self, key: str, folder: Path) -> Case | None:
+        """Return a stored case with its file in the folder of a session; None if not stored."""
+        case = self._cases.get(key)
         if case is None:
             return None
-        place = folder / key
-        place.mkdir(exist_ok=True)
-        _lay(case.folder / case.contents.surface.name, place)
-        return replace(case, folder=place)
+        target = folder / key
+        target.mkdir(exist_ok=True)
+        _link_or_copy(case.folder / case.contents.surface.name, target)
+        return replace(case, folder=target)
 
     def close(self) -> None:
-        """Let go of all of them."""
-        self._held.clear()
+        """Remove all surfaces."""
+        self._cases.clear()
         self._folder.cleanup()
 
     def _size(self) -> int:
         return sum(
             (case.folder / case.contents.surface.name).stat().st_size
-            for case in self._held.values()
+            for case in self._cases.values()
         )
 
 
-def _lay(file: Path, folder: Path) -> None:
-    """A file in another folder too, without a copy where the disk can do that."""
+def _link_or_copy(file: Path, folder: Path) -> None:
+    """Link a file into a folder, or copy it if links are not supported."""
     target = folder / file.name
     if target.exists():
         return

@@ -1,4 +1,4 @@
-"""Dropped files: taken in pieces straight to a temporary file, with a limit, under a name of ours."""
+"""Uploads: dropped files are written in chunks to a temporary file with a safe name and a limit."""
 
 import re
 from collections.abc import Callable
@@ -8,90 +8,88 @@ from typing import Any
 
 from panel.widgets import FileDropper
 
-PIECE = 4_000_000  # bytes that travel at a time
-_NAME = re.compile(r"[^\w.\-]+")
-LONGEST_NAME = 80
+CHUNK_SIZE = 4_000_000  # bytes
+MAX_NAME = 80  # characters of a file name
+_UNSAFE = re.compile(r"[^\w.\-]+")
 
 
 def safe_name(name: str) -> str:
-    """A file's name without folders or anything that a shell, a path or a page would take for more than a name."""
+    """Return a file name without folders and without characters special to shells or HTML."""
     last = re.split(r"[/\\]", name)[-1]
-    kept = _NAME.sub("_", last).lstrip(".-")[-LONGEST_NAME:].lstrip(".-")
-    return kept or "file"
+    safe = _UNSAFE.sub("_", last).lstrip(".-")[-MAX_NAME:].lstrip(".-")
+    return safe or "file"
 
 
-class Drop(FileDropper):  # type: ignore[misc]
-    """A place to drop files on; each is called on with its path when it is whole, or with a sentence that refuses it.
+class FileDrop(FileDropper):  # type: ignore[misc]
+    """Drop area for files, which are kept for the session.
 
-    The files live as long as the session.
+    `on_file` is called with the path of each complete file, `on_error` with a message.
     """
 
     def __init__(
         self,
         *,
         limit: int,
-        arrived: Callable[[Path], None],
-        refused: Callable[[str], None],
+        on_file: Callable[[Path], None],
+        on_error: Callable[[str], None],
         several: bool,
         **settings: Any,
     ) -> None:
         super().__init__(
             multiple=several,
-            chunk_size=PIECE,
+            chunk_size=CHUNK_SIZE,
             previews=[],
             max_file_size=f"{limit // 1_000_000}MB",
             **settings,
         )
-        self._limit, self._arrived, self._refused = limit, arrived, refused
+        self._limit, self._on_file, self._on_error = limit, on_file, on_error
         self._folder: TemporaryDirectory[str] | None = None
-        self._open: dict[str, tuple[Path, int, int]] = {}  # path, pieces and bytes so far
+        self._open: dict[str, tuple[Path, int, int]] = {}  # path, chunks and bytes so far
         self._count = 0
 
     @property
     def folder(self) -> Path:
-        """Where this session's files lie."""
+        """Folder of this session's files."""
         if self._folder is None:
             self._folder = TemporaryDirectory(prefix="asperity-page-")
         return Path(self._folder.name)
 
     def close(self) -> None:
-        """Remove all that was dropped."""
+        """Remove all dropped files."""
         if self._folder is not None:
             self._folder.cleanup()
             self._folder = None
         self._open.clear()
 
     def _process_event(self, event: Any) -> None:
-        """Write a piece to disk; Panel's own keeps all of them in memory."""
+        """Write a chunk to disk, instead of keeping it in memory as Panel does."""
         if event.event_name != "upload_event":
             return
-        piece = event.data
-        name, data = str(piece.get("name", "")), piece.get("data", b"")
+        chunk = event.data
+        name, data = str(chunk.get("name", "")), chunk.get("data", b"")
         try:
-            number, total = int(piece["chunk"]), int(piece["total_chunks"])
+            number, total = int(chunk["chunk"]), int(chunk["total_chunks"])
             data = data.encode() if isinstance(data, str) else bytes(data)
         except (KeyError, TypeError, ValueError):
-            self._refused("A piece of a file came damaged; drop it again.")
+            self._on_error("A chunk of the file was damaged. Drop the file again.")
             return
         if number == 1:
             self._count += 1
-            place = self.folder / str(self._count)
-            place.mkdir()
-            self._open[name] = (place / safe_name(name), 0, 0)
+            folder = self.folder / str(self._count)
+            folder.mkdir()
+            self._open[name] = (folder / safe_name(name), 0, 0)
         if name not in self._open:
-            return  # of a file that was refused
-        path, pieces, size = self._open[name]
-        if size + len(data) > self._limit or number != pieces + 1:
+            return  # a rejected file
+        path, chunks, size = self._open[name]
+        if size + len(data) > self._limit or number != chunks + 1:
             del self._open[name]
             path.unlink(missing_ok=True)
-            most = f"at most {self._limit // 1_000_000} MB may be dropped"
-            self._refused(
-                f"{safe_name(name)} was not taken: {most}, in pieces that follow one another."
-            )
+            limit = f"larger than {self._limit // 1_000_000} MB, or a chunk is missing"
+            self._on_error(f"{safe_name(name)} was rejected: {limit}.")
             return
         with path.open("ab") as file:
             file.write(data)
         self._open[name] = (path, number, size + len(data))
         if number == total:
             del self._open[name]
-            self._arrived(path)
+            self._on_file(path)

@@ -1,4 +1,4 @@
-"""What people look at: figures and the one-page report. Nothing is computed here that is not in a run."""
+"""Figures and HTML reports; they show stored results and compute nothing new."""
 
 import lazy_loader
 

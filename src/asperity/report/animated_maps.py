@@ -1,7 +1,6 @@
-"""Maps that move: axes and key once, and what is in them as small pictures that a few lines of script lay over them.
+"""Animated maps: one empty figure with axes, and one small image per frame laid over it.
 
-A map is drawn in two parts: axes and key as a figure with an empty field, and what is in the field
-as a small picture of one pixel a cell, a frame each.
+The images have one pixel per cell; a short script in the page shows them in turn.
 """
 
 import json
@@ -30,20 +29,17 @@ from asperity.report.maps import colour_bar, map_figure
 from asperity.report.style import CAVITY_COLOUR, CONTACT_COLOUR, OIL_COLOUR, Medium
 
 SCRIPT = resources.files("asperity.report").joinpath("moving.js").read_text("utf-8")
-SHADES = 56  # of a map: few enough for small files, fine enough for the eye
-MOST_PIXELS = 160  # along an axis of a map
+SHADES = 56  # colours of a map: few enough for small files, enough to look continuous
+MAX_PIXELS = 160  # along each axis of a map
 Kind = Literal["gap", "pressure", "contact"]
-KINDS: tuple[Kind, ...] = get_args(Kind)  # as they stand below one another in a frame's picture
+KINDS: tuple[Kind, ...] = get_args(Kind)  # in their order within the image of a frame
 TEXTS: Mapping[Kind, tuple[str, str]] = {  # title and caption
     "gap": (
         "Film thickness",
-        "Gap between the deformed surfaces; colours end where 99 % of the Hertz zone's gaps do.",
+        "Gap between the deformed surfaces; colours end at the 99th percentile in the Hertz zone.",
     ),
-    "pressure": ("Pressure", "Pressure of oil and asperities together."),
-    "contact": (
-        "Asperity contact",
-        "Where asperities touch, where oil fills the gap, where it has ruptured.",
-    ),
+    "pressure": ("Pressure", "Total pressure of oil and asperities."),
+    "contact": ("Asperity contact", "Contact state: asperity contact, oil film, cavitated film."),
 }
 COLOURS = {"gap": "viridis", "pressure": "inferno"}
 CLASSES = {"oil film": OIL_COLOUR, "cavitated": CAVITY_COLOUR, "asperity contact": CONTACT_COLOUR}
@@ -51,14 +47,14 @@ CLASSES = {"oil film": OIL_COLOUR, "cavitated": CAVITY_COLOUR, "asperity contact
 
 @dataclass(frozen=True, slots=True)
 class Ranges:
-    """What the colours of all frames reach to: gap [m] (99 % of the Hertz zone), pressure [Pa]."""
+    """Upper ends of the colour scales: gap [m] (99th percentile, Hertz zone), pressure [Pa]."""
 
     gap: float
     pressure: float
 
 
 class Frame(Protocol):
-    """What is shown at a time: maps on the contact's grid, film [m], pressure [Pa], where bodies touch."""
+    """Maps of a contact at one time, on its grid."""
 
     @property
     def gap(self) -> Field:
@@ -67,36 +63,36 @@ class Frame(Protocol):
 
     @property
     def pressure(self) -> Field:
-        """Of oil and asperities together [Pa]."""
+        """Total pressure of oil and asperities [Pa]."""
         ...
 
     @property
     def in_contact(self) -> Mask:
-        """Where bodies touch."""
+        """Mask of the cells in contact."""
         ...
 
 
-class MovingMap(NamedTuple):
-    """A map of a page: its axes, and where the pictures are laid over them, in per cent of the figure."""
+class AnimatedMap(NamedTuple):
+    """An empty map, and the position of its frames in per cent of the figure."""
 
     picture: Picture
     left: float
     top: float
     width: float
     height: float
-    zone: tuple[float, ...]  # where lines mark the Hertz zone of a line contact
+    zone: tuple[float, ...]  # positions of the Hertz zone's edges, for a line contact
 
 
 def ranges(case: Case, frames: Sequence[Frame]) -> Ranges:
-    """The ends of the colours, the same for all frames."""
+    """Return the ends of the colour scales, common to all frames."""
     zone = hertz_zone(case.conditions, case.grid)
     gap = max(float(np.percentile(frame.gap[zone], 99.0)) for frame in frames)
     return Ranges(gap or 1e-6, max(float(frame.pressure.max()) for frame in frames) or 1e9)
 
 
-def moving_map(case: Case, kind: Kind, reach: Ranges) -> MovingMap:
-    """A map's axes and key, and where its pictures lie."""
-    exhibit = empty_map(case, kind, reach)
+def animated_map(case: Case, kind: Kind, scale: Ranges) -> AnimatedMap:
+    """Draw an empty map and compute the position of its frames."""
+    exhibit = empty_map(case, kind, scale)
     figure = exhibit.figure()
     box = figure.axes[0].get_position()
     left, top, width, height = (
@@ -105,22 +101,24 @@ def moving_map(case: Case, kind: Kind, reach: Ranges) -> MovingMap:
     grid, a = case.grid, case.conditions.hertz.half_widths[0]
     sides = (-a, a) if case.conditions.endless else ()
     zone = tuple(left + width * (side - grid.lower[0]) / grid.extent[0] for side in sides)
-    return MovingMap(exhibit.picture_of(figure), left, top, width, height, zone)
+    return AnimatedMap(exhibit.embed(figure), left, top, width, height, zone)
 
 
-def script_data(frames: Sequence[Frame], words: Sequence[str], reach: Ranges, **more: Any) -> str:
-    """What the page's script shows of each frame: its maps, its numbers in words; and what else it is told."""
-    pictures = [frame_picture(frame, reach) for frame in frames]
-    held = {
-        "frames": ["data:image/png;base64," + b64encode(packed).decode() for packed, _ in pictures],
-        "size": pictures[0][1],
-        "words": list(words),
+def script_data(
+    frames: Sequence[Frame], captions: Sequence[str], scale: Ranges, **extra: Any
+) -> str:
+    """Return the data of the page's script as JSON: images and captions of the frames."""
+    images = [encode_frame(frame, scale) for frame in frames]
+    data = {
+        "frames": ["data:image/png;base64," + b64encode(png).decode() for png, _ in images],
+        "size": images[0][1],
+        "captions": list(captions),
     }
-    return json.dumps(held | more).replace("<", "\\u003c")  # nothing in it ends the script
+    return json.dumps(data | extra).replace("<", "\\u003c")  # must not close the script element
 
 
-def empty_map(case: Case, kind: Kind, reach: Ranges) -> Exhibit:
-    """Axes and key of the map of that kind, oil coming from the left."""
+def empty_map(case: Case, kind: Kind, scale: Ranges) -> Exhibit:
+    """Draw axes and legend of a map without data; oil enters from the left."""
     grid, (title, caption) = case.grid, TEXTS[kind]
 
     def draw(medium: Medium) -> Figure:
@@ -133,35 +131,35 @@ def empty_map(case: Case, kind: Kind, reach: Ranges) -> Exhibit:
             figure.legend(handles=keys, loc="lower center", ncols=3, borderaxespad=0.2)
         else:
             shades = ScalarMappable(
-                Normalize(0.0, display(kind, getattr(reach, kind))), COLOURS[kind]
+                Normalize(0.0, display(kind, getattr(scale, kind))), COLOURS[kind]
             )
             colour_bar(figure, axes, shades, kind, extend="max" if kind == "gap" else "neither")
         return figure
 
-    return Exhibit(f"map-{kind}", draw, caption, f"Moving map: {caption}")
+    return Exhibit(f"map-{kind}", draw, caption, f"Animated map: {caption}")
 
 
-def frame_picture(frame: Frame, reach: Ranges) -> tuple[bytes, tuple[int, int]]:
-    """Gap, pressure and contact of a frame below one another, as a PNG of few colours; and the size of each."""
-    stride = [max(1, -(-count // MOST_PIXELS)) for count in frame.gap.shape]
-    thin = (slice(None, None, stride[0]), slice(None, None, stride[1]))
-    touching = frame.in_contact[thin]
-    classes = np.where(touching, 2, np.where(frame.pressure[thin] <= 0.0, 1, 0)).astype(np.uint8)
+def encode_frame(frame: Frame, scale: Ranges) -> tuple[bytes, tuple[int, int]]:
+    """Encode gap, pressure and contact, stacked, as a PNG; return it and the size of a map."""
+    stride = [max(1, -(-count // MAX_PIXELS)) for count in frame.gap.shape]
+    sample = (slice(None, None, stride[0]), slice(None, None, stride[1]))
+    touching = frame.in_contact[sample]
+    classes = np.where(touching, 2, np.where(frame.pressure[sample] <= 0.0, 1, 0)).astype(np.uint8)
     parts = [
-        _shaded(frame.gap[thin], reach.gap),
-        SHADES + _shaded(frame.pressure[thin], reach.pressure),
+        _quantise(frame.gap[sample], scale.gap),
+        SHADES + _quantise(frame.pressure[sample], scale.pressure),
         2 * SHADES + classes,
     ]
-    pixels = np.concatenate([part.T[::-1] for part in parts])  # y points up, rows of a picture down
+    pixels = np.concatenate([part.T[::-1] for part in parts])  # y points up, image rows down
     image = Image.fromarray(pixels)
     image.putpalette(_palette())
-    packed = BytesIO()
-    image.save(packed, format="PNG", optimize=True)
+    png = BytesIO()
+    image.save(png, format="PNG", optimize=True)
     width, height = touching.shape
-    return packed.getvalue(), (width, height)
+    return png.getvalue(), (width, height)
 
 
-def _shaded(values: Field, top: float) -> npt.NDArray[np.uint8]:
+def _quantise(values: Field, top: float) -> npt.NDArray[np.uint8]:
     shades: Field = np.clip(np.rint(values / top * (SHADES - 1)), 0, SHADES - 1)
     return shades.astype(np.uint8)
 

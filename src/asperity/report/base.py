@@ -1,6 +1,6 @@
-"""What all pages share: exhibits, tiles, the template, numbers as they are set in print, and pages written whole.
+"""Parts shared by all reports: exhibits, tiles, rendering and atomic writing of a page.
 
-Nothing is solved or fitted for a page; it is self-contained and loads nothing.
+A report shows stored results: nothing is solved or fitted for it. It is one self-contained file.
 """
 
 import re
@@ -19,16 +19,18 @@ from matplotlib.figure import Figure
 from asperity.core.files import atomic_write, require_writable
 from asperity.core.quantities import Quantity, in_print, quantity
 from asperity.paper import CITATION
-from asperity.report.style import ON_PAGE, ON_PAPER, ON_TELEPHONE, Medium, svg, write_figure
+from asperity.report.style import ON_PAGE, ON_PAPER, ON_PHONE, Medium, svg, write_figure
 
-POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none';"
+POLICY = (
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; "
+    "form-action 'none';"
+)
 
 
 class Picture(NamedTuple):
-    """A figure as the page embeds it; `width` and `height` in CSS pixels keep its place while it loads.
+    """A figure embedded in a page; `width` and `height` in CSS pixels reserve its space.
 
-    `narrow` is the same figure drawn for a telephone, with its own width and height; a wide one
-    may have it.
+    `narrow` is an optional version of a wide figure for phones, with its own width and height.
     """
 
     uri: str
@@ -41,7 +43,7 @@ class Picture(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Exhibit:
-    """A figure: its file's name, how it is drawn for a medium, and what is said of it wherever it is shown."""
+    """A figure with its file name, drawing function, caption and alternative text."""
 
     name: str
     draw: Callable[[Medium], Figure]
@@ -49,20 +51,20 @@ class Exhibit:
     alt: str
 
     def figure(self, medium: Medium = ON_PAGE) -> Figure:
-        """Drawn for that medium."""
+        """Draw the figure for a medium."""
         with medium.drawing():
             return self.draw(medium)
 
     def picture(self) -> Picture:
-        """As a page embeds it."""
-        return self.picture_of(self.figure())
+        """Draw the figure and embed it."""
+        return self.embed(self.figure())
 
-    def picture_and_narrow(self) -> Picture:
-        """As a page embeds it, with a drawing of its own for telephones."""
-        return self.picture()._replace(narrow=self.picture_of(self.figure(ON_TELEPHONE)))
+    def responsive_picture(self) -> Picture:
+        """Embed the figure together with a narrow version for phones."""
+        return self.picture()._replace(narrow=self.embed(self.figure(ON_PHONE)))
 
-    def picture_of(self, figure: Figure) -> Picture:
-        """As a page embeds it, once it is drawn."""
+    def embed(self, figure: Figure) -> Picture:
+        """Convert a drawn figure to an SVG data URI."""
         text = re.sub(
             r"^.*?(?=<svg)", "", svg(figure), flags=re.DOTALL
         )  # an image needs no XML prologue
@@ -82,7 +84,7 @@ class Exhibit:
 def write_exhibits(
     exhibits: Iterable[Exhibit], folder: Path, progress: Callable[[str], None]
 ) -> None:
-    """Each exhibit for a paper, as PDF and PNG, and what to print below them in captions.md."""
+    """Write each exhibit as PDF and PNG for a paper, and all captions to captions.md."""
     captions = []
     for exhibit in exhibits:
         progress(f"drawing {exhibit.name}")
@@ -98,15 +100,15 @@ def write_exhibits(
 
 
 class Tile(NamedTuple):
-    """A number that stands out on a page, and what stands small beside it: deviation and unit."""
+    """A highlighted number of a page; `detail` holds its uncertainty and unit in small type."""
 
     name: str
     value: str
-    rest: str
+    detail: str
 
 
 def tile(quantity: Quantity, row: Mapping[str, Any]) -> Tile:
-    """A quantity of a row, its deviation and unit apart."""
+    """Return the tile of a quantity of a row, with its uncertainty and unit."""
     low, high = (row.get(end) for end in quantity.ends)
     if low is not None and high is not None:
         return Tile(
@@ -123,26 +125,25 @@ def tile(quantity: Quantity, row: Mapping[str, Any]) -> Tile:
 
 
 def heading(quantity: Quantity) -> str:
-    """What a quantity is called at the beginning of a row."""
+    """Return the title of a quantity with a capital first letter."""
     return capitalised(quantity.title)
 
 
-def span(quantity: Quantity, values: Collection[float]) -> str:
-    """From the least to the largest of the values: "20.0 to 69.4 %"."""
+def range_text(quantity: Quantity, values: Collection[float]) -> str:
+    """Return the range of the values as text, such as "20.0 to 69.4 %"."""
     low, high = quantity.number(min(values)), quantity.text(max(values))
     return high if quantity.text(min(values)) == high else f"{low} to {high}"
 
 
 def capitalised(text: str) -> str:
-    """The text with a capital first letter."""
+    """Return the text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
 def render(template: str, *, script: str = "", **values: Any) -> str:
-    """A page as HTML text, escaped and complete; quantities are asked for their names and numbers where they stand.
+    """Render a template to an HTML page, with escaping.
 
-    The page may load nothing and run nothing but `script`, whatever stands in the names that it
-    shows.
+    The content security policy forbids all loading and every script except `script`.
     """
     runs = (
         f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'" if script else "'none'"
@@ -166,7 +167,7 @@ def render(template: str, *, script: str = "", **values: Any) -> str:
 
 
 def write_page(path: str | Path, page: Callable[[], str]) -> Path:
-    """Write a page whole or not at all, and return its path; BadInput, before anything is drawn, where it cannot be."""
+    """Write a page atomically and return its path; raise BadInput early if not writable."""
     path = Path(path)
     require_writable(path)
     with atomic_write(path) as part:

@@ -1,4 +1,4 @@
-"""The benchmark's figure: error of every certified value over the time that its case took."""
+"""Figure of a benchmark: error of each certified value over computing time."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,12 +15,12 @@ FAMILIES = (
     ("moving", "black", "P"),
     ("cavity", GREEN, "^"),
 )
-LEAST = 1e-8  # below which an error is drawn at it
+SMALLEST_ERROR = 1e-8  # smaller errors are drawn at this value
 
 
 @ON_PAGE.drawing()
 def benchmark_figure(*results: BenchmarkResult) -> Figure:
-    """Relative error over processor time, a panel a solver, a line for each value from coarse to fine."""
+    """Draw relative error over processor time, one panel per solver, one line per value."""
     figure = Figure(
         figsize=(ON_PAGE.single, 4.2 if len(results) == 1 else 3.2 * len(results)),
         layout="constrained",
@@ -33,25 +33,25 @@ def benchmark_figure(*results: BenchmarkResult) -> Figure:
 
 
 def _panel(axes: Axes, result: BenchmarkResult) -> None:
-    named: set[str] = set()
+    labelled: set[str] = set()
     for case, quantity in dict.fromkeys((row.case, row.quantity) for row in result.rows):
         rows = [row for row in result.rows if (row.case, row.quantity) == (case, quantity)]
         family = case.partition("-")[0]
         colour, marker = next(((c, m) for name, c, m in FAMILIES if name == family), (GREY, "D"))
         axes.loglog(
             [max(row.seconds, 1e-4) for row in rows],
-            [max(abs(row.error), LEAST) for row in rows],
+            [max(abs(row.error), SMALLEST_ERROR) for row in rows],
             marker=marker,
             color=colour,
             linewidth=0.6,
             markersize=4,
             alpha=0.8,
-            label=None if family in named else family,
+            label=None if family in labelled else family,
         )
-        named.add(family)
+        labelled.add(family)
     axes.axhline(0.01, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
-    axes.set_ylabel("error over certified value")
+    axes.set_ylabel("relative error")
     cells = ", ".join(str(count) for count in np.unique([row.cells for row in result.rows]))
-    axes.set_title(f"{result.solver}: error over time on {cells} cells")
-    if named:
+    axes.set_title(f"{result.solver}: error over computing time, {cells} cells")
+    if labelled:
         axes.legend(ncols=2)

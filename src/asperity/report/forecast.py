@@ -1,4 +1,4 @@
-"""What is foretold of a series, as pages of recordings and of an inference show it."""
+"""Exhibit of a forecast, shared by the reports of tracking and inference."""
 
 from matplotlib.axes import Axes
 
@@ -9,21 +9,21 @@ from asperity.report.drawing import display, name_axes, one_panel
 from asperity.report.style import BLUE, DASHED, VERMILION
 
 
-def ahead(bands: Bands, x_label: str) -> Exhibit:
-    """The limit's quantity over the series and ahead, with the limit."""
+def forecast_exhibit(bands: Bands, x_label: str) -> Exhibit:
+    """Draw the limited quantity over the series, its forecast and the limit."""
     entry, x = quantity(bands.key), bands.x
     low, middle, high = display(bands.key, bands.ends)
 
-    @one_panel(3.2, key=3)
+    @one_panel(3.2, legend_columns=3)
     def draw(axes: Axes) -> None:
-        for here, colour, name in (
-            (x <= bands.last, BLUE, "as heard"),
-            (x >= bands.last, VERMILION, "foretold"),
+        for part, colour, name in (
+            (x <= bands.last, BLUE, "observed"),
+            (x >= bands.last, VERMILION, "forecast"),
         ):
             axes.fill_between(
-                x[here], low[here], high[here], color=colour, alpha=0.25, linewidth=0, label=name
+                x[part], low[part], high[part], color=colour, alpha=0.25, linewidth=0, label=name
             )
-            axes.plot(x[here], middle[here], color=colour)
+            axes.plot(x[part], middle[part], color=colour)
         axes.axhline(
             display(bands.key, bands.limit), color="black", linestyle=DASHED, label="limit"
         )
@@ -32,7 +32,7 @@ def ahead(bands: Bands, x_label: str) -> Exhibit:
     return Exhibit(
         "ahead",
         draw,
-        "What possible contacts do, 90 % and median: up to the last recording as each was known then, and behind it as "
-        "their drift goes on, restless as it was.",
-        f"{entry.name} over the series of recordings, and its forecast with the limit",
+        "Median and 90 % interval. Up to the last recording: the state inferred at each time. "
+        "After it: the forecast, with the drift and its scatter continuing as observed.",
+        f"{entry.name} over the series of recordings, its forecast and the limit",
     )

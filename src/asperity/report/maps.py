@@ -1,6 +1,6 @@
-"""Maps of a contact: a quantity in colours, what touches, the Hertz zone.
+"""Maps of a contact: a quantity in colours, the contact state, the Hertz zone.
 
-All maps of a contact lie in the same place of their figures.
+All maps of a contact have the same position in their figures.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,7 +31,7 @@ from asperity.report.style import (
 
 
 def map_figure(medium: Medium, extent: tuple[float, float]) -> tuple[Figure, Axes]:
-    """A figure with a map of that extent, all maps of a contact in the same place, and room for a key below."""
+    """Create a figure for a map of this extent, with room for a legend below."""
     width, below, above = medium.single - 0.85, 1.0, 0.32
     height = width * min(max(extent[1] / extent[0], 0.15), 1.4)
     total = below + height + above
@@ -42,7 +42,7 @@ def map_figure(medium: Medium, extent: tuple[float, float]) -> tuple[Figure, Axe
 
 
 def show_map(axes: Axes, values: Field, solution: ContactSolution, **style: Any) -> AxesImage:
-    """Draw values of shape (nx, ny) or colours of shape (nx, ny, 3) over the contact, oil coming from the left."""
+    """Draw values (nx, ny) or colours (nx, ny, 3) over the contact; oil enters from the left."""
     (x0, y0), (x1, y1) = solution.grid.lower, solution.grid.upper
     corners = (*display("x_m", np.array([x0, x1])), *display("y_m", np.array([y0, y1])))
     roller = solution.conditions.geometry == "roller"
@@ -60,11 +60,11 @@ def show_map(axes: Axes, values: Field, solution: ContactSolution, **style: Any)
     if roller:
         axes.tick_params(
             axis="y", labelrotation=90
-        )  # thousands of micrometres leave no room beside them
+        )  # numbers of four digits do not fit horizontally
     return image
 
 
-def drawn_map(
+def map_drawer(
     solution: ContactSolution,
     key: str,
     values: Field,
@@ -74,7 +74,10 @@ def drawn_map(
     ticks: Sequence[float] | None = None,
     **style: Any,
 ) -> Callable[[Medium], Figure]:
-    """The map of a quantity, stored values of shape (nx, ny), with the Hertz zone and a key to the colours."""
+    """Return a function that draws the map of a quantity.
+
+    `values` of shape (nx, ny) are in the stored unit; the map has the Hertz zone and a colour bar.
+    """
 
     def draw(medium: Medium) -> Figure:
         figure, axes = map_figure(medium, solution.grid.extent)
@@ -90,7 +93,7 @@ def drawn_map(
 def colour_bar(
     figure: Figure, axes: Axes, image: ScalarMappable, key: str, **settings: Any
 ) -> None:
-    """The key to the colours of a map of that quantity, below it."""
+    """Add the colour bar of a quantity below its map."""
     box, total = axes.get_position(), figure.get_size_inches()[1]
     place = figure.add_axes((box.x0, 0.42 / total, box.width, 0.11 / total))
     figure.colorbar(
@@ -99,7 +102,7 @@ def colour_bar(
 
 
 def mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
-    """The outline of the smooth, dry contact, dashed."""
+    """Draw the outline of the smooth, dry contact as a dashed line."""
     a, b = (display("x_m", half_width) for half_width in solution.conditions.hertz.half_widths)
     style: dict[str, Any] = {"color": colour, "linestyle": DASHED, "linewidth": 1.0}
     if solution.conditions.endless:
@@ -114,18 +117,21 @@ def mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
             np.concatenate([side, -side[::-1]]), np.concatenate([places, places[::-1]]), **style
         )
     else:
-        turn = np.linspace(0.0, 2.0 * np.pi, 200)
-        axes.plot(a * np.cos(turn), b * np.sin(turn), **style)
+        angle = np.linspace(0.0, 2.0 * np.pi, 200)
+        axes.plot(a * np.cos(angle), b * np.sin(angle), **style)
 
 
 def contact_colours(solution: ContactSolution) -> Field:
-    """Red, green and blue of every cell, shape (nx, ny, 3): asperity contact, oil, ruptured oil; an open gap if dry."""
+    """Return the RGB colour of each cell by its state, shape (nx, ny, 3).
+
+    States are asperity contact, oil film and cavitated film; in a dry contact, open gap.
+    """
     colours = np.empty((*solution.grid.cells, 3))
     colours[:] = to_rgb(GAP_COLOUR if solution.lubricant is None else OIL_COLOUR)
     colours[solution.cavitated] = to_rgb(CAVITY_COLOUR)
     period = max(
         solution.grid.cells[0] // 20, 5
-    )  # of diagonal lines, one part in five wide, about twenty across
+    )  # of the diagonal stripes: about twenty across, each a fifth of the period wide
     i, j = np.indices(solution.grid.cells, sparse=True)
     colours[solution.cavitated & ((i + j) % period < max(period // 5, 1))] = to_rgb(CAVITY_STRIPE)
     colours[solution.in_contact] = to_rgb(CONTACT_COLOUR)
@@ -133,7 +139,7 @@ def contact_colours(solution: ContactSolution) -> Field:
 
 
 def contact_keys(contact: str, rest: str, cavitated: str = "") -> list[Patch | Line2D]:
-    """The key to `contact_colours`; without a name for ruptured oil the rest is an open gap."""
+    """Return the legend of `contact_colours`; without `cavitated`, `rest` is an open gap."""
     keys: list[Patch | Line2D] = [Patch(color=CONTACT_COLOUR, label=contact)]
     if cavitated:
         keys.append(Patch(color=OIL_COLOUR, label=rest))

@@ -1,1 +1,1 @@
-"""The page of what recordings say of a contact."""
+"""Report of the inference of a contact's state from recordings."""

@@ -1,4 +1,4 @@
-"""Exhibits of an inference: marginals, pairs, what it would show against what was heard, what to run next."""
+"""Exhibits of an inference: marginals, pairs, predictions, next recording, design changes."""
 
 from collections.abc import Sequence
 
@@ -14,44 +14,46 @@ from asperity.report.drawing import legend_below, panels_in_rows
 from asperity.report.style import BLUE, GREY, VERMILION, Medium
 
 BINS = 30
-SHOWN = 700  # draws in a cloud
-SIDE = 2.4  # inches, of a panel
-MOST_PAIRS = 3
-LONGEST = 28  # letters of a label
+MAX_DRAWS = 700  # in a scatter plot
+PANEL_SIZE = 2.4  # inches
+MAX_PAIRS = 3
+MAX_LABEL = 28  # characters
 
 
-def marginals(found: Inference) -> Exhibit:
-    """Each quantity before and after."""
-    after, before, exact = (
-        found.values(draws) for draws in (found.draws, found.prior, found.exact)
+def marginals(inference: Inference) -> Exhibit:
+    """Draw the prior and posterior distribution of each quantity."""
+    posterior, prior, exact = (
+        inference.values(draws) for draws in (inference.draws, inference.prior, inference.exact)
     )
 
     def draw(medium: Medium) -> Figure:
-        figure = Figure(figsize=(medium.double, SIDE * -(-len(after) // 4)), layout="constrained")
+        size = medium.double, PANEL_SIZE * -(-len(posterior) // 4)
+        figure = Figure(figsize=size, layout="constrained")
         for number, (axes, key) in enumerate(
-            zip(panels_in_rows(figure, len(after)), after, strict=True)
+            zip(panels_in_rows(figure, len(posterior)), posterior, strict=True)
         ):
-            _marginal(axes, key, (before[key], after[key], exact[key]), named=not number)
+            _marginal(axes, key, (prior[key], posterior[key], exact[key]), labelled=not number)
         legend_below(figure, 3)
         return figure
 
     return Exhibit(
         "marginals",
         draw,
-        "What was known of each quantity before (grey) and is now (blue), at the case's own load and speed; dashed: if "
-        "the laws of the spring had no error. Where blue lies on grey, nothing was learned.",
-        "Distributions of every quantity before and after the recordings",
+        "Prior (grey) and posterior (blue) of each quantity at load and speed of the case. Dashed: "
+        "posterior without the error of the stiffness laws. If blue equals grey, the recordings "
+        "contain no information.",
+        "Prior and posterior distribution of every quantity",
     )
 
 
-def _marginal(axes: Axes, key: str, draws: tuple[Field, Field, Field], *, named: bool) -> None:
+def _marginal(axes: Axes, key: str, draws: tuple[Field, Field, Field], *, labelled: bool) -> None:
     entry = quantity(key)
-    before, after, exact = (entry.factor * values for values in draws)
-    low, high = np.quantile(np.concatenate([before, after]), (0.005, 0.995))
+    prior, posterior, exact = (entry.factor * values for values in draws)
+    low, high = np.quantile(np.concatenate([prior, posterior]), (0.005, 0.995))
     edges = [float(edge) for edge in np.linspace(low, high, BINS + 1)]
-    names = ("before", "after", "after, laws exact") if named else ("", "", "")
-    axes.hist(before, edges, density=True, color=GREY, alpha=0.35, label=names[0] or None)
-    axes.hist(after, edges, density=True, color=BLUE, alpha=0.65, label=names[1] or None)
+    names = ("prior", "posterior", "posterior, exact laws") if labelled else ("", "", "")
+    axes.hist(prior, edges, density=True, color=GREY, alpha=0.35, label=names[0] or None)
+    axes.hist(posterior, edges, density=True, color=BLUE, alpha=0.65, label=names[1] or None)
     axes.hist(
         exact,
         edges,
@@ -63,28 +65,28 @@ def _marginal(axes: Axes, key: str, draws: tuple[Field, Field, Field], *, named:
     )
     label = (
         entry.label
-        if len(entry.label) <= LONGEST
+        if len(entry.label) <= MAX_LABEL
         else f"{entry.name} [{entry.display}]".replace(" along rolling", "")
     )
     axes.set(xlabel=label, yticks=[], xlim=(low, high))
     axes.locator_params(axis="x", nbins=4)
 
 
-def pairs(found: Inference) -> Exhibit:
-    """CLR and Sq, and the unknowns that stand in for one another most."""
-    after, before = found.values(found.draws), found.values(found.prior)
-    shown = _most_alike(after, [unknown.key for unknown in found.setting.unknowns])
+def pairs(inference: Inference) -> Exhibit:
+    """Draw CLR over Sq, and the most correlated pairs of unknowns."""
+    posterior, prior = inference.values(inference.draws), inference.values(inference.prior)
+    shown = _most_correlated(posterior, [unknown.key for unknown in inference.setting.unknowns])
 
     def draw(medium: Medium) -> Figure:
-        figure = Figure(figsize=(medium.double, SIDE + 0.3), layout="constrained")
+        figure = Figure(figsize=(medium.double, PANEL_SIZE + 0.3), layout="constrained")
         for number, (axes, (first, second)) in enumerate(
             zip(panels_in_rows(figure, len(shown)), shown, strict=True)
         ):
-            one, other = quantity(first), quantity(second)
-            for values, colour, name in ((before, GREY, "before"), (after, BLUE, "after")):
+            x, y = quantity(first), quantity(second)
+            for values, colour, name in ((prior, GREY, "prior"), (posterior, BLUE, "posterior")):
                 axes.plot(
-                    one.factor * values[first][:SHOWN],
-                    other.factor * values[second][:SHOWN],
+                    x.factor * values[first][:MAX_DRAWS],
+                    y.factor * values[second][:MAX_DRAWS],
                     ".",
                     markersize=2.0,
                     color=colour,
@@ -92,41 +94,42 @@ def pairs(found: Inference) -> Exhibit:
                     label=None if number else name,
                     rasterized=True,
                 )
-            axes.set(xlabel=one.label, ylabel=other.label)
+            axes.set(xlabel=x.label, ylabel=y.label)
         legend_below(figure, 2, markerscale=4)
         return figure
 
     return Exhibit(
         "pairs",
         draw,
-        "Possible contacts, a point each: load share and roughness, and the pairs of unknowns that stand in for one "
-        "another most. A narrow band is a combination that is known where neither of the two is.",
-        "Clouds of possible contacts before and after the recordings, in pairs of quantities",
+        "Draws of prior and posterior: asperity load share and roughness, and the most correlated "
+        "pairs of unknowns. In a narrow band, only a combination of the two is known.",
+        "Draws of prior and posterior in pairs of quantities",
     )
 
 
-def _most_alike(values: dict[str, Field], keys: Sequence[str]) -> list[tuple[str, str]]:
-    chosen = [(KEY_QUANTITIES[1], KEY_QUANTITIES[0])] if KEY_QUANTITIES[1] in values else []
-    alike = np.abs(np.corrcoef(np.log(np.maximum(np.array([values[key] for key in keys]), 1e-300))))
-    both = [(alike[i, j], keys[i], keys[j]) for i in range(len(keys)) for j in range(i)]
-    ranked = sorted(both, key=lambda entry: -float(np.nan_to_num(entry[0])))
-    return [*chosen, *((first, second) for _, first, second in ranked)][:MOST_PAIRS]
+def _most_correlated(values: dict[str, Field], keys: Sequence[str]) -> list[tuple[str, str]]:
+    first_pair = [(KEY_QUANTITIES[1], KEY_QUANTITIES[0])] if KEY_QUANTITIES[1] in values else []
+    logs = np.log(np.maximum(np.array([values[key] for key in keys]), 1e-300))
+    correlation = np.abs(np.corrcoef(logs))
+    all_pairs = [(correlation[i, j], keys[i], keys[j]) for i in range(len(keys)) for j in range(i)]
+    ranked = sorted(all_pairs, key=lambda entry: -float(np.nan_to_num(entry[0])))
+    return [*first_pair, *((first, second) for _, first, second in ranked)][:MAX_PAIRS]
 
 
-def predicted(found: Inference) -> Exhibit:
-    """CRF at each operating point: heard, and what possible contacts would show."""
-    heard = [
+def predicted(inference: Inference) -> Exhibit:
+    """Draw observed and posterior predictive CRF at each operating point."""
+    observed = [
         (place, point)
-        for place, point in enumerate(found.forward.points)
+        for place, point in enumerate(inference.forward.points)
         if not np.isnan(point.crf.value)
     ]
-    again = np.exp(found.posterior_predictive())
+    predictions = np.exp(inference.posterior_predictive())
 
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(3.4)
-        at = np.arange(len(heard))
-        for number, (place, _) in enumerate(heard):
-            low, middle, high = np.quantile(again[:, place], (0.05, 0.5, 0.95))
+        x = np.arange(len(observed))
+        for number, (place, _) in enumerate(observed):
+            low, middle, high = np.quantile(predictions[:, place], (0.05, 0.5, 0.95))
             axes.plot(
                 [number, number],
                 [low, high],
@@ -134,55 +137,61 @@ def predicted(found: Inference) -> Exhibit:
                 linewidth=7,
                 alpha=0.35,
                 solid_capstyle="butt",
-                label=None if number else "90 % of possible contacts",
+                label=None if number else "predicted, 90 %",
             )
             axes.plot(number, middle, "_", color=BLUE, markersize=12)
-        values = np.array([np.exp(point.crf.value) for _, point in heard])
-        stds = np.array([point.crf.std for _, point in heard]) * values
+        values = np.array([np.exp(point.crf.value) for _, point in observed])
+        stds = np.array([point.crf.std for _, point in observed]) * values
         axes.errorbar(
-            at,
+            x,
             values,
             1.645 * stds,
             fmt="o",
             color=VERMILION,
             markersize=4,
             capsize=3,
-            label="heard",
+            label="observed",
         )
-        names = [f"{point.load_n:.4g} N\n{point.entrainment_m_s:.3g} m/s" for _, point in heard]
-        axes.set_xticks(at, names, fontsize=7.5)
-        axes.set(ylabel=quantity("crf_hz").label, xlim=(-0.6, len(heard) - 0.4))
+        names = [f"{point.load_n:.4g} N\n{point.entrainment_m_s:.3g} m/s" for _, point in observed]
+        axes.set_xticks(x, names, fontsize=7.5)
+        axes.set(ylabel=quantity("crf_hz").label, xlim=(-0.6, len(observed) - 0.4))
         legend_below(figure, 2)
         return figure
 
     return Exhibit(
         "predicted",
         draw,
-        "CRF heard at each operating point (repeats together, 90 %), and what contacts would show that are possible by "
-        "all of them. Points outside their bar are what no contact explains.",
-        "Contact resonance heard at each operating point, beside what possible contacts would show",
+        "CRF observed at each operating point (repeats combined, 90 % interval) and predicted from "
+        "the posterior of all recordings. The model does not explain points outside their bar.",
+        "Contact resonance frequency at each operating point, observed and predicted",
     )
 
 
-def following(found: Inference) -> Exhibit:
-    """Bits that one more recording is expected to tell, over load and speed."""
-    loads = sorted({one.load_n for one in found.candidates})
-    speeds = sorted({one.entrainment_m_s for one in found.candidates})
-    expected = {(one.load_n, one.entrainment_m_s): one.information_bits for one in found.candidates}
+def next_recording(inference: Inference) -> Exhibit:
+    """Draw the expected information of one more recording over load and speed."""
+    candidates = inference.candidates
+    loads = sorted({candidate.load_n for candidate in candidates})
+    speeds = sorted({candidate.entrainment_m_s for candidate in candidates})
+    expected = {
+        (candidate.load_n, candidate.entrainment_m_s): candidate.information_bits
+        for candidate in candidates
+    }
 
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(3.4)
-        told = np.array([[expected[load, speed] for load in loads] for speed in speeds])
-        drawn = axes.contourf(loads, speeds, told, 12, cmap="cividis")
-        figure.colorbar(drawn, ax=axes, label="expected information [bits]")
-        run = [
-            (point.load_n, point.entrainment_m_s) for point in found.forward.points if point.names
+        bits = np.array([[expected[load, speed] for load in loads] for speed in speeds])
+        contours = axes.contourf(loads, speeds, bits, 12, cmap="cividis")
+        figure.colorbar(contours, ax=axes, label="expected information [bits]")
+        recorded = [
+            (point.load_n, point.entrainment_m_s)
+            for point in inference.forward.points
+            if point.names
         ]
-        if run:
+        if recorded:
             axes.plot(
-                *np.array(run).T, "o", color="white", markeredgecolor="black", label="recorded"
+                *np.array(recorded).T, "o", color="white", markeredgecolor="black", label="recorded"
             )
-        best = found.next_point
+        best = inference.next_point
         axes.plot(
             best.load_n,
             best.entrainment_m_s,
@@ -192,7 +201,7 @@ def following(found: Inference) -> Exhibit:
             markersize=15,
             clip_on=False,
             zorder=5,
-            label="to run next",
+            label="recommended next",
         )
         axes.set(
             xlabel=quantity("load_n").axis,
@@ -210,17 +219,18 @@ def following(found: Inference) -> Exhibit:
     return Exhibit(
         "next-point",
         draw,
-        "What one more recording is expected to tell of all unknowns together, over the loads and speeds that the case "
-        "permits.",
-        "Expected information over load and speed, with the points recorded and the one to run next",
+        "Expected information of one more recording about all unknowns, over the loads and speeds "
+        "that the case permits.",
+        "Expected information over load and speed, with recorded points and the recommended next "
+        "one",
     )
 
 
-def levers(design: Design) -> Exhibit:
-    """The chance that the load share stays below the value, over each quantity that can be chosen."""
+def design_changes(design: Design) -> Exhibit:
+    """Draw the probability of a CLR below the limit over each design quantity."""
 
     def draw(medium: Medium) -> Figure:
-        figure = Figure(figsize=(medium.double, SIDE + 0.2), layout="constrained")
+        figure = Figure(figsize=(medium.double, PANEL_SIZE + 0.2), layout="constrained")
         for axes, lever in zip(
             panels_in_rows(figure, len(design.levers), sharey=True), design.levers, strict=True
         ):
@@ -230,7 +240,7 @@ def levers(design: Design) -> Exhibit:
             if lever.bound is not None:
                 axes.axvline(entry.factor * lever.bound, color=VERMILION)
             axes.set(
-                xlabel=entry.label if len(entry.label) <= LONGEST else entry.name, ylim=(-3, 103)
+                xlabel=entry.label if len(entry.label) <= MAX_LABEL else entry.name, ylim=(-3, 103)
             )
         figure.supylabel("probability [%]", fontsize="medium")
         return figure
@@ -238,7 +248,7 @@ def levers(design: Design) -> Exhibit:
     return Exhibit(
         "levers",
         draw,
-        f"Probability that CLR stays below {quantity('clr').text(design.clr)} when one quantity alone is chosen "
-        "otherwise, over all contacts that are possible. Dashed: 95 %.",
-        "Probability of a low load share over roughness, viscosity, load and speed",
+        f"Probability that CLR stays below {quantity('clr').text(design.clr)} if one quantity is "
+        "changed, over the posterior. Dashed: 95 %.",
+        "Probability of a low asperity load share over roughness, viscosity, load and speed",
     )

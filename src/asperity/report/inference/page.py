@@ -1,4 +1,4 @@
-"""One HTML page of an inference: verdict, marginals, pairs, prediction against data, models, what to run next."""
+"""HTML report of an inference: verdict, distributions, predictions, models, next recording."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -6,12 +6,12 @@ from typing import NamedTuple
 from asperity.core.quantities import quantity
 from asperity.inference import KEY_QUANTITIES, Design, Forecast, Inference, PointEstimates
 from asperity.report.base import Tile, heading, render, write_page
-from asperity.report.forecast import ahead
+from asperity.report.forecast import forecast_exhibit
 from asperity.report.inference import exhibits
 
 
-class Line(NamedTuple):
-    """A row of the table: what it is, median, interval with and without the laws' error, bits, what to think of it."""
+class PosteriorRow(NamedTuple):
+    """A row of the table of numbers; `exact` is the interval without the error of the laws."""
 
     name: str
     median: str
@@ -22,86 +22,90 @@ class Line(NamedTuple):
 
 
 def write_inference_report(
-    found: Inference,
+    inference: Inference,
     path: str | Path,
     *,
     forecast: Forecast | None = None,
     design: Design | None = None,
 ) -> Path:
-    """Write one self-contained HTML page about what recordings say, whole or not at all.
+    """Write a self-contained HTML report of an inference, atomically.
 
     Parameters
     ----------
-    found : what they say
-    path : of the page
-    forecast, design : when a limit is crossed, and what keeps the load share below a value, where they were asked
+    inference : result to report
+    path : file to write; its folder must exist
+    forecast, design : forecast of crossing a limit, and design changes for a low CLR, if computed
 
     Raises
     ------
     BadInput
-        for a path that cannot be written to.
+        for a path that is not writable.
     """
-    return write_page(path, lambda: render_inference_page(found, forecast, design))
+    return write_page(path, lambda: render_inference_page(inference, forecast, design))
 
 
 def render_inference_page(
-    found: Inference, forecast: Forecast | None = None, design: Design | None = None
+    inference: Inference, forecast: Forecast | None = None, design: Design | None = None
 ) -> str:
-    """The page as HTML text; see `write_inference_report`."""
-    known = found.posterior()
+    """Render the page as HTML text; see `write_inference_report`."""
+    posterior = inference.posterior()
     return render(
         "inference/page.html.j2",
-        title="What recordings say of a contact",
-        found=found,
+        title="Contact state inferred from recordings",
+        inference=inference,
         tiles=[
             Tile(
                 heading(quantity(key)),
-                quantity(key).number(known[key].median),
-                f"({quantity(key).interval(known[key].low, known[key].high)})",
+                quantity(key).number(posterior[key].median),
+                f"({quantity(key).interval(posterior[key].low, posterior[key].high)})",
             )
             for key in KEY_QUANTITIES
-            if key in known
+            if key in posterior
         ],
-        warnings=found.warnings(),
-        marginals=exhibits.marginals(found).picture(),
-        pairs=exhibits.pairs(found).picture(),
-        predicted=exhibits.predicted(found).picture() if found.observations else None,
-        following=exhibits.following(found).picture(),
-        lines=_lines(found),
+        warnings=inference.warnings(),
+        marginals=exhibits.marginals(inference).picture(),
+        pairs=exhibits.pairs(inference).picture(),
+        predicted=exhibits.predicted(inference).picture() if inference.observations else None,
+        next_recording=exhibits.next_recording(inference).picture(),
+        rows=_posterior_rows(inference),
         heads=PointEstimates.HEADS,
-        points=[one.cells() for one in found.point_estimates()],
+        points=[point.cells() for point in inference.point_estimates()],
         forecast=forecast,
         design=design,
-        ahead=None if forecast is None else ahead(forecast.bands, forecast.x_name or "x").picture(),
-        levers=None if design is None else exhibits.levers(design).picture(),
+        forecast_picture=None
+        if forecast is None
+        else forecast_exhibit(forecast.bands, forecast.x_name or "x").picture(),
+        design_picture=None if design is None else exhibits.design_changes(design).picture(),
         models=[
             (
                 model.law,
-                "with its error" if model.discrepancy else "exact",
+                "with model error" if model.discrepancy else "exact",
                 quantity("log_evidence").number(model.log_evidence, model.log_evidence_std),
                 quantity("model_probability").text(model.probability),
             )
-            for model in found.models
+            for model in inference.models
         ],
-        emulator=found.emulator.sentence(),
+        emulator=inference.emulator.sentence(),
+        case_text=inference.setting.case.text,
     )
 
 
-def _lines(found: Inference) -> list[Line]:
-    exact, lines = found.posterior(discrepancy=False), []
-    for key, one in found.posterior().items():
-        entry, other = quantity(key), exact[key]
-        remark = "" if one.learnt else "as assumed"
-        if one.against:
-            remark = f"against the {'lower' if one.against == 'low' else 'upper'} end of its prior"
-        lines.append(
-            Line(
+def _posterior_rows(inference: Inference) -> list[PosteriorRow]:
+    exact, rows = inference.posterior(discrepancy=False), []
+    for key, estimate in inference.posterior().items():
+        entry, without_error = quantity(key), exact[key]
+        remark = "" if estimate.learnt else "prior only"
+        if estimate.against:
+            end = "lower" if estimate.against == "low" else "upper"
+            remark = f"at the {end} end of its prior"
+        rows.append(
+            PosteriorRow(
                 heading(entry),
-                entry.number(one.median),
-                entry.interval(one.low, one.high),
-                entry.interval(other.low, other.high),
-                quantity("information_bits").number(one.information_bits),
+                entry.number(estimate.median),
+                entry.interval(estimate.low, estimate.high),
+                entry.interval(without_error.low, without_error.high),
+                quantity("information_bits").number(estimate.information_bits),
                 remark,
             )
         )
-    return lines
+    return rows

@@ -1,1 +1,1 @@
-"""The page of a machine."""
+"""Report of a machine."""

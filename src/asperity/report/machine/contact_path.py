@@ -1,4 +1,4 @@
-"""What a machine's contacts have along the path of contact, or round the load zone."""
+"""Exhibits of a machine's contacts along the path of contact or around the load zone."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from asperity.report.base import Exhibit
 from asperity.report.drawing import display, legend_below, name_axes, panels_in_rows
 from asperity.report.style import BLUE, DASHED, GREY, VERMILION, Medium
 
-SHOWN = (  # key of a row, and of the quantity that says how it is shown
+SOLVED = (  # key of a row, and of the quantity that formats it
     ("h_central_m", "h_central_m"),
     ("lambda_ratio", "lambda_ratio"),
     ("clr", "clr"),
@@ -27,24 +27,24 @@ SHOWN = (  # key of a row, and of the quantity that says how it is shown
     ("von_mises_core_pa", "von_mises_core_pa"),
     ("crf_hz", "crf_hz"),
 )
-STATED = (  # of a machine that is not solved
+CONDITIONS_ONLY = (  # for a machine that is not solved
     ("load_n", "load_n"),
     ("p_hertz_pa", "hertz_pressure_pa"),
     ("entrainment_m_s", "entrainment_speed_m_s"),
     ("slide_to_roll", "slide_to_roll"),
 )
-RATED = {"flash_temperature_max_k": "rated_flash_k"}  # drawn beside what was solved
+RATED = {"flash_temperature_max_k": "rated_flash_k"}  # ratings drawn with solved quantities
 RATING = "rating"
 STROKES = ((BLUE, "-", "o"), (VERMILION, "--", "s"))
-NAMED = 9  # contacts of one path whose names fit below an axis
+MAX_NAMED = 9  # contacts of one path whose names fit below an axis
 
 
 def along_path(result: MachineResult) -> Exhibit:
-    """Every solved number over the place of the contact, with its interval where there is one, and ratings beside."""
-    wanted = SHOWN if result.solved else STATED
+    """Draw every quantity over the position of the contact, with intervals and ratings."""
+    quantities = SOLVED if result.solved else CONDITIONS_ONLY
     keys = [
         (key, name)
-        for key, name in wanted
+        for key, name in quantities
         if any(row.get(key) or key == "clr" for row in result.rows)
     ]
     series = _series(result)
@@ -53,8 +53,8 @@ def along_path(result: MachineResult) -> Exhibit:
     )
 
     def draw(medium: Medium) -> Figure:
-        down = -(-len(keys) // 4)
-        figure = Figure(figsize=(medium.double, 2.3 * down + 0.5), layout="constrained")
+        rows = -(-len(keys) // 4)
+        figure = Figure(figsize=(medium.double, 2.3 * rows + 0.5), layout="constrained")
         for (key, name), axes in zip(
             keys, panels_in_rows(figure, len(keys), sharex=True), strict=True
         ):
@@ -69,34 +69,37 @@ def along_path(result: MachineResult) -> Exhibit:
 
     place = quantity(result.case.machine.place)
     low, high = quantity("clr").ends
-    whole = any(row.get(low) is not None and row.get(high) is not None for row in result.rows)
-    bars = " Bars are 90 % intervals, from surfaces, grid and iteration." if whole else ""
-    what = "What was solved" if result.solved else "What the contacts are given"
-    beside = (
-        " Dotted: the standard's rating, which counts roughness in its own way." if rated else ""
+    has_intervals = any(
+        row.get(low) is not None and row.get(high) is not None for row in result.rows
     )
+    bars = " Bars: 90 % intervals from surfaces, grid and iteration." if has_intervals else ""
+    subject = "Solved quantities" if result.solved else "Conditions of the contacts"
+    dotted = " Dotted: rating of the standard, with its own roughness factor." if rated else ""
     return Exhibit(
         "path",
         draw,
-        f"{what} over the {place.name}, {place.meaning}.{bars}{beside}",
-        f"{len(keys)} panels over the {place.name}: {', '.join(quantity(name).name for _, name in keys)}.",
+        f"{subject} over the {place.name}, {place.meaning}.{bars}{dotted}",
+        f"{len(keys)} panels over the {place.name}: "
+        f"{', '.join(quantity(name).name for _, name in keys)}.",
     )
 
 
 def _series(result: MachineResult) -> dict[str, list[dict[str, Any]]]:
-    """Rows by what they lie on: both rings of a bearing apart, each round its load zone."""
-    found: dict[str, list[dict[str, Any]]] = {}
+    """Group the rows by series, sorted by position: each ring of a bearing is one series."""
+    series: dict[str, list[dict[str, Any]]] = {}
     rings = result.rows[0]["name"].endswith("ring")
     for row in result.rows:
-        found.setdefault(row["bodies"][0] if rings else "contact", []).append(row)
-    return {name: sorted(rows, key=lambda row: _place(result, row)) for name, rows in found.items()}
+        series.setdefault(row["bodies"][0] if rings else "contact", []).append(row)
+    return {
+        name: sorted(rows, key=lambda row: _position(result, row)) for name, rows in series.items()
+    }
 
 
-def _place(result: MachineResult, row: dict[str, Any]) -> float:
-    """Where a contact is; angles run from -180 to 180 degrees, as both sides of a load zone belong together."""
-    place = float(row["position"])
-    turned = result.case.machine.place == "cycle_angle" and place > math.pi
-    return place - math.tau if turned else place
+def _position(result: MachineResult, row: dict[str, Any]) -> float:
+    """Return the position of a contact; angles from -180 to 180 degrees keep a load zone whole."""
+    position = float(row["position"])
+    is_angle = result.case.machine.place == "cycle_angle"
+    return position - math.tau if is_angle and position > math.pi else position
 
 
 def _panel(
@@ -104,7 +107,7 @@ def _panel(
 ) -> None:
     entry, place = quantity(name), result.case.machine.place
     for (label, rows), (colour, stroke, marker) in zip(series.items(), STROKES, strict=False):
-        x = display(place, np.array([_place(result, row) for row in rows]))
+        x = display(place, np.array([_position(result, row) for row in rows]))
         y = display(name, _numbers(rows, key))
         axes.plot(x, y, stroke, color=colour, marker=marker, markersize=4, label=label)
         low, high = (display(name, _numbers(rows, end)) for end in entry.ends)
@@ -114,9 +117,9 @@ def _panel(
     _draw_rating(axes, result, key)
     axes.tick_params(labelbottom=True)
     axes.set_title(entry.label, fontweight="normal", fontsize="small")
-    if len(series) == 1 and 1 < len(result.rows) <= NAMED and place == "path_position_m":
+    if len(series) == 1 and 1 < len(result.rows) <= MAX_NAMED and place == "path_position_m":
         rows = next(iter(series.values()))
-        x = display(place, np.array([_place(result, row) for row in rows]))
+        x = display(place, np.array([_position(result, row) for row in rows]))
         axes.set_xticks(x, [row["name"] for row in rows], fontsize="small")
     else:
         name_axes(axes, place)
@@ -125,11 +128,13 @@ def _panel(
 
 
 def _draw_rating(axes: Axes, result: MachineResult, key: str) -> None:
-    """What a rating has in this panel's unit, where one has."""
+    """Draw the rating of this panel's quantity, if there is one."""
     for rating in result.ratings:
         if rating.key == RATED.get(key) and "" not in rating.values:
             rows = [row for row in result.rows if row["name"] in rating.values]
-            x = display(result.case.machine.place, np.array([_place(result, row) for row in rows]))
+            x = display(
+                result.case.machine.place, np.array([_position(result, row) for row in rows])
+            )
             y = display(
                 rating.key, np.array([rating.values[row["name"]] for row in rows], dtype=float)
             )
@@ -140,14 +145,14 @@ def _numbers(rows: Sequence[dict[str, Any]], key: str) -> Field:
     return np.array([np.nan if row.get(key) is None else row[key] for row in rows], dtype=float)
 
 
-def fatigue_over_depth(found: DangVan) -> Exhibit:
-    """Dang Van's measure over depth, of the solved contact and of the smooth one, and the material's limit."""
+def fatigue_over_depth(fatigue: DangVan) -> Exhibit:
+    """Draw Dang Van's criterion over depth for the rough and the smooth contact, with its limit."""
 
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(3.4)
-        depths = display("depth_m", found.depths)
+        depths = display("depth_m", fatigue.depths)
         for values, label, (colour, stroke, marker) in zip(
-            (found.solved, found.smooth),
+            (fatigue.solved, fatigue.smooth),
             ("solved, rough", "smooth, same friction"),
             STROKES,
             strict=True,
@@ -162,15 +167,15 @@ def fatigue_over_depth(found: DangVan) -> Exhibit:
                 label=label,
             )
         axes.axvline(
-            display("dang_van_pa", found.limit),
+            display("dang_van_pa", fatigue.limit),
             color="black",
             linestyle=DASHED,
             linewidth=1.0,
             label="limit",
         )
-        axes.axhspan(0.0, display("depth_m", found.core_depth), color="#eef1f5", zorder=0)
+        axes.axhspan(0.0, display("depth_m", fatigue.core_depth), color="#eef1f5", zorder=0)
         axes.set(
-            xlabel=f"Dang Van's measure [{quantity('dang_van_pa').display}]",
+            xlabel=f"Dang Van equivalent stress [{quantity('dang_van_pa').display}]",
             ylabel=quantity("depth_m").axis,
         )
         axes.set_ylim(depths[-1], 0.0)
@@ -182,7 +187,7 @@ def fatigue_over_depth(found: DangVan) -> Exhibit:
     return Exhibit(
         "fatigue",
         draw,
-        f"τ + a σ_h with a = {found.slope:.3g}, the largest of all lines along rolling, as material passes below the "
-        "pattern of asperities. In the grey layer it grows as cells get finer, and is no property of the contact.",
-        "Dang Van's measure over depth.",
+        f"τ + a σ_h with a = {fatigue.slope:.3g}, maximum over all lines along rolling as material "
+        "passes below the asperities. In the grey layer it grows with grid refinement.",
+        "Dang Van equivalent stress over depth.",
     )

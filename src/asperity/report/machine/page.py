@@ -1,4 +1,4 @@
-"""The page of a machine: what was concluded, the machine drawn, its contacts, its ratings, the worst contact opened."""
+"""HTML report of a machine: verdict, drawing, contacts, ratings and the worst contact."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from asperity.core.quantities import NO_VALUE, Quantity, quantity
 from asperity.machines import MachineResult, Rating
 from asperity.report.base import Exhibit, heading, render, tile, write_page
-from asperity.report.machine.contact_path import SHOWN, along_path, fatigue_over_depth
+from asperity.report.machine.contact_path import SOLVED, along_path, fatigue_over_depth
 from asperity.report.machine.sketch import machine_sketch
 from asperity.report.run import contact, friction_maps
 from asperity.results import Run
@@ -34,29 +34,29 @@ TILES = (
 def write_machine_report(
     result: MachineResult, path: str | Path, *, opened: str | None = None
 ) -> Path:
-    """Write one self-contained HTML page about a machine, whole or not at all.
+    """Write a self-contained HTML report of a machine, atomically.
 
     Parameters
     ----------
-    result : from `solve_machine`, or `machine_conditions`
-    path : the file to write; its folder must exist
-    opened : what the page of the worst contact is called, beside this one; None: there is none
+    result : from `solve_machine` or `machine_conditions`
+    path : file to write; its folder must exist
+    opened : file name of the report of the worst contact in the same folder; None if there is none
 
     Returns
     -------
     Path
-        The file written. The same result and asperity version give the same bytes.
+        File written. The same result and asperity version give the same bytes.
 
     Raises
     ------
     BadInput
-        for a path that cannot be written to.
+        for a path that is not writable.
     """
     return write_page(path, lambda: _page(result, opened))
 
 
 def _page(result: MachineResult, opened: str | None) -> str:
-    keys = [(key, quantity(name)) for key, name in (*CONDITIONS, *SHOWN) if _known(result, key)]
+    keys = [(key, quantity(name)) for key, name in (*CONDITIONS, *SOLVED) if _known(result, key)]
     return render(
         "machine/page.html.j2",
         title=result.case.machine.title(),
@@ -69,7 +69,7 @@ def _page(result: MachineResult, opened: str | None) -> str:
         path=along_path(result).picture() if len(result.rows) > 1 else None,
         heads=[(_head(key, entry), entry.display) for key, entry in keys],
         rows=[(row, [_cell(row, key, entry) for key, entry in keys]) for row in result.rows],
-        ratings=[_rated(rating) for rating in result.ratings],
+        ratings=[_rating_view(rating) for rating in result.ratings],
         worst=[exhibit.picture() for exhibit in _worst(result)],
         run=result.run,
         opened=opened,
@@ -89,12 +89,12 @@ def _head(key: str, entry: Quantity) -> str:
 
 
 def _cell(row: dict[str, object], key: str, entry: Quantity) -> str:
-    """A number, with its interval where the row has one."""
+    """Return a number with its interval, if the row has one."""
     return entry.number_in(row) if key == entry.key else entry.number(row.get(key))
 
 
 class _RatingView(NamedTuple):
-    """What the template shows of a rating."""
+    """Values of a rating for the template."""
 
     name: str
     meaning: str
@@ -102,7 +102,7 @@ class _RatingView(NamedTuple):
     rating: Rating
 
 
-def _rated(rating: Rating) -> _RatingView:
+def _rating_view(rating: Rating) -> _RatingView:
     entry = quantity(rating.key)
     if rating.reason:
         value = f"not rated: {rating.reason}"
@@ -119,7 +119,7 @@ def _rated(rating: Rating) -> _RatingView:
 
 
 def _worst(result: MachineResult) -> Iterator[Exhibit]:
-    """The worst contact's maps, and what it does to the material below."""
+    """Yield maps of the worst contact and the fatigue of the material below."""
     if result.run is None:
         return
     yield from _maps(result.run)

@@ -1,4 +1,4 @@
-"""A machine drawn to scale: where its contacts are, and what each of them carries."""
+"""Scale drawing of a machine with its contacts and their loads."""
 
 import math
 from collections.abc import Callable
@@ -28,38 +28,38 @@ from asperity.report.style import BLUE, GREY, VERMILION, Medium
 MM = 1e3
 METAL, EDGE, IDLE = "#e5e7eb", "#556070", "#ffffff"
 HEIGHT = 4.3  # inches
-Line = tuple[Field, Field]
+Polyline = tuple[Field, Field]
 
 
 def machine_sketch(result: MachineResult) -> Exhibit:
-    """The machine to scale, its worst contact marked."""
+    """Draw the machine to scale and mark its worst contact."""
     machine = result.case.machine
     draw: Callable[[Axes], None]
     if isinstance(machine, SpurGear):
         draw, caption = (
             partial(_gears, machine, result),
             (
-                "The pair in mesh, to scale: the pinion (below) drives. Contact runs along the line of action from A "
-                "to E; between B and D one pair of teeth bears alone. Fillets are left out."
+                "Gear pair in mesh, to scale: the pinion (below) drives. Contact runs along the "
+                "line "
+                "of action from A to E; between B and D a single pair of teeth carries the load. "
+                "Fillets are not shown."
             ),
         )
     elif isinstance(machine, CylindricalRollerBearing | BallBearing):
         draw, caption = (
             partial(_bearing, machine, result),
             (
-                "The bearing from its side, to scale. Shaded rolling elements bear; the bars outside are their loads, "
-                "over the largest. The load presses the inner ring down."
+                "Side view of the bearing, to scale. Shaded rolling elements carry load; the bars "
+                "show it relative to the largest. The load on the inner ring acts downwards."
             ),
         )
     elif isinstance(machine, TwinDisc):
-        draw, caption = partial(_discs, machine), "Both discs from their side, to scale."
+        draw, caption = partial(_discs, machine), "Side view of both discs, to scale."
     else:
         assert isinstance(machine, Cam)
         draw, caption = (
             partial(_cam, machine, result),
-            (
-                "Cam and follower at the worst contact, to scale; the places that were solved are dots on the cam."
-            ),
+            ("Cam and follower at the worst contact, to scale. Dots: solved positions on the cam."),
         )
 
     def drawn(medium: Medium) -> Figure:
@@ -78,7 +78,7 @@ def _circle(axes: Axes, x: float, y: float, radius: float, **style: Any) -> None
     )
 
 
-def _line(axes: Axes, line: Line, **style: Any) -> None:
+def _line(axes: Axes, line: Polyline, **style: Any) -> None:
     axes.plot(MM * line[0], MM * line[1], **{"color": EDGE, "linewidth": 1.0, **style})
 
 
@@ -87,7 +87,7 @@ def _frame(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
 
 
 # Bearings
-# ------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------
 
 
 def _bearing(
@@ -105,8 +105,8 @@ def _bearing(
     _circle(axes, 0.0, 0.0, inner - wall, facecolor="white")
     largest, room = float(loads.max()), 1.1 * diameter
     for number, (angle, load) in enumerate(zip(bearing.angles, loads, strict=True)):
-        away = np.array([math.sin(angle), -math.cos(angle)])
-        x, y = middle * away
+        direction = np.array([math.sin(angle), -math.cos(angle)])
+        x, y = middle * direction
         share = load / largest
         _circle(
             axes,
@@ -123,15 +123,14 @@ def _bearing(
         if load > 0.0:
             start, end = outer + wall, outer + wall + room * share
             axes.plot(
-                *(MM * np.outer(away, [start, end])),
+                *(MM * np.outer(direction, [start, end])),
                 color=VERMILION,
                 linewidth=4.0,
                 solid_capstyle="butt",
             )
-    most = int(np.argmax(loads))
-    place = (outer + wall + room) * np.array(
-        [math.sin(bearing.angles[most]), -math.cos(bearing.angles[most])]
-    )
+    most_loaded = int(np.argmax(loads))
+    angle = bearing.angles[most_loaded]
+    place = (outer + wall + room) * np.array([math.sin(angle), -math.cos(angle)])
     axes.annotate(
         quantity("load_n").text(largest),
         (MM * place[0], MM * place[1]),
@@ -142,47 +141,47 @@ def _bearing(
         color=VERMILION,
         fontsize="small",
     )
-    _applied(axes, bearing, inner - wall)
-    reach = outer + wall + 0.3 * diameter
-    _frame(axes, (-reach - room, reach + room), (-reach - 1.2 * room, reach))
+    _draw_load(axes, bearing, inner - wall)
+    size = outer + wall + 0.3 * diameter
+    _frame(axes, (-size - room, size + room), (-size - 1.2 * room, size))
 
 
-def _applied(axes: Axes, bearing: CylindricalRollerBearing | BallBearing, bore: float) -> None:
-    """The load on the shaft, and which way the inner ring turns."""
-    words = []
+def _draw_load(axes: Axes, bearing: CylindricalRollerBearing | BallBearing, bore: float) -> None:
+    """Draw the load on the shaft and the direction of rotation of the inner ring."""
+    labels = []
     if bearing.radial_load > 0.0:
         style: Any = {"arrowstyle": "-|>", "color": VERMILION, "linewidth": 2.0}
         axes.annotate("", (0.0, -MM * 0.55 * bore), (0.0, MM * 0.3 * bore), arrowprops=style)
-        words.append(quantity("load_n").text(bearing.radial_load))
+        labels.append(quantity("load_n").text(bearing.radial_load))
     axial = getattr(bearing, "axial_load", 0.0)
     if axial > 0.0:
-        words.append(f"{quantity('load_n').text(axial)} axial")
+        labels.append(f"{quantity('load_n').text(axial)} axial")
     axes.text(
         0.0,
         MM * 0.38 * bore,
-        "\n".join(words),
+        "\n".join(labels),
         ha="center",
         va="bottom",
         color=VERMILION,
         fontsize="small",
     )
-    turn = np.linspace(math.radians(150.0), math.radians(30.0), 40)
-    way = 0.85 * bore * np.array([np.cos(turn), np.sin(turn)])
-    _line(axes, (way[0], way[1]), color=GREY)
+    angles = np.linspace(math.radians(150.0), math.radians(30.0), 40)
+    arc = 0.85 * bore * np.array([np.cos(angles), np.sin(angles)])
+    _line(axes, (arc[0], arc[1]), color=GREY)
     axes.annotate(
         "",
-        tuple(MM * way[:, -1]),
-        tuple(MM * way[:, -3]),
+        tuple(MM * arc[:, -1]),
+        tuple(MM * arc[:, -3]),
         arrowprops={"arrowstyle": "-|>", "color": GREY},
     )
 
 
 # Gears
-# ---------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------
 
 
 def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
-    """The pinion's axis below, the wheel's above, both teeth meeting at the worst point."""
+    """Draw the pinion below and the wheel above, in contact at the worst point."""
     (base_1, _), centres, angle = gears.base_radii, gears.centres, gears.working_angle
     foot = base_1 * np.array([math.sin(angle), math.cos(angle)])
     along = np.array([-math.cos(angle), math.sin(angle)])
@@ -190,7 +189,7 @@ def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
     pinion = _flanks(gears, 0, touching)
     wheel = _flanks(
         gears, 1, np.array([0.0, centres]) - touching
-    )  # its own axis is turned by half a turn
+    )  # in the wheel's frame, rotated by 180 degrees
     axes.fill(MM * pinion[0], MM * pinion[1], facecolor=METAL, edgecolor=EDGE, linewidth=0.9)
     axes.fill(
         -MM * wheel[0],
@@ -216,41 +215,45 @@ def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
             fontsize="small",
             fontweight="bold" if is_worst else "normal",
         )
-    reach = 0.62 * float(np.ptp(places[:, 0])) + 1.2 * gears.module
+    size = 0.62 * float(np.ptp(places[:, 0])) + 1.2 * gears.module
     middle = places.mean(axis=0)
     _frame(
         axes,
-        (middle[0] - reach, middle[0] + reach),
-        (middle[1] - 0.8 * reach, middle[1] + 0.8 * reach),
+        (middle[0] - size, middle[0] + size),
+        (middle[1] - 0.8 * size, middle[1] + 0.8 * size),
     )
 
 
-def _flanks(gears: SpurGear, body: int, touching: Field) -> Line:
-    """A gear's outline about its own axis, a flank through a point given from there, y towards the mesh."""
+def _flanks(gears: SpurGear, body: int, contact_point: Field) -> Polyline:
+    """Return the outline of a gear about its axis with a flank through the contact point.
+
+    The y axis points towards the mesh.
+    """
     teeth, shift = gears.teeth[body], gears.profile_shift[body]
     base, tip = gears.base_radii[body], gears.tip_radii[body]
-    half = (0.5 * math.pi + 2.0 * shift * math.tan(gears.pressure_angle)) / teeth + _inv(
+    half = (0.5 * math.pi + 2.0 * shift * math.tan(gears.pressure_angle)) / teeth + _involute(
         gears.pressure_angle
     )
     root = gears.module * (0.5 * teeth + shift - 1.25)
     radii = np.linspace(max(base, root), tip, 25)
-    rolled = np.arccos(np.clip(base / radii, -1.0, 1.0))
-    away = half - (np.tan(rolled) - rolled)  # of a flank from the tooth's middle, at each radius
-    tooth = np.concatenate([[-half], -away, away[::-1], [half]])
-    rise = np.concatenate([[root], radii, radii[::-1], [root]])
-    met = math.acos(min(base / float(np.hypot(*touching)), 1.0))
-    first = math.atan2(touching[0], touching[1]) + half - _inv(met)
-    angles = (first + math.tau * np.arange(teeth)[:, None] / teeth + tooth).ravel()
-    radius = np.tile(rise, teeth)
+    pressure_angles = np.arccos(np.clip(base / radii, -1.0, 1.0))
+    # angle of a flank from the middle of its tooth, at each radius
+    flank = half - (np.tan(pressure_angles) - pressure_angles)
+    tooth_angles = np.concatenate([[-half], -flank, flank[::-1], [half]])
+    tooth_radii = np.concatenate([[root], radii, radii[::-1], [root]])
+    contact_angle = math.acos(min(base / float(np.hypot(*contact_point)), 1.0))
+    first = math.atan2(contact_point[0], contact_point[1]) + half - _involute(contact_angle)
+    angles = (first + math.tau * np.arange(teeth)[:, None] / teeth + tooth_angles).ravel()
+    radius = np.tile(tooth_radii, teeth)
     return radius * np.sin(angles), radius * np.cos(angles)
 
 
-def _inv(angle: float) -> float:
+def _involute(angle: float) -> float:
     return math.tan(angle) - angle
 
 
 # Discs and cams
-# ------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------
 
 
 def _discs(discs: TwinDisc, axes: Axes) -> None:
@@ -276,26 +279,27 @@ def _discs(discs: TwinDisc, axes: Axes) -> None:
 
 
 def _cam(cam: Cam, result: MachineResult, axes: Axes) -> None:
-    """Turned so that the worst contact is where the follower is; the follower moves upwards."""
-    turn = result.worst["position"]
+    """Draw the cam rotated to its worst contact; the follower moves upwards."""
+    rotation = result.worst["position"]
     angles = np.linspace(-math.pi, math.pi, 721)
     outline = np.array([_on_cam(cam, angle) for angle in angles])
-    back = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    x, y = (outline @ back.T).T
+    cosine, sine = math.cos(rotation), math.sin(rotation)
+    matrix = np.array([[cosine, -sine], [sine, cosine]])
+    x, y = (outline @ matrix.T).T
     axes.fill(MM * x, MM * y, facecolor=METAL, edgecolor=EDGE, linewidth=1.0)
     _circle(axes, 0.0, 0.0, cam.base_radius, linestyle=":")
     axes.plot(0.0, 0.0, "+", color=EDGE)
-    dots = np.array([_on_cam(cam, angle) for angle in cam.angles]) @ back.T
+    dots = np.array([_on_cam(cam, angle) for angle in cam.angles]) @ matrix.T
     axes.plot(MM * dots[:, 0], MM * dots[:, 1], "o", color=GREY, markersize=3)
-    met = back @ _on_cam(cam, turn)
-    reach = cam.base_radius + cam.lift
+    contact_point = matrix @ _on_cam(cam, rotation)
+    top = cam.base_radius + cam.lift
     if isinstance(cam, RollerCam):
-        middle = cam.base_radius + cam.roller_radius + cam.lift_at(turn)
+        middle = cam.base_radius + cam.roller_radius + cam.lift_at(rotation)
         _circle(axes, 0.0, middle, cam.roller_radius, facecolor="#d7dde5")
         axes.plot(0.0, MM * middle, "+", color=EDGE)
-        reach += 2.0 * cam.roller_radius
+        top += 2.0 * cam.roller_radius
     else:
-        lift = cam.base_radius + cam.lift_at(turn)
+        lift = cam.base_radius + cam.lift_at(rotation)
         half = 1.1 * cam.base_radius
         axes.fill(
             MM * np.array([-half, half, half, -half]),
@@ -304,29 +308,29 @@ def _cam(cam: Cam, result: MachineResult, axes: Axes) -> None:
             edgecolor=EDGE,
             linewidth=1.0,
         )
-        reach += 0.4 * cam.base_radius
-    axes.plot(*(MM * met), "o", color=VERMILION, markersize=6)
-    below = 1.1 * (cam.base_radius + cam.lift)
-    _frame(axes, (-below, below), (-below, 1.05 * reach))
+        top += 0.4 * cam.base_radius
+    axes.plot(*(MM * contact_point), "o", color=VERMILION, markersize=6)
+    size = 1.1 * (cam.base_radius + cam.lift)
+    _frame(axes, (-size, size), (-size, 1.05 * top))
 
 
 def _on_cam(cam: Cam, angle: float) -> Field:
-    """Where the follower touches at an angle, seen with the nose up and the follower's way turned by it."""
-    turned = abs(angle) if abs(angle) <= cam.half_angle else cam.half_angle
-    way = np.array([math.sin(angle), math.cos(angle)])
+    """Return the contact point at a cam angle, in the cam's frame with the nose up."""
+    limited = abs(angle) if abs(angle) <= cam.half_angle else cam.half_angle
+    along = np.array([math.sin(angle), math.cos(angle)])
     across = np.array([math.cos(angle), -math.sin(angle)])
-    lift = cam.base_radius + cam.lift_at(turned)
-    slope = math.copysign(1.0, angle) * _slope(cam, turned)
+    lift = cam.base_radius + cam.lift_at(limited)
+    slope = math.copysign(1.0, angle) * _lift_slope(cam, limited)
     if isinstance(cam, FlatCam):
-        return np.asarray(lift * way + slope * across)
+        return np.asarray(lift * along + slope * across)
     assert isinstance(cam, RollerCam)
-    centre = (lift + cam.roller_radius) * way
-    normal = (lift + cam.roller_radius) * way - slope * across
+    centre = (lift + cam.roller_radius) * along
+    normal = (lift + cam.roller_radius) * along - slope * across
     return np.asarray(centre - cam.roller_radius * normal / float(np.hypot(*normal)))
 
 
-def _slope(cam: Cam, angle: float) -> float:
-    """S' by differences: of a drawing [m]."""
+def _lift_slope(cam: Cam, angle: float) -> float:
+    """Differentiate the lift over the cam angle numerically [m]."""
     step = 1e-5
     ends = (min(max(angle + side * step, 0.0), cam.half_angle) for side in (-1.0, 1.0))
     low, high = ends

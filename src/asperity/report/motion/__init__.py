@@ -1,1 +1,1 @@
-"""The page of a history and its exhibits."""
+"""Report of a simulated history of a contact in motion."""

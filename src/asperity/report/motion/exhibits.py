@@ -1,4 +1,4 @@
-"""Exhibits of a history: curves over its steps."""
+"""Exhibits of a history: curves over time and over passes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,7 +16,7 @@ from asperity.report.style import BLUE, GREEN, GREY, VERMILION, Medium
 from asperity.simulation import History
 
 STROKES = (("-", BLUE), ("--", VERMILION), (":", GREEN))
-PANELS = (  # over time: what the axis is, unless a panel's one curve says so, and its curves
+PANELS = (  # over time: quantity of the axis, and of its curves
     ("share", ("clr", "car")),
     ("film_thickness_m", ("h_mean_m", "h_central_m", "h_min_m")),
     (
@@ -37,40 +37,41 @@ PASSES = (
 def _known(
     panels: Sequence[tuple[str, tuple[str, ...]]], table: Any
 ) -> list[tuple[str, tuple[str, ...]]]:
-    """The panels that have a value to show."""
+    """Return the panels that have values."""
     return [panel for panel in panels if bool(table[panel[1][0]].notna().any())]
 
 
 def curves(history: History) -> Exhibit:
-    """Load and area shares, film, friction, heat and resonance over time; the steps that count shaded."""
+    """Draw shares, film, friction, power and resonance over time; averaged steps are shaded."""
     table = history.table
 
     def draw(medium: Medium) -> Figure:
         panels = _known(PANELS, table)
         figure = Figure(figsize=(medium.double, 1.55 * len(panels) + 0.5))
-        every = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        all_axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         bottom = 0.5 / figure.get_size_inches()[1]
         figure.subplots_adjust(left=0.09, right=0.985, top=0.985, bottom=bottom, hspace=0.12)
-        time, counts = (
+        time, averaged = (
             display("time_s", rows["time_s"].to_numpy()) for rows in (table, history.settled)
         )
-        for axes, (side, keys) in zip(every, panels, strict=True):
+        for axes, (side, keys) in zip(all_axes, panels, strict=True):
             _draw_over_time(
                 axes,
                 time,
                 {quantity(key).title: display(key, table[key].to_numpy()) for key in keys},
             )
-            axes.axvspan(float(counts[0]), time[-1], color=GREY, alpha=0.08, linewidth=0.0)
+            axes.axvspan(float(averaged[0]), time[-1], color=GREY, alpha=0.08, linewidth=0.0)
             axes.set_ylabel(quantity(side).label)
-        name_axes(every[-1], "time_s")
+        name_axes(all_axes[-1], "time_s")
         return figure
 
     return Exhibit(
         "over-time",
         draw,
-        "Over time; the means and deviations above and below are of the shaded steps. The vertical line is the "
-        "step that the maps show.",
-        "Shares, film, friction, heat and resonance over time",
+        "History over time. Means and standard deviations are taken over the shaded steps. "
+        "Vertical "
+        "line: the step shown in the maps.",
+        "Load and area shares, film, friction, power and resonance over time",
     )
 
 
@@ -84,12 +85,12 @@ def _draw_over_time(axes: Axes, time: Field, lines: Mapping[str, Field]) -> None
         if min(float(np.nanmin(values)) for values in lines.values()) >= 0.0 and low < 0.4 * high
         else low
     )
-    axes.set_ylim(low, high + 0.28 * (high - low))  # room for the key
+    axes.set_ylim(low, high + 0.28 * (high - low))  # room for the legend
     axes.legend(loc="upper right", ncols=3)
 
 
 def running_in(history: History) -> Exhibit:
-    """Load and area shares, Sq of the tracks, how far they are pressed down, and resonance, pass by pass."""
+    """Draw shares, Sq and flattening of the tracks, and resonance over passes."""
     table = history.by_pass()
 
     def draw(medium: Medium) -> Figure:
@@ -104,8 +105,8 @@ def running_in(history: History) -> Exhibit:
                     table["pass"], values, marker=marker, markersize=3.5, color=colour, label=title
                 )
             if len(keys) > 1:
-                axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])  # room for the key
-            if keys != (side,):  # else the axis says it
+                axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])  # room for the legend
+            if keys != (side,):  # otherwise the axis label suffices
                 axes.legend(loc="best")
             axes.set(ylabel=quantity(side).label, xlabel="pass")
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -114,8 +115,9 @@ def running_in(history: History) -> Exhibit:
     return Exhibit(
         "passes",
         draw,
-        "Running-in, a point a pass of the rough surface: shares and resonance are means over the pass, Sq and how far "
-        "the tracks are pressed down stand as at its end. What is pressed down is taken to come up everywhere alike: "
-        "the mean plane rises, which under a held load parts the bodies by as much and changes nothing else.",
-        "Shares, Sq, flattening and resonance over passes",
+        "Running-in, one point per pass of the rough surface: means of shares and resonance over "
+        "the "
+        "pass, Sq and flattening at its end. Flattened volume is distributed uniformly: the mean "
+        "plane rises and, at constant load, separates the bodies by the same distance.",
+        "Load and area shares, Sq, flattening and resonance over passes",
     )

@@ -1,16 +1,14 @@
-"""One HTML page of a history: what moving did to the contact, maps that move, curves over time, numbers, limits.
-
-The maps are small pictures in the page, shown one after the other by a few lines of script.
-"""
+"""HTML report of a history: verdict, animated maps, curves over time, numbers and limits."""
 
 from dataclasses import replace
 from pathlib import Path
 
 from asperity.core.errors import BadInput
 from asperity.core.quantities import in_print, quantity
-from asperity.report import animated_maps as moving
+from asperity.report import animated_maps
 from asperity.report.base import render, tile, write_page
 from asperity.report.motion import exhibits
+from asperity.report.oil_balance import DRY, oil_limit
 from asperity.simulation import History, HistoryVibration
 
 NUMBERS = (
@@ -34,23 +32,29 @@ TILES = ("clr", "car", "h_mean_m", "friction_coefficient", "resonance_hz")
 def write_motion_report(
     history: History, path: str | Path, *, vibration: HistoryVibration | None = None
 ) -> Path:
-    """Write one self-contained HTML page about a history, whole or not at all; with what a mass on it does.
+    """Write a self-contained HTML report of a history, atomically.
+
+    Parameters
+    ----------
+    history : with at least one stored map
+    path : file to write; its folder must exist
+    vibration : response of a mass on the contact, if computed
 
     Raises
     ------
     BadInput
-        for a history without a kept map, or a path that cannot be written to.
+        for a history without a stored map, or a path that is not writable.
     """
     if not history.frames:
         raise BadInput(
-            "a report needs at least one map of the history, got none; run the case into a new folder"
+            "a report needs at least one stored map, got none; run the case into a new folder"
         )
     return write_page(path, lambda: render_motion_page(history, vibration))
 
 
 def render_motion_page(history: History, vibration: HistoryVibration | None = None) -> str:
-    """The page as HTML text."""
-    reach = moving.ranges(history.case, history.frames)
+    """Render the page as HTML text."""
+    scale = animated_maps.ranges(history.case, history.frames)
     over_time = exhibits.curves(history)
     figure = over_time.figure()
     box = figure.axes[0].get_position()
@@ -66,29 +70,35 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
             for key in TILES
             if values[key] is not None
         ],
-        maps=[moving.moving_map(history.case, kind, reach) for kind in moving.KINDS],
-        curves=over_time.picture_of(figure),
+        maps=[
+            animated_maps.animated_map(history.case, kind, scale) for kind in animated_maps.KINDS
+        ],
+        curves=over_time.embed(figure),
         running_in=exhibits.running_in(history).picture() if pass_by_pass else None,
         motion=motion,
         numbers=[quantity(key) for key in NUMBERS],
         values=values,
         settled_from=int(rows["step"].iloc[0]),
-        model=history.case.contents.model,
-        imbalance=quantity("mass_flux_imbalance").text(rows["mass_flux_imbalance"].mean()),
-        script=moving.SCRIPT,
-        script_data=_script_data(history, reach, (100.0 * box.x0, 100.0 * box.x1)),
+        oil_limit=oil_limit(
+            history.case.contents.model if history.case.lubricant else DRY,
+            quantity("mass_flux_imbalance").text(rows["mass_flux_imbalance"].mean()),
+        ),
+        case_text=history.case.text,
+        script=animated_maps.SCRIPT,
+        script_data=_script_data(history, scale, (100.0 * box.x0, 100.0 * box.x1)),
     )
 
 
-def _script_data(history: History, reach: moving.Ranges, ends: tuple[float, float]) -> str:
-    """What the page's script shows of each kept step, and where that is along the curves over time."""
+def _script_data(history: History, scale: animated_maps.Ranges, ends: tuple[float, float]) -> str:
+    """Return the data of the page's script: frames, captions and positions on the time axis."""
     last = float(history.table["time_s"].iloc[-1])
-    words = [_in_words(history, frame.number) for frame in history.frames]
+    captions = [_caption(history, frame.number) for frame in history.frames]
     place = [frame.time / last if last else 0.0 for frame in history.frames]
-    return moving.script_data(history.frames, words, reach, ends=ends, place=place)
+    return animated_maps.script_data(history.frames, captions, scale, ends=ends, place=place)
 
 
-def _in_words(history: History, number: int) -> str:
+def _caption(history: History, number: int) -> str:
+    """Describe a step: number, time, CLR, CAR and friction."""
     row = history.table[history.table["step"] == number].iloc[0]
     values = [quantity(key).named(row[key]) for key in ("clr", "car")]
     friction = quantity("friction_coefficient").number(row["friction_coefficient"])

@@ -1,1 +1,1 @@
-"""The page of solved contacts and its exhibits; figures of measured surfaces, friction curves and vibration."""
+"""Report of solved contacts; figures of measured surfaces, friction curves and vibration."""

@@ -1,4 +1,4 @@
-"""The table of conditions of a run: what was given, in words and display units."""
+"""Table of a run's conditions, in words and display units."""
 
 import math
 import tomllib
@@ -13,15 +13,11 @@ from asperity.lubricant import ZERO_CELSIUS, LawFamily, Lubricant, Solid, law_na
 from asperity.report.base import heading
 from asperity.results import Run
 
-TACIT = {
-    "direction_deg": 0.0,
-    "turn": False,
-    "outliers": "keep",
-}  # of a surface: what goes without saying
+OMITTED_DEFAULTS = {"direction_deg": 0.0, "turn": False, "outliers": "keep"}  # of a surface
 
 
 def conditions_table(runs: Sequence[Run]) -> dict[str, list[str]]:
-    """What each run was given, by the name of the condition; a single cell where it is the same for all."""
+    """Return the conditions of each run by name; a single cell where all runs agree."""
     columns = [_conditions(run) for run in runs]
     names = dict.fromkeys(name for column in columns for name in column)
     rows = {name: [column.get(name, NO_VALUE) for column in columns] for name in names}
@@ -36,31 +32,33 @@ def _conditions(run: Run) -> dict[str, str]:
         **_lubricant_rows(solution.lubricant),
         **_oil_rows(run),
         **_thermal_rows(run),
-        "Roughness": f"{quantity('sq_m').named(solution.surface.sq)}; case: {_roughness(run.case.text)}",
+        "Roughness": f"{quantity('sq_m').named(solution.surface.sq)}; case: "
+        f"{_roughness(run.case.text)}",
         **_numerical_rows(solution),
         **_vibration_rows(run.case.vibration),
     }
 
 
 def _law(family: LawFamily, law: object) -> str:
-    values = ((name, mark, getattr(law, name)) for name, mark in parameters(type(law)).items())
+    values = ((name, entry, getattr(law, name)) for name, entry in parameters(type(law)).items())
     stated = (
-        f"{mark.symbol or name} = {mark.text(value)}"
-        for name, mark, value in values
+        f"{entry.symbol or name} = {entry.text(value)}"
+        for name, entry, value in values
         if value is not None
     )
     return ", ".join([law_name(family, law), *stated])
 
 
 def _both(texts: Sequence[str]) -> str:
-    """What each of the bodies has."""
-    different = dict.fromkeys(texts)
-    return " and ".join(different) if len(different) > 1 else f"{texts[0]} (both)"
+    """Join the values of both bodies, or state once what they share."""
+    distinct = dict.fromkeys(texts)
+    return " and ".join(distinct) if len(distinct) > 1 else f"{texts[0]} (both)"
 
 
 def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
     pair, hertz, radius = conditions.pair, conditions.hertz, quantity("radius_m")
-    contact = f"{conditions.geometry} contact, effective radius {radius.text(conditions.radius_along_rolling)}"
+    radius_along = radius.text(conditions.radius_along_rolling)
+    contact = f"{conditions.geometry} contact, effective radius {radius_along}"
     if conditions.geometry == "elliptic":
         contact += f" along rolling, {radius.text(conditions.radius_across_rolling)} across"
     load = quantity("load_n").text(conditions.load)
@@ -83,23 +81,23 @@ def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
         "Speeds": f"{speeds}: {mean.name} {mean.text(conditions.entrainment_speed)}, "
         f"{slip.name} {slip.text(conditions.slide_to_roll)}",
         "Young's moduli": _both(
-            [quantity("youngs_modulus_pa").text(each) for each in pair.youngs_moduli]
+            [quantity("youngs_modulus_pa").text(modulus_pa) for modulus_pa in pair.youngs_moduli]
         ),
         "Poisson's ratios": _both(
-            [quantity("poisson_ratio").text(each) for each in pair.poisson_ratios]
+            [quantity("poisson_ratio").text(ratio) for ratio in pair.poisson_ratios]
         ),
         "Reduced modulus": f"E* = {modulus.text(pair.reduced_modulus)} "
         f"(E′ = 2 E* = {modulus.text(pair.effective_modulus)})",
         "Pressure cap (hardness)": "none: purely elastic"
         if conditions.hardness is None
         else quantity("hardness_pa").text(conditions.hardness),
-        "Hertz (smooth, dry)": f"half-width a = {half_widths[0]}{across}, largest pressure "
+        "Hertz (smooth, dry)": f"half-width a = {half_widths[0]}{across}, maximum pressure "
         f"{quantity('hertz_pressure_pa').text(hertz.p_max)}",
     }
 
 
 def _shape(conditions: ContactConditions) -> str:
-    """What a roller is along its length."""
+    """Describe the profile of a roller along its length."""
     shape, drop, length = conditions.roller, quantity("height_m"), quantity("length_m")
     parts = []
     if shape.amplitude > 0.0:
@@ -115,7 +113,8 @@ def _shape(conditions: ContactConditions) -> str:
         parts.append(f"straight middle of {length.text(shape.flat)}")
     if shape.chamfer > 0.0:
         parts.append(
-            f"chamfers of {length.text(shape.chamfer)} at {math.degrees(shape.chamfer_angle):.3g} degrees"
+            f"chamfers of {length.text(shape.chamfer)} at {math.degrees(shape.chamfer_angle):.3g} "
+            "degrees"
         )
     if shape.tilt != 0.0:
         parts.append(f"tilted by {1e3 * shape.tilt:.3g} mrad")
@@ -134,7 +133,7 @@ def _lubricant_rows(lubricant: Lubricant | None) -> dict[str, str]:
 
 
 def _oil_rows(run: Run) -> dict[str, str]:
-    """Of an oil by its data sheet, what was given, measured, estimated and computed."""
+    """Return the properties of an oil given by its data sheet, grouped by their origin."""
     rows: dict[str, list[str]] = {}
     for fact in run.case.oil_facts:
         rows.setdefault(f"Oil, {fact.origin}", []).append(str(fact))
@@ -144,8 +143,9 @@ def _oil_rows(run: Run) -> dict[str, str]:
 def _thermal_rows(run: Run) -> dict[str, str]:
     thermal = run.case.thermal
     solids = [
-        f"{name.replace('_', ' ')} {_both([mark.text(getattr(solid, name)) for solid in thermal.solids])}"
-        for name, mark in parameters(Solid).items()
+        f"{name.replace('_', ' ')} "
+        f"{_both([entry.text(getattr(solid, name)) for solid in thermal.solids])}"
+        for name, entry in parameters(Solid).items()
     ]
     boundary = quantity("boundary_friction")
     rows = {
@@ -157,22 +157,26 @@ def _thermal_rows(run: Run) -> dict[str, str]:
     bulk = (
         ""
         if thermal.bulk is None
-        else f", bodies at {_both([_temperature(each) for each in thermal.bulk])}"
+        else f", bodies at {_both([_temperature(kelvin) for kelvin in thermal.bulk])}"
     )
     feedback = (
-        "the film's heat thins the oil" if thermal.feedback else "heat does not act back on the oil"
+        "frictional heat reduces the viscosity"
+        if thermal.feedback
+        else "viscosity independent of frictional heat"
     )
     return {
         **rows,
         "Temperature": f"{_temperature(thermal.ambient)} ambient{bulk}; {feedback}",
-        "Oil and heat": f"conductivity {quantity('oil_conductivity_w_m_k').text(thermal.oil_conductivity)}, viscosity "
-        f"falls by the law {_law('warmth', thermal.warmth)}",
+        "Oil, thermal": "conductivity "
+        f"{quantity('oil_conductivity_w_m_k').text(thermal.oil_conductivity)}, "
+        f"viscosity over temperature: {_law('warmth', thermal.warmth)}",
     }
 
 
 def _temperature(kelvin: float) -> str:
-    """In degrees Celsius, as cases mostly have it, and in kelvin."""
-    return f"{with_deviation(kelvin - ZERO_CELSIUS, None)} °C ({quantity('oil_temperature_k').text(kelvin)})"
+    """Return a temperature in degrees Celsius and kelvin."""
+    celsius = with_deviation(kelvin - ZERO_CELSIUS, None)
+    return f"{celsius} °C ({quantity('oil_temperature_k').text(kelvin)})"
 
 
 def _numerical_rows(solution: ContactSolution) -> dict[str, str]:
@@ -189,21 +193,23 @@ def _numerical_rows(solution: ContactSolution) -> dict[str, str]:
     return {
         "Grid": f"{nx} × {ny} cells of {cell.number(dx)} × {cell.text(dy)}",
         "Domain": ", ".join(sides) + (", repeating in y" if grid.periodic[1] else ""),
-        "Contact threshold": f"gap of at most {quantity('contact_film_m').text(solution.options.contact_film)}",
+        "Contact threshold": "gap of at most "
+        f"{quantity('contact_film_m').text(solution.options.contact_film)}",
         "Tolerance": with_deviation(solution.options.tolerance, None, ".1e"),
     }
 
 
 def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
     if model is None:
-        return {"Vibration": "not asked for"}
+        return {"Vibration": "not requested"}
     damping = model.damping_law.summary(model.damping_ratio)
     duration, rate = (
         quantity("duration_s").text(model.duration_s),
         quantity("record_rate_hz").text(model.rate_hz),
     )
     return {
-        "Oscillator": f"{quantity('mass_kg').name} {quantity('mass_kg').text(model.mass)}, {damping}, "
+        "Oscillator": f"{quantity('mass_kg').name} {quantity('mass_kg').text(model.mass)}, "
+        f"{damping}, "
         f"stiffness law {model.stiffness_law.name}",
         "Excitation": f"{model.excitation.summary}{model.patch.summary}, seed {model.seed}",
         "Record": f"{duration} at {rate}; resonance by {model.method}"
@@ -212,7 +218,7 @@ def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
 
 
 def _roughness(case_text: str) -> str:
-    """The case's [surface] in one line: which surface it was belongs beside every CAR."""
+    """Describe the case's [surface] in one line: CAR depends on it."""
     surface = tomllib.loads(case_text)["surface"]
     second = surface.pop("second", None)
     other = f"; on the other body: {_table_in_words(second)}" if second is not None else ""
@@ -220,7 +226,7 @@ def _roughness(case_text: str) -> str:
 
 
 def _table_in_words(table: dict[str, Any]) -> str:
-    stated = {key: value for key, value in table.items() if TACIT.get(key) != value}
+    stated = {key: value for key, value in table.items() if OMITTED_DEFAULTS.get(key) != value}
     texts = {
         key: " and ".join(map(str, value)) if isinstance(value, list) else value
         for key, value in stated.items()

@@ -1,4 +1,4 @@
-"""Exhibits of a solved contact: contact, film, pressure, roughness as maps, a cut along rolling, how it was solved."""
+"""Exhibits of a solved contact: maps, section along rolling, height distribution, convergence."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ from asperity.report.drawing import display, legend_below, name_axes, one_panel
 from asperity.report.maps import (
     contact_colours,
     contact_keys,
-    drawn_map,
+    map_drawer,
     map_figure,
     mark_hertz_zone,
     show_map,
@@ -25,11 +25,12 @@ from asperity.results import Run
 
 
 def contact_map(run: Run) -> Exhibit:
-    """Where asperities touch, where oil fills the gap and where it has ruptured: the paper's Fig 6."""
+    """Map asperity contact, oil film and cavitated film (Fig 6 of the paper)."""
     solution = run.solution
-    touching, ruptured = run.state.car, run.sharing.cavitated
+    car, cavitated_share = run.state.car, run.sharing.cavitated
     contact, cavitated, film = (
-        quantity("share").text(share) for share in (touching, ruptured, 1.0 - touching - ruptured)
+        quantity("share").text(share)
+        for share in (car, cavitated_share, 1.0 - car - cavitated_share)
     )
     dry = solution.lubricant is None
 
@@ -46,59 +47,62 @@ def contact_map(run: Run) -> Exhibit:
     return Exhibit(
         "contact",
         draw,
-        "Contact state, shares of the Hertz zone. A cell counts as contact where the gap is at most "
-        f"{quantity('contact_film_m').text(solution.options.contact_film)}. The dashed lines bound the Hertz zone; oil "
-        "enters from the left.",
+        "Contact state, shares of the Hertz zone. Contact: gap of at most "
+        f"{quantity('contact_film_m').text(solution.options.contact_film)}. "
+        "Dashed: the Hertz zone; oil enters from the left.",
         f"Map of the contact: asperities touch on {contact} of the Hertz zone, "
-        + ("the rest is open." if dry else f"oil fills {film}, {cavitated} has cavitated."),
+        + ("the rest is open." if dry else f"oil fills {film}, {cavitated} is cavitated."),
     )
 
 
 def film_map(run: Run) -> Exhibit:
-    """Gap between the deformed surfaces; the colours end where the Hertz zone's gaps do (its 99th percentile)."""
+    """Map the gap between the deformed surfaces; colours end at the 99th percentile."""
     solution, state = run.solution, run.state
     zone = hertz_zone(solution.conditions, solution.grid)
     top = display("gap", float(np.percentile(solution.gap[zone], 99.0))) or 1.0
     title = "Gap between the surfaces" if solution.lubricant is None else "Film thickness"
     return Exhibit(
         "film",
-        drawn_map(
+        map_drawer(
             solution, "gap", solution.gap, title, extend="max", cmap="viridis", vmin=0.0, vmax=top
         ),
-        "Gap between the deformed surfaces. The colours end at the Hertz zone's 99th percentile.",
-        f"Map of the film thickness: mean {quantity('h_mean_m').text(state.h_mean)} in the Hertz zone, "
-        f"smallest {quantity('h_min_m').text(state.h_min)}.",
+        "Gap between the deformed surfaces. Colours end at the 99th percentile in the Hertz zone.",
+        f"Map of the film thickness: mean {quantity('h_mean_m').text(state.h_mean)} in the Hertz "
+        f"zone, minimum {quantity('h_min_m').text(state.h_min)}.",
     )
 
 
 def pressure_map(run: Run) -> Exhibit:
-    """Pressure of oil and asperities together."""
+    """Map the total pressure of oil and asperities."""
     solution, pressure = run.solution, quantity("pressure")
     largest = pressure.text(float(solution.pressure.max()))
     capped = ""
-    if solution.p_cap is not None and solution.lubricant is not None:  # what CLR leaves out
+    if solution.p_cap is not None and solution.lubricant is not None:  # not part of CLR
         share = quantity("capped_oil_load_ratio").text(run.state.capped_oil_load_ratio)
-        capped = f" Cells that stand at the hardness without touching carry {share} of the load; CLR leaves them out."
-    title = f"Pressure, at most {largest}"
+        capped = (
+            f" Cells at the hardness without contact carry {share} of the load, not part of CLR."
+        )
+    title = f"Pressure, maximum {largest}"
     return Exhibit(
         "pressure",
-        drawn_map(solution, "pressure", solution.pressure, title, cmap="inferno", vmin=0.0),
-        f"Pressure of oil and asperities together.{capped}",
-        f"Map of the pressure: at most {largest}; Hertz's would be {pressure.text(solution.conditions.hertz.p_max)}.",
+        map_drawer(solution, "pressure", solution.pressure, title, cmap="inferno", vmin=0.0),
+        f"Total pressure of oil and asperities.{capped}",
+        f"Map of the pressure: at most {largest}; Hertz (smooth, dry): "
+        f"{pressure.text(solution.conditions.hertz.p_max)}.",
     )
 
 
 def centre_line(run: Run) -> Exhibit:
-    """Pressure and gap along rolling at the cell row nearest y = 0, with Hertz's pressure dashed."""
+    """Draw pressure and gap along rolling in the row of cells nearest y = 0."""
     solution = run.solution
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.single, 4.0), layout="constrained")
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.1, 1.0))
         row = int(np.argmin(np.abs(solution.grid.y)))
-        upper.set_title(f"Cut along rolling at y = {quantity('y_m').text(solution.grid.y[row])}")
-        _draw_pressure_cut(upper, solution, row)
-        _draw_gap_cut(lower, solution, row)
+        upper.set_title(f"Section along rolling, y = {quantity('y_m').text(solution.grid.y[row])}")
+        _draw_pressure_section(upper, solution, row)
+        _draw_gap_section(lower, solution, row)
         left = max(solution.grid.lower[0], -2.5 * solution.conditions.hertz.half_widths[0])
         lower.set_xlim(display("x_m", left), display("x_m", solution.grid.upper[0]))
         keys = [key for axes in (upper, lower) for key in axes.get_legend_handles_labels()[0]]
@@ -108,12 +112,14 @@ def centre_line(run: Run) -> Exhibit:
     return Exhibit(
         "centre-line",
         draw,
-        "Pressure and gap along rolling through the middle. The gap's axis ends where the Hertz zone's gaps do.",
-        "Curves along rolling: pressure with the dashed Hertz ellipse, and below it the gap with contact marked.",
+        "Pressure and gap along rolling through the middle. The axis of the gap ends at the "
+        "largest gap near the Hertz zone.",
+        "Curves along rolling: pressure with the dashed Hertz ellipse, and below it the gap with "
+        "contact marked.",
     )
 
 
-def _draw_pressure_cut(axes: Axes, solution: ContactSolution, row: int) -> None:
+def _draw_pressure_section(axes: Axes, solution: ContactSolution, row: int) -> None:
     x, hertz = display("x_m", solution.grid.x), solution.conditions.hertz
     pressure = solution.pressure[:, row]
     smooth = line_pressure(solution.grid.x, hertz.half_widths[0], hertz.p_max)
@@ -128,7 +134,7 @@ def _draw_pressure_cut(axes: Axes, solution: ContactSolution, row: int) -> None:
     axes.set(ylabel=quantity("pressure").label, ylim=(0.0, None))
 
 
-def _draw_gap_cut(axes: Axes, solution: ContactSolution, row: int) -> None:
+def _draw_gap_section(axes: Axes, solution: ContactSolution, row: int) -> None:
     x, gap = display("x_m", solution.grid.x), display("gap", solution.gap[:, row])
     inside = np.abs(solution.grid.x) <= 1.2 * solution.conditions.hertz.half_widths[0]
     top = 1.15 * float(gap[inside].max()) or 1.0
@@ -148,36 +154,36 @@ def _draw_gap_cut(axes: Axes, solution: ContactSolution, row: int) -> None:
 
 
 def roughness_map(run: Run) -> Exhibit:
-    """The roughness that was pressed into the contact, before it deformed."""
+    """Map the composite roughness before deformation."""
     solution, sq = run.solution, quantity("sq_m")
     heights, title = (
         solution.surface.heights,
         f"Composite roughness, {sq.named(solution.surface.sq)}",
     )
-    reach = display("surface_height", float(np.percentile(np.abs(heights), 99.5))) or 1.0
-    colours: Any = {"extend": "both", "cmap": "cividis", "vmin": -reach, "vmax": reach}
+    limit = display("surface_height", float(np.percentile(np.abs(heights), 99.5))) or 1.0
+    colours: Any = {"extend": "both", "cmap": "cividis", "vmin": -limit, "vmax": limit}
     return Exhibit(
         "roughness",
-        drawn_map(solution, "surface_height", heights, title, **colours),
-        "The composite roughness of both surfaces before they deform, material up.",
+        map_drawer(solution, "surface_height", heights, title, **colours),
+        "Composite roughness of both surfaces before deformation; positive heights are material.",
         f"Map of the roughness heights, {sq.named(run.state.sq)}.",
     )
 
 
 def height_distribution(run: Run) -> Exhibit:
-    """How often each height occurs, beside the Gaussian of the same Sq."""
+    """Draw the distribution of heights and the Gaussian of equal Sq."""
     return Exhibit(
         "heights",
-        one_panel(3.1, key=0)(
+        one_panel(3.1, legend_columns=0)(
             lambda axes: draw_height_distribution(axes, run.solution.surface.heights)
         ),
-        "Distribution of the heights in the map, with the Gaussian of the same Sq dashed.",
-        f"Histogram of the heights, {quantity('sq_m').named(run.state.sq)}, beside a Gaussian curve.",
+        "Distribution of the heights in the map. Dashed: the Gaussian of equal Sq.",
+        f"Histogram of the heights, {quantity('sq_m').named(run.state.sq)}, with a Gaussian curve.",
     )
 
 
 def draw_height_distribution(axes: Axes, heights: Field, rms: str = "Sq") -> None:
-    """The same of any heights [m], whose deviation is called `rms`; what was not measured is left out."""
+    """Draw the distribution of heights [m], without missing values; `rms` labels its deviation."""
     deviations = heights[np.isfinite(heights)] - np.nanmean(heights)
     values = display("height_m", deviations)
     sq = float(values.std())
@@ -197,16 +203,16 @@ def draw_height_distribution(axes: Axes, heights: Field, rms: str = "Sq") -> Non
         color="black",
         label=f"Gaussian, {rms} {quantity('sq_m').text(float(deviations.std()))}",
     )
-    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the key
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the legend
     axes.legend(loc="upper right")
 
 
 def convergence_history(run: Run) -> Exhibit:
-    """Residual, load error and change of every step, grid level after grid level, against the tolerance."""
+    """Draw residual, load error and change of each Newton step against the tolerance."""
     convergence = run.solution.convergence
     history = convergence.history
 
-    @one_panel(3.1, key=4)
+    @one_panel(3.1, legend_columns=4)
     def draw(axes: Axes) -> None:
         steps, sparse = np.arange(1, len(history) + 1), max(len(history) // 60, 1)
         for name, stroke, colour in (
@@ -217,7 +223,7 @@ def convergence_history(run: Run) -> Exhibit:
             values = np.array([getattr(step, name) for step in history])
             positive = np.where(
                 values > 0.0, values, np.nan
-            )  # a logarithmic axis has no place for exact zeros
+            )  # a logarithmic axis cannot show exact zeros
             style = {"color": colour, "markersize": 3, "markevery": sparse, "linewidth": 1.0}
             axes.semilogy(steps, positive, stroke, label=name.replace("_", " "), **style)
         axes.axhline(
@@ -251,6 +257,6 @@ def convergence_history(run: Run) -> Exhibit:
     return Exhibit(
         "convergence",
         draw,
-        f"How the solver got there: {convergence.explain()}.",
+        f"Convergence of the solver: {convergence.explain()}.",
         f"Residual, load error and change against the Newton step: {convergence.explain()}.",
     )

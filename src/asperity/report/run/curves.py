@@ -1,4 +1,4 @@
-"""Friction curves: Stribeck's over speed, the traction curve over the slide-to-roll ratio."""
+"""Figures of friction curves: Stribeck curve over speed, traction curve over slide-to-roll."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ from asperity.results import FrictionCurve
 
 STROKES = ((BLUE, "-", "o"), (VERMILION, "--", "s"), (GREEN, "-.", "^"), (GREY, ":", "D"))
 ABSCISSA = {"stribeck": "entrainment_speed_m_s", "traction": "slide_to_roll"}
-PARTS = {  # of a single curve, left and right: the quantity, what it is of, its stroke
+PARTS = {  # components drawn for a single curve: quantity, label, stroke
     "friction_coefficient": (
         ("asperity_part", "asperities", STROKES[1]),
         ("oil_part", "oil", STROKES[2]),
@@ -25,9 +25,12 @@ PARTS = {  # of a single curve, left and right: the quantity, what it is of, its
 
 @ON_PAGE.drawing()
 def friction_figure(curves: Sequence[FrictionCurve]) -> Figure:
-    """Friction and temperature over speed or slip, for curves of one kind; of a single curve its parts too."""
+    """Draw friction and temperature over speed or slip for curves of one kind.
+
+    A single curve is drawn with its components.
+    """
     kind = f"{curves[0].kind.capitalize()} curve"
-    of = f", {_name(curves[0])}" if len(curves) == 1 else ""
+    surface = f", {_name(curves[0])}" if len(curves) == 1 else ""
     figure = Figure(figsize=(ON_PAGE.double, 4.0), layout="constrained")
     left, right = figure.subplots(1, 2)
     _draw_panel(left, curves, "friction_coefficient", "coefficient")
@@ -44,8 +47,8 @@ def friction_figure(curves: Sequence[FrictionCurve]) -> Figure:
             ha="right",
             fontsize=8.5,
         )
-    left.set(ylabel=quantity("friction_coefficient").axis, title=f"{kind}: friction{of}")
-    right.set(ylabel=quantity("temperature_rise_k").axis, title=f"{kind}: temperature{of}")
+    left.set(ylabel=quantity("friction_coefficient").axis, title=f"{kind}: friction{surface}")
+    right.set(ylabel=quantity("temperature_rise_k").axis, title=f"{kind}: temperature{surface}")
     left.set_ylim(0.0, max(1.12 * max(limits), left.get_ylim()[1]))
     unfinished = any(not point.converged for curve in curves for point in curve.points)
     left.legend(title="crosses: not converged" if unfinished else None, loc="best")
@@ -54,12 +57,12 @@ def friction_figure(curves: Sequence[FrictionCurve]) -> Figure:
 
 
 def _draw_panel(axes: Axes, curves: Sequence[FrictionCurve], key: str, name: str) -> None:
-    """A quantity of every curve; of a single curve the parts of it too."""
+    """Draw a quantity of every curve, and its components for a single curve."""
     single = len(curves) == 1
     for number, curve in enumerate(curves):
         _draw(axes, curve, key, name if single else _name(curve), *STROKES[number % len(STROKES)])
-        for part, of, stroke in PARTS[key] if single else ():
-            _draw(axes, curve, part, of, *stroke)
+        for part, label, stroke in PARTS[key] if single else ():
+            _draw(axes, curve, part, label, *stroke)
     abscissa = ABSCISSA[curves[0].kind]
     if abscissa == "entrainment_speed_m_s":
         axes.set_xscale("log")
@@ -69,7 +72,7 @@ def _draw_panel(axes: Axes, curves: Sequence[FrictionCurve], key: str, name: str
 
 
 def _name(curve: FrictionCurve) -> str:
-    return quantity("sq_m").named(curve.sq) + (", heat fed back" if curve.feedback else "")
+    return quantity("sq_m").named(curve.sq) + (", thermal feedback" if curve.feedback else "")
 
 
 def _draw(

@@ -1,4 +1,4 @@
-"""Exhibits of friction, heat and stress: maps, a cut along rolling, and what lies below the surface."""
+"""Exhibits of friction, flash temperature and subsurface stress."""
 
 from typing import Any
 
@@ -10,17 +10,17 @@ from matplotlib.figure import Figure
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, name_axes, one_panel
-from asperity.report.maps import colour_bar, drawn_map, map_figure
+from asperity.report.maps import colour_bar, map_drawer, map_figure
 from asperity.report.style import BLUE, DASHED, GREEN, VERMILION, Medium
 from asperity.results import Run
 from asperity.solution import FlashTemperature, Friction, hertz_stress
 
-DEEP = 1.6  # half-widths: how far the section reaches down, and to both sides
+SECTION_DEPTH = 1.6  # half-widths: extent of the section in depth and to both sides
 SECTION_ROWS = 160
 
 
 def traction_map(run: Run, friction: Friction) -> Exhibit:
-    """Shear stress on the surfaces; colours go with its root, or the oil's could not be seen beside the asperities'."""
+    """Map the shear stress; a square-root colour scale keeps the oil's part visible."""
     values, coefficient = (
         np.abs(friction.shear),
         quantity("friction_coefficient").text(friction.coefficient),
@@ -28,41 +28,42 @@ def traction_map(run: Run, friction: Friction) -> Exhibit:
     top = float(display("shear", values).max()) or 1.0
     ticks = [float(f"{share * top:.2g}") for share in (0.0, 0.04, 0.16, 0.36, 0.64, 0.98)]
     title, norm = (
-        f"Shear stress (colours by its square root), friction {coefficient}",
+        f"Shear stress (square-root scale), friction {coefficient}",
         PowerNorm(0.5, 0.0, top),
     )
     speed = quantity("sliding_speed_m_s").text(run.solution.conditions.sliding_speed)
     return Exhibit(
         "traction",
-        drawn_map(run.solution, "shear", values, title, ticks=ticks, cmap="magma", norm=norm),
-        f"Shear stress of sliding at {speed} on both surfaces: {friction.boundary_friction:g} times the pressure where "
-        f"they touch (friction {quantity('friction_asperity_part').text(friction.asperity_part)}), the oil's own "
-        f"elsewhere ({quantity('friction_oil_part').text(friction.oil_part)}).",
+        map_drawer(run.solution, "shear", values, title, ticks=ticks, cmap="magma", norm=norm),
+        f"Shear stress on both surfaces at sliding speed {speed}. In asperity contact: "
+        f"{friction.boundary_friction:g} times the pressure (friction part "
+        f"{quantity('friction_asperity_part').text(friction.asperity_part)}); elsewhere: shear of "
+        f"the oil ({quantity('friction_oil_part').text(friction.oil_part)}).",
         f"Map of the shear stress: friction coefficient {coefficient}.",
     )
 
 
 def temperature_map(run: Run, friction: Friction, heat: FlashTemperature) -> Exhibit:
-    """The hotter of the two surfaces."""
+    """Map the temperature rise of the hotter surface."""
     largest = quantity("flash_temperature_max_k").text(heat.max_k)
     hotter, title = (
         np.maximum(heat.surface_1, heat.surface_2),
-        f"Flash temperature, at most {largest}",
+        f"Flash temperature, maximum {largest}",
     )
-    whole, first, second = map(
+    total, first, second = map(
         quantity("friction_power_w").text, (friction.power, heat.heat_1_w, heat.heat_2_w)
     )
     return Exhibit(
         "temperature",
-        drawn_map(run.solution, "surface_temperature", hotter, title, cmap="inferno"),
-        f"Temperature of the hotter surface. Friction makes {whole}; {first} flow into body 1 and {second} into body "
-        "2.",
-        f"Map of the flash temperature: at most {largest} above the body.",
+        map_drawer(run.solution, "surface_temperature", hotter, title, cmap="inferno"),
+        f"Temperature of the hotter surface. Friction power {total}: {first} flow into body 1, "
+        f"{second} into body 2.",
+        f"Map of the flash temperature: at most {largest} above the bulk of the body.",
     )
 
 
 def temperature_line(run: Run, heat: FlashTemperature) -> Exhibit:
-    """Both surfaces and the film along rolling, through the hottest cell."""
+    """Draw the temperatures of both surfaces and the film along rolling at the hottest cell."""
     solution = run.solution
 
     @one_panel(3.1)
@@ -80,7 +81,7 @@ def temperature_line(run: Run, heat: FlashTemperature) -> Exhibit:
         axes.plot(x, heat.surface_1[:, row], color=VERMILION, label=f"surface 1, {first}")
         axes.plot(x, heat.surface_2[:, row], "--", color=BLUE, label=f"surface 2, {second}")
         if solution.lubricant is not None:
-            axes.plot(x, heat.film[:, row], ":", color=GREEN, label="film, mean over its thickness")
+            axes.plot(x, heat.film[:, row], ":", color=GREEN, label="film, mean over thickness")
         for side in (-half_width, half_width):
             axes.axvline(side, color="black", linestyle=DASHED, linewidth=0.8)
         name_axes(axes, "x_m", "temperature_rise_k")
@@ -92,48 +93,50 @@ def temperature_line(run: Run, heat: FlashTemperature) -> Exhibit:
     return Exhibit(
         "temperature-line",
         draw,
-        "Temperatures along rolling through the hottest cell. The slower surface stays longer in the heat; the "
-        "film can be hotter than both, as the heat is made within it.",
-        "Curves of both surfaces' temperatures along rolling; the film's largest rise is "
+        "Temperatures along rolling through the hottest cell. The slower surface is heated for "
+        "longer; the film, in which the heat is generated, can be hotter than both.",
+        "Curves of both surface temperatures along rolling; maximum rise of the film "
         f"{quantity('film_temperature_max_k').text(heat.film_max_k)}.",
     )
 
 
 def stress_map(run: Run) -> Exhibit:
-    """The largest von Mises stress below every cell, at whatever depth."""
-    title = f"Largest von Mises stress below, {quantity('von_mises_max_pa').text(run.stress.peak.value)}"
+    """Map the maximum over depth of the von Mises stress."""
+    largest = quantity("von_mises_max_pa").text(run.stress.peak.value)
+    title = f"Maximum von Mises stress over depth, {largest}"
     return Exhibit(
         "stress",
-        drawn_map(
+        map_drawer(
             run.solution, "von_mises_stress_pa", run.stress.largest, title, cmap="viridis", vmin=0.0
         ),
-        "The largest von Mises stress below each cell, of sixteen depths in body 1. Pressure and "
-        "friction load an elastic, smooth half-space: above its yield stress the material would flow.",
-        f"Map of the largest von Mises stress below the surface: {_peak(run)}.",
+        "Maximum von Mises stress below each cell, over sixteen depths in body 1: an elastic, "
+        "smooth "
+        "half-space under pressure and friction. Above the yield stress the material would flow.",
+        f"Map of the maximum von Mises stress below the surface: {_peak(run)}.",
     )
 
 
 def stress_section(run: Run) -> Exhibit:
-    """Von Mises stress in the plane along rolling that holds its largest value; depth and x to the same scale."""
+    """Draw the von Mises stress in the plane along rolling that contains its maximum."""
     stress, peak = run.stress, run.stress.peak
 
     def draw(medium: Medium) -> Figure:
-        x, dx, reach = (
+        x, dx, size = (
             stress.grid.x,
             stress.grid.spacing[0],
-            DEEP * run.solution.conditions.hertz.half_widths[0],
+            SECTION_DEPTH * run.solution.conditions.hertz.half_widths[0],
         )
-        seen = (x >= min(-reach, peak.x - reach / 4.0)) & (x <= max(reach, peak.x + reach / 4.0))
+        shown = (x >= min(-size, peak.x - size / 4.0)) & (x <= max(size, peak.x + size / 4.0))
         left, right, bottom = (
-            x[seen][0] - dx / 2.0,
-            x[seen][-1] + dx / 2.0,
-            min(reach, float(stress.depths[-1])),
+            x[shown][0] - dx / 2.0,
+            x[shown][-1] + dx / 2.0,
+            min(size, float(stress.depths[-1])),
         )
-        even = (np.arange(SECTION_ROWS) + 0.5) * bottom / SECTION_ROWS
+        depths = (np.arange(SECTION_ROWS) + 0.5) * bottom / SECTION_ROWS
         values = np.stack(
             [
-                np.interp(even, stress.depths, column)
-                for column in stress.von_mises[seen, stress.row]
+                np.interp(depths, stress.depths, column)
+                for column in stress.von_mises[shown, stress.row]
             ]
         )
         figure, axes = map_figure(medium, (right - left, bottom))
@@ -158,21 +161,21 @@ def stress_section(run: Run) -> Exhibit:
         name_axes(axes, "x_m", "depth_m")
         axes.spines[:].set_visible(False)
         depth = quantity("von_mises_depth_m").text(peak.depth)
-        axes.set_title(f"Section at y = {quantity('y_m').text(peak.y)}, peak {depth} deep")
+        axes.set_title(f"Section at y = {quantity('y_m').text(peak.y)}, peak at depth {depth}")
         colour_bar(figure, axes, image, "von_mises_stress_pa")
         return figure
 
     return Exhibit(
         "stress-section",
         draw,
-        "Von Mises stress below the surface, in the plane along rolling that holds the largest: "
-        f"{_peak(run)} (circle).",
-        f"Section of the von Mises stress along rolling and depth: largest {_peak(run)}.",
+        "Von Mises stress in the plane along rolling that contains the maximum "
+        f"(circle): {_peak(run)}.",
+        f"Section of the von Mises stress along rolling and depth: maximum {_peak(run)}.",
     )
 
 
 def stress_over_depth(run: Run) -> Exhibit:
-    """The largest von Mises stress of each depth, with that below Hertz's contact."""
+    """Draw the maximum von Mises stress at each depth, solved and for the Hertz contact."""
     solution, stress = run.solution, run.stress
 
     @one_panel(3.1)
@@ -181,8 +184,8 @@ def stress_over_depth(run: Run) -> Exhibit:
         below = depths > 0.0
         smooth = hertz_stress(solution.conditions, stress.depths, body=stress.body)
         solved, hertz = (
-            display("von_mises_stress_pa", each.von_mises.max(axis=(0, 1)))
-            for each in (stress, smooth)
+            display("von_mises_stress_pa", field.von_mises.max(axis=(0, 1)))
+            for field in (stress, smooth)
         )
         axes.semilogx(
             depths[below], solved[below], "-o", color=BLUE, markersize=3.5, label="solved"
@@ -196,7 +199,7 @@ def stress_over_depth(run: Run) -> Exhibit:
         )
         if not below.all():
             axes.axhline(
-                solved[~below][0], color=GREEN, linestyle=":", label="solved, on the surface"
+                solved[~below][0], color=GREEN, linestyle=":", label="solved, at the surface"
             )
         depth, value = (
             display("depth_m", stress.peak.depth),
@@ -206,7 +209,7 @@ def stress_over_depth(run: Run) -> Exhibit:
             "color": VERMILION,
             "markerfacecolor": "none",
             "markersize": 9,
-            "label": "largest",
+            "label": "maximum",
         }
         axes.plot(max(depth, depths[below][0]), value, "o", **circle)
         name_axes(
@@ -214,20 +217,21 @@ def stress_over_depth(run: Run) -> Exhibit:
             "depth_m",
             "von_mises_stress_pa",
             ylim=(0.0, None),
-            title="Largest stress at each depth",
+            title="Maximum stress at each depth",
         )
 
     dx, dy = (quantity("cell_m").number(side) for side in solution.grid.spacing)
     return Exhibit(
         "stress-over-depth",
         draw,
-        "The largest von Mises stress at each depth. Asperities raise it near the surface; at their edges it grows "
-        f"with a finer grid (here {dx} × {dy} {quantity('cell_m').display}), from a tenth of the half-width down it "
-        "does not.",
-        f"Curve of the largest von Mises stress over depth beside that of Hertz's contact: {_peak(run)}.",
+        "Maximum von Mises stress at each depth. Asperities raise it near the surface, where it "
+        f"grows with grid refinement (here {dx} × {dy} {quantity('cell_m').display}); below a "
+        "tenth "
+        "of the half-width it does not depend on the grid.",
+        f"Curve of the maximum von Mises stress over depth, with the Hertz contact: {_peak(run)}.",
     )
 
 
 def _peak(run: Run) -> str:
     value, depth = quantity("von_mises_max_pa"), quantity("von_mises_depth_m")
-    return f"{value.text(run.stress.peak.value)}, {depth.text(run.stress.peak.depth)} deep"
+    return f"{value.text(run.stress.peak.value)} at depth {depth.text(run.stress.peak.depth)}"

@@ -1,4 +1,4 @@
-"""One HTML page from solved runs: what was found, how, how well, and what the model leaves out."""
+"""HTML report of solved runs: results, conditions, uncertainties and limits of the model."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -8,7 +8,8 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity, select
 from asperity.ehl import Convergence
 from asperity.lubricant import Newtonian
-from asperity.report.base import Exhibit, Picture, Tile, render, span, tile, write_page
+from asperity.report.base import Exhibit, Picture, Tile, range_text, render, tile, write_page
+from asperity.report.oil_balance import DRY, model_name, oil_limit
 from asperity.report.run import contact, friction_maps, roller, several_runs
 from asperity.report.run.conditions import conditions_table
 from asperity.report.run.stiffness import stiffness_over_frequency
@@ -29,23 +30,23 @@ TILES = (
 
 
 def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = None) -> Path:
-    """Write one self-contained HTML page about one or several runs, whole or not at all.
+    """Write a self-contained HTML report of one or several runs, atomically.
 
     Parameters
     ----------
-    runs : at least one; several are put side by side and drawn against their roughness
-    path : the file to write; its folder must exist
-    title : heading of the page; without it, the page says what it shows
+    runs : at least one; several are compared and drawn over their roughness
+    path : file to write; its folder must exist
+    title : heading of the page (default: the contact and its roughness)
 
     Returns
     -------
     Path
-        The file written. The same runs and asperity version give the same bytes.
+        File written. The same runs and asperity version give the same bytes.
 
     Raises
     ------
     BadInput
-        for no runs, or a path that cannot be written to.
+        if there are no runs, or the path is not writable.
     """
     if not runs:
         raise BadInput("a report needs at least one run, got none; name the run files to show")
@@ -53,7 +54,7 @@ def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = N
 
 
 def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
-    """The page as HTML text."""
+    """Render the page as HTML text."""
     oils = [run.solution.lubricant for run in runs]
     ends = any(run.axial is not None for run in runs)
     groups = [
@@ -79,19 +80,30 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
         ),
         line=any(run.solution.conditions.long for run in runs),
         ends=ends,
-        imbalance=span(
-            quantity("mass_flux_imbalance"), [run.state.mass_flux_imbalance for run in runs]
-        ),
+        oil_limits=_oil_limits(runs),
     )
 
 
+def _oil_limits(runs: Sequence[Run]) -> list[tuple[str, str]]:
+    """Return the limits set by the oil balance of each contact model among the runs."""
+    imbalances: dict[str, list[float]] = {}
+    for run in runs:
+        imbalances.setdefault(model_name(run.solution), []).append(run.state.mass_flux_imbalance)
+    if len(imbalances) > 1:
+        imbalances.pop(DRY, None)
+    entry = quantity("mass_flux_imbalance")
+    return [oil_limit(model, range_text(entry, values)) for model, values in imbalances.items()]
+
+
 def _title(runs: Sequence[Run]) -> str:
-    several_runs = f": {len(runs)} runs" if len(runs) > 1 else ""
-    return f"Rough lubricated contact{several_runs}, Sq {span(quantity('sq_m'), [run.state.sq for run in runs])}"
+    kind = "dry" if all(run.solution.lubricant is None for run in runs) else "lubricated"
+    count = f": {len(runs)} runs" if len(runs) > 1 else ""
+    sq = range_text(quantity("sq_m"), [run.state.sq for run in runs])
+    return f"Rough {kind} contact{count}, Sq {sq}"
 
 
 class _RunView(NamedTuple):
-    """What the template shows of one run."""
+    """Values of one run for the template."""
 
     label: str
     anchor: str
@@ -100,27 +112,27 @@ class _RunView(NamedTuple):
     convergence: Convergence
     tiles: list[Tile]
     pictures: list[Picture]
-    doubts: list[tuple[str, str]]
+    uncertainties: list[tuple[str, str]]
     notes: list[str]
 
 
-def _view(run: Run, number: int, several_runs: bool) -> _RunView:
-    scalars, rough = run.scalars(), quantity("sq_m").named(run.state.sq)
+def _view(run: Run, number: int, numbered: bool) -> _RunView:
+    scalars, roughness = run.scalars(), quantity("sq_m").named(run.state.sq)
     return _RunView(
-        label=f"{number}. {rough}" if several_runs else rough,
+        label=f"{number}. {roughness}" if numbered else roughness,
         anchor=f"run-{number}",
         run=run,
         scalars=scalars,
         convergence=run.solution.convergence,
         tiles=[tile(quantity(key), scalars) for key in TILES],
         pictures=[exhibit.picture() for exhibit in _exhibits(run)],
-        doubts=uncertainty_rows(run.error),
+        uncertainties=uncertainty_rows(run.error),
         notes=[*run.remarks, *_missing_exhibits(run)],
     )
 
 
 def _exhibits(run: Run) -> Iterator[Exhibit]:
-    """What is shown of a run, in the order of the page."""
+    """Yield the exhibits of a run in the order of the page."""
     yield contact.contact_map(run)
     yield contact.film_map(run)
     yield contact.pressure_map(run)
@@ -145,19 +157,19 @@ def _exhibits(run: Run) -> Iterator[Exhibit]:
 
 
 def _missing_exhibits(run: Run) -> Iterator[str]:
-    """Why a figure is not there."""
+    """Yield the reason for each figure that is missing."""
     if run.friction_failure is not None:
-        yield f"There is no friction and no temperature to show: {run.friction_failure}."
+        yield f"No friction and temperature figures: {run.friction_failure}."
     elif run.solution.conditions.sliding_speed == 0.0:
-        yield "There is no friction to show: both surfaces move at the same speed."
+        yield "No friction figures: both surfaces move at the same speed."
     if run.vibration is not None and run.own_resonance_failure is not None:
-        yield f"There is no stiffness and damping of the contact's own: {run.own_resonance_failure}."
+        yield f"No dynamic stiffness and damping: {run.own_resonance_failure}."
     if run.vibration is not None and run.vibration.spectrum is None:
-        yield f"There is no spectrum to show: {run.vibration.resonance.reason}."
+        yield f"No spectrum: {run.vibration.resonance.reason}."
 
 
 def _overview(runs: Sequence[Run]) -> Iterator[Exhibit]:
-    """Several runs against their roughness."""
+    """Yield the exhibits of several runs over roughness."""
     points = [run.scalars() for run in runs]
     full_load = {run.vibration.full_load_crf_hz for run in runs if run.vibration is not None}
     yield several_runs.shares_against_roughness(points)

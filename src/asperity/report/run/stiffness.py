@@ -1,4 +1,4 @@
-"""Stiffness and damping of a run's contact over frequency."""
+"""Exhibit of the contact's stiffness and damping over frequency."""
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,53 +13,54 @@ from asperity.results import DynamicCurve, Run
 
 
 def stiffness_over_frequency(run: Run) -> Exhibit:
-    """K and c of the solved contact over frequency, in both limits of its yielded cells, its resonance marked.
+    """Draw stiffness and damping over frequency for elastic and flowing yielded cells.
 
     Raises
     ------
     BadInput
-        for a run that was not asked for it.
+        for a run without a dynamic curve.
     """
     curve, own = run.dynamic_curve, run.own_resonance
     if curve is None:
         raise BadInput(
-            "there is no stiffness over frequency to draw; set solver.dynamic of the case"
+            "the run has no stiffness over frequency; set solver.dynamic in the case and solve "
+            "again"
         )
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.single, 1.05 * medium.single), layout="constrained")
-        above, below = figure.subplots(2, 1, sharex=True)
-        _draw(above, curve, "dynamic_stiffness")
-        _draw(below, curve, "dynamic_damping")
-        below.axhline(0.0, color="black", linewidth=0.6)
-        above.axhline(
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        _draw(upper, curve, "dynamic_stiffness")
+        _draw(lower, curve, "dynamic_damping")
+        lower.axhline(0.0, color="black", linewidth=0.6)
+        upper.axhline(
             display("dynamic_stiffness", curve.elastic.slow),
             color=BLUE,
             linestyle=":",
             linewidth=0.9,
-            label="so slow that the film follows",
+            label="quasi-static limit",
         )
         if own is not None:
             style = {"marker": "D", "color": VERMILION, "linestyle": "none", "markersize": 5}
             for axes, key, value in (
-                (above, "dynamic_stiffness", own.elastic.stiffness),
-                (below, "dynamic_damping", own.elastic.damping),
+                (upper, "dynamic_stiffness", own.elastic.stiffness),
+                (lower, "dynamic_damping", own.elastic.damping),
             ):
                 axes.plot(
                     own.elastic.frequency_hz,
                     display(key, value),
-                    label="where the mass resonates",
+                    label="resonance of the mass",
                     **style,
                 )
-        above.set_title("Stiffness and damping of the solved contact")
-        name_axes(below, "dynamic_frequency")
-        below.set_xscale("log")
-        below.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        handles, labels = above.get_legend_handles_labels()
+        upper.set_title("Stiffness and damping of the solved contact")
+        name_axes(lower, "dynamic_frequency")
+        lower.set_xscale("log")
+        lower.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        handles, labels = upper.get_legend_handles_labels()
         legend_below(figure, 2, handles=handles, labels=labels)
         return figure
 
-    said = ""
+    at_resonance = ""
     if own is not None:
         parts = (
             quantity(key).named(getattr(own.elastic, name))
@@ -68,14 +69,16 @@ def stiffness_over_frequency(run: Run) -> Exhibit:
                 ("contact_damping_ratio", "damping_ratio"),
             )
         )
-        said = f" At {quantity('contact_resonance_hz').text(own.elastic.frequency_hz)}: {', '.join(parts)}."
+        frequency = quantity("contact_resonance_hz").text(own.elastic.frequency_hz)
+        at_resonance = f" At {frequency}: {', '.join(parts)}."
     return Exhibit(
         "stiffness-over-frequency",
         draw,
-        "Force over approach of the contact when it is shaken a little, k + iωc, of the first surface. Elastic: what "
-        "yielded once stays flat, as on tracks that come round again; flowing: virgin roughness. Below zero the "
-        f"entraining motion feeds the oscillation.{said}",
-        f"Dynamic stiffness and damping of the contact over frequency.{said}",
+        "Dynamic stiffness k + iωc of the contact, the ratio of force to approach for small "
+        "oscillations, of the first surface. Yielded cells elastic: surfaces that have run in; "
+        "flowing: virgin roughness. Negative damping: entrainment feeds the "
+        f"oscillation.{at_resonance}",
+        f"Dynamic stiffness and damping of the contact over frequency.{at_resonance}",
     )
 
 

@@ -1,4 +1,4 @@
-"""A measured surface drawn: map, profile, bearing curve, radial and directional spectrum."""
+"""Figure of a measured surface: map, profile, bearing curve, radial and directional spectrum."""
 
 from pathlib import Path
 from typing import Any
@@ -23,12 +23,12 @@ from asperity.surface import (
 
 
 def surface_map(description: SurfaceDescription, path: Path) -> Path:
-    """Write a PNG of a measured surface, levelled: map, profile, bearing curve, radial and directional spectrum.
+    """Write a PNG of a levelled surface: map, profile, bearing curve and spectra.
 
     Raises
     ------
     BadInput
-        for a path that is not a .png, or cannot be written to.
+        for a path that does not end in .png or is not writable.
     """
     if path.suffix.lower() != ".png":
         raise BadInput(f"the map is written as PNG, got {path.name}; name a file that ends in .png")
@@ -66,15 +66,15 @@ def _surface_figure(description: SurfaceDescription) -> Figure:
 def _draw_levelled_map(figure: Figure, axes: Axes, levelled: MeasuredSurface) -> None:
     heights = display("surface_height", levelled.heights)
     width, height = display("y_m", np.array(levelled.grid.extent))
-    reach = float(np.nanpercentile(np.abs(heights), 99.5)) or 1.0
-    axes.set_facecolor("#d946ef")  # what was not measured; no height has this colour
+    limit = float(np.nanpercentile(np.abs(heights), 99.5)) or 1.0
+    axes.set_facecolor("#d946ef")  # missing pixels; not a colour of the scale
     image = axes.imshow(
         heights.T,
         origin="lower",
         extent=(0.0, width, 0.0, height),
         cmap="cividis",
-        vmin=-reach,
-        vmax=reach,
+        vmin=-limit,
+        vmax=limit,
         interpolation="none" if max(heights.shape) < 600 else "antialiased",
     )
     missing = (
@@ -124,7 +124,7 @@ def _draw_bearing_curve(axes: Axes, description: SurfaceDescription) -> None:
         fontsize=8.5,
     )
     inner = [display("height_m", curve.height_at(share)) for share in (0.999, 0.001)]
-    if inner[0] < inner[1]:  # the rarest heights would flatten the rest
+    if inner[0] < inner[1]:  # outliers would compress the rest of the curve
         axes.set_ylim(
             inner[0] - 0.1 * (inner[1] - inner[0]), inner[1] + 0.4 * (inner[1] - inner[0])
         )
@@ -133,12 +133,13 @@ def _draw_bearing_curve(axes: Axes, description: SurfaceDescription) -> None:
 
 
 def _draw_radial_spectrum(axes: Axes, spectrum: SurfaceSpectrum, profile: bool) -> None:
-    some = spectrum.density > 0.0
-    if not some.any():
+    positive = spectrum.density > 0.0
+    if not positive.any():
         axes.text(0.5, 0.5, "perfectly smooth", transform=axes.transAxes, ha="center")
     else:
-        wavelength = display("wavelength_m", 2.0 * np.pi / spectrum.wavenumber[some])
-        axes.loglog(wavelength, spectrum.density[some], color=VERMILION, marker=".", markersize=4)
+        wavelength = display("wavelength_m", 2.0 * np.pi / spectrum.wavenumber[positive])
+        density = spectrum.density[positive]
+        axes.loglog(wavelength, density, color=VERMILION, marker=".", markersize=4)
         axes.invert_xaxis()
     title = "Spectrum of the profile" if profile else "Spectrum, all directions"
     name_axes(
@@ -151,9 +152,9 @@ def _draw_radial_spectrum(axes: Axes, spectrum: SurfaceSpectrum, profile: bool) 
 
 def _draw_lay(axes: Axes, spectrum: SurfaceSpectrum) -> None:
     polar: Any = axes
-    both = np.concatenate([spectrum.lay, spectrum.lay + np.pi, spectrum.lay[:1]])
+    angles = np.concatenate([spectrum.lay, spectrum.lay + np.pi, spectrum.lay[:1]])
     share = display("share", np.concatenate([spectrum.share, spectrum.share, spectrum.share[:1]]))
-    polar.plot(both, share, color=GREEN)
-    polar.fill(both, share, color=GREEN, alpha=0.2)
+    polar.plot(angles, share, color=GREEN)
+    polar.fill(angles, share, color=GREEN, alpha=0.2)
     polar.set_title("Lay: share of Sq² in ridges\nalong this direction [% per 5°]")
     polar.tick_params(labelsize=8)

@@ -1,4 +1,4 @@
-"""Figures of the vibration model: a run's spectrum, the paper's Figs 3 and 4, its Table 1 beside the printed values."""
+"""Figures of the vibration model: spectrum of a run, Figs 3 and 4 and Table 1 of the paper."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,28 +15,28 @@ from asperity.core.signals import Signal, Spectrum, power_spectrum
 from asperity.coupling import Vibration, VibrationModel
 from asperity.paper import Table1Row, continuous_crfa, expected_crfa
 from asperity.report.base import Exhibit
-from asperity.report.drawing import display, legend_below, name_axes, neighbours, one_panel
+from asperity.report.drawing import display, group_values, legend_below, name_axes, one_panel
 from asperity.report.style import BAND_COLOUR, BLUE, GREEN, GREY, ON_PAGE, VERMILION
 from asperity.resonance import Resonance
 from asperity.vibration import mass_motion, white_noise
 
 RATES = (10e3, 20e3, 50e3, 200e3)  # Hz
-LONGEST = 0.5  # seconds of a record that are drawn: more is a black bar
+MAX_DURATION = 0.5  # seconds of a record that are drawn: more is a black bar
 LOADS = (100.0, 200.0, 300.0, 400.0)
-HEIGHT, CUTOFF = 2e-6, 30.0  # of Table 1's first four rows
+HEIGHT, CUTOFF = 2e-6, 30.0  # of the first four rows of Table 1
 
 
-def spectrum(vibration: Vibration, resonance_text: str) -> Exhibit:
-    """Acceleration spectrum around the search band, with the fitted resonance and its two-standard-deviation interval.
+def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
+    """Draw the acceleration spectrum around the search band with the fitted resonance.
 
     Raises
     ------
     BadInput
-        for a contact without a spectrum, which has no touching asperities.
+        for a contact without a spectrum: no asperity touches.
     """
     density, resonance = vibration.spectrum, vibration.resonance
     if density is None:
-        raise BadInput(f"there is no spectrum to draw: {resonance.reason}")
+        raise BadInput(f"no spectrum to draw: {resonance.reason}")
     (low, high), line = vibration.band_hz, quantity("crf_hz")
     margin = 0.35 * (high - low)
 
@@ -68,61 +68,65 @@ def spectrum(vibration: Vibration, resonance_text: str) -> Exhibit:
     return Exhibit(
         "spectrum",
         draw,
-        f"Acceleration spectrum of a simulated record of {quantity('duration_s').text(density.duration_s)}, resolution "
-        f"{quantity('resolution_hz').text(density.resolution_hz)}: {resonance_text}. Searched from {band}, where "
-        f"this contact can resonate; asperities that carry the whole load would give {full_load}.",
-        f"Acceleration spectrum around the search band {band}: {resonance_text}.",
+        "Acceleration spectrum of a simulated record of "
+        f"{quantity('duration_s').text(density.duration_s)}, resolution "
+        f"{quantity('resolution_hz').text(density.resolution_hz)}: {resonance_in_words}. "
+        f"Search band: {band}; CRF with all load on asperities: {full_load}.",
+        f"Acceleration spectrum around the search band {band}: {resonance_in_words}.",
     )
 
 
 def _draw_band(
     axes: Axes, density: Spectrum, ends: tuple[float, float], band: tuple[float, float]
 ) -> None:
-    """The spectrum between the ends, means of neighbours where it has more lines than can be seen."""
-    near = (density.frequency_hz >= ends[0]) & (density.frequency_hz <= ends[1])
-    together = max(int(np.count_nonzero(near)) // 400, 1)
+    """Draw the spectrum between the ends, averaged over neighbouring lines if there are many."""
+    inside = (density.frequency_hz >= ends[0]) & (density.frequency_hz <= ends[1])
+    lines_per_point = max(int(np.count_nonzero(inside)) // 400, 1)
     axes.axvspan(*band, facecolor=BAND_COLOUR, edgecolor=GREY, linewidth=0.7, label="search band")
     frequency, level = (
-        neighbours(values[near], together).mean(axis=1)
+        group_values(values[inside], lines_per_point).mean(axis=1)
         for values in (density.frequency_hz, density.density)
     )
-    name = "spectrum" if together == 1 else f"spectrum, mean of {together} lines"
+    name = "spectrum" if lines_per_point == 1 else f"spectrum, mean of {lines_per_point} lines"
     axes.semilogy(frequency, level, color=GREY, linewidth=0.7, label=name)
     name_axes(axes, "frequency_hz", "acceleration_density")
 
 
 def _mark_resonance(axes: Axes, resonance: Resonance, frequency: Field) -> None:
-    if np.isfinite(resonance.damping_ratio):  # a highest point has no curve
+    if np.isfinite(resonance.damping_ratio):  # the method "peak" fits no curve
         axes.semilogy(
             frequency, resonance.curve(frequency), color=VERMILION, label="fitted resonance"
         )
-    crf, reach = resonance.crf_hz, 2.0 * resonance.crf_std
-    if np.isfinite(reach):
-        axes.axvspan(crf - reach, crf + reach, color=BLUE, alpha=0.35, linewidth=0)
-    label = "CRF ± 2 std" if np.isfinite(reach) else "CRF"
+    crf, half_width = resonance.crf_hz, 2.0 * resonance.crf_std
+    if np.isfinite(half_width):
+        axes.axvspan(crf - half_width, crf + half_width, color=BLUE, alpha=0.35, linewidth=0)
+    label = "CRF ± 2 std" if np.isfinite(half_width) else "CRF"
     axes.axvline(crf, color=BLUE, linestyle="--", linewidth=1.0, label=label)
 
 
-# The paper's Figs 3 and 4
-# --------------------------------------------------------------------------------------------
+# Figs 3 and 4 of the paper
+# ---------------------------------------------------------------------------------
 
 
 @ON_PAGE.drawing()
 def excitation_figure(vibration: Vibration, model: VibrationModel) -> Figure:
-    """White noise, its spectrum, the profile and its spectrum: the paper's Fig 3.
+    """Draw white noise, the profile and their spectra (Fig 3 of the paper).
 
-    Raises BadInput for a contact that no asperity touches.
+    Raises
+    ------
+    BadInput
+        for a contact without touching asperities.
     """
     profile = vibration.profile
     if profile is None:
-        raise BadInput(f"there is no profile to draw: {vibration.resonance.reason}")
+        raise BadInput(f"no profile to draw: {vibration.resonance.reason}")
     figure, (a, b, c, d) = _four_panels()
     noise = Signal(white_noise(profile.values.size, model.seed), profile.rate_hz, "m")
-    _draw_record(a, noise, "noise_height_m", "(a) white noise, before any coefficient", GREY)
-    _draw_spectrum(b, noise, "(b) its spectrum", GREY)
+    _draw_record(a, noise, "noise_height_m", "(a) white noise, unscaled", GREY)
+    _draw_spectrum(b, noise, "(b) spectrum of (a)", GREY)
     b.axhline(2.0 / profile.rate_hz, color="black", linestyle="--", linewidth=1.0, label="2 / rate")
     _draw_record(c, profile, "profile_height_m", f"(c) profile, {model.excitation.label}", BLUE)
-    _draw_spectrum(d, profile, "(d) its spectrum", BLUE)
+    _draw_spectrum(d, profile, "(d) spectrum of (c)", BLUE)
     if vibration.oscillator is not None and vibration.expected is not None:
         f = vibration.expected.frequency_hz[1:]
         gain = vibration.oscillator.sampled_gain(f, profile.rate_hz)
@@ -136,13 +140,16 @@ def excitation_figure(vibration: Vibration, model: VibrationModel) -> Figure:
 
 @ON_PAGE.drawing()
 def response_figure(vibration: Vibration, model: VibrationModel) -> Figure:
-    """Displacement, velocity, acceleration and the acceleration's spectrum: the paper's Fig 4.
+    """Draw displacement, velocity, acceleration and its spectrum (Fig 4 of the paper).
 
-    Raises BadInput for a contact that no asperity touches.
+    Raises
+    ------
+    BadInput
+        for a contact without touching asperities.
     """
     profile, oscillator, density = vibration.profile, vibration.oscillator, vibration.spectrum
     if profile is None or oscillator is None or density is None or vibration.expected is None:
-        raise BadInput(f"there is no response to draw: {vibration.resonance.reason}")
+        raise BadInput(f"no response to draw: {vibration.resonance.reason}")
     motion = mass_motion(oscillator, profile, method=model.response, substeps=model.substeps)
     figure, (a, b, c, d) = _four_panels()
     for axes, letter, key, colour in (
@@ -153,12 +160,16 @@ def response_figure(vibration: Vibration, model: VibrationModel) -> Figure:
         record = Signal(getattr(motion, key), profile.rate_hz, quantity(key).unit)
         _draw_record(axes, record, key, f"({letter}) {quantity(key).name}", colour)
     f0, resonance = oscillator.natural_frequency_hz, vibration.resonance
-    near = np.abs(density.frequency_hz / f0 - 1.0) < 0.1
-    f = density.frequency_hz[near]
-    d.plot(f, density.density[near], color=GREY, linewidth=0.7, label="raw periodogram")
-    d.plot(f, vibration.expected.density[near], color="black", linewidth=1.2, label="closed form")
+    inside = np.abs(density.frequency_hz / f0 - 1.0) < 0.1
+    f = density.frequency_hz[inside]
+    d.plot(f, density.density[inside], color=GREY, linewidth=0.7, label="raw periodogram")
+    d.plot(f, vibration.expected.density[inside], color="black", linewidth=1.2, label="closed form")
     if resonance.found:
-        label = f"{quantity('crf_hz').named(resonance.crf_hz)}, CRFA {quantity('crfa').number(resonance.crfa)}"
+        crf, crfa = (
+            quantity("crf_hz").named(resonance.crf_hz),
+            quantity("crfa").number(resonance.crfa),
+        )
+        label = f"{crf}, CRFA {crfa}"
         d.plot(resonance.crf_hz, resonance.crfa, "o", color=VERMILION, label=label)
     d.axvline(
         f0,
@@ -179,14 +190,14 @@ def _four_panels() -> tuple[Figure, Sequence[Any]]:
 
 
 def _draw_record(axes: Axes, record: Signal, key: str, title: str, colour: str) -> None:
-    values = display(key, record.values[: max(2, round(LONGEST * record.rate_hz))])
+    values = display(key, record.values[: max(2, round(MAX_DURATION * record.rate_hz))])
     axes.plot(np.arange(values.size) / record.rate_hz, values, color=colour, linewidth=0.6)
     name_axes(axes, "record_time_s", key, title=title)
     axes.margins(x=0.0)
 
 
 def _draw_spectrum(axes: Axes, record: Signal, title: str, colour: str) -> None:
-    """Means over bins of equal width on a logarithmic axis, where there are more lines than a figure can show."""
+    """Draw the spectrum, averaged over bins of equal width on a logarithmic axis."""
     density = power_spectrum(record)
     frequency, level = density.frequency_hz[2:], density.density[2:]
     edges = np.unique(np.searchsorted(frequency, np.geomspace(frequency[0], frequency[-1], 1200)))
@@ -196,13 +207,13 @@ def _draw_spectrum(axes: Axes, record: Signal, title: str, colour: str) -> None:
     name_axes(axes, "frequency_hz", "profile_density", title=title)
 
 
-# Its Table 1
-# ---------------------------------------------------------------------------------------------------------
+# Table 1 of the paper
+# ---------------------------------------------------------------------------------
 
 
 @ON_PAGE.drawing()
 def table1_figure(rows: Sequence[Table1Row]) -> Figure:
-    """CRFA over load, height and cut-off: the printed values, and the median and 5 to 95 % range of our records."""
+    """Draw CRFA over load, height and cut-off: printed values and simulated 5 to 95 % ranges."""
     parts = (
         (rows[:4], "load_n", "load_n", "load"),
         (rows[4:8], "height_m", "profile_height_m", "height"),
@@ -222,10 +233,10 @@ def table1_figure(rows: Sequence[Table1Row]) -> Figure:
             fmt="o",
             color=BLUE,
             capsize=5,
-            label="ours: median, 5 to 95 % of single records",
+            label="asperity: median, 5 to 95 % of single records",
         )
         axes.plot(
-            x, [row.paper_crfa for row in part], "x", color=VERMILION, markersize=9, label="printed"
+            x, [row.paper_crfa for row in part], "x", color=VERMILION, markersize=9, label="paper"
         )
         axes.set(xscale="log", yscale="log", title=f"median ~ {_power(word, x, median)}")
         name_axes(axes, key)
@@ -237,7 +248,10 @@ def table1_figure(rows: Sequence[Table1Row]) -> Figure:
 
 @ON_PAGE.drawing()
 def trend_over_load_figure(model: VibrationModel) -> Figure:
-    """CRFA over load at several sampling rates, in closed form: what of the paper's trend is sampling, what physics."""
+    """Draw CRFA over load at several sampling rates, in closed form.
+
+    The difference between the curves is the effect of sampling on the trend of the paper.
+    """
     strokes = (("-o", VERMILION), ("--s", BLUE), ("-.^", GREEN), (":D", GREY))
     figure = Figure(figsize=(5.6, 4.4), layout="constrained")
     axes = figure.add_subplot()
@@ -247,8 +261,8 @@ def trend_over_load_figure(model: VibrationModel) -> Figure:
         label = f"{quantity('record_rate_hz').text(rate)}: {_power('load', np.array(LOADS), crfa)}"
         axes.loglog(LOADS, crfa, stroke, color=colour, label=label)
     continuous = [continuous_crfa(model, CUTOFF, HEIGHT, load) for load in LOADS]
-    axes.loglog(LOADS, continuous, color="black", linewidth=1.0, label="not sampled: load^0")
-    name_axes(axes, "load_n", "expected_crfa", title="CRFA falls with load: the sampling")
+    axes.loglog(LOADS, continuous, color="black", linewidth=1.0, label="continuous: load^0")
+    name_axes(axes, "load_n", "expected_crfa", title="CRFA over load: effect of sampling")
     _tick_at(axes, np.array(LOADS))
     legend_below(figure)
     return figure
@@ -260,7 +274,7 @@ def _tick_at(axes: Axes, places: Field) -> None:
 
 
 def _power(word: str, x: Field, values: Field) -> str:
-    """The power law through the values: "load^−0.67"."""
+    """Fit a power law to the values and return it as text, such as "load^−0.67"."""
     power = float(np.polyfit(np.log(x), np.log(values), 1)[0])
     number = f"{power:.2f}".replace("-0.00", "0").replace("-", "−")
     return f"{word}^{number}"

@@ -1,1 +1,1 @@
-"""The page of a study, its exhibits, and its figures and tables for a paper."""
+"""Report of a study, with figures and tables for a paper."""

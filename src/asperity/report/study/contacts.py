@@ -1,4 +1,4 @@
-"""Exhibits of a few contacts of a wear study: the paper's Figs 5 and 6."""
+"""Exhibits of selected contacts of a wear study (Figs 5 and 6 of the paper)."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import ACROSS, display, legend_below, panels_in_rows
+from asperity.report.drawing import PANELS_PER_ROW, display, legend_below, panels_in_rows
 from asperity.report.maps import contact_colours, contact_keys, mark_hertz_zone, show_map
 from asperity.report.style import Medium
 from asperity.results import Run
@@ -18,7 +18,7 @@ SHARES = ("clr", "car", "car_domain")
 
 
 def contact_maps(runs: Sequence[Run]) -> Exhibit:
-    """Where asperities touch, oil fills the gap and oil has ruptured, with CAR and CLR of each: the paper's Fig 6."""
+    """Map the contact state of each run, with its CAR and CLR (Fig 6 of the paper)."""
     dry = all(run.solution.lubricant is None for run in runs)
 
     def draw(medium: Medium) -> Figure:
@@ -34,31 +34,31 @@ def contact_maps(runs: Sequence[Run]) -> Exhibit:
             )
         _label_outer(panels)
         keys = contact_keys(
-            "asperity contact", *(("open gap",) if dry else ("oil film", "ruptured oil"))
+            "asperity contact", *(("open gap",) if dry else ("oil film", "cavitated"))
         )
         legend_below(figure, 4 if len(runs) > 2 else 2, handles=keys)
         return figure
 
-    each = "; ".join(f"{_sq(run)}: {', '.join(_shares(run))}" for run in runs)
+    values = "; ".join(f"{_sq(run)}: {', '.join(_shares(run))}" for run in runs)
     return Exhibit(
         "contact-maps",
         draw,
-        "Contact of one surface a level: asperities yellow, oil red, ruptured oil striped; oil comes from the "
-        "left. The shares are those of this very surface.",
-        f"Contact maps. {each}.",
+        "Contact state of one surface per level: asperity contact yellow, oil film red, cavitated "
+        "film striped; oil enters from the left. The shares are those of the surface shown.",
+        f"Contact maps. {values}.",
     )
 
 
 def surfaces(runs: Sequence[Run]) -> Exhibit:
-    """Roughness of a few levels in one colour scale: the paper's Fig 5."""
+    """Map the roughness of each run in one colour scale (Fig 5 of the paper)."""
 
     def draw(medium: Medium) -> Figure:
         key = "surface_height"
         heights = [display(key, run.solution.surface.heights) for run in runs]
-        reach = max(float(np.percentile(np.abs(field), 99.5)) for field in heights) or 1.0
+        limit = max(float(np.percentile(np.abs(field), 99.5)) for field in heights) or 1.0
         figure, panels = _sheet(runs, medium, above=1.4, below=5.4)
         for run, field, axes, letter in zip(runs, heights, panels, "abcdefgh", strict=False):
-            image = show_map(axes, field, run.solution, cmap="cividis", vmin=-reach, vmax=reach)
+            image = show_map(axes, field, run.solution, cmap="cividis", vmin=-limit, vmax=limit)
             axes.set_title(f"({letter}) {_sq(run)}", fontweight="normal")
         _label_outer(panels)
         style: Any = {"location": "bottom", "shrink": 0.5, "aspect": 40, "extend": "both"}
@@ -68,8 +68,8 @@ def surfaces(runs: Sequence[Run]) -> Exhibit:
     return Exhibit(
         "surfaces",
         draw,
-        "The same surfaces before they deform, all in one scale of heights.",
-        f"Maps of the surfaces' heights at {', '.join(_sq(run) for run in runs)}.",
+        "The same surfaces before deformation, in one colour scale.",
+        f"Maps of the surface heights at {', '.join(_sq(run) for run in runs)}.",
     )
 
 
@@ -84,24 +84,24 @@ def _shares(run: Run) -> list[str]:
 def _sheet(
     runs: Sequence[Run], medium: Medium, *, above: float, below: float
 ) -> tuple[Figure, list[Axes]]:
-    """Equal panels in rows for the maps of the runs, so many lines of type above each and below all."""
-    across = min(ACROSS, len(runs))
-    down = -(-len(runs) // across)
+    """Create a figure of map panels, with `above` and `below` lines of text reserved."""
+    columns = min(PANELS_PER_ROW, len(runs))
+    rows = -(-len(runs) // columns)
     extent = runs[0].case.grid.extent
-    line, width = medium.line_height, medium.width(across)
-    panel = (width - 4.0 * line) / across - 0.6 * line
+    line, width = medium.line_height, medium.width(columns)
+    panel = (width - 4.0 * line) / columns - 0.6 * line
     height = (
-        down * (panel * min(max(extent[1] / extent[0], 0.15), 1.4) + above * line) + below * line
+        rows * (panel * min(max(extent[1] / extent[0], 0.15), 1.4) + above * line) + below * line
     )
     figure = Figure(figsize=(width, height), layout="compressed")
     return figure, panels_in_rows(figure, len(runs), sharex=True, sharey=True)
 
 
 def _label_outer(panels: Sequence[Axes]) -> None:
-    """Labels at the left and at the bottom only; a panel above a gap has the bottom too."""
-    across = min(ACROSS, len(panels))
+    """Label only the leftmost and the lowest panels of each column."""
+    columns = min(PANELS_PER_ROW, len(panels))
     for number, axes in enumerate(panels):
-        lowest, leftmost = number + across >= len(panels), number % across == 0
+        lowest, leftmost = number + columns >= len(panels), number % columns == 0
         axes.set_xlabel(quantity("x_m").axis if lowest else "")
         axes.set_ylabel(quantity("y_m").axis if leftmost else "")
         axes.tick_params(labelbottom=lowest, labelleft=leftmost)

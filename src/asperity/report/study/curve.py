@@ -1,4 +1,4 @@
-"""Exhibits of a wear study: the paper's Figs 7, 8 and 13, ours with the printed numbers in them."""
+"""Exhibits of a wear study: Figs 7, 8 and 13 of the paper, with its printed values."""
 
 from collections.abc import Iterator, Sequence
 from itertools import cycle
@@ -27,12 +27,12 @@ from asperity.study import StudyOverview, WearCurve
 from asperity.trend import Stages
 
 SPLIT_STROKES: tuple[Any, ...] = ("-.", (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 1)))
-MOST_MARKERS = 20  # on a curve
+MAX_MARKERS = 20  # on a curve
 SHARES = (("clr", "-o", VERMILION), ("car", "--s", BLUE), ("car_domain", "-.^", GREEN))
 
 
 def curve_exhibits(study: StudyOverview, curve: WearCurve) -> Iterator[Exhibit]:
-    """What is shown of a wear curve, in the order of the page."""
+    """Yield the exhibits of a wear curve in the order of the page."""
     yield shares(study, curve)
     resonant = [
         preset for preset in curve.stages if np.isfinite(curve.mean(f"crf_{preset}_hz")).any()
@@ -44,7 +44,7 @@ def curve_exhibits(study: StudyOverview, curve: WearCurve) -> Iterator[Exhibit]:
 
 
 def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
-    """CLR and both CARs over Sq, with the interval of their means, each seed, and the anchors: the paper's Fig 7."""
+    """Draw CLR and both CARs over Sq with seeds, intervals and anchors (Fig 7 of the paper)."""
     anchors = study.anchors
     printed = set(anchors) <= set(PAPER_ANCHORS)
 
@@ -60,15 +60,15 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
         )
         name_axes(axes, "sq_m", "share")
         axes.set_ylim(0.0, max(100.0, axes.get_ylim()[1]))
-        medium.title(axes, "Load and area share of asperities")
-        key_below(figure, axes, columns=2)
+        medium.title(axes, "Asperity load and area share")
+        legend_of_panels(figure, axes, columns=2)
         return figure
 
-    anchored = " Hollow marks: what should be met, with its tolerance." if anchors else ""
+    anchor_note = " Hollow markers: anchors with their tolerance." if anchors else ""
     if study.papers:
-        anchored = (
-            " Diamonds: CAR as printed, which does not say of which area; crosses: CLR behind the CRF printed for "
-            "the rig's smoothest and roughest ring. Their bars are tolerances of ours."
+        anchor_note = (
+            " Diamonds: CAR as printed (the paper does not define its area); crosses: CLR from the "
+            "CRF printed for the smoothest and the roughest ring. Bars: tolerances set by asperity."
         )
     ends = (
         f"{quantity(key).short} from {first_to_last(key, curve.mean(key))}" for key, *_ in SHARES
@@ -76,53 +76,53 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
     return Exhibit(
         "shares",
         draw,
-        "Share of the load on asperities (CLR), and of the area: contact cells over all cells of the Hertz "
-        "zone (CAR), contact area of the domain over the Hertz area (CAR of the domain). "
-        f"{surfaces_in_words(study)}{anchored}",
-        f"CLR and CAR against Sq from {first_to_last('sq_m', curve.sq)}: {', '.join(ends)}.",
+        "Asperity load share (CLR), contact area ratio in the Hertz zone (CAR), and contact area "
+        "of "
+        f"the domain over the Hertz area (CAR of the domain). {legend_note(study)}{anchor_note}",
+        f"CLR and CAR over Sq from {first_to_last('sq_m', curve.sq)}: {', '.join(ends)}.",
     )
 
 
 def first_to_last(key: str, values: Field) -> str:
-    """Where a curve begins and where it ends."""
+    """Return the first and last value of a curve as text."""
     return f"{quantity(key).number(values[0])} to {quantity(key).text(values[-1])}"
 
 
-def surfaces_in_words(study: StudyOverview) -> str:
-    """What curves, bands and dots of a figure are."""
-    surfaces = surfaces_a_point(study)
-    return f"Means over {surfaces} a level with the 90 % interval of the mean; dots are single surfaces."
+def legend_note(study: StudyOverview) -> str:
+    """Explain curves, bands and dots of a figure."""
+    count = surface_count(study)
+    return f"Means over {count} per level with 90 % intervals of the mean; dots: single surfaces."
 
 
-def surfaces_a_point(study: StudyOverview) -> str:
-    """How many surfaces each point has, in words."""
+def surface_count(study: StudyOverview) -> str:
+    """Return the number of surfaces of each point as text."""
     count = study.result.plan.realisations
     return f"{count} surfaces" if count > 1 else "one surface"
 
 
 def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
-    """CRF and CRFA over Sq by each vibration preset, with stages and anchors: the paper's Fig 8."""
+    """Draw CRF and CRFA over Sq for each preset with stages and anchors (Fig 8 of the paper)."""
     presets, anchors = list(curve.stages), study.anchors
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.double, 0.62 * medium.double), layout="constrained")
         grid = figure.subplots(2, len(presets), sharex=True, sharey="row", squeeze=False)
-        for preset, letters, (above, below) in zip(presets, ("ac", "bd"), grid.T, strict=False):
-            _draw_preset(above, below, curve, anchors, preset)
-            medium.title(above, f"Vibration preset: {preset}", f"({letters[0]}) preset {preset}")
-            medium.title(below, "", f"({letters[1]}) preset {preset}")
+        for preset, letters, (upper, lower) in zip(presets, ("ac", "bd"), grid.T, strict=False):
+            _draw_preset(upper, lower, curve, anchors, preset)
+            medium.title(upper, f"Vibration preset: {preset}", f"({letters[0]}) preset {preset}")
+            medium.title(lower, "", f"({letters[1]}) preset {preset}")
         grid[0, 0].set_ylabel(quantity("crf_hz").label)
         grid[1, 0].set_ylabel(quantity("crfa").label)
         known = [anchor.value for anchor in anchors if anchor.quantity in _CRF]
-        stay_near(
+        limit_to_data(
             grid[0, 0],
             np.concatenate([known, *(curve.by_case(f"crf_{preset}_hz")[1] for preset in presets)]),
         )
-        stay_near(
+        limit_to_data(
             grid[1, 0], np.concatenate([curve.by_case(f"crfa_{preset}")[1] for preset in presets])
         )
         grid[1, 0].set_ylim(bottom=0.0)
-        key_below(figure, *grid.flat, columns=4)
+        legend_of_panels(figure, *grid.flat, columns=4)
         return figure
 
     stages = " ".join(
@@ -131,10 +131,11 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
     return Exhibit(
         "resonance",
         draw,
-        "Contact resonance frequency (CRF) and its height in the spectrum (CRFA), by the two vibration presets "
-        "on the same contacts: sound, and as the paper prints it. A shaded strip is where the split lies with "
-        f"90 %. {surfaces_in_words(study)} {stages}",
-        f"CRF and CRFA against Sq. {stages}",
+        "Contact resonance frequency (CRF) and amplitude (CRFA) of the same contacts with both "
+        "vibration presets: sound, and as printed in the paper. Shaded: 90 % interval of the "
+        "split. "
+        f"{legend_note(study)} {stages}",
+        f"CRF and CRFA over Sq. {stages}",
     )
 
 
@@ -142,47 +143,48 @@ _CRF = ("crf_sound_hz", "crf_paper_hz")
 
 
 def _draw_preset(
-    above: Axes, below: Axes, curve: WearCurve, anchors: Sequence[Anchor], preset: str
+    upper: Axes, lower: Axes, curve: WearCurve, anchors: Sequence[Anchor], preset: str
 ) -> None:
     printed = set(anchors) <= set(PAPER_ANCHORS)
     splits = [anchor for anchor in anchors if anchor.quantity == SPLIT_ANCHOR]
-    for axes in (above, below):
-        _mark_stages(axes, curve, preset, named=axes is above)
+    for axes in (upper, lower):
+        _mark_stages(axes, curve, preset, named=axes is upper)
         for split, stroke in zip(splits, cycle(SPLIT_STROKES), strict=False):
             label = f"{'printed ' if printed else ''}{split.name}"
             axes.axvline(split.value, color="black", linestyle=stroke, linewidth=0.9, label=label)
-    draw_mean(above, curve, f"crf_{preset}_hz", "-o", VERMILION, quantity("crf_hz").short)
-    _draw_full_load(above, curve)
-    _draw_anchors(above, anchors, _CRF, "D", "CRF of the rig, printed" if printed else "CRF, given")
-    draw_mean(below, curve, f"crfa_{preset}", "--s", BLUE, quantity("crfa").short)
-    name_axes(below, "sq_m")
+    draw_mean(upper, curve, f"crf_{preset}_hz", "-o", VERMILION, quantity("crf_hz").short)
+    _draw_full_load(upper, curve)
+    _draw_anchors(upper, anchors, _CRF, "D", "CRF of the rig, printed" if printed else "CRF, given")
+    draw_mean(lower, curve, f"crfa_{preset}", "--s", BLUE, quantity("crfa").short)
+    name_axes(lower, "sq_m")
 
 
 def rig(curve: WearCurve, preset: str) -> Exhibit:
-    """The rig's twelve rings with what is printed of their CRF, beside what the study predicts: the paper's Fig 13."""
+    """Draw the printed CRF of the rig's rings and the study's prediction (Fig 13 of the paper)."""
     key = f"crf_{preset}_hz"
 
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(0.9 * medium.single)
         first, *others = list(curve.stages)
         axes.axvspan(*RIG_SPLIT_UM, color="#dfe3e8", linewidth=0, zorder=0, label="printed split")
-        draw_mean(axes, curve, f"crf_{first}_hz", "-", BLUE, f"ours, preset {first}", seeds=False)
+        label = f"study, preset {first}"
+        draw_mean(axes, curve, f"crf_{first}_hz", "-", BLUE, label, seeds=False)
         for other in others:
-            sq, label = display("sq_m", curve.sq), f"ours, preset {other}"
+            sq, label = display("sq_m", curve.sq), f"study, preset {other}"
             axes.plot(
                 sq, curve.mean(f"crf_{other}_hz"), "--", color=GREEN, linewidth=1.0, label=label
             )
         rings = rig_prediction(curve, f"crf_{first}_hz")
-        sq, ours, low, std = (
+        sq, predicted, low, std = (
             rings[column].to_numpy() for column in ("sq_um", "crf_hz", "low", "sq_std_um")
         )
         ring: Any = {
             "color": BLUE,
             "markerfacecolor": "white",
             "markersize": 4,
-            "label": "ours at a ring's Sq",
+            "label": "study at a ring's Sq",
         }
-        draw_intervals(axes, sq, ours, ours - low, "o", xerr=std, **ring)
+        draw_intervals(axes, sq, predicted, predicted - low, "o", xerr=std, **ring)
         known = rings[rings["printed_hz"].notna()]
         ring = {"color": "black", "markersize": 4.5, "label": "rings, CRF printed", "zorder": 4}
         draw_intervals(
@@ -190,28 +192,33 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
         )
         _draw_full_load(axes, curve)
         name_axes(axes, "sq_m", ylabel=quantity("crf_hz").label)
-        stay_near(axes, np.concatenate([curve.by_case(f"crf_{first}_hz")[1], known["printed_hz"]]))
-        medium.title(axes, "The rig's rings and our prediction")
-        key_below(figure, axes, columns=2, seeds=False)
+        limit_to_data(
+            axes, np.concatenate([curve.by_case(f"crf_{first}_hz")[1], known["printed_hz"]])
+        )
+        medium.title(axes, "Rings of the rig, measured and predicted")
+        legend_of_panels(figure, axes, columns=2, seeds=False)
         return figure
 
     return Exhibit(
         "rig",
         draw,
-        "The rig's twelve rings. Filled: CRF as printed, of the smoothest and the roughest ring; the ten "
-        "others are drawn in the paper without numbers. Hollow: the study's CRF at each ring's Sq, with "
-        "the interval over seeds and the printed error of Sq. Strip: between these rings the paper's wear "
-        f"turns severe. {_deviations(rig_deviation(curve, key))}",
-        "CRF of the rig's rings as printed beside the study's prediction at their Sq.",
+        "The twelve rings of the rig. Filled: printed CRF of the smoothest and the roughest ring; "
+        "the "
+        "paper draws the other ten without numbers. Hollow: the study's CRF at each ring's Sq, "
+        "with "
+        "the interval over seeds and the printed error of Sq. Strip: onset of severe wear in the "
+        f"paper. {_deviations(rig_deviation(curve, key))}",
+        "Printed CRF of the rig's rings, and the study's prediction at their Sq.",
     )
 
 
-def _deviations(off: dict[str, float]) -> str:
-    if not np.isfinite(off["ends"]):
-        return "The study does not reach over all rings."
+def _deviations(rms_hz: dict[str, float]) -> str:
+    if not np.isfinite(rms_hz["ends"]):
+        return "The study does not cover all rings."
     return (
-        f"Root mean square of ours less theirs: {off['ends']:.0f} Hz over the two printed values; over all twelve Sq "
-        f"{off['knee']:.0f} Hz from a bent line between those, {off['smooth']:.0f} Hz from a saturating one."
+        f"RMS deviation: {rms_hz['ends']:.0f} Hz from the two printed values; over all twelve Sq, "
+        f"{rms_hz['knee']:.0f} Hz from a bent line through them, {rms_hz['smooth']:.0f} Hz from a "
+        "saturating curve."
     )
 
 
@@ -225,15 +232,15 @@ def draw_mean(
     *,
     seeds: bool = True,
 ) -> None:
-    """Mean over seeds with its interval as a band, each seed as a faint dot."""
+    """Draw the mean over seeds, its interval as a band and each seed as a faint dot."""
     sq = display("sq_m", curve.sq)
     if seeds:
-        at, each = curve.by_case(key)
+        case_sq, values = curve.by_case(key)
         style: Any = {"alpha": 0.5, "markersize": 4.5, "markeredgewidth": 0, "zorder": 1}
-        axes.plot(display("sq_m", at), display(key, each), ".", color=colour, **style)
+        axes.plot(display("sq_m", case_sq), display(key, values), ".", color=colour, **style)
     axes.update_datalim(
         [(end, 0.0) for end in sq[[0, -1]]], updatey=False
-    )  # levels without a value, too
+    )  # include levels without a value
     axes.fill_between(
         sq, *display(key, curve.interval(key)).T, color=colour, alpha=0.22, linewidth=0, zorder=1
     )
@@ -243,7 +250,7 @@ def draw_mean(
         stroke,
         color=colour,
         markersize=3.5,
-        markevery=-(-sq.size // MOST_MARKERS),
+        markevery=-(-sq.size // MAX_MARKERS),
         label=label,
         zorder=2,
     )
@@ -252,7 +259,7 @@ def draw_mean(
 def _draw_anchors(
     axes: Axes, anchors: Sequence[Anchor], keys: Sequence[str], marker: str, label: str
 ) -> None:
-    """Numbers known of these quantities, with their tolerance; changes from one Sq to another have no place here."""
+    """Draw the anchors of these quantities with tolerances, except changes between two Sq."""
     places = {}
     for anchor in anchors:
         if anchor.quantity in keys and anchor.sq is not None and anchor.since is None:
@@ -267,8 +274,8 @@ def _draw_anchors(
         draw_intervals(axes, display("sq_m", anchor.sq), value, tolerance, marker, **style)
 
 
-def stay_near(axes: Axes, values: Field) -> None:
-    """Keep the scale to what was computed: the interval of two seeds can be ten times as wide as all values."""
+def limit_to_data(axes: Axes, values: Field) -> None:
+    """Limit the y axis to the values: intervals of two seeds can be ten times as wide."""
     if not values.size:
         return
     lowest, highest = float(values.min()), float(values.max())
@@ -280,24 +287,24 @@ def stay_near(axes: Axes, values: Field) -> None:
 
 def _draw_full_load(axes: Axes, curve: WearCurve) -> None:
     known = curve.table["full_load_crf_hz"].dropna().unique()
-    if known.size == 1:  # of several, none is the one
+    if known.size == 1:  # omit the line if cases differ
         axes.axhline(
             float(known[0]),
             color="black",
             linestyle=":",
             linewidth=1.0,
-            label="all load on asperities",
+            label="CRF at full load",
             zorder=1,
         )
 
 
 def stage_names(stages: Stages) -> tuple[str, str]:
-    """What the stages on either side of a split are called."""
+    """Return the names of the stages before and after a split."""
     return ("normal", "severe") if stages.kind == "severe" else ("running-in", "steady")
 
 
 def _mark_stages(axes: Axes, curve: WearCurve, preset: str, *, named: bool) -> None:
-    """The split with its interval, and the names of the stages; where there is none, that."""
+    """Mark the split with its interval and name the stages, or state that there is none."""
     stages = curve.stages[preset]
     low, high = display("sq_m", curve.sq[[0, -1]])
     names: dict[str, Any] = {stages.kind: 0.5 * (low + high)}
@@ -319,13 +326,13 @@ def _mark_stages(axes: Axes, curve: WearCurve, preset: str, *, named: bool) -> N
         )
 
 
-def key_below(figure: Figure, *panels: Axes, columns: int, seeds: bool = True) -> None:
-    """One key for all panels, below them; a name stands in it once, and faint dots and bands are explained."""
+def legend_of_panels(figure: Figure, *panels: Axes, columns: int, seeds: bool = True) -> None:
+    """Add one legend for all panels below them, with entries for bands and dots."""
     keys: dict[str, Any] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             keys.setdefault(label, handle)
-    keys["mean's 90 % interval"] = Patch(color=GREY, alpha=0.3, linewidth=0)
+    keys["90 % interval of the mean"] = Patch(color=GREY, alpha=0.3, linewidth=0)
     if seeds:
         keys["single seeds"] = Line2D(
             [], [], color=GREY, marker=".", linestyle="none", alpha=0.6, markersize=4

@@ -1,4 +1,4 @@
-"""Exhibits of a wear study that shook its contacts: damping and stiffness over Sq, and what tells the load share."""
+"""Exhibits of dynamic stiffness and damping in a wear study, and their correlation with CLR."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -13,9 +13,9 @@ from asperity.report.drawing import display, name_axes, panels_in_rows
 from asperity.report.study.curve import (
     draw_mean,
     first_to_last,
-    key_below,
-    stay_near,
-    surfaces_in_words,
+    legend_note,
+    legend_of_panels,
+    limit_to_data,
 )
 from asperity.report.style import BLUE, GREEN, GREY, Medium
 from asperity.study import StudyOverview, WearCurve
@@ -28,50 +28,51 @@ ELASTIC, VIRGIN, STIFFNESS = (
 BY_LAW = "crf_sound_hz"
 
 
-def shaken_exhibits(study: StudyOverview, curve: WearCurve) -> Iterator[Exhibit]:
-    """What is shown of contacts that were shaken; nothing where none was."""
+def dynamic_exhibits(study: StudyOverview, curve: WearCurve) -> Iterator[Exhibit]:
+    """Yield the exhibits of dynamic stiffness and damping, if the study computed them."""
     if ELASTIC in curve.table and np.isfinite(curve.mean(ELASTIC)).any():
-        yield over_roughness(study, curve)
-        yield told_by(study, curve)
+        yield damping_over_roughness(study, curve)
+        yield clr_correlations(study, curve)
 
 
-def over_roughness(study: StudyOverview, curve: WearCurve) -> Exhibit:
-    """Damping ratio and dynamic stiffness of the contact itself over Sq."""
+def damping_over_roughness(study: StudyOverview, curve: WearCurve) -> Exhibit:
+    """Draw the damping ratio and dynamic stiffness of the contact over Sq."""
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.single, 1.25 * medium.single), layout="constrained")
-        above, below = figure.subplots(2, 1, sharex=True)
-        draw_mean(above, curve, ELASTIC, "-o", GREEN, "yielded cells elastic")
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        draw_mean(upper, curve, ELASTIC, "-o", GREEN, "yielded cells elastic")
         if VIRGIN in curve.table:
-            draw_mean(above, curve, VIRGIN, "--s", GREY, "yielded cells flowing")
-        above.axhline(0.0, color="black", linewidth=0.6)
-        above.set_ylabel(f"damping ratio {quantity(ELASTIC).label}")
-        draw_mean(below, curve, STIFFNESS, "-o", BLUE, "stiffness, yielded cells elastic")
-        name_axes(below, "sq_m", ylabel=quantity(STIFFNESS).label)
-        for axes, keys in ((above, [ELASTIC, VIRGIN]), (below, [STIFFNESS])):
-            stay_near(
+            draw_mean(upper, curve, VIRGIN, "--s", GREY, "yielded cells flowing")
+        upper.axhline(0.0, color="black", linewidth=0.6)
+        upper.set_ylabel(f"damping ratio {quantity(ELASTIC).label}")
+        draw_mean(lower, curve, STIFFNESS, "-o", BLUE, "stiffness, yielded cells elastic")
+        name_axes(lower, "sq_m", ylabel=quantity(STIFFNESS).label)
+        for axes, keys in ((upper, [ELASTIC, VIRGIN]), (lower, [STIFFNESS])):
+            limit_to_data(
                 axes,
                 np.concatenate(
                     [display(key, curve.by_case(key)[1]) for key in keys if key in curve.table]
                 ),
             )
-        medium.title(above, "Damping and stiffness of the contact itself")
-        key_below(figure, above, below, columns=2)
+        medium.title(upper, "Dynamic damping and stiffness of the contact")
+        legend_of_panels(figure, upper, lower, columns=2)
         return figure
 
     ends = first_to_last(ELASTIC, curve.mean(ELASTIC))
     return Exhibit(
         "damping",
         draw,
-        "Damping ratio of the oil in the contact, and the contact's own stiffness k where the mass resonates on it, at "
-        "the root of k over the mass; no law of the paper's is in either. Elastic: tracks that come round again, what "
-        f"yielded once stays flat; flowing: virgin roughness. {surfaces_in_words(study)}",
-        f"Damping ratio of the contact against Sq, {ends}, and its own stiffness.",
+        "Damping ratio of the contact and its stiffness k at resonance, both computed from the "
+        "solved contact without the laws of the paper. Yielded cells elastic: surfaces that have "
+        "run "
+        f"in; flowing: virgin roughness. {legend_note(study)}",
+        f"Damping ratio of the contact over Sq, {ends}, and its dynamic stiffness.",
     )
 
 
-def told_by(study: StudyOverview, curve: WearCurve) -> Exhibit:
-    """The load share of every contact over CRF by law, over its own stiffness, and over its damping."""
+def clr_correlations(study: StudyOverview, curve: WearCurve) -> Exhibit:
+    """Draw CLR of every contact over CRF by law, dynamic stiffness and damping."""
     keys = [key for key in (BY_LAW, STIFFNESS, ELASTIC) if key in curve.table]
     rows = study.used
     ranks = {key: rank_correlation(rows, key) for key in keys}
@@ -98,20 +99,22 @@ def told_by(study: StudyOverview, curve: WearCurve) -> Exhibit:
 
     in_words = "; ".join(f"{quantity(key).short}: {_number(rank)}" for key, rank in ranks.items())
     return Exhibit(
-        "told",
+        "load-share-correlations",
         draw,
-        "Load share of each contact over what a recording may show of it; colour is Sq. Rank correlation (±1 tells "
-        f"all, 0 nothing): {in_words}. CRF follows from CLR by the paper's empirical law, so that it says nothing of "
-        "whether a contact does that; stiffness, whose root is the frequency, and damping are read off the solved "
-        "contacts.",
-        f"Load share against CRF by law, the contact's own stiffness, and its damping. Rank correlations: {in_words}.",
+        "Asperity load share of each contact over quantities that a recording can show; colour: "
+        "Sq. "
+        f"Rank correlation: {in_words}. CRF is computed from CLR by the empirical law of the "
+        "paper, "
+        "so its correlation tests nothing; stiffness and damping come from the solved contacts.",
+        "Asperity load share over CRF by law, dynamic stiffness and damping. Rank correlations: "
+        f"{in_words}.",
     )
 
 
 def rank_correlation(rows: pandas.DataFrame, key: str) -> float:
-    """Spearman's, of the load share and another column, over the cases that have both; nan where one does not vary."""
-    both = rows[["clr", key]].dropna()
-    return float(both.corr(method="spearman").to_numpy()[0, 1]) if len(both) > 2 else float("nan")
+    """Return Spearman's rank correlation of CLR and a column; nan if either does not vary."""
+    known = rows[["clr", key]].dropna()
+    return float(known.corr(method="spearman").to_numpy()[0, 1]) if len(known) > 2 else float("nan")
 
 
 def _number(rank: float) -> str:

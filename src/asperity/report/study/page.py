@@ -1,7 +1,7 @@
-"""One HTML page of a study, and its figures and tables for a paper.
+"""HTML report of a study, with figures and tables for a paper.
 
-A study of Sq alone gets the paper's Figs 5 to 8 and 13 with the printed numbers in them; any other
-gets each output against each swept quantity.
+A study of Sq alone shows Figs 5 to 8 and 13 of the paper with its printed values; any other shows
+each output over each swept quantity.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,7 +15,7 @@ from asperity.paper import Anchor
 from asperity.report.base import Exhibit, Picture, Tile, heading, render, write_exhibits, write_page
 from asperity.report.study import contacts, tables
 from asperity.report.study.curve import curve_exhibits, first_to_last
-from asperity.report.study.dynamic import shaken_exhibits
+from asperity.report.study.dynamic import dynamic_exhibits
 from asperity.report.study.sweep import sweep_exhibits
 from asperity.study import SEED_KEYS, StudyOverview, StudyResult
 
@@ -32,27 +32,28 @@ def write_study_report(
     anchors: Sequence[Anchor] | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Write one self-contained HTML page about a study, and its figures and tables for a paper.
+    """Write a self-contained HTML report of a study, and figures and tables for a paper.
 
     Parameters
     ----------
-    result : from `run_study` or `load_study`; what is missing, failed or did not converge is said, and left out of
-        every mean
-    path : the file to write; its folder must exist
-    figures : folder for each figure as PDF and as PNG (300 dpi, 84 or 174 mm wide), `captions.md` and the tables as
-        csv; made if it is not there
-    anchors : what a study of Sq should meet; by default the paper's printed numbers, if the case is its contact
-    progress : called with what is being solved or drawn
+    result : from `run_study` or `load_study`; missing, failed and unconverged cases are listed and
+        excluded from all means
+    path : file to write; its folder must exist
+    figures : folder for each figure as PDF and PNG (300 dpi, 84 or 174 mm wide), `captions.md` and
+        the tables as csv; created if missing
+    anchors : reference values of a study of Sq (default: the paper's printed values, if the case is
+        its contact)
+    progress : called with a description of each step
 
     Returns
     -------
     Path
-        The page. The same table and asperity version give the same bytes.
+        File written. The same table and asperity version give the same bytes.
 
     Raises
     ------
     BadInput
-        for a study without a computed case, or a place that cannot be written to.
+        for a study without a computed case, or a path that is not writable.
     """
     require_writable(Path(path))
     study = StudyOverview(result, anchors, progress)
@@ -77,25 +78,25 @@ def _folder(path: Path) -> Path:
 
 
 def _write_tables(study: StudyOverview, folder: Path) -> None:
-    """Each table as csv."""
+    """Write each table as csv."""
     for name, table in study.tables.items():
         write_csv(folder / f"{name}.csv", table)
 
 
 def study_exhibits(study: StudyOverview) -> list[Exhibit]:
-    """Every figure, in the order of the page."""
+    """Return all exhibits in the order of the page."""
     if not len(study.used):
         return []
     if study.curve is None:
         return list(sweep_exhibits(study))
-    exhibits = [*curve_exhibits(study, study.curve), *shaken_exhibits(study, study.curve)]
+    exhibits = [*curve_exhibits(study, study.curve), *dynamic_exhibits(study, study.curve)]
     if study.runs and not isinstance(study.runs, str):
         exhibits += [contacts.contact_maps(study.runs), contacts.surfaces(study.runs)]
     return exhibits
 
 
 def render_study_page(study: StudyOverview, exhibits: Sequence[Exhibit], progress: Progress) -> str:
-    """The page as HTML text."""
+    """Render the page as HTML text."""
 
     def picture(exhibit: Exhibit) -> Picture:
         progress(f"drawing {exhibit.name}")
@@ -150,10 +151,10 @@ def _tiles(study: StudyOverview) -> list[Tile]:
     split = quantity("split")
     for preset, stages in curve.stages.items():
         low, high = (split.number(end) for end in stages.interval)
-        value, rest = (
+        value, detail = (
             (split.text(stages.split), f"90 %: {low} to {high}")
             if stages.found
             else ("none", stages.kind)
         )
-        tiles.append(Tile(f"Split, preset {preset}", value, rest))
+        tiles.append(Tile(f"Split, preset {preset}", value, detail))
     return tiles

@@ -1,8 +1,8 @@
-"""What is swept or varied, as people read it: names of a case's keys, units as they were written, values."""
+"""Readable names, units and values of swept quantities."""
 
 from asperity.study import SEED_FACTOR, SweptAxis
 
-NAMES = {  # of a key, or of its last part where it is swept
+NAMES = {  # by key, or by its last part
     "sq": "Sq",
     "alpha": "pressure-viscosity α",
     "lubricant.viscosity.alpha": "pressure-viscosity α",
@@ -10,7 +10,7 @@ NAMES = {  # of a key, or of its last part where it is swept
     "eta0": "viscosity η0",
     "slip": "slide-to-roll ratio",
     "x": "domain along rolling (half-widths)",
-    "material.hardness": "pressure cap",
+    "material.hardness": "hardness",
     "grid.x[0]": "inlet",
     "solver.contact_film": "contact threshold",
     "vibration.cutoff_exponent": "coupling exponent q",
@@ -28,12 +28,12 @@ UNITS = {
 
 
 def axis_label(axis: SweptAxis) -> str:
-    """What is swept, with the unit it was written in."""
+    """Return the name of a swept quantity with the unit in which it was given."""
     last = axis.key.rpartition(".")[2]
     name = NAMES.get(axis.key, NAMES.get(last, last.replace("_", " ")))
     return f"{name} [{UNITS.get(axis.unit, axis.unit)}]" if axis.unit else name
 
 
-def place_in_words(axis: SweptAxis, value: float) -> str:
-    """A value of an axis as people read it."""
+def value_label(axis: SweptAxis, value: float) -> str:
+    """Return the label of a value of an axis."""
     return axis.names[int(value)] if axis.names else f"{value:.4g}".replace("-", "−")

@@ -1,4 +1,4 @@
-"""Figures of what a wear study hangs on: the factors of a sensitivity study, and a calibration with its open ends."""
+"""Figures of a sensitivity study and of a calibration."""
 
 from typing import Any
 
@@ -13,14 +13,14 @@ from asperity.report.study.quantity_names import NAMES
 from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, STYLE, VERMILION
 from asperity.study import CalibratedParameter, Calibration, Sensitivity, SensitivityOutcome
 
-DARK = 0.55  # share from which a cell's number is white
-FARTHEST_MISS = 8.0  # tolerances: what is farther off stands at the edge, with an arrow
+DARK = 0.55  # share above which a cell's number is white
+MAX_DEVIATION = 8.0  # tolerances; larger deviations are drawn at the edge with an arrow
 OUTCOMES = ("car", "clr", "crf_hz", "log10_crfa", "knee_m")
 
 
 @ON_PAGE.drawing()
 def sensitivity_figure(result: Sensitivity) -> Figure:
-    """Factors over outcomes, dark where a factor moves an outcome most, with the size of its effect."""
+    """Draw the effect of each factor on each outcome; dark cells are the largest shares."""
     overall, outcomes = result.overall(), result.outcomes
     order = [str(name) for name in overall.index]
     figure = Figure(
@@ -37,9 +37,9 @@ def sensitivity_figure(result: Sensitivity) -> Figure:
     side.tick_params(left=False, labelleft=False)
     side.set(xlabel=f"mean {quantity('share').label}")
     morris = result.method == "morris"
-    what = "mean effect of crossing the range (Morris' μ*)" if morris else "total Sobol index"
+    measure = "mean effect over the range (Morris' μ*)" if morris else "total Sobol index"
     title: Any = {"fontsize": STYLE["axes.titlesize"], "fontweight": "bold"}
-    figure.suptitle(f"What moves the curves: {what}", x=0.01, ha="left", **title)
+    figure.suptitle(f"Sensitivity of the curves: {measure}", x=0.01, ha="left", **title)
     return figure
 
 
@@ -76,11 +76,11 @@ def _draw_effects(axes: Axes, result: Sensitivity, order: list[str]) -> None:
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
     axes.set_xlabel(quantity("sq_m").label)
-    _head(axes, outcomes)
+    _draw_column_heads(axes, outcomes)
 
 
-def _head(axes: Axes, outcomes: tuple[SensitivityOutcome, ...]) -> None:
-    """Names of the quantities above their columns, a white line between them."""
+def _draw_column_heads(axes: Axes, outcomes: tuple[SensitivityOutcome, ...]) -> None:
+    """Write the names of the quantities above their columns, separated by white lines."""
     for key in OUTCOMES:
         columns = [column for column, outcome in enumerate(outcomes) if outcome.quantity == key]
         if columns:
@@ -100,40 +100,44 @@ def _head(axes: Axes, outcomes: tuple[SensitivityOutcome, ...]) -> None:
 
 @ON_PAGE.drawing()
 def calibration_figure(result: Calibration) -> Figure:
-    """How far each anchor is missed before and after, each parameter in its range, the curves with the anchors."""
+    """Draw deviations from the anchors, parameters in their ranges and calibrated curves."""
     figure = Figure(figsize=(11.2, 4.3), layout="constrained")
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.05, 1.1))
-    _draw_misses(left, result)
+    _draw_deviations(left, result)
     _draw_ranges(middle, result)
     _draw_curves(right, result)
     return figure
 
 
-def _draw_misses(axes: Axes, result: Calibration) -> None:
+def _draw_deviations(axes: Axes, result: Calibration) -> None:
     names = [anchor.name for anchor in result.aimed_at]
     axes.axvspan(-1.0, 1.0, color="#dbeafe", linewidth=0)
     tables = (
-        ("as given", result.start, GREY, "x"),
+        ("initial", result.start, GREY, "x"),
         ("calibrated", result.fit, BLUE, "o"),
-        ("checked", result.check, VERMILION, "s"),
+        ("validated", result.check, VERMILION, "s"),
     )
     for number, (_, table, colour, marker) in enumerate(tables):
         rows: dict[str, Any] = {row["anchor"]: row for row in table.to_dict("records")}
         for place, name in enumerate(names):
-            miss = rows[name]["miss"] / rows[name]["tolerance"]
-            at = place + 0.2 * (number - 1)
-            if not np.isfinite(miss):
+            deviation = rows[name]["miss"] / rows[name]["tolerance"]
+            y = place + 0.2 * (number - 1)
+            if not np.isfinite(deviation):
                 continue
-            beyond = abs(miss) > FARTHEST_MISS
-            side = float(np.sign(miss))
-            marked = (">" if side > 0 else "<") if beyond else marker
+            beyond = abs(deviation) > MAX_DEVIATION
+            side = float(np.sign(deviation))
+            symbol = (">" if side > 0 else "<") if beyond else marker
             axes.plot(
-                side * FARTHEST_MISS if beyond else miss, at, marked, color=colour, markersize=5
+                side * MAX_DEVIATION if beyond else deviation,
+                y,
+                symbol,
+                color=colour,
+                markersize=5,
             )
             if beyond:
                 axes.annotate(
-                    f"{miss:.0f}",
-                    (side * FARTHEST_MISS, at),
+                    f"{deviation:.0f}",
+                    (side * MAX_DEVIATION, y),
                     xytext=(-7 * side, 0),
                     textcoords="offset points",
                     ha="right" if side > 0 else "left",
@@ -142,8 +146,8 @@ def _draw_misses(axes: Axes, result: Calibration) -> None:
                     color=colour,
                 )
     axes.axvline(0.0, color="black", linewidth=0.8)
-    axes.set(xlim=(-1.1 * FARTHEST_MISS, 1.1 * FARTHEST_MISS), ylim=(len(names) - 0.5, -0.5))
-    axes.set(xlabel="miss [tolerances]", title="Anchors")
+    axes.set(xlim=(-1.1 * MAX_DEVIATION, 1.1 * MAX_DEVIATION), ylim=(len(names) - 0.5, -0.5))
+    axes.set(xlabel="deviation [tolerances]", title="Anchors")
     axes.set_yticks(range(len(names)), [_wrapped(name) for name in names], fontsize=8)
     handles = [
         Line2D([], [], linestyle="", color=c, marker=m, markersize=5, label=label)
@@ -186,7 +190,7 @@ def _draw_ranges(axes: Axes, result: Calibration) -> None:
     axes.set(
         xlim=(-0.02, 1.02),
         ylim=(len(result.parameters) - 0.4, -0.7),
-        title="Free quantities in their ranges",
+        title="Free parameters in their ranges",
     )
     axes.set_yticks([])
     axes.set_xticks([])
@@ -234,14 +238,14 @@ def _draw_curves(axes: Axes, result: Calibration) -> None:
                 axes.errorbar(
                     place, value, tolerance, fmt="D", color=GREEN, markersize=4, capsize=2, zorder=5
                 )
-    axes.plot([], [], ":", color=GREY, linewidth=1.0, label="as given")
+    axes.plot([], [], ":", color=GREY, linewidth=1.0, label="initial")
     axes.plot([], [], "D", color=GREEN, markersize=4, label="anchors")
-    name_axes(axes, "sq_m", "share", ylim=(0.0, 105.0), title="Checked on other surfaces")
+    name_axes(axes, "sq_m", "share", ylim=(0.0, 105.0), title="Validated on other surfaces")
     axes.legend(loc="lower center", bbox_to_anchor=(0.45, -0.34), ncols=4, columnspacing=1.0)
 
 
 def _wrapped(name: str) -> str:
-    """Two lines of about equal length."""
+    """Break a name into two lines of about equal length."""
     words = in_print(name).split(" ")
     cut = min(range(1, len(words) + 1), key=lambda i: abs(len(" ".join(words[:i])) - len(name) / 2))
     return "\n".join(part for part in (" ".join(words[:cut]), " ".join(words[cut:])) if part)

@@ -1,6 +1,6 @@
-"""Exhibits of any study: each output against each swept quantity, and maps over two of them.
+"""Exhibits of any study: each output over each swept quantity, and maps over two of them.
 
-Swept quantities are shown in the unit they were written in.
+Swept quantities are shown in the unit in which they were given.
 """
 
 from collections.abc import Iterator
@@ -15,9 +15,15 @@ from matplotlib.ticker import LogLocator
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import ACROSS, display, draw_intervals, legend_below, panels_in_rows
-from asperity.report.study.curve import stay_near
-from asperity.report.study.quantity_names import axis_label, place_in_words
+from asperity.report.drawing import (
+    PANELS_PER_ROW,
+    display,
+    draw_intervals,
+    legend_below,
+    panels_in_rows,
+)
+from asperity.report.study.curve import limit_to_data
+from asperity.report.study.quantity_names import axis_label, value_label
 from asperity.report.style import BLUE, GREY, Medium
 from asperity.study import (
     GROUPS,
@@ -28,29 +34,29 @@ from asperity.study import (
     pair_means,
 )
 
-MOST_DRAWN = 1500  # dots as drawings; more are a picture
-MOST_WRITTEN = 8  # values a side of a map whose cells hold their number
+MAX_VECTOR_DOTS = 1500  # more dots are rasterised
+MAX_LABELLED_CELLS = 8  # per side of a map; a larger map has no numbers in its cells
 
 
 def sweep_exhibits(study: StudyOverview) -> Iterator[Exhibit]:
-    """Every output against each swept quantity, and over a pair of them."""
+    """Yield every output over each swept quantity, and over a pair of them."""
     if not study.outputs:
         return
     for axis in study.axes:
-        yield against(study, axis)
+        yield output_curves(study, axis)
     if len(study.axes) == 2 and not any(axis.binned for axis in study.axes):
-        yield over_two(study, study.axes[0], study.axes[1])
+        yield output_maps(study, study.axes[0], study.axes[1])
 
 
-def against(study: StudyOverview, axis: SweptAxis) -> Exhibit:
-    """Every output against one swept quantity: each case, and means with their intervals."""
+def output_curves(study: StudyOverview, axis: SweptAxis) -> Exhibit:
+    """Draw every output over one swept quantity: each case, and means with intervals."""
 
     def draw(medium: Medium) -> Figure:
-        figure, panels = _sheet(len(study.outputs), medium, shape=0.85, key=1.6)
+        figure, panels = _panel_figure(len(study.outputs), medium, shape=0.85, legend_lines=1.6)
         for key, axes in zip(study.outputs, panels, strict=True):
-            _draw_against(axes, axis, display(key, study.used[key].to_numpy(dtype=float)))
+            _draw_output(axes, axis, display(key, study.used[key].to_numpy(dtype=float)))
             axes.set_title(quantity(key).label, fontweight="normal", fontsize="small")
-        for axes in panels[-min(ACROSS, len(panels)) :]:
+        for axes in panels[-min(PANELS_PER_ROW, len(panels)) :]:
             axes.set_xlabel(axis_label(axis))
         mean: Any = {"color": BLUE, "marker": "o", "markersize": 3.5}
         interval = f"mean, {100 * MEAN_CONFIDENCE:.0f} % interval"
@@ -62,12 +68,13 @@ def against(study: StudyOverview, axis: SweptAxis) -> Exhibit:
         return figure
 
     others = " over all values of the other swept quantities" if len(study.axes) > 1 else ""
-    means = f"means of {GROUPS} groups of neighbours" if axis.binned else "means at each value"
+    means = f"means of {GROUPS} bins" if axis.binned else "means at each value"
     return Exhibit(
         f"against-{_file_name(axis)}",
         draw,
-        f"Every output against {axis.key}: cases as dots, and {means}{others}, with the 90 % interval of each mean.",
-        f"Outputs of the study against {axis.key}.",
+        f"Outputs over {axis.key}: cases as dots, and {means}{others}, with 90 % intervals of the "
+        "mean.",
+        f"Outputs of the study over {axis.key}.",
     )
 
 
@@ -75,14 +82,16 @@ def _file_name(axis: SweptAxis) -> str:
     return axis.key.replace(".", "-").replace("_", "-")
 
 
-def _draw_against(axes: Axes, axis: SweptAxis, values: Field) -> None:
+def _draw_output(axes: Axes, axis: SweptAxis, values: Field) -> None:
     known = np.isfinite(values)
     dots: Any = {"color": GREY, "alpha": 0.6, "markersize": 4.5, "markeredgewidth": 0}
-    axes.plot(axis.values[known], values[known], ".", rasterized=values.size > MOST_DRAWN, **dots)
+    axes.plot(
+        axis.values[known], values[known], ".", rasterized=values.size > MAX_VECTOR_DOTS, **dots
+    )
     x, mean, low, high = group_means(axis.values[known], values[known], binned=axis.binned)
     style: Any = {"linestyle": "none" if axis.names else "-", "color": BLUE, "markersize": 3.5}
     draw_intervals(axes, x, mean, [mean - low, high - mean], "o", **style)
-    stay_near(axes, values[known])
+    limit_to_data(axes, values[known])
     _scale(axes, axis)
 
 
@@ -98,47 +107,50 @@ def _scale(axes: Axes, axis: SweptAxis) -> None:
         axes.set_xticks([], minor=True)
 
 
-def _sheet(count: int, medium: Medium, *, shape: float, key: float) -> tuple[Figure, list[Axes]]:
-    """So many equal panels, in rows."""
-    across = min(ACROSS, count)
-    down = -(-count // across)
-    line, width = medium.line_height, medium.width(across)
-    height = down * (width / across * shape + 1.0 * line) + (2.0 + key) * line
+def _panel_figure(
+    count: int, medium: Medium, *, shape: float, legend_lines: float
+) -> tuple[Figure, list[Axes]]:
+    """Create a figure with `count` equal panels in rows."""
+    columns = min(PANELS_PER_ROW, count)
+    rows = -(-count // columns)
+    line, width = medium.line_height, medium.width(columns)
+    height = rows * (width / columns * shape + 1.0 * line) + (2.0 + legend_lines) * line
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, panels_in_rows(figure, count)
 
 
-def over_two(study: StudyOverview, across: SweptAxis, up: SweptAxis) -> Exhibit:
-    """Means over two swept quantities as maps, a colour scale for each output; what has no value is hatched."""
+def output_maps(study: StudyOverview, x_axis: SweptAxis, y_axis: SweptAxis) -> Exhibit:
+    """Map the mean of every output over two swept quantities; cells without values are hatched."""
 
     def draw(medium: Medium) -> Figure:
-        figure, panels = _sheet(len(study.outputs), medium, shape=1.15, key=1.0)
+        figure, panels = _panel_figure(len(study.outputs), medium, shape=1.15, legend_lines=1.0)
         for key, axes in zip(study.outputs, panels, strict=True):
-            cells = pair_means(display(key, study.used[key].to_numpy(dtype=float)), across, up)
+            values = display(key, study.used[key].to_numpy(dtype=float))
+            cells = pair_means(values, x_axis, y_axis)
             axes.patch.set(hatch="////", edgecolor="#9ca3af", facecolor="white")
             image = axes.imshow(
                 cells, origin="lower", cmap="cividis", aspect="auto", interpolation="none"
             )
-            if max(cells.shape) <= MOST_WRITTEN:
-                _write_cells(axes, cells, image.norm(cells))
-            _tick(axes.xaxis, across)
-            _tick(axes.yaxis, up)
+            if max(cells.shape) <= MAX_LABELLED_CELLS:
+                _label_cells(axes, cells, image.norm(cells))
+            _tick(axes.xaxis, x_axis)
+            _tick(axes.yaxis, y_axis)
             axes.spines[:].set_visible(False)
             axes.set_title(quantity(key).label, fontweight="normal", fontsize="small")
             figure.colorbar(image, ax=axes, location="bottom", aspect=18, pad=0.04)
-        figure.supxlabel(axis_label(across), fontsize="medium")
-        figure.supylabel(axis_label(up), fontsize="medium")
+        figure.supxlabel(axis_label(x_axis), fontsize="medium")
+        figure.supylabel(axis_label(y_axis), fontsize="medium")
         return figure
 
     return Exhibit(
-        f"over-{_file_name(across)}-and-{_file_name(up)}",
+        f"over-{_file_name(x_axis)}-and-{_file_name(y_axis)}",
         draw,
-        f"Means over seeds at each pair of {across.key} and {up.key}. Hatched: no case that may be used.",
-        f"Outputs of the study over {across.key} and {up.key}.",
+        f"Means over seeds at each pair of {x_axis.key} and {y_axis.key}. Hatched: no usable case.",
+        f"Outputs of the study over {x_axis.key} and {y_axis.key}.",
     )
 
 
-def _write_cells(axes: Axes, cells: Field, shade: Any) -> None:
+def _label_cells(axes: Axes, cells: Field, shade: Any) -> None:
     spread = float(np.nanmax(cells) - np.nanmin(cells))
     decimals = max(0, 1 - int(np.floor(np.log10(spread)))) if spread > 0.0 else 0
     for (j, i), value in np.ndenumerate(cells):
@@ -155,9 +167,9 @@ def _write_cells(axes: Axes, cells: Field, shade: Any) -> None:
 
 
 def _tick(side: Any, axis: SweptAxis) -> None:
-    """The values at cell centres, thinned out where they are many."""
-    places = axis.distinct
-    step = -(-places.size // 6)
+    """Set tick labels at cell centres, at most about six."""
+    values = axis.distinct
+    step = -(-values.size // 6)
     side.set_ticks(
-        np.arange(places.size)[::step], [place_in_words(axis, value) for value in places[::step]]
+        np.arange(values.size)[::step], [value_label(axis, value) for value in values[::step]]
     )

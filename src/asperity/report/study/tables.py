@@ -1,4 +1,4 @@
-"""The tables of a study's page, in words and display units: levels, points, anchors, and what the study was."""
+"""Tables of a study's report, in words and display units: levels, points, anchors and facts."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from asperity.core.quantities import NO_VALUE, Quantity, in_print, quantity
-from asperity.report.study.curve import stage_names, surfaces_a_point
-from asperity.report.study.quantity_names import axis_label, place_in_words
+from asperity.report.study.curve import stage_names, surface_count
+from asperity.report.study.quantity_names import axis_label, value_label
 from asperity.study import StudyOverview, as_written
 
-MOST_POINTS = 60  # in a table of the page; the csv has all
-MOST_OUTPUTS = 8  # beside each other in it
+MAX_POINTS = 60  # rows of a table in the page; the csv has all points
+MAX_OUTPUTS = 8  # columns of that table
 COMPUTED = {
     "solve": "contact and vibration",
-    "shake": "contact and vibration, with the contact's own stiffness and damping",
-    "vibrate": "the vibration model alone",
+    "shake": "contact and vibration, with dynamic stiffness and damping of the contact",
+    "vibrate": "vibration model only",
     "surfaces": "contact and vibration, over several surfaces each",
 }
 LEVELS = (
@@ -32,14 +32,14 @@ LEVELS = (
 
 
 class Cell(NamedTuple):
-    """A value in a table, and what stands small below it."""
+    """A value in a table, with a detail in small type below it."""
 
     value: str
-    below: str = ""
+    detail: str = ""
 
 
 def anchor_rows(study: StudyOverview) -> list[dict[str, str]]:
-    """The anchors, what the study has there, and whether it meets them."""
+    """Return the rows of the anchors: required value, study's value, interval, deviation, met."""
     if study.curve is None or not study.anchors:
         return []
     rows = []
@@ -50,10 +50,10 @@ def anchor_rows(study: StudyOverview) -> list[dict[str, str]]:
             {
                 "name": in_print(row["anchor"]),
                 "source": row["source"],
-                "wanted": f"{sense}{entry.text(row['printed'], row['tolerance'])}",
-                "ours": entry.text(row["ours"]),
+                "required": f"{sense}{entry.text(row['printed'], row['tolerance'])}",
+                "computed": entry.text(row["ours"]),
                 "interval": _interval(entry, row["low"], row["high"]) or NO_VALUE,
-                "miss": f"{'+' if row['miss'] >= 0.0 else ''}{entry.number(row['miss'])}",
+                "deviation": f"{'+' if row['miss'] >= 0.0 else ''}{entry.number(row['miss'])}",
                 "met": "yes" if row["met"] else "within the interval" if row["possible"] else "NO",
             }
         )
@@ -61,7 +61,7 @@ def anchor_rows(study: StudyOverview) -> list[dict[str, str]]:
 
 
 def _entry(column: str) -> Quantity:
-    """The quantity of a column of the study; a column that the catalogue has not is a plain number."""
+    """Return the quantity of a column; a plain number if the catalogue lacks it."""
     try:
         return quantity(column)
     except KeyError:
@@ -69,7 +69,7 @@ def _entry(column: str) -> Quantity:
 
 
 def _interval(entry: Quantity, low: float, high: float) -> str:
-    """From low to high; empty where there is none."""
+    """Return an interval as text, empty if it is not finite."""
     return (
         f"{entry.number(low)} to {entry.number(high)}"
         if np.isfinite(low) and np.isfinite(high)
@@ -78,7 +78,7 @@ def _interval(entry: Quantity, low: float, high: float) -> str:
 
 
 def level_rows(study: StudyOverview) -> list[list[Cell]]:
-    """Head and rows of the levels of a wear curve: means, and the interval below each."""
+    """Return head and rows of the levels of a wear curve: means with their intervals."""
     curve = study.curve
     if curve is None:
         return []
@@ -87,15 +87,15 @@ def level_rows(study: StudyOverview) -> list[list[Cell]]:
     rows = [
         [Cell(sq.label), Cell("Used"), *(Cell(entry.short, entry.display) for entry in entries)]
     ]
-    staged = stages is not None and stages.found
-    if staged:
+    has_split = stages is not None and stages.found
+    if has_split:
         rows[0].append(Cell("Stage", "preset sound"))
     for level, row in enumerate(summary.to_dict("records")):
         cells = [Cell(sq.number(curve.sq[level])), Cell(str(curve.values("clr", level).size))]
         for entry in entries:
             low, high = row[f"{entry.key}_low"], row[f"{entry.key}_high"]
             cells.append(Cell(entry.number(row[entry.key]), _interval(entry, low, high)))
-        if stages is not None and staged:
+        if stages is not None and has_split:
             before, after = stage_names(stages)
             cells.append(Cell(after if row["sq_um"] >= stages.split else before))
         rows.append(cells)
@@ -103,29 +103,29 @@ def level_rows(study: StudyOverview) -> list[list[Cell]]:
 
 
 def has_many_points(study: StudyOverview) -> bool:
-    """Whether there are more points than the page has a table for."""
-    return study.curve is None and len(study.result.plan.points) > MOST_POINTS
+    """Return True if there are too many points for a table in the page."""
+    return study.curve is None and len(study.result.plan.points) > MAX_POINTS
 
 
 def point_rows(study: StudyOverview) -> list[list[Cell]]:
-    """Head and rows of the points of any other study, where there are not too many: means and standard deviations."""
+    """Return head and rows of the points of a study: means and standard deviations."""
     if study.curve is not None or has_many_points(study) or not len(study.used):
         return []
     entries = [
-        replace(quantity(key), deviation=f"{key}_std") for key in study.outputs[:MOST_OUTPUTS]
+        replace(quantity(key), deviation=f"{key}_std") for key in study.outputs[:MAX_OUTPUTS]
     ]
     head = [*(Cell(axis_label(axis)) for axis in study.axes), Cell("Used")]
     rows = [[*head, *(Cell(entry.short, entry.display) for entry in entries)]]
     for _, point in study.tables["points"].iterrows():
         first = int(np.argmax(study.used["point"].to_numpy() == point["point"]))
-        places = (place_in_words(axis, axis.values[first]) for axis in study.axes)
+        labels = (value_label(axis, axis.values[first]) for axis in study.axes)
         numbers: Sequence[str] = [entry.number_in(dict(point)) for entry in entries]
-        rows.append([*map(Cell, places), Cell(f"{point['cases']:.0f}"), *map(_stacked, numbers)])
+        rows.append([*map(Cell, labels), Cell(f"{point['cases']:.0f}"), *map(_stacked, numbers)])
     return rows
 
 
 def _stacked(number: str) -> Cell:
-    """A value, its deviation below it."""
+    """Split a number into its value and the deviation below it."""
     value, _, deviation = number.partition(" ± ")
     return (
         Cell(value, f"± {deviation}") if deviation and not number.startswith("(") else Cell(number)
@@ -133,24 +133,24 @@ def _stacked(number: str) -> Cell:
 
 
 def facts(study: StudyOverview) -> list[tuple[str, str]]:
-    """What the study was."""
+    """Return the facts about the study: cases, values, seeds, folder, versions."""
     plan = study.result.plan
     points = f"{len(plan.points)} points" if len(plan.points) > 1 else "1 point"
     rows = [
         ("Computed", COMPUTED[plan.kind]),
-        ("Cases", f"{len(plan.cases)}: {points} of {surfaces_a_point(study)}"),
+        ("Cases", f"{len(plan.cases)}: {points} of {surface_count(study)}"),
     ]
     rows += [(key, _range(plan, key)) for key in plan.axes]
     seeding = {
-        "independent": "drawn anew for every case from the case's own seed",
-        "common": "the same at every point, realisation by realisation",
+        "independent": "independent for every case, derived from the case's seed",
+        "common": "the same set at every point",
     }
     seeds = (
-        "surfaces' seeds given: " + ", ".join(map(str, plan.seeds))
+        "seeds of the surfaces: " + ", ".join(map(str, plan.seeds))
         if plan.seeds
         else seeding[plan.seeding]
     )
-    rows.append(("Seeds", f"{seeds}; each case's own stand in cases.csv"))
+    rows.append(("Seeds", f"{seeds}; listed in cases.csv"))
     if study.result.folder is not None:
         rows.append(("Folder", study.result.folder.resolve().name))
     rows.append(
@@ -163,7 +163,7 @@ def facts(study: StudyOverview) -> list[tuple[str, str]]:
 
 
 def _range(plan: Any, key: str) -> str:
-    """The values of a swept key in words."""
+    """Return the values of a swept key as text."""
     values = list(dict.fromkeys(as_written(point[key]) for point in plan.points if key in point))
     few = len(values) <= 8
     return in_print(

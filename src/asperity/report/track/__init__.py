@@ -1,1 +1,1 @@
-"""The page of a tracked series and its exhibits."""
+"""Report of a tracked series."""

@@ -1,4 +1,4 @@
-"""One HTML page of a tracked series: the verdict first, then trend, spectra, numbers, quality, method and limits."""
+"""HTML report of a tracked series: verdict, trend, spectra, numbers, quality, method, limits."""
 
 from collections import Counter
 from pathlib import Path
@@ -9,40 +9,55 @@ import numpy as np
 from asperity.core.quantities import NO_VALUE, in_print, quantity
 from asperity.monitoring import FORECAST, Track, TrackedRecording
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, render, write_page
-from asperity.report.forecast import ahead
+from asperity.report.forecast import forecast_exhibit
 from asperity.report.track import exhibits
 from asperity.trend import ALERT_RATE_FACTOR, SOURCE_NAMES
 
 METHODS = {
-    "joint": "All spectra are fitted together: a background common to the series, of any shape, each recording with "
-    "a gain of its own, and one oscillator line a recording, which moves or changes its height from one recording to "
-    "the next. What stays is taken for the machine, what moves for the contact.",
-    "modes": "Each spectrum by itself: several oscillator lines over a floor, of which one may be the contact's.",
-    "likelihood": "Each spectrum by itself: the likeliest single oscillator line over a sloping floor (Whittle "
-    "likelihood), against the floor alone by BIC.",
-    "peak": "The paper's: each spectrum smoothed three times by a five-point cubic, the highest point of the band "
-    "taken. It is not tested against chance, and structural modes or shaft lines can be that point.",
+    "joint": "All spectra are fitted jointly: a common background of any shape, a gain for each "
+    "recording, and one "
+    "resonance per recording that may change its frequency and height. The constant part is "
+    "attributed to the "
+    "machine, the changing part to the contact.",
+    "modes": "Each spectrum is fitted separately: several resonances above a noise floor, one of "
+    "which may be the "
+    "contact's.",
+    "likelihood": "Each spectrum is fitted separately: a single resonance above a sloping noise "
+    "floor (maximum "
+    "Whittle likelihood), compared with the floor alone by BIC.",
+    "peak": "The method of the paper: each spectrum is smoothed three times by a five-point cubic, "
+    "and the highest "
+    "point in the band is used. It has no significance test and may select a structural mode or a "
+    "shaft line.",
 }
-NEXT = {  # what to do, by the alarm's state; of an alarm by who raised it, its first word
-    "CRF": "Look at the contact before it goes on under this load: oil sample (particles, water, viscosity), "
-    "temperature, load and speed against what they were; inspect the surfaces at the next stop, and plan that stop.",
-    "the": "Look for what grew: bearing and mesh rates in the envelope, imbalance and looseness at the shaft's rate, "
-    "a sensor that was moved. Repeat the recording today; if it stays, inspect.",
-    "zone": "Take the machine down in a controlled way, or take its load off, and find the cause: balance, alignment, "
+_CHECK_CONTACT = (
+    "Check the contact before continuing at this load: oil sample (particles, water, viscosity), "
+    "temperature, load "
+    "and speed. Plan a stop and inspect the surfaces."
+)
+_CHECK_LEVEL = (
+    "Find the source of the increase: bearing and mesh frequencies in the envelope, imbalance and "
+    "looseness at the "
+    "shaft frequency, a displaced sensor. Repeat the recording today; inspect if the increase "
+    "persists."
+)
+ACTIONS = {  # by state; for an alarm, by the first word of the indicator that raised it
+    "CRF": _CHECK_CONTACT,
+    "damping": _CHECK_CONTACT,
+    FORECAST: _CHECK_CONTACT,
+    "zone": "Shut the machine down in a controlled way, or reduce its load, and find the cause: "
+    "balance, alignment, "
     "looseness, bearings.",
-    "alert": "Record more often (ten times) until it becomes an alarm or goes away; nothing need be stopped for it.",
-    "cannot-tell": "Name what is missing: longer recordings, the case or band of the contact, more recordings for a "
-    "baseline, or the cause of a step; then acknowledge it.",
-    "blind": "Check that the machine runs, then sensor, cable and supply. Until then nobody hears the machine.",
-    "none": "Nothing; record on as planned.",
+    "alert": "Record ten times as often until the alert becomes an alarm or ends. No stop is "
+    "needed.",
+    "cannot-tell": "Provide what is missing: longer recordings, the case or band of the contact, "
+    "more recordings for "
+    "a baseline, or the cause of a step; then acknowledge.",
+    "blind": "Check that the machine runs, then sensor, cable and supply. The machine is not "
+    "monitored until then.",
+    "none": "None; continue recording as planned.",
 }
-NEXT |= {
-    FORECAST: NEXT["CRF"],
-    "damping": NEXT["CRF"],
-    "kurtosis": NEXT["the"],
-    "velocity": NEXT["the"],
-}
-SUREST = 0.99  # beyond which a probability says more of the model than of the machine
+MAX_PROBABILITY = 0.99  # stated at most, because model errors are not included
 NO_BREAK = (
     "saturating exponential",
     "saturating hyperbola",
@@ -50,31 +65,31 @@ NO_BREAK = (
     "smooth curves",
     "no change",
 )
-MOST_LINES = 20  # of those taken out, listed by name
+MAX_LINES = 20  # removed lines that are listed by name
 
 
 def write_track_report(track: Track, path: str | Path) -> Path:
-    """Write one self-contained HTML page about a series, whole or not at all.
+    """Write a self-contained HTML report of a tracked series, atomically.
 
     Raises
     ------
     BadInput
-        for a path that cannot be written to.
+        for a path that is not writable.
     """
     return write_page(path, lambda: render_track_page(track))
 
 
 def render_track_page(track: Track) -> str:
-    """The page as HTML text."""
+    """Render the page as HTML text."""
     return render(
         "track/page.html.j2",
         title=_title(track),
         track=track,
         tiles=_tiles(track),
-        act=_act(track),
-        trend=[exhibits.trend(track).picture_and_narrow()] if track.resonance_count else [],
-        ahead=_ahead(track),
-        more=_pictures(_details(track)),
+        actions=_actions(track),
+        trend=[exhibits.trend(track).responsive_picture()] if track.resonance_count else [],
+        forecast=_forecast_picture(track),
+        details=[exhibit.picture() for exhibit in _details(track)],
         heads=_heads(track),
         rows=[_row(recording, _with_clr(track)) for recording in track.recordings],
         with_clr=_with_clr(track),
@@ -83,28 +98,28 @@ def render_track_page(track: Track) -> str:
         facts=_facts(track),
         lines=_lines(track),
         evidence=_evidence(track),
-        ways=_ways(track),
+        stage_rows=_stage_rows(track),
         x_label=exhibits.x_label(track),
         decides=capitalised(SOURCE_NAMES["crf" if track.stages is None else track.stages.source]),
-        method_in_words=METHODS[track.method],
+        method=METHODS[track.method],
         resolution=_resolution(track),
         false_alarms=f"{1.0 / track.alarm.false_alarm_rate:.0f}",
     )
 
 
-def _ahead(track: Track) -> Picture | None:
-    """What is foretold; None where nothing was asked, or nothing can be told."""
+def _forecast_picture(track: Track) -> Picture | None:
+    """Draw the forecast; None if none was requested or possible."""
     bands = None if track.forecast is None else track.forecast.bands
-    return None if bands is None else ahead(bands, exhibits.x_label(track)).picture()
+    return None if bands is None else forecast_exhibit(bands, exhibits.x_label(track)).picture()
 
 
 def _with_clr(track: Track) -> bool:
-    """Whether the contact model reads a load share off the CRF."""
+    """Return True if the contact model gives a load share for the CRF."""
     return track.target.full_load_crf_hz is not None
 
 
 def _with_damping(track: Track) -> bool:
-    """Whether the damping of any recording's line is determined."""
+    """Return True if any recording has a damping ratio."""
     return not all(recording.damping_reason for recording in track.recordings)
 
 
@@ -114,10 +129,10 @@ def _title(track: Track) -> str:
     return f"Contact resonance of a series{where}"
 
 
-def _act(track: Track) -> list[tuple[str, str]]:
-    """For who must act: what changed, since when, how sure, what to do next."""
+def _actions(track: Track) -> list[tuple[str, str]]:
+    """Return finding, start, severity, confidence and recommended action."""
     alarm, last = track.alarm, track.recordings[-1]
-    rows = [("What", capitalised(in_print(alarm.reason)) + ".")]
+    rows = [("Finding", capitalised(in_print(alarm.reason)) + ".")]
     if alarm.since is not None:
         first = track.recordings[alarm.since]
         when = f", {_when(first)}" if first.reading.started else ""
@@ -126,49 +141,53 @@ def _act(track: Track) -> list[tuple[str, str]]:
         )
     rows.append(
         (
-            "Last heard",
+            "Last recording",
             f"{Path(last.file).name}{', ' + _when(last) if last.reading.started else ''}",
         )
     )
     rows.append(("Severity", capitalised(in_print(last.severity())) + "."))
-    rows.append(("How sure", _how_sure(track)))
+    rows.append(("Confidence", _confidence(track)))
     kind = alarm.raised_by.partition(" ")[0] if alarm.state == "alarm" else alarm.state
-    return [*rows, ("What next", NEXT[kind])]
+    return [*rows, ("Action", ACTIONS.get(kind, _CHECK_LEVEL))]
 
 
 def _when(recording: TrackedRecording) -> str:
     return recording.reading.started.replace("T", " ")
 
 
-def _how_sure(track: Track) -> str:
-    """What the alarm's rate and the stage's probability say, and what they do not."""
+def _confidence(track: Track) -> str:
+    """State the false-alarm rate and the probability of the severe stage."""
     alarm, last = track.alarm, track.recordings[-1]
     if alarm.raised_by == "zone":
-        return "The standard's limits for machines of this class, not what this machine is used to."
+        return (
+            "Limits of the standard for machines of this class, not the baseline of this machine."
+        )
     if alarm.raised_by == FORECAST:
-        return "The probability is that of the model's courses; a change is told where it is a hundred to one."
+        return "Probability under the forecast model; changes are reported at odds of 100 to 1."
     if alarm.state not in ("alarm", "alert"):
         return (
             "No statement: see what is missing."
             if alarm.state != "none"
-            else "Small changes would not be seen yet."
+            else "Small changes are not detectable yet."
         )
-    said = f"Set to be said without wear once in {1.0 / alarm.false_alarm_rate:.0f} recordings"
-    said = (
-        said
+    recordings = 1.0 / alarm.false_alarm_rate
+    text = (
+        f"False-alarm rate: one in {recordings:.0f} recordings"
         if alarm.state == "alarm"
-        else f"Not sure: chance does it {ALERT_RATE_FACTOR:.0f} times as often as it alarms"
+        else f"Not significant: by chance, alerts are {ALERT_RATE_FACTOR:.0f} times as frequent as alarms"
     )
     if np.isfinite(last.severe_probability) and alarm.raised_by in ("CRF", "damping"):
-        said += f"; probability of the severe stage {_likely(last.severe_probability)}, if the line is the contact's"
-    return f"{said}."
+        severe = _probability_text(last.severe_probability)
+        text += f"; probability of the severe stage {severe}, if the resonance is the contact's"
+    return f"{text}."
 
 
-def _likely(probability: float) -> str:
-    """A probability, never certain: the model it is of is not."""
-    if probability > SUREST:
-        return f"above {SUREST:g}"
-    return f"below {1.0 - SUREST:.2g}" if probability < 1.0 - SUREST else f"{probability:.2f}"
+def _probability_text(probability: float) -> str:
+    """Return a probability as text, limited to the range that the model supports."""
+    lowest = 1.0 - MAX_PROBABILITY
+    if probability > MAX_PROBABILITY:
+        return f"above {MAX_PROBABILITY:g}"
+    return f"below {lowest:.2g}" if probability < lowest else f"{probability:.2f}"
 
 
 def _tiles(track: Track) -> list[Tile]:
@@ -187,12 +206,16 @@ def _tiles(track: Track) -> list[Tile]:
         tiles.append(Tile(f"Last {crf.short}", value, deviation))
         if np.isfinite(last.severe_probability):
             tiles.append(
-                Tile("Severe, last recording", _likely(last.severe_probability), "probability")
+                Tile(
+                    "Severe, last recording",
+                    _probability_text(last.severe_probability),
+                    "probability",
+                )
             )
         if np.isfinite(last.clr):
             low, high = last.clr_interval
             interval = f"90 %: {clr.number(low)} to {clr.number(high)}"
-            tiles.append(Tile("Load share, last", clr.text(last.clr), interval))
+            tiles.append(Tile("Asperity load share, last", clr.text(last.clr), interval))
     zone = track.recordings[-1].zone
     if zone is not None:
         velocity = quantity("velocity_rms").text(track.recordings[-1].reading.velocity)
@@ -202,15 +225,11 @@ def _tiles(track: Track) -> list[Tile]:
     return tiles
 
 
-def _pictures(chosen: list[Exhibit]) -> list[Picture]:
-    return [exhibit.picture() for exhibit in chosen]
-
-
 def _details(track: Track) -> list[Exhibit]:
-    """What is shown below the trend."""
-    heard = exhibits.levels(track)
+    """Return the exhibits below the trend."""
+    levels = exhibits.levels(track)
     details = [
-        *([] if heard is None else [heard]),
+        *([] if levels is None else [levels]),
         *([exhibits.amplitude(track)] if track.resonance_count else []),
     ]
     if _with_damping(track):
@@ -224,7 +243,7 @@ def _details(track: Track) -> list[Exhibit]:
 
 
 class _Row(NamedTuple):
-    """A line of the table of recordings."""
+    """A row of the table of recordings."""
 
     name: str
     cells: list[str]
@@ -259,7 +278,7 @@ def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
     )
     resonant.append(width)
     severe = (
-        _likely(recording.severe_probability)
+        _probability_text(recording.severe_probability)
         if np.isfinite(recording.severe_probability)
         else NO_VALUE
     )
@@ -274,7 +293,7 @@ def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
 
 
 def _remarks(track: Track) -> list[tuple[str, str]]:
-    """What the checks remarked, with how many recordings it holds for, or which."""
+    """Return the remarks of the quality checks with the recordings that they concern."""
     remarks: dict[str, list[str]] = {}
     for recording in track.recordings:
         name = Path(recording.file).name
@@ -286,26 +305,27 @@ def _remarks(track: Track) -> list[tuple[str, str]]:
             remarks.setdefault(f"Not used: {recording.reading.reason}", []).append(name)
     total = len(track.recordings)
 
-    def holders(names: list[str]) -> str:
+    def recordings_text(names: list[str]) -> str:
         if len(names) == total and total > 1:
             return "all"
         return ", ".join(names) if len(names) <= 3 else f"{len(names)} recordings, first {names[0]}"
 
     return [
-        (in_print(capitalised(sentence)), holders(names)) for sentence, names in remarks.items()
+        (in_print(capitalised(sentence)), recordings_text(names))
+        for sentence, names in remarks.items()
     ]
 
 
 def _facts(track: Track) -> list[tuple[str, str, str]]:
-    """Name, value and source of each fact; where recordings differ, the commonest and how many there are."""
+    """Return name, most common value and source of each fact about the recordings."""
     readings, rows = [recording.reading for recording in track.recordings], []
     for name in ("rate", "unit", "channel", "scale", "format"):
-        seen = Counter(reading.facts[name] for reading in readings if name in reading.facts)
-        if seen:
-            ((value, source), count), *others = seen.most_common()
-            more = f"; others in {seen.total() - count} recordings" if others else ""
+        counts = Counter(reading.facts[name] for reading in readings if name in reading.facts)
+        if counts:
+            ((value, source), count), *others = counts.most_common()
+            rest = f"; others in {counts.total() - count} recordings" if others else ""
             rows.append(
-                (name.capitalize(), f"{value} Hz{more}" if name == "rate" else value + more, source)
+                (name.capitalize(), f"{value} Hz{rest}" if name == "rate" else value + rest, source)
             )
     lengths = [reading.quality.duration_s for reading in readings if reading.quality is not None]
     if lengths:
@@ -316,7 +336,7 @@ def _facts(track: Track) -> list[tuple[str, str, str]]:
             (
                 "Length",
                 shortest if shortest == longest else f"{shortest} to {longest}",
-                "its samples",
+                "number of samples",
             )
         )
     started = sorted(reading.started for reading in readings if reading.started)
@@ -328,18 +348,18 @@ def _facts(track: Track) -> list[tuple[str, str, str]]:
 
 
 def _lines(track: Track) -> list[str]:
-    """The lines taken out of the recording that is shown, the strongest in words."""
+    """Describe the strongest lines removed from the spectrum shown."""
     if not any(recording.clean is not None for recording in track.recordings):
         return []
     clean = exhibits.typical_recording(track).clean
     assert clean is not None
-    strongest = sorted(clean.removed, key=lambda line: -line.mean_square)[:MOST_LINES]
+    strongest = sorted(clean.removed, key=lambda line: -line.mean_square)[:MAX_LINES]
     strongest.sort(key=lambda line: line.frequency_hz)
     return [f"{quantity('line_hz').text(line.frequency_hz)}: {line.source}" for line in strongest]
 
 
-class _Way(NamedTuple):
-    """What one indicator, or both, say of the stage."""
+class _StageRow(NamedTuple):
+    """Stage of wear from one indicator, or from both."""
 
     name: str
     kind: str
@@ -348,9 +368,9 @@ class _Way(NamedTuple):
     verdict: str
 
 
-def _ways(track: Track) -> list[_Way]:
-    """A line each for CRF, damping and both, the one that decides marked."""
-    ways = []
+def _stage_rows(track: Track) -> list[_StageRow]:
+    """Return the stages from CRF, damping and both; the deciding one is marked."""
+    rows = []
     for source, stages in track.stages_by.items():
         low, high = stages.interval
         breaks = [
@@ -363,8 +383,8 @@ def _ways(track: Track) -> list[_Way]:
         name = capitalised(SOURCE_NAMES[source]) + (" (decides)" if stages is track.stages else "")
         split = f"{stages.split:.3g} ({low:.3g} to {high:.3g})" if stages.found else NO_VALUE
         kind = "not determined" if stages.kind == "too few" else stages.kind
-        ways.append(_Way(name, kind, split, margin, in_print(stages.verdict)))
-    return ways
+        rows.append(_StageRow(name, kind, split, margin, in_print(stages.verdict)))
+    return rows
 
 
 def _evidence(track: Track) -> list[tuple[str, str]]:
@@ -389,6 +409,7 @@ def _resolution(track: Track) -> str:
         quantity(key).text(getattr(spectrum, key)) for key in ("spacing_hz", "resolution_hz")
     )
     return (
-        f"{spectrum.window} window, {spectrum.segment} samples a piece, lines {spacing} apart "
-        f"(noise bandwidth {resolution})"
+        f"{spectrum.window} window, segments of {spectrum.segment} samples, line spacing "
+        f"{spacing}, "
+        f"noise bandwidth {resolution}"
     )

@@ -1,4 +1,4 @@
-"""Exhibits of a wear history: curves over hours, both bodies' surfaces before and after, CRF beside the paper's."""
+"""Exhibits of a wear history: curves over hours, resonance, surfaces before and after."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ from asperity.surface import Surface, bearing_curve
 
 COLOURS = (BLUE, VERMILION, GREEN)
 STROKES = ("-", "--", ":")
-PANELS: Sequence[tuple[str, tuple[str, ...]]] = (  # over hours: the axis, and its curves
+PANELS: Sequence[tuple[str, tuple[str, ...]]] = (  # quantity of the axis, and of its curves
     ("sq_m", ("sq_m", "sq_1_m", "sq_2_m")),
     ("sk_m", ("sk_m", "spk_m", "svk_m")),
     ("ssk", ("ssk",)),
@@ -33,27 +33,27 @@ PANELS: Sequence[tuple[str, tuple[str, ...]]] = (  # over hours: the axis, and i
 NAMES = ("First body", "Second body")
 
 
-class Worn(NamedTuple):
-    """A body's track before and after, and which body it is."""
+class WornTrack(NamedTuple):
+    """Track of a body before and after wear."""
 
     name: str
     before: Surface
     after: Surface
 
 
-def worn_bodies(history: WearHistory) -> tuple[Worn, ...]:
-    """The bodies that were rough, or have lost anything."""
+def worn_tracks(history: WearHistory) -> tuple[WornTrack, ...]:
+    """Return the tracks of the bodies that are rough or have worn."""
     before, after = history.initial_surfaces, history.final_surfaces
     pairs = ((before.first, after.first), (before.second, after.second))
     return tuple(
-        Worn(name, *pair)
+        WornTrack(name, *pair)
         for name, pair in zip(NAMES, pairs, strict=True)
-        if any(np.ptp(one.heights) for one in pair)
+        if any(np.ptp(surface.heights) for surface in pair)
     )
 
 
 def curves(history: WearHistory) -> Exhibit:
-    """Roughness, shares, film, friction, heat, worn depth and CRFA over hours, with their intervals."""
+    """Draw roughness, shares, film, friction, temperature, wear depth and CRFA over hours."""
     table = history.table
     panels = [panel for panel in PANELS if bool(table[panel[1][0]].notna().any())]
 
@@ -64,23 +64,26 @@ def curves(history: WearHistory) -> Exhibit:
             axes = figure.add_subplot(rows, 2, number)
             for key, colour, stroke in zip(keys, COLOURS, STROKES, strict=False):
                 if key != keys[0] and not np.any(table[key].to_numpy(float)):
-                    continue  # of a body that is smooth
+                    continue  # this body is smooth
                 _draw_over_hours(axes, history, key, colour, stroke)
             if len(axes.get_lines()) > 1:
                 low, high = axes.get_ylim()
-                axes.set_ylim(low, high + 0.25 * (high - low))  # room for the key
+                axes.set_ylim(low, high + 0.25 * (high - low))  # room for the legend
                 axes.legend(loc="upper right", ncols=3)
             axes.set_ylabel(quantity(side).label)
             axes.set_xlabel(quantity("hours").axis)
         return figure
 
-    by_k = " Lightly shaded: the interval of the wear coefficient; it ends where the history would have to be longer."
+    k_note = (
+        " Light band: interval of the wear coefficient; it ends where it needs a longer history."
+    )
     return Exhibit(
         "over-hours",
         draw,
-        "Over hours of running, a point a jump. Shaded about CLR: 90 % of its mean over a jump's positions."
-        + (by_k if history.k_interval is not None else ""),
-        "Roughness parameters, load and area shares, film, friction, flash temperature, worn depth and CRFA over hours",
+        "One point per wear step. Band of CLR: 90 % interval of the mean over the positions of a "
+        "step." + (k_note if history.k_interval is not None else ""),
+        "Roughness parameters, load and area shares, film, friction, flash temperature, wear depth "
+        "and CRFA over hours",
     )
 
 
@@ -107,7 +110,7 @@ def _draw_over_hours(axes: Axes, history: WearHistory, key: str, colour: str, st
 
 
 def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
-    """CRF over hours and over Sq; of the paper's contact, what the paper prints beside it."""
+    """Draw CRF over hours and over Sq, with the printed values if `papers`."""
 
     def draw(medium: Medium) -> Figure:
         table = history.table
@@ -117,18 +120,18 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
         crf, low, high = (
             table[key].to_numpy(float) for key in ("crf_hz", "crf_low_hz", "crf_high_hz")
         )
-        least, most = (
+        mean_low, mean_high = (
             table[key].to_numpy(float) for key in ("crf_mean_low_hz", "crf_mean_high_hz")
         )
         for axes, x, key in ((left, hours, "hours"), (right, sq, "sq_m")):
             axes.fill_between(
                 x,
-                least,
-                most,
+                mean_low,
+                mean_high,
                 color=BLUE,
                 alpha=0.3,
                 linewidth=0,
-                label="90 % of the mean over positions",
+                label="mean over positions, 90 %",
             )
             if np.isfinite(low).any():
                 axes.fill_between(
@@ -138,7 +141,7 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
                     color=BLUE,
                     alpha=0.1,
                     linewidth=0,
-                    label="90 % with scatter and grid",
+                    label="with scatter and grid, 90 %",
                 )
             axes.plot(x, crf, color=BLUE, label="this contact")
             axes.set(xlabel=quantity(key).axis, ylabel=quantity("crf_hz").label)
@@ -146,7 +149,7 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
         stages = history.stages
         if stages is not None and stages.found:
             left.axvspan(
-                *stages.interval, color=GREY, alpha=0.2, linewidth=0, label="break of stages"
+                *stages.interval, color=GREY, alpha=0.2, linewidth=0, label="stage break, 90 %"
             )
             left.axvline(stages.split, color=GREY)
         if papers:
@@ -157,14 +160,14 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
                 "D",
                 color=VERMILION,
                 markersize=4.5,
-                label="printed: first and last ring",
+                label="paper: first and last ring",
             )
             for end in CRF_ENDS_HZ:
                 left.axhline(end, color=VERMILION, linestyle=DASHED, linewidth=0.9)
-            rings = right.get_ylim()[0]
+            bottom = right.get_ylim()[0]
             right.plot(
                 SAMPLES_SQ_UM,
-                np.full(len(SAMPLES_SQ_UM), rings),
+                np.full(len(SAMPLES_SQ_UM), bottom),
                 "|",
                 color=VERMILION,
                 label="Sq of the rings",
@@ -178,44 +181,44 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
         legend_below(figure, 3, handles=handles, labels=names)
         return figure
 
-    beside = (
-        " Red: what the paper prints, the CRF of its smoothest and roughest ring (Figure 8 draws the others without "
-        "numbers) and the Sq of its twelve rings; 0.54 µm is new, 0.87 µm has run for ten hours."
+    paper_note = (
+        " Red: values of the paper, the CRF of the smoothest and the roughest ring (Figure 8 draws "
+        "the others without numbers) and Sq of its twelve rings; 0.54 µm: new, 0.87 µm: ten hours."
         if papers
         else ""
     )
     return Exhibit(
         "resonance",
         draw,
-        "Contact resonance of the mean contact, by the case's coupling, over hours and over the roughness of both "
-        f"bodies.{beside}",
+        "Contact resonance of the mean contact over hours and over the composite roughness."
+        f"{paper_note}",
         "CRF over hours and over Sq",
     )
 
 
-def surfaces(body: Worn) -> Exhibit:
-    """Maps of a body's track before and after, and what it has lost."""
+def surfaces(track: WornTrack) -> Exhibit:
+    """Map a track before and after wear, and the depth lost."""
 
     def draw(medium: Medium) -> Figure:
-        grid = body.before.grid
+        grid = track.before.grid
         figure = Figure(figsize=(medium.double, 3.3), layout="constrained")
         panels = panels_in_rows(figure, 3, sharey=True)
         height = quantity("height_m")
-        lost = body.before.heights - body.after.heights
-        shown_after = body.after.heights + lost.mean()
-        both = np.stack([body.before.heights, shown_after])
-        reach = height.factor * float(np.percentile(np.abs(both), 99.5)) or 1.0
+        lost = track.before.heights - track.after.heights
+        after = track.after.heights + lost.mean()
+        heights_shown = np.stack([track.before.heights, after])
+        limit = height.factor * float(np.percentile(np.abs(heights_shown), 99.5)) or 1.0
         extent = (0.0, display("surface_x_m", grid.extent[0]), 0.0, display("y_m", grid.extent[1]))
-        shown: list[tuple[str, Field, dict[str, Any]]] = [
-            ("new", body.before.heights, {"cmap": "cividis", "vmin": -reach, "vmax": reach}),
-            ("after", shown_after, {"cmap": "cividis", "vmin": -reach, "vmax": reach}),
+        maps: list[tuple[str, Field, dict[str, Any]]] = [
+            ("new", track.before.heights, {"cmap": "cividis", "vmin": -limit, "vmax": limit}),
+            ("after", after, {"cmap": "cividis", "vmin": -limit, "vmax": limit}),
             (
                 "lost",
                 lost,
                 {"cmap": "inferno", "vmin": min(0.0, height.factor * float(lost.min()))},
             ),
         ]
-        for axes, (name, heights, style) in zip(panels, shown, strict=True):
+        for axes, (name, heights, style) in zip(panels, maps, strict=True):
             image = axes.imshow(
                 height.factor * heights.T,
                 origin="lower",
@@ -224,7 +227,7 @@ def surfaces(body: Worn) -> Exhibit:
                 interpolation="none",
                 **style,
             )
-            axes.set(title=f"{body.name}, {name}", xlabel=quantity("surface_x_m").axis)
+            axes.set(title=f"{track.name}, {name}", xlabel=quantity("surface_x_m").axis)
             if name != "new":
                 title = quantity("worn_depth_m").label if name == "lost" else height.label
                 figure.colorbar(image, ax=axes, label=title, extend="both")
@@ -232,41 +235,44 @@ def surfaces(body: Worn) -> Exhibit:
         return figure
 
     return Exhibit(
-        f"surface-{body.name.split()[0].lower()}",
+        f"surface-{track.name.split()[0].lower()}",
         draw,
-        f"{body.name}: its track new and after, in the same colours and each about its own mean, and what it has lost.",
-        f"Maps of the {body.name.lower()}'s heights before and after, and of the depth lost",
+        f"{track.name}: track new and worn in one colour scale, each about its mean, and depth "
+        "lost.",
+        f"Maps of the {track.name.lower()}'s heights before and after, and of the depth lost",
     )
 
 
-def profiles(bodies: Sequence[Worn]) -> Exhibit:
-    """A profile along rolling through the middle, and the bearing curve, of each body before and after."""
+def profiles(tracks: Sequence[WornTrack]) -> Exhibit:
+    """Draw the middle profile and the bearing curve of each track before and after wear."""
 
     def draw(medium: Medium) -> Figure:
-        figure = Figure(figsize=(medium.double, 2.7 * len(bodies) + 0.3), layout="constrained")
-        places = figure.subplots(len(bodies), 2, squeeze=False, width_ratios=(2, 1))
-        for (along, curve), body in zip(places, bodies, strict=True):
-            x = display("surface_x_m", body.before.grid.x - body.before.grid.lower[0])
-            for name, surface, colour in (("new", body.before, GREY), ("after", body.after, BLUE)):
+        figure = Figure(figsize=(medium.double, 2.7 * len(tracks) + 0.3), layout="constrained")
+        panels = figure.subplots(len(tracks), 2, squeeze=False, width_ratios=(2, 1))
+        for (profile, curve), track in zip(panels, tracks, strict=True):
+            x = display("surface_x_m", track.before.grid.x - track.before.grid.lower[0])
+            states = (("new", track.before, GREY), ("after", track.after, BLUE))
+            for name, surface, colour in states:
                 row = display("height_m", surface.heights[:, surface.heights.shape[1] // 2])
-                along.plot(x, row, color=colour, linewidth=1.0, label=name)
+                profile.plot(x, row, color=colour, linewidth=1.0, label=name)
                 bearing = bearing_curve(surface.heights)
                 curve.plot(
                     display("material_ratio", bearing.share),
                     display("height_m", bearing.height),
                     color=colour,
                 )
-            name_axes(along, "surface_x_m", "height_m", title=f"{body.name}: profile along rolling")
-            along.set_xlim(0.0, float(x[-1]))
+            title = f"{track.name}: profile along rolling"
+            name_axes(profile, "surface_x_m", "height_m", title=title)
+            profile.set_xlim(0.0, float(x[-1]))
             name_axes(curve, "material_ratio", "height_m", title="Bearing curve")
             curve.set_xlim(0.0, 100.0)
-        legend_below(figure, 2, handles=places[0][0].get_lines())
+        legend_below(figure, 2, handles=panels[0][0].get_lines())
         return figure
 
     return Exhibit(
         "profiles",
         draw,
-        "Profiles through the middle of each track, from its first mean line, and the bearing curves of all heights, "
-        "each about its own mean.",
+        "Profiles through the middle of each track, relative to its initial mean line, and bearing "
+        "curves of all heights, each about its mean.",
         "Profiles and bearing curves of both bodies before and after",
     )
