@@ -1,15 +1,15 @@
 """Variables, coordinates and attributes of a run as they are stored."""
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from asperity import ehl
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
-
-if TYPE_CHECKING:
-    from asperity.results.run import Run
+from asperity.results.dynamic import DynamicCurve
+from asperity.results.surface_spread import Scalar
+from asperity.solution import SubsurfaceStress
 
 MAPS = (
     "von_mises",
@@ -21,7 +21,26 @@ MAPS = (
 )
 
 
-def run_contents(run: "Run") -> ehl.FileContents:
+class SolvedRun(Protocol):
+    """The parts of a run that its file holds."""
+
+    @property
+    def solution(self) -> ehl.ContactSolution:
+        """Solved contact of the first surface."""
+
+    @property
+    def stress(self) -> SubsurfaceStress:
+        """Subsurface stress."""
+
+    @property
+    def dynamic_curve(self) -> DynamicCurve | None:
+        """Stiffness and damping over frequency."""
+
+    def scalars(self) -> dict[str, Scalar]:
+        """Return the numbers of the run by key."""
+
+
+def run_contents(run: SolvedRun) -> ehl.FileContents:
     """Return the solution's contents, with all numbers of the run and maps of derived fields.
 
     Maps of traction, temperature and von Mises stress are in single precision. A loaded run
