@@ -17,13 +17,19 @@ sys.path.insert(0, str(ROOT / "tests"))
 from asperity.core.quantities import catalogue  # noqa: E402
 from support.vocabulary import case_sections, commands, golden  # noqa: E402  the documentation's tests read the same
 
-GROUPS = {  # of names, by the module that hands them out
-    "Contacts and bodies": ("conditions", "grid", "surface"),
+GROUPS = {  # of names, by the module that exports them
+    "Contacts and bodies": ("contact.conditions", "contact.grid", "surface"),
     "Oils": ("lubricant",),
-    "Solving a contact": ("ehl", "errors"),
-    "Case files, runs, studies": ("case", "results", "study", "history", "ageing", "report"),
-    "Vibration": ("coupling", "vibration", "signals"),
-    "Recordings and wear": ("recording", "tracking", "wear"),
+    "Solving a contact": ("ehl", "solution", "core.errors"),
+    "Case files, runs, studies": ("case", "results", "study", "simulation", "report"),
+    "Vibration": ("coupling", "vibration", "core.signals"),
+    "Recordings, wear stage, inference": (
+        "recording",
+        "resonance",
+        "trend",
+        "monitoring",
+        "inference",
+    ),
 }
 
 JSON = """With `--json` a command prints one object, numbers in SI, `null` for what there is not. \
@@ -84,7 +90,7 @@ def commands_page() -> str:
     parts = [
         "# Commands",
         "",
-        "What `--help` says. What the output means is in [command-line](../command-line.md).",
+        "The texts of `--help`. [Command line](../command-line.md) explains the output.",
     ]
     for name, command in commands().items():
         options = [
@@ -96,7 +102,7 @@ def commands_page() -> str:
         said = (command.help or "").strip().replace("\n", " ")
         parts += ["", f"## asperity {name}".rstrip(), "", said, "", "```text"]
         parts += [" ".join(f"asperity {name} {usage} [OPTIONS]".split()), "```", ""]
-        parts += _table(("", "value", "default", "says"), [_option(entry) for entry in options])
+        parts += _table(("", "value", "default", "meaning"), [_option(entry) for entry in options])
     return "\n".join([*parts, ""])
 
 
