@@ -18,8 +18,6 @@ EQUATION = re.compile(r"\S = \S")
 NO_LAW = {  # public, with an equation in what is said of them, but no law of physics
     "CaseFile": "a key and its value",
     "Condition": "what an indicator may follow, and how much of it",
-    "Scales": "what numbers are divided by",
-    "Surface": "a shape",
     "recursion": "a digital filter",
 }
 
