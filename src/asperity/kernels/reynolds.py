@@ -310,6 +310,18 @@ def _add_flow_across(
     out[i, 0] -= over_dy2 * north
 
 
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"}, inline="always")
+def _scale_row(rows: Rows, change: PressureChange, i: int, touching: float, out: Field) -> None:
+    """Scale the lubricated cells of row `i`, and fill its other cells with their own equations."""
+    for j in range(out.shape[1]):
+        if rows.state[i, j] == LUBRICATED:
+            out[i, j] *= rows.fluid_scale[i, j]
+        elif rows.state[i, j] == TOUCHING:
+            out[i, j] = change.gap[i, j] * touching
+        else:
+            out[i, j] = change.pressure[i, j]
+
+
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
 def jacobian_product(
     rows: Rows,
@@ -336,7 +348,6 @@ def jacobian_product(
         real(1.0 / (dy * dy)),
         real(storing),
     )
-    state, scale, touching = rows.state, rows.fluid_scale, real(rows.contact_scale)
     log_h, log_p = film.log_mobility_by_gap, film.log_mobility_by_pressure
     m_h, m_p = film.content_by_gap, film.content_by_pressure
     d_log, d_log_east = np.empty(ny, pressure.dtype), np.empty(ny, pressure.dtype)
@@ -374,13 +385,8 @@ def jacobian_product(
                 flux += real(2.0) * over_dx * through
                 out[i, j] = (flux - upstream[j]) * over_dx + storing_rate * here[j]
         _add_flow_across(faces, pressure, d_pressure, d_log, i, over_dy2, out)
+        _scale_row(rows, change, i, real(rows.contact_scale), out)
         for j in range(ny):
-            if state[i, j] == LUBRICATED:
-                out[i, j] *= scale[i, j]
-            elif state[i, j] == TOUCHING:
-                out[i, j] = d_gap[i, j] * touching
-            else:
-                out[i, j] = d_pressure[i, j]
             before[j], here[j], d_log[j] = here[j], after[j], d_log_east[j]
 
 
