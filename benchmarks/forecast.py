@@ -24,7 +24,7 @@ from asperity.inference import (
     Emulator,
     ForwardModel,
     Observation,
-    OperatingPoint,
+    ObservationPoint,
     Setting,
     build_emulator,
     forecast_observations,
@@ -111,7 +111,7 @@ def judge_all(histories: int, steady: int, kept: Path, *, end: float = float("in
 def judged(setting: Setting, emulator: Emulator, kind: str, number: int) -> dict[str, Any]:
     """One series: what is foretold of it, and what comes."""
     rng = np.random.default_rng([SEED, number, list(CLASSES).index(kind)])
-    forward = ForwardModel(setting, emulator, (OperatingPoint(*PLACE),))
+    forward = ForwardModel(setting, emulator, (ObservationPoint(*PLACE),))
     crossing = np.nan
     while True:
         z = rng.standard_normal((1, len(setting.unknowns)))

@@ -21,7 +21,7 @@ from asperity.inference import (
     Emulator,
     ForwardModel,
     Observation,
-    OperatingPoint,
+    ObservationPoint,
     Setting,
     build_emulator,
     infer_observations,
@@ -70,7 +70,7 @@ def judge_all(machines: int, kept: Path, *, end: float = float("inf")) -> None:
 def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     """Bits that the advised point teaches, and those drawn at random."""
     rng = np.random.default_rng([SEED, number])
-    first = ForwardModel(setting, emulator, (OperatingPoint(*FIRST),))
+    first = ForwardModel(setting, emulator, (ObservationPoint(*FIRST),))
     z = rng.standard_normal((1, first.dims))
     while first.states(z, ["clr"])["clr"][0, 0] < 0.05:
         z = rng.standard_normal((1, first.dims))
@@ -96,10 +96,10 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     )
     places = [(found.next_point.load_n, found.next_point.entrainment_m_s)]
     places += [(loads.value(rng.random()), speeds.value(rng.random())) for _ in range(RANDOM)]
-    points = tuple(OperatingPoint(*place) for place in places)
+    points = tuple(ObservationPoint(*place) for place in places)
     shown, every = (
         predict_recordings(found.forward, found.draws, points),
-        ForwardModel(setting, emulator, (OperatingPoint(*FIRST), *points)),
+        ForwardModel(setting, emulator, (ObservationPoint(*FIRST), *points)),
     )
     information_gain = np.array(
         [taught(shown, _heard(every, z, own, rng)[:, 1:]) for _ in range(TIMES)]

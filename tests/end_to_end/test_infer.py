@@ -15,7 +15,7 @@ from asperity.core.errors import BadInput
 from asperity.inference import (
     ForwardModel,
     Observation,
-    OperatingPoint,
+    ObservationPoint,
     RecordingInput,
     build_emulator,
     design_contact,
@@ -82,7 +82,7 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     setting, first, folder = small
     shutil.copytree(folder, tmp_path / "own")
     emulator = replace(first, folder=tmp_path / "own")
-    points = [OperatingPoint(load, speed) for load in (420.0, 580.0) for speed in (1.2, 2.8)]
+    points = [ObservationPoint(load, speed) for load in (420.0, 580.0) for speed in (1.2, 2.8)]
     z = np.zeros((1, len(setting.unknowns)))
     shown = ForwardModel(setting, emulator, tuple(points)).predict(z, "hertz-point")
     heard = [

@@ -12,8 +12,8 @@ from asperity.core.errors import BadInput
 from asperity.inference import (
     ForwardModel,
     Observation,
+    ObservationPoint,
     ObservedSeries,
-    OperatingPoint,
     SeriesForecaster,
     design_contact,
     forecast_observations,
@@ -72,7 +72,7 @@ HEARD = ObservedSeries(observations=(recording(1.0),))
 def heard_along(setting, emulator, shares, *, seed=0, std=2e-3):
     """What a contact in the middle of its priors shows while its Sq goes along its range."""
     rng = np.random.default_rng(seed)
-    forward = ForwardModel(setting, emulator, (OperatingPoint(500.0, 1.91),))
+    forward = ForwardModel(setting, emulator, (ObservationPoint(500.0, 1.91),))
     z = np.zeros((len(shares), len(setting.unknowns)))
     z[:, 0] = setting.unknowns[0].at_share(shares)
     shown = forward.predict(z, "hertz-point")
@@ -321,7 +321,7 @@ def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_fo
     model = DriftModel(forward, series, "hertz-point", "sq_m")
     z = rng.standard_normal((400, forward.dims))
     there = (
-        ForwardModel(setting, emulator, tuple(OperatingPoint(load, 1.91) for load in loads))
+        ForwardModel(setting, emulator, tuple(ObservationPoint(load, 1.91) for load in loads))
         .predict(z, "hertz-point")
         .crf
     )
@@ -420,7 +420,7 @@ def test_what_keeps_the_load_share_low_does_so_in_nineteen_contacts_of_twenty(se
     rng = np.random.default_rng(11)
     conditions = setting.case.conditions
     forward = ForwardModel(
-        setting, emulator, (OperatingPoint(conditions.load, conditions.entrainment_speed),)
+        setting, emulator, (ObservationPoint(conditions.load, conditions.entrainment_speed),)
     )
     found = design_contact(forward, rng.standard_normal((600, forward.dims)), clr=0.3)
     ways = {entry.key: entry for entry in found.levers}

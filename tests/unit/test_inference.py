@@ -19,7 +19,7 @@ from asperity.inference import (
     Inference,
     LogMeasurement,
     Observation,
-    OperatingPoint,
+    ObservationPoint,
     Unknown,
     infer_contact,
     infer_observations,
@@ -70,7 +70,7 @@ def heard(setting, emulator, points, *, law="hertz-point", std=1e-3, seed=1):
     """What the true contact shows at operating points, with errors of measurement."""
     rng = np.random.default_rng(seed)
     forward = ForwardModel(
-        setting, emulator, tuple(OperatingPoint(load, speed) for load, speed in points)
+        setting, emulator, tuple(ObservationPoint(load, speed) for load, speed in points)
     )
     shown = forward.predict(truth(setting), law)
     crf = np.exp(shown.crf[0] + std * rng.standard_normal(len(points)))
@@ -163,7 +163,7 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
         LogMeasurement(1.0, 0.1),
     ]
     points = [
-        OperatingPoint(500.0 * 1.01**i, 1.0, crf=one, damping=one, crfa=one)
+        ObservationPoint(500.0 * 1.01**i, 1.0, crf=one, damping=one, crfa=one)
         for i, one in enumerate(said)
     ]
     here = [0, 2, 3]
@@ -243,7 +243,7 @@ def test_bits_are_those_of_a_narrowed_normal_and_nothing_of_chance():
 def test_crf_and_crfa_are_those_of_the_coupling(setting, emulator):
     """The oscillator and its excitation as `solve` makes them, at the load share that is emulated."""
     forward = ForwardModel(
-        setting, emulator, (OperatingPoint(300.0, 0.8), OperatingPoint(900.0, 2.5))
+        setting, emulator, (ObservationPoint(300.0, 0.8), ObservationPoint(900.0, 2.5))
     )
     z = truth(setting)
     shown, states = forward.predict(z, "hertz-point"), forward.states(z, ["clr", "car"])
@@ -280,7 +280,7 @@ def replace_choices(setting, z):
 
 
 def test_the_own_law_hears_stiffness_and_damping(setting, emulator):
-    forward = ForwardModel(setting, emulator, (OperatingPoint(500.0, 1.91),))
+    forward = ForwardModel(setting, emulator, (ObservationPoint(500.0, 1.91),))
     z = truth(setting)
     state = forward.states(z, ["contact_stiffness_n_m", "contact_damping_ratio"])
     shown = forward.predict(z, "own")
@@ -416,7 +416,7 @@ def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
     off = np.linspace(-0.4, 0.4, 2001)[:, None]
 
     def width(loads):
-        points = [OperatingPoint(load, 1.0, crf=said) for load in loads]
+        points = [ObservationPoint(load, 1.0, crf=said) for load in loads]
         nothing, log_force = (
             np.full((len(off), len(loads)), np.nan),
             np.tile(np.log(loads), (len(off), 1)),

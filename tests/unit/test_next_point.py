@@ -10,7 +10,7 @@ from asperity.inference import (
     ForwardModel,
     LogMeasurement,
     Observation,
-    OperatingPoint,
+    ObservationPoint,
     infer_observations,
 )
 from asperity.inference.likelihood import (
@@ -34,7 +34,7 @@ LOADS = (500.0, 500.0, 800.0)
 
 def heard_once(setting, emulator, times=1):
     """A contact with unknowns in the middle of their priors, heard so often at one point."""
-    forward = ForwardModel(setting, emulator, (OperatingPoint(*HERE),))
+    forward = ForwardModel(setting, emulator, (ObservationPoint(*HERE),))
     shown = forward.predict(np.zeros((1, forward.dims)), "hertz-point")
     crf, damping = (float(np.exp(values[0, 0])) for values in (shown.crf, shown.damping))
     one = Observation(
@@ -92,7 +92,7 @@ def linear(unknown, emulated=0.01):
 def points(std, value=8.02):
     """Heard at the first alone."""
     return [
-        OperatingPoint(
+        ObservationPoint(
             load, 1.0, crf=LogMeasurement(value, std) if place == 0 else LogMeasurement()
         )
         for place, load in enumerate(LOADS)
@@ -158,8 +158,8 @@ def test_what_was_heard_says_nothing_of_errors_elsewhere_under_another_force():
 def test_densities_of_what_would_be_heard_make_the_likelihood_of_both():
     """p(first) p(second given first) is p(both), the law's sizes unknown, as long as no exponent is off."""
     same = [
-        OperatingPoint(500.0, 1.0, crf=LogMeasurement(8.02, 2e-3)),
-        OperatingPoint(500.0, 2.0, crf=LogMeasurement(7.96, 2e-3)),
+        ObservationPoint(500.0, 1.0, crf=LogMeasurement(8.02, 2e-3)),
+        ObservationPoint(500.0, 2.0, crf=LogMeasurement(7.96, 2e-3)),
     ]
     first = [same[0], replace(same[1], crf=LogMeasurement())]
     rng = np.random.default_rng(3)

@@ -38,7 +38,7 @@ from .measured_surface import with_measured_surface as with_measured_surface
 from .next_point import NextPoint as NextPoint
 from .observations import LogMeasurement as LogMeasurement
 from .observations import Observation as Observation
-from .observations import OperatingPoint as OperatingPoint
+from .observations import ObservationPoint as ObservationPoint
 from .posterior import Draws as Draws
 from .posterior import ModelEvidence as ModelEvidence
 from .posterior import Sampler as Sampler

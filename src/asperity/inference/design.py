@@ -11,7 +11,7 @@ from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 from asperity.inference.forward import ForwardModel
-from asperity.inference.observations import OperatingPoint
+from asperity.inference.observations import ObservationPoint
 from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.priors import Unknown
 from asperity.inference.settings import LOAD, SPEED, TEMPERATURE, Setting
@@ -168,7 +168,7 @@ def _probability_below(forward: ForwardModel, z: Field, clr: float) -> Field:
     return np.asarray(ndtr((limit - mean) / np.maximum(std, 1e-9)).mean(axis=0))
 
 
-def _with_value(point: OperatingPoint, key: str, value: float) -> OperatingPoint:
+def _with_value(point: ObservationPoint, key: str, value: float) -> ObservationPoint:
     if key == LOAD:
         return replace(point, load_n=value)
     return (

@@ -19,7 +19,7 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 from asperity.coupling import NoiseExcitation
 from asperity.inference.emulator import Emulator, EmulatorGridError
-from asperity.inference.observations import OperatingPoint
+from asperity.inference.observations import ObservationPoint
 from asperity.inference.outputs import CAR, CLR, DAMPING, OUTPUTS, STIFFNESS
 from asperity.inference.priors import Unknown, share_of
 from asperity.inference.settings import GRID_ERROR, LOAD, OFFSET, SPEED, TEMPERATURE, Setting
@@ -57,7 +57,7 @@ class ForwardModel:
 
     setting: Setting
     emulator: Emulator
-    points: tuple[OperatingPoint, ...]
+    points: tuple[ObservationPoint, ...]
 
     def __post_init__(self) -> None:
         for point in self.points:
@@ -243,7 +243,7 @@ class ForwardModel:
         return np.asarray(height), power * exponent * emulated[1] / (OUTPUTS[CAR].slope(car) * car)
 
 
-def _operating_value(setting: Setting, point: OperatingPoint, key: str) -> float:
+def _operating_value(setting: Setting, point: ObservationPoint, key: str) -> float:
     """Return an operating quantity of a point in SI; by default the case's temperature."""
     if key == LOAD:
         return point.load_n
@@ -254,7 +254,7 @@ def _operating_value(setting: Setting, point: OperatingPoint, key: str) -> float
     return float(setting.case.contents.lubricant.temperature)  # type: ignore[union-attr]
 
 
-def require_inside(setting: Setting, point: OperatingPoint) -> None:
+def require_inside(setting: Setting, point: ObservationPoint) -> None:
     """Raise BadInput for a point outside the emulator's ranges or an unusable temperature."""
     if point.temperature_k is not None and all(
         entry.key != TEMPERATURE for entry in setting.operating

@@ -14,7 +14,7 @@ from asperity.inference.forecast import Forecast, Limit, forecast_observations, 
 from asperity.inference.forward import ChannelPrediction, ForwardModel, Law
 from asperity.inference.inference import Inference
 from asperity.inference.next_point import candidate_points, expected_information
-from asperity.inference.observations import Observation, OperatingPoint, operating_points
+from asperity.inference.observations import Observation, ObservationPoint, operating_points
 from asperity.inference.posterior import (
     Draws,
     Sampler,
@@ -277,7 +277,7 @@ def infer_observations(
     notes : notes to add to the result
     """
     conditions = setting.case.conditions
-    own = OperatingPoint(conditions.load, conditions.entrainment_speed)
+    own = ObservationPoint(conditions.load, conditions.entrainment_speed)
     forward = ForwardModel(setting, emulator, (own, *operating_points(observations)))
     source = _Source(tuple(observations), excluded, notes)
     return _infer(forward, source, new_pools(forward, seed), sampler, seed)

@@ -12,7 +12,7 @@ from asperity.inference.emulator import Emulator
 from asperity.inference.estimates import Estimate, quantity_estimates
 from asperity.inference.forward import LAWS, ForwardModel, Law
 from asperity.inference.next_point import NextPoint
-from asperity.inference.observations import Observation, OperatingPoint
+from asperity.inference.observations import Observation, ObservationPoint
 from asperity.inference.outputs import CLR, FILM, OUTPUTS
 from asperity.inference.posterior import Draws, ModelEvidence
 from asperity.inference.sampling import Pool
@@ -42,7 +42,7 @@ class PointEstimates:
         "stage",
     )
 
-    point: OperatingPoint
+    point: ObservationPoint
     state: Mapping[str, Estimate]
     stages: Mapping[str, float]
 

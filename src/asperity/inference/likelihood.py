@@ -15,7 +15,7 @@ import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.inference.forward import ChannelPrediction
-from asperity.inference.observations import OperatingPoint, point_similarity
+from asperity.inference.observations import ObservationPoint, point_similarity
 
 SIZES = (0.005, 0.02, 0.08)  # of the law's error, relative to CRF: 3, 12 and 60 % of a load share
 # size of the error in ln ζ and ln CRFA, relative to that in ln CRF
@@ -30,7 +30,7 @@ CHUNK_SIZE = 2**20  # covariance entries held at a time
 
 
 def log_likelihood(
-    prediction: ChannelPrediction, points: Sequence[OperatingPoint], *, discrepancy: bool
+    prediction: ChannelPrediction, points: Sequence[ObservationPoint], *, discrepancy: bool
 ) -> Field:
     """Return ln p(measurements | unknowns), shape (n,); `prediction` has a column per point."""
     sizes = SIZES if discrepancy else (0.0,)
@@ -40,7 +40,7 @@ def log_likelihood(
 
 def log_at_sizes(
     prediction: ChannelPrediction,
-    points: Sequence[OperatingPoint],
+    points: Sequence[ObservationPoint],
     channel: str,
     sizes: Sequence[float] = SIZES,
 ) -> Field:
@@ -90,7 +90,7 @@ class PredictiveMixture(NamedTuple):
 
 def predictive_mixture(
     prediction: ChannelPrediction,
-    points: Sequence[OperatingPoint],
+    points: Sequence[ObservationPoint],
     channel: str,
     sizes: Sequence[float] = SIZES,
 ) -> PredictiveMixture:
@@ -130,7 +130,7 @@ def predictive_mixture(
     return PredictiveMixture(np.broadcast_to(share[:, :, None], std.shape), expected, std)
 
 
-def _measured(points: Sequence[OperatingPoint], channel: str) -> tuple[Field, Field]:
+def _measured(points: Sequence[ObservationPoint], channel: str) -> tuple[Field, Field]:
     """Return values and standard deviations of a channel at points."""
     entries = [getattr(point, channel) for point in points]
     return np.array([entry.value for entry in entries]), np.array([entry.std for entry in entries])

@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 from asperity.core.arrays import Field
 from asperity.inference.forward import LAWS, ForwardModel
 from asperity.inference.likelihood import SIZES, PredictiveMixture, predictive_mixture
-from asperity.inference.observations import OperatingPoint
+from asperity.inference.observations import ObservationPoint
 from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.posterior import Draws
 from asperity.inference.priors import Unknown
@@ -64,7 +64,7 @@ class PredictedRecordings(NamedTuple):
 
 
 def predict_recordings(
-    forward: ForwardModel, draws: Draws, points: Sequence[OperatingPoint]
+    forward: ForwardModel, draws: Draws, points: Sequence[ObservationPoint]
 ) -> PredictedRecordings:
     """Predict measurements of posterior draws at points, with errors conditional on the data."""
     known = tuple(point for point in forward.points if not np.isnan(point.crf.value))
@@ -103,7 +103,7 @@ def expected_information(
     measured = dict(TYPICAL_STD)
     if known:
         measured["crf"] = float(np.median([point.crf.std for point in known]))
-    points = [OperatingPoint(load, speed, temperature) for load, speed in candidates]
+    points = [ObservationPoint(load, speed, temperature) for load, speed in candidates]
     predicted = predict_recordings(forward, draws.select_rows(rows), points)
     # common random numbers for all candidates
     random = {key: (rng.random(len(rows)), rng.standard_normal(len(rows))) for key in TYPICAL_STD}

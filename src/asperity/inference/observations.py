@@ -79,7 +79,7 @@ class LogMeasurement:
 
 
 @dataclass(frozen=True, slots=True)
-class OperatingPoint:
+class ObservationPoint:
     """An operating point and the combined measurements of its recordings."""
 
     load_n: float
@@ -91,7 +91,7 @@ class OperatingPoint:
     names: tuple[str, ...] = ()
 
 
-def operating_points(observations: Sequence[Observation]) -> tuple[OperatingPoint, ...]:
+def operating_points(observations: Sequence[Observation]) -> tuple[ObservationPoint, ...]:
     """Group observations by operating point, in order; repeats are combined.
 
     Raises
@@ -104,7 +104,7 @@ def operating_points(observations: Sequence[Observation]) -> tuple[OperatingPoin
     for observation in observations:
         groups.setdefault(observation.conditions, []).append(observation)
     return tuple(
-        OperatingPoint(
+        ObservationPoint(
             *conditions,
             crf=_combined(
                 [(entry.crf_hz, entry.crf_std_hz, entry.crf_shared_std_hz) for entry in group],
@@ -118,14 +118,14 @@ def operating_points(observations: Sequence[Observation]) -> tuple[OperatingPoin
     )
 
 
-def point_coordinates(point: OperatingPoint) -> Field:
+def point_coordinates(point: ObservationPoint) -> Field:
     """Return the logarithms of load and speed, and the temperature [K]."""
     return np.array(
         [math.log(point.load_n), math.log(point.entrainment_m_s), point.temperature_k or 0.0]
     )
 
 
-def point_similarity(points: Sequence[OperatingPoint]) -> Field:
+def point_similarity(points: Sequence[ObservationPoint]) -> Field:
     """Return the correlation of point-specific errors, (points, points): 1 for equal conditions."""
     scaled = np.array([point_coordinates(point) for point in points]) / SIMILARITY_SCALES
     return np.asarray(np.exp(-0.5 * np.sum((scaled[:, None] - scaled) ** 2, axis=-1)))

@@ -21,7 +21,7 @@ from asperity.inference.likelihood import (
     log_at_sizes,
     log_likelihood,
 )
-from asperity.inference.observations import OperatingPoint, point_similarity
+from asperity.inference.observations import ObservationPoint, point_similarity
 from asperity.inference.outputs import CAR, CLR, FILM, FRICTION, OUTPUTS
 from asperity.inference.sampling import (
     FEWEST,
@@ -141,7 +141,7 @@ def _by_likelihood(forward: ForwardModel, pools: Mapping[Law, Pool]) -> list[tup
 
 
 def _target(
-    points: tuple[OperatingPoint, ...], *, discrepancy: bool
+    points: tuple[ObservationPoint, ...], *, discrepancy: bool
 ) -> Callable[[ChannelPrediction], Field]:
     return lambda prediction: log_likelihood(prediction, points, discrepancy=discrepancy)
 
@@ -285,7 +285,7 @@ def _draw(
 
 
 def _sizes(
-    prediction: ChannelPrediction, points: tuple[OperatingPoint, ...], rng: np.random.Generator
+    prediction: ChannelPrediction, points: tuple[ObservationPoint, ...], rng: np.random.Generator
 ) -> dict[str, Field]:
     """Draw the sizes of the law's errors for each contact from their posterior."""
     sizes = {}
@@ -301,7 +301,7 @@ def _corrected(
     mean: Field,
     std: Field,
     prediction: ChannelPrediction,
-    points: tuple[OperatingPoint, ...],
+    points: tuple[ObservationPoint, ...],
     size: Field,
     rng: np.random.Generator,
 ) -> Field:

@@ -12,7 +12,7 @@ from asperity.inference.observations import (
     SIMILARITY_SCALES,
     LogMeasurement,
     Observation,
-    OperatingPoint,
+    ObservationPoint,
     operating_points,
     point_coordinates,
     require_temperatures,
@@ -51,7 +51,7 @@ class VisitSeries:
     """
 
     x: tuple[float, ...]
-    points: tuple[OperatingPoint, ...]
+    points: tuple[ObservationPoint, ...]
     measurements: tuple[SeriesMeasurement, ...]
 
     @property
@@ -114,11 +114,11 @@ def visit_series(observations: Sequence[Observation]) -> VisitSeries:
     return VisitSeries(x, nominal, tuple(measurements))
 
 
-def _nominal_points(points: Sequence[OperatingPoint]) -> tuple[OperatingPoint, ...]:
+def _nominal_points(points: Sequence[ObservationPoint]) -> tuple[ObservationPoint, ...]:
     """Return operating points in order, without those close to an earlier one."""
     distance = SIMILARITY_SCALES
     while True:
-        nominal: list[OperatingPoint] = []
+        nominal: list[ObservationPoint] = []
         for point in points:
             if all(
                 np.any(np.abs(point_coordinates(point) - point_coordinates(other)) > distance)
@@ -127,14 +127,14 @@ def _nominal_points(points: Sequence[OperatingPoint]) -> tuple[OperatingPoint, .
                 nominal.append(point)
         if len(nominal) <= MAX_POINTS:
             return tuple(
-                OperatingPoint(point.load_n, point.entrainment_m_s, point.temperature_k)
+                ObservationPoint(point.load_n, point.entrainment_m_s, point.temperature_k)
                 for point in nominal
             )
         distance = WIDENING * distance
 
 
 def _nearest(
-    point: OperatingPoint, nominal: Sequence[OperatingPoint]
+    point: ObservationPoint, nominal: Sequence[ObservationPoint]
 ) -> tuple[int, tuple[float, float, float]]:
     """Return the index of the nearest nominal point and the offset from it."""
     offsets = [point_coordinates(point) - point_coordinates(other) for other in nominal]

@@ -373,7 +373,7 @@ class BallBearing:
         return self.pitch_diameter / 2.0 + inner * self._free_cosine
 
     def _balls(self, shifts: Field, stiffness: float) -> tuple[Field, Field]:
-        """Return loads and contact angles for shifts of the inner ring; the third: tilt · `_arm`."""
+        """Return loads and contact angles for shifts of the inner ring (third: tilt · `_arm`)."""
         across = self.groove_distance - self.play / 2.0 + shifts[0] * np.cos(self.angles)
         along = shifts[1] + shifts[2] * np.cos(self.angles)
         elastic = np.maximum(np.hypot(across, along) - self.groove_distance, 0.0)

@@ -113,7 +113,8 @@ def moving_contact(
     require_positive("time step", time_step, "cells")
     if time_step > MAX_CELLS_PER_TIME_STEP:
         raise BadInput(
-            f"time step must be at most {MAX_CELLS_PER_TIME_STEP:g} cells, got {time_step:g}; 1 follows the "
+            f"time step must be at most {MAX_CELLS_PER_TIME_STEP:g} cells, got {time_step:g}; "
+            "1 follows the "
             "oil"
         )
     if start not in ("steady", "stationary"):

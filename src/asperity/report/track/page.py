@@ -174,7 +174,8 @@ def _confidence(track: Track) -> str:
     text = (
         f"False-alarm rate: one in {recordings:.0f} recordings"
         if alarm.state == "alarm"
-        else f"Not significant: by chance, alerts are {ALERT_RATE_FACTOR:.0f} times as frequent as alarms"
+        else "Not significant: by chance, alerts are "
+        f"{ALERT_RATE_FACTOR:.0f} times as frequent as alarms"
     )
     if np.isfinite(last.severe_probability) and alarm.raised_by in ("CRF", "damping"):
         severe = _probability_text(last.severe_probability)
