@@ -239,7 +239,7 @@ def _details(track: Track) -> list[Exhibit]:
         details.append(exhibits.asperity_load_share(track))
     if any(recording.clean is not None for recording in track.recordings):
         details.append(spectra.waterfall(track))
-        details.append(spectra.spectrum_with_fit(track, exhibits.typical_recording(track)))
+        details.append(spectra.spectrum_with_fit(track, spectra.typical_recording(track)))
     return details
 
 
