@@ -20,8 +20,8 @@ import scipy
 
 from asperity.monitoring import TrackSettings, Update, WatchSettings, watch_folder
 from asperity.monitoring.reading import read_channels
-from asperity.monitoring.sensor_lookup import open_sensors
-from asperity.monitoring.store import STORE
+from asperity.monitoring.store.database import STORE
+from asperity.monitoring.store.sensor_lookup import open_sensors
 from asperity.monitoring.target import search_target
 from asperity.monitoring.watch_state import WatchState, version_of
 from asperity.recording import ReadOptions

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from asperity.monitoring import notify as calls
-from asperity.monitoring.sensors import Sensors
-from asperity.monitoring.store import SensorAddress, Store
+from asperity.monitoring.store.database import SensorAddress, Store
+from asperity.monitoring.store.sensors import Sensors
 
 STORE = "in/asperity-watch/asperity.db"
 LISTENER = """

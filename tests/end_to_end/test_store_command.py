@@ -17,7 +17,7 @@ import pytest
 
 from asperity.core.errors import AsperityError, UnreadableFile
 from asperity.monitoring import TrackSettings, WatchSettings, store_overview, watch_folder
-from asperity.monitoring.store import Store
+from asperity.monitoring.store.database import Store
 
 ONCE = ("--once", "--settle", "0", "--quiet")
 
@@ -221,7 +221,7 @@ def _empty(path):
 
 
 def test_a_store_that_another_program_holds_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr("asperity.monitoring.store.BUSY_S", 0.05)
+    monkeypatch.setattr("asperity.monitoring.store.database.BUSY_S", 0.05)
     snapshots(tmp_path / "in", [1.0])
     store = Store(tmp_path / "plant.db")
     with store.transaction(), pytest.raises(AsperityError, match="another program has locked it"):

@@ -7,6 +7,7 @@ an alarm (of `infer --forecast`, too), 4 they cannot tell, 5 sensor or machine o
 
 from asperity.cli import (
     benchmark,
+    check,
     contact,
     friction,
     infer,
@@ -29,6 +30,7 @@ from asperity.cli.app import app, main
 __all__ = [
     "app",
     "benchmark",
+    "check",
     "contact",
     "friction",
     "infer",

@@ -1,4 +1,4 @@
-"""`asperity check`, `track` and `watch`: measured recordings, from files to a verdict."""
+"""`asperity track` and `watch`: measured recordings, from files to a verdict."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -13,16 +13,13 @@ from asperity.cli import options
 from asperity.cli.app import app
 from asperity.cli.forecast import series_forecaster
 from asperity.cli.options import AsJson, Quiet, contact_at, require_output
-from asperity.cli.output import Block, Row, columns, progress, show, span, table, text, written
+from asperity.cli.output import Block, Row, columns, progress, show, span, table, written
 from asperity.core import files, processes
-from asperity.core.errors import BadInput
 from asperity.core.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
     from asperity.monitoring import (
-        CheckedRecording,
         Reading,
-        RecordingChecks,
         Track,
         TrackSettings,
         Update,
@@ -33,127 +30,6 @@ if TYPE_CHECKING:
 
 EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # by state of the alarm; otherwise 0
 PAGE = "report.html"
-MAX_DETAILED = 4  # recordings up to which `check` shows every fact
-
-
-@app.command()
-def check(
-    paths: Annotated[
-        list[Path] | None, typer.Argument(metavar="FILE...", help="Recordings, or folders of them.")
-    ] = None,
-    data_set: Annotated[
-        Path | None,
-        typer.Option(
-            "--set",
-            metavar="DIR",
-            help="Check whether a folder is a complete data set for publication.",
-        ),
-    ] = None,
-    rate: options.Rate = None,
-    unit: options.Unit = None,
-    channel: options.Channel = None,
-    scale: options.Scale = None,
-    case_file: options.Contact = None,
-    band: options.Band = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
-) -> None:
-    """Check recordings: rate, unit, length, channels, gaps, clipping, offset, machine off."""
-    if data_set is not None:
-        if paths:
-            raise BadInput(
-                f"--set {data_set} takes no other recordings; its {monitoring.STATED} names them"
-            )
-        _show_set(data_set, as_json=as_json, quiet=quiet)
-        return
-    if not paths:
-        raise BadInput("check needs recordings, or --set and the folder of a data set")
-    checks = monitoring.check_recordings(
-        paths,
-        case=contact_at(case_file),
-        band_hz=band,
-        rate_hz=rate,
-        unit=unit,
-        channel=channel,
-        scale=scale,
-    )
-    if checks.checked or as_json:
-        detailed = (
-            [_details(checked) for checked in checks.checked]
-            if len(checks.checked) <= MAX_DETAILED
-            else []
-        )
-        show(
-            checks.verdict(),
-            checks.scalars,
-            [
-                f"  for a resonance {text('width_hz', checks.target.width_hz)} wide "
-                f"in {checks.target.source}"
-            ],
-            *(detailed or [_summary(checks)]),
-            as_json=as_json,
-            quiet=quiet,
-        )
-    if checks.refused:
-        raise BadInput("; ".join(dict.fromkeys(reason for _, reason in checks.refused)))
-
-
-def _show_set(folder: Path, *, as_json: bool, quiet: bool) -> None:
-    """Show what a data set lacks; exit code 2 unless it is complete."""
-    result = monitoring.check_set(folder)
-    lines = [f"  missing: {sentence}" for sentence in result.missing]
-    show(result.verdict(), lambda: result.scalars(), lines, as_json=as_json, quiet=quiet)
-    if not result.whole:
-        raise typer.Exit(2)
-
-
-def _details(checked: "CheckedRecording") -> Block:
-    """Yield every fact of a recording with its source."""
-    recording, quality = checked
-    facts, state = recording.facts, "usable" if quality.usable else "NOT USABLE"
-    values = checked.scalars()
-    level = ", ".join(quantity(key).number_in(values) for key in ("rms", "peak", "offset"))
-    rows = [
-        ("format", str(facts["format"].value)),
-        (
-            quantity("rate_hz").title,
-            f"{text('rate_hz', recording.rate_hz)}, stated by {facts['rate'].source}",
-        ),
-        *(
-            (name, f"{facts[name].value}, stated by {facts[name].source}")
-            for name in ("unit", "scale", "started")
-            if name in facts
-        ),
-        (
-            quantity("duration_s").title,
-            f"{text('duration_s', quality.duration_s)}, {quality.samples} samples",
-        ),
-        ("rms, peak, offset", f"{level}; unit: {recording.unit}"),
-    ]
-    yield f"{recording.path}, channel {recording.channel.name}: {state}"
-    yield from table(rows, quality.remarks)
-    yield from (f"  fault: {fault}" for fault in quality.faults)
-
-
-def _summary(checks: "RecordingChecks") -> Block:
-    """Yield one row per recording, and each fault once."""
-    selected = [quantity(key) for key in ("rate_hz", "duration_s", "rms")]
-    rows: list[list[str]] = []
-    holders: dict[str, list[str]] = {}
-    for checked in checks.checked:
-        values, quality = checked.scalars(), checked.quality
-        name = f"{checked.recording.path.name}, {values['channel']}"
-        state = "usable" if quality.usable else "NOT USABLE"
-        rows.append([name, *(entry.number_in(values) for entry in selected), values["unit"], state])
-        for sentence in (*quality.faults, *quality.remarks):
-            holders.setdefault(sentence, []).append(name)
-    yield from columns(
-        ["recording", *(entry.label for entry in selected), "unit", ""], rows, left=1
-    )
-    for sentence, names in holders.items():
-        everywhere = len(names) == len(checks.checked)
-        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-        yield f"  note: {sentence} ({'all' if everywhere else '; '.join(names[:3]) + more})"
 
 
 @app.command()

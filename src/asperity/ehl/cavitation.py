@@ -254,16 +254,45 @@ class RoughChannel:
         )
 
     def flows(self, signed: Field) -> Flows:
-        """Return all flows and their derivatives.
+        """Return all flows and their derivatives."""
+        cells = self._cells(signed)
+        flow, by_left, by_right = self._inner_faces(cells)
+        entering, d_entering, leaving, d_leaving = self._end_faces(cells)
+        along = np.concatenate([entering[None], flow, leaving[None]])
+        outflow = np.diff(along, axis=0)
+        own = np.concatenate([by_left, d_leaving[None]])
+        own[0] -= d_entering
+        own[1:] -= by_right
+        index: Index = np.arange(self.gap.size, dtype=np.intp).reshape(self.gap.shape)
+        entries = [
+            (index, index, own),
+            (index[:-1], index[1:], by_right),
+            (index[1:], index[:-1], -by_left),
+        ]
+        outflow += self._flow_across(
+            cells.pressure,
+            cells.conductance,
+            cells.d_conductance,
+            cells.d_pressure,
+            index,
+            entries,
+        )
+        rows, columns = (
+            np.concatenate([entry[place].ravel() for entry in entries]) for place in (0, 1)
+        )
+        slopes = np.concatenate([entry[2].ravel() for entry in entries])
+        through = float(np.max(np.abs(along.mean(axis=1))))
+        return Flows(along, outflow, through, rows, columns, slopes)
+
+    def _inner_faces(self, cells: Cells) -> tuple[Field, Field, Field]:
+        """Return the flow through each inner face and its derivatives in the left and right cell.
 
         A face joins two half cells of constant gap, which is exact where the gap steps. Its
         pressure follows from equal flow on both sides; where that would be negative the film
         ruptures at the face.
         """
         dx, u = self.spacing[0], self.speed
-        pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance = (
-            self._cells(signed)
-        )
+        pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance = cells
         half, d_half = 2.0 * conductance / dx, 2.0 * d_conductance / dx
         left, right = np.s_[:-1], np.s_[1:]
         both = half[left] + half[right]
@@ -297,7 +326,13 @@ class RoughChannel:
         flow = np.where(ruptures, to_rupture, flow)
         by_left = np.where(ruptures, d_to_rupture, by_left)
         by_right = np.where(ruptures, 0.0, by_right)
+        return flow, by_left, by_right
 
+    def _end_faces(self, cells: Cells) -> tuple[Field, Field, Field, Field]:
+        """Return the flows through inlet and outlet, each with its derivative in the end cell."""
+        dx, u = self.spacing[0], self.speed
+        pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance = cells
+        half, d_half = 2.0 * conductance / dx, 2.0 * d_conductance / dx
         inlet, outlet = self.boundary.ends
         entering = (
             u
@@ -314,26 +349,7 @@ class RoughChannel:
             + d_half[-1] * (pressure[-1] - outlet)
             + half[-1] * d_pressure[-1]
         )
-        along = np.concatenate([entering[None], flow, leaving[None]])
-        outflow = np.diff(along, axis=0)
-        own = np.concatenate([by_left, d_leaving[None]])
-        own[0] -= d_entering
-        own[1:] -= by_right
-        index: Index = np.arange(self.gap.size, dtype=np.intp).reshape(self.gap.shape)
-        entries = [
-            (index, index, own),
-            (index[:-1], index[1:], by_right),
-            (index[1:], index[:-1], -by_left),
-        ]
-        outflow += self._flow_across(
-            pressure, conductance, d_conductance, d_pressure, index, entries
-        )
-        rows, columns = (
-            np.concatenate([entry[place].ravel() for entry in entries]) for place in (0, 1)
-        )
-        slopes = np.concatenate([entry[2].ravel() for entry in entries])
-        through = float(np.max(np.abs(along.mean(axis=1))))
-        return Flows(along, outflow, through, rows, columns, slopes)
+        return entering, d_entering, leaving, d_leaving
 
     def _flow_across(
         self,

@@ -40,6 +40,38 @@ def mass_acceleration(contact: ContactSpring, compression: float, rate: float) -
     )
 
 
+@njit(cache=True, inline="always")
+def _fourth_stage(k1: float, k2: float, k3: float) -> float:
+    """Return the mean slope that leads to the fourth stage."""
+    return (44 / 45) * k1 - (56 / 15) * k2 + (32 / 9) * k3
+
+
+@njit(cache=True, inline="always")
+def _fifth_stage(k1: float, k2: float, k3: float, k4: float) -> float:
+    """Return the mean slope that leads to the fifth stage."""
+    return (19372 / 6561) * k1 - (25360 / 2187) * k2 + (64448 / 6561) * k3 - (212 / 729) * k4
+
+
+@njit(cache=True, inline="always")
+def _sixth_stage(k1: float, k2: float, k3: float, k4: float, k5: float) -> float:
+    """Return the mean slope that leads to the sixth stage."""
+    return (
+        (9017 / 3168) * k1
+        - (355 / 33) * k2
+        + (46732 / 5247) * k3
+        + (49 / 176) * k4
+        - (5103 / 18656) * k5
+    )
+
+
+@njit(cache=True, inline="always")
+def _fifth_order(k1: float, k3: float, k4: float, k5: float, k6: float) -> float:
+    """Return the mean slope of the whole step; the second stage has no weight."""
+    return (
+        (35 / 384) * k1 + (500 / 1113) * k3 + (125 / 192) * k4 - (2187 / 6784) * k5 + (11 / 84) * k6
+    )
+
+
 @njit(cache=True, fastmath={"contract", "nsz"}, error_model="numpy")
 def integrate_contact(
     contact: ContactSpring,
@@ -64,69 +96,13 @@ def integrate_contact(
             v2 = mass_acceleration(contact, c + h * (1 / 5) * c1, c2)
             c3 = s - (v + h * ((3 / 40) * v1 + (9 / 40) * v2))
             v3 = mass_acceleration(contact, c + h * ((3 / 40) * c1 + (9 / 40) * c2), c3)
-            c4 = s - (v + h * ((44 / 45) * v1 - (56 / 15) * v2 + (32 / 9) * v3))
-            v4 = mass_acceleration(
-                contact, c + h * ((44 / 45) * c1 - (56 / 15) * c2 + (32 / 9) * c3), c4
-            )
-            c5 = s - (
-                v
-                + h
-                * (
-                    (19372 / 6561) * v1
-                    - (25360 / 2187) * v2
-                    + (64448 / 6561) * v3
-                    - (212 / 729) * v4
-                )
-            )
-            v5 = mass_acceleration(
-                contact,
-                c
-                + h
-                * (
-                    (19372 / 6561) * c1
-                    - (25360 / 2187) * c2
-                    + (64448 / 6561) * c3
-                    - (212 / 729) * c4
-                ),
-                c5,
-            )
-            c6 = s - (
-                v
-                + h
-                * (
-                    (9017 / 3168) * v1
-                    - (355 / 33) * v2
-                    + (46732 / 5247) * v3
-                    + (49 / 176) * v4
-                    - (5103 / 18656) * v5
-                )
-            )
-            v6 = mass_acceleration(
-                contact,
-                c
-                + h
-                * (
-                    (9017 / 3168) * c1
-                    - (355 / 33) * c2
-                    + (46732 / 5247) * c3
-                    + (49 / 176) * c4
-                    - (5103 / 18656) * c5
-                ),
-                c6,
-            )
-            c += h * (
-                (35 / 384) * c1
-                + (500 / 1113) * c3
-                + (125 / 192) * c4
-                - (2187 / 6784) * c5
-                + (11 / 84) * c6
-            )
-            v += h * (
-                (35 / 384) * v1
-                + (500 / 1113) * v3
-                + (125 / 192) * v4
-                - (2187 / 6784) * v5
-                + (11 / 84) * v6
-            )
+            c4 = s - (v + h * _fourth_stage(v1, v2, v3))
+            v4 = mass_acceleration(contact, c + h * _fourth_stage(c1, c2, c3), c4)
+            c5 = s - (v + h * _fifth_stage(v1, v2, v3, v4))
+            v5 = mass_acceleration(contact, c + h * _fifth_stage(c1, c2, c3, c4), c5)
+            c6 = s - (v + h * _sixth_stage(v1, v2, v3, v4, v5))
+            v6 = mass_acceleration(contact, c + h * _sixth_stage(c1, c2, c3, c4, c5), c6)
+            c += h * _fifth_order(c1, c3, c4, c5, c6)
+            v += h * _fifth_order(v1, v3, v4, v5, v6)
         compression[n + 1] = c
         velocity[n + 1] = v

@@ -258,6 +258,70 @@ def _through_north(
     return flow
 
 
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"}, inline="always")
+def _through_east(
+    faces: Faces,
+    pressure: Field,
+    d_pressure: Field,
+    d_log: Field,
+    d_log_east: Field,
+    i: int,
+    j: int,
+) -> float:
+    """Return the linearised Poiseuille flow from cell (i + 1, j) to (i, j)."""
+    d_face = faces.east_by_own[i, j] * d_log[j] + faces.east_by_next[i, j] * d_log_east[j]
+    flow: float = faces.east[i, j] * (d_pressure[i + 1, j] - d_pressure[i, j]) + d_face * (
+        pressure[i + 1, j] - pressure[i, j]
+    )
+    return flow
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"}, inline="always")
+def _through_outlet(
+    film: Film, faces: Faces, pressure: Field, change: PressureChange, d_log: Field, j: int
+) -> float:
+    """Return the linearised Poiseuille flow through the outlet over half a cell."""
+    i, half = pressure.shape[0] - 1, pressure.dtype.type(0.5)
+    d_face = (
+        faces.east_by_own[i, j] * d_log[j] + half * film.ambient_by_gap[1, j] * change.gap[i, j]
+    )
+    flow: float = faces.east[i, j] * change.pressure[i, j] + d_face * pressure[i, j]
+    return flow
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"}, inline="always")
+def _add_flow_across(
+    faces: Faces,
+    pressure: Field,
+    d_pressure: Field,
+    d_log: Field,
+    i: int,
+    over_dy2: float,
+    out: Field,
+) -> None:
+    """Add the linearised flow through the y faces: outflow of a line enters the next one."""
+    last = pressure.shape[1] - 1
+    for j in range(last):
+        north = _through_north(faces, pressure, d_pressure, d_log, i, j, j + 1)
+        out[i, j] += over_dy2 * north
+        out[i, j + 1] -= over_dy2 * north
+    north = _through_north(faces, pressure, d_pressure, d_log, i, last, faces.behind)
+    out[i, last] += over_dy2 * north
+    out[i, 0] -= over_dy2 * north
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"}, inline="always")
+def _scale_row(rows: Rows, change: PressureChange, i: int, touching: float, out: Field) -> None:
+    """Scale the lubricated cells of row `i`, and fill its other cells with their own equations."""
+    for j in range(out.shape[1]):
+        if rows.state[i, j] == LUBRICATED:
+            out[i, j] *= rows.fluid_scale[i, j]
+        elif rows.state[i, j] == TOUCHING:
+            out[i, j] = change.gap[i, j] * touching
+        else:
+            out[i, j] = change.pressure[i, j]
+
+
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
 def jacobian_product(
     rows: Rows,
@@ -284,7 +348,6 @@ def jacobian_product(
         real(1.0 / (dy * dy)),
         real(storing),
     )
-    state, scale, touching = rows.state, rows.fluid_scale, real(rows.contact_scale)
     log_h, log_p = film.log_mobility_by_gap, film.log_mobility_by_pressure
     m_h, m_p = film.content_by_gap, film.content_by_pressure
     d_log, d_log_east = np.empty(ny, pressure.dtype), np.empty(ny, pressure.dtype)
@@ -310,44 +373,20 @@ def jacobian_product(
                 after[j] = m_h[i + 1, j] * d_gap[i + 1, j] + m_p[i + 1, j] * d_pressure[i + 1, j]
             for j in range(ny):
                 flux = here[j] + downwind * (after[j] - here[j]) + upwind * (here[j] - before[j])
-                d_face = (
-                    faces.east_by_own[i, j] * d_log[j] + faces.east_by_next[i, j] * d_log_east[j]
-                )
-                flux -= over_dx * (
-                    faces.east[i, j] * (d_pressure[i + 1, j] - d_pressure[i, j])
-                    + d_face * (pressure[i + 1, j] - pressure[i, j])
+                flux -= over_dx * _through_east(
+                    faces, pressure, d_pressure, d_log, d_log_east, i, j
                 )
                 out[i, j] = (flux - upstream[j]) * over_dx + storing_rate * here[j]
                 upstream[j] = flux
         else:
             for j in range(ny):
                 flux = here[j] + half * (here[j] - before[j])
-                d_face = (
-                    faces.east_by_own[i, j] * d_log[j]
-                    + half * film.ambient_by_gap[1, j] * d_gap[i, j]
-                )
-                flux += (
-                    real(2.0)
-                    * over_dx
-                    * (faces.east[i, j] * d_pressure[i, j] + d_face * pressure[i, j])
-                )
+                through = _through_outlet(film, faces, pressure, change, d_log, j)
+                flux += real(2.0) * over_dx * through
                 out[i, j] = (flux - upstream[j]) * over_dx + storing_rate * here[j]
-        # y faces: outflow through a north face enters the next line
-        last = ny - 1
-        for j in range(last):
-            north = _through_north(faces, pressure, d_pressure, d_log, i, j, j + 1)
-            out[i, j] += over_dy2 * north
-            out[i, j + 1] -= over_dy2 * north
-        north = _through_north(faces, pressure, d_pressure, d_log, i, last, faces.behind)
-        out[i, last] += over_dy2 * north
-        out[i, 0] -= over_dy2 * north
+        _add_flow_across(faces, pressure, d_pressure, d_log, i, over_dy2, out)
+        _scale_row(rows, change, i, real(rows.contact_scale), out)
         for j in range(ny):
-            if state[i, j] == LUBRICATED:
-                out[i, j] *= scale[i, j]
-            elif state[i, j] == TOUCHING:
-                out[i, j] = d_gap[i, j] * touching
-            else:
-                out[i, j] = d_pressure[i, j]
             before[j], here[j], d_log[j] = here[j], after[j], d_log_east[j]
 
 

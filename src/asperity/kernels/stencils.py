@@ -91,6 +91,53 @@ def local_stencil(
             out.south[i, j] = -across[j] * scale if wet else zero
 
 
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"}, inline="always")
+def _fill_north_slopes(
+    faces: Faces,
+    pressure: Field,
+    slope: Field,
+    i: int,
+    over_dy2: float,
+    across: Field,
+    over: Field,
+) -> None:
+    """Fill the derivatives of the flow through each north face of row `i` in both its cells."""
+    ny = pressure.shape[1]
+    for j in range(ny):
+        jn = j + 1 if j < ny - 1 else faces.behind
+        through, pressure_gradient = (
+            over_dy2 * faces.north[i, j],
+            over_dy2 * (pressure[i, j] - pressure[i, jn]),
+        )
+        across[j] = through + pressure_gradient * faces.north_by_own[i, j] * slope[j]
+        over[j] = pressure_gradient * faces.north_by_next[i, j] * slope[jn] - through
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"}, inline="always")
+def _add_south_faces(
+    rows: Rows,
+    faces: Faces,
+    i: int,
+    over_dy2: float,
+    across: Field,
+    over: Field,
+    out: Stencil,
+) -> None:
+    """Complete row `i` of a stencil with the flow through the south faces."""
+    zero, ny = out.centre.dtype.type(0.0), across.size
+    for j in range(1, ny):
+        scale = rows.fluid_scale[i, j] if rows.state[i, j] == LUBRICATED else zero
+        out.centre[i, j] -= scale * over[j - 1]
+        out.south[i, j] = -scale * across[j - 1]
+    scale = rows.fluid_scale[i, 0] if rows.state[i, 0] == LUBRICATED else zero
+    last = ny - 1
+    before, beyond = (
+        (over[last], across[last]) if faces.behind == 0 else _first_line(faces, i, over_dy2)
+    )
+    out.centre[i, 0] -= scale * before
+    out.south[i, 0] = -scale * beyond
+
+
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
 def own_stencil(
     rows: Rows,
@@ -115,7 +162,7 @@ def own_stencil(
         real(1.0 / spacing[0] ** 2),
         real(1.0 / spacing[1] ** 2),
     )
-    own, last = real(compliance), ny - 1
+    own = real(compliance)
     m_h, m_p, log_h, log_p = (
         film.content_by_gap,
         film.content_by_pressure,
@@ -142,14 +189,7 @@ def own_stencil(
         else:
             for j in range(ny):
                 by_here[j], by_east[j] = two * over_dx2 * faces.east[i, j], zero
-        for j in range(ny):
-            jn = j + 1 if j < last else faces.behind
-            through, pressure_gradient = (
-                over_dy2 * faces.north[i, j],
-                over_dy2 * (pressure[i, j] - pressure[i, jn]),
-            )
-            across[j] = through + pressure_gradient * faces.north_by_own[i, j] * slope[j]
-            over[j] = pressure_gradient * faces.north_by_next[i, j] * slope[jn] - through
+        _fill_north_slopes(faces, pressure, slope, i, over_dy2, across, over)
         for j in range(ny):
             wet = rows.state[i, j] == LUBRICATED
             scale = rows.fluid_scale[i, j] if wet else zero
@@ -159,16 +199,7 @@ def own_stencil(
             out.west[i, j] = -scale * by_before[j]
             out.east[i, j] = scale * by_east[j]
             out.north[i, j] = scale * over[j]
-        for j in range(1, ny):
-            scale = rows.fluid_scale[i, j] if rows.state[i, j] == LUBRICATED else zero
-            out.centre[i, j] -= scale * over[j - 1]
-            out.south[i, j] = -scale * across[j - 1]
-        scale = rows.fluid_scale[i, 0] if rows.state[i, 0] == LUBRICATED else zero
-        before, beyond = (
-            (over[last], across[last]) if faces.behind == 0 else _first_line(faces, i, over_dy2)
-        )
-        out.centre[i, 0] -= scale * before
-        out.south[i, 0] = -scale * beyond
+        _add_south_faces(rows, faces, i, over_dy2, across, over, out)
         for j in range(ny):
             by_before[j], by_west[j] = by_here[j] + carried[j], by_east[j]
 

@@ -23,8 +23,8 @@ from urllib.parse import SplitResult, unquote, urlsplit
 
 from asperity.core.errors import BadInput
 from asperity.core.third_party import first_line
-from asperity.monitoring.sensors import Sensors
 from asperity.monitoring.settings import Notifier
+from asperity.monitoring.store.sensors import Sensors
 
 COMMAND_S, NETWORK_S = 30.0, 10.0  # time limits [s]
 RETRY_S, MAX_RETRY_S = 5.0, 3600.0  # first interval between attempts, doubled up to the second [s]

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 from asperity.monitoring.alarm import BASELINE, LAST
 from asperity.monitoring.files import RecordingPlace, RecordingTable, place_at, x_of_recordings
-from asperity.monitoring.sensors import Sensors
 from asperity.monitoring.simultaneous import (
     PlacedRecording,
     Slot,
@@ -15,7 +14,8 @@ from asperity.monitoring.simultaneous import (
     match_places,
     match_times,
 )
-from asperity.monitoring.store import FileVersion, StoredRecording
+from asperity.monitoring.store.database import FileVersion, StoredRecording
+from asperity.monitoring.store.sensors import Sensors
 
 LATEST = 112  # recordings judged with the first BASELINE of a long series: the alarm's memory
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from asperity.core.errors import BadInput
 from asperity.core.files import atomic_write, write_csv
 from asperity.monitoring.alarm import LAST
-from asperity.monitoring.sensor import ACKNOWLEDGED
-from asperity.monitoring.sensor_lookup import open_sensors, sensors_judged_with
-from asperity.monitoring.store import SensorAddress, Store
+from asperity.monitoring.store.database import SensorAddress, Store
+from asperity.monitoring.store.sensor import ACKNOWLEDGED
+from asperity.monitoring.store.sensor_lookup import open_sensors, sensors_judged_with
 from asperity.monitoring.track_result import Track, flat
 from asperity.monitoring.watch_state import version_of
 from asperity.recording import ReadOptions

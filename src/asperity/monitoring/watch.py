@@ -19,10 +19,10 @@ from asperity.monitoring.forecast import Forecaster, ForecastSchedule
 from asperity.monitoring.notify import deliver
 from asperity.monitoring.ordering import file_name, order_recordings
 from asperity.monitoring.reading import Reading
-from asperity.monitoring.sensor_lookup import open_sensors
 from asperity.monitoring.settings import TrackSettings, WatchSettings
 from asperity.monitoring.silence import overdue_reason
-from asperity.monitoring.store import STORE
+from asperity.monitoring.store.database import STORE
+from asperity.monitoring.store.sensor_lookup import open_sensors
 from asperity.monitoring.target import search_target
 from asperity.monitoring.watch_state import Update, WatchState
 from asperity.trend import ALARM_STATES

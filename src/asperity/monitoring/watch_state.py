@@ -25,10 +25,10 @@ from asperity.monitoring.ordering import (
     unacknowledged,
 )
 from asperity.monitoring.reading import Reading, common_spacing, read_channels
-from asperity.monitoring.sensors import Sensors
 from asperity.monitoring.series_state import PreviousStates, SeriesMemory
 from asperity.monitoring.settings import TrackSettings, WatchSettings
-from asperity.monitoring.store import FileVersion
+from asperity.monitoring.store.database import FileVersion
+from asperity.monitoring.store.sensors import Sensors
 from asperity.monitoring.target import Target
 from asperity.monitoring.track_result import Track
 from asperity.recording import sidecar_names

@@ -6,11 +6,13 @@ defines one physical surface on any grid that resolves it.
 
 import math
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from asperity.contact.grid import Grid
+from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_positive
 from asperity.surface.generate import require_lengths
 from asperity.surface.model import Surface, length_text
@@ -18,6 +20,16 @@ from asperity.surface.model import Surface, length_text
 _GROOVES_PER_POINT = 8.0  # fewer leave uncut surface, more do not change the shape
 _CRATERS_PER_POINT = 6.0
 _BATCH_CELLS = 200_000  # marked at once, limited by the caches
+
+
+class _Grooves(NamedTuple):
+    """Grooves of grinding: centres (n, 2) and widths [m], roots of the depths, length, lay."""
+
+    centres: Field
+    root_depths: Field
+    widths: Field
+    length: float
+    direction: float
 
 
 def ground_surface(
@@ -60,8 +72,6 @@ def ground_surface(
         direction = np.pi / 2.0 - direction
     else:
         turned = grid
-    (nx, ny), (dx, dy) = turned.cells, turned.spacing
-    tangent, cosine = float(np.tan(direction)), float(abs(np.cos(direction)))
     count = max(
         1,
         round(
@@ -71,34 +81,7 @@ def ground_surface(
     centres = rng.random((count, 2)) * turned.extent
     root_depths = np.sqrt(rng.exponential(size=count))  # proportional to the widths
     widths = groove_width * root_depths / np.mean(root_depths)
-    half_columns = (
-        int(np.ceil((groove_length * cosine + widths.max() * abs(np.sin(direction))) / 2.0 / dx))
-        + 1
-    )
-    heights = np.zeros(nx * ny)
-    order = np.argsort(widths)
-    for marks in _batches(
-        order, lambda widest: (2 * half_columns + 1) * 2 * _rows(widths[widest], cosine, dy)
-    ):
-        half_rows = _rows(widths[marks[-1]], cosine, dy)
-        i = np.floor(centres[marks, 0] / dx).astype(np.intp)[:, None] + np.arange(
-            -half_columns, half_columns + 1
-        )
-        off_x = (i + 0.5) * dx - centres[marks, 0, None]
-        middle = centres[marks, 1, None] + tangent * off_x
-        j = np.floor(middle / dy).astype(np.intp)[:, :, None] + np.arange(-half_rows, half_rows + 1)
-        off_y = (j + 0.5) * dy - middle[:, :, None]  # along y, not perpendicular to the groove
-        along = (off_x / cosine)[:, :, None] + off_y * np.sin(direction) * np.sign(
-            np.cos(direction)
-        )
-        across = off_y * cosine
-        cut = (1.0 - (2.0 * across / widths[marks, None, None]) ** 2) * np.sqrt(
-            np.maximum(1.0 - (2.0 * along / groove_length) ** 2, 0.0)
-        )
-        depth = -(root_depths[marks, None, None] ** 2) * np.maximum(cut, 0.0)
-        cells = np.mod(i, nx)[:, :, None] * ny + np.mod(j, ny)
-        np.minimum.at(heights, cells.ravel(), depth.ravel())
-    field = heights.reshape(nx, ny)
+    field = _cut_grooves(turned, _Grooves(centres, root_depths, widths, groove_length, direction))
     return Surface.scaled(field.T if steep else field, grid, sq)
 
 
@@ -155,6 +138,40 @@ def sandblasted_surface(
         cells = np.mod(i, nx)[:, :, None] * ny + np.mod(j, ny)[:, None, :]
         np.add.at(heights, cells.ravel(), crater.ravel())
     return Surface.scaled(heights.reshape(nx, ny), grid, sq)
+
+
+def _cut_grooves(grid: Grid, grooves: _Grooves) -> Field:
+    """Return the lower envelope of grooves that run mainly along x; zero where nothing is cut."""
+    centres, root_depths, widths, length, direction = grooves
+    (nx, ny), (dx, dy) = grid.cells, grid.spacing
+    tangent, cosine = float(np.tan(direction)), float(abs(np.cos(direction)))
+    half_columns = (
+        int(np.ceil((length * cosine + widths.max() * abs(np.sin(direction))) / 2.0 / dx)) + 1
+    )
+    heights = np.zeros(nx * ny)
+    order = np.argsort(widths)
+    for marks in _batches(
+        order, lambda widest: (2 * half_columns + 1) * 2 * _rows(widths[widest], cosine, dy)
+    ):
+        half_rows = _rows(widths[marks[-1]], cosine, dy)
+        i = np.floor(centres[marks, 0] / dx).astype(np.intp)[:, None] + np.arange(
+            -half_columns, half_columns + 1
+        )
+        off_x = (i + 0.5) * dx - centres[marks, 0, None]
+        middle = centres[marks, 1, None] + tangent * off_x
+        j = np.floor(middle / dy).astype(np.intp)[:, :, None] + np.arange(-half_rows, half_rows + 1)
+        off_y = (j + 0.5) * dy - middle[:, :, None]  # along y, not perpendicular to the groove
+        along = (off_x / cosine)[:, :, None] + off_y * np.sin(direction) * np.sign(
+            np.cos(direction)
+        )
+        across = off_y * cosine
+        cut = (1.0 - (2.0 * across / widths[marks, None, None]) ** 2) * np.sqrt(
+            np.maximum(1.0 - (2.0 * along / length) ** 2, 0.0)
+        )
+        depth = -(root_depths[marks, None, None] ** 2) * np.maximum(cut, 0.0)
+        cells = np.mod(i, nx)[:, :, None] * ny + np.mod(j, ny)
+        np.minimum.at(heights, cells.ravel(), depth.ravel())
+    return heights.reshape(nx, ny)
 
 
 def _rows(width: float, cosine: float, dy: float) -> int:

@@ -28,14 +28,11 @@ from asperity.ehl.linear_solvers.single_pressure import (
     fold_at_mirror,
     single_faces,
 )
-from asperity.ehl.models.mixed import (
+from asperity.ehl.models.mixed import MixedBalance, Pressures, limiter_slopes, opening_slopes
+from asperity.ehl.models.oil_advection import (
     OPENING_RANGE,
-    MixedBalance,
-    Pressures,
     advected_outflow,
     limiter_outflow,
-    limiter_slopes,
-    opening_slopes,
     upwind_at_outlet,
 )
 from asperity.ehl.models.single_pressure import CLOSED_WITHIN, TransientTerm

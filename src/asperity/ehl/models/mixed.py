@@ -27,6 +27,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Codes, Field, Mask
+from asperity.ehl.models.oil_advection import (
+    OPENING_RANGE,
+    advected_outflow,
+    limiter_outflow,
+    outflow_by_content,
+    second_order_outflow,
+    slope_limiter,
+    upstream_content,
+    upwind_at_outlet,
+    uses_limiter,
+)
 from asperity.ehl.models.single_pressure import CLOSED_WITHIN, FIRST_ORDER, THIRD_ORDER, Problem
 from asperity.kernels import load_sharing
 from asperity.kernels.load_sharing import FREE, CellState, ContactBounds
@@ -38,11 +49,8 @@ from asperity.kernels.reynolds import (
     Faces,
     Film,
     Rows,
-    limited_outflow,
 )
 from asperity.lubricant import Lubricant
-
-OPENING_RANGE = 0.5  # in contact films: gap above the contact film over which the limiter sets in
 
 
 class Pressures(NamedTuple):
@@ -103,7 +111,9 @@ class MixedBalance:
     @property
     def limiter_correction(self) -> Field:
         """Second-order correction of the wedge, in content, (nx, ny)."""
-        return self.limiter * (self.film.content - _upstream(self.problem, self.film.content))
+        return self.limiter * (
+            self.film.content - upstream_content(self.problem, self.film.content)
+        )
 
     @property
     def film_share(self) -> Field:
@@ -200,19 +210,19 @@ def _evaluate(
     height = np.maximum(gap, closed) + _growth(problem, signed) if problem.conserve else gap
     film, faces, outflow, fluid_scale = _flow(problem, oil, height, problem.lubricant)
     limiter = (
-        _limiter(problem, film.content, gap)
+        slope_limiter(problem, film.content, gap)
         if second_order and uses_limiter(problem)
         else np.zeros_like(gap)
     )
     surplus, surplus_by_oil = _surplus(problem, film, signed) if problem.conserve else (None, None)
-    outflow += _second_order_outflow(problem, film.content, limiter, second_order=second_order)
+    outflow += second_order_outflow(problem, film.content, limiter, second_order=second_order)
     if surplus is not None:
         outflow += advected_outflow(problem, surplus)
         upwind_at_outlet(problem, film.content, outflow)
 
     cells = CellState(signed, oil, pressure, gap, outflow, np.empty_like(gap))
     load_sharing.outflow_by_pressure(
-        film, faces, _outflow_by_content(problem), *problem.spacing, cells.own_outflow
+        film, faces, outflow_by_content(problem), *problem.spacing, cells.own_outflow
     )
     freed = np.zeros(gap.shape, dtype=bool) if freed is None else freed
     opening_cells, sunk, sealed = np.empty((3, *gap.shape), dtype=bool)
@@ -237,28 +247,10 @@ def _evaluate(
         load_sharing.fill_oil_rows(cells, bounds, fluid_scale, oil_residual, state)
         load_sharing.fix_film_gap(sealed, film)
     else:
-        # a closed cell holds hardly any oil: its missing oil counts as the gap that would open it
-        loose, lacks = (
-            surplus_by_oil > 0.0,
-            np.maximum(surplus_by_oil, problem.softness) * _outflow_by_content(problem),
+        film, fluid_scale, oil_residual, state = _conserving_rows(
+            problem, film, signed, height, outflow, fluid_scale, surplus_by_oil, sealed
         )
-        fluid_scale = np.where(loose, 1.0 / lacks, fluid_scale)
-        oil_residual = outflow * fluid_scale
-        state = np.where(signed < 0.0, RUPTURED, np.where(loose, CAPPED, LUBRICATED)).astype(
-            np.int8
-        )
-        pressed = signed > problem.p_cap  # opened by the oil, not by the approach
-        load_sharing.fix_film_gap(sealed & ~pressed, film)
-        stiff = pressed & (film.log_mobility_by_gap == 0.0)
-        film = film._replace(
-            log_mobility_by_gap=np.where(stiff, -3.0 / height, film.log_mobility_by_gap)
-        )
-    if np.any(rim := problem.rim):
-        state[:, rim], oil_residual[:, rim] = RUPTURED, signed[:, rim]
-        solid[:, rim], solid_residual[:, rim] = FREE, (pressure - oil)[:, rim]
-    if problem.fixed is not None:
-        state[problem.fixed], solid[problem.fixed] = RUPTURED, FREE
-        oil_residual[problem.fixed] = solid_residual[problem.fixed] = 0.0
+    _fix_rows(problem, cells, state, solid, oil_residual, solid_residual)
     rows, left = Rows(state, fluid_scale, scale), (oil_residual, solid_residual)
     balance = MixedBalance(
         problem, unknowns, gap, *left, rows, solid, film, faces, limiter, outflow, sealed
@@ -268,6 +260,54 @@ def _evaluate(
         if problem.conserve
         else balance
     )
+
+
+def _conserving_rows(
+    problem: Problem,
+    film: Film,
+    signed: Field,
+    height: Field,
+    outflow: Field,
+    fluid_scale: Field,
+    surplus_by_oil: Field,
+    sealed: Mask,
+) -> tuple[Film, Field, Field, Codes]:
+    """Return film, scale, residual and state of the oil's equations where oil is conserved.
+
+    The film of `sealed` cells is fixed, except where oil at the cap has opened it.
+    """
+    # a closed cell holds hardly any oil: its missing oil counts as the gap that would open it
+    loose, lacks = (
+        surplus_by_oil > 0.0,
+        np.maximum(surplus_by_oil, problem.softness) * outflow_by_content(problem),
+    )
+    fluid_scale = np.where(loose, 1.0 / lacks, fluid_scale)
+    oil_residual = outflow * fluid_scale
+    state = np.where(signed < 0.0, RUPTURED, np.where(loose, CAPPED, LUBRICATED)).astype(np.int8)
+    pressed = signed > problem.p_cap  # opened by the oil, not by the approach
+    load_sharing.fix_film_gap(sealed & ~pressed, film)
+    stiff = pressed & (film.log_mobility_by_gap == 0.0)
+    film = film._replace(
+        log_mobility_by_gap=np.where(stiff, -3.0 / height, film.log_mobility_by_gap)
+    )
+    return film, fluid_scale, oil_residual, state
+
+
+def _fix_rows(
+    problem: Problem,
+    cells: CellState,
+    state: Codes,
+    solid: Codes,
+    oil_residual: Field,
+    solid_residual: Field,
+) -> None:
+    """Set the equations of the rim, without pressure, and of cells with fixed pressures."""
+    if np.any(rim := problem.rim):
+        state[:, rim], oil_residual[:, rim] = RUPTURED, cells.signed[:, rim]
+        solid[:, rim], solid_residual[:, rim] = FREE, (cells.total - cells.oil)[:, rim]
+    if problem.fixed is not None:
+        state[problem.fixed], solid[problem.fixed] = RUPTURED, FREE
+        oil_residual[problem.fixed] = solid_residual[problem.fixed] = 0.0
 
 
 def _surplus(problem: Problem, film: Film, signed: Field) -> tuple[Field, Field]:
@@ -303,44 +343,6 @@ def _flow(
     )
 
 
-def uses_limiter(problem: Problem) -> bool:
-    """Return True if the wedge is second order with a slope limiter.
-
-    Smooth bodies have a third-order wedge, and at the borders of conserving cavities content jumps.
-    """
-    return not problem.accurate and not problem.conserve
-
-
-def _is_lagrangian(problem: Problem) -> bool:
-    """Return True if oil is balanced along its path."""
-    return problem.past is not None and problem.past.lagrangian
-
-
-def _upstream(problem: Problem, content: Field) -> Field:
-    """Return the content upstream of each cell, (nx, ny).
-
-    For Lagrangian oil one time step earlier.
-    """
-    upstream = np.concatenate([content[:1], content[:-1]])
-    if problem.past is not None and problem.past.upstream is not None:
-        upstream[2:] = problem.past.upstream[2:]
-    return upstream
-
-
-def _limiter(problem: Problem, content: Field, gap: Field) -> Field:
-    """Return the slope limiter, (nx, ny).
-
-    Half of 2 m₁ m₂/(m₁² + m₂²) of each cell and the one upstream: 1/2 where the film is uniform. It
-    falls beside nearly closed cells and is zero beside closed ones: there the film is constant, and
-    its content varies with density only.
-    """
-    closed, limiter = problem.contact_gap, np.empty_like(content)
-    load_sharing.limiter(
-        content, _upstream(problem, content), gap, closed, OPENING_RANGE * closed, limiter
-    )
-    return limiter
-
-
 def limiter_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
     """Return derivatives of the limited correction in the own and, negative, the upstream content.
 
@@ -349,7 +351,7 @@ def limiter_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
     content = balance.film.content
     own, by_upstream = np.empty((2, *content.shape), dtype)
     load_sharing.limiter_slopes(
-        balance.limiter, content, _upstream(balance.problem, content), own, by_upstream
+        balance.limiter, content, upstream_content(balance.problem, content), own, by_upstream
     )
     return own, by_upstream
 
@@ -374,66 +376,3 @@ def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Any, Any, Field]
     )
     leaning = upstream * here / (upstream**2 + here**2) * (here - upstream)
     return faces, cells, leaning * other / (OPENING_RANGE * closed)
-
-
-def _second_order_outflow(
-    problem: Problem, content: Field, limiter: Field, *, second_order: bool
-) -> Field:
-    """Return the outflow of each cell due to the second order of the wedge, (nx, ny)."""
-    if not _is_lagrangian(problem):
-        return limiter_outflow(problem, content, limiter, limiter)
-    assert problem.past is not None
-    added = limiter * (content - _upstream(problem, content)) / problem.spacing[0]
-    limiter_correction = problem.past.limiter_correction
-    return (
-        added - limiter_correction / problem.spacing[0]
-        if second_order and limiter_correction is not None
-        else added
-    )
-
-
-def limiter_outflow(problem: Problem, content: Field, own: Field, upstream: Field) -> Field:
-    """Return the outflow of each cell due to the second order, for an additional content, (nx, ny).
-
-    The correction is `own` times a cell's content less `upstream` times that upstream: the limiter
-    itself, or its derivatives.
-    """
-    if _is_lagrangian(problem):
-        return own * content * content.dtype.type(1.0 / problem.spacing[0])
-    added = np.empty_like(content)
-    limited_outflow(content, own, upstream, problem.spacing[0], added)
-    return added
-
-
-def advected_outflow(problem: Problem, content: Field) -> Field:
-    """Return the outflow of each cell of a content that moves with the oil, (nx, ny).
-
-    Upwind, first order.
-    """
-    past, dx = problem.past, problem.spacing[0]
-    if past is None or not past.lagrangian:
-        outflow = content.copy()
-        outflow[1:] -= content[:-1]
-        outflow /= dx
-    else:
-        outflow = np.zeros_like(content)
-        if not problem.conserve:
-            outflow[0], outflow[1] = content[0] / dx, (content[1] - content[0]) / dx
-    return outflow if past is None else outflow + past.rate * content
-
-
-def upwind_at_outlet(problem: Problem, content: Field, outflow: Field) -> None:
-    """Make the film's last face first order, in place.
-
-    Where oil is missing, all of it must be upwind.
-    """
-    if not _is_lagrangian(problem):
-        dx = problem.spacing[0]
-        outflow[-1] -= (content[-1] - content[-2]) * content.dtype.type(0.5 / dx)
-
-
-def _outflow_by_content(problem: Problem) -> float:
-    """Return the derivative of a cell's outflow in its own content."""
-    past = problem.past
-    wedge = 0.0 if past is not None and past.lagrangian else 1.0 / problem.spacing[0]
-    return wedge if past is None else wedge + past.rate

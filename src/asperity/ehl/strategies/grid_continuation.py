@@ -361,25 +361,21 @@ def grid_error(
         fine.difference(coarse)
     )
     if by_first_order is not None and before:
-        half = replace(
-            half,
-            clr=0.5
-            * (ERROR_ESTIMATE.load_share_forward + ERROR_ESTIMATE.load_share_backward)
-            * apart.clr
-            + ERROR_ESTIMATE.load_share_per_cell_three * cell**2,
-        )
-        lean = replace(
-            lean,
-            clr=math.copysign(
-                0.5
-                * (ERROR_ESTIMATE.load_share_forward - ERROR_ESTIMATE.load_share_backward)
-                * apart.clr,
-                fine.clr - coarse.clr,
-            ),
-        )
+        half_clr, lean_clr = _load_share_error(apart.clr, fine.clr - coarse.clr, cell)
+        half, lean = replace(half, clr=half_clr), replace(lean, clr=lean_clr)
     return GridError(
         **asdict(replace(half, **ends)), lean=replace(lean, **dict.fromkeys(ends, 0.0))
     )
+
+
+def _load_share_error(apart: float, change: float, cell: float) -> tuple[float, float]:
+    """Return half the width and the lean of the load share's interval from three grids."""
+    half = (
+        0.5 * (ERROR_ESTIMATE.load_share_forward + ERROR_ESTIMATE.load_share_backward) * apart
+        + ERROR_ESTIMATE.load_share_per_cell_three * cell**2
+    )
+    lean = 0.5 * (ERROR_ESTIMATE.load_share_forward - ERROR_ESTIMATE.load_share_backward) * apart
+    return half, math.copysign(lean, change)
 
 
 def ends_error(on_grids: Sequence[float]) -> float:

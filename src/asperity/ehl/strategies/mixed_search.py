@@ -10,7 +10,8 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.ehl.contact_solution import ContactSolution
 from asperity.ehl.controls import CONTINUATION, MARCHING, SEARCH
-from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, uses_limiter
+from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
+from asperity.ehl.models.oil_advection import uses_limiter
 from asperity.ehl.models.single_pressure import Problem, TransientTerm
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step

@@ -1,6 +1,5 @@
-"""Exhibits of a tracked series: trend, amplitude, damping, levels, load share and spectra."""
+"""Exhibits of a tracked series over x: trend, amplitude, damping, levels and load share."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,19 +15,16 @@ from asperity.report.base import Exhibit
 from asperity.report.drawing import (
     display,
     draw_intervals,
-    group_values,
     legend_below,
     mark_split,
-    name_axes,
     one_panel,
     plain_log_labels,
 )
-from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREEN, GREY, VERMILION, Medium
+from asperity.report.style import BLUE, DASHED, GREEN, GREY, VERMILION, Medium
 from asperity.trend import INTERVAL_FACTOR, Stages
 
 MIN_CORRECTION = 1e-3  # of the CRF; smaller corrections for operating conditions are not drawn
 MARKERS = "osv^Dp*hXP<>"
-MAX_ROWS = 400  # of a waterfall; more recordings are thinned out
 SEVERITY = LinearSegmentedColormap.from_list("severity", ["#0072b2", "#e69f00", "#d55e00"])
 UNITS = {"um": "µm"} | {unit: unit for unit in ("h", "s", "min", "d", "mm", "nm", "m", "km")}
 
@@ -326,187 +322,3 @@ def _draw_trend(
     values, bars = values_and_bars
     draw_intervals(axes, x, values, bars, marker, ecolor=GREY, markersize=4, **style)
     axes.set_xlabel(x_label(track))
-
-
-def waterfall(track: Track) -> Exhibit:
-    """Draw the spectra of all recordings around the band, one per row, with their resonances.
-
-    Raises
-    ------
-    BadInput
-        for a series without a usable recording.
-    """
-    usable = [recording for recording in track.recordings if recording.clean is not None]
-    if not usable:
-        raise BadInput("no waterfall to draw: no recording is usable")
-    rows = usable[:: -(-len(usable) // MAX_ROWS)]
-
-    @one_panel(4.4, legend_columns=0)
-    def draw(axes: Axes) -> None:
-        frequency, levels = _waterfall_levels(track, rows)
-        limit = float(np.quantile(np.abs(levels), 0.995)) or 1.0
-        image = axes.imshow(
-            levels,
-            aspect="auto",
-            origin="lower",
-            cmap="cividis",
-            vmin=-0.6 * limit,
-            vmax=limit,
-            interpolation="none",
-            extent=(frequency[0], frequency[-1], 0.5, len(rows) + 0.5),
-        )
-        resonant = [
-            (recording.resonance.crf_hz, number)
-            for number, recording in enumerate(rows, 1)
-            if recording.resonance.found
-        ]
-        axes.plot(
-            [crf for crf, _ in resonant],
-            [number for _, number in resonant],
-            "o",
-            markerfacecolor="none",
-            color="white",
-            markersize=4.5,
-            markeredgewidth=0.9,
-            label=quantity("crf_hz").short,
-        )
-        for end in track.target.band_hz:
-            axes.axvline(end, color="white", linewidth=0.9, linestyle=DASHED)
-        name_axes(
-            axes,
-            "frequency_hz",
-            title="Spectra of the series",
-            ylabel=f"recording at {x_label(track)}",
-        )
-        axes.set_xlim(frequency[0], frequency[-1])
-        places = sorted({0, len(rows) // 4, len(rows) // 2, 3 * len(rows) // 4, len(rows) - 1})
-        axes.set_yticks(
-            [place + 1 for place in places], [f"{rows[place].x:.3g}" for place in places]
-        )
-        axes.spines[:].set_visible(False)
-        style: Any = {"location": "bottom", "shrink": 0.8}
-        axes.figure.colorbar(image, ax=axes, label=quantity("level_db").axis, **style)
-
-    return Exhibit(
-        "waterfall",
-        draw,
-        "One spectrum per row, without lines of shafts and mains. Dashed: search band. Vertical "
-        "ridges are structural modes of the machine.",
-        "Waterfall of the spectra of all recordings around the band.",
-    )
-
-
-def _waterfall_levels(track: Track, rows: list[TrackedRecording]) -> tuple[Field, Field]:
-    """Return frequencies around the band and the levels of each row over its median [dB]."""
-    frequency, inside = _band_frequencies(track)
-    group_size = max(1, int(np.count_nonzero(inside)) // 480)
-    density = np.array(
-        [
-            group_values(row.clean.spectrum.density[inside], group_size).mean(axis=1)
-            for row in rows
-            if row.clean is not None
-        ]
-    )
-    levels = 10.0 * np.log10(np.maximum(density, 1e-300))
-    levels -= np.median(levels, axis=1, keepdims=True)
-    return group_values(frequency[inside], group_size).mean(axis=1), levels
-
-
-def typical_recording(track: Track) -> TrackedRecording:
-    """Return the recording with the median CRF uncertainty, or else the first usable one."""
-    resonant = sorted(
-        (recording for recording in track.recordings if recording.resonance.found),
-        key=lambda recording: recording.resonance.crf_std,
-    )
-    if resonant:
-        return resonant[len(resonant) // 2]
-    return next(recording for recording in track.recordings if recording.clean is not None)
-
-
-def spectrum_with_fit(track: Track, recording: TrackedRecording) -> Exhibit:
-    """Draw a recording's spectrum around the band with its fit, CRF and removed lines.
-
-    Raises
-    ------
-    BadInput
-        for a recording without a spectrum.
-    """
-    spectrum, name, resonance = (
-        recording.reading.spectrum,
-        Path(recording.file).name,
-        recording.resonance,
-    )
-    if recording.clean is None or spectrum is None:
-        raise BadInput(f"no spectrum of {recording.file} to draw: {resonance.reason}")
-    clean = recording.clean
-
-    @one_panel(4.4)
-    def draw(axes: Axes) -> None:
-        frequency, inside = _band_frequencies(track)
-        group_size = max(1, int(np.count_nonzero(inside)) // 700)
-        f = group_values(frequency[inside], group_size).mean(axis=1)
-        recorded = group_values(spectrum.density[inside], group_size).max(axis=1)
-        cleaned = group_values(clean.spectrum.density[inside], group_size).mean(axis=1)
-        axes.axvspan(
-            *track.target.band_hz,
-            facecolor=BAND_COLOUR,
-            edgecolor=GREY,
-            linewidth=0.7,
-            label="search band",
-        )
-        axes.semilogy(f, recorded, color="#e3b9a0", linewidth=0.6, label="recorded (maximum)")
-        axes.semilogy(f, cleaned, color=GREY, linewidth=0.8, label="lines removed (mean)")
-        lines = [line.frequency_hz for line in clean.removed if f[0] <= line.frequency_hz <= f[-1]]
-        axes.plot(
-            lines,
-            np.full(len(lines), 0.985),
-            "|",
-            color=VERMILION,
-            markersize=5,
-            markeredgewidth=0.6,
-            transform=axes.get_xaxis_transform(),
-            label=f"{len(lines)} removed lines (shafts, mains)",
-        )
-        _draw_fit(axes, track, recording, f)
-        unit = quantity("acceleration_density").display if track.comparable else spectrum.unit
-        name_axes(axes, "frequency_hz", ylabel=f"density [{unit}]")
-        axes.set_xlim(f[0], f[-1])
-
-    return Exhibit(
-        "spectrum",
-        draw,
-        f"{name}, the recording with the median width of the CRF interval."
-        if resonance.found
-        else f"{name}: {resonance.reason}.",
-        f"Spectrum of {name} with its fit and the removed lines.",
-    )
-
-
-def _draw_fit(axes: Axes, track: Track, recording: TrackedRecording, frequency: Field) -> None:
-    (low, high), resonance, crf = track.target.band_hz, recording.resonance, quantity("crf_hz")
-    curve = resonance.curve(frequency)
-    within = (frequency >= low) & (frequency <= high) & (curve > 0.0)
-    if np.isfinite(curve[within]).any():
-        axes.semilogy(
-            frequency[within],
-            curve[within],
-            color=BLUE,
-            label="fit" if resonance.found else "fit, no resonance",
-        )
-    if resonance.found:
-        axes.axvline(resonance.crf_hz, color=BLUE, linestyle="--", linewidth=1.0, label=crf.short)
-    axes.set_title(
-        f"Spectrum: {crf.named(resonance.crf_hz) if resonance.found else 'no resonance found'}"
-    )
-
-
-def _band_frequencies(track: Track) -> tuple[Field, Any]:
-    """Return the frequencies of the series and a mask of those in and around the band."""
-    first = next(
-        recording.reading.spectrum for recording in track.recordings if recording.clean is not None
-    )
-    assert first is not None
-    low, high = track.target.band_hz
-    margin = 0.3 * (high - low)
-    frequency = first.frequency_hz
-    return frequency, (frequency >= max(low - margin, 0.0)) & (frequency <= high + margin)

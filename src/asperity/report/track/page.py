@@ -10,7 +10,7 @@ from asperity.core.quantities import NO_VALUE, in_print, quantity
 from asperity.monitoring import FORECAST, Track, TrackedRecording
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, render, write_page
 from asperity.report.forecast import forecast_exhibit
-from asperity.report.track import exhibits
+from asperity.report.track import exhibits, spectra
 from asperity.trend import ALERT_RATE_FACTOR, SOURCE_NAMES
 
 METHODS = {
@@ -238,8 +238,8 @@ def _details(track: Track) -> list[Exhibit]:
     if track.resonance_count and _with_clr(track):
         details.append(exhibits.asperity_load_share(track))
     if any(recording.clean is not None for recording in track.recordings):
-        details.append(exhibits.waterfall(track))
-        details.append(exhibits.spectrum_with_fit(track, exhibits.typical_recording(track)))
+        details.append(spectra.waterfall(track))
+        details.append(spectra.spectrum_with_fit(track, spectra.typical_recording(track)))
     return details
 
 
@@ -352,7 +352,7 @@ def _lines(track: Track) -> list[str]:
     """Describe the strongest lines removed from the spectrum shown."""
     if not any(recording.clean is not None for recording in track.recordings):
         return []
-    clean = exhibits.typical_recording(track).clean
+    clean = spectra.typical_recording(track).clean
     assert clean is not None
     strongest = sorted(clean.removed, key=lambda line: -line.mean_square)[:MAX_LINES]
     strongest.sort(key=lambda line: line.frequency_hz)

@@ -117,35 +117,10 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
         figure = Figure(figsize=(medium.double, 3.2), layout="constrained")
         left, right = panels_in_rows(figure, 2)
         hours, sq = table["hours"].to_numpy(float), display("sq_m", table["sq_m"].to_numpy(float))
-        crf, low, high = (
-            table[key].to_numpy(float) for key in ("crf_hz", "crf_low_hz", "crf_high_hz")
-        )
-        mean_low, mean_high = (
-            table[key].to_numpy(float) for key in ("crf_mean_low_hz", "crf_mean_high_hz")
-        )
         for axes, x, key in ((left, hours, "hours"), (right, sq, "sq_m")):
-            axes.fill_between(
-                x,
-                mean_low,
-                mean_high,
-                color=BLUE,
-                alpha=0.3,
-                linewidth=0,
-                label="mean over positions, 90 %",
-            )
-            if np.isfinite(low).any():
-                axes.fill_between(
-                    x,
-                    low,
-                    high,
-                    color=BLUE,
-                    alpha=0.1,
-                    linewidth=0,
-                    label="with scatter and grid, 90 %",
-                )
-            axes.plot(x, crf, color=BLUE, label="this contact")
-            axes.set(xlabel=quantity(key).axis, ylabel=quantity("crf_hz").label)
-        right.plot(sq[:1], crf[:1], "o", color=BLUE, markersize=4, label="new")
+            _draw_crf(axes, x, key, history)
+        new = table["crf_hz"].to_numpy(float)[:1]
+        right.plot(sq[:1], new, "o", color=BLUE, markersize=4, label="new")
         stages = history.stages
         if stages is not None and stages.found:
             left.axvspan(
@@ -153,25 +128,7 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
             )
             left.axvline(stages.split, color=GREY)
         if papers:
-            ends = SAMPLES_SQ_UM[0], SAMPLES_SQ_UM[-1]
-            right.plot(
-                ends,
-                CRF_ENDS_HZ,
-                "D",
-                color=VERMILION,
-                markersize=4.5,
-                label="paper: first and last ring",
-            )
-            for end in CRF_ENDS_HZ:
-                left.axhline(end, color=VERMILION, linestyle=DASHED, linewidth=0.9)
-            bottom = right.get_ylim()[0]
-            right.plot(
-                SAMPLES_SQ_UM,
-                np.full(len(SAMPLES_SQ_UM), bottom),
-                "|",
-                color=VERMILION,
-                label="Sq of the rings",
-            )
+            _draw_paper_values(left, right)
         handles, names = [], []
         for axes in (left, right):
             for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -193,6 +150,49 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
         "Contact resonance of the mean contact over hours and over the composite roughness."
         f"{paper_note}",
         "CRF over hours and over Sq",
+    )
+
+
+def _draw_crf(axes: Axes, x: Field, key: str, history: WearHistory) -> None:
+    """Draw the CRF with both intervals over `x`, the values of quantity `key`."""
+    crf, low, high, mean_low, mean_high = (
+        history.table[name].to_numpy(float)
+        for name in (
+            "crf_hz",
+            "crf_low_hz",
+            "crf_high_hz",
+            "crf_mean_low_hz",
+            "crf_mean_high_hz",
+        )
+    )
+    style: Any = {"color": BLUE, "linewidth": 0}
+    axes.fill_between(x, mean_low, mean_high, alpha=0.3, label="mean over positions, 90 %", **style)
+    if np.isfinite(low).any():
+        axes.fill_between(x, low, high, alpha=0.1, label="with scatter and grid, 90 %", **style)
+    axes.plot(x, crf, color=BLUE, label="this contact")
+    axes.set(xlabel=quantity(key).axis, ylabel=quantity("crf_hz").label)
+
+
+def _draw_paper_values(left: Axes, right: Axes) -> None:
+    """Draw the paper's CRF of the first and last ring, and Sq of all rings."""
+    ends = SAMPLES_SQ_UM[0], SAMPLES_SQ_UM[-1]
+    right.plot(
+        ends,
+        CRF_ENDS_HZ,
+        "D",
+        color=VERMILION,
+        markersize=4.5,
+        label="paper: first and last ring",
+    )
+    for end in CRF_ENDS_HZ:
+        left.axhline(end, color=VERMILION, linestyle=DASHED, linewidth=0.9)
+    bottom = right.get_ylim()[0]
+    right.plot(
+        SAMPLES_SQ_UM,
+        np.full(len(SAMPLES_SQ_UM), bottom),
+        "|",
+        color=VERMILION,
+        label="Sq of the rings",
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.monitoring.reading import Reading, pack_reading, unpack_reading
-from asperity.monitoring.store import (
+from asperity.monitoring.store.database import (
     FileVersion,
     SensorAddress,
     StandingAlarm,

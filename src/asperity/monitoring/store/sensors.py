@@ -11,22 +11,22 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from asperity.core.errors import BadInput
-from asperity.monitoring.notification_queue import (
-    NotificationQueue,
-    PendingNotification,
-    notification_content,
-)
 from asperity.monitoring.reading import Reading
-from asperity.monitoring.sensor import ACKNOWLEDGED, TOGETHER, Sensor
 from asperity.monitoring.series_state import SeriesMemory, pack_shared, unpack_shared
 from asperity.monitoring.silence import SILENCE
-from asperity.monitoring.store import (
+from asperity.monitoring.store.database import (
     FileVersion,
     SensorAddress,
     StandingAlarm,
     Store,
     StoredRecording,
 )
+from asperity.monitoring.store.notification_queue import (
+    NotificationQueue,
+    PendingNotification,
+    notification_content,
+)
+from asperity.monitoring.store.sensor import ACKNOWLEDGED, TOGETHER, Sensor
 from asperity.monitoring.track_result import Track
 from asperity.trend import AlarmState
 

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from asperity.monitoring.reading import channels_in
-from asperity.monitoring.sensor import FOLDER, TOGETHER
-from asperity.monitoring.sensors import Sensors
-from asperity.monitoring.store import SensorAddress, Store
+from asperity.monitoring.store.database import SensorAddress, Store
+from asperity.monitoring.store.sensor import FOLDER, TOGETHER
+from asperity.monitoring.store.sensors import Sensors
 from asperity.monitoring.target import Target
 from asperity.recording import ReadOptions
 

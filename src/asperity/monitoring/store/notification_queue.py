@@ -5,8 +5,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 from uuid import uuid4
 
-from asperity.monitoring.sensor import now
-from asperity.monitoring.store import SensorAddress, Store
+from asperity.monitoring.store.database import SensorAddress, Store
+from asperity.monitoring.store.sensor import now
 from asperity.trend import ALARM_STATES
 
 

@@ -1,0 +1,1 @@
+"""Store of monitored machines: the SQLite file, its sensors and their notifications."""
