@@ -34,10 +34,19 @@ CODE = Path(asperity.__file__).parent
 SOURCES = [
     Path(__file__),
     *(
-        CODE / "wear" / f"{name}.py"
-        for name in ("alarm", "sequential", "regressors", "warming", "stages", "bends")
+        CODE / "trend" / f"{name}.py"
+        for name in (
+            "alarm",
+            "alarm_inputs",
+            "sequential",
+            "regressors",
+            "warming",
+            "stages",
+            "stage_models",
+            "change_points",
+        )
     ),
-    *(CODE / "tracking" / f"{name}.py" for name in ("alarming", "operating")),
+    *(CODE / "monitoring" / f"{name}.py" for name in ("alarm", "operating_point")),
 ]
 SERIES, RECORDINGS = 300, 40
 NUMBER = np.arange(float(RECORDINGS))

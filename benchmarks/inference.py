@@ -34,7 +34,7 @@ from asperity.inference import (
     infer_observations,
     inference_setting,
 )
-from asperity.inference.inference import STAGES, stages
+from asperity.inference.inference import STAGES, stage_probabilities
 from asperity.inference.recording_input import resonance_band
 from asperity.paper import Disturbance
 from asperity.paper.rig_recording import GRID_HZ, RigTest, contact_line, draw_background
@@ -318,7 +318,7 @@ def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[st
             low, high = np.quantile(values, (0.05, 0.95))
             ends |= {f"{key}_{name}low": float(low), f"{key}_{name}high": float(high)}
     own = found.point_estimates()[place - 1]
-    true_stage = max(stages(np.array([clr])).items(), key=lambda entry: entry[1])[0]
+    true_stage = max(stage_probabilities(np.array([clr])).items(), key=lambda entry: entry[1])[0]
     ordered = sorted(STAGES, key=lambda stage: -own.stages[stage])
     reached = np.cumsum([own.stages[stage] for stage in ordered])
     needed = ordered[: int(np.searchsorted(reached, 0.9)) + 1]

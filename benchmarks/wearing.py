@@ -35,18 +35,20 @@ from asperity.simulation import (
 from asperity.simulation.wear.rows import load_share
 from asperity.surface.read import surface_topography
 from asperity.wear import combined_roughness, positions
-from benchmarks.unfinished import add_mark
+from benchmarks.unfinished import stamp
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "build" / "wearing"
 WEARS = (
-    "wearing",
+    "wear",
     "ehl",
+    "solution",
+    "contact",
     "kernels",
     "surface",
     "lubricant",
 )  # rooms that decide a history; of their own room these:
-DECIDE = ("jump", "run", "contact", "reach", "worn")
+DECIDE = ("jump", "run", "contact", "reach", "state", "tracks")
 IMAGES = ROOT / "docs" / "images"
 EXAMPLE = ROOT / "examples" / "wear.toml"
 MEASURED = ROOT.parent / "shared" / "data" / "surfaces" / "milled_1.opd"
@@ -100,7 +102,7 @@ class Shelf:
 
     def __init__(self, seconds: float) -> None:
         self.end = time.perf_counter() + ENOUGH_CELLS * seconds
-        self.folder = KEPT / add_mark(*WEARS, *(f"ageing/{name}" for name in DECIDE))
+        self.folder = KEPT / stamp(*WEARS, *(f"simulation/wear/{name}" for name in DECIDE))
         self.left: list[str] = []
         self.made = 0
 
