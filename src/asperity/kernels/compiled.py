@@ -103,7 +103,7 @@ class _Cache(FunctionCache):
 
 
 def njit(*, cache: bool, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Compile like `numba.njit`, with a verified cache.
+    """Compile like njit of numba, with a verified cache.
 
     The kernel is compiled without a cache where no folder for it is writable.
     """
