@@ -272,7 +272,7 @@ class Worn:
         self.hours = hours
 
     @staticmethod
-    def at(hours):
+    def values_at(hours):
         return {"sq_m": 0.5e-6 * 2.0 ** (hours / 200.0)}
 
 
