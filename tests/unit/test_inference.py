@@ -442,7 +442,7 @@ def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
     ("change", "said"),
     [
         ({"infer.sq": {"from": "1 um", "to": "0.5 um"}}, "must have an ascending range"),
-        ({"infer.sq": {"from": "0.5 um", "to": "2 N"}}, "infer.sq.to must be in um"),
+        ({"infer.sq": {"from": "0.5 um", "to": "2 N"}}, "infer.sq.to must have the unit um"),
         (
             {"infer.radius": {"from": "1 mm", "to": "2 mm"}},
             "infer.radius cannot be inferred; possible are",
@@ -535,7 +535,7 @@ def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
         [0.7 - 0.022, 0.7, 0.7 + 0.022], abs=0.006
     )
     assert known.ranges == setting.ranges  # the emulator's own
-    assert said.startswith("Sq is taken as ring.csv shows it, 0.7")
+    assert said.startswith("The prior of Sq is that of ring.csv, 0.7")
     told = infer_observations(known, emulator, of_one.observations).posterior()["clr"]
     alone = of_one.posterior()["clr"]
     assert told.high - told.low < 0.8 * (alone.high - alone.low)

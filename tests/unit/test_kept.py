@@ -95,7 +95,7 @@ def test_a_changed_value_in_a_manifest_is_refused(tmp_path):
     write_json(path, {"points": [{"surface.sq": "0.5 um"}], "pair": (1, 2)})
     assert read_json(path, "") == {"points": [{"surface.sq": "0.5 um"}], "pair": [1, 2]}
     path.write_text(path.read_text().replace("0.5 um", "0.7 um"))
-    with pytest.raises(UnreadableFile, match="other content"):
+    with pytest.raises(UnreadableFile, match="its digest does not match its content"):
         read_json(path, "compute it again")
     path.write_text(json.dumps({"points": []}))
     with pytest.raises(UnreadableFile, match="no digest"):
