@@ -91,7 +91,7 @@ def test_half_a_fit_is_refused(asp, recorded):
         ),
         (("case.toml",), "needs a case and --hours"),
         ((), "needs a case and --hours"),
-        (("--fit", trace, "--scar", scar), "names no units"),
+        (("--fit", trace, "--scar", scar), "states no units"),
         (("--fit", trace, "--scar", "nowhere.csv"), "nowhere.csv does not exist"),
         (("--fit", trace, "--scar", scar, "--load", "5 m"), "--load must be"),
     ):

@@ -38,7 +38,7 @@ def test_who_must_act_reads_what_since_when_how_sure_and_what_next(failing):
     said = acted(failing)
     assert list(said) == ["Finding", "Since", "Last recording", "Severity", "Confidence", "Action"]
     assert re.fullmatch(
-        r"The level \(rms\) rose to [\d.]+ times what it was since [\d.]+ h\.", said["Finding"]
+        r"The level \(rms\) rose to [\d.]+ times its baseline since [\d.]+ h\.", said["Finding"]
     )
     first = failing.recordings[failing.alarm.since]
     assert first.reading.started.replace("T", " ") in said["Since"]
