@@ -90,7 +90,7 @@ def test_json_has_every_way_and_which_decides(track):
 def test_the_page_shows_each_way_and_the_damping_with_its_break(track):
     page = render_track_page(track)
     assert "Damping (decides)" in page
-    assert "By it alone: Severe wear from" in page
+    assert "From damping alone: Severe wear from" in page
     assert "Damping decides stage and alarm" in page
 
 
