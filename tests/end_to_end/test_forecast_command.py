@@ -129,7 +129,9 @@ def test_infer_foretells_with_a_wear_history_and_a_measured_surface(asp, asked):
     rough = 1.5e-6 * np.random.default_rng(1).standard_normal((48, 48))
     x3pio.write("ring.x3p", rough, x_scale=2e-6, y_scale=2e-6)
     known = json.loads(asp("infer", *asked, "--surface", "ring.x3p", "--json")[1])
-    assert any(note.startswith("The prior of Sq is that of ring.x3p, 1.5") for note in known["notes"])
+    assert any(
+        note.startswith("The prior of Sq is that of ring.x3p, 1.5") for note in known["notes"]
+    )
     free = json.loads(asp("infer", *asked, "--json")[1])
     widths = [
         one["posterior"]["sq_m"]["high"] - one["posterior"]["sq_m"]["low"] for one in (known, free)

@@ -171,7 +171,9 @@ def test_a_history_is_heard_by_its_own_approach_and_stiffness(history, vibration
     chosen, rows = history.case, history.settled
     assert vibration.unsolved == ()
     number = vibration.moments[0]
-    surface = chosen.moving_surfaces().composite_at(float(rows["time_s"][rows["step"] == number].iloc[0]))
+    surface = chosen.moving_surfaces().composite_at(
+        float(rows["time_s"][rows["step"] == number].iloc[0])
+    )
     contact = solve_contact(chosen.conditions, chosen.lubricant, surface, options=chosen.options)
     assert vibration.stiffness[0] == pytest.approx(tangent_stiffness(contact).total, rel=1e-6)
     assert vibration.oscillator.stiffness == pytest.approx(np.mean(vibration.stiffness))
@@ -194,7 +196,9 @@ def test_its_damping_is_that_of_its_moments_solved_apart(history, vibration):
     chosen, rows = history.case, history.settled
     assert vibration.damping.shape == vibration.dynamic.shape == (2,)
     number = vibration.moments[1]
-    surface = chosen.moving_surfaces().composite_at(float(rows["time_s"][rows["step"] == number].iloc[0]))
+    surface = chosen.moving_surfaces().composite_at(
+        float(rows["time_s"][rows["step"] == number].iloc[0])
+    )
     contact = solve_contact(chosen.conditions, chosen.lubricant, surface, options=chosen.options)
     own = own_resonance(contact, chosen.vibration.mass).elastic
     assert vibration.damping[1] == pytest.approx(own.damping_ratio, rel=1e-3)

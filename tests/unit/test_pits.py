@@ -77,9 +77,9 @@ def test_the_ends_of_a_track_are_one_place():
         for patch in (middle, ends)
     )
     np.testing.assert_allclose(np.roll(one, turn, axis=1), other, atol=1e-6 * P_MAX)
-    below = stress_below(middle.pressure, None, grid, np.array([20e-6]), poisson_ratio=0.3).at(
-        20e-6
-    )
+    below = stress_below(
+        middle.pressure, None, grid, np.array([20e-6]), poisson_ratio=0.3
+    ).tensor_at(20e-6)
     np.testing.assert_allclose(one[2, ..., 1], below.zz, atol=1e-6 * P_MAX)
     assert not one[..., 0].any()
 
