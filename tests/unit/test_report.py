@@ -299,9 +299,9 @@ def test_only_what_differs_is_told_apart(several):
     rows = several.html.split('<tr class="varies">')[1:]
     names = [re.search(r"<th[^>]*>([^<]*)<", row)[1] for row in rows]
     fits = [
-        "Fitted central film, Moes",
-        "Fitted least film, Dowson (1968)",
-        "Fitted least film, Blok (1952)",
+        "Fitted central film thickness, Moes",
+        "Fitted minimum film thickness, Dowson (1968)",
+        "Fitted minimum film thickness, Blok (1952)",
     ]
     given = [
         "Load",
@@ -482,7 +482,7 @@ def test_silent_dry_and_deaf_runs_have_a_page_too():
     )
     silent = Page(page.render_page([run_like(smooth, sq=0.0, clr=0.0, car=0.0, lambda_ratio=None)]))
     assert "No spectrum" in silent.text
-    assert next(row for row in silent.rows if row[0].startswith("Film ratio"))[1] == "–"
+    assert next(row for row in silent.rows if row[0].startswith("Lambda ratio"))[1] == "–"
     assert next(row for row in silent.rows if row[0].startswith("Contact resonance"))[1] == "–"
 
     dry = re.sub(r"\[lubricant\].*?(?=\[surface\])", "", CASE, flags=re.DOTALL)

@@ -131,7 +131,7 @@ def test_ranges_are_read_and_gone_through():
     [
         ("material.hardness", "KEY=LOW..HIGH"),
         ("material.hardness=1 GPa..", "KEY=LOW..HIGH"),
-        ("material.hardness=1 GPa..3 um", "must be in GPa"),
+        ("material.hardness=1 GPa..3 um", "must have the unit GPa"),
         ("material.hardness=3 GPa..1 GPa", "ascending range"),
         ("material.hardness=hard..harder", 'got "hard"'),
     ],
