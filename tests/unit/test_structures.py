@@ -24,7 +24,9 @@ def without(monkeypatch):
     """Deviations as they were before they carried what fits leave."""
 
     def left_out():
-        monkeypatch.setattr(misfit, "_model_error_std", lambda _, line, *__: np.zeros((len(line), 4)))
+        monkeypatch.setattr(
+            misfit, "_model_error_std", lambda _, line, *__: np.zeros((len(line), 4))
+        )
 
     return left_out
 
