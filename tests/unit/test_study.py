@@ -421,7 +421,7 @@ def test_a_folder_that_is_no_study_is_said_so(tmp_path):
     with pytest.raises(UnreadableFile, match="has no digest"):
         load_study(tmp_path)
     write_json(tmp_path / "manifest.json", {"of": "history"})
-    with pytest.raises(UnreadableFile, match="not a study's manifest"):
+    with pytest.raises(UnreadableFile, match="is not a study manifest"):
         load_study(tmp_path)
 
 
