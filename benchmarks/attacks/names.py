@@ -78,7 +78,7 @@ def _in_page(page: Path) -> str | None:
     if not page.exists():
         return None
     text = page.read_text("utf-8")
-    bad = re.search(r"<script>alert|<img src=x|<svg onload|</style><b>|\b49\b</", text)
+    bad = re.search(r"<script>alert|<img src=x|<svg onload|</style><b>|(?<![\d.])49</", text)
     return f"{page.name} holds {bad[0]!r}" if bad else None
 
 
