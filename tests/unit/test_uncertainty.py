@@ -1,10 +1,11 @@
 """How far a contact's numbers may be off: what the parts are, how they add up, and what surfaces of one kind make."""
 
-from dataclasses import replace
+from dataclasses import re
 from importlib.resources import files
 
 import numpy as np
 import pytest
+import replace
 
 import asperity.results.solve as solving
 from asperity import BadInput, load_case, load_run, solve_case
@@ -120,7 +121,7 @@ def test_without_a_coarser_grid_the_error_is_not_determined(alone):
     assert alone.verdict().count("± not determined") == 2
     table = "\n".join(run_table(alone))
     assert "CLR, 90 % interval" in table
-    assert "CLR, cell size                                       not determined" in table
+    assert re.search(r"CLR, cell size +not determined", table)
 
 
 def test_numbers_of_several_surfaces_are_means_over_them(three, alone):
@@ -272,7 +273,7 @@ def test_a_measured_map_is_solved_at_places_that_do_not_overlap(tmp_path):
 def test_a_map_with_room_for_one_is_solved_once_and_more_are_refused(tmp_path):
     small = measured_case(tmp_path, 190, 120)
     assert small.surface_count() == 1
-    with pytest.raises(BadInput, match="room for 1 such"):
+    with pytest.raises(BadInput, match="holds 1 non-overlapping contacts"):
         small.surface_count(4)
 
 
