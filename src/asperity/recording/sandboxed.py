@@ -24,7 +24,7 @@ _MAX_OPEN_FILES = 4  # threads of a caller may read several files
 
 
 def contents(path: Path, reader: str, library: str) -> Contents:
-    """List the channels of a file by the `read` of the module `reader`; raises as `read_in_subprocess`.
+    """List the channels of a file by `read` of the module `reader`; raises as `read_in_subprocess`.
 
     `library` is loaded before, within its own time limit.
     """
