@@ -1,11 +1,11 @@
 """How far a contact's numbers may be off: what the parts are, how they add up, and what surfaces of one kind make."""
 
-from dataclasses import re
+import re
+from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
 import pytest
-import replace
 
 import asperity.results.solve as solving
 from asperity import BadInput, load_case, load_run, solve_case
