@@ -222,7 +222,7 @@ def test_a_dry_run_tells_what_it_would_cost(asp):
     ],
 )
 def test_bad_input_is_one_sentence_and_writes_no_table(asp, monkeypatch, words, sentence):
-    monkeypatch.setattr(execution, "DASK_WAIT_S", 1.0)
+    monkeypatch.setattr("asperity.study.dask_workers.DASK_WAIT_S", 1.0)
     code, out, err = asp("study", str(CASE), "--out", "out", *WORDS, *words)
     assert (code, out) == (2, "")
     assert sentence in err
