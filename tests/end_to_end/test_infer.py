@@ -181,7 +181,7 @@ def test_refusals_are_one_sentence(asp):
     Path("nan.csv").write_text("file,load_n\na.wav,nan\n", "utf-8")
     Path("empty").mkdir()
     for arguments, said in (
-        (("a.wav",), "give --case"),
+        (("a.wav",), "state --case"),
         (("--case", "infer.toml"), "asperity infer needs recordings"),
         (("a.wav", "--case", "infer.toml", "--worn", "d"), "add --forecast"),
         (
@@ -207,7 +207,7 @@ def test_refusals_are_one_sentence(asp):
         (("empty", "--case", "infer.toml"), "contains no recordings"),
         (
             ("a.wav", "--case", "infer.toml", "--table", "kilo.csv"),
-            "has a column load_kn; take load_n",
+            "has a column load_kn; use load_n",
         ),
         (("a.wav", "--case", "infer.toml", "--table", "nan.csv"), "load_n must be a number"),
         (
