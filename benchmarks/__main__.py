@@ -1,7 +1,9 @@
-"""`make bench`: every figure that the docs quote, measured part by part within a time, kept, and compared.
+"""`make bench`: every figure that the docs quote, measured part by part within a time, kept, and
+compared.
 
-Each part runs in a process of its own, on one thread: one that fails or takes too long is named at the end, with what
-it said the last time left standing. A run that is cut off, or out of time, goes on where it stopped.
+Each part runs in a process of its own, on one thread: one that fails or takes too long is named at
+the end, with what it said the last time left standing. A run that is cut off, or out of time, goes
+on where it stopped.
 """
 
 import argparse
@@ -23,7 +25,9 @@ from threadpoolctl import threadpool_limits
 from benchmarks import kept, unfinished
 from benchmarks.unfinished import Unfinished
 
-ALONE = (  # whose times are their result: nothing runs beside them; those first that the others' are told against
+# whose times are their result: nothing runs beside them; those first that the others' are told
+# against
+ALONE = (
     "prompt",
     "roughness_levels",
     "first_call",
@@ -44,7 +48,9 @@ ALONE = (  # whose times are their result: nothing runs beside them; those first
     "monitor",
     "gallery",
 )
-ABREAST = (  # what is counted, on each processor one of these, each one part or some that need what another keeps
+# what is counted, on each processor one of these, each one part or some that need what another
+# keeps
+ABREAST = (
     ("inference", "forecast", "next_points", "rings"),  # the longest first
     ("wearing",),
     ("indicators",),
@@ -129,7 +135,8 @@ def main() -> None:
     )
     if run.done:
         print(
-            f"Going on with the run of {run.began}, after {', '.join(run.done)}; --afresh starts anew.\n",
+            f"Going on with the run of {run.began}, after {', '.join(run.done)}; --afresh starts"
+            " anew.\n",
             flush=True,
         )
     _measure(asked, run)

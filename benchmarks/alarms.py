@@ -1,7 +1,8 @@
-"""How often the alarm speaks: series of indicators without wear, with the severe stage, and machines run to failure.
+"""How often the alarm speaks: series of indicators without wear, with the severe stage, and
+machines run to failure.
 
-Each series is judged after every one of its 40 recordings, as `watch` does. `python -m benchmarks.alarms` runs this
-part alone; `--fast` a tenth of it.
+Each series is judged after every one of its 40 recordings, as `watch` does. `python -m
+benchmarks.alarms` runs this part alone; `--fast` a tenth of it.
 """
 
 import argparse
@@ -62,10 +63,12 @@ CYCLES = (6.0, 8.0, 12.0, 24.0)  # recordings a day
 
 
 class Drawn(NamedTuple):
-    """CRF over its first value, logarithm of the level; the recording at which the severe stage begins, if it does.
+    """CRF over its first value, logarithm of the level; the recording at which the severe stage
+    begins, if it does.
 
-    `depth` is the logarithm of how deep the envelope is modulated at a fault's rate, `bands` those of velocity and two
-    bands. `load` [N] and `temperature` [degC] as measured, where they are given.
+    `depth` is the logarithm of how deep the envelope is modulated at a fault's rate, `bands` those
+    of velocity and two bands. `load` [N] and `temperature` [degC] as measured, where they are
+    given.
     """
 
     crf: np.ndarray
@@ -94,7 +97,9 @@ def drawn(
     memory: float = 0.0,
     source: np.ndarray | float = 0.0,
 ) -> Drawn:
-    """Courses of CRF and levels with scatter on them; `source` is by how much more of a bearing is heard than usual."""
+    """Courses of CRF and levels with scatter on them; `source` is by how much more of a bearing is
+    heard than usual.
+    """
     crf = course + rng.choice(SCATTERS) * remembered(rng, memory)
     heard = np.exp(2.0 * np.asarray(source))
     whole = level + 0.5 * np.log(0.5 * (1.0 + heard))
@@ -160,7 +165,9 @@ def steepening(rng: np.random.Generator) -> Drawn:
 
 
 def under_load(rng: np.random.Generator, load: np.ndarray, memory: float = 0.0) -> Drawn:
-    """CRF as load to the power of 0.1 to 0.3, the level as that of 0 to 1; the load measured to 1 %."""
+    """CRF as load to the power of 0.1 to 0.3, the level as that of 0 to 1; the load measured to 1
+    %.
+    """
     ln = np.log(load / load[0])
     one = drawn(rng, np.exp(rng.uniform(0.1, 0.3) * ln), rng.uniform(0.0, 1.0) * ln, memory)
     return one._replace(load=load * (1.0 + 0.01 * rng.standard_normal(RECORDINGS)))
@@ -177,7 +184,9 @@ def in_turns(rng: np.random.Generator) -> Drawn:
 
 
 def warmth(rng: np.random.Generator, temperature: np.ndarray, memory: float = 0.0) -> Drawn:
-    """CRF and level as powers of an oil's viscosity: Vogel's, of 30 to 300 mPa s at 40 degC; measured to 0.5 K."""
+    """CRF and level as powers of an oil's viscosity: Vogel's, of 30 to 300 mPa s at 40 degC;
+    measured to 0.5 K.
+    """
     thin = 1000.0 * (1.0 / (temperature + 95.0) - 1.0 / 135.0)
     size = rng.uniform(0.02, 0.12) / np.ptp(thin)
     one = drawn(
@@ -234,7 +243,9 @@ WITHOUT_WEAR: dict[str, Callable[[np.random.Generator], Drawn]] = {
 def knee(
     rng: np.random.Generator, scatter_hz: float, memory: float = 0.0, *, between: bool = False
 ) -> Drawn:
-    """The rig's course of CRF over recordings, its knee drawn among the 12th to the 24th, or anywhere between them."""
+    """The rig's course of CRF over recordings, its knee drawn among the 12th to the 24th, or
+    anywhere between them.
+    """
     begins = float(rng.uniform(12.0, 24.0) if between else rng.integers(12, 25))
     pace = RISE_HZ / begins
     course = CRF_HZ + np.where(
@@ -271,7 +282,9 @@ KNEES: dict[str, Callable[[np.random.Generator], Drawn]] = {
 
 
 def to_failure(rng: np.random.Generator) -> Drawn:
-    """Level only: steady, then up 15 to 25 times until the end, faster and faster; no contact resonance."""
+    """Level only: steady, then up 15 to 25 times until the end, faster and faster; no contact
+    resonance.
+    """
     begins = rng.integers(15, 30)
     grown = np.maximum(NUMBER - begins, 0.0) / (RECORDINGS - 1 - begins)
     level = np.log(rng.uniform(15.0, 25.0)) * grown ** rng.uniform(1.0, 2.0)
@@ -343,7 +356,9 @@ def _stated(values: np.ndarray | None) -> list[float | None]:
 
 
 class Rows:
-    """Rows that are done, kept in a file as long as the code behind them is the same; a run goes on behind them."""
+    """Rows that are done, kept in a file as long as the code behind them is the same; a run goes on
+    behind them.
+    """
 
     def __init__(self, file: Path = KEPT) -> None:
         self.file, self.code = (
@@ -365,15 +380,25 @@ class Rows:
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time; `fast` takes a tenth of the series. What was cut off goes on where it stopped."""
+    """Markdown, a line at a time; `fast` takes a tenth of the series. What was cut off goes on
+    where it stopped.
+    """
     series = SERIES // (10 if fast else 1)
     rows = Rows()
-    yield f"## Alarms: {series} series of {RECORDINGS} recordings a row, one false alarm in {1.0 / FALSE_ALARM_RATE:.0f}\n"
-    yield "| nothing wears | ever an alarm | ever an alert | ever cannot tell, behind the baseline |"
+    yield (
+        f"## Alarms: {series} series of {RECORDINGS} recordings a row, one false alarm in"
+        f" {1.0 / FALSE_ALARM_RATE:.0f}\n"
+    )
+    yield (
+        "| nothing wears | ever an alarm | ever an alert | ever cannot tell, behind the baseline |"
+    )
     yield "|---|---|---|---|"
     for name, draw in (WITHOUT_WEAR | GIVEN).items():
         yield f"| {name} | {rows.row(f'{series} {name}', partial(quiet_row, draw, series))} |"
-    yield "\n| the severe stage begins | found | too early | recordings until then, median | 90 % within |"
+    yield (
+        "\n| the severe stage begins | found | too early | recordings until then, median | 90 %"
+        " within |"
+    )
     yield "|---|---|---|---|---|"
     for name, draw in (KNEES | {"level alone, up 15 to 25 times by the end": to_failure}).items():
         yield f"| {name} | {rows.row(f'{series} {name}', partial(found_row, draw, series))} |"
@@ -410,7 +435,9 @@ def probabilities(one: Drawn, recordings: int) -> np.ndarray:
 
 
 def reliability_lines(series: int) -> Iterator[str]:
-    """How often a recording is severe that is said to be so with some probability; half of the series wear."""
+    """How often a recording is severe that is said to be so with some probability; half of the
+    series wear.
+    """
     said: list[np.ndarray] = []
     true: list[np.ndarray] = []
     rows = [[draw for name, draw in WITHOUT_WEAR.items() if name in RELIABLE], BETWEEN]
@@ -432,7 +459,9 @@ def reliability_lines(series: int) -> Iterator[str]:
 
 def held_lines(series: int) -> Iterator[str]:
     """How often the break's 90 % interval holds it, where a severe stage is found."""
-    yield "\n| the break of the stages | severe found | 90 % interval holds it | its length, median |"
+    yield (
+        "\n| the break of the stages | severe found | 90 % interval holds it | its length, median |"
+    )
     yield "|---|---|---|---|"
     for scatter_hz in (5.0, 15.0, 30.0):
         for memory in (0.0, 0.7):
@@ -445,7 +474,9 @@ def held_lines(series: int) -> Iterator[str]:
                     lengths.append(found.interval[1] - found.interval[0])
             shares = (1000.0 * len(held) / series, 100.0 * np.mean(held))
             scatters = f"scatter {scatter_hz:g} Hz{', remembers 0.7' if memory else ''}"
-            yield f"| {scatters} | {shares[0]:.0f} % | {shares[1]:.0f} % | {np.median(lengths):.2g} |"
+            yield (
+                f"| {scatters} | {shares[0]:.0f} % | {shares[1]:.0f} % | {np.median(lengths):.2g} |"
+            )
 
 
 def _bins(whose: str, chance: np.ndarray, severe: np.ndarray) -> Iterator[str]:
@@ -455,7 +486,10 @@ def _bins(whose: str, chance: np.ndarray, severe: np.ndarray) -> Iterator[str]:
         inside = (chance >= low) & (chance < high)
         if inside.any():
             shares = (100.0 * chance[inside].mean(), 100.0 * severe[inside].mean())
-            yield f"| {low:g} to {min(high, 1.0):g} | {inside.sum()} | {shares[0]:.0f} % | {shares[1]:.0f} % |"
+            yield (
+                f"| {low:g} to {min(high, 1.0):g} | {inside.sum()} | {shares[0]:.0f} % |"
+                f" {shares[1]:.0f} % |"
+            )
 
 
 def found_row(draw: Callable[[np.random.Generator], Drawn], series: int) -> str:

@@ -1,8 +1,8 @@
 """Four studies against what the paper prints: `python -m benchmarks.anchors [CELLS]`.
 
-Default: examples/paper.toml, by its own model and by the paper's; as printed: the domain that the paper prints, which
-starves the film; calibrated: the free parameters that meet the anchors best (docs/theory/calibration.md); both by the
-paper's model.
+Default: examples/paper.toml, by its own model and by the paper's; as printed: the domain that the
+paper prints, which starves the film; calibrated: the free parameters that meet the anchors best
+(docs/theory/calibration.md); both by the paper's model.
 """
 
 import sys
@@ -61,7 +61,8 @@ def print_anchors(cells: int | None = None) -> None:
             )
             cells_shown.append(f"**{text}**" if row["met"] else text)
         print(
-            f"| {anchor.name} | {sign}{shown(anchor.quantity, anchor.value)} | {' | '.join(cells_shown)} |"
+            f"| {anchor.name} | {sign}{shown(anchor.quantity, anchor.value)} |"
+            f" {' | '.join(cells_shown)} |"
         )
     for name, what in (
         ("ends", "two printed ends"),

@@ -1,9 +1,10 @@
-"""Two hundred ellipses and a hundred rollers from fixed Latin hypercubes, rough and lubricated: does every one solve?
+"""Two hundred ellipses and a hundred rollers from fixed Latin hypercubes, rough and lubricated:
+does every one solve?
 
-Ellipses: Rx 4-20 mm, Ry/Rx 0.3-10, 5-500 N. Rollers: R 2-20 mm, 1-20 mm long, 20-400 N/mm; straight, with the
-logarithm of half to thrice the load, or a circular crown that falls back by 1-50 um; half of them tilted by up to
-2 mrad. Both: Sq 0.05-2 um, correlation lengths 10-120 um or four cells, pressure cap 1, 2, 4 GPa or none, inlet at -4.5
-or -1.9 half-widths, 0.01-20 m/s.
+Ellipses: Rx 4-20 mm, Ry/Rx 0.3-10, 5-500 N. Rollers: R 2-20 mm, 1-20 mm long, 20-400 N/mm;
+straight, with the logarithm of half to thrice the load, or a circular crown that falls back by
+1-50 um; half of them tilted by up to 2 mrad. Both: Sq 0.05-2 um, correlation lengths 10-120 um or
+four cells, pressure cap 1, 2, 4 GPa or none, inlet at -4.5 or -1.9 half-widths, 0.01-20 m/s.
 """
 
 import csv
@@ -148,7 +149,8 @@ def lines(*, fast: bool, artefact: Path = Path("build/bounded.csv")) -> Iterator
                 [float(str(row[key])) for row in solved] for key in ("processor_s", "steps")
             )
             yield (
-                f"{name}: {len(solved)} of {len(rows)} solved, the rest said so; median {np.median(times):.1f} s of "
-                f"processor time and {np.median(steps):.0f} steps, at most {max(times):.0f} s."
+                f"{name}: {len(solved)} of {len(rows)} solved, the rest said so; median"
+                f" {np.median(times):.1f} s of processor time and {np.median(steps):.0f} steps, at"
+                f" most {max(times):.0f} s."
             )
     yield f"All of it: {artefact}."

@@ -15,9 +15,15 @@ def lines(*, fast: bool) -> Iterator[str]:
     ]
     yield "## The benchmark's certified values"
     yield ""
-    yield "Relative to the certified value; processor time of a case, all that is loaded and compiled once apart."
+    yield (
+        "Relative to the certified value; processor time of a case, all that is loaded and compiled"
+        " once apart."
+    )
     yield ""
-    yield "| solver | cases | cells | values | median error [%] | largest [%] | of | median time [s] | largest [s] |"
+    yield (
+        "| solver | cases | cells | values | median error [%] | largest [%] | of | median time [s]"
+        " | largest [s] |"
+    )
     yield "|---|---|---|---|---|---|---|---|---|"
     for result in results:
         yield from _rows(result)
@@ -39,7 +45,7 @@ def _rows(result: BenchmarkResult) -> Iterator[str]:
             seconds = list({row.case: row.seconds for row in rows}.values())
             middle = 100 * median(abs(row.error) for row in rows)
             yield (
-                f"| {result.solver} | {family} | {cells} | {len(rows)} | {middle:.2g} | "
-                f"{100 * abs(worst.error):.2g} | {worst.case} {worst.quantity} | {median(seconds):.2g} | "
-                f"{max(seconds):.2g} |"
+                f"| {result.solver} | {family} | {cells} | {len(rows)} | {middle:.2g} |"
+                f" {100 * abs(worst.error):.2g} | {worst.case} {worst.quantity} |"
+                f" {median(seconds):.2g} | {max(seconds):.2g} |"
             )

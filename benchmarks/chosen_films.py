@@ -1,8 +1,10 @@
-"""Smooth films on the grid that is chosen for them: lines of M 5 to 500, a soft ball, light contacts.
+"""Smooth films on the grid that is chosen for them: lines of M 5 to 500, a soft ball, light
+contacts.
 
-The lines' films are those of an independent one-dimensional solver on non-uniform nodes, X -4.5..1.9, of M 5 -10..3;
-one least film is of the twin of it in the tests (`tests/validation/test_auto_grid.py` holds the same). The soft ball is
-compared with Hamrock and Dowson's fit for soft bodies (1978), light contacts with themselves on X -30..8, 1024 cells.
+The lines' films are those of an independent one-dimensional solver on non-uniform nodes, X
+-4.5..1.9, of M 5 -10..3; one least film is of the twin of it in the tests
+(`tests/validation/test_auto_grid.py` holds the same). The soft ball is compared with Hamrock and
+Dowson's fit for soft bodies (1978), light contacts with themselves on X -30..8, 1024 cells.
 """
 
 import time
@@ -51,7 +53,9 @@ kind = "flat"
 
 
 def timed(conditions: ContactConditions, oil: Lubricant) -> tuple[ContactSolution, float]:
-    """Solved on the chosen grid, and the least processor time of a few tries [s], choosing included."""
+    """Solved on the chosen grid, and the least processor time of a few tries [s], choosing
+    included.
+    """
     seconds = []
     for _ in range(TRIES):
         began = time.process_time()
@@ -70,7 +74,10 @@ def films(solution: ContactSolution) -> tuple[float, float]:
 
 
 def heavy() -> Iterator[str]:
-    yield "| M, L, law | cells | time [s] | H_c | off by [%] | own bar [%] | H_min | off by [%] | own bar [%] | held |"
+    yield (
+        "| M, L, law | cells | time [s] | H_c | off by [%] | own bar [%] | H_min | off by [%] | own"
+        " bar [%] | held |"
+    )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for load_number, oil_number, law, central, least in FILMS:
         conditions, oil, unit = line_case(load_number, oil_number, law)
@@ -85,8 +92,8 @@ def heavy() -> Iterator[str]:
             cells.append(f"{film / unit:.3f} | {100.0 * off:+.2f} | {100.0 * own:.2f}")
         shown = " x ".join(map(str, solution.grid.cells))
         yield (
-            f"| {load_number}, {oil_number}, {law} | {shown} | {seconds:.2f} | {' | '.join(cells)} | "
-            f"{'yes' if held and solution.convergence.converged else 'no'} |"
+            f"| {load_number}, {oil_number}, {law} | {shown} | {seconds:.2f} | {' | '.join(cells)}"
+            f" | {'yes' if held and solution.convergence.converged else 'no'} |"
         )
 
 
@@ -120,13 +127,19 @@ def soft() -> str:
     off = ", ".join(f"{fit.place} film {100.0 * fit.deviation:+.1f} %" for fit in fits)
     shown = " x ".join(map(str, solution.grid.cells))
     touching = int(solution.in_contact.sum())
-    return f"Soft ball ({shown} cells, {seconds:.2f} s) against the soft fit: {off}; {touching} cells touch."
+    return (
+        f"Soft ball ({shown} cells, {seconds:.2f} s) against the soft fit: {off}; {touching} cells"
+        " touch."
+    )
 
 
 def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - short as it is
     """The tables as Markdown."""
     yield "## Smooth films on the grid that is chosen\n"
-    yield f"Lines, processor time on one thread, least of {TRIES}; held: within 1 % or the solution's own bar:\n"
+    yield (
+        f"Lines, processor time on one thread, least of {TRIES}; held: within 1 % or the solution's"
+        " own bar:\n"
+    )
     yield from heavy()
     yield f"\n{soft()}\n"
     yield "Light contacts against themselves with an inlet from -30 half-widths:\n"

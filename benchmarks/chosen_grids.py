@@ -1,7 +1,9 @@
-"""Hard-steel contacts on the grid that is chosen for them, against one finer by 1.5 in both directions.
+"""Hard-steel contacts on the grid that is chosen for them, against one finer by 1.5 in both
+directions.
 
-Fifty random ones: cap 5 to 8 GPa, Hertz's pressure 1 to 2.5 GPa, film ratio 0.1 to 2; lines, balls and ellipses. Asks
-how many are solved, how long that takes, and whether CLR is within its error bar of the finer grid's.
+Fifty random ones: cap 5 to 8 GPa, Hertz's pressure 1 to 2.5 GPa, film ratio 0.1 to 2; lines, balls
+and ellipses. Asks how many are solved, how long that takes, and whether CLR is within its error
+bar of the finer grid's.
 """
 
 import json
@@ -43,7 +45,9 @@ class Sample:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a solve went: whether it converged, processor time [s], CLR, its interval, whether the grid can tell it."""
+    """How a solve went: whether it converged, processor time [s], CLR, its interval, whether the
+    grid can tell it.
+    """
 
     cells: tuple[int, int]
     converged: bool
@@ -132,7 +136,9 @@ def solved(sample: Sample, model: ContactModel, most: int, finer: float = 1.0) -
 
 
 def summary(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
-    """Solved, seconds, and how many of those solved on both grids hold the finer one's CLR in their bar."""
+    """Solved, seconds, and how many of those solved on both grids hold the finer one's CLR in their
+    bar.
+    """
     chosen, both = (
         [one for one, _ in pairs],
         [(one, two) for one, two in pairs if one.converged and two.converged],
@@ -145,19 +151,25 @@ def summary(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
         for one, two in told
     )
     return (
-        f"{sum(one.converged for one in chosen)} of {len(chosen)} solved on the chosen grid, median "
-        f"{np.median(seconds):.1f} s, longest {max(seconds):.1f} s; of {len(both)} solved on both, {len(told)} are "
-        f"determined, {held} of them hold the finer CLR in their interval; difference "
-        f"median {np.median(off) if off else np.nan:.3f}, largest {max(off, default=np.nan):.3f}"
+        f"{sum(one.converged for one in chosen)} of {len(chosen)} solved on the chosen grid, median"
+        f" {np.median(seconds):.1f} s, longest {max(seconds):.1f} s; of {len(both)} solved on both,"
+        f" {len(told)} are determined, {held} of them hold the finer CLR in their interval;"
+        f" difference median {np.median(off) if off else np.nan:.3f}, largest"
+        f" {max(off, default=np.nan):.3f}"
     )
 
 
 def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
-    """The table as Markdown: all contacts solved so far by this code, as many more as there is time for."""
+    """The table as Markdown: all contacts solved so far by this code, as many more as there is time
+    for.
+    """
     end = time.perf_counter() + seconds - LEFT_S
     every = dict(enumerate(samples(COUNT)))
     pairs = kept_pairs({number: every[number] for number in (FEW if fast else every)}, end)
-    yield "## Hard steel on the grid that is chosen for it, and on one finer by 1.5 in both directions\n"
+    yield (
+        "## Hard steel on the grid that is chosen for it, and on one finer by 1.5 in both"
+        " directions\n"
+    )
     yield f"Sample: {len(pairs)} contacts.\n"
     yield "| contact | film ratio | p_h [GPa] | cells | time [s] | CLR | finer: time [s] | CLR |"
     yield "|---|---|---|---|---|---|---|---|"

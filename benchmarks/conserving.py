@@ -1,8 +1,9 @@
-"""The contact that loses no oil: rigid films, 16 contacts on three surfaces standing still, the same in motion, cost.
+"""The contact that loses no oil: rigid films, 16 contacts on three surfaces standing still, the
+same in motion, cost.
 
-The rigid films are those of `tests/validation/test_cavitation.py`, where closed forms and quadratures stand beside
-them. Every steady solve starts cold; times are those of the processor. One pass is as many steps as the domain has
-cells along rolling.
+The rigid films are those of `tests/validation/test_cavitation.py`, where closed forms and
+quadratures stand beside them. Every steady solve starts cold; times are those of the processor.
+One pass is as many steps as the domain has cells along rolling.
 """
 
 from collections import defaultdict
@@ -41,7 +42,9 @@ def lines(*, fast: bool) -> Iterator[str]:
 
 
 def rigid_films() -> Iterator[str]:
-    """A parabolic slider and one with a pocket (physics: p = 0 where the film ruptures), over cells."""
+    """A parabolic slider and one with a pocket (physics: p = 0 where the film ruptures), over
+    cells.
+    """
     yield "| rigid film | cells | p_max off | flow off | flow varies by | Newton steps |"
     yield "|---|---|---|---|---|---|"
     for cells in (100, 400, 1600):
@@ -56,7 +59,10 @@ def rigid_films() -> Iterator[str]:
         )
         peak, flow = film.pressure.max() / 3.594269e6 - 1.0, film.flux.mean() / 6.547565e-5 - 1.0
         vary = np.ptp(film.flux) / film.flux.mean()
-        yield f"| parabolic slider | {cells} | {100 * peak:.4f} % | {flow:.1e} | {vary:.1e} | {film.steps} |"
+        yield (
+            f"| parabolic slider | {cells} | {100 * peak:.4f} % | {flow:.1e} | {vary:.1e} |"
+            f" {film.steps} |"
+        )
     for cells in (100, 400, 1600):
         x = (np.arange(cells) + 0.5) / cells * 20e-3
         film = solve_film(
@@ -68,7 +74,10 @@ def rigid_films() -> Iterator[str]:
         )
         peak, flow = film.pressure.max() / 350e3 - 1.0, film.flux.mean() / 5.002083e-7 - 1.0
         vary = np.ptp(film.flux) / film.flux.mean()
-        yield f"| slider with a pocket | {cells} | {100 * peak:.4f} % | {flow:.1e} | {vary:.1e} | {film.steps} |"
+        yield (
+            f"| slider with a pocket | {cells} | {100 * peak:.4f} % | {flow:.1e} | {vary:.1e} |"
+            f" {film.steps} |"
+        )
 
 
 class Contact(NamedTuple):
@@ -132,9 +141,10 @@ def standing(seeds: tuple[int, ...]) -> Iterator[str]:
         seconds.append(spent[CONSERVING])
     each = ", ".join(f"{solved[seed]} of 16 on surface {seed}" for seed in seeds)
     yield (
-        f"Standing still, 128 x 128: solved {each}. Oil lost by all cells together at most {worst:.1e} of the "
-        f"throughflow. Cold in {median(seconds):.2f} s in the median (longest {max(seconds):.1f} s), "
-        f"{median(ratios):.1f} times the default model (longest {max(ratios):.0f} times).\n"
+        f"Standing still, 128 x 128: solved {each}. Oil lost by all cells together at most"
+        f" {worst:.1e} of the throughflow. Cold in {median(seconds):.2f} s in the median (longest"
+        f" {max(seconds):.1f} s), {median(ratios):.1f} times the default model (longest"
+        f" {max(ratios):.0f} times).\n"
     )
     yield from _shares(shares)
 
@@ -152,9 +162,10 @@ def _shares(shares: dict[tuple[str, float], list[LoadSharing]]) -> Iterator[str]
             spread([one.below[index] for one in found]) for index in range(len(FILMS_NM))
         )
         yield (
-            f"| {sq:g} | {model} | {spread([one.clr_solid for one in found])} | "
-            f"{spread([one.car_solid for one in found])} | {below} | {spread([one.cavitated for one in found])} | "
-            f"{spread([one.oil for one in found], 1e6)} | {len(found)} |"
+            f"| {sq:g} | {model} | {spread([one.clr_solid for one in found])} |"
+            f" {spread([one.car_solid for one in found])} | {below} |"
+            f" {spread([one.cavitated for one in found])} |"
+            f" {spread([one.oil for one in found], 1e6)} | {len(found)} |"
         )
 
 
@@ -173,8 +184,9 @@ def moving(seeds: tuple[int, ...]) -> Iterator[str]:
                 worst = max(worst, snapshot.state.mass_flux_imbalance)
         shares["moving", one.sq_um].append(sharing_by_film(snapshot.solution))
     yield (
-        f"Moving, 64 x 64, one pass: {accepted} of {taken} steps accepted ({100 * accepted / taken:.1f} %); in any "
-        f"accepted step all that cells of the Hertz zone lose and gain is at most {worst:.1e} of the oil carried there."
+        f"Moving, 64 x 64, one pass: {accepted} of {taken} steps accepted"
+        f" ({100 * accepted / taken:.1f} %); in any accepted step all that cells of the Hertz zone"
+        f" lose and gain is at most {worst:.1e} of the oil carried there."
     )
     yield f"First steps not accepted: {first_bad[:5]}\n" if first_bad else ""
     yield from _shares(shares)

@@ -1,5 +1,6 @@
-"""Studies that are killed: `python -m benchmarks.crashes [MOMENTS]` kills a worker or the parent at random moments,
-goes on each time, and compares with the study that nothing interrupted, number by number; exit code 1
+"""Studies that are killed: `python -m benchmarks.crashes [MOMENTS]` kills a worker or the parent at
+random moments, goes on each time, and compares with the study that nothing interrupted, number by
+number; exit code 1
 if one differs."""
 
 import os
@@ -51,7 +52,9 @@ def children(pid: int) -> list[int]:
 
 
 def killed(out: Path, after: float, target: str) -> str:
-    """Start or resume the study and kill the target after so many seconds; what became of the process."""
+    """Start or resume the study and kill the target after so many seconds; what became of the
+    process.
+    """
     running = subprocess.Popen(
         command(out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
@@ -106,11 +109,13 @@ def main(moments: int) -> None:
             left = len(list(out.rglob("*.part")))
             behind += left
             print(
-                f"  after {after:5.1f} s: {fate}; same to the last bit: {again.equals(whole)}; left over: {left}"
+                f"  after {after:5.1f} s: {fate}; same to the last bit: {again.equals(whole)}; left"
+                f" over: {left}"
             )
             shutil.rmtree(out)
         print(
-            f"{same} of {moments} the same to the last bit; {twice} cases computed twice, {behind} files left over"
+            f"{same} of {moments} the same to the last bit; {twice} cases computed twice, {behind}"
+            " files left over"
         )
         sys.exit(same < moments or twice > 0 or behind > 0)
     finally:

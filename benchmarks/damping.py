@@ -1,7 +1,7 @@
 """Damping as an indicator of load sharing: over roughness, and read from 60 simulated series.
 
-`python -m benchmarks.damping` runs this part alone. Contacts are solved once (96 x 48, model mixed) and kept in
-build/damping.csv; `--seeds 0 1 2` solves fewer surfaces.
+`python -m benchmarks.damping` runs this part alone. Contacts are solved once (96 x 48, model
+mixed) and kept in build/damping.csv; `--seeds 0 1 2` solves fewer surfaces.
 """
 
 import argparse
@@ -47,7 +47,9 @@ SEVERE_UM = 1.8  # between the paper's stages
 
 @dataclass(frozen=True)
 class Point:
-    """A solved contact and what two masses on it meet; stiffness [N/m], yielded cells elastic unless virgin."""
+    """A solved contact and what two masses on it meet; stiffness [N/m], yielded cells elastic
+    unless virgin.
+    """
 
     sq_um: float
     seed: int
@@ -102,18 +104,24 @@ def solved(sq_um: float, seed: int) -> Point:
 def lines(seeds: Sequence[int] = SEEDS, *, fast: bool = False) -> Iterator[str]:
     """Markdown, a line at a time; `fast` leaves out the series, which take ten minutes."""
     library = points(seeds)
-    yield "## Stiffness and damping over roughness (96 x 48, model mixed): mean ± deviation over surfaces\n"
+    yield (
+        "## Stiffness and damping over roughness (96 x 48, model mixed): mean ± deviation over"
+        " surfaces\n"
+    )
     yield from roughness_lines(library)
     if fast:
         return
-    yield f"\n## Stage and load share from {SERIES} series of {len(SAMPLES_SQ_UM)} rings, {TESTS} tests each\n"
+    yield (
+        f"\n## Stage and load share from {SERIES} series of {len(SAMPLES_SQ_UM)} rings, {TESTS}"
+        " tests each\n"
+    )
     yield from series_lines(library)
 
 
 def roughness_lines(library: Sequence[Point]) -> Iterator[str]:
     yield (
-        "| Sq [um] | surfaces | CLR [%] | k [N/um] elastic | flowing | ζ at 2.9 kHz [%] elastic | flowing | "
-        "ζ at 9 kHz [%] elastic | flowing |"
+        "| Sq [um] | surfaces | CLR [%] | k [N/um] elastic | flowing | ζ at 2.9 kHz [%] elastic |"
+        " flowing | ζ at 9 kHz [%] elastic | flowing |"
     )
     yield "|---|---|---|---|---|---|---|---|---|"
     scales = {"clr": 100.0, "stiffness": 1e-6, "virgin_stiffness": 1e-6} | dict.fromkeys(
@@ -133,7 +141,8 @@ def moments(values: Sequence[float]) -> tuple[float, float]:
     return float(np.mean(values)), float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
 
 
-# Series --------------------------------------------------------------------------------------------------------------
+# Series
+# -------------------------------------------------------------------------------------------------
 
 
 class Ring(NamedTuple):
@@ -145,7 +154,9 @@ class Ring(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """What a series says of a ring: logarithms of frequency and damping ratio, means over the tests that have one."""
+    """What a series says of a ring: logarithms of frequency and damping ratio, means over the tests
+    that have one.
+    """
 
     sq_um: float
     clr: float
@@ -155,8 +166,8 @@ class Reading(NamedTuple):
 
 def series_lines(library: Sequence[Point]) -> Iterator[str]:
     yield (
-        "| frequency by | else in the band | rings with a resonance | read from | CLR off, rms [points] | "
-        "rings in the right stage | series with 11 of 12 right |"
+        "| frequency by | else in the band | rings with a resonance | read from | CLR off, rms"
+        " [points] | rings in the right stage | series with 11 of 12 right |"
     )
     yield "|---|---|---|---|---|---|---|"
     for law in ("the paper's (CLR F)^(1/6)", "the contact itself"):
@@ -259,7 +270,9 @@ def readings(rings: Sequence[Ring], modes: int) -> list[Reading]:
 def told(
     training: Sequence[Sequence[Reading]], judged: Sequence[Sequence[Reading]], name: str
 ) -> str:
-    """Regressions of the odds of CLR, and of the stage, on quadratics of what is read; learnt on other series."""
+    """Regressions of the odds of CLR, and of the stage, on quadratics of what is read; learnt on
+    other series.
+    """
     learnt = [reading for rings in training for reading in rings]
     centre, width = (
         moment(np.array([(one.frequency, one.damping) for one in learnt]), axis=0)
@@ -292,7 +305,10 @@ def told(
         )
         right += list(same)
         whole += int(np.count_nonzero(same) >= len(SAMPLES_SQ_UM) - 1)
-    return f"{100 * np.sqrt(np.mean(np.square(off))):.0f} | {100 * np.mean(right):.0f} % | {whole} of {len(judged)} |"
+    return (
+        f"{100 * np.sqrt(np.mean(np.square(off))):.0f} | {100 * np.mean(right):.0f} % | {whole} of"
+        f" {len(judged)} |"
+    )
 
 
 def main() -> None:

@@ -1,9 +1,11 @@
-"""How often stages are right that are read from CRF, from the line's damping, or from both with one break.
+"""How often stages are right that are read from CRF, from the line's damping, or from both with one
+break.
 
-`python -m benchmarks.damping_stages` runs this part alone. Indicators are drawn about known courses: the paper's
-twelve rings, five tests each, CRF off by 15 Hz and damping by 10 % from test to test. Of the solved contact
-(benchmarks.damping has its library) every ring is a surface of its own, and all else damps with 0.01. Then how well
-the joint separation knows the damping of lines that move, or hardly do.
+`python -m benchmarks.damping_stages` runs this part alone. Indicators are drawn about known
+courses: the paper's twelve rings, five tests each, CRF off by 15 Hz and damping by 10 % from test
+to test. Of the solved contact (benchmarks.damping has its library) every ring is a surface of its
+own, and all else damps with 0.01. Then how well the joint separation knows the damping of lines
+that move, or hardly do.
 """
 
 import argparse
@@ -155,8 +157,12 @@ def rows(name: str, knee: float | None, drawn: Sequence[tuple[Field, Field]]) ->
         )
         covers = "-"
         if knee is not None and place != "-":
-            covers = f"{100.0 * np.mean([one.interval[0] <= knee <= one.interval[1] for one in broken]):.0f} %"
-        yield f"| {name} | {source} | {' | '.join(f'{part:.0f} %' for part in share)} | {place} | {covers} |"
+            inside = [stages.interval[0] <= knee <= stages.interval[1] for stages in broken]
+        covers = f"{100.0 * np.mean(inside):.0f} %"
+        yield (
+            f"| {name} | {source} | {' | '.join(f'{part:.0f} %' for part in share)} | {place} |"
+            f" {covers} |"
+        )
 
 
 WIDTH_SERIES, REPEATS = 6, 3
@@ -166,7 +172,10 @@ STIFFNESS = 3.32e8  # N/m: 2900 Hz
 def width_lines(*, fast: bool = False) -> Iterator[str]:
     """What the joint separation makes of the damping of lines that move, or hardly do."""
     count = WIDTH_SERIES // 3 if fast else WIDTH_SERIES
-    yield f"\n## Damping by the joint separation, {count} series of {len(SAMPLES_SQ_UM) * REPEATS} recordings a row\n"
+    yield (
+        f"\n## Damping by the joint separation, {count} series of {len(SAMPLES_SQ_UM) * REPEATS}"
+        " recordings a row\n"
+    )
     heads = [
         "damping",
         "frequency scatters by",
@@ -190,13 +199,15 @@ def width_lines(*, fast: bool = False) -> Iterator[str]:
             ]
             found = f"{100 * len(seen) / len(told):.0f} %"
             yield (
-                f"| {name} | {100 * scatter:g} % | {found} | {100 * np.mean(stands):.0f} % | {cells[0]}, {cells[1]} | "
-                f"{cells[2]} | {100 * covered:.0f} % |"
+                f"| {name} | {100 * scatter:g} % | {found} | {100 * np.mean(stands):.0f} % |"
+                f" {cells[0]}, {cells[1]} | {cells[2]} | {100 * covered:.0f} % |"
             )
 
 
 def judged(law: Course, scatter: float, number: int) -> Iterator[tuple[float, float, bool] | None]:
-    """Of each recording of a series: logarithm of found over true damping, its deviation, whether the line stands."""
+    """Of each recording of a series: logarithm of found over true damping, its deviation, whether
+    the line stands.
+    """
     rng = np.random.default_rng([11, number])
     frequency = np.arange(0.0, RATE_HZ / 2.0 + GRID_HZ, GRID_HZ)
     disturbance = Disturbance(snr_db=10.0, modes=4)

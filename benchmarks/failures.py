@@ -1,7 +1,9 @@
-"""Bearings that run to failure, simulated: an outer race, an inner race, a ball; short snapshots as loggers keep them.
+"""Bearings that run to failure, simulated: an outer race, an inner race, a ball; short snapshots as
+loggers keep them.
 
-A fault's impulses ring modes of the housing and grow, rms to 15 to 25 times by the end; there is no contact resonance.
-Judged after every snapshot. `python -m benchmarks.failures` runs this part alone; `--fast` a tenth.
+A fault's impulses ring modes of the housing and grow, rms to 15 to 25 times by the end; there is
+no contact resonance. Judged after every snapshot. `python -m benchmarks.failures` runs this part
+alone; `--fast` a tenth.
 """
 
 import argparse
@@ -112,7 +114,9 @@ def tracked(one: Machine, folder: Path) -> Track:
 
 
 class Outcome(NamedTuple):
-    """Of a machine: snapshots from the fault's begin to the alarm, and from there to the end; claims of a resonance."""
+    """Of a machine: snapshots from the fault's begin to the alarm, and from there to the end;
+    claims of a resonance.
+    """
 
     delay: float
     left: float
@@ -135,8 +139,8 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     share = 10 if fast else 1
     yield f"## Bearings run to failure: {SNAPSHOTS} snapshots each\n"
     yield (
-        "| snapshots | fault | machines | alarm before the end | alarm while healthy | "
-        "snapshots from the fault's begin, median | left to the end, least | a contact resonance claimed |"
+        "| snapshots | fault | machines | alarm before the end | alarm while healthy | snapshots"
+        " from the fault's begin, median | left to the end, least | a contact resonance claimed |"
     )
     yield "|---|---|---|---|---|---|---|---|"
     for seconds, rate_hz in LENGTHS:
@@ -145,9 +149,10 @@ def lines(*, fast: bool = False) -> Iterator[str]:
             every = [outcome(fault, seed, seconds, rate_hz) for seed in range(machines)]
             delays, left = [one.delay for one in every], [one.left for one in every]
             yield (
-                f"| {seconds:g} s at {rate_hz / 1e3:g} kHz | {fault} | {machines} | "
-                f"{sum(value > 0.0 for value in left)} | {sum(one.early for one in every)} | "
-                f"{np.median(delays):.0f} | {min(left):.0f} | {sum(one.claims > 0 for one in every)} |"
+                f"| {seconds:g} s at {rate_hz / 1e3:g} kHz | {fault} | {machines} |"
+                f" {sum(value > 0.0 for value in left)} | {sum(one.early for one in every)} |"
+                f" {np.median(delays):.0f} | {min(left):.0f} |"
+                f" {sum(one.claims > 0 for one in every)} |"
             )
 
 

@@ -1,8 +1,9 @@
 """Smooth films against published ones: a line contact in Moes' numbers, balls on flats and barrels.
 
-Line contacts are compared with an independent one-dimensional solver of the tests on 3201 nodes, itself held to a
-published-style table; balls with Richardson-extrapolated references; balls and barrels with the fit of Nijenbanning,
-Venner and Moes, Wear 176 (1994) 217 (central film, Roelands), whose authors claim 10 %, and with Hamrock and Dowson's.
+Line contacts are compared with an independent one-dimensional solver of the tests on 3201 nodes,
+itself held to a published-style table; balls with Richardson-extrapolated references; balls and
+barrels with the fit of Nijenbanning, Venner and Moes, Wear 176 (1994) 217 (central film,
+Roelands), whose authors claim 10 %, and with Hamrock and Dowson's.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,7 +34,8 @@ ROELANDS = Lubricant(
     viscosity=Roelands(ETA0, ALPHA), density=DowsonHigginson(870.0), rheology=Newtonian()
 )
 BARUS = Lubricant(viscosity=Barus(ETA0, ALPHA), density=Incompressible(870.0), rheology=Newtonian())
-REFERENCE = {  # M, L, oil: central and least film, Richardson from 257 and 513 points, X -4.5..1.5, Y -3..3
+# M, L, oil: central and least film, Richardson from 257 and 513 points, X -4.5..1.5, Y -3..3
+REFERENCE = {
     (20, 10, "Barus"): (4.803, 2.961),
     (100, 5, "Barus"): (3.102, 1.439),
     (20, 10, "Roelands"): (4.171, 2.823),
@@ -44,7 +46,9 @@ REFERENCE = {  # M, L, oil: central and least film, Richardson from 257 and 513 
 def ball(
     load_number: float, oil_number: float, ratio: float = 1.0
 ) -> tuple[ContactConditions, float]:
-    """A ball or barrel (`ratio` = Rx/Ry) on a flat with these Moes numbers, and the film [m] that H = 1 stands for."""
+    """A ball or barrel (`ratio` = Rx/Ry) on a flat with these Moes numbers, and the film [m] that H
+    = 1 stands for.
+    """
     modulus = PAIR.effective_modulus
     twice_u = (oil_number / (ALPHA * modulus)) ** 4
     speed = twice_u * modulus * RADIUS / (2.0 * ETA0)
@@ -64,7 +68,9 @@ TRIES = 5
 
 @dataclass(frozen=True)
 class Films:
-    """Central and least film in units of H, on the finest grid and extrapolated from it and one half as fine."""
+    """Central and least film in units of H, on the finest grid and extrapolated from it and one
+    half as fine.
+    """
 
     central: float
     least: float
@@ -217,8 +223,8 @@ def _timed(load_number: float, oil_number: float, oil: Lubricant) -> str:
             f"{100.0 * (film / true - 1.0):+.2f}" for film, true in zip(found, known, strict=True)
         ]
     return (
-        f"| {load_number}, {oil_number}, {law} | {', '.join(map(str, steps))} | {min(seconds):.2f} | "
-        f"{min(seconds) / min(beside):.0f} | {' | '.join(off)} |"
+        f"| {load_number}, {oil_number}, {law} | {', '.join(map(str, steps))} | {min(seconds):.2f}"
+        f" | {min(seconds) / min(beside):.0f} | {' | '.join(off)} |"
     )
 
 
@@ -229,7 +235,10 @@ def lines(*, fast: bool) -> Iterator[str]:
     """The tables as Markdown."""
     yield "## Smooth films"
     yield ""
-    yield "Line contacts at 256 cells against 4096; the order is log2 of the ratio of errors at 128 and 256 cells."
+    yield (
+        "Line contacts at 256 cells against 4096; the order is log2 of the ratio of errors at 128"
+        " and 256 cells."
+    )
     yield ""
     yield "| M, L | law | H_c | off by [%] | order | H_min | off by [%] | order |"
     yield "|---|---|---|---|---|---|---|---|"
@@ -248,7 +257,10 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield ""
     yield "Balls against extrapolated references:"
     yield ""
-    yield "| M, L, oil | cells | H_c | off by [%] | extrapolated | H_min | off by [%] | extrapolated | seconds |"
+    yield (
+        "| M, L, oil | cells | H_c | off by [%] | extrapolated | H_min | off by [%] | extrapolated"
+        " | seconds |"
+    )
     yield "|---|---|---|---|---|---|---|---|---|"
     for (load_number, oil_number, name), (central, least) in REFERENCE.items():
         films = ball_films(load_number, oil_number, ROELANDS if name == "Roelands" else BARUS, 256)
@@ -268,8 +280,9 @@ def lines(*, fast: bool) -> Iterator[str]:
         )
     yield ""
     yield (
-        "Balls on 257 x 257 cells to 1e-4, one thread, processor time, least of five; steps evaluated on 65, 129 and "
-        "257 cells a side; an FFT pair is a real one of 512 x 512 and back, in the same run:"
+        "Balls on 257 x 257 cells to 1e-4, one thread, processor time, least of five; steps"
+        " evaluated on 65, 129 and 257 cells a side; an FFT pair is a real one of 512 x 512 and"
+        " back, in the same run:"
     )
     yield ""
     yield "| M, L, oil | steps | time [s] | over an FFT pair | H_c off by [%] | H_min off by [%] |"
@@ -279,7 +292,10 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield ""
     yield "Balls and barrels (Roelands) against fits; extrapolated from 256 and 512 cells a side:"
     yield ""
-    yield "| M, L, Rx/Ry | H_c | Nijenbanning et al. | off by [%] | H_min | Hamrock and Dowson | off by [%] |"
+    yield (
+        "| M, L, Rx/Ry | H_c | Nijenbanning et al. | off by [%] | H_min | Hamrock and Dowson | off"
+        " by [%] |"
+    )
     yield "|---|---|---|---|---|---|---|"
     balls = [
         (load_number, oil_number, 1.0)
@@ -305,7 +321,8 @@ def lines(*, fast: bool) -> Iterator[str]:
             smooth_film(conditions, ROELANDS) / unit,
         )
         yield (
-            f"| {load_number}, {oil_number}, {ratio:g} | {films.central_extrapolated:.3f} | {fit:.3f} | "
-            f"{100.0 * (films.central_extrapolated / fit - 1.0):+.1f} | {films.least_extrapolated:.3f} | {least:.3f} | "
-            f"{100.0 * (films.least_extrapolated / least - 1.0):+.1f} |"
+            f"| {load_number}, {oil_number}, {ratio:g} | {films.central_extrapolated:.3f} |"
+            f" {fit:.3f} | {100.0 * (films.central_extrapolated / fit - 1.0):+.1f} |"
+            f" {films.least_extrapolated:.3f} | {least:.3f} |"
+            f" {100.0 * (films.least_extrapolated / least - 1.0):+.1f} |"
         )

@@ -1,4 +1,6 @@
-"""The first solve after installation, compilation included: in a fresh process with an empty compiler cache."""
+"""The first solve after installation, compilation included: in a fresh process with an empty
+compiler cache.
+"""
 
 import os
 import subprocess
@@ -12,7 +14,9 @@ CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
 
 
 def first_call() -> tuple[float, bool]:
-    """Seconds of `asperity solve` with nothing compiled, and whether it said what the wait was for."""
+    """Seconds of `asperity solve` with nothing compiled, and whether it said what the wait was
+    for.
+    """
     with tempfile.TemporaryDirectory() as empty:
         began = perf_counter()
         done = subprocess.run(

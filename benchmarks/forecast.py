@@ -1,10 +1,11 @@
 """When a limit is crossed: simulated wear histories, and machines that stay as they are.
 
-Contacts have unknowns from the case's priors, and are off the emulator by its deviation, which stays along the course.
-Of one class courses are straight, steepening, slackening and wandering, and scatter is white and of the size stated:
-what the filter takes for granted too. The other class has what it does not: a course that jumps, one that runs in and
-then roughens, and CRF that scatters by twice the size stated and remembers the visit before by 0.7. Those count whose
-load share crosses 50 % between the last recording and two series' lengths after it. Rows are kept in
+Contacts have unknowns from the case's priors, and are off the emulator by its deviation, which
+stays along the course. Of one class courses are straight, steepening, slackening and wandering,
+and scatter is white and of the size stated: what the filter takes for granted too. The other class
+has what it does not: a course that jumps, one that runs in and then roughens, and CRF that
+scatters by twice the size stated and remembers the visit before by 0.7. Those count whose load
+share crosses 50 % between the last recording and two series' lengths after it. Rows are kept in
 docs/benchmarks/forecast-courses.csv and gone on from.
 """
 
@@ -88,7 +89,9 @@ def main() -> None:
 
 
 def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
-    """What `python -m benchmarks forecast` prints: all series judged so far, as many more as there is time for."""
+    """What `python -m benchmarks forecast` prints: all series judged so far, as many more as there
+    is time for.
+    """
     end = perf_counter() + seconds - LEFT_S
     judge_all(FEW if fast else HISTORIES, FEW if fast else STEADY, KEPT, end=end)
     yield from tables()
@@ -200,7 +203,9 @@ def _course(shape: str, begin: float, rng: np.random.Generator) -> Field:
 def _shown(
     forward: ForwardModel, z: Field, course: Field, rng: np.random.Generator
 ) -> tuple[dict[str, Field], Field]:
-    """Logarithms that the true contact shows, and its load share: the emulator's, off by a draw of its deviation."""
+    """Logarithms that the true contact shows, and its load share: the emulator's, off by a draw of
+    its deviation.
+    """
     unknown, grid = forward.setting.unknowns[0], np.linspace(0.0, 1.0, 4 * KNOTS)
     along = along_range(z, 0, unknown.at_share(grid))
     shown = forward.predict(along, "hertz-point", deviations=False)
@@ -253,7 +258,10 @@ def tables() -> Iterator[str]:
     yield f"Sample: {len(rows)} series."
     if not rows:
         return
-    yield "| course | series | held | upper end over lower (median) | CLR at the last recording held | change told |"
+    yield (
+        "| course | series | held | upper end over lower (median) | CLR at the last recording held"
+        " | change told |"
+    )
     yield "|---|---|---|---|---|---|"
     for kind, whole in (
         ("wearing", "all of these, as the filter assumes"),
@@ -275,9 +283,15 @@ def tables() -> Iterator[str]:
                     [float(row["log_odds"]) >= np.log(100.0) for row in own],
                 )
             )
-            yield f"Of {len(own)} machines {what}, {told} are told to change and {alarms} are alarmed of."
+            yield (
+                f"Of {len(own)} machines {what}, {told} are told to change and {alarms} are"
+                " alarmed of."
+            )
     took = np.median([float(row["seconds"]) for row in rows])
-    yield f"A forecast took {took:.1f} s of a processor (median). Rows by the code that found them: {kept.codes()}."
+    yield (
+        f"A forecast took {took:.1f} s of a processor (median). Rows by the code that found them:"
+        f" {kept.codes()}."
+    )
 
 
 def _line(shape: str, rows: list[dict[str, str]]) -> str:

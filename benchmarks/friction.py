@@ -1,4 +1,6 @@
-"""Friction, flash temperature and the thermal loop: errors against closed forms, the paper's case over Sq, the cost."""
+"""Friction, flash temperature and the thermal loop: errors against closed forms, the paper's case
+over Sq, the cost.
+"""
 
 import statistics
 from collections.abc import Callable, Iterator
@@ -52,7 +54,10 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield "\n## Cost of friction, heat and stress, 256 x 256\n"
     yield from cost_lines()
     if not fast:
-        yield "\n## The paper's case over Sq, heat as a result and heat fed back, 256 x 256, mean of three surfaces\n"
+        yield (
+            "\n## The paper's case over Sq, heat as a result and heat fed back, 256 x 256, mean of"
+            " three surfaces\n"
+        )
         yield from roughness_lines()
         yield "\n## Stribeck curves of the paper's case, 128 x 128\n"
         yield from stribeck_lines()
@@ -87,16 +92,25 @@ def limit_lines() -> Iterator[str]:
             quad(limited, -a, a, epsrel=1e-9)[0],
         ),
     }
-    yield "| traction of a Hertz pressure over 0.7 um | cells over 2a | coefficient | closed form | off |"
+    yield (
+        "| traction of a Hertz pressure over 0.7 um | cells over 2a | coefficient | closed form |"
+        " off |"
+    )
     yield "|---|---|---|---|---|"
     for name, (law, force) in exact.items():
         for cells in (64, 256, 1024):
             found = friction(_hertz_film(case, law, cells, gap)).coefficient
             wanted = force / conditions.line_load
-            yield f"| {name} | {cells} | {found:.5f} | {wanted:.5f} | {100 * (found / wanted - 1):+.3f} % |"
+            yield (
+                f"| {name} | {cells} | {found:.5f} | {wanted:.5f} |"
+                f" {100 * (found / wanted - 1):+.3f} % |"
+            )
     dry = solve_contact(conditions, None, case.surface())
     found = friction(dry).coefficient
-    yield f"\nDry, Sq 1 um, 256 x 256: {found:.6f} where f_b is 0.15, off by {abs(found / 0.15 - 1):.0e}."
+    yield (
+        f"\nDry, Sq 1 um, 256 x 256: {found:.6f} where f_b is 0.15, off by"
+        f" {abs(found / 0.15 - 1):.0e}."
+    )
 
 
 def _hertz_film(case: Case, law: FrictionLaw, cells: int, gap: float) -> ContactSolution:
@@ -126,7 +140,10 @@ def speed_at(peclet: float) -> float:
 
 def source_lines() -> Iterator[str]:
     k, kappa = STEEL.conductivity, STEEL.diffusivity
-    yield "Sources of half-width b = 50 um on steel, 64 x 64 cells over the source, Pe = u b/(2 κ); largest rise."
+    yield (
+        "Sources of half-width b = 50 um on steel, 64 x 64 cells over the source, Pe = u b/(2 κ);"
+        " largest rise."
+    )
     yield "\n| source | Pe | rise over q b/k | closed form | off |"
     yield "|---|---|---|---|---|"
     dx = 2.0 * HALF / 64
@@ -175,11 +192,17 @@ def source_lines() -> Iterator[str]:
 
 def _compared(name: str, peclet: float, found: float, exact: float) -> str:
     unit = STEEL.conductivity / HALF
-    return f"| {name} | {peclet:g} | {found * unit:.5f} | {exact * unit:.5f} | {100 * (found / exact - 1):+.3f} % |"
+    return (
+        f"| {name} | {peclet:g} | {found * unit:.5f} | {exact * unit:.5f} |"
+        f" {100 * (found / exact - 1):+.3f} % |"
+    )
 
 
 def balance_lines() -> Iterator[str]:
-    yield "| Sq [um] | speeds [m/s] | friction power [W] | into body 1 [W] | into body 2 [W] | sum off |"
+    yield (
+        "| Sq [um] | speeds [m/s] | friction power [W] | into body 1 [W] | into body 2 [W] | sum"
+        " off |"
+    )
     yield "|---|---|---|---|---|---|"
     case = load_case(CASE).with_overrides({"grid.cells": [128, 128]})
     for sq in (0.5, 2.0):
@@ -193,8 +216,8 @@ def balance_lines() -> Iterator[str]:
             heat = flash_temperature(moved, rubbing)
             off = (heat.heat_1_w + heat.heat_2_w) / rubbing.power - 1.0 if rubbing.power else 0.0
             yield (
-                f"| {sq:g} | {speeds[0]:g}, {speeds[1]:g} | {rubbing.power:.3f} | {heat.heat_1_w:.3f} | "
-                f"{heat.heat_2_w:.3f} | {off:.0e} |"
+                f"| {sq:g} | {speeds[0]:g}, {speeds[1]:g} | {rubbing.power:.3f} |"
+                f" {heat.heat_1_w:.3f} | {heat.heat_2_w:.3f} | {off:.0e} |"
             )
 
 
@@ -221,7 +244,10 @@ def cost_lines() -> Iterator[str]:
     yield f"- friction and heat: {heat:.3f} s (the first time on a grid {first:.3f} s)"
     yield f"- the same at the film's own temperature: {fed:.3f} s"
     yield f"- stress at {DEPTHS} depths: {stress:.3f} s (the first time {first_stress:.3f} s)"
-    yield f"- heat and stress together: {heat + stress:.2f} s, {100 * (heat + stress) / solve:.0f} % of the solve"
+    yield (
+        f"- heat and stress together: {heat + stress:.2f} s, {100 * (heat + stress) / solve:.0f} %"
+        " of the solve"
+    )
 
 
 def _median(run: Callable[[], object]) -> float:
@@ -235,8 +261,8 @@ def _median(run: Callable[[], object]) -> float:
 
 def roughness_lines() -> Iterator[str]:
     yield (
-        "| Sq [um] | CLR [%] | friction (range) | asperities | oil | surface [K] | film [K] | mean film [um] | "
-        "fed back: CLR [%] | friction | oil | film [K] | mean film [um] |"
+        "| Sq [um] | CLR [%] | friction (range) | asperities | oil | surface [K] | film [K] | mean"
+        " film [um] | fed back: CLR [%] | friction | oil | film [K] | mean film [um] |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|---|---|---|"
     warm = Thermal(feedback=True)
@@ -252,9 +278,10 @@ def roughness_lines() -> Iterator[str]:
         mean = np.mean(rows, axis=0)
         coefficients = [row[1] for row in rows]
         yield (
-            f"| {sq:g} | {mean[0]:.1f} | {mean[1]:.4f} ({min(coefficients):.4f} to {max(coefficients):.4f}) | "
-            f"{mean[2]:.4f} | {mean[3]:.4f} | {mean[4]:.1f} | {mean[5]:.1f} | {mean[6]:.3f} | "
-            f"{mean[7]:.1f} | {mean[8]:.4f} | {mean[10]:.4f} | {mean[12]:.1f} | {mean[13]:.3f} |"
+            f"| {sq:g} | {mean[0]:.1f} | {mean[1]:.4f} ({min(coefficients):.4f} to"
+            f" {max(coefficients):.4f}) | {mean[2]:.4f} | {mean[3]:.4f} | {mean[4]:.1f} |"
+            f" {mean[5]:.1f} | {mean[6]:.3f} | {mean[7]:.1f} | {mean[8]:.4f} | {mean[10]:.4f} |"
+            f" {mean[12]:.1f} | {mean[13]:.3f} |"
         )
 
 

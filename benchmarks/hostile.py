@@ -1,9 +1,9 @@
 """`asperity watch` on a folder as loggers leave it, killed ten times beside one that is not.
 
-Files come late, in parts, twice, from a clock that is ahead, and from other programs. At the end every file has to be
-accounted for, on each of the sensors, and both stores have to hold the same.
-`python -m benchmarks.hostile --minutes 60 [--kills 10] [--sensors 2]` runs this part alone and prints what was found;
-processor time is small, the clock's is not.
+Files come late, in parts, twice, from a clock that is ahead, and from other programs. At the end
+every file has to be accounted for, on each of the sensors, and both stores have to hold the same.
+`python -m benchmarks.hostile --minutes 60 [--kills 10] [--sensors 2]` runs this part alone and
+prints what was found; processor time is small, the clock's is not.
 """
 
 import argparse
@@ -110,7 +110,9 @@ def watch(
 
 
 def latest(store: Path) -> dict[str, list[tuple[object, ...]]]:
-    """Of each file what was read of the last version, and that it was judged; a row for each sensor."""
+    """Of each file what was read of the last version, and that it was judged; a row for each
+    sensor.
+    """
     told: dict[str, dict[str, tuple[object, ...]]] = {}
     with closing(sqlite3.connect(store)) as connection:
         rows = connection.execute(
@@ -126,7 +128,9 @@ def latest(store: Path) -> dict[str, list[tuple[object, ...]]]:
 
 
 def accounted(folder: Path, store: Path, sensors: int) -> tuple[Counter[str], list[str]]:
-    """What became of every file of the folder, and those of which not every sensor says anything."""
+    """What became of every file of the folder, and those of which not every sensor says
+    anything.
+    """
     held, counts, silent = latest(store), Counter[str](), []
     for path in folder.iterdir():
         rows = held.get(path.name, [])
@@ -201,11 +205,16 @@ def run(
         yield from (f"| {what} | {many} |" for what, many in sorted(counts.items()))
         yield f"| nobody says what became of | {len(silent)} {' '.join(silent[:3])} |"
         same = len(first.keys() | second.keys()) - len(differ)
-        yield f"| files of which both stores hold the same, and not | {same}, {len(differ)} {' '.join(differ[:3])} |"
+        yield (
+            f"| files of which both stores hold the same, and not | {same}, {len(differ)}"
+            f" {' '.join(differ[:3])} |"
+        )
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time; `fast` takes a minute of it. The hour is run by itself, with `--minutes 60`."""
+    """Markdown, a line at a time; `fast` takes a minute of it. The hour is run by itself, with
+    `--minutes 60`.
+    """
     yield from run(1.0 if fast else 5.0, 3 if fast else 10)
 
 

@@ -1,4 +1,5 @@
-"""Indicators measured on the simulated rig: failures and errors over SNR, intervals, stages of wear.
+"""Indicators measured on the simulated rig: failures and errors over SNR, intervals, stages of
+wear.
 
 `python -m benchmarks.indicators` runs this part alone; `--fast` a twentieth of it.
 """
@@ -59,7 +60,10 @@ class Heard(NamedTuple):
 def lines(*, fast: bool = False) -> Iterator[str]:
     """Markdown, a line at a time; `fast` takes a twentieth of the series and trials."""
     share = 20 if fast else 1
-    yield f"## Indicators: 12 samples x 5 repeats of {DURATION:g} s at 20 kHz, {SERIES // share} series a row\n"
+    yield (
+        f"## Indicators: 12 samples x 5 repeats of {DURATION:g} s at 20 kHz, {SERIES // share}"
+        " series a row\n"
+    )
     yield from table_lines(SERIES // share)
     few, fewer = max(FEW // share, 1), max(FEWER // share, 1)
     yield f"\n## Indicators: each spectrum by itself, {fewer} series a row\n"
@@ -67,8 +71,8 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     yield f"\n## Indicators: short recordings of 10 s, {few} series a row\n"
     yield from table_lines(few, (10.0, 0.0), METHODS, duration_s=10.0)
     yield (
-        "\n## Indicators: a machine that repeats itself badly (modes' levels 0.3 dB, frequencies 0.05 %), "
-        f"{few} series a row\n"
+        "\n## Indicators: a machine that repeats itself badly (modes' levels 0.3 dB, frequencies"
+        f" 0.05 %), {few} series a row\n"
     )
     yield from table_lines(few, (6.0, 0.0), METHODS, mode_gain_db=0.3, mode_drift=5e-4)
     yield f"\n## Indicators: the line heard through a structure, {few} series a row\n"
@@ -87,7 +91,9 @@ def drawn(snr_db: float, seed: int, *, duration_s: float = DURATION, **choices: 
 
 
 def transferred(rig: Rig, size: float, seed: int) -> Rig:
-    """The rig with its contact heard through a structure: |1 + 2 to 6 modes|^2, in the band, damped by 0.4 to 3 %."""
+    """The rig with its contact heard through a structure: |1 + 2 to 6 modes|^2, in the band, damped
+    by 0.4 to 3 %.
+    """
     rng = np.random.default_rng([5, seed])
     frequency = rig.recordings[0].frequency_hz
     passed = np.ones(frequency.size, dtype=complex)
@@ -119,8 +125,9 @@ def moved(rig: Rig, size: float, seed: int) -> Rig:
 def through_lines(series: int) -> Iterator[str]:
     """The joint separation where a structure passes on what it hears of the contact."""
     yield (
-        "| recordings | modes up to | failures | > 100 Hz off | not found | CRF rms error [Hz] | stated [Hz] | "
-        "CRFA rms error | CRFA median error | 90 % intervals cover CRF and CRFA | s a series |"
+        "| recordings | modes up to | failures | > 100 Hz off | not found | CRF rms error [Hz] |"
+        " stated [Hz] | CRFA rms error | CRFA median error | 90 % intervals cover CRF and CRFA | s"
+        " a series |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|---|"
     for duration_s, name, way in (
@@ -221,9 +228,10 @@ class Tally:
         rms = np.sqrt(np.mean(np.square(self.crf))) if self.crf else np.nan
         crfa = 100 * np.sqrt(np.mean(np.square(self.crfa))) if self.crfa else np.nan
         return (
-            f"{percent(self.wrong + self.lost)} | {percent(self.wrong)} | {percent(self.lost)} | {rms:.2f} | "
-            f"{stated} | {crfa:.1f} % | {100 * np.median(self.crfa) if self.crfa else np.nan:+.1f} % | {coverage} | "
-            f"{self.seconds:.1f}"
+            f"{percent(self.wrong + self.lost)} | {percent(self.wrong)} | {percent(self.lost)} |"
+            f" {rms:.2f} | {stated} | {crfa:.1f} % |"
+            f" {100 * np.median(self.crfa) if self.crfa else np.nan:+.1f} % | {coverage} |"
+            f" {self.seconds:.1f}"
         )
 
 
@@ -238,8 +246,9 @@ def table_lines(
     **choices: float,
 ) -> Iterator[str]:
     yield (
-        "| SNR [dB] | method | failures | > 100 Hz off | not found | CRF rms error [Hz] | stated [Hz] | "
-        "CRFA rms error | CRFA median error | 90 % intervals cover CRF and CRFA | s a series |"
+        "| SNR [dB] | method | failures | > 100 Hz off | not found | CRF rms error [Hz] | stated"
+        " [Hz] | CRFA rms error | CRFA median error | 90 % intervals cover CRF and CRFA | s a"
+        " series |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|---|"
     for snr_db in snrs:
@@ -257,8 +266,8 @@ def table_lines(
 
 def stage_lines(trials: int) -> Iterator[str]:
     yield (
-        "| truth | Sq | tests a sample | said: severe | running-in | no distinct stage | no change | "
-        "break in 1.68 to 1.92 um | 90 % interval covers | sd of the break [um] |"
+        "| truth | Sq | tests a sample | said: severe | running-in | no distinct stage | no change"
+        " | break in 1.68 to 1.92 um | 90 % interval covers | sd of the break [um] |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     truths: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -316,7 +325,10 @@ def stage_row(
     if truth is not TRENDS["knee"]:
         return f"{said} | - | - | -"
     inside = sum(RANGE[0] <= split <= RANGE[1] for split in splits)
-    return f"{said} | {100 * inside / trials:.1f} % | {100 * covered / max(len(splits), 1):.0f} % | {np.std(splits):.3f}"
+    return (
+        f"{said} | {100 * inside / trials:.1f} % | {100 * covered / max(len(splits), 1):.0f} % |"
+        f" {np.std(splits):.3f}"
+    )
 
 
 if __name__ == "__main__":

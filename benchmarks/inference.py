@@ -1,13 +1,16 @@
-"""Contact spectroscopy on simulated machines: do intervals hold the truth, at one operating point and at six.
+"""Contact spectroscopy on simulated machines: do intervals hold the truth, at one operating point
+and at six.
 
-Truths are contacts solved anew (never the emulator's), means over many surfaces, with unknowns drawn from the case's
-priors; their recordings are the rig's, with structural modes, noise and tones, and go through the joint separation.
-The emulator is the product's; only where a truth is solved on the emulator's own grid is what a finer one changes no
-part of it. Truths are kept in docs/benchmarks/inference-truths.csv, a line an operating point: when the inference has
-changed, they are judged anew without a solve. Emulator and contacts under way are kept in build/inference, intervals in
-docs/benchmarks/inference-machines.csv, of which the tables are made. `python -m benchmarks.inference` runs this part
-alone, `--machines 60` with fewer of them, `--finer 10` with as many whose truth is solved on twice the cells,
-`--known` with those alone that were solved before.
+Truths are contacts solved anew (never the emulator's), means over many surfaces, with unknowns
+drawn from the case's priors; their recordings are the rig's, with structural modes, noise and
+tones, and go through the joint separation. The emulator is the product's; only where a truth is
+solved on the emulator's own grid is what a finer one changes no part of it. Truths are kept in
+docs/benchmarks/inference-truths.csv, a line an operating point: when the inference has changed,
+they are judged anew without a solve. Emulator and contacts under way are kept in build/inference,
+intervals in docs/benchmarks/inference-machines.csv, of which the tables are made. `python -m
+benchmarks.inference` runs this part alone, `--machines 60` with fewer of them, `--finer 10` with
+as many whose truth is solved on twice the cells, `--known` with those alone that were solved
+before.
 """
 
 import argparse
@@ -78,7 +81,9 @@ def main() -> None:
 
 
 def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
-    """What `python -m benchmarks inference` prints: all machines judged so far, as many more as there is time for."""
+    """What `python -m benchmarks inference` prints: all machines judged so far, as many more as
+    there is time for.
+    """
     end = perf_counter() + seconds - LEFT_S
     judge_all(FEW if fast else MACHINES, 0, KEPT, end=end)
     yield from tables()
@@ -110,14 +115,17 @@ def judge_all(
             rows.write([row | {"seconds": process_time() - began} for row in found])
 
 
-# Truths --------------------------------------------------------------------------------------------------------------
+# Truths
+# -------------------------------------------------------------------------------------------------
 
 GRIDS = ("as the emulator's", "twice the cells")
 
 
 @dataclass(frozen=True)
 class Machine:
-    """A simulated machine: unknowns, and its contact's states at `PLACES`; None where one could not be solved."""
+    """A simulated machine: unknowns, and its contact's states at `PLACES`; None where one could not
+    be solved.
+    """
 
     number: int
     law: str
@@ -126,7 +134,9 @@ class Machine:
 
 
 def machines_of(setting: Setting) -> Iterator[Field]:
-    """Unknowns of one machine after the other, each a standard normal number: drawn from the case's priors."""
+    """Unknowns of one machine after the other, each a standard normal number: drawn from the case's
+    priors.
+    """
     rng = np.random.default_rng(SEED)
     while True:
         yield rng.standard_normal(len(setting.unknowns))
@@ -134,7 +144,9 @@ def machines_of(setting: Setting) -> Iterator[Field]:
 
 @dataclass
 class Truths:
-    """States of machines' contacts at `PLACES`, means over surfaces: as they are kept, or solved now, and kept."""
+    """States of machines' contacts at `PLACES`, means over surfaces: as they are kept, or solved
+    now, and kept.
+    """
 
     setting: Setting
     kept: Path
@@ -256,7 +268,8 @@ def wrongly(model: VibrationModel, law: str, clr: float, load: float) -> Vibrati
     return model.with_choices(mass=model.mass / factor**2)
 
 
-# Judged --------------------------------------------------------------------------------------------------------------
+# Judged
+# -------------------------------------------------------------------------------------------------
 
 ENDS = tuple(
     f"{key}_{name}{end}"
@@ -340,17 +353,20 @@ def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[st
     }
 
 
-# Told ----------------------------------------------------------------------------------------------------------------
+# Told
+# -------------------------------------------------------------------------------------------------
 
 
 def tables() -> Iterator[str]:
-    """Shares of intervals that hold, with 90 % of the binomial, and widths, as Markdown: of all rows that are kept."""
+    """Shares of intervals that hold, with 90 % of the binomial, and widths, as Markdown: of all
+    rows that are kept.
+    """
     kept = Rows(ROWS, ("machine", "law"))
     every = list(kept)
     yield "## Intervals of 90 % that hold the truth, of simulated machines"
     yield (
-        "| truth | points | machines | CLR held | CLR held, laws exact | Sq held | Sq held, laws exact | stage held "
-        "| likeliest stage right (said) |"
+        "| truth | points | machines | CLR held | CLR held, laws exact | Sq held | Sq held, laws"
+        " exact | stage held | likeliest stage right (said) |"
     )
     yield "|---|---|---|---|---|---|---|---|---|"
     groups = {(row["law"], row["points"]): [] for row in every}
@@ -378,8 +394,9 @@ def tables() -> Iterator[str]:
         yield f"| {' | '.join(map(str, cells))} |"
     yield "## What such an interval is wide, and what was learned (medians)"
     yield (
-        "| truth | points | CLR, points of load | laws exact | Sq, upper end over lower | laws exact | bits of CLR "
-        "| bits of Sq | law's error, % of CRF | ln evidence of an error over none |"
+        "| truth | points | CLR, points of load | laws exact | Sq, upper end over lower | laws"
+        " exact | bits of CLR | bits of Sq | law's error, % of CRF | ln evidence of an error over"
+        " none |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for (law, points), rows in told.items():
@@ -406,8 +423,9 @@ def tables() -> Iterator[str]:
         if row["law"] == INSIDE and row["points"] != "1" and row["heard"] == "0"
     }
     yield (
-        f"{len(machines)} machines with {SURFACES} surfaces at each operating point; of {len(silent)} too few "
-        f"recordings show a line, and nothing is said. Rows by the code that found them: {kept.codes()}."
+        f"{len(machines)} machines with {SURFACES} surfaces at each operating point; of"
+        f" {len(silent)} too few recordings show a line, and nothing is said. Rows by the code that"
+        f" found them: {kept.codes()}."
     )
 
 

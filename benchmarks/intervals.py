@@ -1,7 +1,9 @@
-"""Do the intervals hold what they say? Load shares on 128 and 256 cells against 512, a hundred of the wide sample.
+"""Do the intervals hold what they say? Load shares on 128 and 256 cells against 512, a hundred of
+the wide sample.
 
-A contact counts where it converged on both grids and the interval is determined. The calibration of
-`asperity.ehl.strategies.grid_continuation.grid_error`: its factors were chosen on forty of these contacts.
+A contact counts where it converged on both grids and the interval is determined. The calibration
+of `asperity.ehl.strategies.grid_continuation.grid_error`: its factors were chosen on forty of
+these contacts.
 """
 
 import csv
@@ -17,7 +19,9 @@ from benchmarks.robustness import OIL, contacts, prepared
 
 MODELS: tuple[ContactModel, ...] = ("mixed",)
 COARSE, FINE = (128, 256), 512
-SHOWN = 1e-3  # difference from which on an interval is compared with it: below, the solver's tolerance is what differs
+# difference from which on an interval is compared with it: below, the solver's tolerance is what
+# differs
+SHOWN = 1e-3
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,10 @@ def lines(*, fast: bool, artefact: Path = Path("build/intervals.csv")) -> Iterat
 
 def table(results: list[Held]) -> Iterator[str]:
     """How often the interval holds the finest grid, and how wide it is beside the difference."""
-    yield f"| model | cells | contacts | determined | {FINE} inside | half-width over difference, median |"
+    yield (
+        f"| model | cells | contacts | determined | {FINE} inside | half-width over difference,"
+        " median |"
+    )
     yield "|---|---|---|---|---|---|"
     for model in MODELS:
         for cells in COARSE:
@@ -92,4 +99,7 @@ def table(results: list[Held]) -> Iterator[str]:
             wide = [one.ratio for one in known if abs(one.true - one.clr) > SHOWN]
             inside = 100.0 * np.mean([one.inside for one in known]) if known else np.nan
             ratio = np.median(wide) if wide else np.nan
-            yield f"| {model} | {cells} | {len(all_of)} | {len(known)} | {inside:.0f} % | {ratio:.1f} |"
+            yield (
+                f"| {model} | {cells} | {len(all_of)} | {len(known)} | {inside:.0f} % |"
+                f" {ratio:.1f} |"
+            )

@@ -1,7 +1,9 @@
-"""What benchmarks said, kept as csv that `docs/benchmarks.md` includes, and what became of each number since.
+"""What benchmarks said, kept as csv that `docs/benchmarks.md` includes, and what became of each
+number since.
 
-A part's tables go to docs/benchmarks/PART.csv, PART-2.csv ... as they stand, its headings and sentences to
-PART-said.csv, where a table is named by its file. What a larger sample gave stays: a smaller one is compared with it.
+A part's tables go to docs/benchmarks/PART.csv, PART-2.csv ... as they stand, its headings and
+sentences to PART-said.csv, where a table is named by its file. What a larger sample gave stays: a
+smaller one is compared with it.
 """
 
 import csv
@@ -23,7 +25,9 @@ Table = list[list[str]]
 
 
 def taken_apart(lines: Iterable[str]) -> tuple[list[str], list[Table]]:
-    """Sentences and headings of Markdown lines, each table among them as its number in braces; and the tables."""
+    """Sentences and headings of Markdown lines, each table among them as its number in braces; and
+    the tables.
+    """
     said: list[str] = []
     tables: list[Table] = []
     within = False  # a table, which any other line ends, an empty one too
@@ -49,7 +53,9 @@ def cells(line: str) -> list[str]:
 
 
 def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
-    """Write a part's csv in place of those of no larger a sample; what changed against these, a line each."""
+    """Write a part's csv in place of those of no larger a sample; what changed against these, a
+    line each.
+    """
     said, tables = taken_apart(lines)
     before = {path.name: read(path) for path in _files(part, folder)}
     now = {_name(part, number): table for number, table in enumerate(tables, 1)}
@@ -78,13 +84,17 @@ def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
 
 
 def sample(said: Iterable[str]) -> float:
-    """How much a part took into account, by its own words; 0 where it took little or does not say."""
+    """How much a part took into account, by its own words; 0 where it took little or does not
+    say.
+    """
     sizes = [
-        float("inf")
-        if text == IN_FULL
-        else float(found[1])
-        if (found := SAMPLE.match(text))
-        else 0.0
+        (
+            float("inf")
+            if text == IN_FULL
+            else float(found[1])
+            if (found := SAMPLE.match(text))
+            else 0.0
+        )
         for text in said
     ]
     return max(sizes, default=0.0)
@@ -101,7 +111,8 @@ def _in_words(size: float) -> str:
 
 
 def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:
-    """Numbers that moved by more than a tenth, with the first cell of their row and the head of their column.
+    """Numbers that moved by more than a tenth, with the first cell of their row and the head of
+    their column.
 
     Of a table with other rows than the last, those that both have.
     """
@@ -115,7 +126,10 @@ def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:
             (before[0], now[0]),
             *((old_rows[key], rows[key]) for key in rows if key in old_rows),
         ]
-        yield f"{name}: {len(before) - 1} rows are now {len(now) - 1}, {len(pairs) - 1} of them as before"
+        yield (
+            f"{name}: {len(before) - 1} rows are now {len(now) - 1}, {len(pairs) - 1} of them as"
+            " before"
+        )
     elif len(before) != len(now):
         yield f"{name}: has another shape"
         return
@@ -131,7 +145,10 @@ def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:
                 if _moved(*(float(n.replace("−", "-")) for n in (a, b)))
             ]
             if moved or NUMBER.sub("", old) != NUMBER.sub("", new):
-                yield f"{name}: {row[0][:60]}, {head}: {'; '.join(moved) or f'{old[:60]!r} is now {new[:60]!r}'}"
+                yield (
+                    f"{name}: {row[0][:60]}, {head}:"
+                    f" {'; '.join(moved) or f'{old[:60]!r} is now {new[:60]!r}'}"
+                )
 
 
 def _by_name(*tables: Table) -> list[dict[tuple[str, ...], list[str]]]:
@@ -153,7 +170,10 @@ def page(folder: Path = FOLDER, parts: Iterable[str] = ()) -> str:
     text = [
         "# Benchmarks",
         "",
-        "Written by `make bench` from the csv files in `docs/benchmarks`; not by hand. Times are those of the machine",
+        (
+            "Written by `make bench` from the csv files in `docs/benchmarks`; not by hand. Times"
+            " are those of the machine"
+        ),
         "that ran them, shared with other work: ratios within a table are the result.",
     ]
     for part in parts:

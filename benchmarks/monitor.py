@@ -1,7 +1,8 @@
-"""What a monitor costs: a store of 10 000 recordings and one more, and a watch over files that it knows.
+"""What a monitor costs: a store of 10 000 recordings and one more, and a watch over files that it
+knows.
 
-Processor time, least of several. `python -m benchmarks.monitor` runs this part alone; `--fast` with a tenth of the
-recordings.
+Processor time, least of several. `python -m benchmarks.monitor` runs this part alone; `--fast`
+with a tenth of the recordings.
 """
 
 import argparse
@@ -28,7 +29,8 @@ from asperity.recording import ReadOptions
 
 RATE, SAMPLES, BAND = 12e3, 12_000, (2000.0, 4000.0)
 SPACING, MORE = 5.0, 12
-ELSEWHERE = 0.05  # of their frequencies, by which the modes of one sensor's structure lie beside the last one's
+# of their frequencies, by which the modes of one sensor's structure lie beside the last one's
+ELSEWHERE = 0.05
 LINES = ((3300.0, 0.004, 0.5), (2300.0, 0.01, 0.7))  # of the machine: frequency, damping, level
 
 
@@ -88,7 +90,9 @@ def filled(folder: Path, store: Path, many: int, sensors: int) -> None:
 
 
 def one_more(folder: Path, out: Path, many: int, sensors: int) -> tuple[list[float], list[float]]:
-    """Processor time [s] of judging one more recording, and of all that a look at the folder takes."""
+    """Processor time [s] of judging one more recording, and of all that a look at the folder
+    takes.
+    """
     rng = np.random.default_rng(2)
     judged: list[float] = []
     plain = WatchState.judge
@@ -119,11 +123,14 @@ def one_more(folder: Path, out: Path, many: int, sensors: int) -> tuple[list[flo
 
 
 def _require_known(update: Update) -> None:
-    """That the watch goes on with what was filled in, and that it was heard: nothing else is worth a time."""
+    """That the watch goes on with what was filled in, and that it was heard: nothing else is worth
+    a time.
+    """
     track = update.track
     if update.new or track is None or not all(one.resonance.found for one in track.recordings):
         raise RuntimeError(
-            f"the watch reads {len(update.new)} recordings that its store should know, or hears no line"
+            f"the watch reads {len(update.new)} recordings that its store should know, or hears no"
+            " line"
         )
 
 
@@ -167,7 +174,10 @@ def lines(*, fast: bool = False) -> Iterator[str]:
             of = "a sensor" if sensors == 1 else f"{sensors} sensors"
             yield f"| a store of {many} recordings of {of}: size | {size:.0f} MB |"
             yield f"| {of}: one more judged, median of {MORE} | {1e3 * np.median(judged):.0f} ms |"
-            yield f"| {of}: one more looked for, read, judged and kept, median | {1e3 * np.median(whole):.0f} ms |"
+            yield (
+                f"| {of}: one more looked for, read, judged and kept, median |"
+                f" {1e3 * np.median(whole):.0f} ms |"
+            )
             yield f"| {of}: the same, longest | {1e3 * np.max(whole):.0f} ms |"
     with TemporaryDirectory() as name:
         folder, out = _folders(name)

@@ -1,4 +1,6 @@
-"""Motion: waviness running through a line contact against published amplitudes, orders, accepted steps, cost."""
+"""Motion: waviness running through a line contact against published amplitudes, orders, accepted
+steps, cost.
+"""
 
 from collections.abc import Iterator
 from functools import cache
@@ -17,8 +19,9 @@ from asperity.surface import MovingSurfaces, Surface, flat_surface
 from asperity.transient import moving_contact
 from benchmarks.roughness_levels import paper_case
 
-# deformed over undeformed amplitude by wavelength over half-width, pure rolling, M 100, L 11, amplitude 0.1 H_c:
-# Venner, Couhier, Lubrecht and Greenwood, Tribology Series 32 (1997) 103, transcribed second-hand
+# deformed over undeformed amplitude by wavelength over half-width, pure rolling, M 100, L 11,
+# amplitude 0.1 H_c: Venner, Couhier, Lubrecht and Greenwood, Tribology Series 32 (1997) 103,
+# transcribed second-hand
 VENNER = {4.0: 0.030, 2.0: 0.073, 1.0: 0.183, 0.5: 0.394, 0.25: 0.660, 0.125: 0.839}
 M, L = 100.0, 11.0
 ALPHA, ETA0, EFFECTIVE, RADIUS = (
@@ -58,7 +61,9 @@ def contact(m: float = M, l: float = L) -> ContactConditions:  # noqa: E741
 
 
 class Waves(NamedTuple):
-    """What became of a wave: first harmonic of the film over time at each cell, complex, over the wave's own there."""
+    """What became of a wave: first harmonic of the film over time at each cell, complex, over the
+    wave's own there.
+    """
 
     x: np.ndarray
     harmonic: np.ndarray
@@ -110,7 +115,10 @@ def waves(wavelength: float, cells_per_b: int, time_step: float = 1.0, share: fl
 
 def _amplitudes(*, fast: bool) -> Iterator[str]:
     grids = (64,) if fast else (64, 128, 256)
-    yield f"| wavelength/b | {' | '.join(f'{n} cells a half-width' for n in grids)} | Δ -> 0 | Venner | off | curve |"
+    yield (
+        f"| wavelength/b | {' | '.join(f'{n} cells a half-width' for n in grids)} | Δ -> 0 | Venner"
+        " | off | curve |"
+    )
     yield "|---|" + "---|" * (len(grids) + 4)
     for wavelength, printed in VENNER.items():
         found = [waves(wavelength, cells).central for cells in grids]
@@ -121,14 +129,20 @@ def _amplitudes(*, fast: bool) -> Iterator[str]:
         row = " | ".join(
             "not determined" if value is None else f"{value:.4f}" for value in (*found, limit)
         )
-        yield f"| {wavelength:g} | {row} | {printed:.3f} | {off:+.1f} % | {master_curve(wavelength):.3f} |"
+        yield (
+            f"| {wavelength:g} | {row} | {printed:.3f} | {off:+.1f} % |"
+            f" {master_curve(wavelength):.3f} |"
+        )
 
 
 def _orders(*, fast: bool) -> Iterator[str]:
     for grids in ((32, 64, 128),) if fast else ((32, 64, 128), (64, 128, 256)):
         coarse, middle, fine = (waves(0.5, cells).at(0.0) for cells in grids)
         order = np.log2(abs(coarse - middle) / abs(middle - fine))
-        yield f"Order in Δx = u Δt together (wavelength b/2, {grids} cells a half-width): {order:.2f}."
+        yield (
+            f"Order in Δx = u Δt together (wavelength b/2, {grids} cells a half-width):"
+            f" {order:.2f}."
+        )
     long, half, quarter = (waves(0.5, 64, time_step).at(0.0) for time_step in (0.5, 0.25, 0.125))
     order = np.log2(abs(half - long) / abs(quarter - half))
     yield f"Order in Δt alone (steps of 1/2, 1/4, 1/8 cell, time and wedge apart): {order:.2f}."
@@ -141,7 +155,10 @@ def _orders(*, fast: bool) -> Iterator[str]:
 
 
 def _costs(*, fast: bool) -> Iterator[str]:
-    yield "| Sq [um] | cells | steps | not converged | bodies held | Newton steps | s a step | over a cold solve |"
+    yield (
+        "| Sq [um] | cells | steps | not converged | bodies held | Newton steps | s a step | over a"
+        " cold solve |"
+    )
     yield "|---|---|---|---|---|---|---|---|"
     for cells in (64,) if fast else (64, 128, 256):
         for sq in (0.5, 1.0, 2.5, 4.0):
@@ -159,7 +176,10 @@ def _costs(*, fast: bool) -> Iterator[str]:
                 median(one.seconds for one in rest),
             )
             ratio = seconds / start.seconds
-            yield f"| {sq} | {cells} | {steps} | {bad} | {held} | {newton:g} | {seconds:.3f} | {ratio:.2f} |"
+            yield (
+                f"| {sq} | {cells} | {steps} | {bad} | {held} | {newton:g} | {seconds:.3f} |"
+                f" {ratio:.2f} |"
+            )
 
 
 def lines(*, fast: bool) -> Iterator[str]:

@@ -1,9 +1,11 @@
-"""One table over roughness: load and area shares, load by film, films and resonances, of three models of one contact.
+"""One table over roughness: load and area shares, load by film, films and resonances, of three
+models of one contact.
 
-The paper's contact with a cap of 0.7 GPa and a correlation length of 40 um: snapshot and moving contact of the mixed
-model, moving contact of the conserving one. Means over one passage of the rough surface after oil has crossed the
-domain once; mean and standard deviation over seeds. What is computed is kept in build/motion_table.csv and not
-computed again: `python -m benchmarks.motion_table --cells 64 --seeds 0 1 2`.
+The paper's contact with a cap of 0.7 GPa and a correlation length of 40 um: snapshot and moving
+contact of the mixed model, moving contact of the conserving one. Means over one passage of the
+rough surface after oil has crossed the domain once; mean and standard deviation over seeds. What
+is computed is kept in build/motion_table.csv and not computed again: `python -m
+benchmarks.motion_table --cells 64 --seeds 0 1 2`.
 """
 
 import argparse
@@ -45,7 +47,9 @@ MOMENTS = 2  # of a passage, at which the tangent stiffness is taken
 
 @dataclass(frozen=True)
 class Outcome:
-    """Means of one surface's passage, SI; `tangent_hz` and `shared_hz` are resonances, `bad` steps not converged."""
+    """Means of one surface's passage, SI; `tangent_hz` and `shared_hz` are resonances, `bad` steps
+    not converged.
+    """
 
     model: str
     cells: int
@@ -156,9 +160,11 @@ def _tangent(snapshot: Snapshot) -> float | None:
 def tangent_in_motion(
     sq_um: float, seed: int, cells: int, model: str = MIXED
 ) -> tuple[float, float]:
-    """Resonance [Hz] by the tangent stiffness of the moving contact, and that by the standing one's at MOMENTS times.
+    """Resonance [Hz] by the tangent stiffness of the moving contact, and that by the standing one's
+    at MOMENTS times.
 
-    In motion: the same passage under a load 2 % less and 2 % more, difference of loads over that of mean approaches.
+    In motion: the same passage under a load 2 % less and 2 % more, difference of loads over that
+    of mean approaches.
     """
     case = table_case(sq_um, seed, cells).with_overrides({"model": MODELS[model]})
     assert case.lubricant is not None
@@ -178,9 +184,10 @@ def tangent_in_motion(
         )
     stiffness = 2.0 * LOAD_STEP * conditions.load / (approaches[1] - approaches[0])
     compute(cells, [seed], [model], [sq_um])
-    return math.sqrt(stiffness / mass) / (2.0 * math.pi), kept()[
-        model, cells, sq_um, seed
-    ].tangent_hz
+    return (
+        math.sqrt(stiffness / mass) / (2.0 * math.pi),
+        kept()[model, cells, sq_um, seed].tangent_hz,
+    )
 
 
 def kept() -> dict[tuple[str, int, float, int], Outcome]:
@@ -246,7 +253,10 @@ def lines(*, fast: bool) -> Iterator[str]:
 def table() -> Iterator[str]:
     """What is kept; in brackets the same surfaces on the coarsest grid."""
     found = kept()
-    yield f"| Sq [um] | model | cells | surfaces | {' | '.join(name for name, *_ in COLUMNS)} | not converged |"
+    yield (
+        f"| Sq [um] | model | cells | surfaces | {' | '.join(name for name, *_ in COLUMNS)} | not"
+        " converged |"
+    )
     yield "|" + "---|" * (len(COLUMNS) + 5)
     coarsest = min((one.cells for one in found.values()), default=0)
     for sq in SQ_UM:
@@ -268,7 +278,10 @@ def table() -> Iterator[str]:
                     _shown(rows, same, name, scale, digits) for _, name, scale, digits in COLUMNS
                 )
                 bad = f"{sum(one.bad for one in rows)} of {sum(one.steps + cells for one in rows)}"
-                yield f"| {sq:g} | {model} | {cells} | {len(rows)} | {shown} | {'-' if model == SNAPSHOT else bad} |"
+                yield (
+                    f"| {sq:g} | {model} | {cells} | {len(rows)} | {shown} |"
+                    f" {'-' if model == SNAPSHOT else bad} |"
+                )
 
 
 def _shown(rows: list[Outcome], same: list[Outcome], name: str, scale: float, digits: int) -> str:

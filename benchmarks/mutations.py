@@ -1,6 +1,8 @@
-"""Do the tests notice broken physics? One deliberately wrong version of each term of the solver, and what catches it.
+"""Do the tests notice broken physics? One deliberately wrong version of each term of the solver,
+and what catches it.
 
-`python -m benchmarks.mutations` breaks a copy of the sources, term by term, and runs the tests that should fail.
+`python -m benchmarks.mutations` breaks a copy of the sources, term by term, and runs the tests
+that should fail.
 """
 
 import os
@@ -103,7 +105,8 @@ def caught(mutation: Mutation) -> str | None:
         text = path.read_text("utf-8")
         if text.count(mutation.true) != 1:
             raise RuntimeError(
-                f"{mutation.file} holds {mutation.true!r} {text.count(mutation.true)} times, not once"
+                f"{mutation.file} holds {mutation.true!r} {text.count(mutation.true)} times, not"
+                " once"
             )
         path.write_text(text.replace(mutation.true, mutation.broken), "utf-8")
         command = [

@@ -1,9 +1,11 @@
-"""Whether the advised next operating point teaches more than twenty drawn at random, of machines heard at one.
+"""Whether the advised next operating point teaches more than twenty drawn at random, of machines
+heard at one.
 
-Machines have unknowns from the case's priors and show what the emulator says, off by draws of its deviation that go
-together at points as the likelihood has them: those at the first point stay, the others are drawn anew each time. What
-a point teaches is how far the posterior's entropy falls by what is heard there: once, and in the mean over ten times.
-Rows are kept in docs/benchmarks/next-points-machines.csv and gone on from.
+Machines have unknowns from the case's priors and show what the emulator says, off by draws of its
+deviation that go together at points as the likelihood has them: those at the first point stay, the
+others are drawn anew each time. What a point teaches is how far the posterior's entropy falls by
+what is heard there: once, and in the mean over ten times. Rows are kept in
+docs/benchmarks/next-points-machines.csv and gone on from.
 """
 
 import argparse
@@ -123,7 +125,8 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
 def _heard(forward: ForwardModel, z: Field, own: Field, rng: np.random.Generator) -> Field:
     """Logarithms of frequency and damping as the true machine shows them once, (2, points).
 
-    `own` is the chance that its emulator's error at the first point has, which is the same each time.
+    `own` is the chance that its emulator's error at the first point has, which is the same each
+    time.
     """
     shown = forward.predict(z, "hertz-point", heights=False)
     lower = np.linalg.cholesky(
@@ -138,7 +141,9 @@ def _heard(forward: ForwardModel, z: Field, own: Field, rng: np.random.Generator
 
 
 def taught(shown: PredictedRecordings, heard: Field) -> Field:
-    """Bits by which the entropy of what is possible falls at each point: by the weights that what is heard gives."""
+    """Bits by which the entropy of what is possible falls at each point: by the weights that what
+    is heard gives.
+    """
     logs = np.asarray(
         sum(
             shown.channels[key].log_density(value, TYPICAL_STD[key])
@@ -158,7 +163,10 @@ def tables() -> Iterator[str]:
     yield f"Sample: {len(rows)} machines."
     if not rows:
         return
-    yield "| heard there | machines | advised teaches more than their mean | bits, advised | bits, mean of the random |"
+    yield (
+        "| heard there | machines | advised teaches more than their mean | bits, advised | bits,"
+        " mean of the random |"
+    )
     yield "|---|---|---|---|---|"
     for key, name in (("once", "once"), ("mean", f"mean of {TIMES} times")):
         better = share([row[key] > row[f"{key}_random"] for row in rows])
@@ -168,8 +176,8 @@ def tables() -> Iterator[str]:
         yield f"| {name} | {len(rows)} | {better} | {information_gain[0]} | {information_gain[1]} |"
     shows = share([row["advised_shows"] == 1.0 for row in rows])
     yield (
-        f"At the advised point a line is to be heard (CLR over {100 * LEAST_SHARE:.0f} %) in {shows} of machines. Rows "
-        f"by the code that found them: {kept.codes()}."
+        f"At the advised point a line is to be heard (CLR over {100 * LEAST_SHARE:.0f} %) in"
+        f" {shows} of machines. Rows by the code that found them: {kept.codes()}."
     )
 
 

@@ -1,8 +1,9 @@
-"""Towards no speed: the load share of lines and balls, which is 1 in the limit, and a gear pair's Stribeck curve.
+"""Towards no speed: the load share of lines and balls, which is 1 in the limit, and a gear pair's
+Stribeck curve.
 
-The lines are the paper's contact, the balls 10 mm under 15 N in its oil; the gear pair is an FZG type C at its pitch
-point, load stage 7, ground across, by a grid of 256 x 128 cells. Each speed of the curve is solved from nothing, and
-from the next faster one's solution.
+The lines are the paper's contact, the balls 10 mm under 15 N in its oil; the gear pair is an FZG
+type C at its pitch point, load stage 7, ground across, by a grid of 256 x 128 cells. Each speed of
+the curve is solved from nothing, and from the next faster one's solution.
 """
 
 import time
@@ -78,7 +79,10 @@ def posed(
 
 def limits(*, fast: bool) -> Iterator[str]:
     """A row for each body, grid and speed: nine contacts of three roughnesses and three caps."""
-    heads = "contact | cells | speed [m/s] | solved | CLR, least | largest | within 0.02 of 1 | median [s] | longest"
+    heads = (
+        "contact | cells | speed [m/s] | solved | CLR, least | largest | within 0.02 of 1 | median"
+        " [s] | longest"
+    )
     yield f"| {heads} |"
     yield "|---|---|---|---|---|---|---|---|---|"
     solve_contact(
@@ -98,24 +102,30 @@ def limits(*, fast: bool) -> Iterator[str]:
                         clr.append(contact_state(solution).clr)
                 near = sum(abs(one - 1.0) < WANTED for one in clr)
                 yield (
-                    f"| {body} | {cells} x {cells} | {speed:g} | {solved} of {len(clr)} | {min(clr):.4f} | "
-                    f"{max(clr):.4f} | {near} of {len(clr)} | {np.median(seconds):.2f} | {max(seconds):.2f} |"
+                    f"| {body} | {cells} x {cells} | {speed:g} | {solved} of {len(clr)} |"
+                    f" {min(clr):.4f} | {max(clr):.4f} | {near} of {len(clr)} |"
+                    f" {np.median(seconds):.2f} | {max(seconds):.2f} |"
                 )
 
 
 def gears(*, fast: bool) -> Iterator[str]:
-    """Friction and load share over speed, each speed from nothing and from the next faster one's solution."""
+    """Friction and load share over speed, each speed from nothing and from the next faster one's
+    solution.
+    """
     case = load_case(GEARS, name="gears")
     speeds = GEAR_SPEEDS[::4] if fast else GEAR_SPEEDS
     swept = stribeck_curve(case, speeds=speeds).points
-    yield "| speed [m/s] | film ratio | CLR from nothing | swept | friction from nothing | swept | solved |"
+    yield (
+        "| speed [m/s] | film ratio | CLR from nothing | swept | friction from nothing | swept |"
+        " solved |"
+    )
     yield "|---|---|---|---|---|---|---|"
     for after in swept:
         (alone,) = stribeck_curve(case, speeds=[after.entrainment_speed_m_s]).points
         yield (
-            f"| {after.entrainment_speed_m_s:g} | {after.lambda_ratio:.2g} | {alone.clr:.4f} | {after.clr:.4f} | "
-            f"{alone.friction_coefficient:.4f} | {after.friction_coefficient:.4f} | "
-            f"{alone.converged + after.converged} of 2 |"
+            f"| {after.entrainment_speed_m_s:g} | {after.lambda_ratio:.2g} | {alone.clr:.4f} |"
+            f" {after.clr:.4f} | {alone.friction_coefficient:.4f} |"
+            f" {after.friction_coefficient:.4f} | {alone.converged + after.converged} of 2 |"
         )
 
 

@@ -1,7 +1,9 @@
-"""The live page in headless Chromium: from a turned knob to new maps, first content, three users, a file, memory.
+"""The live page in headless Chromium: from a turned knob to new maps, first content, three users, a
+file, memory.
 
-Needs the extra `page`, Playwright and Debian's chromium. Times are by the clock: the machine's load stands beside them.
-So does the processor time of a knob's step: in the server, in what solves, in the browser.
+Needs the extra `page`, Playwright and Debian's chromium. Times are by the clock: the machine's
+load stands beside them. So does the processor time of a knob's step: in the server, in what
+solves, in the browser.
 """
 
 import os
@@ -23,7 +25,8 @@ STEPS, USERS, SESSIONS, GIVEN_BACK_S = 40, 3, 200, 40.0
 RECORDING = 37_500_000  # samples of eight bytes: 300 MB
 TURN = """([key, text]) => new Promise(done => {
   const models = Bokeh.documents.flatMap(d => [...d._all_models.values()])
-  const film = models.find(m => m.type === 'ColumnDataSource' && m.data.image?.[0]?.dtype === 'float32')
+  const film = models.find(
+    m => m.type === 'ColumnDataSource' && m.data.image?.[0]?.dtype === 'float32')
   const status = models.find(m => m.type === 'Div' && /Solved on/.test(m.text))
   const knob = models.find(m => m.type === 'TextInput' && m.title === key)
   const before = film.data, began = performance.now()
@@ -33,7 +36,8 @@ TURN = """([key, text]) => new Promise(done => {
     const now = performance.now() - began
     if (first === null && film.data !== before) first = now
     if (!/Solved on/.test(status.text)) left = true
-    if (left && /Solved on|NOT CONVERGED|Not solved/.test(status.text) || now > 60000) done([first ?? now, now])
+    const ended = left && /Solved on|NOT CONVERGED|Not solved/.test(status.text)
+    if (ended || now > 60000) done([first ?? now, now])
     else setTimeout(look, 4)
   }
   look()
@@ -126,7 +130,9 @@ def _seconds(processes: Iterable[int]) -> float:
 
 
 def _memory(browser: Any, url: str, process: int, count: int) -> tuple[float, float]:
-    """The server's memory before and after so many visits that have gone [MB]; each until its maps are there."""
+    """The server's memory before and after so many visits that have gone [MB]; each until its maps
+    are there.
+    """
 
     def visits(number: int) -> None:
         for _ in range(number):
@@ -198,8 +204,9 @@ def lines(*, fast: bool) -> Iterator[str]:
             yield f"| {name} | {parts[128][name]:.2f} | {parts[256][name]:.2f} |"
         yield ""
         yield (
-            f"{20 if fast else SESSIONS} visits come and gone: the server grew from {before:.0f} to {after:.0f} MB. "
-            f"Load of the machine ({os.cpu_count()} processors) at the end: {os.getloadavg()[1]:.1f}."
+            f"{20 if fast else SESSIONS} visits come and gone: the server grew from {before:.0f} to"
+            f" {after:.0f} MB. Load of the machine ({os.cpu_count()} processors) at the end:"
+            f" {os.getloadavg()[1]:.1f}."
         )
 
 

@@ -1,4 +1,6 @@
-"""From the prompt to the answer: processor time of whole commands beside that of the solves in them."""
+"""From the prompt to the answer: processor time of whole commands beside that of the solves in
+them.
+"""
 
 import json
 import os
@@ -54,12 +56,16 @@ def _on_one_processor() -> None:
 
 @cache
 def _bytecode() -> tempfile.TemporaryDirectory[str]:
-    """Where Python keeps what it compiled, also where it is told to keep none beside the sources."""
+    """Where Python keeps what it compiled, also where it is told to keep none beside the
+    sources.
+    """
     return tempfile.TemporaryDirectory()
 
 
 def _run(*arguments: str) -> tuple[float, str]:
-    """Processor time of a Python process on one thread [s], system's included, and what it printed."""
+    """Processor time of a Python process on one thread [s], system's included, and what it
+    printed.
+    """
     kept = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -72,18 +78,23 @@ def _run(*arguments: str) -> tuple[float, str]:
         preexec_fn=_on_one_processor,
     )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return sum(
-        getattr(after, kind) - getattr(before, kind) for kind in ("ru_utime", "ru_stime")
-    ), done.stdout
+    return (
+        sum(getattr(after, kind) - getattr(before, kind) for kind in ("ru_utime", "ru_stime")),
+        done.stdout,
+    )
 
 
 def seconds(*arguments: str, tries: int) -> float:
-    """Least processor time of `asperity` with these arguments [s]; once before, unmeasured, to compile."""
+    """Least processor time of `asperity` with these arguments [s]; once before, unmeasured, to
+    compile.
+    """
     return min([_run("-m", "asperity", *arguments)[0] for _ in range(tries + 1)][1:])
 
 
 def rows(*, fast: bool) -> Iterator[tuple[str, float]]:
-    """What is measured, and its processor time [s]: least of several, all that is compiled in its cache."""
+    """What is measured, and its processor time [s]: least of several, all that is compiled in its
+    cache.
+    """
     tries = 2 if fast else 5
     with tempfile.TemporaryDirectory() as folder:
         recording, run = Path(folder) / "small.csv", Path(folder) / "run.nc"

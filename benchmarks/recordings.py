@@ -1,4 +1,5 @@
-"""What docs/recordings.md quotes: seconds and memory from disk to report, damaged files, false finds on real bearings.
+"""What docs/recordings.md quotes: seconds and memory from disk to report, damaged files, false
+finds on real bearings.
 
 Recordings come from the rig simulator; what it costs to make them is not counted.
 """
@@ -47,8 +48,8 @@ def lines(*, fast: bool) -> Iterator[str]:
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         worked = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         yield (
-            f"- `asperity track`: {seconds:.1f} s, {worked:.1f} s of processor time, {peak:.0f} MB at most, all "
-            f"processes together. {said}"
+            f"- `asperity track`: {seconds:.1f} s, {worked:.1f} s of processor time, {peak:.0f} MB"
+            f" at most, all processes together. {said}"
         )
         yield f"- {one_file(next(iter(sorted(where.glob('*.h5')))))}"
         if not fast:
@@ -63,7 +64,9 @@ def lines(*, fast: bool) -> Iterator[str]:
 
 
 def measured(command: list[str]) -> tuple[float, float, str]:
-    """Seconds, peak of the memory [MB] of a command and its children (proportional set size), its first line."""
+    """Seconds, peak of the memory [MB] of a command and its children (proportional set size), its
+    first line.
+    """
     began = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     peak = 0.0
@@ -180,8 +183,9 @@ def damaged_files(count: int) -> Iterator[str]:
     peak = sum(int(line.split()[1]) for line in status if line.startswith("VmHWM")) / 1024
     told = ", ".join(f"{number} {outcome}" for outcome, number in outcomes.most_common())
     yield (
-        f"{count} files of {len(contents)} kinds, cut, flipped, lengthened, with huge counts, NaN and text in numbers: "
-        f"{told}; slowest {slowest[0]:.2f} s ({slowest[1]}); the process never held more than {peak:.0f} MB."
+        f"{count} files of {len(contents)} kinds, cut, flipped, lengthened, with huge counts, NaN"
+        f" and text in numbers: {told}; slowest {slowest[0]:.2f} s ({slowest[1]}); the process"
+        f" never held more than {peak:.0f} MB."
     )
 
 
@@ -203,7 +207,10 @@ def false_finds() -> Iterator[str]:
         ]
         usable = [track for track in tracks if track.recordings[0].reading.usable]
         found = sum(track.resonance_count for track in usable)
-        yield f"| MFPT and IMS channels one by one (the machine runs) | {name} | {found} | {len(usable)} |"
+        yield (
+            f"| MFPT and IMS channels one by one (the machine runs) | {name} | {found} |"
+            f" {len(usable)} |"
+        )
     with tempfile.TemporaryDirectory() as folder:
         found = total = 0
         for path in sorted((MEASURED / "mfpt").iterdir()):
@@ -214,7 +221,13 @@ def false_finds() -> Iterator[str]:
                 np.savez(names[-1], acc=piece, fs=recording.rate_hz, unit="m/s^2")
             track = track_recordings(names)
             found, total = found + track.resonance_count, total + len(names)
-        yield f"| MFPT, each record in 8 pieces as a series | none given (joint) | {found} | {total} |"
+        yield (
+            f"| MFPT, each record in 8 pieces as a series | none given (joint) | {found} |"
+            f" {total} |"
+        )
         every = sorted(Path(folder).iterdir())
         count = track_recordings(every).resonance_count
-        yield f"| MFPT, all pieces of all four as one series | none given (joint) | {count} | {len(every)} |"
+        yield (
+            f"| MFPT, all pieces of all four as one series | none given (joint) | {count} |"
+            f" {len(every)} |"
+        )

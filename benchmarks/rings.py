@@ -1,4 +1,5 @@
-"""The paper's twelve rings: what Sq of a profilometer says of their load share, and what its two printed CRF add.
+"""The paper's twelve rings: what Sq of a profilometer says of their load share, and what its two
+printed CRF add.
 
 `python -m benchmarks.rings` runs this part alone; the emulator is that of `benchmarks.inference`.
 """
@@ -40,7 +41,10 @@ def lines(*, fast: bool, kept: Path = KEPT) -> Iterator[str]:  # noqa: ARG001 - 
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     clr, kg = quantity("clr"), quantity("mass_kg")
     yield "## The paper's rings at 500 N: what Sq says of CLR, and what a printed CRF adds"
-    yield "| Sq [um] | CLR by Sq alone, 90 % | printed CRF [Hz] | CLR, 90 % | bits | effective mass, 90 % | law own |"
+    yield (
+        "| Sq [um] | CLR by Sq alone, 90 % | printed CRF [Hz] | CLR, 90 % | bits | effective mass,"
+        " 90 % | law own |"
+    )
     yield "|---|---|---|---|---|---|---|"
     for number, (sq, std) in enumerate(zip(SAMPLES_SQ_UM, SAMPLES_STD_UM, strict=True)):
         known = Unknown("sq_m", setting.contact[0].range, sq, std)

@@ -1,8 +1,9 @@
-"""Six hundred contacts from a fixed Latin hypercube: does every one of them solve, and is none of them silently wrong?
+"""Six hundred contacts from a fixed Latin hypercube: does every one of them solve, and is none of
+them silently wrong?
 
-Roughness 0.25-6 um, correlation length 10-120 um, Gaussian and self-affine, pressure cap 0.65, 1, 2 GPa or none,
-inlet at -1.9 or -4.5 half-widths, load 50-2000 N, speed 0.01-20 m/s. Thirty of the solved ones are solved again
-100 times tighter.
+Roughness 0.25-6 um, correlation length 10-120 um, Gaussian and self-affine, pressure cap 0.65, 1,
+2 GPa or none, inlet at -1.9 or -4.5 half-widths, load 50-2000 N, speed 0.01-20 m/s. Thirty of the
+solved ones are solved again 100 times tighter.
 """
 
 import csv
@@ -88,9 +89,11 @@ def contacts(count: int = 600) -> list[Contact]:
 def prepared(
     contact: Contact, cells: int, *, shown: int | None = None
 ) -> tuple[ContactConditions, Surface]:
-    """Conditions and roughness; a length that the domain cannot hold is cut to 0.45 of its shorter side.
+    """Conditions and roughness; a length that the domain cannot hold is cut to 0.45 of its shorter
+    side.
 
-    The roughness has no waves that a grid of `shown` cells cannot show, so that it is the same one on finer grids.
+    The roughness has no waves that a grid of `shown` cells cannot show, so that it is the same one
+    on finer grids.
     """
     conditions = ContactConditions(
         pair=STEEL,
@@ -116,8 +119,8 @@ def prepared(
 def overlap(solution: ContactSolution) -> float:
     """How far the bent bodies reach below the contact film, worked out from the pressure alone [m].
 
-    The solution's own gap is no less than the contact film by construction, so it could not tell. Cells that the cap
-    decides are flattened plastically and do not count.
+    The solution's own gap is no less than the contact film by construction, so it could not tell.
+    Cells that the cap decides are flattened plastically and do not count.
     """
     scales = Scales.from_conditions(solution.conditions, solution.lubricant)
     problem = contact_problem(
@@ -178,10 +181,10 @@ def lines(*, fast: bool, artefact: Path = Path("build/robustness.csv")) -> Itera
     yield "## Contacts from a fixed Latin hypercube, 128 x 128"
     yield ""
     yield (
-        f"{len(solved)} of {len(results)} solved, the rest refused loudly; "
-        f"median {np.median([one.seconds for one in solved]):.2f} s and "
-        f"{np.median([one.steps for one in solved]):.0f} steps. "
-        f"Bodies overlap nowhere by more than {max(one.overlap_nm for one in solved):.3f} nm. "
-        f"{len(errors)} solved again 100 times tighter: {sum(np.isnan(errors))} of those did not converge, "
-        f"the load share of the others is off by {np.nanmax(errors):.1e} at most. All of it: {artefact}."
+        f"{len(solved)} of {len(results)} solved, the rest refused loudly; median"
+        f" {np.median([one.seconds for one in solved]):.2f} s and"
+        f" {np.median([one.steps for one in solved]):.0f} steps. Bodies overlap nowhere by more"
+        f" than {max(one.overlap_nm for one in solved):.3f} nm. {len(errors)} solved again 100"
+        f" times tighter: {sum(np.isnan(errors))} of those did not converge, the load share of the"
+        f" others is off by {np.nanmax(errors):.1e} at most. All of it: {artefact}."
     )

@@ -1,7 +1,8 @@
-"""Rollers that end: which drop of the ends is best, dry, level and tilted; and how long a lubricated roller takes.
+"""Rollers that end: which drop of the ends is best, dry, level and tilted; and how long a
+lubricated roller takes.
 
-Steel on steel, R 3.629 mm, 10 mm long, 2000 N: the most loaded roller of an NU 206, about. The oil has 0.04 Pa s and
-20 1/GPa, the surfaces roll at 3.5 m/s.
+Steel on steel, R 3.629 mm, 10 mm long, 2000 N: the most loaded roller of an NU 206, about. The oil
+has 0.04 Pa s and 20 1/GPa, the surfaces roll at 3.5 m/s.
 """
 
 import time
@@ -44,7 +45,9 @@ def lundberg(share: float) -> RollerShape:
 
 
 def between(contact: ContactConditions, cells: tuple[int, int], x: tuple[float, float]) -> Grid:
-    """A grid from x to x, in half-widths, and four lines of cells past each end, so that coarser ones have it too."""
+    """A grid from x to x, in half-widths, and four lines of cells past each end, so that coarser
+    ones have it too.
+    """
     a, end = contact.hertz.half_widths[0], 0.5 * LENGTH * cells[1] / (cells[1] - 8)
     return Grid(cells, (x[0] * a, -end), (x[1] * a, end), periodic=(False, False))
 
@@ -57,7 +60,9 @@ def _largest(shape: RollerShape) -> float:
 
 def lines(*, fast: bool) -> Iterator[str]:
     """Tables as Markdown."""
-    yield "## Rollers: largest pressure over Hertz's, dry, by the load that the logarithm is made for"
+    yield (
+        "## Rollers: largest pressure over Hertz's, dry, by the load that the logarithm is made for"
+    )
     yield ""
     yield f"| design load over load | {' | '.join(f'{1e3 * tilt:g} mrad' for tilt in TILTS)} |"
     yield f"|---{'|---' * len(TILTS)}|"
@@ -67,7 +72,10 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield ""
     yield "## Rollers: smooth and lubricated, processor time on one thread"
     yield ""
-    yield "| shape | cells | steps | time [s] | central film [um] | film at the ends [um] | edge pressure [GPa] |"
+    yield (
+        "| shape | cells | steps | time [s] | central film [um] | film at the ends [um] | edge"
+        " pressure [GPa] |"
+    )
     yield "|---|---|---|---|---|---|---|"
     iso = RollerShape.iso(9e-3, LENGTH)
     shapes = {

@@ -1,7 +1,9 @@
-"""The paper's contact at nine roughness levels on five surfaces each: how it converges, what it costs, what comes out.
+"""The paper's contact at nine roughness levels on five surfaces each: how it converges, what it
+costs, what comes out.
 
-Every solve starts cold, with the elastic kernel built anew, on one thread, in processor time. Compiled kernels are
-cached. The tight solves (tolerance 1e-6) tell how far off the default ones (1e-4) are.
+Every solve starts cold, with the elastic kernel built anew, on one thread, in processor time.
+Compiled kernels are cached. The tight solves (tolerance 1e-6) tell how far off the default ones
+(1e-4) are.
 """
 
 import statistics
@@ -109,8 +111,10 @@ def fft_pair_seconds(cells: int = 512) -> float:
 def table(results: list[Outcome]) -> list[str]:
     """A Markdown table, a row a roughness level: means over seeds, standard deviation behind ±."""
     rows = [
-        "| Sq [um] | CAR [%] | CAR domain [%] | CLR [%] | load on capped oil [%] | oil imbalance [%] | converged | "
-        "steps | seconds | CLR off by |",
+        (
+            "| Sq [um] | CAR [%] | CAR domain [%] | CLR [%] | load on capped oil [%] | oil"
+            " imbalance [%] | converged | steps | seconds | CLR off by |"
+        ),
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for sq_um in SQ_UM:
@@ -125,10 +129,12 @@ def table(results: list[Outcome]) -> list[str]:
             "" if worst is None else f" ({sum(bool(one.tight_converged) for one in level)} tight)"
         )
         rows.append(
-            f"| {sq_um} | {spread('car')} | {spread('car_domain')} | {spread('clr')} | {spread('capped_oil')} | "
-            f"{spread('imbalance')} | {sum(one.converged for one in level)} of {len(level)}{tight} | "
-            f"{statistics.median(one.steps for one in level):.0f} | "
-            f"{statistics.median(one.seconds for one in level):.2f} | {'-' if worst is None else f'{worst:.1e}'} |"
+            f"| {sq_um} | {spread('car')} | {spread('car_domain')} | {spread('clr')} |"
+            f" {spread('capped_oil')} | {spread('imbalance')} |"
+            f" {sum(one.converged for one in level)} of {len(level)}{tight} |"
+            f" {statistics.median(one.steps for one in level):.0f} |"
+            f" {statistics.median(one.seconds for one in level):.2f} |"
+            f" {'-' if worst is None else f'{worst:.1e}'} |"
         )
     return rows
 
@@ -149,6 +155,7 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield from table(results)
     median = statistics.median(one.seconds for one in results)
     yield (
-        f"\nMedian cold solve {median:.2f} s (slowest {max(one.seconds for one in results):.2f} s) = "
-        f"{median / pair:.0f} times one real 512 x 512 FFT and back ({1e3 * pair:.2f} ms in the same run)."
+        f"\nMedian cold solve {median:.2f} s (slowest {max(one.seconds for one in results):.2f} s)"
+        f" = {median / pair:.0f} times one real 512 x 512 FFT and back ({1e3 * pair:.2f} ms in the"
+        " same run)."
     )

@@ -1,6 +1,8 @@
-"""Rows of long benchmarks, kept in the repository, so that runs of many sessions add up and tables are made of them.
+"""Rows of long benchmarks, kept in the repository, so that runs of many sessions add up and tables
+are made of them.
 
-Each row says by which code it was found: the commit, with a + where the code or its examples were changed since.
+Each row says by which code it was found: the commit, with a + where the code or its examples were
+changed since.
 """
 
 import csv

@@ -1,7 +1,8 @@
-"""One machine on two sensors, each through its own structure: how often the line is found, held, and wrongly claimed.
+"""One machine on two sensors, each through its own structure: how often the line is found, held,
+and wrongly claimed.
 
-The contact's line is one random wave for both; what else a sensor hears is its own, or in part the other's too.
-`python -m benchmarks.sensors` runs this part alone; `--fast` a tenth of it.
+The contact's line is one random wave for both; what else a sensor hears is its own, or in part the
+other's too. `python -m benchmarks.sensors` runs this part alone; `--fast` a tenth of it.
 """
 
 import argparse
@@ -41,8 +42,8 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     series = SERIES // (10 if fast else 1)
     yield f"## One line on two sensors: {series} series of {TRUTH.size} recordings a row\n"
     yield (
-        "| what is heard | claimed | of those wrong | sensors disagree | found by the better alone | "
-        "CRF rms error [Hz] | alone [Hz] | 90 % intervals cover | alone |"
+        "| what is heard | claimed | of those wrong | sensors disagree | found by the better alone"
+        " | CRF rms error [Hz] | alone [Hz] | 90 % intervals cover | alone |"
     )
     yield "|---|---|---|---|---|---|---|---|---|"
     for name, choices in ROWS.items():
@@ -94,8 +95,9 @@ def two_sensors(
 ) -> dict[str, list[Spectrum]]:
     """Spectra by sensor, a and b.
 
-    `heights` of the line over the loudest mode on each; `size` of the structures' modes over the direct way; `alike`
-    the share of the rest that both hear; `moving` whether a hears a mode that moves by 100 to 400 Hz.
+    `heights` of the line over the loudest mode on each; `size` of the structures' modes over the
+    direct way; `alike` the share of the rest that both hear; `moving` whether a hears a mode that
+    moves by 100 to 400 Hz.
     """
     rng = np.random.default_rng([3, seed])
     rests, ways = [machine(rng), machine(rng)], [passed_on(rng, size), passed_on(rng, size)]
@@ -117,7 +119,9 @@ def two_sensors(
 
 
 def machine(rng: np.random.Generator) -> Field:
-    """What stays of what a sensor hears: noise that falls with frequency, and three modes in the band."""
+    """What stays of what a sensor hears: noise that falls with frequency, and three modes in the
+    band.
+    """
     heard = 0.1 * (np.maximum(FREQUENCY, 1.0) / 2000.0) ** -0.7
     for f0 in rng.uniform(*BAND, 3):
         heard = heard + rng.uniform(0.2, 1.0) * line_shape(
@@ -127,7 +131,9 @@ def machine(rng: np.random.Generator) -> Field:
 
 
 def passed_on(rng: np.random.Generator, size: float) -> Field:
-    """|1 + two modes|^2: what a structure between contact and sensor makes of the contact's line."""
+    """|1 + two modes|^2: what a structure between contact and sensor makes of the contact's
+    line.
+    """
     factor = np.ones(FREQUENCY.size, dtype=complex)
     for _ in range(2):
         f0, damping = rng.uniform(*BAND), rng.uniform(0.008, 0.03)

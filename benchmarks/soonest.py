@@ -1,11 +1,13 @@
-"""How soon an alarm can be raised at all: what the knees of `alarms` are told from, and the power that this allows.
+"""How soon an alarm can be raised at all: what the knees of `alarms` are told from, and the power
+that this allows.
 
-Of all tests with a chance a of speaking without a cause, the likelihood ratio finds most
-(Neyman and Pearson); for Gaussian scatter of known size it finds a course with chance Phi(d - z), z the deviation that
-chance exceeds with a, and d the distance [deviations of the scatter, made independent] from the nearest course without
-a knee. Where size and memory of the scatter are not known, a course without a knee may stand nearer in another scatter
-(by Kullback and Leibler); the likelihood ratio of both, drawn, bounds every test that keeps its rate there, too. A test
-that must learn the place of the knee as well finds less. `python -m benchmarks.soonest`.
+Of all tests with a chance a of speaking without a cause, the likelihood ratio finds most (Neyman
+and Pearson); for Gaussian scatter of known size it finds a course with chance Phi(d - z), z the
+deviation that chance exceeds with a, and d the distance [deviations of the scatter, made
+independent] from the nearest course without a knee. Where size and memory of the scatter are not
+known, a course without a knee may stand nearer in another scatter (by Kullback and Leibler); the
+likelihood ratio of both, drawn, bounds every test that keeps its rate there, too. A test that must
+learn the place of the knee as well finds less. `python -m benchmarks.soonest`.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,7 +39,9 @@ def independent(rows: np.ndarray, memory: float) -> np.ndarray:
 
 
 def courses(x: np.ndarray) -> Iterator[np.ndarray]:
-    """All that the alarm stands against, but for steps: line, exponentials, hyperbolas, a row each; cycles, two."""
+    """All that the alarm stands against, but for steps: line, exponentials, hyperbolas, a row each;
+    cycles, two.
+    """
     yield x[None]
     for length in x[-1] * LENGTHS:
         yield np.exp(-x / length)[None]
@@ -47,7 +51,9 @@ def courses(x: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def in_season(x: np.ndarray) -> Iterator[np.ndarray]:
-    """The same, each beside any amount of what an oil does that grows warmer; its law and temperature are known."""
+    """The same, each beside any amount of what an oil does that grows warmer; its law and
+    temperature are known.
+    """
     thin = 1.0 / (35.0 + WARMER_K * x / RECORDINGS + 95.0)
     yield from (np.vstack([rows, thin]) for rows in courses(x))
 
@@ -86,7 +92,8 @@ def distance(begins: int, behind: int, scatter_hz: float, memory: float, others:
 def power(distances: np.ndarray, behind: np.ndarray, chance: float | None) -> np.ndarray:
     """With what chance a knee can be found by so many recordings behind it.
 
-    `chance` of ever speaking without a cause; None: at most the alarm's rate for CRF in each recording since the knee.
+    `chance` of ever speaking without a cause; None: at most the alarm's rate for CRF in each
+    recording since the knee.
     """
     wrong = (
         CONTACT_SHARE * FALSE_ALARM_RATE * behind
@@ -97,10 +104,12 @@ def power(distances: np.ndarray, behind: np.ndarray, chance: float | None) -> np
 
 
 class Nearest(NamedTuple):
-    """A course without a knee, in scatter of its own: what it leaves of the knee, made independent by its memory.
+    """A course without a knee, in scatter of its own: what it leaves of the knee, made independent
+    by its memory.
 
-    `size` is of its scatter over the knee's. `apart` is the least information (Kullback and Leibler) by which a series
-    with the knee speaks against it, `left` over the scatter of the knee.
+    `size` is of its scatter over the knee's. `apart` is the least information (Kullback and
+    Leibler) by which a series with the knee speaks against it, `left` over the scatter of the
+    knee.
     """
 
     apart: float
@@ -110,7 +119,9 @@ class Nearest(NamedTuple):
 
 
 def nearest(begins: int, behind: int, scatter_hz: float, memory: float, others: Courses) -> Nearest:
-    """Of all courses without a knee, in scatter of any size and of MEMORIES, the one least told from a knee."""
+    """Of all courses without a knee, in scatter of any size and of MEMORIES, the one least told
+    from a knee.
+    """
     course = knee(begins, behind) / scatter_hz
     many = course.size
     own, found = np.linalg.inv(independent(np.eye(many), memory)), []
@@ -123,7 +134,9 @@ def nearest(begins: int, behind: int, scatter_hz: float, memory: float, others: 
 
 
 def power_unknown(near: Nearest, memory: float, chance: float) -> float:
-    """With what chance the likelihood ratio of a knee over the nearest course finds the knee, drawn."""
+    """With what chance the likelihood ratio of a knee over the nearest course finds the knee,
+    drawn.
+    """
     rng, many = np.random.default_rng(3), near.left.size
     across = independent(np.linalg.inv(independent(np.eye(many), memory)), near.memory)
     fresh = rng.standard_normal((DRAWS, many))
@@ -140,7 +153,9 @@ def power_unknown(near: Nearest, memory: float, chance: float) -> float:
 
 
 def row(scatter_hz: float, memory: float, others: Courses) -> str:
-    """Recordings behind the knee until half of the knees can be found, until 90 %, and the share by the end."""
+    """Recordings behind the knee until half of the knees can be found, until 90 %, and the share by
+    the end.
+    """
     left = np.array([RECORDINGS - 1 - begins for begins in BEGINS])
     known = (scatter_hz, memory, others)
     after = np.array([[distance(begins, many, *known) for many in BEHIND] for begins in BEGINS])
@@ -165,14 +180,22 @@ def _told(found: np.ndarray, ends: np.ndarray) -> str:
     """Of chances, (begins, recordings behind), and by the end."""
     mean = np.append(found.mean(axis=0), 1.0)
     half, most = (f"{1 + int(np.argmax(mean >= share))}" for share in (0.5, 0.9))
-    return f"{half}, {most if mean[:-1].max() >= 0.9 else f'over {len(BEHIND)}'}, {100.0 * ends.mean():.1f} %"
+    return (
+        f"{half}, {most if mean[:-1].max() >= 0.9 else f'over {len(BEHIND)}'},"
+        f" {100.0 * ends.mean():.1f} %"
+    )
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:  # noqa: ARG001  (as all parts are asked)
     """Markdown, a line at a time; `fast` is the same."""
-    yield "## How soon a knee can be found at all: half of them, 90 %, and the share by the end of 40 recordings\n"
+    yield (
+        "## How soon a knee can be found at all: half of them, 90 %, and the share by the end of 40"
+        " recordings\n"
+    )
     ever = f"with {100.0 * EVER:g} % ever without a cause"
-    yield f"| CRF scatters by | at the default rate | the same, size and memory not known | {ever} |"
+    yield (
+        f"| CRF scatters by | at the default rate | the same, size and memory not known | {ever} |"
+    )
     yield "|---|---|---|---|"
     for name, *of in ROWS:
         yield f"| {name} | {row(*of)} |"

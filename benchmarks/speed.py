@@ -1,4 +1,6 @@
-"""What a solve costs: on finer grids, smooth, dry, beside other codes, and on two processors at once."""
+"""What a solve costs: on finer grids, smooth, dry, beside other codes, and on two processors at
+once.
+"""
 
 import os
 import subprocess
@@ -83,17 +85,18 @@ def _beside_papers_model() -> Iterator[str]:
                 times.append(process_time() - began)
     paper, mixed = (median(times) for times in spent.values())
     yield (
-        f"Rough, 256 x 256, median of {len(spent['mixed'])} surfaces in turns: {mixed:.2f} s by the default model, "
-        f"{paper:.2f} s by the paper's: {mixed / paper:.2f}."
+        f"Rough, 256 x 256, median of {len(spent['mixed'])} surfaces in turns: {mixed:.2f} s by the"
+        f" default model, {paper:.2f} s by the paper's: {mixed / paper:.2f}."
     )
 
 
 def peak_gib(cells: int) -> float:
     """Of a process that solves the paper's contact once."""
     code = (
-        "import resource; from benchmarks.speed import cold; from benchmarks.roughness_levels import paper_case; "
-        f"case = paper_case(1.0, 0, {cells}); cold(case.conditions, case.lubricant, case.surface(), 1e-4); "
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+        "import resource; from benchmarks.speed import cold; from benchmarks.roughness_levels"
+        f" import paper_case; case = paper_case(1.0, 0, {cells}); cold(case.conditions,"
+        " case.lubricant, case.surface(), 1e-4);"
+        " print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return int(said.stdout) / 1024.0**2
@@ -122,7 +125,10 @@ def _smooth() -> Iterator[str]:
 
 def _dry() -> Iterator[str]:
     yield ""
-    yield "| dry, rough, elastic, to 1e-8 | ours [s] | kernel at hand [s] | tamaas [s] | ours over tamaas |"
+    yield (
+        "| dry, rough, elastic, to 1e-8 | ours [s] | kernel at hand [s] | tamaas [s] | ours over"
+        " tamaas |"
+    )
     yield "|---|---|---|---|---|"
     for cells in (256, 512):
         for sq_um, seed in ((0.5, 2), (1.0, 0), (3.0, 1)):
@@ -131,12 +137,14 @@ def _dry() -> Iterator[str]:
     conditions, surface = elastic_case(1.0, 0, 256)
     try:
         seconds = _contact_mechanics_seconds(surface, conditions)
-        yield f"ContactMechanics, Sq 1.0 um, 256 x 256, periodic both ways, to 1e-8: {seconds:.3f} s."
+        yield (
+            f"ContactMechanics, Sq 1.0 um, 256 x 256, periodic both ways, to 1e-8: {seconds:.3f} s."
+        )
     except ImportError:
         yield "ContactMechanics is not installed here."
     yield (
-        "SlipPy 0.5.2, the one open code for the rough point contact, asks for NumPy below 1.21 and so for Python 3.9 "
-        "or older: it cannot be installed beside asperity."
+        "SlipPy 0.5.2, the one open code for the rough point contact, asks for NumPy below 1.21 and"
+        " so for Python 3.9 or older: it cannot be installed beside asperity."
     )
 
 
@@ -230,7 +238,10 @@ def _two_processors() -> Iterator[str]:
     alone = sum(_one_solve(seed) for seed in (0, 1))
     with ProcessPoolExecutor(2) as pool:
         together = max(pool.map(_one_solve, (0, 1)))
-    yield f"Two solves on two processors: {alone / together:.2f} times as fast as one after the other."
+    yield (
+        f"Two solves on two processors: {alone / together:.2f} times as fast as one after the"
+        " other."
+    )
 
 
 def _error_bars(*, fast: bool) -> Iterator[str]:
@@ -252,8 +263,8 @@ def _error_bars(*, fast: bool) -> Iterator[str]:
                     factors.append(getattr(error, name) / off)
     counts = ", ".join(f"{name} in {count}" for name, count in held.items())
     yield (
-        f"Of {cases} contacts at 256 x 256 the stated error holds the difference to 512 x 512 for {counts}; "
-        f"it is {median(factors):.1f} times that difference (median)."
+        f"Of {cases} contacts at 256 x 256 the stated error holds the difference to 512 x 512 for"
+        f" {counts}; it is {median(factors):.1f} times that difference (median)."
     )
 
 

@@ -1,4 +1,6 @@
-"""What docs/theory/stress.md quotes: peaks below sliding Hertz contacts on several grids, and what stress costs."""
+"""What docs/theory/stress.md quotes: peaks below sliding Hertz contacts on several grids, and what
+stress costs.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,7 +24,9 @@ NU = 0.3
 def lines(*, fast: bool) -> Iterator[str]:
     """The tables, line by line."""
     yield "## Stress below the surface\n"
-    yield "Largest von Mises stress [p_h] and its depth [a] below sliding Hertz contacts, nu = 0.3:\n"
+    yield (
+        "Largest von Mises stress [p_h] and its depth [a] below sliding Hertz contacts, nu = 0.3:\n"
+    )
     cells = (64, 128, 256) if fast else (64, 128, 256, 512)
     yield "| contact | f | " + " | ".join(f"{n} cells" for n in cells) + " |"
     yield "|---|---|" + "---|" * len(cells)
@@ -39,7 +43,10 @@ def lines(*, fast: bool) -> Iterator[str]:
         )
     )
     yield "\nSeconds of one processor, with kernels made anew and with kernels kept:\n"
-    yield "| case | cells | solve | friction and heat, anew | stress, anew | friction and heat, kept | stress, kept |"
+    yield (
+        "| case | cells | solve | friction and heat, anew | stress, anew | friction and heat, kept"
+        " | stress, kept |"
+    )
     yield "|---|---|---|---|---|---|---|"
     for file, count in (("paper.toml", 256), ("ball-on-disc.toml", 256)):
         case = load_case(EXAMPLES / file).with_overrides(

@@ -1,4 +1,6 @@
-"""Studies: the paper's own on one and two workers, and what ten thousand cheap cases cost beside their own work."""
+"""Studies: the paper's own on one and two workers, and what ten thousand cheap cases cost beside
+their own work.
+"""
 
 import resource
 import shutil
@@ -30,7 +32,10 @@ CHEAP = {  # the vibration model alone, on a record of 5000 samples
 
 def papers_study(levels: str = "0.1 um") -> Iterator[str]:
     """All of it from the command line, on two workers and on one."""
-    yield f"The paper's study, {levels} from level to level, 5 seeds, 256 x 256, vibration and indicators included:\n"
+    yield (
+        f"The paper's study, {levels} from level to level, 5 seeds, 256 x 256, vibration and"
+        " indicators included:\n"
+    )
     taken = {}
     for workers in (2, 1):
         with tempfile.TemporaryDirectory() as folder:
@@ -43,7 +48,10 @@ def papers_study(levels: str = "0.1 um") -> Iterator[str]:
                 stdout=subprocess.DEVNULL,
             )
             taken[workers] = time.perf_counter() - begun
-        yield f"- {workers} worker{'s' if workers > 1 else ''}: {taken[workers]:.1f} s from the prompt"
+        yield (
+            f"- {workers} worker{'s' if workers > 1 else ''}: {taken[workers]:.1f} s from the"
+            " prompt"
+        )
     yield f"- parallel efficiency {taken[1] / (2.0 * taken[2]):.2f}"
 
 
@@ -73,8 +81,9 @@ def overhead(cases: int = 10_000) -> Iterator[str]:
     early, late = (min(held, key=lambda done: abs(done - share * cases)) for share in (0.1, 0.9))
     beside = 1e3 * (parent + workers - work)
     yield (
-        f"- {1e3 * wall / cases:.2f} ms a case; processor time: parent {1e3 * parent:.2f} ms, workers "
-        f"{1e3 * workers:.2f} ms, of it work {1e3 * work:.2f} ms; overhead {beside:.2f} ms a case"
+        f"- {1e3 * wall / cases:.2f} ms a case; processor time: parent {1e3 * parent:.2f} ms,"
+        f" workers {1e3 * workers:.2f} ms, of it work {1e3 * work:.2f} ms; overhead {beside:.2f} ms"
+        " a case"
     )
     memory = f"{held[early]:.0f} MiB after {early} cases, {held[late]:.0f} after {late}"
     yield f"- the parent holds {memory}; {result.failed} cases failed"

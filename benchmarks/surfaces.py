@@ -1,4 +1,6 @@
-"""What docs/theory/surfaces.md quotes: generated statistics over 20 seeds, their cost, second opinions, the lay."""
+"""What docs/theory/surfaces.md quotes: generated statistics over 20 seeds, their cost, second
+opinions, the lay.
+"""
 
 import statistics
 import warnings
@@ -64,12 +66,19 @@ KINDS: dict[str, Maker] = {
 
 def lines(*, fast: bool) -> Iterator[str]:
     """The tables, as Markdown."""
-    yield "## Generated surfaces, 256 x 256 cells of 2 um, means over 20 seeds (standard deviation)\n"
-    yield "| kind | Sq off by | 1/e length along, across [um] | Ssk | Sku | seconds at 1024 x 1024 |"
+    yield (
+        "## Generated surfaces, 256 x 256 cells of 2 um, means over 20 seeds (standard deviation)\n"
+    )
+    yield (
+        "| kind | Sq off by | 1/e length along, across [um] | Ssk | Sku | seconds at 1024 x 1024 |"
+    )
     yield "|---|---|---|---|---|---|"
     for kind, make in KINDS.items():
         yield _row(kind, make)
-    yield f"\nSlope of the self-affine spectrum, asked -3.6: {_slope(0.8):.3f}; asked -2.6: {_slope(0.3):.3f}."
+    yield (
+        f"\nSlope of the self-affine spectrum, asked -3.6: {_slope(0.8):.3f}; asked -2.6:"
+        f" {_slope(0.3):.3f}."
+    )
     if not MEASURED.is_dir():
         yield "\nThe measured surfaces are not on this machine: no second opinion on them, no lay."
         return
@@ -96,8 +105,8 @@ def _row(kind: str, make: Maker) -> str:
         seconds.append(perf_counter() - began)
     moments = [f"{shapes[:, i].mean():.3f} ({shapes[:, i].std():.3f})" for i in range(2)]
     return (
-        f"| {kind} | {off:.0e} | {means[0]:.2f} ({spreads[0]:.2f}), {means[1]:.2f} ({spreads[1]:.2f}) | "
-        f"{moments[0]} | {moments[1]} | {statistics.median(seconds):.2f} |"
+        f"| {kind} | {off:.0e} | {means[0]:.2f} ({spreads[0]:.2f}), {means[1]:.2f}"
+        f" ({spreads[1]:.2f}) | {moments[0]} | {moments[1]} | {statistics.median(seconds):.2f} |"
     )
 
 
@@ -184,7 +193,10 @@ def _second_opinion() -> Iterator[str]:
 
 def _lay() -> Iterator[str]:
     case = load_case(CASE)
-    yield "| surface | Sq [um] | lay | CAR [%] | CLR [%] | load on capped oil [%] | oil imbalance [%] | converged |"
+    yield (
+        "| surface | Sq [um] | lay | CAR [%] | CLR [%] | load on capped oil [%] | oil imbalance [%]"
+        " | converged |"
+    )
     yield "|---|---|---|---|---|---|---|---|"
     for name in ("milled_1.opd", "ground_lay.plu"):
         for sq in (None, "0.5 um", "1 um"):
@@ -196,7 +208,8 @@ def _lay() -> Iterator[str]:
                     100.0 * share for share in (state.car, state.clr, state.capped_oil_load_ratio)
                 ]
                 yield (
-                    f"| {name} | {1e6 * state.sq:.3f}{'' if sq else ' as measured'} | {lay} | {percent[0]:.2f} | "
-                    f"{percent[1]:.2f} | {percent[2]:.1f} | {100 * state.mass_flux_imbalance:.0f} | "
-                    f"{'yes' if run.solution.convergence.converged else 'no'} |"
+                    f"| {name} | {1e6 * state.sq:.3f}{'' if sq else ' as measured'} | {lay} |"
+                    f" {percent[0]:.2f} | {percent[1]:.2f} | {percent[2]:.1f} |"
+                    f" {100 * state.mass_flux_imbalance:.0f} |"
+                    f" {'yes' if run.solution.convergence.converged else 'no'} |"
                 )

@@ -1,4 +1,6 @@
-"""A run of the benchmarks that may be cut off: which parts have ended, kept beside what it builds."""
+"""A run of the benchmarks that may be cut off: which parts have ended, kept beside what it
+builds.
+"""
 
 import hashlib
 import json
@@ -65,7 +67,9 @@ class Unfinished:
 
 
 def stamp(*names: str) -> str:
-    """The code of rooms and modules of the package as a digest: what other code has done is not gone on with."""
+    """The code of rooms and modules of the package as a digest: what other code has done is not
+    gone on with.
+    """
     digest = hashlib.sha256()
     for name in names:
         for path in sorted((PACKAGE / name).rglob("*.py")) or [PACKAGE / f"{name}.py"]:

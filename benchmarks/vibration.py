@@ -1,4 +1,5 @@
-"""The vibration model measured: Table 1, trends, speed, loss of contact, and the stiffness of solved contacts.
+"""The vibration model measured: Table 1, trends, speed, loss of contact, and the stiffness of
+solved contacts.
 
 `python -m benchmarks.vibration` runs this part alone.
 """
@@ -47,23 +48,33 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     yield "\n## Vibration: Hertz's spring against its tangent\n"
     yield from nonlinear_lines()
     if not fast:
-        yield "\n## Vibration: tangent stiffness of the solved contact, 256 x 256, mean and range of three surfaces\n"
+        yield (
+            "\n## Vibration: tangent stiffness of the solved contact, 256 x 256, mean and range of"
+            " three surfaces\n"
+        )
         yield from stiffness_lines()
 
 
 def table_lines() -> Iterator[str]:
-    yield "| cut-off [Hz] | height [um] | load [N] | CRF [Hz] | printed | off | CRFA | 5 to 95 % | printed | inside |"
+    yield (
+        "| cut-off [Hz] | height [um] | load [N] | CRF [Hz] | printed | off | CRFA | 5 to 95 % |"
+        " printed | inside |"
+    )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for row in reproduce_table1():
         yield (
-            f"| {row.cutoff_hz:.0f} | {1e6 * row.height_m:.0f} | {row.load_n:.0f} | {row.crf_hz:.2f} | "
-            f"{row.paper_crf_hz:.2f} | {100 * row.crf_deviation:+.2f} % | {row.crfa:.3f} | "
-            f"{row.crfa_low:.3f} to {row.crfa_high:.3f} | {row.paper_crfa:.2f} | {'yes' if row.within else 'NO'} |"
+            f"| {row.cutoff_hz:.0f} | {1e6 * row.height_m:.0f} | {row.load_n:.0f} |"
+            f" {row.crf_hz:.2f} | {row.paper_crf_hz:.2f} | {100 * row.crf_deviation:+.2f} % |"
+            f" {row.crfa:.3f} | {row.crfa_low:.3f} to {row.crfa_high:.3f} | {row.paper_crfa:.2f} |"
+            f" {'yes' if row.within else 'NO'} |"
         )
 
 
 def trend_lines() -> Iterator[str]:
-    yield "| rate [kHz] | bilinear filter (paper) | continuous filter (sound) | the same, point patch averaged |"
+    yield (
+        "| rate [kHz] | bilinear filter (paper) | continuous filter (sound) | the same, point patch"
+        " averaged |"
+    )
     yield "|---|---|---|---|"
     for rate in (10e3, 20e3, 50e3, 200e3, None):
         figures = []
@@ -72,9 +83,11 @@ def trend_lines() -> Iterator[str]:
                 "paper", mass=0.1, damping_ratio=0.02, **{"filter": "continuous", **choices}
             )
             crfa = [
-                continuous_crfa(model, 30.0, 2e-6, load)
-                if rate is None
-                else expected_crfa(replace(model, rate_hz=rate), 30.0, 2e-6, load)
+                (
+                    continuous_crfa(model, 30.0, 2e-6, load)
+                    if rate is None
+                    else expected_crfa(replace(model, rate_hz=rate), 30.0, 2e-6, load)
+                )
                 for load in LOADS
             ]
             figures.append(f"{np.polyfit(np.log(LOADS), np.log(crfa), 1)[0]:+.3f}")
@@ -115,8 +128,14 @@ def speed_lines() -> Iterator[str]:
         profile = SurfaceTrack.from_surface(surface, 0.42).profile(6_000_000, 20e3, 1)
         return power_spectrum(acceleration(SPRING, profile), segment=20_000)
 
-    yield f"- 300 s at 20 kHz, filtered noise to spectrum: {median_seconds(noise_to_spectrum, 3):.2f} s"
-    yield f"- 300 s at 20 kHz, surface's own spectrum to spectrum: {median_seconds(surface_to_spectrum, 3):.2f} s"
+    yield (
+        "- 300 s at 20 kHz, filtered noise to spectrum:"
+        f" {median_seconds(noise_to_spectrum, 3):.2f} s"
+    )
+    yield (
+        "- 300 s at 20 kHz, surface's own spectrum to spectrum:"
+        f" {median_seconds(surface_to_spectrum, 3):.2f} s"
+    )
     few = Signal(million.values[:1000], 20e3, "m")
     reference = acceleration(SPRING, few).values
     error = np.max(np.abs(acceleration(SPRING, few, method="rk5").values - reference)) / np.max(
@@ -124,9 +143,9 @@ def speed_lines() -> Iterator[str]:
     )
     seconds, off = by_solve_ivp(few, reference, 1e-10)
     yield (
-        f"- solve_ivp (RK45, rtol 1e-10; off by {off:.0e} of the largest acceleration), a million samples: "
-        f"{1e3 * seconds:.0f} s, {1e3 * seconds / exact:.0f} times the exact response and {1e3 * seconds / rk5:.0f} "
-        f"times Runge-Kutta with 8 sub-steps (off by {error:.0e})"
+        f"- solve_ivp (RK45, rtol 1e-10; off by {off:.0e} of the largest acceleration), a million"
+        f" samples: {1e3 * seconds:.0f} s, {1e3 * seconds / exact:.0f} times the exact response and"
+        f" {1e3 * seconds / rk5:.0f} times Runge-Kutta with 8 sub-steps (off by {error:.0e})"
     )
 
 
@@ -181,8 +200,8 @@ def nonlinear_lines() -> Iterator[str]:
 
 def stiffness_lines() -> Iterator[str]:
     yield (
-        "| Sq [um] | CLR [%] | tangent [N/um] | asperities | film | step moves total, split | CRF tangent [Hz] | "
-        "CRF paper's law | parallel film | line |"
+        "| Sq [um] | CLR [%] | tangent [N/um] | asperities | film | step moves total, split | CRF"
+        " tangent [Hz] | CRF paper's law | parallel film | line |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for sq_um in (0.0, *SQ_UM):

@@ -1,7 +1,8 @@
-"""Wear in time: what it takes, kills, what jumps, grids and positions do to it, intervals, plateaus, rings.
+"""Wear in time: what it takes, kills, what jumps, grids and positions do to it, intervals,
+plateaus, rings.
 
-Histories are kept in build/wearing and go on where they were stopped, as long as the code that wears is the same: each
-call does what its time allows and says what is left.
+Histories are kept in build/wearing and go on where they were stopped, as long as the code that
+wears is the same: each call does what its time allows and says what is left.
 """
 
 import hashlib
@@ -84,7 +85,9 @@ class OutOfTime(Exception):
 
 
 class Plan(NamedTuple):
-    """A history that is wanted: its folder's name, its hours, and what its case differs in from the example."""
+    """A history that is wanted: its folder's name, its hours, and what its case differs in from the
+    example.
+    """
 
     name: str
     hours: float
@@ -107,7 +110,9 @@ class Shelf:
         self.made = 0
 
     def worn(self, plan: Plan) -> tuple[WearHistory, float] | None:
-        """A history and the processor time that it took in all; None where time runs out on the way."""
+        """A history and the processor time that it took in all; None where time runs out on the
+        way.
+        """
         folder = self.folder / plan.folder
         clock, ended = (self.folder / f"{plan.folder}.{kind}" for kind in ("json", "ended"))
         if time.perf_counter() > self.end and not ended.is_file():
@@ -177,7 +182,9 @@ def solved_at(history: WearHistory, count: int, seed: int) -> list[SolvedPositio
 
 
 def end_mean(history: WearHistory) -> str:
-    """CLR of the worn surfaces over many positions, which a jump's own have not the number for, and its deviation."""
+    """CLR of the worn surfaces over many positions, which a jump's own have not the number for, and
+    its deviation.
+    """
     clr = 100.0 * np.array([one.state.clr for one in solved_at(history, ENDS, 99)])
     return f"{np.mean(clr):.2f} ± {np.std(clr, ddof=1) / np.sqrt(len(clr)):.1f}"
 
@@ -195,9 +202,9 @@ def speed(shelf: Shelf) -> Iterator[str]:
         jumps, patches = len(history.table) - 1, history.contact.patches
         abreast = -(-patches // 2) / patches  # of a jump's positions, that the busier of two solves
         yield (
-            f"| {history.hours:.1f} | {jumps} | {patches} | {seconds:.0f} | {seconds / jumps:.2f} | "
-            f"{seconds * abreast:.0f} | "
-            f"{row(history, 'sq_m', 'clr')} | {history.volume_error:.1e} | {history.worn.error:.1e} |"
+            f"| {history.hours:.1f} | {jumps} | {patches} | {seconds:.0f} | {seconds / jumps:.2f} |"
+            f" {seconds * abreast:.0f} | {row(history, 'sq_m', 'clr')} | {history.volume_error:.1e}"
+            f" | {history.worn.error:.1e} |"
         )
 
 
@@ -252,7 +259,10 @@ def _killed(
 
 def jumps(shelf: Shelf) -> Iterator[str]:
     yield "\n## Half the jump, and fewer or more positions, 2 h\n"
-    yield f"| cells | step | positions | jumps | {heads('sq_m', 'spk_m', 'clr')} of {ENDS} positions | seconds |"
+    yield (
+        f"| cells | step | positions | jumps | {heads('sq_m', 'spk_m', 'clr')} of {ENDS} positions"
+        " | seconds |"
+    )
     yield "|---|---|---|---|---|---|---|---|"
     ways = [(64, 0.1, 7), (64, 0.05, 7), (64, 0.025, 7), (64, 0.05, 4), (64, 0.05, 14)]
     plans = [
@@ -275,7 +285,10 @@ def jumps(shelf: Shelf) -> Iterator[str]:
 def grids(shelf: Shelf) -> Iterator[str]:
     keys = ("clr", "sq_m", "spk_m", "worn_depth_2_m")
     yield "\n## Grids, 1 h\n"
-    yield f"| cells | {heads(*keys)} | {heads('clr')} of {ENDS} positions | jumps | processor time [s] |"
+    yield (
+        f"| cells | {heads(*keys)} | {heads('clr')} of {ENDS} positions | jumps | processor time"
+        " [s] |"
+    )
     yield "|---|---|---|---|---|---|---|---|"
     plans = [Plan(f"grid-{cells}", 1.0, {"grid.cells": [cells] * 2}) for cells in (64, 128, 256)]
     for plan, history, seconds in shelf.all(plans):
@@ -303,9 +316,15 @@ def intervals() -> Iterator[str]:
     yield f"\n## The interval of CLR over a jump's positions, {SEEDS} surfaces on 96 x 32 cells\n"
     yield "| what it should hold | how often it does [%] | asked [%] |"
     yield "|---|---|---|"
-    yield f"| CLR at a further position (`clr_low`, `clr_high`) | {100 * one_more / all_others:.0f} | 90 |"
+    yield (
+        f"| CLR at a further position (`clr_low`, `clr_high`) | {100 * one_more / all_others:.0f} |"
+        " 90 |"
+    )
     yield f"| the mean of {MANY} positions, by the same | {100 * mean / SEEDS:.0f} | 90 or more |"
-    yield f"| the mean of {MANY} positions, by `clr_mean_low`, `clr_mean_high` | {100 * of_mean / SEEDS:.0f} | 90 |"
+    yield (
+        f"| the mean of {MANY} positions, by `clr_mean_low`, `clr_mean_high` |"
+        f" {100 * of_mean / SEEDS:.0f} | 90 |"
+    )
     yield f"\nThe interval is {np.mean(widths):.3f} wide on average.\n"
 
 
@@ -341,7 +360,10 @@ def plateau_plan(sq: str, k: float, hours: float) -> Plan:
 def plateau(shelf: Shelf) -> Iterator[str]:
     """Removal alone, as long in k times time."""
     keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "h_mean_m")
-    yield "\n## Removal alone: three roughnesses, three coefficients (32 x 32 cells, correlation length 30 um)\n"
+    yield (
+        "\n## Removal alone: three roughnesses, three coefficients (32 x 32 cells, correlation"
+        " length 30 um)\n"
+    )
     yield f"| sq | k of the ring [1/Pa] | hours | k times hours | {heads(*keys)} | jumps |"
     yield f"|---|---|---|---|{'---|' * len(keys)}---|"
     done = {
@@ -361,14 +383,19 @@ def plateau(shelf: Shelf) -> Iterator[str]:
 
 
 def measured(shelf: Shelf) -> Iterator[str]:
-    """A measured surface: parameters as reported, and as SurfaceTopography finds them in the written files."""
+    """A measured surface: parameters as reported, and as SurfaceTopography finds them in the
+    written files.
+    """
     if not MEASURED.is_file():
         yield f"\n{MEASURED.name} is not at hand.\n"
         return
     keys = ("sq_m", "ssk", "spk_m", "svk_m")
     surface = {"file": os.path.relpath(MEASURED, EXAMPLE.parent), "fit": "tile"}
     yield "\n## A measured surface, 3 h at 128 x 128 cells\n"
-    yield f"| {MEASURED.name} | {heads(*keys)} | Sq by SurfaceTopography [µm] | Ssk from its heights |"
+    yield (
+        f"| {MEASURED.name} | {heads(*keys)} | Sq by SurfaceTopography [µm] | Ssk from its"
+        " heights |"
+    )
     yield f"|---|{'---|' * len(keys)}---|---|"
     for _, history, _ in shelf.all(
         [Plan("measured", 3.0, {"surface": surface, "grid.cells": [128, 128]})]
@@ -395,7 +422,10 @@ def rings(shelf: Shelf) -> Iterator[str]:
         new = history.values_at(0.0)
         for k in (1e-18, 1e-17, 1e-16):  # the same history, as k is its clock
             then = history.values_at(10.0 * k / most)
-            yield f"| {k:g} | {' | '.join(f'{told(new, key)} to {told(then, key)}' for key in keys)} |"
+            yield (
+                f"| {k:g} |"
+                f" {' | '.join(f'{told(new, key)} to {told(then, key)}' for key in keys)} |"
+            )
 
 
 PAPERS: Overrides = {
@@ -410,7 +440,10 @@ def debris_rings(shelf: Shelf) -> Iterator[str]:
     """The first ring in dirty oil, for ten hours, of three seeds: 0.87 um are printed then."""
     keys = ("sq_1_m", "sq_2_m", "clr", "crf_hz")
     marks: Overrides = {"law": "debris", "concentration": "1.74e10 1/m^3", "sinking": 0.2}
-    yield "\n## The paper's first ring in dirty oil (code 21), three seeds: 0.54 to 0.87 um in ten hours are printed\n"
+    yield (
+        "\n## The paper's first ring in dirty oil (code 21), three seeds: 0.54 to 0.87 um in ten"
+        " hours are printed\n"
+    )
     yield f"| seed | {heads(*keys)} | least of the ring |"
     yield "|---|---|---|---|---|---|"
     for seed in (7, 8, 9):
@@ -432,7 +465,10 @@ def falls_and_rises(shelf: Shelf) -> Iterator[str]:
         "wear.patches": 5,
         "wear.fatigue": {"law": "dang-van", "limit": "260 MPa"},
     }
-    yield "\n## Sq falls, then rises: removal, and pits by fatigue (260 MPa; 32 x 32 cells, correlation length 30 um)\n"
+    yield (
+        "\n## Sq falls, then rises: removal, and pits by fatigue (260 MPa; 32 x 32 cells,"
+        " correlation length 30 um)\n"
+    )
     yield f"| hours | {heads(*keys)} |"
     yield f"|---|{'---|' * len(keys)}"
     for _, history, _ in shelf.all([Plan("falls-and-rises", RISEN, overrides)]):
@@ -463,9 +499,11 @@ def draw_plateaus(histories: Mapping[str, WearHistory]) -> None:
                 STROKES[float(k)],
                 color=COLOURS[sq],
                 linewidth=1.2,
-                label=f"Sq {sq.removesuffix('um')} µm"
-                if float(k) == 1e-16 and key == "sq_m"
-                else None,
+                label=(
+                    f"Sq {sq.removesuffix('um')} µm"
+                    if float(k) == 1e-16 and key == "sq_m"
+                    else None
+                ),
             )
         axes.set(ylabel=quantity(key).label, xlabel="k times hours [1e-16 h/Pa]")
     figure.legend(loc="lower center", ncols=3)
@@ -497,7 +535,9 @@ def draw_rise(history: WearHistory) -> None:
 
 
 def lines(*, fast: bool, seconds: float) -> Iterator[str]:
-    """The same tables in the same order at any length: docs/theory/wear.md includes them by number."""
+    """The same tables in the same order at any length: docs/theory/wear.md includes them by
+    number.
+    """
     shelf = Shelf(min(seconds, SHORT_S) if fast else seconds)
     checks = [*intervals(), *kills()]  # first, as they do not go on another time
     for part in (speed, plateau, falls_and_rises, debris_rings, rings, jumps, grids, measured):
@@ -505,4 +545,7 @@ def lines(*, fast: bool, seconds: float) -> Iterator[str]:
     yield from checks
     yield f"Sample: {shelf.made} histories."
     if shelf.left:
-        yield f"\nNot at their end for want of time; the same command goes on with them: {', '.join(shelf.left)}.\n"
+        yield (
+            "\nNot at their end for want of time; the same command goes on with them:"
+            f" {', '.join(shelf.left)}.\n"
+        )

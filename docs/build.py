@@ -1,7 +1,8 @@
 """Builds the site into build/site: `make docs`.
 
-The pages are staged first, in one tree with the README, the changelog and the reference of `make_reference.py`, so that
-nothing that is made ever stands among what is written. Warnings are errors; nothing is fetched.
+The pages are staged first, in one tree with the README, the changelog and the reference of
+`make_reference.py`, so that nothing that is made ever stands among what is written. Warnings are
+errors; nothing is fetched.
 """
 
 import os
@@ -41,7 +42,7 @@ def staged(path: Path) -> Path:
 
 
 def sources() -> Iterator[Path]:
-    """What the site is made of, but for the reference."""
+    """Yield the source files of the site, without the reference."""
     yield from (ROOT / name for name in BESIDE)
     yield from (ROOT / "examples").glob("*.toml")
     yield ROOT / "benchmark" / "certified.csv"
@@ -51,7 +52,7 @@ def sources() -> Iterator[Path]:
 
 
 def relinked(path: Path) -> str:
-    """A page whose links lead where they lead in the repository."""
+    """Return a page with its links adapted to the stage."""
     here = staged(path).parent
 
     def leading(link: re.Match) -> str:
@@ -87,7 +88,7 @@ def listed(texts: dict[Path, str]) -> set[str]:
 
 
 def stage() -> None:
-    """Bring the stage up to date; what has not changed keeps its time, so that only what has is built anew."""
+    """Update the stage; unchanged files keep their time, so that only changed ones are rebuilt."""
     texts = {staged(path): relinked(path) for path in sources() if path.suffix == ".md"}
     texts |= {STAGE / name: text for name, text in make_reference.pages().items()}
     rest = sorted(path.stem for path in texts if path.parent == STAGE and path.stem != "index")
@@ -120,7 +121,8 @@ def main() -> int:
     )
     if code == 0:
         print(  # noqa: T201
-            f"The site is in {SITE.relative_to(ROOT)}: open {(SITE / 'index.html').relative_to(ROOT)}."
+            f"The site is in {SITE.relative_to(ROOT)}: open"
+            f" {(SITE / 'index.html').relative_to(ROOT)}."
         )
     return code
 

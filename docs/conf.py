@@ -1,4 +1,4 @@
-"""Sphinx on what `docs/build.py` staged: this folder's pages, the README, and the generated reference."""
+"""Sphinx settings for the stage of `docs/build.py`."""
 
 import sys
 from importlib.metadata import version as version_of
@@ -87,7 +87,7 @@ sphinx_gallery_conf = {
 
 
 def setup(app):
-    """Docstrings speak Markdown in places, and what reStructuredText would read into them is put right here."""
+    """Register the conversion of Markdown in docstrings to reStructuredText."""
     app.connect("autodoc-process-docstring", described, priority=100)  # before napoleon reads them
     app.connect("autodoc-process-docstring", plain)
     app.connect("autodoc-process-signature", signed)

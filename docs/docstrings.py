@@ -1,6 +1,7 @@
 """Docstrings as Sphinx reads them, and the look of the gallery's figures.
 
-What reStructuredText would take for markup is meant as it stands; fields are told by the comments behind them.
+What reStructuredText would take for markup is meant as it stands; fields are told by the comments
+behind them.
 """
 
 import inspect
@@ -13,9 +14,9 @@ ARRAY = re.compile(rf"(~?numpy\.ndarray){INNER}")
 
 
 def plain(_app: Any, what: str, _name: str, thing: Any, _options: Any, lines: list[str]) -> None:
-    """Escape bars, stars and trailing underscores outside code, in place; add what a class says behind its fields.
+    """Escape bars, stars and trailing underscores outside code, and describe a class's fields.
 
-    Words before a colon in a property's first line are no type: they come back to where they stood.
+    Words before a colon in the first line of a property are no type and are restored.
     """
     if what == "class":
         lines += _fields(thing)
@@ -29,7 +30,7 @@ def plain(_app: Any, what: str, _name: str, thing: Any, _options: Any, lines: li
 def described(
     _app: Any, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]
 ) -> None:
-    """Put what a parameter is on a line of its own: behind the colon numpy's form has types, and ours has words."""
+    """Move the description of each parameter to a line of its own."""
     lines[:] = [part for line in lines for part in _entry(line)]
 
 
@@ -42,7 +43,7 @@ def signed(
     signature: str | None,
     returns: str | None,
 ) -> tuple[str | None, str | None]:
-    """Arrays without what they are made of, and defaults that a factory makes as dots, so that the rest is parsed."""
+    """Shorten array types and factory defaults in a signature so that it parses."""
     return _short(signature), _short(returns)
 
 

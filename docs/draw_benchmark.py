@@ -1,4 +1,4 @@
-"""Error of the certified values over time, by solver and family, drawn from the csv of `make bench` at build."""
+"""Draw the error of the certified values over time from the csv of `make bench`."""
 
 import csv
 from pathlib import Path

@@ -1,7 +1,8 @@
 """The generated pages of the reference: what Python offers, commands, keys of a case, keys of JSON.
 
-Each is made of what the program itself reads: the stub of its names, typer's commands, pydantic's sections, the
-catalogue of quantities. JSON's shape is that of the golden numbers, which the tests hold against every command.
+Each is made of what the program itself reads: the stub of its names, typer's commands, pydantic's
+sections, the catalogue of quantities. JSON's shape is that of the golden numbers, which the tests
+hold against every command.
 """
 
 import ast
@@ -15,7 +16,7 @@ from typing import Any, get_args
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 from asperity.core.quantities import catalogue  # noqa: E402
-from support.vocabulary import case_sections, commands, golden  # noqa: E402  the documentation's tests read the same
+from support.vocabulary import case_sections, commands, golden  # noqa: E402
 
 GROUPS = {  # of names, by the module that exports them
     "Contacts and bodies": ("contact.conditions", "contact.grid", "surface"),
@@ -47,7 +48,7 @@ def pages() -> dict[str, str]:
 
 
 def public_names() -> dict[str, list[str]]:
-    """The names of `asperity` by the module that hands them out."""
+    """Return the public names of `asperity` by the module that exports them."""
     stub = ast.parse((ROOT / "src" / "asperity" / "__init__.pyi").read_text("utf-8"))
     names: dict[str, list[str]] = {}
     for node in stub.body:
@@ -57,7 +58,7 @@ def public_names() -> dict[str, list[str]]:
 
 
 def api_page() -> str:
-    """An entry for every public name; a module that stands in no group has its own."""
+    """Return the page of public names, grouped by topic."""
     names = public_names()
     grouped = {module for modules in GROUPS.values() for module in modules}
     groups = GROUPS | {module.capitalize(): (module,) for module in names if module not in grouped}
@@ -130,11 +131,14 @@ def _option(entry: Any) -> tuple[str, ...]:
 
 
 def case_page() -> str:
-    """Every key of every table, as pydantic's models read it; what each means is told in docs/case-file.md."""
+    """Return the page of case keys; docs/case-file.md explains them."""
     parts = [
         "# Keys of a case file",
         "",
-        "What each means, and why its default is what it is, says [the case file](../case-file.md).",
+        (
+            "What each means, and why its default is what it is, says [the case"
+            " file](../case-file.md)."
+        ),
     ]
     for name, section in sorted(
         case_sections().items(), key=lambda item: (item[0] != "Top level", item[0])
@@ -172,7 +176,7 @@ PLAIN = {bool: "true or false", int: "whole number", float: "number", str: "text
 
 
 def _parts(*things: Any) -> Iterator[Any]:
-    """What an annotation is made of: types, texts of its choices, and what reads it."""
+    """Yield the types, choices and validators of an annotation."""
     for thing in things:
         yield from _parts(*get_args(thing))
         yield from _parts(*getattr(thing, "__metadata__", ()))
@@ -219,7 +223,7 @@ def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _meaning(path: str) -> tuple[str, str]:
-    """Unit and name of the catalogue; of a value's deviation or beginning, those of the value."""
+    """Return unit and name by the catalogue; a deviation takes those of its value."""
     key = re.split(r"[.\]]+", path.removesuffix("[]"))[-1]
     for suffix, words in {
         "": "",

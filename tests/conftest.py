@@ -1,4 +1,6 @@
-"""Puts this folder on the import path for `support`, and marks the slow files that `make quick` leaves out."""
+"""Puts this folder on the import path for `support`, and marks the slow files that `make quick`
+leaves out.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,6 @@
-"""All attacks, and the table of docs/validation.md: `python -m benchmarks.attacks [--share 0.01] [KIND ...]`."""
+"""All attacks, and the table of docs/validation.md: `python -m benchmarks.attacks [--share 0.01]
+[KIND ...]`.
+"""
 
 import argparse
 import json
@@ -18,7 +20,9 @@ ROOT = Path(__file__).parents[2]
 
 
 class Kind(NamedTuple):
-    """How many attacks of a kind there are, and what does them: yields a fault, or None, for each."""
+    """How many attacks of a kind there are, and what does them: yields a fault, or None, for
+    each.
+    """
 
     attacks: int
     do: Callable[[str, int], Iterator[str | None]]
@@ -27,7 +31,8 @@ class Kind(NamedTuple):
 def in_worker(kind: str, count: int) -> Iterator[str | None]:
     """Attacks in a worker that is started again where one kills or stops it.
 
-    What takes 20 s of a processor, or three times that by the clock, hangs: other work on the machine is nobody's hang.
+    What takes 20 s of a processor, or three times that by the clock, hangs: other work on the
+    machine is nobody's hang.
     """
     at, longest = 0, (0.0, 0.0, 0)
     while at < count:

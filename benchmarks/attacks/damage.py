@@ -1,4 +1,6 @@
-"""Damage of files: what lies on disk is flipped, cut, filled and mixed up, and has to be refused or read as it was."""
+"""Damage of files: what lies on disk is flipped, cut, filled and mixed up, and has to be refused or
+read as it was.
+"""
 
 import json
 import random
@@ -43,7 +45,8 @@ def damaged(content: bytes, rng: random.Random) -> bytes:
     return bytes(changed)
 
 
-# Results --------------------------------------------------------------------------------------------------------------
+# Results
+# -------------------------------------------------------------------------------------------------
 
 
 def make_results(folder: Path) -> None:
@@ -126,7 +129,8 @@ def too_long(refusal: BadInput) -> str | None:
     return f"refusal of {len(text)} characters" if len(text) > 500 or "\n" in text else None
 
 
-# What was measured ----------------------------------------------------------------------------------------------------
+# What was measured
+# -------------------------------------------------------------------------------------------------
 
 
 def originals(folder: Path) -> list[Path]:
@@ -165,7 +169,9 @@ def _made(folder: Path) -> list[Path]:
 
 
 def measured(folder: Path) -> Callable[[int], str | None]:
-    """An attack by number on a recording or a surface: what is wrong with it is said, or it is read."""
+    """An attack by number on a recording or a surface: what is wrong with it is said, or it is
+    read.
+    """
     from asperity.surface import read_surface
 
     files = originals(folder)

@@ -1,4 +1,6 @@
-"""Ends that nobody asked for: a process that is killed, a disk that is full. What is left is whole, or goes on."""
+"""Ends that nobody asked for: a process that is killed, a disk that is full. What is left is whole,
+or goes on.
+"""
 
 import os
 import random

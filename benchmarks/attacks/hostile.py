@@ -1,4 +1,6 @@
-"""Small files that are meant to take the machine: each is made in a folder, with the command that meets it."""
+"""Small files that are meant to take the machine: each is made in a folder, with the command that
+meets it.
+"""
 
 import json
 import os
@@ -48,7 +50,8 @@ def _matrix(path: Path) -> tuple[str, ...]:
     )
 
 
-# What claims to be large ----------------------------------------------------------------------------------------------
+# What claims to be large
+# ----------------------------------------------------------------------------------------------
 
 
 def sparse(name: str, head: bytes, size: int, command: Callable[[Path], tuple[str, ...]]) -> Attack:
@@ -287,7 +290,9 @@ def uff_claim() -> bytes:
 
 
 def ide_formula(folder: Path) -> tuple[str, ...]:
-    """A recorder's file whose clock is a formula, which its library evaluates: a number of 370 million digits."""
+    """A recorder's file whose clock is a formula, which its library evaluates: a number of 370
+    million digits.
+    """
     from ebmlite import loadSchema
 
     schema = loadSchema("mide_ide.xml")
@@ -329,7 +334,8 @@ def sidecar(text: str, suffix: str = "toml") -> Attack:
     return make
 
 
-# What is no file ------------------------------------------------------------------------------------------------------
+# What is no file
+# -------------------------------------------------------------------------------------------------
 
 
 def fifo(name: str, command: Callable[[Path], tuple[str, ...]]) -> Attack:

@@ -1,4 +1,6 @@
-"""Case files and `--set` values as nobody should write them; and names that want to be more than names."""
+"""Case files and `--set` values as nobody should write them; and names that want to be more than
+names.
+"""
 
 import contextlib
 import io

@@ -1,4 +1,6 @@
-"""Names that want to be more than names: in pages, tables, terminals and paths they stay what they are."""
+"""Names that want to be more than names: in pages, tables, terminals and paths they stay what they
+are.
+"""
 
 import re
 from collections.abc import Callable

@@ -1,4 +1,6 @@
-"""Runs a command under attack, and says what became of it: its end, what it said, how long it took, what memory."""
+"""Runs a command under attack, and says what became of it: its end, what it said, how long it took,
+what memory.
+"""
 
 import os
 import re
@@ -46,7 +48,8 @@ class Outcome:
                 found.append("no sentence")
             if self.processor_s > LONGEST_S:
                 found.append(
-                    f"refusal after {self.processor_s:.0f} s of a processor, {self.seconds:.0f} s in all"
+                    f"refusal after {self.processor_s:.0f} s of a processor, {self.seconds:.0f} s"
+                    " in all"
                 )
             if self.megabytes > MOST_MB:
                 found.append(f"refusal took {self.megabytes:.0f} MB")

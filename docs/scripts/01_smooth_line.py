@@ -2,8 +2,9 @@
 Pressure and film of a smooth line contact
 ==========================================
 
-Oil that thickens under pressure carries the load nearly as the dry bodies would, Hertz's half ellipse, but for three
-things: pressure begins ahead of the contact, the film narrows at the outlet, and a spike of pressure stands before it.
+Oil that thickens under pressure carries the load nearly as the dry bodies would, Hertz's half
+ellipse, but for three things: pressure begins ahead of the contact, the film narrows at the
+outlet, and a spike of pressure stands before it.
 """
 
 import matplotlib.pyplot as plt

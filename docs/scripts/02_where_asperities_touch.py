@@ -2,8 +2,8 @@
 Where asperities touch
 ======================
 
-The paper's contact at a roughness of 1 µm: film, pressure, and the cells in which the bodies touch. Their share of the
-load is CLR, their share of the Hertz zone CAR.
+The paper's contact at a roughness of 1 µm: film, pressure, and the cells in which the bodies
+touch. Their share of the load is CLR, their share of the Hertz zone CAR.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,9 @@
 Film over speed, beside the usual fit
 =====================================
 
-A smooth ball on a disc. Hamrock and Dowson's fit of 1977 was made of coarse solutions for thick films. Where the film
-is thick it holds; where it is thin, the least film, at the sides of the ball, comes down to half of what the fit says.
+A smooth ball on a disc. Hamrock and Dowson's fit of 1977 was made of coarse solutions for thick
+films. Where the film is thick it holds; where it is thin, the least film, at the sides of the
+ball, comes down to half of what the fit says.
 """
 
 import matplotlib.pyplot as plt
@@ -20,7 +21,7 @@ oil = asp.Lubricant(
 
 
 def ball(speed: float) -> asp.ContactConditions:
-    """A steel ball of 19 mm on glass, rolling."""
+    """Return a contact of a 19 mm steel ball rolling on glass."""
     return asp.ContactConditions(
         pair=asp.ElasticPair((210e9, 75e9), (0.3, 0.22)),
         geometry="point",
@@ -55,5 +56,6 @@ axis.set(xlabel="rolling speed [m/s]", ylabel="film [nm]")
 axis.legend()
 for speed, ours, fit in zip(speeds, solved, fitted, strict=True):
     print(
-        f"{speed:5.2f} m/s: solved over fit {ours[0] / fit[0]:.2f} in the middle, {ours[1] / fit[1]:.2f} at the least"
+        f"{speed:5.2f} m/s: solved over fit {ours[0] / fit[0]:.2f} in the middle,"
+        f" {ours[1] / fit[1]:.2f} at the least"
     )

@@ -2,8 +2,8 @@
 Load share over roughness
 =========================
 
-As the roughness grows, asperities take the load from the oil. Three surfaces a level: the bars are their range, which
-is what one surface of a kind says of another.
+As the roughness grows, asperities take the load from the oil. Three surfaces a level: the bars are
+their range, which is what one surface of a kind says of another.
 """
 
 import matplotlib.pyplot as plt

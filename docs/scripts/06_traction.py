@@ -2,8 +2,8 @@
 Friction over slip: three oils
 ==============================
 
-A Newtonian oil under high pressure would bear shear stresses that no oil bears. A law of friction ends that: Eyring's
-stress, or a limit in proportion to pressure (Bair and Winer).
+A Newtonian oil under high pressure would bear shear stresses that no oil bears. A law of friction
+ends that: Eyring's stress, or a limit in proportion to pressure (Bair and Winer).
 """
 
 import matplotlib.pyplot as plt

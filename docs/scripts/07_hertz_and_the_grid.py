@@ -2,8 +2,8 @@
 How fast the solver closes in on Hertz
 ======================================
 
-A dry, smooth ball has a closed form. The solver's largest pressure and contact area come nearer to it with every finer
-grid: that is how its numerical error is known.
+A dry, smooth ball has a closed form. The solver's largest pressure and contact area come nearer to
+it with every finer grid: that is how its numerical error is known.
 """
 
 import matplotlib.pyplot as plt

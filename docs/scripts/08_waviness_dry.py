@@ -2,8 +2,9 @@
 Waviness pressed flat
 =====================
 
-A dry wave is pressed flat by the pressure p* = π E* A/λ (Westergaard, Johnson). Below it only crests touch, over a
-share of the wavelength that has a closed form: (2/π) arcsin of the root of p/p*.
+A dry wave is pressed flat by the pressure p* = π E* A/λ (Westergaard, Johnson). Below it only
+crests touch, over a share of the wavelength that has a closed form: (2/π) arcsin of the root of
+p/p*.
 """
 
 import matplotlib.pyplot as plt
@@ -14,8 +15,8 @@ import asperity as asp
 pair = asp.ElasticPair((210e9, 210e9), (0.3, 0.3))
 wavelength = 0.1e-3
 
-# %%
-# A line contact is nearly flat over one wave in its middle; the pressure there is Hertz's. Half-width 1 mm, 20 waves.
+# %% A line contact is nearly flat over one wave in its middle; the pressure there is Hertz's.
+# Half-width 1 mm, 20 waves.
 amplitude, half_width = 0.2e-6, 1e-3
 full = np.pi * pair.reduced_modulus * amplitude / wavelength
 shares = np.array([0.1, 0.2, 0.35, 0.5, 0.7, 0.9])

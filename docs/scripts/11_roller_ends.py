@@ -2,8 +2,9 @@
 A roller's ends
 ===============
 
-A straight roller presses hardest at its ends. A logarithmic profile evens it out, up to the load it was made for; a
-tilt spends that reserve. Dry, and thus quick: what presses on the ends is a matter of the bodies.
+A straight roller presses hardest at its ends. A logarithmic profile evens it out, up to the load
+it was made for; a tilt spends that reserve. Dry, and thus quick: what presses on the ends is a
+matter of the bodies.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,9 @@
 What each roller of a bearing bears
 ===================================
 
-A cylindrical roller bearing under a radial load: only half of its rollers bear, fewer the larger the clearance. Each is
-a contact of its own; the most loaded one is what ratings and films are about.
+A cylindrical roller bearing under a radial load: only half of its rollers bear, fewer the larger
+the clearance. Each is a contact of its own; the most loaded one is what ratings and films are
+about.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Along the path of contact of a gear pair
 ========================================
 
-The radius grows and falls, the load is shared by two pairs of teeth and borne by one in between, sliding changes its
-sign at the pitch point. Each place is a contact with a film of its own.
+The radius grows and falls, the load is shared by two pairs of teeth and borne by one in between,
+sliding changes its sign at the pitch point. Each place is a contact with a film of its own.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,9 @@
 An oil by its data sheet
 ========================
 
-A grade gives the viscosity over temperature; the pressure-viscosity coefficient alpha is seldom printed and has to be
-estimated. The band is what published estimates differ by, for one and the same oil.
+A grade gives the viscosity over temperature; the pressure-viscosity coefficient alpha is seldom
+printed and has to be estimated. The band is what published estimates differ by, for one and the
+same oil.
 """
 
 import matplotlib.pyplot as plt

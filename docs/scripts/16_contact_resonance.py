@@ -2,8 +2,8 @@
 The contact's resonance in a spectrum
 =====================================
 
-A contact under noise rings at its natural frequency. The likelihood of the whole line, background and all, gives the
-frequency with a standard deviation, and says "not found" where there is none.
+A contact under noise rings at its natural frequency. The likelihood of the whole line, background
+and all, gives the frequency with a standard deviation, and says "not found" where there is none.
 """
 
 import matplotlib.pyplot as plt

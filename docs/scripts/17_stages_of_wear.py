@@ -2,8 +2,8 @@
 Stages of wear from recordings
 ==============================
 
-Sixty recordings of the paper's wear test, simulated with noise. The resonance of each, and where its trend breaks, with
-the probability of severe wear at each recording.
+Sixty recordings of the paper's wear test, simulated with noise. The resonance of each, and where
+its trend breaks, with the probability of severe wear at each recording.
 """
 
 import matplotlib.pyplot as plt

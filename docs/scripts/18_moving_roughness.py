@@ -2,8 +2,8 @@
 Roughness that moves
 ====================
 
-A snapshot lets the roughness stand still. Here it runs through the contact, and the oil is squeezed: load share and
-film change from step to step as other summits come in.
+A snapshot lets the roughness stand still. Here it runs through the contact, and the oil is
+squeezed: load share and film change from step to step as other summits come in.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Wear, minute by minute
 ======================
 
-Asperities that rub lose what Archard's law says: peaks go, Sq falls, and the load goes back to the oil. On a coarse
-grid, to be quick.
+Asperities that rub lose what Archard's law says: peaks go, Sq falls, and the load goes back to the
+oil. On a coarse grid, to be quick.
 """
 
 import matplotlib.pyplot as plt

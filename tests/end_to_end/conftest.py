@@ -31,7 +31,9 @@ def asp(tmp_path, monkeypatch, capsys):
 
 @pytest.fixture(scope="session")
 def small(tmp_path_factory):
-    """A setting, its emulator of a few small contacts, and the folder that holds it: what extends it takes a copy."""
+    """A setting, its emulator of a few small contacts, and the folder that holds it: what extends
+    it takes a copy.
+    """
     folder = tmp_path_factory.mktemp("infer") / "emulator"
     setting = inference_setting(load_case(CASE).with_overrides(SMALL))
     with ThreadPoolExecutor(1) as executor:

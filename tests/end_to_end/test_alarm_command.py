@@ -1,4 +1,6 @@
-"""The alarm of `asperity track` and `watch` as a user meets it: states, exit codes, levels, log, acknowledgement."""
+"""The alarm of `asperity track` and `watch` as a user meets it: states, exit codes, levels, log,
+acknowledgement.
+"""
 
 import json
 import sqlite3
@@ -12,7 +14,9 @@ STEADY, LOUD = 12, 24
 
 
 def snapshots(folder, levels, seconds=0.1, first=0):
-    """Noise of a machine without a contact resonance, as a logger keeps it: a tenth of a second each."""
+    """Noise of a machine without a contact resonance, as a logger keeps it: a tenth of a second
+    each.
+    """
     Path(folder).mkdir(exist_ok=True)
     for number, level in enumerate(levels, first):
         rng = np.random.default_rng(number)

@@ -1,4 +1,6 @@
-"""Who is called when a state changes, as a user meets it: a command, a web address, an MQTT broker; all on loopback."""
+"""Who is called when a state changes, as a user meets it: a command, a web address, an MQTT broker;
+all on loopback.
+"""
 
 import json
 import socket
@@ -58,7 +60,9 @@ def kept(query):
 
 @pytest.fixture
 def listener(tmp_path):
-    """A program that appends what it hears to a file whose name holds what a shell would take apart."""
+    """A program that appends what it hears to a file whose name holds what a shell would take
+    apart.
+    """
     Path(tmp_path / "listen.py").write_text(LISTENER)
     heard = tmp_path / "heard; $(touch never).jsonl"
     command = f"'{sys.executable}' '{tmp_path / 'listen.py'}' '{heard}'"
@@ -101,8 +105,8 @@ def test_a_call_that_fails_is_noted_and_made_again(asp, listener, tmp_path):
     code, out, err = watched(asp, "--on-alarm", command)
     assert (code, heard()) == (4, [])
     assert (
-        "could not be notified (exit code 1: nobody is at home); the notification will be sent again"
-        in err
+        "could not be notified (exit code 1: nobody is at home); the notification will be sent"
+        " again" in err
     )
     assert kept("SELECT attempts, answered, failure FROM call") == [
         (1, None, "exit code 1: nobody is at home")
@@ -120,7 +124,10 @@ def test_a_command_that_does_not_end_is_stopped_with_all_it_started(monkeypatch,
     monkeypatch.setattr(calls, "COMMAND_S", 1.0)
     late = tmp_path / "late"
     child = f"import time; time.sleep(3); open({str(late)!r}, 'w')"
-    parent = f"import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', {child!r}]); time.sleep(60)"
+    parent = (
+        f"import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', {child!r}]);"
+        " time.sleep(60)"
+    )
     began = time.monotonic()
     with pytest.raises(calls.NotificationFailed, match="did not end within 1 s"):
         calls.Command((sys.executable, "-c", parent)).send({"state": "alarm"})
@@ -232,7 +239,8 @@ from amqtt.broker import Broker
 
 async def serve():
     plugins = {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}}
-    await Broker({"listeners": {"default": {"type": "tcp", "bind": sys.argv[1]}}, "plugins": plugins}).start()
+    listeners = {"default": {"type": "tcp", "bind": sys.argv[1]}}
+    await Broker({"listeners": listeners, "plugins": plugins}).start()
     print("ready", flush=True)
     await asyncio.sleep(120)
 

@@ -15,7 +15,9 @@ from asperity.solution import OscillatingContact, OwnResonance
 from asperity.surface import flat_surface
 
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
-KEYS = [  # design.md, section 4, errors, the load on capped oil, parts of friction, shear, the last two's deviations
+# design.md, section 4, errors, the load on capped oil, parts of friction, shear, the last two's
+# deviations
+KEYS = [
     *("car", "car_error", "car_domain", "clr", "clr_error", "capped_oil_load_ratio"),
     *(
         "load_below_20nm",
@@ -75,7 +77,9 @@ def test_json_holds_the_contract_and_nothing_else_is_on_stdout(asp):
 
 
 def test_quantities_not_shown_are_not_computed(asp, monkeypatch):
-    """The virgin contact's stiffness stands in no short table, and costs as much as the other limit."""
+    """The virgin contact's stiffness stands in no short table, and costs as much as the other
+    limit.
+    """
     expected = asp("solve", "case.toml")
     monkeypatch.setattr(
         OwnResonance, "virgin", property(lambda _: pytest.fail("shaken without being asked to"))
@@ -94,7 +98,10 @@ def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
     code, out, _ = asp("solve", "case.toml")
     assert code == 0
     scalars = json.loads(asp("solve", "case.toml", "--json")[1])
-    coarse = "Grid too coarse, CLR not determined (3.3 cells along the correlation length in x, where 4 are needed; "
+    coarse = (
+        "Grid too coarse, CLR not determined (3.3 cells along the correlation length in x, where 4"
+        " are needed; "
+    )
     unknown = "no coarser grid is available to estimate its error): "
     assert out.splitlines()[0].startswith(f"{coarse}{unknown}on this grid asperities carry ")
     assert (scalars["determined"], scalars["cells"]) == (False, [64, 64])

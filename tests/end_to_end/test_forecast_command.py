@@ -1,4 +1,6 @@
-"""When a limit is crossed, as a user asks for it: of `infer`, and of a series that is tracked or watched."""
+"""When a limit is crossed, as a user asks for it: of `infer`, and of a series that is tracked or
+watched.
+"""
 
 import json
 import shutil
@@ -19,7 +21,9 @@ QUIET = Disturbance(snr_db=20.0, modes=2)
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
-    """Seven recordings of a contact whose roughness, and load share, rise steadily: too few for any other alarm."""
+    """Seven recordings of a contact whose roughness, and load share, rise steadily: too few for any
+    other alarm.
+    """
     folder = tmp_path_factory.mktemp("rig") / "rising"
     folder.mkdir()
     found = simulate_rig(
@@ -70,8 +74,10 @@ def test_a_track_foretells_and_the_forecast_is_an_alarm(asp, asked):
     said = json.loads(out)
     assert (code, said["alarm"]["state"]) == (0, "none")
     assert said["forecast"] == {
-        "sentence": "No forecast: a forecast needs resonances of at least 4 recordings at different "
-        "times, got 0; leave --forecast out, or record again."
+        "sentence": (
+            "No forecast: a forecast needs resonances of at least 4 recordings at different "
+            "times, got 0; leave --forecast out, or record again."
+        )
     }
     assert said["verdict"].endswith(said["forecast"]["sentence"])
     page = Path("silent.html").read_text("utf-8")

@@ -42,7 +42,8 @@ def test_stribeck_falls_from_boundary_friction_to_the_oils(asp):
         for point in points
     )
     assert told["verdict"].startswith(
-        f"The friction coefficient changes from {friction[0]:.4f} at 0.0191 m/s to {friction[-1]:.4f}"
+        f"The friction coefficient changes from {friction[0]:.4f} at 0.0191 m/s to"
+        f" {friction[-1]:.4f}"
     )
 
 

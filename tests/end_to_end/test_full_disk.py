@@ -1,4 +1,6 @@
-"""A disk that is full, or a quota: one sentence, nothing half written, whatever is being written."""
+"""A disk that is full, or a quota: one sentence, nothing half written, whatever is being
+written.
+"""
 
 import resource
 import subprocess
@@ -10,7 +12,9 @@ SMALL = ("--set", "grid.cells=[32, 24]", "--set", "surface.correlation_length=40
 
 
 def limited(kilobytes: int):
-    """What lets the files of a process grow no further; the system's own limit is as good as a full disk."""
+    """What lets the files of a process grow no further; the system's own limit is as good as a full
+    disk.
+    """
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (kilobytes << 10, kilobytes << 10))
 
 

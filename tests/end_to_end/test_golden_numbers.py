@@ -1,4 +1,6 @@
-"""Every number that commands state stays what it was, unless a change is meant; see `golden_numbers`."""
+"""Every number that commands state stays what it was, unless a change is meant; see
+`golden_numbers`.
+"""
 
 import json
 import os

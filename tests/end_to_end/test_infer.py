@@ -1,4 +1,6 @@
-"""`asperity infer` from files to verdict: a small emulator that is solved, kept and gone on from; what is refused."""
+"""`asperity infer` from files to verdict: a small emulator that is solved, kept and gone on from;
+what is refused.
+"""
 
 import json
 import shutil
@@ -78,7 +80,9 @@ def test_an_emulator_interrupted_goes_on(small, tmp_path):
 
 
 def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
-    """Its deviation there falls, contacts solved anew keep to it, and the extended one is what comes back."""
+    """Its deviation there falls, contacts solved anew keep to it, and the extended one is what
+    comes back.
+    """
     setting, first, folder = small
     shutil.copytree(folder, tmp_path / "own")
     emulator = replace(first, folder=tmp_path / "own")
@@ -237,7 +241,9 @@ def test_a_table_of_operating_points_needs_no_x(tmp_path):
 
 @pytest.mark.parametrize("folder", REAL)
 def test_no_real_recording_is_told_anything_from(folder):
-    """Bearings with faults, a stopped machine, a shaker, a microphone: none shows a contact resonance."""
+    """Bearings with faults, a stopped machine, a shaker, a microphone: none shows a contact
+    resonance.
+    """
     if not (SHARED / "vibration" / folder).exists():
         pytest.skip("the shared data are not here")
     setting = formula_setting()

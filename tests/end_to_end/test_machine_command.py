@@ -1,4 +1,6 @@
-"""`asperity machine` as a user types it: conditions, solved contacts, what is kept, what is refused."""
+"""`asperity machine` as a user types it: conditions, solved contacts, what is kept, what is
+refused.
+"""
 
 import json
 import shutil

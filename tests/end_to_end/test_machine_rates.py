@@ -1,4 +1,6 @@
-"""`asperity track` with a machine's case: the rates at which its faults pass, at the speed of each recording."""
+"""`asperity track` with a machine's case: the rates at which its faults pass, at the speed of each
+recording.
+"""
 
 import json
 from pathlib import Path
@@ -15,7 +17,9 @@ BAND = ("--band", "2000", "4000")
 
 
 def bearing(rng, speed, size):
-    """Noise, and a ring of 5 kHz that is struck whenever a ball passes; the shaft's angle beside it [turns]."""
+    """Noise, and a ring of 5 kHz that is struck whenever a ball passes; the shaft's angle beside it
+    [turns].
+    """
     time = np.arange(round(RATE * SECONDS)) / RATE
     turns = np.cumsum(np.broadcast_to(speed, time.shape)) / RATE
     struck = np.flatnonzero(np.diff(np.floor(OUTER * turns), prepend=0.0))

@@ -1,4 +1,6 @@
-"""`asperity track` and `watch` where load, speed or oil temperature are stated beside recordings."""
+"""`asperity track` and `watch` where load, speed or oil temperature are stated beside
+recordings.
+"""
 
 import json
 from pathlib import Path
@@ -9,7 +11,9 @@ MANY = 24
 
 
 def loud(folder, loads, sidecar=False):
-    """Noise whose level goes with load, a tenth of a second each; the load in a table, or beside each."""
+    """Noise whose level goes with load, a tenth of a second each; the load in a table, or beside
+    each.
+    """
     Path(folder).mkdir()
     rows = ["file,load_n,temperature_degc"]
     for number, load in enumerate(loads):

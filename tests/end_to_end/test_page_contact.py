@@ -1,4 +1,6 @@
-"""The page of a contact in a browser: knobs, what becomes of them, files dropped, links, and who is let in."""
+"""The page of a contact in a browser: knobs, what becomes of them, files dropped, links, and who is
+let in.
+"""
 
 import http.client
 import json
@@ -353,7 +355,8 @@ def test_dark_and_light_have_legible_ink(browser, server):
         visit = Visit(browser, server, color_scheme=scheme)
         page = visit.solved()
         colours = page.evaluate(
-            "() => { const s = getComputedStyle(document.body); return JSON.stringify([s.color, s.backgroundColor]) }"
+            "() => { const s = getComputedStyle(document.body); return JSON.stringify([s.color,"
+            " s.backgroundColor]) }"
         )
         ink, paper = (
             [int(part) / 255 for part in re.findall(r"\d+", text)[:3]]

@@ -1,4 +1,6 @@
-"""Recordings, a study and a history in a browser: dropped, watched, clicked, moved; and who is let in with --listen."""
+"""Recordings, a study and a history in a browser: dropped, watched, clicked, moved; and who is let
+in with --listen.
+"""
 
 import http.client
 import re

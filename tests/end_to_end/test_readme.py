@@ -13,7 +13,8 @@ from support.pages import read
 from support.source import ROOT
 
 README = read(ROOT / "README.md")
-# Another processor sums in another order, see test_golden_numbers; nothing but 0 demands every digit.
+# Another processor sums in another order, see test_golden_numbers; nothing but 0 demands every
+# digit.
 TOLERANCE = float(os.environ.get("ASPERITY_GOLDEN_TOLERANCE", "2e-3"))
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 

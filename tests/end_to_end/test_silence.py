@@ -43,7 +43,8 @@ def test_what_is_usual_is_learned_from_when_recordings_came():
     said = overdue_reason(every_10_min, None, last + timedelta(minutes=51))
     assert (
         said
-        == "no recording has come for 51 min, since 2026-11-22T13:50:00+00:00; the usual interval is 10 min"
+        == "no recording has come for 51 min, since 2026-11-22T13:50:00+00:00; the usual interval"
+        " is 10 min"
     )
     assert (
         overdue_reason(every_10_min[:5], None, NOON + timedelta(days=300)) == ""
@@ -130,7 +131,9 @@ def test_a_watch_that_runs_says_so_by_itself(tmp_path):
 
 
 def test_only_what_somebody_wants_to_be_told_is_told_and_its_end(asp):
-    """`--tell alarm`: neither the first judgement nor silence, but the alarm and that it is over."""
+    """`--tell alarm`: neither the first judgement nor silence, but the alarm and that it is
+    over.
+    """
     Path("listen.py").write_text(LISTENER)
     tell = ("--on-alarm", f"'{sys.executable}' listen.py heard.jsonl", "--tell", "alarm", "--quiet")
     snapshots("in", np.ones(12))

@@ -1,6 +1,8 @@
-"""The built site: every link leads somewhere on it, no page asks another machine for anything, mathematics is drawn.
+"""The built site: every link leads somewhere on it, no page asks another machine for anything,
+mathematics is drawn.
 
-`make docs` builds it; without it these tests are skipped, but in CI, where ASPERITY_SITE asks for it.
+`make docs` builds it; without it these tests are skipped, but in CI, where ASPERITY_SITE asks for
+it.
 """
 
 import os

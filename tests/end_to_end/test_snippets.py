@@ -1,8 +1,10 @@
-"""Every snippet of every page is run, or says above itself why it is not: `<!-- not run: reason -->`.
+"""Every snippet of every page is run, or says above itself why it is not: `<!-- not run: reason
+-->`.
 
-The snippets of a page are run in their order, in one folder that holds the examples, in this process; what Python
-defines stays for the page's next block of Python. README's are run in test_readme, which holds what they print. A block
-of `text` behind commands is what they print: each of its lines, where "..." stands for anything.
+The snippets of a page are run in their order, in one folder that holds the examples, in this
+process; what Python defines stays for the page's next block of Python. README's are run in
+test_readme, which holds what they print. A block of `text` behind commands is what they print:
+each of its lines, where "..." stands for anything.
 """
 
 import re
@@ -70,7 +72,9 @@ def unsaid(shown: str, said: str) -> list[str]:
 
 
 def run(line: str, refusal: str | None, capsys) -> str:
-    """What a command prints that does what it is for, or is refused as the block behind it shows."""
+    """What a command prints that does what it is for, or is refused as the block behind it
+    shows.
+    """
     words = shlex.split(line, comments=True)
     if not words:
         return ""

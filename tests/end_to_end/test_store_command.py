@@ -1,4 +1,6 @@
-"""One store for many machines, as a user meets it: filled by `watch` and `track`, shown, exported, killed, resumed."""
+"""One store for many machines, as a user meets it: filled by `watch` and `track`, shown, exported,
+killed, resumed.
+"""
 
 import json
 import os
@@ -46,11 +48,13 @@ def without_times(store):
     return [
         asked(
             store,
-            "SELECT sensor, file, started, state, row, reading FROM recording ORDER BY sensor, file",
+            "SELECT sensor, file, started, state, row, reading FROM recording ORDER BY sensor,"
+            " file",
         ),
         asked(
             store,
-            "SELECT sensor, state, since, reason, raised_by, verdict, recordings FROM judgement ORDER BY id",
+            "SELECT sensor, state, since, reason, raised_by, verdict, recordings FROM judgement"
+            " ORDER BY id",
         ),
         asked(
             store, "SELECT name, settings, json_remove(said, '$.numbers') FROM sensor ORDER BY id"
@@ -261,7 +265,9 @@ def test_a_file_that_changed_is_another_recording_and_its_past_is_kept(tmp_path)
 
 
 def test_every_file_of_an_untidy_folder_is_accounted_for(asp):
-    """Of a clock that is ahead, empty, cut, foreign, half copied, a duplicate, and one that comes late."""
+    """Of a clock that is ahead, empty, cut, foreign, half copied, a duplicate, and one that comes
+    late.
+    """
     snapshots("in", np.ones(8))
     ahead = time.time() + 7200.0
     os.utime("in/s-005.npz", (ahead, ahead))
@@ -289,7 +295,9 @@ def test_every_file_of_an_untidy_folder_is_accounted_for(asp):
 
 
 def test_lines_that_another_program_changed_are_written_again(tmp_path):
-    """Lines that stand as they were judged are not written again, unless somebody else has written meanwhile."""
+    """Lines that stand as they were judged are not written again, unless somebody else has written
+    meanwhile.
+    """
     snapshots(tmp_path / "in", np.ones(9))
     looks = watch_folder(
         tmp_path / "in",
@@ -408,7 +416,9 @@ def test_a_name_that_is_not_utf_8_is_left_out_with_a_word(asp):
 
 @pytest.mark.parametrize("sensors", [1, 2])
 def test_a_watch_that_is_killed_ends_with_the_store_of_one_that_is_not(monkeypatch, sensors):
-    """`python -m benchmarks.hostile` in seconds: an untidy folder, two watches, one of them killed."""
+    """`python -m benchmarks.hostile` in seconds: an untidy folder, two watches, one of them
+    killed.
+    """
     from benchmarks import hostile
 
     monkeypatch.setattr(hostile, "PARTS_S", 0.4)

@@ -1,4 +1,6 @@
-"""asperity study as a user runs it: processes that are killed, dask workers that are killed, shards, bad input."""
+"""asperity study as a user runs it: processes that are killed, dask workers that are killed,
+shards, bad input.
+"""
 
 import json
 import os

@@ -142,7 +142,9 @@ def test_what_cannot_be_meant_is_refused_in_a_sentence(asp, arguments, said):
 
 
 def test_a_ground_surface_is_solved_with_its_lay_across_and_along(asp):
-    """Across rolling the ridges carry oil in and lift the contact; along it the oil runs off between them."""
+    """Across rolling the ridges carry oil in and lift the contact; along it the oil runs off
+    between them.
+    """
     clr = {}
     for lay, turn in (("across", "false"), ("along", "true")):
         code, out, _ = asp(

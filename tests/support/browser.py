@@ -1,4 +1,6 @@
-"""A live page's server and a browser that lets no request leave the machine; both tell what went wrong in them."""
+"""A live page's server and a browser that lets no request leave the machine; both tell what went
+wrong in them.
+"""
 
 import os
 import re
@@ -12,8 +14,8 @@ from urllib.parse import urlsplit
 import pytest
 
 PATIENCE_MS = 60_000
-REQUIRED = (
-    "ASPERITY_CHROMIUM"  # where it is set, as in CI, a browser that is not there fails the tests
+REQUIRED = (  # where it is set, as in CI, a browser that is not there fails the tests
+    "ASPERITY_CHROMIUM"
 )
 
 
@@ -90,7 +92,9 @@ def chromium():
 
 
 def expect(locator):
-    """Playwright's expectation, which waits as long as a visit does: what is shown comes part by part."""
+    """Playwright's expectation, which waits as long as a visit does: what is shown comes part by
+    part.
+    """
     from playwright.sync_api import expect as expected
 
     expected.set_options(timeout=PATIENCE_MS)
@@ -191,7 +195,9 @@ def accessible(page):
 
 
 def require_operable(page) -> None:
-    """Every control and every picture has a name for a screen reader, and the Tab key comes to all controls."""
+    """Every control and every picture has a name for a screen reader, and the Tab key comes to all
+    controls.
+    """
     for _ in range(20):  # a drop's own picture of how far it is goes away by itself
         controls, pictures, nameless = accessible(page)
         if not nameless:
@@ -210,12 +216,14 @@ def require_operable(page) -> None:
 
 
 MARK = """([label, number]) => {
-  const named = view => view.model.type === "Figure" && view.model.html_attributes["aria-label"] === label
+  const named = view => view.model.type === "Figure"
+    && view.model.html_attributes["aria-label"] === label
   const figure = [...Bokeh.index.query(named)][0]
   const {glyph, data_source} = figure.model.renderers.find(drawn => drawn.glyph.type === "Scatter")
   const {left, top} = figure.canvas_view.el.getBoundingClientRect()
   const across = figure.frame.x_scale.compute(data_source.data[glyph.x.field][number])
-  return [left + across, top + figure.frame.y_scale.compute(data_source.data[glyph.y.field][number])]
+  const down = figure.frame.y_scale.compute(data_source.data[glyph.y.field][number])
+  return [left + across, top + down]
 }"""
 
 

@@ -37,7 +37,9 @@ def formula_setting(**overrides: object) -> Setting:
 
 
 def formula(x: np.ndarray, sq: np.ndarray) -> dict[str, np.ndarray]:
-    """Shares, film, friction, stiffness and damping of a contact whose film ratio goes as exp(4 x)."""
+    """Shares, film, friction, stiffness and damping of a contact whose film ratio goes as
+    exp(4 x).
+    """
     film = 1.6 * np.exp(4.0 * x)
     share = 1.0 / (1.0 + film**2.5)
     return {

@@ -1,7 +1,8 @@
-"""Numbers that a change of the house must not move: what `--json` says of small cases, and the tables behind it.
+"""Numbers that a change of the house must not move: what `--json` says of small cases, and the
+tables behind it.
 
-`python -m support.golden_numbers` (from `tests`) writes them anew into `reference/golden`: only when a change of
-numbers is meant, and the changelog says which.
+`python -m support.golden_numbers` (from `tests`) writes them anew into `reference/golden`: only
+when a change of numbers is meant, and the changelog says which.
 """
 
 import json
@@ -202,7 +203,9 @@ def numbers(name: str) -> dict[str, Any]:
 
 
 def differences(then: Any, now: Any, tolerance: float, where: str = "") -> list[str]:
-    """Where two trees of numbers differ, a line each; numbers by more than `tolerance` of the larger one."""
+    """Where two trees of numbers differ, a line each; numbers by more than `tolerance` of the
+    larger one.
+    """
     if isinstance(then, dict) and isinstance(now, dict):
         gone = [f"{where}.{key} is gone" for key in then.keys() - now.keys()]
         each = [

@@ -1,10 +1,14 @@
-"""How a uniformly loaded rectangle dents a half-space that repeats in y, by summing its images one by one."""
+"""How a uniformly loaded rectangle dents a half-space that repeats in y, by summing its images one
+by one.
+"""
 
 import numpy as np
 
 
 def love(x, y, half_x, half_y):
-    """Integral of 1/r over a rectangle centred on zero. Source: Love (1929), Johnson (1985) eq 3.25."""
+    """Integral of 1/r over a rectangle centred on zero. Source: Love (1929), Johnson (1985) eq
+    3.25.
+    """
     total = 0.0
     for sign, edge_x, edge_y in (
         (+1, x + half_x, y + half_y),
@@ -25,8 +29,9 @@ def love(x, y, half_x, half_y):
 def periodic_compliance(x, y, spacing, period, images=3000):
     """Displacement at distances (x, y) from a unit pressure on one cell, all images in y included.
 
-    In the solver's units: 1/(2 pi) times the integral of 1/r. The sum of images grows like their logarithm; what is
-    left once the same length of a line is taken out is the potential -ln|x|/pi per unit load and length.
+    In the solver's units: 1/(2 pi) times the integral of 1/r. The sum of images grows like their
+    logarithm; what is left once the same length of a line is taken out is the potential -ln|x|/pi
+    per unit load and length.
     """
     dx, dy = spacing
     image = np.arange(-images, images + 1) * period

@@ -1,7 +1,7 @@
 """The documentation held against what exists.
 
-A span of code is judged by its shape: a path, a command, an option, a piece of a case file, an expression, a name. What
-is none of these must stand in the package's code as a string.
+A span of code is judged by its shape: a path, a command, an option, a piece of a case file, an
+expression, a name. What is none of these must stand in the package's code as a string.
 """
 
 import ast
@@ -101,7 +101,9 @@ def is_word(text: str) -> bool:
 
 
 def is_file(text: str, page: Path) -> bool:
-    """Is it there, from the root, the package, the page's folder; or as a bare name anywhere in the repository?"""
+    """Is it there, from the root, the package, the page's folder; or as a bare name anywhere in the
+    repository?
+    """
     if text.startswith("."):
         hidden = (ROOT / text).exists() or text in ROOT.joinpath(".gitignore").read_text("utf-8")
         return (
@@ -140,7 +142,9 @@ def is_output(name: str) -> bool:
 
 
 def wrong_command(text: str) -> str | None:
-    """A command, its options and how many values each takes: of a usage line in brackets, or of one to be typed."""
+    """A command, its options and how many values each takes: of a usage line in brackets, or of one
+    to be typed.
+    """
     typed = re.sub(r"\.\.\.|[\[\]]", " ", text) if " [" in text else text
     words = shlex.split(re.sub(r"(\\\||\|) ?-", "-", typed), comments=True)[1:]
     if not words or words[0] == "...":
@@ -218,7 +222,9 @@ def wrong_shell(text: str) -> str | None:
 
 
 def wrong_options(text: str, headings: tuple[str, ...]) -> str | None:
-    """An option of the command that the section is about, or of any command where it is about none."""
+    """An option of the command that the section is about, or of any command where it is about
+    none.
+    """
     about = [
         name for heading in headings for name in re.split(r",? ", heading) if name in commands()
     ]
@@ -318,7 +324,8 @@ def problems(page: Page) -> Iterator[str]:
 
 
 def place(page: Page, line: Line) -> str:
-    return f"{page.path.relative_to(ROOT) if page.path.is_relative_to(ROOT) else page.path}:{line.number}"
+    path = page.path.relative_to(ROOT) if page.path.is_relative_to(ROOT) else page.path
+    return f"{path}:{line.number}"
 
 
 def leads(page: Page, target: str) -> bool:
@@ -332,7 +339,9 @@ def leads(page: Page, target: str) -> bool:
 
 
 def block_problems(page: Page) -> Iterator[tuple[Line, str]]:
-    """Commands that the command line would refuse, keys that a case would, names that Python would not find."""
+    """Commands that the command line would refuse, keys that a case would, names that Python would
+    not find.
+    """
     for block in page.blocks:
         if block.language == "sh":
             typed = (

@@ -1,8 +1,9 @@
 """Smooth lubricated line contact in one dimension, by dense Newton on nodes.
 
-Dimensionless as in the literature: lengths in a, pressures in p_h, gaps in a^2/R. Unlike the package it keeps pressures
-at nodes (zero at both ends), lets them vary linearly between, solves Reynolds' equation before a fixed rupture point,
-and moves that point until P >= 0 before it and R >= 0 behind it.
+Dimensionless as in the literature: lengths in a, pressures in p_h, gaps in a^2/R. Unlike the
+package it keeps pressures at nodes (zero at both ends), lets them vary linearly between, solves
+Reynolds' equation before a fixed rupture point, and moves that point until P >= 0 before it and R
+>= 0 behind it.
 """
 
 from collections.abc import Callable
@@ -12,7 +13,9 @@ import numpy as np
 
 
 class Oil(NamedTuple):
-    """Logarithm of the viscosity ratio and the density ratio, as functions of P, each with its derivative."""
+    """Logarithm of the viscosity ratio and the density ratio, as functions of P, each with its
+    derivative.
+    """
 
     log_viscosity: Callable
     log_viscosity_slope: Callable
@@ -39,7 +42,9 @@ class Film(NamedTuple):
 
 
 def compliance(x):
-    """Displacement of each node under a unit hat of pressure on each node, plane strain: -ln|x|/pi integrated."""
+    """Displacement of each node under a unit hat of pressure on each node, plane strain: -ln|x|/pi
+    integrated.
+    """
     spacing = x[1] - x[0]
     offset = np.arange(-x.size, x.size + 1) * spacing
     twice_integrated = np.zeros(offset.size)
@@ -79,7 +84,9 @@ def line_contact(lower, upper, nodes, speed, oil):
 
 
 def _full_film(x, matrix, pressure, approach, speed, oil, stiffening, rupture):
-    """Newton for R = 0 at the inner nodes before `rupture`, and the load; R of all inner nodes comes back too."""
+    """Newton for R = 0 at the inner nodes before `rupture`, and the load; R of all inner nodes
+    comes back too.
+    """
     spacing = x[1] - x[0]
     wet = slice(0, rupture - 1)  # of the inner nodes
     pressure = pressure.copy()
@@ -123,7 +130,8 @@ def _fluxes(x, matrix, pressure, gap, speed, oil, stiffening):
 
 
 def shaken(film, speed, oil, frequency):
-    """Complex change of the load (sum of P dX) as the bodies come closer by 1, at the angular frequency ω a/u.
+    """Complex change of the load (sum of P dX) as the bodies come closer by 1, at the angular
+    frequency ω a/u.
 
     Dense: every node stores what its film gains, and the rupture point stays.
     """

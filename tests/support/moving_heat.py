@@ -1,4 +1,5 @@
-"""Temperatures of half-spaces that move under heat, from closed forms and point sources summed by quadrature.
+"""Temperatures of half-spaces that move under heat, from closed forms and point sources summed by
+quadrature.
 
 Unit heat flux unless given; `speed` of the body along x, so that the wake lies at larger x.
 """
@@ -11,7 +12,9 @@ from scipy.special import k0e
 
 
 def band(x, half_width, speed, conductivity, diffusivity, depth=0.0):
-    """Steady rise at (x, depth) under heat on |x| < half_width, endless in y: Jaeger (1942), line sources summed."""
+    """Steady rise at (x, depth) under heat on |x| < half_width, endless in y: Jaeger (1942), line
+    sources summed.
+    """
     v = speed / (2.0 * diffusivity)
 
     def source(at):
@@ -25,13 +28,17 @@ def band(x, half_width, speed, conductivity, diffusivity, depth=0.0):
 
 
 def rectangle_at_rest(half_length, half_width, conductivity):
-    """Steady rise at the centre of a heated rectangle on a body at rest: Carslaw and Jaeger (1959), section 10.5."""
+    """Steady rise at the centre of a heated rectangle on a body at rest: Carslaw and Jaeger (1959),
+    section 10.5.
+    """
     a, b = half_length, half_width
     return 2.0 / (np.pi * conductivity) * (a * np.arcsinh(b / a) + b * np.arcsinh(a / b))
 
 
 def rectangle(x, y, half_length, half_width, speed, conductivity, diffusivity):
-    """Steady rise at (x, y) under heat on |x| < half_length, |y| < half_width: point sources in polar coordinates."""
+    """Steady rise at (x, y) under heat on |x| < half_length, |y| < half_width: point sources in
+    polar coordinates.
+    """
     v = speed / (2.0 * diffusivity)
 
     def ray(
@@ -68,7 +75,8 @@ def rectangle(x, y, half_length, half_width, speed, conductivity, diffusivity):
 def tian_kennedy_square(half_width, peclet, conductivity):
     """Largest rise under a uniform square source: 2 q b/(k sqrt(π (1.011 + Pe))), Pe = u b/(2 κ).
 
-    Source: X. Tian, F. E. Kennedy, J. Tribol. 116 (1994) 167; recollected. Its limits are the closed forms at rest,
-    4 ln(1 + √2)/π = 1.122, and Jaeger's for great speed; it joins them within about 5 %.
+    Source: X. Tian, F. E. Kennedy, J. Tribol. 116 (1994) 167; recollected. Its limits are the
+    closed forms at rest, 4 ln(1 + √2)/π = 1.122, and Jaeger's for great speed; it joins them
+    within about 5 %.
     """
     return 2.0 * half_width / (conductivity * np.sqrt(np.pi * (1.011 + peclet)))

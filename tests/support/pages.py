@@ -1,4 +1,6 @@
-"""The documentation read as markdown: code spans, fenced blocks, headings, tables, links, each with its place."""
+"""The documentation read as markdown: code spans, fenced blocks, headings, tables, links, each with
+its place.
+"""
 
 import re
 from collections.abc import Iterator

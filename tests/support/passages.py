@@ -1,4 +1,6 @@
-"""Jumps made up for the mechanisms of wear: a track, the contact on it at some positions, a body."""
+"""Jumps made up for the mechanisms of wear: a track, the contact on it at some positions, a
+body.
+"""
 
 import numpy as np
 
@@ -15,7 +17,9 @@ def track(cells=(64, 32), size=(400e-6, 200e-6)):
 
 
 def hertz_patches(grid, half_width, p_max, count, *, friction=0.0, asperities=0.0, film=0.5e-6):
-    """A line contact's pressure at places that lie evenly along the track; `asperities` is their share of it."""
+    """A line contact's pressure at places that lie evenly along the track; `asperities` is their
+    share of it.
+    """
     patches = []
     length = grid.extent[0]
     for number in range(count):

@@ -1,4 +1,6 @@
-"""Small recordings in every format that asperity reads, written by the formats' own libraries; and damage to them."""
+"""Small recordings in every format that asperity reads, written by the formats' own libraries; and
+damage to them.
+"""
 
 import json
 import warnings
@@ -23,7 +25,9 @@ def vibration(samples=4000, seed=3):
 
 
 def write_all(folder, values):
-    """Write `values` [g] in every format; return {name: what must be said beside the file to read it}."""
+    """Write `values` [g] in every format; return {name: what must be said beside the file to read
+    it}.
+    """
     import h5py
     import nptdms
     import pyarrow
@@ -150,7 +154,9 @@ def uff_set(values, *, binary=1, func_type=1):
 
 
 def damaged(content, rng):
-    """A file's bytes cut, flipped, zeroed, lengthened, with huge counts, with NaN or text in its numbers, or none."""
+    """A file's bytes cut, flipped, zeroed, lengthened, with huge counts, with NaN or text in its
+    numbers, or none.
+    """
     data = bytearray(content)
     size = len(data)
     where, length = int(rng.integers(size)), int(rng.integers(1, 2000))

@@ -1,4 +1,6 @@
-"""The finite-volume Reynolds equation face by face in plain NumPy, once without and once with units."""
+"""The finite-volume Reynolds equation face by face in plain NumPy, once without and once with
+units.
+"""
 
 import numpy as np
 
@@ -21,10 +23,11 @@ def faces(
     wedge=SECOND_ORDER,
     logarithmic=False,
 ):
-    """Fluxes through all x faces, shape (nx + 1, ny), and through the north face of each cell; complex welcome.
+    """Fluxes through all x faces, shape (nx + 1, ny), and through the north face of each cell;
+    complex welcome.
 
-    `ambient` is the mobility that the first and the last cells would have at the ambient pressure of the outer faces,
-    `wedge` the weights of the next and of the upstream cell.
+    `ambient` is the mobility that the first and the last cells would have at the ambient pressure
+    of the outer faces, `wedge` the weights of the next and of the upstream cell.
     """
     nx = pressure.shape[0]
     couette = np.empty((nx + 1, pressure.shape[1]), dtype=pressure.dtype)
@@ -51,7 +54,9 @@ def net_outflow(*arguments, **scheme):
 
 
 def mass_outflow(solution):
-    """Net mass outflow of each cell [kg/m^2/s] of a solved contact, from its pressure and gap and the oil's laws."""
+    """Net mass outflow of each cell [kg/m^2/s] of a solved contact, from its pressure and gap and
+    the oil's laws.
+    """
     conditions, oil, grid = solution.conditions, solution.lubricant, solution.grid
     dx, dy = grid.spacing
     h = solution.gap
@@ -76,7 +81,9 @@ def mass_outflow(solution):
 
 
 def leaning(solution, dx):
-    """What the mixed model's wedge adds to the first-order one: less where the film jumps, none beside closed cells."""
+    """What the mixed model's wedge adds to the first-order one: less where the film jumps, none
+    beside closed cells.
+    """
     film = (
         solution.conditions.entrainment_speed
         * solution.lubricant.density(solution.oil.pressure)

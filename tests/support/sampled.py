@@ -1,4 +1,6 @@
-"""A contact that nobody solved: any pressure and gap, as a solution, to test what is worked out from solutions."""
+"""A contact that nobody solved: any pressure and gap, as a solution, to test what is worked out
+from solutions.
+"""
 
 import numpy as np
 

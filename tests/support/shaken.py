@@ -1,6 +1,8 @@
-"""A solved contact, shaken: its equations written out face by face in NumPy and solved as one dense complex system.
+"""A solved contact, shaken: its equations written out face by face in NumPy and solved as one dense
+complex system.
 
-Takes from the package what decides each cell and nothing else of its linearisation: slopes come by complex steps.
+Takes from the package what decides each cell and nothing else of its linearisation: slopes come by
+complex steps.
 """
 
 import numpy as np
@@ -27,7 +29,9 @@ def faces_of(balance):
 
 
 def shaken_cells(balance, frequencies):
-    """Complex changes of the sum of P as the bodies come closer by 1, at angular frequencies ω a/u."""
+    """Complex changes of the sum of P as the bodies come closer by 1, at angular frequencies ω
+    a/u.
+    """
     problem, count = balance.problem, balance.gap.size
     two = isinstance(balance, MixedBalance)
     oil_pressure = balance.unknowns.oil if two else balance.pressure

@@ -1,7 +1,8 @@
-"""Stresses below sliding Hertz contacts, from closed forms and from point loads summed up; no transform, no grid.
+"""Stresses below sliding Hertz contacts, from closed forms and from point loads summed up; no
+transform, no grid.
 
-Pressure p_h sqrt(1 - r²), traction along x on the body q = friction times pressure; half-width and p_h are 1; z points
-into the body, tension is positive.
+Pressure p_h sqrt(1 - r²), traction along x on the body q = friction times pressure; half-width and
+p_h are 1; z points into the body, tension is positive.
 """
 
 import numpy as np
@@ -10,8 +11,8 @@ import numpy as np
 def line(x, z, friction, nu=0.3):
     """σ_xx, σ_yy, σ_zz, σ_xz below a sliding cylinder, in plane strain.
 
-    Source: E. McEwen, Phil. Mag. 40 (1949) 454, as in K. L. Johnson, Contact Mechanics (1985), eqs 4.49 and 7.8; the
-    same as J. O. Smith, C. K. Liu, J. Appl. Mech. 20 (1953) 157.
+    Source: E. McEwen, Phil. Mag. 40 (1949) 454, as in K. L. Johnson, Contact Mechanics (1985), eqs
+    4.49 and 7.8; the same as J. O. Smith, C. K. Liu, J. Appl. Mech. 20 (1953) 157.
     """
     even = 1.0 - x**2 + z**2
     root = np.sqrt(even**2 + 4.0 * x**2 * z**2)
@@ -26,10 +27,11 @@ def line(x, z, friction, nu=0.3):
 
 
 def point(x, y, z, friction, nu=0.3, radial=80, around=160):
-    """σ_xx, σ_yy, σ_zz, σ_xy, σ_yz, σ_xz at points below a sliding ball: the integral that Hamilton worked out.
+    """σ_xx, σ_yy, σ_zz, σ_xy, σ_yz, σ_xz at points below a sliding ball: the integral that Hamilton
+    worked out.
 
-    Boussinesq's and Cerruti's point loads at Gauss points over the disc. Source: K. L. Johnson, Contact Mechanics
-    (1985), eqs 3.19 and 3.76; G. M. Hamilton, Proc. IMechE 197C (1983) 53.
+    Boussinesq's and Cerruti's point loads at Gauss points over the disc. Source: K. L. Johnson,
+    Contact Mechanics (1985), eqs 3.19 and 3.76; G. M. Hamilton, Proc. IMechE 197C (1983) 53.
     """
     nodes, weights = np.polynomial.legendre.leggauss(radial)
     angle = np.pi / 4.0 * (nodes + 1.0)  # r = sin(angle) takes the root out of the pressure

@@ -50,7 +50,9 @@ def imports_inside_functions(tree: ast.Module) -> list[ast.stmt]:
 
 
 def faces() -> dict[str, types.ModuleType]:
-    """The modules that outside code imports from: every room's face, and the modules of rooms without one."""
+    """The modules that outside code imports from: every room's face, and the modules of rooms
+    without one.
+    """
     names = [path.parent.name for path in PACKAGE.glob("*/__init__.pyi")]
     names += [
         f"{room}.{path.stem}"
@@ -62,7 +64,9 @@ def faces() -> dict[str, types.ModuleType]:
 
 
 def exported(face: types.ModuleType) -> dict[str, Any]:
-    """What a face hands out: the names of its stub, or the public names that a module defines itself."""
+    """What a face hands out: the names of its stub, or the public names that a module defines
+    itself.
+    """
     if hasattr(face, "__path__"):
         return {name: getattr(face, name) for name in face.__all__}
     own = {
@@ -74,7 +78,9 @@ def exported(face: types.ModuleType) -> dict[str, Any]:
 
 
 def own_types(thing: Any) -> set[type]:
-    """The classes of the package that a function takes or returns, or that a class holds or its methods return."""
+    """The classes of the package that a function takes or returns, or that a class holds or its
+    methods return.
+    """
     if inspect.isclass(thing):
         public = {name: member for name, member in vars(thing).items() if not name.startswith("_")}
         members = [_function(member) for member in public.values()]

@@ -1,4 +1,6 @@
-"""Everything that the documentation may name: what is defined in the source, case keys, commands, JSON keys, files."""
+"""Everything that the documentation may name: what is defined in the source, case keys, commands,
+JSON keys, files.
+"""
 
 import ast
 import importlib
@@ -51,7 +53,9 @@ GOLDEN = {  # command: where its JSON lies in the golden numbers
 
 
 class Vocabulary:
-    """Names by what they are; `members` has the attributes of each class, those of its bases among them."""
+    """Names by what they are; `members` has the attributes of each class, those of its bases among
+    them.
+    """
 
     def __init__(self) -> None:
         self.defined: set[str] = (
@@ -184,7 +188,9 @@ class Vocabulary:
         return {part for module in self.contents for part in module.split(".")}
 
     def resolves(self, dotted: str) -> bool:
-        """Does a.b.c lead from a module, a class or an attribute of known type to something that it has?"""
+        """Does a.b.c lead from a module, a class or an attribute of known type to something that it
+        has?
+        """
         head, *rest = dotted.split(".")
         if head in ELSEWHERE:
             return _leads_elsewhere(dotted)
@@ -278,7 +284,9 @@ def vocabulary() -> Vocabulary:
 
 @cache
 def golden(command: str) -> tuple[Any, ...]:
-    """What a command's JSON was when the golden numbers were taken; nothing for commands that have none."""
+    """What a command's JSON was when the golden numbers were taken; nothing for commands that have
+    none.
+    """
     trees = []
     for name, *inside in GOLDEN.get(command, ()):
         tree = json.loads(
@@ -422,7 +430,9 @@ def is_leaf(word: str) -> bool:
 
 
 def case_sections() -> dict[str, Any]:
-    """The tables of a case file as docs/case-file.md calls them, each as the model that reads it."""
+    """The tables of a case file as docs/case-file.md calls them, each as the model that reads
+    it.
+    """
     base = next(
         name for name, tree in modules() if any(_is_class(node, "Section") for node in tree.body)
     )

@@ -1,4 +1,6 @@
-"""The small roller on a ring that tests of wear let wear: a case file, and the case with other values."""
+"""The small roller on a ring that tests of wear let wear: a case file, and the case with other
+values.
+"""
 
 from asperity import load_case
 from asperity.case import Case

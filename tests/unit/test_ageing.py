@@ -1,4 +1,6 @@
-"""A wear history in its folder: killed and gone on with, gone on to more hours, in processes, refused."""
+"""A wear history in its folder: killed and gone on with, gone on to more hours, in processes,
+refused.
+"""
 
 import shutil
 import signal
@@ -163,7 +165,9 @@ def test_a_moment_lies_between_its_rows(unbroken):
 
 
 def test_the_interval_of_k_is_another_clock(unbroken):
-    """What happens by the end with k at the ends of its interval, computed: it lies where the interval says."""
+    """What happens by the end with k at the ends of its interval, computed: it lies where the
+    interval says.
+    """
     band = unbroken.interval_by_k("sq_m")
     slow, fast = unbroken.k_interval
     assert (slow, fast) == pytest.approx((np.exp(-0.8224), np.exp(0.8224)), rel=1e-4, abs=0.0)
@@ -178,7 +182,9 @@ def test_the_interval_of_k_is_another_clock(unbroken):
 
 
 def test_a_law_of_film_defects_runs_with_its_own_values():
-    """The bare metal's k, at which Archard's law asks for thousands of jumps: few of its sites are bare."""
+    """The bare metal's k, at which Archard's law asks for thousands of jumps: few of its sites are
+    bare.
+    """
     defects = {"wear.law": "film-defect", "wear.k": "severe"}
     assert len(run_wear(case(defects), hours=10.0).table) < 20
 
@@ -281,7 +287,9 @@ def test_a_rig_records_a_contact_as_it_wears(unbroken, tmp_path):
 
 
 def test_a_longer_run_that_is_killed_leaves_the_shorter_one_as_it_was(tmp_path, monkeypatch):
-    """Its rows, its end and the surfaces' files hang together; the longer run's own rows are not among them."""
+    """Its rows, its end and the surfaces' files hang together; the longer run's own rows are not
+    among them.
+    """
     monkeypatch.setattr(folder, "SAVE_INTERVAL_S", 0.0)
     short = run_wear(case(), hours=0.5, out=tmp_path / "worn")
     last = int(short.table["jump"].iloc[-1])
@@ -325,7 +333,9 @@ def test_a_folder_of_another_layout_is_refused_in_a_sentence(tmp_path, monkeypat
         write_with_digest(tmp_path / name / name, shorter.getvalue())
         with pytest.raises(
             UnreadableFile,
-            match="is damaged or was written by another version; compute the case into another folder",
+            match=(
+                "is damaged or was written by another version; compute the case into another folder"
+            ),
         ):
             run_wear(case(), hours=0.1, out=tmp_path / name)
 

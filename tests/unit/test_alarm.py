@@ -94,7 +94,9 @@ def test_the_evidence_of_a_knee_does_not_depend_on_the_unit_of_x(unit):
 
 
 def test_the_likelihood_ratio_of_white_scatter_is_that_of_least_squares():
-    """Slow twin: with independent scatter alone, n/2 ln of the ratio of the squares left by two straight fits."""
+    """Slow twin: with independent scatter alone, n/2 ln of the ratio of the squares left by two
+    straight fits.
+    """
     values = knee_at(10, 20.0, 5)[:20]
     at = NUMBER[:20]
 
@@ -119,7 +121,9 @@ def test_the_likelihood_ratio_of_white_scatter_is_that_of_least_squares():
 
 @pytest.mark.parametrize("memory", [-0.3, 0.7, 0.9])
 def test_scatter_that_remembers_has_the_likelihood_of_its_whole_covariance(memory):
-    """Slow twin: generalised least squares with the dense covariance, its determinant by its own factors."""
+    """Slow twin: generalised least squares with the dense covariance, its determinant by its own
+    factors.
+    """
     from scipy.linalg import toeplitz
 
     from asperity.trend import sequential
@@ -207,7 +211,9 @@ def test_a_step_of_load_or_gain_is_not_told_from_damage():
     ("level", "state"), [(0.0, "alarm"), (0.4, "cannot-tell")], ids=["fault", "moved sensor"]
 )
 def test_a_depth_that_jumps_is_a_fault_unless_all_that_is_loud_moves_with_it(level, state):
-    """A sensor that is moved hears a bearing better: the level moves too, which a fault hardly does."""
+    """A sensor that is moved hears a bearing better: the level moves too, which a fault hardly
+    does.
+    """
     jump = (NUMBER >= 20).astype(float)
     series = {"depth": 0.9 * jump + scatter(1, 0.1), "rms": level * jump + scatter(2, 0.05)}
     watching = [

@@ -1,4 +1,6 @@
-"""Readers in a process of their own: what becomes of them there is a sentence, and the next read works."""
+"""Readers in a process of their own: what becomes of them there is a sentence, and the next read
+works.
+"""
 
 import ctypes
 import os

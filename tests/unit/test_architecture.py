@@ -1,4 +1,6 @@
-"""The page on the architecture lists every room in its row, and the solver's modules in their layers."""
+"""The page on the architecture lists every room in its row, and the solver's modules in their
+layers.
+"""
 
 import re
 import tomllib

@@ -1,4 +1,6 @@
-"""The benchmark: its certified values by both ways where these are quick, its runner, and adapters of others."""
+"""The benchmark: its certified values by both ways where these are quick, its runner, and adapters
+of others.
+"""
 
 import csv
 import json

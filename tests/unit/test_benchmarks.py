@@ -27,8 +27,8 @@ def test_lines_come_back_as_a_page(tmp_path):
     assert (tmp_path / "cost.csv").read_text("utf-8") == "cells,time [s]\n256,0.50\n512,2.0 ± 0.1\n"
     page = kept.page(tmp_path, ["absent", "cost"])
     assert (
-        "\n\n## Cost\n\n| cells | time [s] |\n| --- | --- |\n| 256 | 0.50 |\n| 512 | 2.0 ± 0.1 |\n\nMedian"
-        in page
+        "\n\n## Cost\n\n| cells | time [s] |\n| --- | --- |\n| 256 | 0.50 |\n| 512 | 2.0 ± 0.1"
+        " |\n\nMedian" in page
     )
 
 
@@ -201,7 +201,9 @@ def test_every_part_is_one_that_can_be_run():
 
 @pytest.fixture
 def bench(tmp_path, monkeypatch, capsys):
-    """The command on two timed parts and a row of two counted ones, none of which is run; what it prints, its code."""
+    """The command on two timed parts and a row of two counted ones, none of which is run; what it
+    prints, its code.
+    """
     ran: list[str] = []
     troubles: dict[str, str] = {}
 

@@ -1,6 +1,8 @@
-"""Calibration: parameters that made the anchors come back, closed forms, and what cannot be told is called so.
+"""Calibration: parameters that made the anchors come back, closed forms, and what cannot be told is
+called so.
 
-Dry contacts, mostly: all load is on asperities, and the resonance is Hertz's, which needs no solver to be known.
+Dry contacts, mostly: all load is on asperities, and the resonance is Hertz's, which needs no
+solver to be known.
 """
 
 import json
@@ -154,7 +156,9 @@ def test_a_bound_that_is_kept_does_not_pull(silent, threads):
 
 
 def test_scatter_over_surfaces_is_no_information():
-    """Slopes of pure noise: their products over different surfaces cancel, where their squares add up."""
+    """Slopes of pure noise: their products over different surfaces cancel, where their squares add
+    up.
+    """
     rng = np.random.default_rng(3)
     learnt, naive = [], []
     for _ in range(200):
@@ -234,7 +238,8 @@ def test_the_command_writes_a_case_that_a_study_can_run(silent, tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     Path("case.toml").write_text(silent.text, "utf-8")
     Path("anchors.toml").write_text(
-        '[[anchor]]\nname = "CAR"\nquantity = "car_domain"\nsq = "2 um"\nvalue = 0.3\ntolerance = 0.01\n',
+        '[[anchor]]\nname = "CAR"\nquantity = "car_domain"\nsq = "2 um"\nvalue = 0.3\ntolerance ='
+        " 0.01\n",
         "utf-8",
     )
     arguments = [

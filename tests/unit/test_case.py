@@ -59,7 +59,9 @@ def test_the_packaged_case_is_the_example():
 
 
 def test_a_domain_that_starves_says_by_how_much(paper):
-    """Against the films that docs/case-file.md states for alpha 20 1/GPa: 0.448 um from -1.9, 0.722 from -4.5."""
+    """Against the films that docs/case-file.md states for alpha 20 1/GPa: 0.448 um from -1.9, 0.722
+    from -4.5.
+    """
     printed = load_case(EXAMPLES / "paper-as-printed.toml")
     assert printed.with_overrides({"grid.x": [-4.5, 1.9], "model": "mixed"}) == paper
     for case, film in ((printed, 0.448), (paper, 0.722)):

@@ -1,4 +1,6 @@
-"""[grid] of a case left out, whole or in part: what is chosen then, for every kind of surface, and what is kept."""
+"""[grid] of a case left out, whole or in part: what is chosen then, for every kind of surface, and
+what is kept.
+"""
 
 import numpy as np
 import pytest
@@ -27,10 +29,16 @@ rheology = "newtonian"
 """
 SURFACES = [
     'kind = "gaussian"\nsq = "1 um"\ncorrelation_length = ["20 um", "60 um"]\ndirection_deg = 30',
-    'kind = "non-gaussian"\nsq = "1 um"\nskewness = -0.5\nkurtosis = 4.0\ncorrelation_length = "25 um"',
+    (
+        'kind = "non-gaussian"\nsq = "1 um"\nskewness = -0.5\nkurtosis = 4.0\ncorrelation_length ='
+        ' "25 um"'
+    ),
     'kind = "run-in"\nsq = "1 um"\ncorrelation_length = "25 um"\nplateau_share = 0.5',
     'kind = "self-affine"\nsq = "1 um"\nhurst = 0.8\ncutoffs = ["20 um", "200 um"]',
-    'kind = "ground"\nsq = "1 um"\ngroove_width = "20 um"\ngroove_length = "150 um"\ndirection_deg = 90',
+    (
+        'kind = "ground"\nsq = "1 um"\ngroove_width = "20 um"\ngroove_length = "150'
+        ' um"\ndirection_deg = 90'
+    ),
     'kind = "sandblasted"\nsq = "1 um"\ncrater_radius = "20 um"',
     'kind = "flat"',
 ]
@@ -85,7 +93,9 @@ def test_what_cannot_be_meant_is_refused(grid, said):
 
 
 def test_a_measured_map_limits_its_grid_and_is_resolved(tmp_path):
-    """A map of 640 x 160 um whose hills are 16 um wide: the contact would ask for more of y than there is."""
+    """A map of 640 x 160 um whose hills are 16 um wide: the contact would ask for more of y than
+    there is.
+    """
     hills = np.kron(np.random.default_rng(3).standard_normal((40, 10)), np.ones((8, 8)))
     x3pio.write(tmp_path / "ring.x3p", 1e-6 * hills.T, x_scale=2e-6, y_scale=2e-6)
     text = f'{CONTACT}[surface]\nfile = "ring.x3p"\nsq = "0.8 um"\n'

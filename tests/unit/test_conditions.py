@@ -30,7 +30,9 @@ def test_the_papers_contact_has_the_papers_size():
 
 
 def test_speeds_of_the_papers_rig():
-    """Roller 12 mm at 3375 r/min, ring 108 mm at 300 r/min: slide-to-roll ratio 0.2 as in its Table 2."""
+    """Roller 12 mm at 3375 r/min, ring 108 mm at 300 r/min: slide-to-roll ratio 0.2 as in its Table
+    2.
+    """
     rig = contact(surface_speeds=(2.12, 1.70))
     assert rig.entrainment_speed == pytest.approx(1.91)
     assert rig.sliding_speed == pytest.approx(0.42)

@@ -63,7 +63,9 @@ def state(clr: float = 1.0, car: float = 1.0, sq: float = 2e-6) -> ContactState:
 
 
 def test_full_load_gives_the_stiffness_worked_out_by_hand():
-    """physics.md section 4: z0 6.855 um, S0 4.3765e7 N/m, f0 3329.5 Hz at 200 N, E* 113.74 GPa, R 5.4 mm."""
+    """physics.md section 4: z0 6.855 um, S0 4.3765e7 N/m, f0 3329.5 Hz at 200 N, E* 113.74 GPa, R
+    5.4 mm.
+    """
     spring = oscillator(state(), CONDITIONS, MODEL)
     assert spring.stiffness == pytest.approx(4.3765e7, rel=2e-4)
     assert spring.natural_frequency_hz == pytest.approx(3329.5, rel=1e-4)
@@ -288,7 +290,9 @@ def test_a_film_that_feeds_more_than_the_rest_damps_is_refused():
 
 
 def test_a_line_contacts_own_spring_is_the_slope_of_its_approach():
-    """dF/dδ of δ = (P'/πE*) (2 ln(4R/a) - 1), a cylinder pressed at its centre (Johnson 1985, section 5.6)."""
+    """dF/dδ of δ = (P'/πE*) (2 ln(4R/a) - 1), a cylinder pressed at its centre (Johnson 1985,
+    section 5.6).
+    """
     modulus, radius, length = CONDITIONS.pair.reduced_modulus, 5.4e-3, 10e-3
 
     def approach(load: float) -> float:

@@ -1,4 +1,6 @@
-"""Contacts that change: the filter against a normal distribution written out, forecasts, and what keeps CLR low."""
+"""Contacts that change: the filter against a normal distribution written out, forecasts, and what
+keeps CLR low.
+"""
 
 import json
 from dataclasses import replace
@@ -96,7 +98,8 @@ def test_a_kept_forecast_knows_how_many_contacts_its_emulator_had(setting, emula
     assert asked.question == SeriesForecaster(setting, emulator, Limit("clr", 0.5)).question
 
 
-# The filter ----------------------------------------------------------------------------------------------------------
+# The filter
+# -------------------------------------------------------------------------------------------------
 
 
 def straight_table(share, memory, places=2):
@@ -126,7 +129,9 @@ def straight_table(share, memory, places=2):
 def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(
     setting, emulator, changing, memory, offset
 ):
-    """Twenty logarithms' joint density, their covariance by the integrated Wiener process's own formula."""
+    """Twenty logarithms' joint density, their covariance by the integrated Wiener process's own
+    formula.
+    """
     rng = np.random.default_rng(3)
     observations = [
         replace(
@@ -226,11 +231,14 @@ def test_a_share_of_a_range_goes_both_ways(setting):
             )
 
 
-# Forecasts -----------------------------------------------------------------------------------------------------------
+# Forecasts
+# -------------------------------------------------------------------------------------------------
 
 
 def test_a_roughening_contact_is_foretold(setting, emulator):
-    """Sq goes along its range at a steady rate; the load share reaches one half after the last recording."""
+    """Sq goes along its range at a steady rate; the load share reaches one half after the last
+    recording.
+    """
     shares = np.linspace(0.3, 1.0, 61)
     heard, clr = heard_along(setting, emulator, shares)
     there, limit = int(np.argmax(clr >= 0.5)), 0.5
@@ -307,7 +315,9 @@ def test_many_visits_are_taken_together_and_none_is_lost():
 def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_for(
     setting, emulator
 ):
-    """A load that differs at every visit: one table, and CRF moved to it to within what contacts differ by."""
+    """A load that differs at every visit: one table, and CRF moved to it to within what contacts
+    differ by.
+    """
     rng = np.random.default_rng(8)
     loads = 500.0 * np.exp(0.012 * rng.standard_normal(12))
     heard = [
@@ -412,7 +422,8 @@ def test_a_forecast_of_nothing_is_refused(setting, call, said):
         call(setting)
 
 
-# Design --------------------------------------------------------------------------------------------------------------
+# Design
+# -------------------------------------------------------------------------------------------------
 
 
 def test_what_keeps_the_load_share_low_does_so_in_nineteen_contacts_of_twenty(setting, emulator):
@@ -449,7 +460,9 @@ def test_what_keeps_the_load_share_low_does_so_in_nineteen_contacts_of_twenty(se
 
 
 def test_a_posterior_that_is_hard_to_find_is_drawn_for_longer_unless_it_is_ruled_out():
-    """A narrow ridge in six dimensions: evidence in closed form; a model far behind costs no further round."""
+    """A narrow ridge in six dimensions: evidence in closed form; a model far behind costs no
+    further round.
+    """
     direction = np.array([1.0, -2.0, 3.0, 1.0, -1.0, 2.0])
 
     def target(z):
@@ -459,9 +472,10 @@ def test_a_posterior_that_is_hard_to_find_is_drawn_for_longer_unless_it_is_ruled
 
     def found(best=-np.inf, longest=0):
         pool = Pool(lambda z: z, lambda a, b: np.concatenate([a, b]), lambda a, rows: a[rows], 6, 0)
-        return importance(
-            pool, target, rounds=2, best=best, least=200.0, longest=longest
-        ), pool.drawn
+        return (
+            importance(pool, target, rounds=2, best=best, least=200.0, longest=longest),
+            pool.drawn,
+        )
 
     short, drawn = found()
     assert short.effective < 200.0

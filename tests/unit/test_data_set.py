@@ -1,4 +1,6 @@
-"""`asperity check --set DIR`: a folder that is a set of data, and the same with one thing missing at a time."""
+"""`asperity check --set DIR`: a folder that is a set of data, and the same with one thing missing
+at a time.
+"""
 
 import csv
 import json

@@ -1,4 +1,6 @@
-"""Ploughing: a mark's volume and square, what is cut off and what stands beside it, and the roughness of many."""
+"""Ploughing: a mark's volume and square, what is cut off and what stands beside it, and the
+roughness of many.
+"""
 
 from dataclasses import replace
 
@@ -35,7 +37,9 @@ def test_a_groove_is_two_thirds_of_width_times_depth_across():
 
 
 def test_a_mark_lies_on_a_coarse_grid_as_on_a_fine_one():
-    """Cells hold their mean of it: its volume does not hang on where it lies, though it is a cell wide; ends meet."""
+    """Cells hold their mean of it: its volume does not hang on where it lies, though it is a cell
+    wide; ends meet.
+    """
     grid = track((64, 32))
     mark = WearMark.with_ridge(30e-6, 6e-6, 0.5e-6, 0.3)
     rng = np.random.default_rng(2)
@@ -76,7 +80,9 @@ def test_as_many_particles_come_as_the_oil_holds():
 
 
 def test_a_ball_is_struck_only_on_its_track():
-    """Beside the track nothing presses a particle in: marks lie on it, as many as its area asks for, at any width."""
+    """Beside the track nothing presses a particle in: marks lie on it, as many as its area asks
+    for, at any width.
+    """
     expected = 1e14 * 0.5e-6 * 20.0 * 400e-6 * 100e-6
     for cells, width in ((48, 200e-6), (96, 400e-6)):
         grid = Grid((96, cells), (-200e-6, -0.5 * width), (200e-6, 0.5 * width), (False, False))
@@ -130,7 +136,9 @@ def test_particles_thinner_than_the_film_pass_through():
 
 
 def test_roughness_of_many_marks_is_campbells():
-    """Mean and variance of shot noise: density times the integral of a mark, and of its square. All marks alike."""
+    """Mean and variance of shot noise: density times the integral of a mark, and of its square. All
+    marks alike.
+    """
     grid = track((128, 64))
     cutting, density = 0.4, 60.0 / float(np.prod(grid.extent))
     mark = WearMark.with_ridge(25e-6, 20e-6, 1e-6, cutting)

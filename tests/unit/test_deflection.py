@@ -19,7 +19,9 @@ def deflection():
 
 
 def test_one_loaded_cell_dents_as_the_sum_of_its_images_does(deflection):
-    """Love's rectangle and 6000 images of it: no logarithmic kernel, no Bessel function, no transform."""
+    """Love's rectangle and 6000 images of it: no logarithmic kernel, no Bessel function, no
+    transform.
+    """
     pressure = np.zeros(CELLS)
     pressure[3, 5] = 1.0
     (dx, dy), (nx, ny) = SPACING, CELLS
@@ -47,7 +49,9 @@ def test_cells_of_any_shape(cells, spacing, tolerance):
 def alias_by_alias(
     cells: tuple[int, int], spacing: tuple[float, float], aliases: int
 ) -> np.ndarray:
-    """The transformed kernel with each alias' cells integrated one by one, as far as the sum is told to go."""
+    """The transformed kernel with each alias' cells integrated one by one, as far as the sum is
+    told to go.
+    """
     (nx, ny), (dx, dy) = cells, spacing
     kernel = np.zeros((nx, ny // 2 + 1))
     edges = (np.arange(nx + 1) - 0.5) * dx
@@ -115,7 +119,9 @@ def test_some_lines_deflect_as_among_all(deflection):
 
 @pytest.mark.parametrize("cells", [64, 128, 256])
 def test_a_hertz_pressure_flattens_the_parabola(cells):
-    """V = const - X^2/2 inside |X| < 1, within 3/cells^1.5 of it; the pressure's edge sets the order."""
+    """V = const - X^2/2 inside |X| < 1, within 3/cells^1.5 of it; the pressure's edge sets the
+    order.
+    """
     dx = 4.0 / cells
     x = -2.0 + (np.arange(cells) + 0.5) * dx
     pressure = np.repeat(np.sqrt(np.maximum(1.0 - x**2, 0.0))[:, None], 8, axis=1)
@@ -128,7 +134,9 @@ def test_a_hertz_pressure_flattens_the_parabola(cells):
 
 
 def test_a_wave_along_y_sinks_as_a_half_space_does():
-    """cos(q y) on a band far wider than a wave: V = P/q, wave by wave of the staircase that the cells make of it."""
+    """cos(q y) on a band far wider than a wave: V = P/q, wave by wave of the staircase that the
+    cells make of it.
+    """
     cells, dy = 32, 0.05
     y = (np.arange(cells) + 0.5) * dy
     wave = np.tile(np.cos(2.0 * np.pi * y / (cells * dy)), (256, 1))
@@ -157,7 +165,9 @@ def test_linear_reciprocal_and_mirrored(deflection):
 
 
 def test_every_pressure_costs_work(deflection):
-    """The elastic energy of a pressure without net load on any line is positive: else a solver may run away."""
+    """The elastic energy of a pressure without net load on any line is positive: else a solver may
+    run away.
+    """
     rng = np.random.default_rng(3)
     for _ in range(20):
         pressure = rng.standard_normal(CELLS)
@@ -174,7 +184,9 @@ def test_the_near_row_is_the_compliance_itself(deflection):
 
 
 def test_a_hertz_pressure_on_a_circle_flattens_the_sphere():
-    """V = const - (X^2 + Y^2)/2 inside the circle for compliance 2/pi^2, and const = 1; second order, edge and all."""
+    """V = const - (X^2 + Y^2)/2 inside the circle for compliance 2/pi^2, and const = 1; second
+    order, edge and all.
+    """
     errors = []
     for cells in (32, 64, 128):
         step = 3.0 / cells

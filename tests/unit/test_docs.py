@@ -1,6 +1,7 @@
 """Every name, key, file, option and recipe step in README, CONTRIBUTING and docs exists.
 
-How a span of code is judged stands in `support.judging`; what is right all the same is in `EXCEPTIONS`.
+How a span of code is judged stands in `support.judging`; what is right all the same is in
+`EXCEPTIONS`.
 """
 
 import ast
@@ -93,7 +94,9 @@ COMMAND_LINE, STUDY = read(ROOT / "docs" / "command-line.md"), read(ROOT / "docs
 
 
 def sections(page: Page = COMMAND_LINE) -> dict[str, list[Line]]:
-    """The lines of docs/command-line.md by the command that they are about; a study has a page of its own."""
+    """The lines of docs/command-line.md by the command that they are about; a study has a page of
+    its own.
+    """
     about: dict[str, list[Line]] = {"study": STUDY.prose}
     for line in page.prose:
         for name in line.headings[1].split(", ") if len(line.headings) > 1 else ():
@@ -161,11 +164,13 @@ def case_tables() -> dict[str, dict[str, str]]:
         name = (
             kind[1]
             if kind
-            else line.text.lstrip("# ")
-            if line.text.startswith("#")
-            else name
-            if heading in ("[surface]", "[machine]")
-            else heading
+            else (
+                line.text.lstrip("# ")
+                if line.text.startswith("#")
+                else name
+                if heading in ("[surface]", "[machine]")
+                else heading
+            )
         )
         table = tables.setdefault(name, {})
         if not line.text.startswith("|"):
@@ -364,7 +369,10 @@ def test_a_mistake_of_each_kind_is_seen(kind, text):
 
 
 def test_a_mistake_is_seen_where_it_stands():
-    text = "# T\n\n## track\n\n`--band` or\n`--cells`; [x](gone.md), [y](#gone), [T](#t).\n\n`--json`: `clr`, `crl`.\n"
+    text = (
+        "# T\n\n## track\n\n`--band` or\n`--cells`; [x](gone.md), [y](#gone), [T](#t).\n\n`--json`:"
+        " `clr`, `crl`.\n"
+    )
     page = Page(ROOT / "docs" / "a.md", text)
     assert [line.split(": ")[0] for line in problems(page)] == ["docs/a.md:6", "docs/a.md:8"]
     assert [target for _, target in page.links() if not leads(page, target)] == ["gone.md", "#gone"]

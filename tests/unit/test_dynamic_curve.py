@@ -1,4 +1,6 @@
-"""k and c of a solved contact over frequency, as a run states them: only where asked for, through the resonance."""
+"""k and c of a solved contact over frequency, as a run states them: only where asked for, through
+the resonance.
+"""
 
 import json
 from dataclasses import replace

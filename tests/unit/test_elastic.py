@@ -1,4 +1,6 @@
-"""The dry elastic contact by its own solver: beside Newton's steps, which share nothing with it but the equations."""
+"""The dry elastic contact by its own solver: beside Newton's steps, which share nothing with it but
+the equations.
+"""
 
 from dataclasses import replace
 

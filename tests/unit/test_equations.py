@@ -1,7 +1,7 @@
 """The tables "equation, source, function, test" of the theory pages, both ways.
 
-What a row of docs/theory/equations.md names exists, function and test, and every public law that states an equation in
-its docstring stands in a row of some page.
+What a row of docs/theory/equations.md names exists, function and test, and every public law that
+states an equation in its docstring stands in a row of some page.
 """
 
 import inspect

@@ -52,7 +52,9 @@ def test_height_of_the_record_is_exact_and_of_the_process_scatters():
 
 
 def test_noise_with_its_height_before_the_filter_loses_the_filtered_power():
-    """Of white noise up to rate/2, a filter of noise bandwidth B = fc (π/4)/sin(π/4) passes B/(rate/2)."""
+    """Of white noise up to rate/2, a filter of noise bandwidth B = fc (π/4)/sin(π/4) passes
+    B/(rate/2).
+    """
     profile = noise(height_of="noise", filter="bilinear").profile(800_000, 10e3, seed=1).values
     assert np.std(profile) == pytest.approx(2e-6 * np.sqrt(30.0 * 1.1107 / 5e3), rel=0.02)
 
@@ -86,7 +88,9 @@ def test_a_kept_coefficient_leaves_the_noise_alone_and_a_readjusted_one_the_heig
     ids=str,
 )
 def test_records_have_the_expected_spectrum(choices):
-    """Mean ratio over bands below, at and above the cut-off, each to its statistical error, through a strong taper."""
+    """Mean ratio over bands below, at and above the cut-off, each to its statistical error, through
+    a strong taper.
+    """
     source = noise(cutoff_hz=400.0, **choices)
     rate, segment = 10e3, 10_000
     spectrum = power_spectrum(
@@ -106,7 +110,9 @@ def test_records_have_the_expected_spectrum(choices):
 
 
 def test_both_ways_of_making_a_record_agree():
-    """The recursion in time (order 2) and the sum of waves: autocovariances at a few lags, over 400 s."""
+    """The recursion in time (order 2) and the sum of waves: autocovariances at a few lags, over 400
+    s.
+    """
     source = noise()
     rate, samples = 4e3, 1_600_000
     a = np.sqrt(2.0) * np.pi * 30.0
@@ -124,7 +130,9 @@ def test_both_ways_of_making_a_record_agree():
 
 
 def test_profile_at_the_resonance_has_the_continuous_filters_power():
-    """Where a bilinear filter would lack 1.6 % and more: band power against the closed form, to statistical error."""
+    """Where a bilinear filter would lack 1.6 % and more: band power against the closed form, to
+    statistical error.
+    """
     source = noise()
     spectrum = power_spectrum(
         source.profile(2_000_000, 20e3, seed=1), segment=20_000, window="blackmanharris"
@@ -148,7 +156,9 @@ def test_a_sine_runs_over_as_a_line_at_speed_over_wavelength():
 
 
 def test_a_generated_surface_has_its_own_spectrum():
-    """R = Sq^2 exp(-(x/l)^2) gives Φ(q) = 2 Sq^2 l √π exp(-(π q l)^2); mean over 30 surfaces, S(f) = Φ(f/v)/v."""
+    """R = Sq^2 exp(-(x/l)^2) gives Φ(q) = 2 Sq^2 l √π exp(-(π q l)^2); mean over 30 surfaces, S(f)
+    = Φ(f/v)/v.
+    """
     length, speed = 20e-6, 0.42
     frequency = np.linspace(1500.0, 12e3, 50)
     seen = np.mean(
@@ -197,7 +207,9 @@ def test_the_patchs_weight_is_the_mean_of_a_wave_under_hertzs_pressure(shape):
 
 
 def test_a_patch_averages_the_record_it_is_given():
-    """A record of the averaged noise is the moving mean, under Hertz's pressure, of the record of the noise."""
+    """A record of the averaged noise is the moving mean, under Hertz's pressure, of the record of
+    the noise.
+    """
     source = noise(cutoff_hz=2000.0)
     rate, speed, a = 100e3, 0.42, 56e-6
     patch = PatchAverage(source=source, shape="line", half_width=a, speed=speed)

@@ -1,4 +1,6 @@
-"""Bearings that run to failure: an alarm on level before the end, none while healthy, and no contact resonance."""
+"""Bearings that run to failure: an alarm on level before the end, none while healthy, and no
+contact resonance.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,6 @@
-"""Figures that were measured stand in tables, those of a benchmark in its csv: prose tells what they mean."""
+"""Figures that were measured stand in tables, those of a benchmark in its csv: prose tells what
+they mean.
+"""
 
 import re
 from collections.abc import Iterator
@@ -68,7 +70,9 @@ def heads_of_tables(page: Page) -> Iterator[Line]:
 
 
 def numbers(cells: list[str]) -> tuple[str, ...]:
-    """Those of a row, if it has enough to tell it from others: none and all of something is no figure."""
+    """Those of a row, if it has enough to tell it from others: none and all of something is no
+    figure.
+    """
     found = tuple(kept.NUMBER.findall(" ".join(cells)))
     return (
         found

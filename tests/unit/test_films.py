@@ -1,4 +1,6 @@
-"""Fits of smooth films: their constants by quadrature, their values against solved films, and which one holds."""
+"""Fits of smooth films: their constants by quadrature, their values against solved films, and which
+one holds.
+"""
 
 import numpy as np
 import pytest
@@ -36,8 +38,9 @@ def line(load_number, oil_number, *, alpha=22e-9, eta0=0.04, radius=5.4e-3):
 def rigid_cylinder():
     """Reynolds' equation between a parabola and a plane, p = dp/dx = 0 where it ruptures.
 
-    In s = x/sqrt(2 R h0): dq/ds = 12 eta u sqrt(2R) h0^-1.5 (1 + s² - c)/(1 + s²)³. Gives c, the film under the highest
-    pressure over the least one; q_max of 12 eta u sqrt(2R) h0^-1.5; and the load over 24 eta u R/h0.
+    In s = x/sqrt(2 R h0): dq/ds = 12 eta u sqrt(2R) h0^-1.5 (1 + s² - c)/(1 + s²)³. Gives c, the
+    film under the highest pressure over the least one; q_max of 12 eta u sqrt(2R) h0^-1.5; and the
+    load over 24 eta u R/h0.
     """
 
     def slope(s, c):
@@ -54,7 +57,9 @@ def rigid_cylinder():
 
 
 def test_the_rigid_films_of_a_line_contact_are_those_of_reynolds_equation():
-    """Martin's h0 w/(eta u R) = 4.898; Blok's, at which alpha q reaches 1, 1.666 (alpha eta u)^2/3; Moes' times c."""
+    """Martin's h0 w/(eta u R) = 4.898; Blok's, at which alpha q reaches 1, 1.666 (alpha eta u)^2/3;
+    Moes' times c.
+    """
     c, highest, load = rigid_cylinder()
     conditions, oil, unit = line(0.1, 1.0)
     numbers = film_numbers(conditions, oil)
@@ -79,7 +84,9 @@ def martin_of(conditions, oil):
 
 @pytest.mark.parametrize(
     ("m", "l", "solved", "rho"),
-    [  # central H, Roelands, and the density at p_h: physics of smooth line contacts, own non-uniform solver
+    # central H, Roelands, and the density at p_h: physics of smooth line contacts, own non-uniform
+    # solver
+    [
         (5, 10, 5.301, 1.145),
         (50, 10, 3.783, 1.242),
         (100, 5, 2.332, 1.214),

@@ -1,4 +1,6 @@
-"""The shear stress of the film by each law, and what warmth does to an oil, against closed forms and twins."""
+"""The shear stress of the film by each law, and what warmth does to an oil, against closed forms
+and twins.
+"""
 
 import numpy as np
 import pytest
@@ -82,13 +84,15 @@ def test_rigid_oil_shears_as_its_law_says(rate):
     law = LinearBairWiner(2e6, 0.05, ratio=1e-9)
     stress, limit = law(film(rate))[:, 0], 2e6 + 0.05 * PRESSURE
     twin = [
-        brentq(
-            lambda t, top=top, eta=eta: rate + top / eta * np.log1p(-t / top),
-            0.0,
-            top * (1.0 - 1e-15),
+        (
+            brentq(
+                lambda t, top=top, eta=eta: rate + top / eta * np.log1p(-t / top),
+                0.0,
+                top * (1.0 - 1e-15),
+            )
+            if rate * eta < 30.0 * top
+            else top
         )
-        if rate * eta < 30.0 * top
-        else top
         for top, eta in zip(limit, VISCOSITY, strict=True)
     ]
     np.testing.assert_allclose(stress, twin, rtol=1e-7)
@@ -105,7 +109,9 @@ def test_stiff_oil_far_below_its_limit_is_a_spring():
 
 @pytest.mark.parametrize("rate", [3e3, 2e4])
 def test_carried_oil_follows_the_equation(rate):
-    """Maxwell's memory through the paper's contact, against an ODE solver on the same fields between cells."""
+    """Maxwell's memory through the paper's contact, against an ODE solver on the same fields
+    between cells.
+    """
     law, speed = BairWiner(), 1.91
     limit, modulus = law.limits(PRESSURE, np.full(X.size, 313.15))
 
@@ -148,8 +154,9 @@ def test_the_kernel_agrees_with_its_twin():
                 top, g, gamma = (
                     (1.0 - share) * f[i - 1, j] + share * f[i, j] for f in (limit, modulus, rate)
                 )
+                dt, before = transit / steps, stress
                 after = brentq(
-                    lambda s, top=top, g=g, gamma=gamma, eta=eta, before=stress, dt=transit / steps: (
+                    lambda s, top=top, g=g, gamma=gamma, eta=eta, dt=dt, before=before: (
                         before - top * -np.expm1(-s) + g * dt * (gamma - top / eta * s)
                     ),
                     0.0,

@@ -19,7 +19,9 @@ LOAD, RADIUS, LENGTH, MODULUS = 200.0, 5.4e-3, 0.01, 113.74e9
 
 
 def test_line_pressure_carries_the_load_and_flattens_the_curve():
-    """p = p_h sqrt(1 - X^2) integrates to the load; inside, deflection has the curvature p_h 2/(E* a) = 1/R."""
+    """p = p_h sqrt(1 - X^2) integrates to the load; inside, deflection has the curvature p_h 2/(E*
+    a) = 1/R.
+    """
     hertz = line_contact(LOAD, LENGTH, RADIUS, MODULUS)
     a, p_h = hertz.half_widths[0], hertz.p_max
     angle = (
@@ -40,7 +42,9 @@ def test_line_pressure_ends_at_the_half_width():
 
 @pytest.mark.parametrize("x", [1.0001, 1.3, -2.0, 6.0])
 def test_line_gap_is_what_the_pressure_leaves_open(x):
-    """h = x^2/2 - (1/pi) int P ln|(x - s)/(1 - s)| ds - 1/2, with s = cos(t), in units of a and a^2/R."""
+    """h = x^2/2 - (1/pi) int P ln|(x - s)/(1 - s)| ds - 1/2, with s = cos(t), in units of a and
+    a^2/R.
+    """
 
     def displaced(t):
         return np.sin(t) ** 2 * np.log(np.abs((x - np.cos(t)) / (1.0 - np.cos(t))))
@@ -63,7 +67,9 @@ def test_line_gap_opens_as_its_slope_says():
 
 
 def test_point_contact_is_johnsons():
-    """p0 = (6 F E*^2 / (pi^3 R^2))^(1/3) and approach (9 F^2 / (16 R E*^2))^(1/3): Johnson eqs 4.23, 4.24."""
+    """p0 = (6 F E*^2 / (pi^3 R^2))^(1/3) and approach (9 F^2 / (16 R E*^2))^(1/3): Johnson eqs
+    4.23, 4.24.
+    """
     hertz = point_contact(LOAD, RADIUS, MODULUS)
     assert hertz.p_max == pytest.approx(
         (6.0 * LOAD * MODULUS**2 / (np.pi**3 * RADIUS**2)) ** (1 / 3), rel=1e-12
@@ -97,9 +103,11 @@ def test_the_papers_contact_at_200_n():
 @pytest.mark.parametrize("ratio", [1.0, 1.0001, 1.1, 2.0, 10.0, 1e3])
 @pytest.mark.parametrize("swapped", [False, True])
 def test_elliptic_contact_meets_both_curvatures(ratio, swapped):
-    """The ellipsoid of pressure p0 on semi-axes a, b displaces by (L - M x^2 - N y^2)/(pi E*) (Johnson eq 3.29).
+    """The ellipsoid of pressure p0 on semi-axes a, b displaces by (L - M x^2 - N y^2)/(pi E*)
+    (Johnson eq 3.29).
 
-    M, N and L as Carlson's integrals; M/(pi E*) must be 1/(2 Rx), N/(pi E*) 1/(2 Ry), L/(pi E*) the approach.
+    M, N and L as Carlson's integrals; M/(pi E*) must be 1/(2 Rx), N/(pi E*) 1/(2 Ry), L/(pi E*)
+    the approach.
     """
     radii = (RADIUS, RADIUS * ratio) if not swapped else (RADIUS * ratio, RADIUS)
     hertz = elliptic_contact(LOAD, radii, MODULUS)

@@ -1,4 +1,6 @@
-"""Histories: what is read off each step, kept and gone on with; where moving surfaces are; the page and the command."""
+"""Histories: what is read off each step, kept and gone on with; where moving surfaces are; the page
+and the command.
+"""
 
 import json
 import os

@@ -1,4 +1,6 @@
-"""What a mass on a contact hears of its history: the profile that repeats, the steady answer to it, the paper's way."""
+"""What a mass on a contact hears of its history: the profile that repeats, the steady answer to it,
+the paper's way.
+"""
 
 import html
 import json
@@ -65,7 +67,8 @@ def test_what_does_not_repeat_is_said():
     steady = waves(period, (1, 3), 200, rate)
     drift = np.random.default_rng(1).standard_normal(200) * 0.5 * np.std(steady)
     profile, left, _ = repeating(np.arange(200) / rate, steady + drift, period)
-    # noise of 0.5 beside 1; of 200 numbers 33 are the period's own, and take their share of the noise
+    # noise of 0.5 beside 1; of 200 numbers 33 are the period's own, and take their share of the
+    # noise
     assert left == pytest.approx(np.sqrt(0.25 * (1 - 33 / 200) / 1.25), rel=0.1)
     assert np.std(profile.values - waves(period, (1, 3), 40, rate)) < np.std(drift)
 

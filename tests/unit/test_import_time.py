@@ -97,55 +97,37 @@ READ = {
 }  # libraries of single formats
 TABLES = {"pandas", "pyarrow", "xarray"}
 NOT_LOADED = {  # a command, and what it must not load
-    ("--version",): {"numpy", "scipy", "pydantic", "pint", "rich"}
-    | COMPUTE
-    | DRAW
-    | STUDY
-    | READ
-    | TABLES,
+    ("--version",): (
+        {"numpy", "scipy", "pydantic", "pint", "rich"} | COMPUTE | DRAW | STUDY | READ | TABLES
+    ),
     ("solve", "absent.toml"): {"rich"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES,
-    ("surface", "ring.x3p"): {"rich", "numba", "xarray", "jinja2"}
-    | STUDY,  # SurfaceTopography brings matplotlib
-    ("check", "noise.npy", "--rate", "20000"): {"rich", "scipy.fft", "h5py"}
-    | COMPUTE
-    | UNITS
-    | DRAW
-    | STUDY
-    | READ
-    | TABLES,
-    ("check", "noise.csv"): {"rich", "scipy.fft", "h5py"}
-    | COMPUTE
-    | UNITS
-    | DRAW
-    | STUDY
-    | READ
-    | TABLES,
-    ("check", str(PAPER)): {"rich", "scipy.fft", "h5py"}
-    | COMPUTE
-    | UNITS
-    | DRAW
-    | STUDY
-    | READ
-    | TABLES,
-    ("track", "noise.npy", "--rate", "20000", "--method", "peak"): {"numba", "rich"}
-    | DRAW
-    | STUDY
-    | READ
-    | TABLES,
-    ("rig", "--out", "rig", "--samples", "1", "--repeats", "1", "--duration", "1 s"): {
-        "rich",
-        "numba",
-    }
-    | DRAW
-    | STUDY
-    | TABLES,
-    ("solve", str(PAPER), *SMALL, "--out", "run.nc"): {"rich"}
-    | STATISTICS
-    | UNITS
-    | DRAW
-    | STUDY
-    | READ
-    | TABLES,
+    ("surface", "ring.x3p"): (
+        {"rich", "numba", "xarray", "jinja2"} | STUDY
+    ),  # SurfaceTopography brings matplotlib
+    ("check", "noise.npy", "--rate", "20000"): (
+        {"rich", "scipy.fft", "h5py"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES
+    ),
+    ("check", "noise.csv"): (
+        {"rich", "scipy.fft", "h5py"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES
+    ),
+    ("check", str(PAPER)): (
+        {"rich", "scipy.fft", "h5py"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES
+    ),
+    ("track", "noise.npy", "--rate", "20000", "--method", "peak"): (
+        {"numba", "rich"} | DRAW | STUDY | READ | TABLES
+    ),
+    ("rig", "--out", "rig", "--samples", "1", "--repeats", "1", "--duration", "1 s"): (
+        {
+            "rich",
+            "numba",
+        }
+        | DRAW
+        | STUDY
+        | TABLES
+    ),
+    ("solve", str(PAPER), *SMALL, "--out", "run.nc"): (
+        {"rich"} | STATISTICS | UNITS | DRAW | STUDY | READ | TABLES
+    ),
     ("solve", str(PAPER), *VIBRATED): {"rich"} | STATISTICS | UNITS | DRAW | STUDY | READ | TABLES,
     ("vibrate", str(PAPER), "--quiet"): {"rich"} | DRAW | STUDY | READ | TABLES,
 }
@@ -162,8 +144,8 @@ def test_a_command_loads_only_what_it_needs(tmp_path, arguments):
     )
     names = sorted(NOT_LOADED[arguments])
     probe = (
-        f"import atexit, sys\natexit.register(lambda: print('loaded', *[m for m in {names!r} if m in sys.modules]))\n"
-        f"from asperity.cli import main\nmain({list(arguments)!r})"
+        f"import atexit, sys\natexit.register(lambda: print('loaded', *[m for m in {names!r} if m"
+        f" in sys.modules]))\nfrom asperity.cli import main\nmain({list(arguments)!r})"
     )
     done = subprocess.run(
         [sys.executable, "-c", probe], cwd=tmp_path, capture_output=True, text=True, check=False
@@ -176,8 +158,9 @@ COMPILES = {"numba.np.linalg", "numba.np.npyimpl", "numba.typed.typeddict"}
 
 def test_kernels_that_were_compiled_before_load_nothing_that_compiles(tmp_path):
     probe = (
-        f"import sys\nfrom asperity.cli import main\ntry: main(['solve', {str(PAPER)!r}, *{VIBRATED!r}])\n"
-        f"except SystemExit: print('loaded', *[m for m in {sorted(COMPILES)!r} if m in sys.modules])"
+        f"import sys\nfrom asperity.cli import main\ntry: main(['solve', {str(PAPER)!r},"
+        f" *{VIBRATED!r}])\nexcept SystemExit: print('loaded', *[m for m in {sorted(COMPILES)!r} if"
+        " m in sys.modules])"
     )
     for _ in range(2):  # the first one may have to compile
         done = subprocess.run(
@@ -188,10 +171,10 @@ def test_kernels_that_were_compiled_before_load_nothing_that_compiles(tmp_path):
 
 def test_a_solve_begins_without_a_search_for_garbage():
     probe = (
-        "import atexit, gc\nfound = []\n"
-        "gc.callbacks.append(lambda phase, told: found.append(told) if gc.get_threshold()[0] > 10_000 else None)\n"
-        "atexit.register(lambda: print('searched', len(found)))\n"
-        f"from asperity.cli import main\nmain(['solve', {str(PAPER)!r}, *{VIBRATED!r}, '--quiet'])"
+        "import atexit, gc\nfound = []\ngc.callbacks.append(lambda phase, told: found.append(told)"
+        " if gc.get_threshold()[0] > 10_000 else None)\natexit.register(lambda: print('searched',"
+        f" len(found)))\nfrom asperity.cli import main\nmain(['solve', {str(PAPER)!r},"
+        f" *{VIBRATED!r}, '--quiet'])"
     )
     for _ in range(2):  # the first one may have to compile
         done = subprocess.run(
@@ -237,11 +220,11 @@ def test_a_name_that_is_not_there_is_named():
 def test_what_is_freed_is_kept():
     """Fields of 16 MB: the system clears 4096 pages of memory that it hands out."""
     probe = (
-        "import resource, numpy as np\nfrom asperity.core.processes import tune_memory_use\ntune_memory_use()\n"
-        "def faults():\n  before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
-        "  np.ones(1 << 21) + np.ones(1 << 21)\n"
-        "  return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before\n"
-        "print(faults(), max(faults() for _ in range(5)))"
+        "import resource, numpy as np\nfrom asperity.core.processes import"
+        " tune_memory_use\ntune_memory_use()\ndef faults():\n  before ="
+        " resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n  np.ones(1 << 21) + np.ones(1 <<"
+        " 21)\n  return resource.getrusage(resource.RUSAGE_SELF).ru_minflt -"
+        " before\nprint(faults(), max(faults() for _ in range(5)))"
     )
     environment = {**os.environ, "NUMPY_MADVISE_HUGEPAGE": "0"}
     done = subprocess.run(

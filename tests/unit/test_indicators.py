@@ -74,7 +74,9 @@ def test_without_scatter_the_fit_returns_what_was_put_in():
 
 
 def test_a_line_blurred_by_a_short_hann_window_is_fitted_unblurred():
-    """The mean of a Welch spectrum is the density convolved with |W|^2: here on a grid 100 times finer."""
+    """The mean of a Welch spectrum is the density convolved with |W|^2: here on a grid 100 times
+    finer.
+    """
     rate, segment, finer = 20e3, 500, 100
     frequency = np.fft.fftfreq(segment * finer, 1 / rate)
     density = 0.7 * line_shape(np.abs(frequency), 3210.0, 0.02)
@@ -204,7 +206,9 @@ def several(lines, seed):
 
 
 def test_the_strongest_of_several_lines_is_found_and_scatters_as_it_says():
-    """0.8 s of three lines; alone, the one-line fit takes them for one wide line or trips over them."""
+    """0.8 s of three lines; alone, the one-line fit takes them for one wide line or trips over
+    them.
+    """
     lines = [(1.0, 3200.0, 0.02), (0.6, 2800.0, 0.008), (0.5, 3650.0, 0.006)]
     fits = [
         contact_resonance(several(lines, seed), band_hz=BAND, method="modes") for seed in range(25)

@@ -1,4 +1,6 @@
-"""Contact spectroscopy: against closed forms, libraries, and a contact whose emulator is a formula."""
+"""Contact spectroscopy: against closed forms, libraries, and a contact whose emulator is a
+formula.
+"""
 
 import json
 from dataclasses import replace
@@ -98,7 +100,8 @@ def of_six(setting, emulator):
     return infer_observations(setting, emulator, heard(setting, emulator, SIX))
 
 
-# Parts ---------------------------------------------------------------------------------------------------------------
+# Parts
+# -------------------------------------------------------------------------------------------------
 
 
 def test_a_process_says_what_scikit_learn_says():
@@ -151,7 +154,9 @@ def test_priors_have_the_quantiles_that_are_stated():
 
 @pytest.mark.parametrize("discrepancy", [True, False])
 def test_the_likelihood_is_the_multivariate_normal(discrepancy):
-    """Of three channels, each with a size of the law's error of its own, covariances written out."""
+    """Of three channels, each with a size of the law's error of its own, covariances written
+    out.
+    """
     rng = np.random.default_rng(2)
     crf, damping, crfa, log_force = rng.standard_normal((4, 3, 4))
     stds = rng.uniform(0.1, 0.3, (3, 3, 4))
@@ -237,11 +242,14 @@ def test_bits_are_those_of_a_narrowed_normal_and_nothing_of_chance():
     )
 
 
-# Laws ----------------------------------------------------------------------------------------------------------------
+# Laws
+# -------------------------------------------------------------------------------------------------
 
 
 def test_crf_and_crfa_are_those_of_the_coupling(setting, emulator):
-    """The oscillator and its excitation as `solve` makes them, at the load share that is emulated."""
+    """The oscillator and its excitation as `solve` makes them, at the load share that is
+    emulated.
+    """
     forward = ForwardModel(
         setting, emulator, (ObservationPoint(300.0, 0.8), ObservationPoint(900.0, 2.5))
     )
@@ -291,7 +299,8 @@ def test_the_own_law_hears_stiffness_and_damping(setting, emulator):
     )
 
 
-# Inference -----------------------------------------------------------------------------------------------------------
+# Inference
+# -------------------------------------------------------------------------------------------------
 
 
 def test_one_operating_point_leaves_sq_open_and_six_do_not(setting, emulator, of_one, of_six):
@@ -435,7 +444,8 @@ def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
     )  # there agreement tells
 
 
-# What is refused -----------------------------------------------------------------------------------------------------
+# What is refused
+# -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -513,7 +523,9 @@ def test_a_process_of_no_slope_is_flat():
 
 
 def test_the_height_of_one_line_says_nothing_of_the_contact(setting, emulator):
-    """The gain of what excites and hears it is free: any CRFA at all leaves Sq and damping where they are."""
+    """The gain of what excites and hears it is free: any CRFA at all leaves Sq and damping where
+    they are.
+    """
     plain = heard(setting, emulator, SIX[2:3])[0]
     loud = [replace(plain, crfa=height, crfa_std=0.03 * height) for height in (1e-6, 1e6)]
     quiet, noisy = (
@@ -525,7 +537,9 @@ def test_the_height_of_one_line_says_nothing_of_the_contact(setting, emulator):
 
 
 def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
-    """Its Sq, with what places and instruments differ by; recordings are then told from a narrower prior."""
+    """Its Sq, with what places and instruments differ by; recordings are then told from a narrower
+    prior.
+    """
     rng = np.random.default_rng(6)
     grid = Grid((64, 64), (-1e-3, -1e-3), (1e-3, 1e-3), (False, False))
     measured = MeasuredSurface(0.7e-6 * rng.standard_normal((64, 64)), grid, "ring.csv", "text")
@@ -546,7 +560,9 @@ def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
 
 
 def test_further_points_never_take_a_folder_that_is_there(monkeypatch, tmp_path):
-    """A damaged one is deleted, as its error says, and the next stands behind those that are left."""
+    """A damaged one is deleted, as its error says, and the next stands behind those that are
+    left.
+    """
     base = formula_emulator(formula_setting())
     held = replace(base, folder=tmp_path)
     (tmp_path / "emulator.json").write_text("{}")

@@ -48,7 +48,9 @@ def ageing(overrides: dict[str, object] | None = None) -> WearingContact:
 def rubbed(
     model: WearingContact, rise: float = 0.0, touching: float = 1.0
 ) -> list[tuple[TrackPosition, SolvedPosition]]:
-    """Hertz's pressure at one position, borne by asperities to a share, on surfaces hotter than ambient by `rise`."""
+    """Hertz's pressure at one position, borne by asperities to a share, on surfaces hotter than
+    ambient by `rise`.
+    """
     grid, hertz = model.case.grid, model.case.conditions.hertz
     half_widths = [*hertz.half_widths, math.inf][:2]
     off = (grid.x[:, None] / half_widths[0]) ** 2 + (grid.y / half_widths[1]) ** 2
@@ -87,7 +89,9 @@ def test_a_jump_is_as_long_as_the_coefficient_that_acts_allows():
 
 
 def test_what_a_jump_takes_off_is_spread_by_the_coefficient_that_acts():
-    """A cold film wears a hundred thousandth, and z with it: next to nothing is spread, where bare metal would be."""
+    """A cold film wears a hundred thousandth, and z with it: next to nothing is spread, where bare
+    metal would be.
+    """
     film = ageing({"wear.law": {"law": "film-defect", "heat": "49 kJ/mol"}})
     new, at = WearState.unworn(film.surfaces), rubbed(film, 0.0)
     seconds = 1e-3 * film.seconds(new, at)
@@ -108,7 +112,9 @@ def ball(overrides: dict[str, object], wide: float = 1.8, cells: int = 24) -> We
 
 
 def test_a_balls_track_is_as_wide_as_its_contact_whatever_the_grid():
-    """Worn depth is the volume over the Hertz zone's width and the way round; beside it nothing counts for Sq."""
+    """Worn depth is the volume over the Hertz zone's width and the way round; beside it nothing
+    counts for Sq.
+    """
     rows = []
     for wide, cells in ((1.8, 24), (3.6, 48)):
         model = ball({"surface": "flat"}, wide, cells)
@@ -150,7 +156,9 @@ def test_a_track_that_has_grown_beyond_the_hertz_zone_counts_whole():
 
 
 def test_a_standing_bodys_scar_is_no_roughness():
-    """A smooth ball at rest, worn to a flat: its Sq is 0; its mean depth is the cap's over the square about it."""
+    """A smooth ball at rest, worn to a flat: its Sq is 0; its mean depth is the cap's over the
+    square about it.
+    """
     model = ball({"surface": "flat", "contact.slip": 2.0})
     (still,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
     new, grid = WearState.unworn(model.surfaces), model.surfaces.grid
@@ -220,7 +228,9 @@ def test_a_smooth_bodys_grooves_are_said_to_be_the_tracks():
 
 
 def test_rates_that_make_other_bodies_than_the_contacts_are_said():
-    """A roller of 12 mm on a ring of 108 mm turning as the example's do, and the pair the wrong way round."""
+    """A roller of 12 mm on a ring of 108 mm turning as the example's do, and the pair the wrong way
+    round.
+    """
     radii, speeds = (6e-3, 54e-3), ageing().case.conditions.surface_speeds
     assert 1.0 / (1.0 / radii[0] + 1.0 / radii[1]) == pytest.approx(5.4e-3)
     rates = [speed / (2.0 * math.pi * radius) for speed, radius in zip(speeds, radii, strict=True)]
@@ -271,7 +281,9 @@ def test_what_is_smooth_to_rounding_has_no_shape():
 
 
 def test_a_jump_that_differs_too_much_from_the_one_before_going_on_is_shortened():
-    """Of rates that jump from one place to another, Sq of two jumps and of one of both together differ."""
+    """Of rates that jump from one place to another, Sq of two jumps and of one of both together
+    differ.
+    """
     model = ageing({"wear.step": 0.5})
     new = WearState.unworn(model.surfaces)
     at = rubbed(model)
@@ -327,7 +339,9 @@ def test_the_drift_of_a_line_is_its_slope_with_the_interval_of_k():
 
 
 def test_the_drift_with_another_k_is_that_of_another_time():
-    """Of a parabola, read from 2 to 4 h, k so much larger is the slope so much later, and so much faster."""
+    """Of a parabola, read from 2 to 4 h, k so much larger is the slope so much later, and so much
+    faster.
+    """
     history = fallen(-0.01, 0.0005)
     slow, fast = history.k_interval
     at = {factor: factor * (-0.01 + 0.001 * 3.0 * factor) for factor in (slow, 1.0, fast)}
@@ -346,7 +360,9 @@ def test_the_interval_of_a_drift_holds_nine_times_in_ten():
 
 
 def test_the_mean_over_positions_has_students_interval():
-    """Four shares: mean .5, deviation .1291, t(3, 95 %) = 2.353 from a printed table: .5 ± .1519."""
+    """Four shares: mean .5, deviation .1291, t(3, 95 %) = 2.353 from a printed table: .5 ±
+    .1519.
+    """
     model = ageing()
     solved = rubbed(model)[0][1]
     shares = (0.35, 0.45, 0.55, 0.65)

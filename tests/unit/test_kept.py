@@ -1,4 +1,6 @@
-"""What lies on disk is what was written: damage, another case's files and another version are said, not believed."""
+"""What lies on disk is what was written: damage, another case's files and another version are said,
+not believed.
+"""
 
 import json
 import shutil
@@ -77,7 +79,9 @@ def test_a_flipped_bit_in_a_table_gives_the_same_table_or_a_refusal(tmp_path, se
 
 
 def test_a_table_of_lists_comes_back(tmp_path):
-    """As a study of the vibration model alone has, of its bands: parquet calls a list's items by a name of its own."""
+    """As a study of the vibration model alone has, of its bands: parquet calls a list's items by a
+    name of its own.
+    """
     table = pyarrow.table({"band_hz": [[2e3, 4e3], None, [1e3, 2e3]], "names": [["a"], [], ["b"]]})
     write_table(tmp_path / "table.parquet", table, "this case")
     back = read_table(tmp_path / "table.parquet", "this case", "delete it")

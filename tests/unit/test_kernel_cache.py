@@ -1,4 +1,6 @@
-"""The cache of compiled kernels may be emptied, damaged or nowhere: kernels compile again, and give the same."""
+"""The cache of compiled kernels may be emptied, damaged or nowhere: kernels compile again, and give
+the same.
+"""
 
 import os
 import subprocess
@@ -78,7 +80,9 @@ def test_a_kernel_is_stale_where_a_module_beside_it_has_changed(ran, tmp_path):
 
 
 def test_what_two_processes_keep_under_one_number_is_not_taken_for_one_another(tmp_path):
-    """Both find the cache empty and take the first number: index and code end up as different ones left them."""
+    """Both find the cache empty and take the first number: index and code end up as different ones
+    left them.
+    """
     stamp = ("source", "modules")
     late = []
     one, other = (compiled._CheckedFile(str(tmp_path), "late", stamp) for _ in range(2))

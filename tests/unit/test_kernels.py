@@ -113,7 +113,9 @@ def test_net_outflow_is_its_twins(rng, film, scheme):
 
 
 def test_what_leaves_the_cells_leaves_the_grid(rng, film):
-    """Fluxes telescope: the sum of all net outflows is what the outlet face lets out less what the inlet lets in."""
+    """Fluxes telescope: the sum of all net outflows is what the outlet face lets out less what the
+    inlet lets in.
+    """
     pressure, inlet = rng.random(CELLS), rng.random(CELLS[1])
     along, _ = twin.faces(pressure, film.content, film.mobility, film.ambient, inlet, DX, DY)
     kept = outflow(pressure, film, inlet).sum() * DX
@@ -122,7 +124,9 @@ def test_what_leaves_the_cells_leaves_the_grid(rng, film):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_net_outflow_is_second_order(scheme):
-    """d(m)/dx - d(eps dp/dx)/dx - d(eps dp/dy)/dy of smooth fields; away from the first-order inlet face."""
+    """d(m)/dx - d(eps dp/dx)/dx - d(eps dp/dy)/dy of smooth fields; away from the first-order inlet
+    face.
+    """
 
     def error(cells):
         x, dx = (np.arange(cells) + 0.5) / cells, 1.0 / cells
@@ -185,7 +189,9 @@ def test_jacobian_product_is_the_complex_step_of_the_twin(rng, film, rows, stori
 
 
 def first_order_rows(film, storing=0.0):
-    """Poiseuille with its mobility held, plus the first-order wedge through the near compliances; rows unscaled."""
+    """Poiseuille with its mobility held, plus the first-order wedge through the near compliances;
+    rows unscaled.
+    """
     nx, ny = CELLS
     count = nx * ny
     matrix = np.empty((count, count))
@@ -230,7 +236,9 @@ def test_local_stencil_is_the_twins_matrix(film, rows, storing):
 
 
 def test_own_stencil_is_the_complex_step_of_the_twin(rng, film, rows):
-    """Each cell's gap gives way to its own pressure; the wedge is first order, and the ends' mobility is held."""
+    """Each cell's gap gives way to its own pressure; the wedge is first order, and the ends'
+    mobility is held.
+    """
     compliance, pressure = 0.4, rng.random(CELLS)
     stencil = Stencil(*(np.zeros(CELLS) for _ in range(5)))
     stencils.own_stencil(rows, film, faces_of(film), pressure, compliance, (DX, DY), stencil)
@@ -259,7 +267,9 @@ def test_own_stencil_is_the_complex_step_of_the_twin(rng, film, rows):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_wedge_stencil_is_the_complex_step_of_the_twin(rng, film, rows, scheme):
-    """Along x a pressure moves its own gap and those on both sides, across x its own; three cells upstream is cut."""
+    """Along x a pressure moves its own gap and those on both sides, across x its own; three cells
+    upstream is cut.
+    """
     ny = CELLS[1]
     own, beside = 0.4, 0.15
     pressure, faces = rng.random(CELLS), faces_of(film, **scheme)
@@ -330,7 +340,9 @@ def test_fluid_diagonal_is_the_stencils_own_but_never_below_the_stiff_film(film)
 @pytest.mark.parametrize("across", [8, 7, 2, 1])
 @pytest.mark.parametrize("parity", [0, 1])
 def test_relaxed_lines_leave_no_residual(rng, parity, across, reaching):
-    """With the lines between held; of an odd number, the first and the last do not feel each other."""
+    """With the lines between held; of an odd number, the first and the last do not feel each
+    other.
+    """
     cells = CELLS[0], across
     stencil = Stencil(5.0 + rng.random(cells), *(-rng.random(cells) for _ in range(4)))
     far = far_of(cells, rng if reaching else None)
@@ -388,7 +400,9 @@ def test_split_residual_is_the_matrix_product(rng, across, reaching):
 
 @pytest.mark.parametrize("block", [(1, 1), (2, 2), (3, 3), (2, 8), (4, 3)])
 def test_aggregation_is_a_galerkin_product(rng, stencil, block):
-    """R A R^T with R one for the active cells of a block: restrict, prolong and the coarse stencil agree on R."""
+    """R A R^T with R one for the active cells of a block: restrict, prolong and the coarse stencil
+    agree on R.
+    """
     active, scale = rng.random(CELLS) < 0.7, 0.5 + rng.random(CELLS)
     active[: block[0], : block[1]] = False  # one block without any
     weight = active * scale
@@ -423,7 +437,9 @@ def test_factored_matrix_is_the_stencils(rng, cells):
 
 @pytest.mark.parametrize("cells", [(150, 70), (40, 33), (64, 8)])
 def test_nested_blocks_answer_what_the_factored_sum_does(rng, cells):
-    """Flow in a film whose mobility varies a thousandfold, where a tenth of the cells is ruptured."""
+    """Flow in a film whose mobility varies a thousandfold, where a tenth of the cells is
+    ruptured.
+    """
     mobility = np.exp(rng.uniform(0.0, 7.0, cells))
     east = 2.0 / (1.0 / mobility + 1.0 / np.roll(mobility, -1, 0))
     north = 2.0 / (1.0 / mobility + 1.0 / np.roll(mobility, -1, 1))
@@ -446,7 +462,9 @@ def test_nested_blocks_answer_what_the_factored_sum_does(rng, cells):
 
 
 def test_the_last_of_nested_grids_is_inverted(rng):
-    """Not dominated by its centres, so that pivots are taken; a matrix without an inverse is refused."""
+    """Not dominated by its centres, so that pivots are taken; a matrix without an inverse is
+    refused.
+    """
     cells = 3, 4
     parts = Stencil(*rng.standard_normal((5, *cells)))
     inverse = np.empty((12, 12))
@@ -500,7 +518,9 @@ def test_every_state_occurs_and_each_cell_is_judged_by_its_own_equation(balance)
 
 
 def test_the_linearisation_is_the_derivative_of_the_equations(balance):
-    """Central differences of gap, outflow and pressure, in the cells that each decides and away from kinks."""
+    """Central differences of gap, outflow and pressure, in the cells that each decides and away
+    from kinks.
+    """
     problem, rng = balance.problem, np.random.default_rng(9)
     step = 1e-6
     d_pressure, d_approach = rng.standard_normal(problem.cells), 0.7

@@ -72,7 +72,9 @@ def test_nothing_wanted_is_nothing_done(system):
 
 
 def shifted(kind, spread=1.0):
-    """A sweep of 60 equations at Ω = 1.7, weights of the sum, and matrix and right-hand side at any Ω."""
+    """A sweep of 60 equations at Ω = 1.7, weights of the sum, and matrix and right-hand side at any
+    Ω.
+    """
     rng = np.random.default_rng(5)
     a = np.diag(np.linspace(1.0, 1.0 + spread, 60)) + 0.02 * rng.standard_normal((60, 60))
     b = 0.03 * rng.standard_normal((60, 60))

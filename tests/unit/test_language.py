@@ -1,4 +1,6 @@
-"""House style, section 1: standard terms in identifiers, and docstrings that open with a verb or a noun."""
+"""House style, section 1: standard terms in identifiers, and docstrings that open with a verb or a
+noun.
+"""
 
 import ast
 import re

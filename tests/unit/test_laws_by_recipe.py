@@ -1,4 +1,6 @@
-"""A law is one class and one line in its table: the case file, the run file and the report need nothing else."""
+"""A law is one class and one line in its table: the case file, the run file and the report need
+nothing else.
+"""
 
 import json
 from dataclasses import dataclass

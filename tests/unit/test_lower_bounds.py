@@ -1,4 +1,6 @@
-"""The lowest versions that are allowed are those that `lowest.txt` has, which CI installs and tests."""
+"""The lowest versions that are allowed are those that `lowest.txt` has, which CI installs and
+tests.
+"""
 
 import re
 import tomllib

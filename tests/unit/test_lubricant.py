@@ -37,7 +37,9 @@ def test_barus_decades():
 
 
 def test_roelands_is_the_formula_as_textbooks_print_it():
-    """eta = eta0 exp((ln eta0 + 9.67) (-1 + (1 + 5.1e-9 p)^z)): Hamrock, Fundamentals of fluid film lubrication."""
+    """eta = eta0 exp((ln eta0 + 9.67) (-1 + (1 + 5.1e-9 p)^z)): Hamrock, Fundamentals of fluid film
+    lubrication.
+    """
     z, eta0 = 0.6, 0.04
     law = Roelands(eta0, z * 5.1e-9 * (np.log(eta0) + 9.67), 1.0 / 5.1e-9)
     assert law.exponent == pytest.approx(z, rel=1e-12)
@@ -46,7 +48,9 @@ def test_roelands_is_the_formula_as_textbooks_print_it():
 
 
 def test_density_levels_off_a_third_higher():
-    """Dowson and Higginson (1966): at most 0.6/1.7 = 35 % denser; the printed value at 1 GPa is 22 %."""
+    """Dowson and Higginson (1966): at most 0.6/1.7 = 35 % denser; the printed value at 1 GPa is 22
+    %.
+    """
     density = DowsonHigginson(1.0)(np.array([0.0, 1e9, 1e15]))
     np.testing.assert_allclose(density, [1.0, 1.0 + 0.6 / 2.7, 1.0 + 6.0 / 17.0], rtol=1e-5)
 

@@ -1,4 +1,6 @@
-"""Machines to contacts: closed forms, catalogue and published values, independent twins, and bad machines refused."""
+"""Machines to contacts: closed forms, catalogue and published values, independent twins, and bad
+machines refused.
+"""
 
 import math
 
@@ -67,7 +69,8 @@ CAM = {
     "spring_load": 100.0,
 }
 
-# Gears ---------------------------------------------------------------------------------------------------------------
+# Gears
+# -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -192,7 +195,9 @@ def test_gears_that_cannot_be_are_refused(changed, words):
 
 
 def cut_away_up_to(count, module, angle):
-    """A twin: the largest radius at which some position of the rack's tooth reaches into the involute."""
+    """A twin: the largest radius at which some position of the rack's tooth reaches into the
+    involute.
+    """
     pitch = module * count / 2.0
     travel = np.linspace(-2.0 * pitch, 2.0 * pitch, 4001)
     cut = 0.0
@@ -234,7 +239,8 @@ def test_an_undercut_below_the_bearing_flank_is_no_harm():
     assert SpurGear(**A_GEAR).contact_ratio > 1.0
 
 
-# Rolling bearings ----------------------------------------------------------------------------------------------------
+# Rolling bearings
+# -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -452,7 +458,9 @@ def random_bearing(rng, *, tilt, thrusts):
 
 
 def carried(bearing):
-    """Radial and axial force on all balls, and the moment over the radius of their grooves' centres [N]."""
+    """Radial and axial force on all balls, and the moment over the radius of their grooves' centres
+    [N].
+    """
     radial, axial, tilt = bearing.shifts(STEEL)
     return bearing._forces(np.array([radial, axial, tilt * bearing._arm]), bearing.stiffness(STEEL))
 
@@ -484,9 +492,11 @@ def test_an_angular_contact_bearing_that_comes_apart_says_so():
 
 
 def test_an_angular_contact_bearing_bears_as_its_catalogue_supposes():
-    """7205 B, 1 kN across and 1.14 kN along, e of ISO 281: half of the balls, at 40 degrees, for (C/P)³ million turns.
+    """7205 B, 1 kN across and 1.14 kN along, e of ISO 281: half of the balls, at 40 degrees, for
+    (C/P)³ million turns.
 
-    C 15.6 kN, P the radial load. Free to tilt it would bear at 20 degrees, on balls opposite the load too.
+    C 15.6 kN, P the radial load. Free to tilt it would bear at 20 degrees, on balls opposite the
+    load too.
     """
     upright, free = (
         BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=1140.0, tilt=tilt)
@@ -620,7 +630,8 @@ def test_what_is_left_out_of_a_bearing_is_said():
     assert any("steel rollers" in note for note in fast.notes(brass))
 
 
-# Discs and cams ------------------------------------------------------------------------------------------------------
+# Discs and cams
+# -------------------------------------------------------------------------------------------------
 
 
 def test_discs_keep_the_sign_of_their_sliding():
@@ -695,7 +706,8 @@ def test_cams_that_cannot_be_are_refused(changed, words):
         FlatCam(**(CAM | changed))
 
 
-# Roller followers ----------------------------------------------------------------------------------------------------
+# Roller followers
+# -------------------------------------------------------------------------------------------------
 
 ROLLER_CAM = {
     "base_radius": 18e-3,
@@ -710,7 +722,9 @@ ROLLER_CAM = {
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, 1.5, 3.0])
 def test_an_eccentric_disc_under_a_roller(angle):
-    """The roller's centre stays on a circle: the cam's radius is the disc's, and so is the path that is passed."""
+    """The roller's centre stays on a circle: the cam's radius is the disc's, and so is the path
+    that is passed.
+    """
     disc, off, roller = 20e-3, 6e-3, 8e-3
 
     def reach(theta):
@@ -737,7 +751,9 @@ def _swing(reach, angle, off, step):
 
 
 def test_a_roller_cam_by_its_outline():
-    """A twin: the cam as the envelope of the roller's places, its curvature and path by differences."""
+    """A twin: the cam as the envelope of the roller's places, its curvature and path by
+    differences.
+    """
     cam = RollerCam(**ROLLER_CAM)
     angles = np.linspace(0.02, cam.half_angle - 0.02, 4001)
     reach = (
@@ -791,7 +807,9 @@ def test_a_roller_cams_contacts():
 
 @pytest.mark.parametrize("slip", [-0.5, 0.0, 0.2, 1.5])
 def test_a_roller_that_slips_changes_its_own_speed_and_not_the_cams(slip):
-    """What it turns in a turn of the cam is its surface speed, by the contacts' ratio, over the cam's outline."""
+    """What it turns in a turn of the cam is its surface speed, by the contacts' ratio, over the
+    cam's outline.
+    """
     cam = RollerCam(**ROLLER_CAM, slip=slip)
     contacts = cam.contacts(STEEL)
     cams, rollers = (

@@ -1,4 +1,6 @@
-"""Ratings of a whole machine: that each standard gets the machine's own numbers, and says what it lacks."""
+"""Ratings of a whole machine: that each standard gets the machine's own numbers, and says what it
+lacks.
+"""
 
 import math
 from dataclasses import replace
@@ -79,7 +81,9 @@ def test_a_ball_bearings_life_is_a_commercial_programs():
 
 
 def test_gears_get_their_own_numbers():
-    """Against the formulas called by hand, with Ra and the bulk temperature given and by the roughness."""
+    """Against the formulas called by hand, with Ra and the bulk temperature given and by the
+    roughness.
+    """
     case = load_machine(EXAMPLES / "fzg-c.toml")
     given = case.with_overrides(
         {"rating": {"roughness_ra": "0.5 um", "bulk_temperature": "100 degC"}}
@@ -217,7 +221,9 @@ def test_what_lies_outside_a_standards_range_is_said(changed, beyond):
 
 
 def test_the_life_factor_of_rollers_is_of_the_bearings_load_at_least():
-    """NJ 208 under 10 kN: slices and clearance make the equivalent load less than the load, no stress less."""
+    """NJ 208 under 10 kN: slices and clearance make the equivalent load less than the load, no
+    stress less.
+    """
     case = load_machine(EXAMPLES / "nu206.toml").with_overrides(
         {
             "machine": {
@@ -274,7 +280,9 @@ def test_machines_without_a_standard_have_no_ratings():
 
 
 def test_fatigue_below_a_smooth_contact_is_hertz():
-    """The solved smooth, dry contact and Hertz' pressure agree; both are a line contact's quarter at a = 0."""
+    """The solved smooth, dry contact and Hertz' pressure agree; both are a line contact's quarter
+    at a = 0.
+    """
     case = load_machine(EXAMPLES / "nu206.toml").with_overrides(LIMITS)
     dry = {"surface": "flat", "lubricant": "none", "grid.cells": [192, 24], "grid.x": [-3.0, 3.0]}
     run = solve_case(case.case(case.contacts[0]).with_overrides(dry))

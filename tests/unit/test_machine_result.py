@@ -38,9 +38,11 @@ def solved(gears, **changed):
 def test_the_worst_is_where_asperities_carry_most(gears):
     found = solved(gears, A=(0.3, 0.9, 1e-7), D=(0.4, 1.1, 2e-7), E=(0.2, 0.2, 1e-8))
     assert found.worst["name"] == "D"
-    assert found.verdict() == (
-        "Spur gear pair 16/24, contact ratio 1.44: mixed lubrication at 3 of 7 contacts; worst is D, where asperities "
-        "carry 40.0 % of the load on a film of 0.200 µm, Λ 1.10, maximum flash temperature 12.5 K; rated λGF 0.256 at A."
+    assert (
+        found.verdict()
+        == "Spur gear pair 16/24, contact ratio 1.44: mixed lubrication at 3 of 7 contacts; worst"
+        " is D, where asperities carry 40.0 % of the load on a film of 0.200 µm, Λ 1.10, maximum"
+        " flash temperature 12.5 K; rated λGF 0.256 at A."
     )
 
 

@@ -90,7 +90,9 @@ def test_each_cell_leaves_what_it_leaves_on_all_cells(lines, model):
 @pytest.mark.parametrize("lines", LINES)
 @pytest.mark.parametrize("accurate", [True, False])
 def test_its_linearisation_is_that_of_all_cells(lines, accurate):
-    """Stencils too: on the last line they have the couplings behind the mirror on their side of it."""
+    """Stencils too: on the last line they have the couplings behind the mirror on their side
+    of it.
+    """
     problem = replace(posed(lines), accurate=accurate)
     part = reduced_problem(problem)
     everywhere, here = pressed(problem)

@@ -76,7 +76,8 @@ def test_a_repeat_tells_a_small_part_of_what_the_first_told(setting, emulator):
     assert beside < 0.15 * first
 
 
-# A linear machine ----------------------------------------------------------------------------------------------------
+# A linear machine
+# -------------------------------------------------------------------------------------------------
 
 
 def linear(unknown, emulated=0.01):
@@ -100,14 +101,18 @@ def points(std, value=8.02):
 
 
 def covariance(size, emulated=0.01):
-    """Of the errors at the three points, of one machine: those of the likelihood, the exponent's about the first."""
+    """Of the errors at the three points, of one machine: those of the likelihood, the exponent's
+    about the first.
+    """
     shown, near = linear(np.zeros(1), emulated), point_similarity(points(1e-3))
     law = law_errors("crf", shown.log_force, np.array([size]), near, shown.log_force[:, :1])
     return (law + emulated_errors("crf", shown.crf_std, near))[0]
 
 
 def closed_form(place, size, std, emulated=0.01):
-    """Bits of the unknown that one more recording at a place tells: half log2 of determinants' ratios."""
+    """Bits of the unknown that one more recording at a place tells: half log2 of determinants'
+    ratios.
+    """
     measured = std**2 * np.eye(2)
     rows = np.ix_([0, place], [0, place])
     slopes = 0.1 * SLOPES[[0, place]]
@@ -119,7 +124,9 @@ def closed_form(place, size, std, emulated=0.01):
 
 
 def told(place, size, std, emulated=0.01, count=3000):
-    """The same by possible machines: drawn from what the first recording leaves, and asked what they would show."""
+    """The same by possible machines: drawn from what the first recording leaves, and asked what
+    they would show.
+    """
     rng = np.random.default_rng(1)
     variance = covariance(size, emulated)[0, 0] + std**2
     log_force = 0.1 * SLOPES[0]
@@ -139,7 +146,9 @@ def test_information_of_a_linear_machine_is_the_ratio_of_determinants(place, std
 
 
 def test_a_repeat_tells_what_measurement_left_open_and_no_more():
-    """Errors that both have in common are no news; without any, two say what one of half the variance does."""
+    """Errors that both have in common are no news; without any, two say what one of half the
+    variance does.
+    """
     repeats = [told(1, 0.02, std) for std in (0.05, 0.01, 1e-4)]
     assert repeats == sorted(repeats, reverse=True)
     assert repeats[-1] < 0.01
@@ -148,7 +157,9 @@ def test_a_repeat_tells_what_measurement_left_open_and_no_more():
 
 
 def test_what_was_heard_says_nothing_of_errors_elsewhere_under_another_force():
-    """Without the emulator's share that all points have in common; an exponent that is off adds to what is left."""
+    """Without the emulator's share that all points have in common; an exponent that is off adds to
+    what is left.
+    """
     far = linear(np.zeros(1), emulated=0.0)._replace(log_force=np.log([[1.0, 1.0, 1e6]]))
     shown = predictive_mixture(far, points(1e-3), "crf", [0.02])
     assert shown.mean[0, 0, 2] == pytest.approx(8.0, abs=1e-9)
@@ -156,7 +167,9 @@ def test_what_was_heard_says_nothing_of_errors_elsewhere_under_another_force():
 
 
 def test_densities_of_what_would_be_heard_make_the_likelihood_of_both():
-    """p(first) p(second given first) is p(both), the law's sizes unknown, as long as no exponent is off."""
+    """p(first) p(second given first) is p(both), the law's sizes unknown, as long as no exponent is
+    off.
+    """
     same = [
         ObservationPoint(500.0, 1.0, crf=LogMeasurement(8.02, 2e-3)),
         ObservationPoint(500.0, 2.0, crf=LogMeasurement(7.96, 2e-3)),

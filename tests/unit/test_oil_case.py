@@ -1,4 +1,6 @@
-"""[lubricant] by a data sheet in the case file, and what the case, a run, a study and a page make of it."""
+"""[lubricant] by a data sheet in the case file, and what the case, a run, a study and a page make
+of it.
+"""
 
 import json
 import pickle

@@ -1,4 +1,6 @@
-"""An oil by its data sheet: numbers against the standards' examples, other programs' and a table of measurements."""
+"""An oil by its data sheet: numbers against the standards' examples, other programs' and a table of
+measurements.
+"""
 
 import re
 from pathlib import Path
@@ -84,7 +86,8 @@ def test_an_index_is_inverted(index, warm):
     )  # L and H have steps of 0.05
 
 
-MINERAL = {  # viscosity at 100 °C, density at 15 °C, viscosities [mPa s] at 20, 40 ... 120 °C: index 95
+# viscosity at 100 °C, density at 15 °C, viscosities [mPa s] at 20, 40 ... 120 °C: index 95
+MINERAL = {
     32: (5.289, 870.8, 76.2, 27.33, 12.62, 6.93, 4.29, 2.90),
     46: (6.645, 877.6, 119.4, 39.60, 17.26, 9.08, 5.44, 3.59),
     68: (8.530, 885.0, 192.6, 59.04, 24.24, 12.17, 7.05, 4.52),
@@ -103,7 +106,8 @@ def test_mineral_oils_by_grade(grade):
     assert oil.at_100 / MM2 == pytest.approx(hot, rel=5e-4)
     assert oil.density(15 + ZERO) == pytest.approx(dense, abs=0.06)
     found = [1e3 * oil.viscosity(celsius + ZERO) for celsius in range(20, 121, 20)]
-    # the table counts density from 289 K, 0.08 %; its last digit; the table of the index against the fit to it
+    # the table counts density from 289 K, 0.08 %; its last digit; the table of the index against
+    # the fit to it
     assert found == pytest.approx(viscosities, rel=2.5e-3)
 
 
@@ -399,7 +403,10 @@ def test_a_sheet_that_cannot_be_is_refused(given, says):
                 alpha_estimate="iso",
             ),
             70,
-            "ISO/TR 15144-1 has no constants for base 'ester'; give alpha, or use alpha_estimate = gold",
+            (
+                "ISO/TR 15144-1 has no constants for base 'ester'; give alpha, or use"
+                " alpha_estimate = gold"
+            ),
         ),
     ],
 )
@@ -429,7 +436,10 @@ def test_alpha_rises_as_oil_cools_or_none_is_given(name, grade):
 def test_a_thin_grade_says_what_is_missing():
     with pytest.raises(
         BadInput,
-        match=r"viscosity_100 is missing; give it, as the default .* index of 95 .* 2.2 mm.2/s at 40 degC",
+        match=(
+            r"viscosity_100 is missing; give it, as the default .* index of 95 .* 2.2 mm.2/s at 40"
+            r" degC"
+        ),
     ):
         OilSheet(grade="VG 2")
 

@@ -32,7 +32,9 @@ def scatter(seed, size=0.004):
 
 
 def crf(values, follows=CRF, **met):
-    """The series as it is watched, beside what it was recorded at, by its keys; nan where nothing is stated."""
+    """The series as it is watched, beside what it was recorded at, by its keys; nan where nothing
+    is stated.
+    """
     rows = [
         OperatingPoint(
             **{key: None if np.isnan(value) else value for key, value in zip(met, row, strict=True)}
@@ -136,7 +138,9 @@ def test_powers_are_found_exactly_where_nothing_scatters_and_held_within_their_b
 
 @pytest.mark.parametrize("memory", [0.0, 0.7])
 def test_the_likelihood_beside_conditions_is_that_of_regression_with_a_prior(memory):
-    """Slow twin: dense generalised least squares of the places and of one made-up reading of each coefficient."""
+    """Slow twin: dense generalised least squares of the places and of one made-up reading of each
+    coefficient.
+    """
     values, loads = scatter(6)[:20] + 0.02 * NUMBER[:20], np.log(LOADS[10:30] / 500.0)
     beside = sequential.ConditionRows(loads[None], np.array([3.0]))
     rows = sequential._saturating_curves(NUMBER[:20])[::9]
@@ -163,7 +167,9 @@ def test_the_likelihood_beside_conditions_is_that_of_regression_with_a_prior(mem
 
 
 def test_wear_and_a_condition_that_drift_alike_are_not_taken_for_one_another():
-    """Wear of 0.5 % a recording beside a load that grows by 1 % a recording and scatters: by its power of 0.1."""
+    """Wear of 0.5 % a recording beside a load that grows by 1 % a recording and scatters: by its
+    power of 0.1.
+    """
     load = 0.01 * NUMBER + 0.05 * np.random.default_rng(8).standard_normal(NUMBER.size)
     met = Condition(name="load", values=load, low=0.0, high=1.0 / 3.0, shown=np.exp(load), unit="N")
     told = fit_conditions(0.005 * NUMBER + 0.1 * load, [met], smallest_change=0.05)
@@ -201,7 +207,9 @@ rheology = { law = "newtonian" }
 
 
 def test_a_dry_contact_follows_its_load_as_hertz_has_it_and_no_speed(tmp_path, monkeypatch):
-    """All load on asperities: S ~ F^(1/3), so CRF ~ F^(1/6) whatever the speed. The doubt is never less than 0.05."""
+    """All load on asperities: S ~ F^(1/3), so CRF ~ F^(1/6) whatever the speed. The doubt is never
+    less than 0.05.
+    """
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     follows = contact_exponents(load_case('lubricant = "none"\n' + SMALL))
     assert follows.load == pytest.approx((1.0 / 12.0, 1.0 / 4.0), abs=1e-3)
@@ -219,7 +227,9 @@ def test_a_contact_that_follows_far_is_taken_at_its_word():
 
 
 def test_a_fault_that_heats_its_oil_alarms_all_the_same():
-    """A level that grows fourfold while the oil warms from 60 to 85 degC is hardly the oil's doing."""
+    """A level that grows fourfold while the oil warms from 60 to 85 degC is hardly the oil's
+    doing.
+    """
     warm = np.interp(NUMBER, [15.0, 39.0], [60.0, 85.0])
     louder = np.interp(NUMBER, [15.0, 39.0], [0.0, np.log(4.0)]) + scatter(2, 0.03)
     assert (

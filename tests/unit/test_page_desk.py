@@ -1,4 +1,6 @@
-"""A contact without its widgets: answered twice, marked while it is old, compared, tried again, taken away."""
+"""A contact without its widgets: answered twice, marked while it is old, compared, tried again,
+taken away.
+"""
 
 import json
 import shutil

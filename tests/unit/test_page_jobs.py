@@ -1,4 +1,6 @@
-"""One piece of work in flight a session, the newest wins; what is refused or fails comes back as a sentence."""
+"""One piece of work in flight a session, the newest wins; what is refused or fails comes back as a
+sentence.
+"""
 
 import os
 import queue

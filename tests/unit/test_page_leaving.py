@@ -1,4 +1,6 @@
-"""Visits that have gone: sent away soon after their connection was lost, swept after, and no others."""
+"""Visits that have gone: sent away soon after their connection was lost, swept after, and no
+others.
+"""
 
 import gc
 import weakref

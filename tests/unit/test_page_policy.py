@@ -1,4 +1,6 @@
-"""A page loads nothing and runs nothing but its own script, whatever stands in the names that it shows."""
+"""A page loads nothing and runs nothing but its own script, whatever stands in the names that it
+shows.
+"""
 
 import re
 from base64 import b64encode

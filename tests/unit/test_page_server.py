@@ -1,4 +1,6 @@
-"""Who is let in, what is dropped where, what the page is opened with; and widgets that escape what they show."""
+"""Who is let in, what is dropped where, what the page is opened with; and widgets that escape what
+they show.
+"""
 
 import socket
 import subprocess
@@ -149,7 +151,10 @@ def test_the_page_is_opened_with_what_is_named(tmp_path):
 
 
 def test_without_panel_the_extra_is_named():
-    without = "import sys; sys.modules['panel'] = None; from asperity.cli import main; main(['page', '--port', '0'])"
+    without = (
+        "import sys; sys.modules['panel'] = None; from asperity.cli import main; main(['page',"
+        " '--port', '0'])"
+    )
     done = subprocess.run(
         [sys.executable, "-c", without], capture_output=True, text=True, check=False
     )

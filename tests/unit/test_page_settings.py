@@ -1,4 +1,6 @@
-"""Knobs of cases and the settings they make: in the case file's words, back from an address, nothing let through."""
+"""Knobs of cases and the settings they make: in the case file's words, back from an address,
+nothing let through.
+"""
 
 import tomllib
 from functools import reduce

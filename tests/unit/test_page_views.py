@@ -1,4 +1,6 @@
-"""Recordings, studies and histories as the page shows them: what the command line says of the same files."""
+"""Recordings, studies and histories as the page shows them: what the command line says of the same
+files.
+"""
 
 import os
 

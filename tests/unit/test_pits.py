@@ -1,4 +1,6 @@
-"""Fatigue: Miner's sum, what counts as damage, what breaks out, and that mild wear runs ahead of it."""
+"""Fatigue: Miner's sum, what counts as damage, what breaks out, and that mild wear runs ahead of
+it.
+"""
 
 from dataclasses import replace
 
@@ -63,7 +65,9 @@ def test_the_path_below_a_rolling_line_contact_is_hertz():
 
 
 def test_the_ends_of_a_track_are_one_place():
-    """A contact that lies across the ends of its track stresses what is below it like one in the middle."""
+    """A contact that lies across the ends of its track stresses what is below it like one in the
+    middle.
+    """
     grid = track((65, 16))
     (middle,) = hertz_patches(grid, WIDTH, P_MAX, 1)
     turn = 30
@@ -194,7 +198,9 @@ def test_what_is_worn_off_brings_up_what_lay_deeper():
 
 
 def test_wear_that_is_fast_enough_leaves_no_pits():
-    """A layer takes its damage on the way up: the sum stays below the integral of damage over depth by wear."""
+    """A layer takes its damage on the way up: the sum stays below the integral of damage over depth
+    by wear.
+    """
     grid = track((64, 8))
     patches = hertz_patches(grid, WIDTH, P_MAX, 8)
     fatigue = VonMisesPits(limit=150e6, cycles=1e7)

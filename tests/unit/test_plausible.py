@@ -121,7 +121,9 @@ def test_a_film_far_from_its_fits_is_noted_with_the_reason():
 
 
 def test_unloaded_asperities_at_a_small_film_ratio_are_noted():
-    """The paper's contact at Sq 2.5 um has a film ratio of 0.25, and asperities bear nine tenths: no note."""
+    """The paper's contact at Sq 2.5 um has a film ratio of 0.25, and asperities bear nine tenths:
+    no note.
+    """
     solved = solve_contact(contact(hardness=2e9), barus(), rough(grid((48, 32)), 2.5e-6))
     assert not any("film ratio" in note for note in solution_notes(solved))
     untouched = replace(solved, in_contact=np.zeros_like(solved.in_contact))
@@ -133,7 +135,9 @@ def test_unloaded_asperities_at_a_small_film_ratio_are_noted():
 
 
 def test_sharp_ridges_are_noted():
-    """Grooves that cut one another leave edges; a Gaussian surface's crests have a radius on any grid."""
+    """Grooves that cut one another leave edges; a Gaussian surface's crests have a radius on any
+    grid.
+    """
     conditions, on = contact(speed=0.1), grid((96, 64))
     ground = ground_surface(
         on,
@@ -160,7 +164,9 @@ def test_sharp_ridges_are_noted():
     ("shape", "ratio"), [(lambda t: t**2, 1.0), (lambda t: np.abs(t) * 1e-5, 2.0)]
 )
 def test_the_radius_of_ridges_is_that_of_a_parabola_and_an_edge_has_none(shape, ratio):
-    """Ten crests of radius 1/2 m along x, in units of the lengths; of edges twice as much on cells twice as wide."""
+    """Ten crests of radius 1/2 m along x, in units of the lengths; of edges twice as much on cells
+    twice as wide.
+    """
     on = grid((240, 16))
     past_crest = (np.arange(240) % 24 - 12) * on.spacing[0]
     surface = Surface(np.repeat(-shape(past_crest)[:, None], 16, axis=1), on)

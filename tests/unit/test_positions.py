@@ -1,4 +1,6 @@
-"""A position of the tracks, solved loosely first; and a grid that shows too little of the roughness."""
+"""A position of the tracks, solved loosely first; and a grid that shows too little of the
+roughness.
+"""
 
 from dataclasses import replace
 
@@ -66,7 +68,9 @@ def test_what_leads_nowhere_at_once_is_solved_from_afar(monkeypatch):
 
 
 def test_what_wears_is_the_load_of_touching_cells():
-    """CLR's, as the film's own part in a touching cell has no meaning by itself; nothing elsewhere."""
+    """CLR's, as the film's own part in a touching cell has no meaning by itself; nothing
+    elsewhere.
+    """
     found = solved(worn_case(ROUGH))
     borne = found.asperity_pressure.sum() / found.pressure.sum()
     assert borne == pytest.approx(found.state.clr, rel=1e-12)

@@ -1,4 +1,6 @@
-"""Progress: on a terminal only, beside the output; the wait for the compiler is announced, a solver at work is not."""
+"""Progress: on a terminal only, beside the output; the wait for the compiler is announced, a solver
+at work is not.
+"""
 
 import os
 import subprocess

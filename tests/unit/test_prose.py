@@ -1,4 +1,6 @@
-"""One idea a sentence: no sentence of the pages is long. What is told is counted in words, not in names or formulas."""
+"""One idea a sentence: no sentence of the pages is long. What is told is counted in words, not in
+names or formulas.
+"""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,6 @@
-"""Ratings: constants as public readings of the standards have them, published lives, closed forms, limits."""
+"""Ratings: constants as public readings of the standards have them, published lives, closed forms,
+limits.
+"""
 
 import math
 from dataclasses import fields
@@ -40,7 +42,8 @@ RPM = 2.0 * math.pi / 60.0
 SHARES = (0.01, 0.05, 0.1, 0.2, 0.5)
 KAPPAS = (0.2, 0.5, 1.0, 2.0, 4.0)
 
-# Bearings ------------------------------------------------------------------------------------------------------------
+# Bearings
+# -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -146,7 +149,8 @@ def zone(count, power, eps=0.5):
 
 
 def test_a_roller_bearing_lives_as_its_rating_promises():
-    """C is made for half a load zone: a million turns under C, but for λν, which slices account for themselves.
+    """C is made for half a load zone: a million turns under C, but for λν, which slices account for
+    themselves.
 
     The slices' life goes with the fourth power of the load, so that only there both agree.
     """
@@ -165,7 +169,9 @@ def test_a_roller_bearing_lives_as_its_rating_promises():
 
 @pytest.mark.parametrize("ratio", [0.05, 0.2, 0.35])
 def test_both_rings_of_a_roller_bearing_by_lundberg_and_palmgren(ratio):
-    """A ring's capacity goes with (1 - γ)^(29/27)/(1 + γ)^(1/4), of the outer ring with γ negative; here by hand."""
+    """A ring's capacity goes with (1 - γ)^(29/27)/(1 + γ)^(1/4), of the outer ring with γ negative;
+    here by hand.
+    """
     inner, outer = (
         (1.0 - side) ** (29.0 / 27.0) / (1.0 + side) ** 0.25 for side in (ratio, -ratio)
     )
@@ -193,7 +199,8 @@ def test_the_edge_factors_of_slices():
     assert edge_factors(31)[15] == 1.0
 
 
-# Gears ---------------------------------------------------------------------------------------------------------------
+# Gears
+# -------------------------------------------------------------------------------------------------
 
 C_GEAR = SpurGear(
     module=4.5e-3,
@@ -274,7 +281,9 @@ def test_the_loss_factor_of_the_fzg_c_gears():
 
 
 def test_friction_and_bulk_temperature_in_the_standards_units():
-    """By hand: 0.045 (400/(6 8))^0.2 20^-0.05 2.2 (0.5/8)^0.25 and 90 + 7400 (0.5/(91.5 14))^0.72/1.2."""
+    """By hand: 0.045 (400/(6 8))^0.2 20^-0.05 2.2 (0.5/8)^0.25 and 90 + 7400 (0.5/(91.5
+    14))^0.72/1.2.
+    """
     by_hand = 0.045 * (400.0 / 48.0) ** 0.2 * 20.0**-0.05 * 2.2 * (0.5 / 8.0) ** 0.25
     assert mesh_friction(400e3, 8e-3, 6.0, 0.5e-6, 0.02, 1.0) == pytest.approx(by_hand, rel=1e-12)
     assert bulk_temperature(363.15, 500.0, 0.0915, 0.014) == pytest.approx(
@@ -287,15 +296,19 @@ def test_friction_and_bulk_temperature_in_the_standards_units():
         GearOil(lambda _: 0.02, lambda _: 1e-8, "ester")
 
 
-# Flash temperature ---------------------------------------------------------------------------------------------------
+# Flash temperature
+# -------------------------------------------------------------------------------------------------
 
 
 def heated(shape):
-    """Largest rise of a half-space under a fast band of heat of mean 1, unit speed, effusivity and half-width 1."""
+    """Largest rise of a half-space under a fast band of heat of mean 1, unit speed, effusivity and
+    half-width 1.
+    """
     mean = scipy.integrate.quad(shape, -1.0, 1.0)[0] / 2.0
 
     def rise(x):
-        # the heat that has passed over the point at x since -1: T = 1/(B sqrt(π u)) ∫ q(s)/sqrt(x - s) ds
+        # the heat that has passed over the point at x since -1: T = 1/(B sqrt(π u)) ∫ q(s)/sqrt(x -
+        # s) ds
         root = math.sqrt(x + 1.0)
         inner = scipy.integrate.quad(
             lambda z: 2.0 * shape(x - z * z), 0.0, root, limit=200, epsabs=1e-12
@@ -307,7 +320,9 @@ def heated(shape):
 
 
 def test_bloks_constants():
-    """A twin: the moving source integrated. Each body takes the heat that lets both be equally hot."""
+    """A twin: the moving source integrated. Each body takes the heat that lets both be equally
+    hot.
+    """
     hertz, where = heated(lambda x: math.sqrt(max(1.0 - x * x, 0.0)))
     even, _ = heated(lambda _: 1.0)
     assert hertz / math.sqrt(2.0) == pytest.approx(1.1115, rel=1e-4)
@@ -368,7 +383,8 @@ def test_the_scuffing_temperature_of_an_oil():
         scuffing_temperature(14, 1.0)
 
 
-# Dang Van ------------------------------------------------------------------------------------------------------------
+# Dang Van
+# -------------------------------------------------------------------------------------------------
 
 TIME = np.linspace(0.0, 2.0 * np.pi, 721)
 SINE, COSINE, NOTHING = np.sin(TIME), np.cos(TIME), np.zeros_like(TIME)
@@ -432,7 +448,9 @@ def test_the_smallest_sphere_is_one():
 
 
 def rolled_by(width, p_max, depth):
-    """Stresses at a depth as Hertz' line contact passes, from 5 half-widths before it to 5 behind."""
+    """Stresses at a depth as Hertz' line contact passes, from 5 half-widths before it to 5
+    behind.
+    """
     grid = Grid((480, 24), (-5.0 * width, -width), (5.0 * width, width), (False, True))
     pressure = p_max * np.sqrt(np.maximum(1.0 - (grid.x[:, None] / width) ** 2, 0.0)) + np.zeros(
         grid.cells
@@ -442,7 +460,9 @@ def rolled_by(width, p_max, depth):
 
 
 def test_dang_van_below_a_rolling_line_contact():
-    """p_h/4 at half a half-width where hydrostatic stress does not count; own values with it, 1 %."""
+    """p_h/4 at half a half-width where hydrostatic stress does not count; own values with it,
+    1 %.
+    """
     conditions = ContactConditions(
         pair=STEEL, geometry="line", radius=0.01, length=0.01, load=5e3, surface_speeds=(1.0, 1.0)
     )

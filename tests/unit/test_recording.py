@@ -1,4 +1,6 @@
-"""Reading recordings: every format gives the same signal; rate, unit and channel come from somewhere, or are asked."""
+"""Reading recordings: every format gives the same signal; rate, unit and channel come from
+somewhere, or are asked.
+"""
 
 from datetime import datetime
 from pathlib import Path
@@ -288,9 +290,10 @@ def test_every_measured_file_is_read_or_refused_in_words():
         except BadInput as reason:
             refused[path.name] = str(reason)
     assert list(refused) == ["trib_c1.csv"]
-    assert refused["trib_c1.csv"] == (
-        "trib_c1.csv states no sampling rate (its column 'Time' names no unit; in seconds: 9.99994 Hz); "
-        "give rate_hz, or state it as rate_hz in trib_c1.csv.toml beside it"
+    assert (
+        refused["trib_c1.csv"]
+        == "trib_c1.csv states no sampling rate (its column 'Time' names no unit; in seconds:"
+        " 9.99994 Hz); give rate_hz, or state it as rate_hz in trib_c1.csv.toml beside it"
     )
     assert channels["ActTest_009.IDE"] == 15
     assert channels["2003.10.22.12.06.24"] == 8

@@ -56,7 +56,9 @@ def test_damaged_recordings_leave_no_traceback(tmp_path, capfd):
 
 
 def outcome(path, beside):
-    """How many samples were read, or the sentence that refuses them; anything else is the traceback not to be seen."""
+    """How many samples were read, or the sentence that refuses them; anything else is the traceback
+    not to be seen.
+    """
     try:
         return sum(check_recording(one).samples for one in open_channels(path, **beside))
     except BadInput as refusal:
@@ -69,9 +71,10 @@ LIBRARIES = ("soundfile", "scipy.io", "h5py", "nptdms", "pyarrow", "idelib", "py
 def test_no_library_of_somebody_elses_reads_a_recording_in_our_process(tmp_path):
     said = write_all(tmp_path, vibration(300))
     probe = (
-        "import sys\nfrom pathlib import Path\nfrom asperity.recording import open_channels\n"
-        "for name, beside in eval(sys.argv[1]).items():\n    open_channels(name, **beside)[0].read()\n"
-        f"print(*[library for library in {LIBRARIES!r} if library in sys.modules])"
+        "import sys\nfrom pathlib import Path\nfrom asperity.recording import open_channels\nfor"
+        " name, beside in eval(sys.argv[1]).items():\n    open_channels(name,"
+        f" **beside)[0].read()\nprint(*[library for library in {LIBRARIES!r} if library in"
+        " sys.modules])"
     )
     command = [sys.executable, "-c", probe, repr(said)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -1,4 +1,6 @@
-"""What files state beside their numbers, and what a table states of them: nothing of it may be lost in silence."""
+"""What files state beside their numbers, and what a table states of them: nothing of it may be lost
+in silence.
+"""
 
 from datetime import datetime
 

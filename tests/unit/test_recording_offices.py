@@ -1,4 +1,6 @@
-"""Recordings as offices and loggers of other countries write them, and files that are no recordings at all."""
+"""Recordings as offices and loggers of other countries write them, and files that are no recordings
+at all.
+"""
 
 import zipfile
 from datetime import datetime
@@ -117,7 +119,9 @@ def test_what_is_no_recording_takes_no_place(tmp_path):
 
 
 def test_bursts_of_lost_samples_leave_neither_lines_nor_a_slope(tmp_path):
-    """Held for 10 ms ten times a second, 40 % of the pieces: what is left has the spectrum of what was not lost."""
+    """Held for 10 ms ten times a second, 40 % of the pieces: what is left has the spectrum of what
+    was not lost.
+    """
     rng = np.random.default_rng(3)
     whole = rng.standard_normal(20 * 20_000)
     held = whole.copy()

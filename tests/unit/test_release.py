@@ -1,4 +1,6 @@
-"""What a release states of itself: one version everywhere, metadata by their schemas, needs as pyproject has them."""
+"""What a release states of itself: one version everywhere, metadata by their schemas, needs as
+pyproject has them.
+"""
 
 import copy
 import json
@@ -189,7 +191,9 @@ def split(requirement: str) -> tuple[str, str]:
 
 
 def test_the_package_stays_small():
-    """Its files: a folder's own size is the file system's, and one of caches is none of the package."""
+    """Its files: a folder's own size is the file system's, and one of caches is none of the
+    package.
+    """
     files = (
         path
         for path in PACKAGE.rglob("*")

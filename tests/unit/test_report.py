@@ -178,7 +178,9 @@ class Page(HTMLParser):
 
 @pytest.fixture
 def unprinted(monkeypatch):
-    """Figures are drawn and not printed, which is most of a page's time, where its words are what is asked for."""
+    """Figures are drawn and not printed, which is most of a page's time, where its words are what
+    is asked for.
+    """
     monkeypatch.setattr(base, "svg", lambda figure: f"<svg>{figure.get_label()}</svg>")
 
 
@@ -267,7 +269,9 @@ def test_a_new_quantity_of_a_shown_group_is_in_the_table(monkeypatch):
 
 @pytest.mark.usefixtures("unprinted")
 def test_a_resonance_is_not_given_with_its_record_s_deviation_alone(single):
-    """The fit to one record knows its frequency to some hertz where the load share's error bar is worth a hundred."""
+    """The fit to one record knows its frequency to some hertz where the load share's error bar is
+    worth a hundred.
+    """
     resonance = run_like().vibration.resonance
     (row,) = [row for row in single.rows if row[0].startswith("Contact resonance frequency")]
     assert float(row[1]) == pytest.approx(resonance.crf_hz, abs=0.06)
@@ -566,7 +570,8 @@ def test_load_on_capped_oil_is_not_hidden():
     assert "without contact carry 50.0\N{NO-BREAK SPACE}% of the load" in shown
 
 
-# Figures -------------------------------------------------------------------------------------------------------------
+# Figures
+# -------------------------------------------------------------------------------------------------
 
 
 MAP = ["x along rolling [µm]", "y across rolling [µm]"]
@@ -679,15 +684,17 @@ def test_temperatures_are_cut_through_the_hottest_cell():
 def test_friction_heat_and_stress_are_numbers_of_the_page(single):
     rows = {row[0]: row[1] for row in single.rows}
     run = run_like()
-    assert next(rows[name] for name in rows if name.startswith("Friction coefficient")) == (
-        f"{run.friction.coefficient:.4f}"
+    assert (
+        next(rows[name] for name in rows if name.startswith("Friction coefficient"))
+        == f"{run.friction.coefficient:.4f}"
     )
     assert (
         next(rows[name] for name in rows if name.startswith("Maximum flash temp"))
         == f"{run.heat.max_k:.1f}"
     )
-    assert next(rows[name] for name in rows if name.startswith("Maximum von Mises")) == (
-        f"{run.stress.peak.value * 1e-9:.3f}"
+    assert (
+        next(rows[name] for name in rows if name.startswith("Maximum von Mises"))
+        == f"{run.stress.peak.value * 1e-9:.3f}"
     )
     assert (
         next(rows[name] for name in rows if name.startswith("Boundary friction coefficient"))

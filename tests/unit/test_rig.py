@@ -72,7 +72,9 @@ def test_the_signal_to_noise_ratio_is_as_requested(snr_db):
 
 
 def test_the_contact_line_is_the_oscillators_own_response():
-    """Against a record by another way: the profile, finely sampled, through the exact response in time."""
+    """Against a record by another way: the profile, finely sampled, through the exact response in
+    time.
+    """
     one = simulate_rig(RigSettings(**SMALL)).recordings[0]
     model = VibrationModel(mass=0.1, damping_ratio=0.02)
     spring = replace(_spring(one.crf_hz), damping_ratio=one.damping_ratio)
@@ -84,7 +86,8 @@ def test_the_contact_line_is_the_oscillators_own_response():
     ratio = seen.density[inside] / np.interp(
         seen.frequency_hz[inside], one.frequency_hz, one.contact_density
     )
-    # straight lines between samples cost 1.5 % at 100 kHz; the accelerometer adds 1 %; the rest is chance
+    # straight lines between samples cost 1.5 % at 100 kHz; the accelerometer adds 1 %; the rest is
+    # chance
     assert np.mean(ratio) == pytest.approx(0.98, abs=0.02)
     assert np.std(ratio) < 0.2
 
@@ -177,7 +180,9 @@ def test_a_case_gives_its_own_load_shares():
 
 
 def test_a_case_gives_its_contacts_own_damping_and_a_track_finds_it_again():
-    """Stated 0.02 and what the solved contact adds at the line's frequency; the fit of each quiet record returns it."""
+    """Stated 0.02 and what the solved contact adds at the line's frequency; the fit of each quiet
+    record returns it.
+    """
     case = load_case(Path(__file__).parents[2] / "examples" / "paper.toml").with_overrides(
         {"grid.cells": [64, 64], "vibration.damping_law": "contact"}
     )

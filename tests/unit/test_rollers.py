@@ -1,4 +1,6 @@
-"""A roller's shape along its length: closed forms, refusals, slices, and the way through a case and a file."""
+"""A roller's shape along its length: closed forms, refusals, slices, and the way through a case and
+a file.
+"""
 
 import json
 import math
@@ -133,7 +135,10 @@ def test_conditions_that_do_not_fit_are_refused():
         (
             {},
             1.0,
-            r"load of 1 N is carried by a film of 30.5 um over 333 um, .* half-width of 2.02 um: .* raise",
+            (
+                r"load of 1 N is carried by a film of 30.5 um over 333 um, .* half-width of 2.02"
+                r" um: .* raise"
+            ),
         ),
     ],
 )
@@ -149,7 +154,9 @@ def test_what_is_no_roller_contact_is_refused_at_once(given, load, said):
 
 
 def test_slices_share_the_load_about_as_iso_does():
-    """w'max/w'mean 1.3318 on 0.955 of the length by ISO's slices; a half-space's differ by a few per cent."""
+    """w'max/w'mean 1.3318 on 0.955 of the length by ISO's slices; a half-space's differ by a few
+    per cent.
+    """
     load = sliced_load(ISO, LENGTH, LOAD, RADIUS, STEEL.reduced_modulus)
     assert load.line_load.mean() * LENGTH == pytest.approx(LOAD)
     assert load.peak == pytest.approx(1.3318, rel=0.03)
@@ -161,7 +168,9 @@ def test_slices_share_the_load_about_as_iso_does():
 
 
 def test_the_chosen_grid_ends_past_the_roller_or_where_no_load_is():
-    """Past it so many cells that the end lies on a border of coarser ones too, where there are enough."""
+    """Past it so many cells that the end lies on a border of coarser ones too, where there are
+    enough.
+    """
     whole = auto_grid(roller(ISO), None)
     few = auto_grid(roller(ISO), None, cells=(32, 64))
     assert few.y[[1, -2]] == pytest.approx(np.array([-0.5, 0.5]) * (LENGTH - few.spacing[1]))

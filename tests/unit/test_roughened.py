@@ -1,4 +1,6 @@
-"""What roughens, as a case that wears asks it: booked, handed over, kept to the bit, no longer jumps than allowed."""
+"""What roughens, as a case that wears asks it: booked, handed over, kept to the bit, no longer
+jumps than allowed.
+"""
 
 import math
 from dataclasses import replace
@@ -86,7 +88,9 @@ def test_what_was_kept_goes_on_to_the_bit(solved):
 
 
 def test_a_jump_is_no_longer_than_what_roughens_allows(solved):
-    """Of both bodies the one that passes more often decides, at its own rate; without what roughens nobody does."""
+    """Of both bodies the one that passes more often decides, at its own rate; without what roughens
+    nobody does.
+    """
     model = ageing("ploughing")
     worn = jumped(model, solved)
     assert 0.0 < worn.longest < SECONDS

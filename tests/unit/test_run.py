@@ -1,4 +1,6 @@
-"""What a run works out beside the contact: friction, heat and stress, kept as maps and worked out anew."""
+"""What a run works out beside the contact: friction, heat and stress, kept as maps and worked out
+anew.
+"""
 
 from importlib.resources import files
 

@@ -40,7 +40,9 @@ def test_a_cell_scuffs_where_pressure_times_shear_passes_the_limit():
 
 
 def test_removal_jumps_by_the_factor_and_the_volume_is_shared():
-    """A load share s of a cell scuffs: (factor - 1) s of what the law removed; of it `transfer` goes over."""
+    """A load share s of a cell scuffs: (factor - 1) s of what the law removed; of it `transfer`
+    goes over.
+    """
     jump = rubbed()
     change = PressureShearScuffing(limit=0.25 * MU * P_MAX**2, factor=1000.0, transfer=0.3)(jump)
     load = sum(patch.asperity_pressure for patch in jump.patches)
@@ -70,7 +72,9 @@ def test_scuffing_takes_a_tenth_of_sq_and_then_the_contact_is_asked_again():
 
 
 def test_a_smooth_bodys_jumps_are_counted_against_the_film():
-    """It has no Sq of its own, but is as far from its partner as the film is thick; where there is none, 10 nm."""
+    """It has no Sq of its own, but is as far from its partner as the film is thick; where there is
+    none, 10 nm.
+    """
     scuffing = PressureShearScuffing(limit=0.25 * MU * P_MAX**2)
     smooth = rubbed(heights=np.zeros(track().cells), removed=np.full(track().cells, 1e-6))
     assert -scuffing(smooth).heights_change.min() == pytest.approx(0.1 * 0.5e-6, rel=1e-9, abs=0.0)
@@ -82,7 +86,9 @@ def test_a_smooth_bodys_jumps_are_counted_against_the_film():
 
 
 def test_the_threshold_of_temperature_is_bloks():
-    """A friction just above the one at which Blok's rise is the limit scuffs, one just below does not."""
+    """A friction just above the one at which Blok's rise is the limit scuffs, one just below does
+    not.
+    """
     line_load, width, speeds = 0.5 * np.pi * 50e-6 * P_MAX, 50e-6, (2.0, 1.5)
     threshold = 100.0 / flash_rise(1.0, line_load, width, speeds)
     scuffing = TemperatureScuffing(limit=100.0)

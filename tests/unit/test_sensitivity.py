@@ -1,4 +1,6 @@
-"""Sensitivity: indices against functions whose own are known, ranges, and the real solver where closed forms hold."""
+"""Sensitivity: indices against functions whose own are known, ranges, and the real solver where
+closed forms hold.
+"""
 
 import json
 import math

@@ -117,7 +117,9 @@ def test_a_spectrum_without_vibration_is_one_that_its_sensor_does_not_have():
 
 
 def test_a_sensor_that_was_moved_parts_the_series_of_all():
-    """The same recordings four times, behind the second time with b's line through another structure."""
+    """The same recordings four times, behind the second time with b's line through another
+    structure.
+    """
     once = two_sensors(9)
     assert (
         learn_sensors({name: 4 * every for name, every in once.items()}, band_hz=BAND)[0].moved

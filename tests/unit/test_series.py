@@ -28,7 +28,9 @@ TRUTH = np.linspace(2900.0, 3750.0, 12)
 
 
 def machine() -> np.ndarray:
-    """What stays: two structural modes, one of them where the contact passes, over a sloping floor."""
+    """What stays: two structural modes, one of them where the contact passes, over a sloping
+    floor.
+    """
     f = np.maximum(FREQUENCY, 1.0)
     modes = sum(
         height * (f / f0) ** 4 / ((1 - (f / f0) ** 2) ** 2 + (2 * z * f / f0) ** 2) * 4 * z**2
@@ -72,7 +74,9 @@ def test_the_moving_line_is_told_from_standing_modes_as_high():
 
 
 def test_a_further_recording_is_judged_beside_what_others_have_settled():
-    """As if all had been separated together, within the deviations; and what is no line of the contact is none."""
+    """As if all had been separated together, within the deviations; and what is no line of the
+    contact is none.
+    """
     truth = 3300.0 + 300.0 * np.random.default_rng(5).standard_normal(60).clip(-1.3, 1.3)
     spectra = series(truth=truth, seed=5)
     together = series_resonances(spectra, band_hz=BAND)
@@ -177,7 +181,9 @@ def test_lines_beside_what_is_settled_are_those_of_the_whole_fit(fit_of_seven):
 
 
 def test_a_line_heard_through_a_structure_is_held_by_its_interval():
-    """What is passed on more at one frequency than at another draws the line there, alike in all recordings."""
+    """What is passed on more at one frequency than at another draws the line there, alike in all
+    recordings.
+    """
     mode = 1.0 + 0.8 * 0.03j / (1.0 - (FREQUENCY / 3150.0) ** 2 + 0.03j * FREQUENCY / 3150.0)
     pulls = []
     for seed in range(6):
@@ -315,7 +321,9 @@ def through_structures(seed, *, moved):
 
 
 def test_a_moved_sensor_is_told_and_each_part_has_its_own_transfer():
-    """Places twice over: what moves them there is the structure, and only the parts by themselves hold the truth."""
+    """Places twice over: what moves them there is the structure, and only the parts by themselves
+    hold the truth.
+    """
     spectra, truth = through_structures(1, moved=True)
     found, shared, moved = learn_series(spectra, band_hz=BAND)
     assert moved == (12,)
@@ -347,7 +355,9 @@ def test_a_louder_sensor_and_modes_that_drift_have_not_moved():
 
 
 def test_a_base_that_was_nil_below_a_line_comes_back():
-    """The logarithm of nothing has no slope: a fit that began there stayed there, far from the best."""
+    """The logarithm of nothing has no slope: a fit that began there stayed there, far from the
+    best.
+    """
     blocks = separate_series(series(), band_hz=BAND).blocks
     converged = separate(blocks).joint
     below = np.argmin(np.abs(blocks.centre - 3300.0))

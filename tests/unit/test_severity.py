@@ -1,4 +1,6 @@
-"""Velocity and its zones, and envelopes, held against closed forms and the standard's table; and what they raise."""
+"""Velocity and its zones, and envelopes, held against closed forms and the standard's table; and
+what they raise.
+"""
 
 import json
 from pathlib import Path
@@ -29,7 +31,9 @@ def test_velocity_of_a_tone_is_acceleration_over_angular_frequency(hertz, within
 
 
 def test_velocity_of_white_noise_is_the_integral_of_its_band():
-    """∫ S/(2πf)² df from 10 to 1000 Hz = S/(4π²) (1/10 - 1/1000); lines as wide as 1 Hz add 5 % at the lower end."""
+    """∫ S/(2πf)² df from 10 to 1000 Hz = S/(4π²) (1/10 - 1/1000); lines as wide as 1 Hz add 5 % at
+    the lower end.
+    """
     frequency = np.arange(0.0, 5000.0, 0.1)
     exact = np.sqrt(2.0 / (4.0 * np.pi**2) * (1.0 / 10.0 - 1.0 / 1000.0))
     assert velocity_rms(frequency, np.full(frequency.size, 2.0)) == pytest.approx(exact, rel=5e-3)
@@ -61,7 +65,9 @@ def test_zones_are_those_of_the_standard(machine, mm_s, zone):
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 1.0])
 def test_a_modulated_tone_is_as_deep_as_its_closed_form(share):
-    """(1 + m cos)² = 1 + m²/2 + 2m cos + m²/2 cos 2: rms of both lines over the mean; a taper takes 15 % at most."""
+    """(1 + m cos)² = 1 + m²/2 + 2m cos + m²/2 cos 2: rms of both lines over the mean; a taper takes
+    15 % at most.
+    """
     time = np.arange(round(8 * RATE)) / RATE
     wave = (1.0 + share * np.cos(2.0 * np.pi * 87.3 * time)) * np.cos(2.0 * np.pi * 4321.0 * time)
     envelope = Envelope(RATE)
@@ -90,7 +96,9 @@ def test_an_envelope_of_a_short_record_or_of_gaps_says_what_it_can():
 
 
 def recordings(folder, velocities, depths, seconds=2.0, **stated):
-    """A machine that shakes at 50 Hz, of this velocity [m/s], whose bearing rings at 4 kHz every 1/87.3 s, so deep."""
+    """A machine that shakes at 50 Hz, of this velocity [m/s], whose bearing rings at 4 kHz every
+    1/87.3 s, so deep.
+    """
     folder.mkdir()
     time = np.arange(round(seconds * RATE)) / RATE
     for number, (velocity, depth) in enumerate(zip(velocities, depths, strict=True)):
@@ -109,7 +117,10 @@ def recordings(folder, velocities, depths, seconds=2.0, **stated):
             8e-3,
             "D",
             "alarm",
-            "velocity 8 mm/s rms, 10 to 1000 Hz: zone D of ISO 20816-3 (large-rigid), severe enough",
+            (
+                "velocity 8 mm/s rms, 10 to 1000 Hz: zone D of ISO 20816-3 (large-rigid), severe"
+                " enough"
+            ),
         ),
         (6e-3, "C", "cannot-tell", "Cannot tell: no contact"),
         (3e-3, "B", "cannot-tell", "Cannot tell: no contact"),

@@ -1,4 +1,6 @@
-"""Which of oil and asperities bears a cell, its film, and how far it may step: loops against slow twins."""
+"""Which of oil and asperities bears a cell, its film, and how far it may step: loops against slow
+twins.
+"""
 
 import numpy as np
 import pytest
@@ -18,7 +20,9 @@ def rng():
 
 @pytest.fixture
 def cells(rng):
-    """Gaps around the contact film, some of them just on it; pressures from nothing to beyond the cap."""
+    """Gaps around the contact film, some of them just on it; pressures from nothing to beyond the
+    cap.
+    """
     oil, total = rng.uniform(0.0, 1.0, (2, *CELLS))
     gap = rng.uniform(-0.6, 0.5, CELLS)
     gap[rng.random(CELLS) < 0.3] = 0.1

@@ -35,7 +35,9 @@ def test_a_course_that_is_no_knee_has_no_distance():
 
 
 def test_in_scatter_of_its_own_a_course_is_told_by_what_dense_covariances_say():
-    """Slow twin: information (Kullback and Leibler) of one Gaussian against another, and no scatter that is nearer."""
+    """Slow twin: information (Kullback and Leibler) of one Gaussian against another, and no scatter
+    that is nearer.
+    """
     near = nearest(18, 6, 30.0, 0.0, courses)
     own = np.eye(25)
     other = near.size**2 * scipy.linalg.toeplitz(near.memory ** np.arange(25))
@@ -64,7 +66,9 @@ def test_a_season_hides_a_knee():
 
 
 def test_the_alarms_own_test_finds_no_more_than_the_bound():
-    """Knees at the 18th recording to 30 Hz, with the share of drawn ones whose ratio is beyond all but 2 % of lines."""
+    """Knees at the 18th recording to 30 Hz, with the share of drawn ones whose ratio is beyond all
+    but 2 % of lines.
+    """
     rng, x = np.random.default_rng(5), np.arange(24.0)
     line = RISE_HZ / 18.0 * x
     bent = np.where(x < 18.0, line, RISE_HZ + AFTER * RISE_HZ / 18.0 * (x - 18.0))

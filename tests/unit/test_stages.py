@@ -19,7 +19,9 @@ X = np.repeat(SQ, 5)
 
 
 def knee(x):
-    """The rig's ends, 2921.93 Hz at 0.54 um and 3811.88 Hz at 3.49 um, by way of 3640 Hz at 1.8 um."""
+    """The rig's ends, 2921.93 Hz at 0.54 um and 3811.88 Hz at 3.49 um, by way of 3640 Hz at
+    1.8 um.
+    """
     return np.interp(x, [0.54, 1.8, 3.49], [2921.93, 3640.0, 3811.88])
 
 

@@ -64,7 +64,9 @@ def test_its_break_is_where_it_was_put_and_the_interval_covers():
 
 
 def test_deviations_of_a_ratio_count_by_its_size():
-    """Ratios near 0.04 that are off by half, and known to be: by their size, not by 0.02 of a logarithm."""
+    """Ratios near 0.04 that are off by half, and known to be: by their size, not by 0.02 of a
+    logarithm.
+    """
     ratio, std = narrowing(SQ), 0.01 * narrowing(SQ)
     ratio[:2] *= 0.5
     std[:2] = 0.6 * ratio[:2]
@@ -156,7 +158,9 @@ def test_indicators_that_contradict_each_other_have_no_stage():
 
 
 def test_a_damping_that_holds_contradicts_nothing():
-    """A break in the damping alone may be the likeliest break of a CRF that goes straight: it is none for that."""
+    """A break in the damping alone may be the likeliest break of a CRF that goes straight: it is
+    none for that.
+    """
 
     def straight(x):
         return np.interp(x, [0.54, 3.49], [2900.0, 3750.0])
@@ -197,7 +201,8 @@ def test_what_cannot_be_meant_is_refused(changes, named):
         split_stages(SQ, rising(SQ), **changes)
 
 
-# Whether a line's width is its damping at all -------------------------------------------------------------------------
+# Whether a line's width is its damping at all
+# -------------------------------------------------------------------------
 
 
 def fitted(ratio, std, *, found=True):
@@ -236,7 +241,9 @@ def test_a_width_that_is_no_damping_is_told(resonance, said):
 
 
 def test_the_narrowest_line_allowed_is_seen_too_wide_by_what_is_stated():
-    """A line four resolutions wide behind a Hann window of that resolution (1.5 lines): its half-power width."""
+    """A line four resolutions wide behind a Hann window of that resolution (1.5 lines): its
+    half-power width.
+    """
     per_line, width = 400, 6.0  # grid points a spectral line; width in lines
     lines = np.arange(-40 * per_line, 40 * per_line + 1) / per_line
     f0, zeta = 3000.0, width / 2.0 / 3000.0

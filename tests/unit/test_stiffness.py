@@ -63,8 +63,9 @@ def test_a_smooth_dry_point_contact_has_hertzs_stiffness(radius):
 def test_a_row_of_point_contacts_has_hertzs_stiffness(load):
     """A sphere a period L, as roughness on a line contact: the paper's Eq 3 within 2 %.
 
-    The row's other spheres and the line's own reference add F (2/L) (γ + ln(d/2L)) / πE* to each one's approach, which
-    is nothing from d = 2L e^-γ: the limit of Σ 1/|r - nL| against the line potential -(2/L) ln r.
+    The row's other spheres and the line's own reference add F (2/L) (γ + ln(d/2L)) / πE* to each
+    one's approach, which is nothing from d = 2L e^-γ: the limit of Σ 1/|r - nL| against the line
+    potential -(2/L) ln r.
     """
     radius, modulus = STEEL.radius_along_rolling, STEEL.pair.reduced_modulus
     a = point_contact(load, radius, modulus).half_widths[0]
@@ -129,7 +130,8 @@ def test_a_contact_vibrates_on_its_own_stiffness_and_its_own_surface(mixed):
         patch="line",
         rate_hz=200e3,
         duration_s=1.0,
-        method="peak",  # the fitted line takes the base for white in acceleration, which this surface's is not
+        # the fitted line takes the base for white in acceleration, which this surface's is not
+        method="peak",
     )
     heard = contact_vibration(contact_state(mixed), mixed.conditions, model, solution=mixed)
     expected = np.sqrt(tangent_stiffness(mixed).total / 0.1) / (2.0 * np.pi)

@@ -50,7 +50,9 @@ def test_equal_pressure_from_all_sides_has_no_equivalent_stress():
 
 
 def images_summed(cells, spacing, depth, loaded, images=60):
-    """Stresses of unit pressure and unit traction on one cell each of a grid that repeats in y, image by image."""
+    """Stresses of unit pressure and unit traction on one cell each of a grid that repeats in y,
+    image by image.
+    """
     nx, ny = cells
     kernels = _rectangles((nx, (images + 1) * ny), spacing, depth, 0.3)
     total = np.zeros((6, nx, ny))
@@ -71,7 +73,9 @@ def images_summed(cells, spacing, depth, loaded, images=60):
 )
 @pytest.mark.parametrize("depth", [0.0, 0.3, 1.5, 3.0, 12.0])
 def test_waves_and_strips_meet_closed_forms_of_rectangles_and_their_images(cells, size, depth):
-    """Two derivations: the half-space's answer to waves, and Love's corners. Depths in cells along x."""
+    """Two derivations: the half-space's answer to waves, and Love's corners. Depths in cells along
+    x.
+    """
     spacing = (size[0] / cells[0], size[1] / cells[1])
     loaded = ((3, 5), (8, 2))
     pressure, shear = np.zeros(cells), np.zeros(cells)
@@ -110,7 +114,9 @@ def test_surface_stresses_equal_the_applied_tractions(repeats):
 
 @pytest.mark.parametrize("repeats", [True, False])
 def test_every_plane_below_carries_the_load(repeats):
-    """The force through a plane is that on the surface; the plane's own width leaves a little of it out."""
+    """The force through a plane is that on the surface; the plane's own width leaves a little of it
+    out.
+    """
     generator = np.random.default_rng(6)
     grid = Grid((96, 96), (-1.5, -1.5), (1.5, 1.5), (False, repeats))
     loaded = (np.abs(grid.x) < 0.2)[:, None] & (np.abs(grid.y) < 0.2)
@@ -121,7 +127,9 @@ def test_every_plane_below_carries_the_load(repeats):
 
 
 def test_material_is_in_equilibrium():
-    """div sigma = 0 by central differences, all six components, between a rough pressure's cells."""
+    """div sigma = 0 by central differences, all six components, between a rough pressure's
+    cells.
+    """
     generator = np.random.default_rng(7)
     grid = Grid((48, 32), (0.0, 0.0), (1.5, 1.0))
     stress = stress_below(
@@ -203,7 +211,9 @@ def test_maps_and_section_are_of_the_same_stresses():
     ],
 )
 def test_stress_below_hertz_contacts_of_all_geometries(geometry, radius, length, value, depth):
-    """Johnson, section 4.2 and table 4.1: a slim ellipse (axis ratio 0.08) is nearly a line, depth in short axes."""
+    """Johnson, section 4.2 and table 4.1: a slim ellipse (axis ratio 0.08) is nearly a line, depth
+    in short axes.
+    """
     pair = ElasticPair((2e11, 2e11), (0.3, 0.3))
     bodies = ContactConditions(
         pair=pair,
@@ -277,7 +287,9 @@ def test_the_second_body_feels_the_opposite_traction_and_has_its_own_poisson_rat
 
 
 def test_the_largest_shear_of_single_precision_keeps_its_digits():
-    """Below the middle of a ball two principal stresses are equal: on Hertz's axis, K. L. Johnson (1985), eq. 3.45."""
+    """Below the middle of a ball two principal stresses are equal: on Hertz's axis, K. L. Johnson
+    (1985), eq. 3.45.
+    """
     depth, nu = np.linspace(0.05, 2.0, 200), 0.3
     inside = 1.0 - depth * np.arctan(1.0 / depth)
     across, down = -(1.0 + nu) * inside + 0.5 / (1.0 + depth**2), -1.0 / (1.0 + depth**2)

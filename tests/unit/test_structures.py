@@ -1,4 +1,6 @@
-"""What a structure between contact and sensor does to a line: deviations that carry it, lines that it alone makes."""
+"""What a structure between contact and sensor does to a line: deviations that carry it, lines that
+it alone makes.
+"""
 
 import numpy as np
 import pytest
@@ -32,7 +34,9 @@ def without(monkeypatch):
 
 
 def test_intervals_hold_what_splines_do_not_follow(without):
-    """Modes as loud as the direct way, one of them narrower than the splines; 60 recordings of 300 s."""
+    """Modes as loud as the direct way, one of them narrower than the splines; 60 recordings of 300
+    s.
+    """
     rig = transferred(drawn(6.0, 3102), 1.0, 102)
     share, _ = held(rig)
     without()
@@ -50,7 +54,9 @@ def test_intervals_are_no_wider_where_no_structure_is_heard(without):
 
 
 def test_a_housing_that_impulses_ring_is_no_contact():
-    """Snapshots of a second of an outer race that fails: healthy and failing spectra differ in shape, nothing moves."""
+    """Snapshots of a second of an outer race that fails: healthy and failing spectra differ in
+    shape, nothing moves.
+    """
     for seed in (0, 1):
         assert failures.outcome("outer race", seed, 1.0, 20_000.0).claims == 0
 

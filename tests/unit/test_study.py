@@ -1,4 +1,6 @@
-"""A study on disk and in memory: nothing lost, nothing twice, the same however it is spread; small dry contacts."""
+"""A study on disk and in memory: nothing lost, nothing twice, the same however it is spread; small
+dry contacts.
+"""
 
 import json
 import os
@@ -105,7 +107,9 @@ def test_a_row_is_what_solving_the_case_gives(plan, unbroken):
 
 
 def test_a_study_that_shakes_has_the_contacts_own_stiffness_and_damping(case):
-    """A dry contact of rough bodies: elastic where it yielded, it is stiffer than flowing, and nothing damps it."""
+    """A dry contact of rough bodies: elastic where it yielded, it is stiffer than flowing, and
+    nothing damps it.
+    """
     shaken = case.with_overrides({"study": {"sq": ["2 um"], "kind": "shake"}})
     row = run_study(plan_study(shaken)).table.iloc[0]
     chosen = {"surface.sq": "2 um", "surface.seed": int(row["surface.seed"])}
@@ -430,7 +434,8 @@ def test_a_script_that_workers_cannot_import_is_told_so_and_no_case_is_blamed(ca
     script = tmp_path / "script.py"
     script.write_text(
         "import asperity as asp\n"
-        "asp.run_study(asp.study.plan_study(asp.load_case('case.toml')), out='out', workers=1)\n"  # and no __main__
+        # and no __main__
+        "asp.run_study(asp.study.plan_study(asp.load_case('case.toml')), out='out', workers=1)\n"
     )
     ran = subprocess.run(
         [sys.executable, script], cwd=tmp_path, capture_output=True, text=True, timeout=100

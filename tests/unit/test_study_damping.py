@@ -1,4 +1,6 @@
-"""A study that shakes its contacts: damping and stiffness over Sq, and how well each tells the load share."""
+"""A study that shakes its contacts: damping and stiffness over Sq, and how well each tells the load
+share.
+"""
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ from asperity.study import StudyOverview, curve_from_study
 
 
 def shaken(*, seeds=5):
-    """Damping that falls with the load share, a stiffness that has nothing to do with it; one surface has neither."""
+    """Damping that falls with the load share, a stiffness that has nothing to do with it; one
+    surface has neither.
+    """
     result = with_knee(seeds=seeds)
     table, random = result.table, np.random.default_rng(3)
     table["contact_damping_ratio"] = 0.03 * (

@@ -1,4 +1,6 @@
-"""The page of a study and its figures: the numbers of the table, the printed ones beside them, failures loud."""
+"""The page of a study and its figures: the numbers of the table, the printed ones beside them,
+failures loud.
+"""
 
 import io
 import json
@@ -167,7 +169,8 @@ def points_of(axes, label):
     return found[0].get_xydata()
 
 
-# The page ------------------------------------------------------------------------------------------------------------
+# The page
+# -------------------------------------------------------------------------------------------------
 
 
 def test_page_loads_nothing(page):
@@ -281,7 +284,8 @@ def test_unfinished_study_says_so():
     assert overview.notes == ["15 of 75 cases have not been computed yet: run the study again."]
 
 
-# The paper's figures -------------------------------------------------------------------------------------------------
+# The paper's figures
+# -------------------------------------------------------------------------------------------------
 
 
 def test_shares_over_sq_with_the_printed_car(wear):
@@ -419,7 +423,8 @@ def test_anchors_of_ones_own_replace_the_papers(wear):
     assert [row["name"] for row in anchor_rows(overview)] == ["CLR of my rig"]
 
 
-# Any other study -----------------------------------------------------------------------------------------------------
+# Any other study
+# -------------------------------------------------------------------------------------------------
 
 
 def over_two():
@@ -520,7 +525,8 @@ def test_names_are_places_on_an_axis():
     assert axis.values.tolist() == [0.0, 1.0]
 
 
-# On disk and from the command line -----------------------------------------------------------------------------------
+# On disk and from the command line
+# -----------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

@@ -146,7 +146,8 @@ def test_what_cannot_be_meant_is_refused(paper, surface, message):
         paper.with_overrides({"surface": surface}).surface()
 
 
-# Two bodies ----------------------------------------------------------------------------------------------------------
+# Two bodies
+# -------------------------------------------------------------------------------------------------
 
 GROUND = {
     "kind": "ground",

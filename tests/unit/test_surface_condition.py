@@ -71,7 +71,9 @@ def test_a_polynomial_takes_its_degree_and_no_higher(form, degree):
 )
 @pytest.mark.parametrize("axis", [0, 1])
 def test_the_filters_pass_what_iso_16610_says(wavelength, passed, axis):
-    """Transmission exp(-ln 2 (cut-off/wavelength)^2) of the Gaussian, and the rest of 1 for the L-filter."""
+    """Transmission exp(-ln 2 (cut-off/wavelength)^2) of the Gaussian, and the rest of 1 for the
+    L-filter.
+    """
     z = wave((600, 600), wavelength, axis)
     short, _ = condition_surface(measured(z), SurfaceConditioning(form="none", s_filter=20e-6))
     long, _ = condition_surface(measured(z), SurfaceConditioning(form="none", l_filter=20e-6))

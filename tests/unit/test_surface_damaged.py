@@ -14,7 +14,9 @@ UNITS = {"xyz": ("um", "um"), "csv": ("um", "mm"), "txt": ("um", "mm"), "npy": (
 
 
 def originals(folder):
-    """A small file of each format that can be written here, and the developers' own where they are at hand."""
+    """A small file of each format that can be written here, and the developers' own where they are
+    at hand.
+    """
     import sdfio
     import x3pio
 
@@ -88,7 +90,9 @@ def test_300_damaged_files_leave_no_traceback(tmp_path, capfd):
 
 
 def outcome(path):
-    """Sq of what was read, or the sentence that refuses it; anything else is the traceback not to be seen."""
+    """Sq of what was read, or the sentence that refuses it; anything else is the traceback not to
+    be seen.
+    """
     unit, lateral = UNITS.get(path.suffix[1:], (None, None))
     pixel = 1e-6 if path.name in ("a.npy", "a.txt") else None
     try:

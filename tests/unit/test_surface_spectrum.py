@@ -14,7 +14,9 @@ BOTH = (True, True)
 
 
 def test_the_density_integrates_to_sq_squared():
-    """Sq^2 = (1/4 pi^2) integral of C d2q; an isotropic C over rings gives it but for what lies in the corners."""
+    """Sq^2 = (1/4 pi^2) integral of C d2q; an isotropic C over rings gives it but for what lies in
+    the corners.
+    """
     on = Grid((256, 256), (0.0, 0.0), (256e-6, 256e-6), BOTH)
     surface = gaussian_surface(on, sq=1.3e-6, correlation_length=8e-6, rng=np.random.default_rng(1))
     spectrum = surface_spectrum(surface)

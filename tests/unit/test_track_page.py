@@ -1,4 +1,6 @@
-"""What a track's page says to who must act: what changed, since when, how sure, what next; never that it is certain."""
+"""What a track's page says to who must act: what changed, since when, how sure, what next; never
+that it is certain.
+"""
 
 import re
 from dataclasses import replace

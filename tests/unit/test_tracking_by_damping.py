@@ -1,4 +1,6 @@
-"""A series whose line narrows and keeps its frequency: what `track` reads from CRF, from damping and from both."""
+"""A series whose line narrows and keeps its frequency: what `track` reads from CRF, from damping
+and from both.
+"""
 
 import json
 import re

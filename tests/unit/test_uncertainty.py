@@ -1,4 +1,6 @@
-"""How far a contact's numbers may be off: what the parts are, how they add up, and what surfaces of one kind make."""
+"""How far a contact's numbers may be off: what the parts are, how they add up, and what surfaces of
+one kind make.
+"""
 
 import re
 from dataclasses import replace
@@ -75,7 +77,9 @@ def test_nine_in_ten_further_surfaces_lie_within_the_interval_of_a_few(count):
 
 @pytest.mark.parametrize(("centre", "scatter"), [(0.0, 0.4), (2.5, 0.8), (-4.0, 1.0), (5.0, 2.0)])
 def test_intervals_of_shares_cover_and_stay_within_0_and_1(centre, scatter):
-    """Of shares whose logarithm of odds scatters normally, from a twentieth to nearly all of the load."""
+    """Of shares whose logarithm of odds scatters normally, from a twentieth to nearly all of the
+    load.
+    """
     rng = np.random.default_rng(2)
     held = 0
     for *few, further in 1.0 / (1.0 + np.exp(-rng.normal(centre, scatter, (10_000, 6)))):
@@ -96,7 +100,9 @@ def test_surfaces_that_agree_do_not_scatter(share):
 
 
 def test_the_error_of_a_resonance_follows_from_its_load_share(run):
-    """CRF goes with CLR^(1/6): of 2466.0 Hz, 1.4 were said to be in doubt where CLR 7 ± 2.4 % alone is worth 136."""
+    """CRF goes with CLR^(1/6): of 2466.0 Hz, 1.4 were said to be in doubt where CLR 7 ± 2.4 % alone
+    is worth 136.
+    """
     clr, crf = run.error.clr, run.error.crf_hz
     assert clr.surfaces is crf.surfaces is None
     f0 = run.vibration.oscillator.natural_frequency_hz

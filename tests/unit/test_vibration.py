@@ -30,7 +30,9 @@ def test_frequency_and_damping_are_those_worked_out_by_hand():
 @pytest.mark.parametrize("damping_ratio", [0.005, 0.02, 0.3])
 @pytest.mark.parametrize("rate", [20e3, 50e3, 400e3])
 def test_response_to_kinks_is_the_closed_form(damping_ratio, rate):
-    """After a change of slope d at rest, r = d e^(-zeta w t) sin(w_d t)/w_d and m y'' = S r + C r'."""
+    """After a change of slope d at rest, r = d e^(-zeta w t) sin(w_d t)/w_d and m y'' = S r +
+    C r'.
+    """
     oscillator = ContactOscillator(mass=0.1, stiffness=4.3765e7, damping_ratio=damping_ratio)
     omega = np.sqrt(oscillator.stiffness / oscillator.mass)
     damped = omega * np.sqrt(1 - damping_ratio**2)
@@ -58,7 +60,9 @@ def test_a_constant_slope_excites_no_vibration():
 
 @pytest.mark.parametrize("frequency", [400.0, 3000.0, 3329.5, 5000.0])
 def test_response_to_a_sine_is_the_closed_form_of_its_straight_lines(frequency):
-    """A sampled sine joined by lines is sum_k sinc^2(f_k/rate) e^(i 2 pi f_k t), f_k = f + k rate."""
+    """A sampled sine joined by lines is sum_k sinc^2(f_k/rate) e^(i 2 pi f_k t), f_k = f + k
+    rate.
+    """
     rate, samples = 50e3, 40_000
     time = np.arange(samples) / rate
     response = acceleration(
@@ -226,7 +230,9 @@ def test_a_small_nonlinear_motion_is_the_linear_one():
 
 
 def test_undamped_hertz_keeps_its_energy_over_1000_periods():
-    """After a step of the profile: m v^2/2 + (2/5) K c^2.5 - F c, twice as high as the load presses, to 1e-6."""
+    """After a step of the profile: m v^2/2 + (2/5) K c^2.5 - F c, twice as high as the load
+    presses, to 1e-6.
+    """
     free = ContactOscillator(mass=0.1, stiffness=4.3765e7, damping_ratio=1e-13, load=200.0)
     rate = 100e3
     samples = round(1000 * rate / free.natural_frequency_hz) + 100
@@ -257,10 +263,12 @@ def test_a_mass_in_the_air_falls_under_the_load_alone():
 
 @pytest.mark.parametrize(("force", "shift"), [(0.22, -0.004), (0.45, -0.015), (0.89, -0.057)])
 def test_nonlinear_resonance_is_lower(force, shift):
-    """-0.4, -1.5 and -5.7 % at 0.22, 0.45 and 0.89 F rms, each within a third: physics.md section 4, another's code.
+    """-0.4, -1.5 and -5.7 % at 0.22, 0.45 and 0.89 F rms, each within a third: physics.md section
+    4, another's code.
 
-    Highest point of the spectrum's 40 Hz running mean, over white base acceleration whose linear response has that rms.
-    A symmetric line fitted to the lopsided peak would say -9.5 % in place of -5.7 %.
+    Highest point of the spectrum's 40 Hz running mean, over white base acceleration whose linear
+    response has that rms. A symmetric line fitted to the lopsided peak would say -9.5 % in place
+    of -5.7 %.
     """
     from scipy.ndimage import uniform_filter1d
 
@@ -274,7 +282,9 @@ def test_nonlinear_resonance_is_lower(force, shift):
 
 
 def test_gain_of_the_sampled_response_is_that_of_its_straight_lines():
-    """Sum over the aliases of a sampled sine, sinc^2 in height each, as in the test of a sine above."""
+    """Sum over the aliases of a sampled sine, sinc^2 in height each, as in the test of a sine
+    above.
+    """
     rate = 10e3
     frequency = np.array([300.0, 2000.0, 3329.5, 4500.0])
     aliases = frequency[:, None] + rate * np.arange(-20_000, 20_001)
@@ -290,7 +300,9 @@ def test_gain_of_the_sampled_response_is_that_of_its_straight_lines():
 
 @pytest.mark.parametrize(("rate", "filter_name"), [(10e3, "bilinear"), (50e3, "continuous")])
 def test_welch_of_a_long_record_is_the_closed_form_in_level_and_shape(rate, filter_name):
-    """2 million samples; the ratio has mean 1, the scatter of its averages, no slope or bump around the resonance."""
+    """2 million samples; the ratio has mean 1, the scatter of its averages, no slope or bump around
+    the resonance.
+    """
     from asperity.vibration import FilteredNoise
 
     noise = FilteredNoise(height=2e-6, cutoff_hz=30.0, filter=filter_name)

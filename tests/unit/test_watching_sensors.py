@@ -1,4 +1,6 @@
-"""Several sensors of one machine, watched: judged as one as they arrive, each kept by its own name."""
+"""Several sensors of one machine, watched: judged as one as they arrive, each kept by its own
+name.
+"""
 
 import json
 import shutil
@@ -30,7 +32,9 @@ START = datetime(2025, 3, 1, 12, tzinfo=UTC)
 
 @pytest.fixture(scope="module")
 def machine(tmp_path_factory):
-    """Files with the channels a and b, and the same as a file each, beside which stands who heard it, and when."""
+    """Files with the channels a and b, and the same as a file each, beside which stands who heard
+    it, and when.
+    """
     folder = tmp_path_factory.mktemp("machine")
     rng = np.random.default_rng(8)
     for name in ("whole", "apart"):
@@ -83,7 +87,10 @@ def crf(track):
     return [one.resonance.crf_hz for one in track.recordings]
 
 
-PER_SENSOR = "SELECT sensor.name, count(*) FROM recording JOIN sensor ON sensor.id = recording.sensor GROUP BY 1"
+PER_SENSOR = (
+    "SELECT sensor.name, count(*) FROM recording JOIN sensor ON sensor.id = recording.sensor GROUP"
+    " BY 1"
+)
 
 
 def test_channels_are_judged_as_track_judges_them_and_kept_by_their_names(machine, tmp_path):

@@ -27,7 +27,9 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def made(sq_um, seeds, **columns):
-    """A curve of so many seeds at each level; a column is a function of Sq in um and of a seed's number."""
+    """A curve of so many seeds at each level; a column is a function of Sq in um and of a seed's
+    number.
+    """
     at, seed = (grid.ravel() for grid in np.meshgrid(sq_um, np.arange(seeds), indexing="ij"))
     table = pandas.DataFrame({"surface.sq": 1e-6 * at, "status": "done", "clr": 0.5})
     for name, law in columns.items():
@@ -183,7 +185,10 @@ def test_a_study_of_something_else_has_no_wear_curve():
 
 def test_anchors_of_ones_own_are_read_and_mistakes_named(tmp_path):
     file = tmp_path / "anchors.toml"
-    own = '[[anchor]]\nname = "ours"\nquantity = "clr"\nsq = "0.6 um"\nvalue = 0.2\ntolerance = 0.05\n'
+    own = (
+        '[[anchor]]\nname = "ours"\nquantity = "clr"\nsq = "0.6 um"\nvalue = 0.2\ntolerance ='
+        " 0.05\n"
+    )
     file.write_text(own)
     assert load_anchors(file) == (
         Anchor(name="ours", quantity="clr", sq=0.6e-6, value=0.2, tolerance=0.05),

@@ -1,4 +1,6 @@
-"""One k from a test: made-up scars whose k is known, what the profile cannot tell, and the public test."""
+"""One k from a test: made-up scars whose k is known, what the profile cannot tell, and the public
+test.
+"""
 
 from pathlib import Path
 
@@ -76,7 +78,9 @@ def test_nine_intervals_of_ten_hold_the_k_of_a_noisy_groove(tmp_path):
 
 
 def test_noise_is_not_taken_for_wear(tmp_path):
-    """Rectified roughness adds to both areas; what the same measurement finds elsewhere is taken off."""
+    """Rectified roughness adds to both areas; what the same measurement finds elsewhere is taken
+    off.
+    """
     scars = [find_scar(scar(tmp_path, noise=0.12e-6, seed=seed)) for seed in range(8)]
     assert np.mean([one.missing for one in scars]) == pytest.approx(AREA, rel=0.03, abs=0.0)
     assert np.mean([one.piled for one in scars]) < 0.03 * AREA

@@ -58,7 +58,8 @@ def test_a_cold_film_has_no_defects_and_a_hot_one_nothing_else():
     assert law.defects(np.array([1e6]), speed)[0] == pytest.approx(1.0, abs=1e-12)
     warm = np.linspace(300.0, 700.0, 9)
     assert np.all(np.diff(law.defects(warm, speed)) > 0.0)
-    # a temperature at which the exponent is known: E/(R T) = ln(crossing), so that half the sites ... 1 - 1/e are bare
+    # a temperature at which the exponent is known: E/(R T) = ln(crossing), so that half the sites
+    # ... 1 - 1/e are bare
     at = 5e4 / (8.31446261815324 * math.log(200.0))
     assert law.defects(np.array([at]), speed)[0] == pytest.approx(
         1.0 - math.exp(-1.0), rel=1e-12, abs=0.0

@@ -1,9 +1,11 @@
-"""The grid that a contact is given: films within 1 % on it; and grids given by hand judged as their errors are.
+"""The grid that a contact is given: films within 1 % on it; and grids given by hand judged as their
+errors are.
 
-The films are those of an own one-dimensional solver on non-uniform nodes (E' 219.78 GPa, R 5.4 mm, eta0 0.04 Pa s,
-alpha 22 1/GPa, Dowson and Higginson's density; -4.5..1.9 a, of M 5 -10..3), and the errors those of the unified model
-on uniform grids of that domain, before grids were chosen. One least film is not as it was given, 3.54: the twin in
-`support.line` comes to 3.456, 3.481 and 3.487 on 801, 1601 and 2401 nodes, and the package to 3.495 on 4096 cells.
+The films are those of an own one-dimensional solver on non-uniform nodes (E' 219.78 GPa, R 5.4 mm,
+eta0 0.04 Pa s, alpha 22 1/GPa, Dowson and Higginson's density; -4.5..1.9 a, of M 5 -10..3), and
+the errors those of the unified model on uniform grids of that domain, before grids were chosen.
+One least film is not as it was given, 3.54: the twin in `support.line` comes to 3.456, 3.481 and
+3.487 on 801, 1601 and 2401 nodes, and the package to 3.495 on 4096 cells.
 """
 
 from pathlib import Path
@@ -186,7 +188,9 @@ def test_the_verdict_says_that_the_grid_is_too_coarse():
 
 
 def test_a_chosen_grid_of_few_cells_still_has_a_coarser_one_that_tells_its_error():
-    """Long waves in a dry contact ask for few cells; CLR was called determined without an interval there."""
+    """Long waves in a dry contact ask for few cells; CLR was called determined without an interval
+    there.
+    """
     case = load_case(SOFT).with_overrides({"lubricant": "none", "grid": {"accuracy": 0.05}})
     run = solve_case(case)
     assert case.grid.cells == (96, 64)
@@ -233,7 +237,9 @@ def test_roughness_moves_the_edges_and_the_cells():
 
 
 def test_a_contact_has_its_asperities_inside_the_chosen_grid():
-    """The paper's contact at Sq 1.5 um touches out to the outlet of the printed domain, and not of this one."""
+    """The paper's contact at Sq 1.5 um touches out to the outlet of the printed domain, and not of
+    this one.
+    """
     case = load_case(BEARING).with_overrides(
         {"contact": {"geometry": "line", "radius": "5.4 mm", "length": "10 mm", "load": "500 N"}}
         | {

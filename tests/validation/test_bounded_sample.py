@@ -1,4 +1,5 @@
-"""Some of the benchmark's ellipses and rollers, rough and lubricated: solved, carrying their load, and none tilted the
+"""Some of the benchmark's ellipses and rollers, rough and lubricated: solved, carrying their load,
+and none tilted the
 wrong way. `python -m benchmarks bounded` has all three hundred.
 """
 

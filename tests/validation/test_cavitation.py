@@ -1,7 +1,9 @@
-"""Oil that ruptures and forms again between rigid walls, against closed forms and quadratures of the same problem.
+"""Oil that ruptures and forms again between rigid walls, against closed forms and quadratures of
+the same problem.
 
-Two published-style cases (B1, a parabolic slider; B3, a slider with a pocket) and three of our own: a journal bearing
-by Sommerfeld's substitution, a wavy slider and a starved one by quadrature. p = 0 is the cavitation pressure.
+Two published-style cases (B1, a parabolic slider; B3, a slider with a pocket) and three of our
+own: a journal bearing by Sommerfeld's substitution, a wavy slider and a starved one by quadrature.
+p = 0 is the cavitation pressure.
 """
 
 import numpy as np
@@ -22,7 +24,9 @@ def parabola(x):
 
 
 def wave(x):
-    """Three waves between walls that part a little, so that every one has a cavity and none is like another."""
+    """Three waves between walls that part a little, so that every one has a cavity and none is like
+    another.
+    """
     return LEAST * (1.2 + 0.4 * np.cos(6.0 * np.pi * x / LENGTH) + 0.1 * x / LENGTH)
 
 
@@ -90,7 +94,8 @@ def test_slider_with_a_pocket_b3(cells):
 def test_long_journal_bearing_with_a_groove_at_the_widest_gap(eccentricity):
     """Closed form by Sommerfeld's substitution, 1 + e cos(phi) = (1 - e^2)/(1 - e cos(gamma)).
 
-    Source: the integrals of dphi/h^2 and dphi/h^3 as in Pinkus and Sternlicht (1961); rupture where dp/dx = p = 0.
+    Source: the integrals of dphi/h^2 and dphi/h^3 as in Pinkus and Sternlicht (1961); rupture
+    where dp/dx = p = 0.
     """
     e = eccentricity
 
@@ -189,7 +194,9 @@ def test_oil_that_is_offered_and_does_not_pass_flows_back():
 
 
 def test_barus_oil_is_a_transformed_plain_one():
-    """With eta0 exp(alpha p) the reduced pressure (1 - exp(-alpha p))/alpha obeys the equation of a plain oil."""
+    """With eta0 exp(alpha p) the reduced pressure (1 - exp(-alpha p))/alpha obeys the equation of a
+    plain oil.
+    """
     alpha = 0.9 / slider(parabola, 400, viscosity=VISCOSITY).pressure.max()
     errors = []
     for cells in (400, 800):
@@ -228,7 +235,9 @@ def test_a_field_that_does_not_vary_across_is_a_line():
 
 
 def test_short_journal_bearing_is_ocvirks():
-    """p = -6 eta u (b^2/4 - y^2) h'/h^3 where the gap narrows, and rupture where it is least. Source: Ocvirk (1952)."""
+    """p = -6 eta u (b^2/4 - y^2) h'/h^3 where the gap narrows, and rupture where it is least.
+    Source: Ocvirk (1952).
+    """
     e, r, c, width, cells = 0.6, 25e-3, 30e-6, 2e-3, (200, 24)
     angle = (np.arange(cells[0]) + 0.5) * 2.0 * np.pi / cells[0]
     y = (np.arange(cells[1]) + 0.5) * width / cells[1] - width / 2.0

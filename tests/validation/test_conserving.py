@@ -1,4 +1,6 @@
-"""The contact that loses no oil: what must hold whatever the surface, checked from the solution's fields alone."""
+"""The contact that loses no oil: what must hold whatever the surface, checked from the solution's
+fields alone.
+"""
 
 from dataclasses import replace
 from itertools import islice, pairwise
@@ -51,7 +53,9 @@ def mobility_of(rho, h, p):
 
 
 def flows(solution, speed=1.91):
-    """Oil through each section along x [m^2/s per width, at ambient density], from pressure, content and gap alone."""
+    """Oil through each section along x [m^2/s per width, at ambient density], from pressure,
+    content and gap alone.
+    """
     oil, h, u = solution.oil, solution.gap, speed
     dx, dy = solution.grid.spacing
     p = oil.pressure
@@ -73,7 +77,9 @@ def test_no_oil_is_lost_on_the_way(some):
 
 @pytest.mark.parametrize("kind", ["point", "elliptic"])
 def test_no_oil_is_lost_in_bounded_contacts_standing_or_moving(kind):
-    """Of every cell inside, from the fields alone; the lines at both sides are at ambient pressure."""
+    """Of every cell inside, from the fields alone; the lines at both sides are at ambient
+    pressure.
+    """
     radius = 12.5e-3 if kind == "point" else (8e-3, 20e-3)
     conditions = contact(
         geometry=kind, radius=radius, load=40.0, length=None, speed=0.1, hardness=CAP
@@ -103,7 +109,9 @@ def test_the_unified_model_loses_some(flattened):
 
 
 def test_every_alternative_is_decided(some):
-    """Full or ruptured, apart or touching, below the cap or at it; the cap bounds oil and contact together."""
+    """Full or ruptured, apart or touching, below the cap or at it; the cap bounds oil and contact
+    together.
+    """
     p, oil, cap = some.pressure, some.oil, some.p_cap
     assert p.min() >= 0.0
     assert p.max() <= cap * (1.0 + 1e-12)
@@ -318,7 +326,9 @@ def oil_carried(solution):
 
 
 def test_every_step_balances_its_oil():
-    """What the domain holds more than before came in with the surfaces, less what left at both ends."""
+    """What the domain holds more than before came in with the surfaces, less what left at both
+    ends.
+    """
     x0, (dx, _) = ON.lower[0] + ON.spacing[0] / 2.0, ON.spacing
     before = None
     for snapshot in islice(moving(rough(ON, 1.5e-6, correlation_length=40e-6)), 6):
@@ -392,7 +402,9 @@ def test_motion_from_rest_draws_oil_in_step_by_step():
     ids=["one", "two", "none"],
 )
 def test_a_step_begins_where_roughness_has_carried_its_contacts(speeds, first):
-    """Cells a step: from the cell before, or of a body that slides from another one, it takes twice as many steps."""
+    """Cells a step: from the cell before, or of a body that slides from another one, it takes twice
+    as many steps.
+    """
     rolling = contact(hardness=CAP, surface_speeds=speeds)
     surfaces = MovingSurfaces.one_rough(
         rough(ON, 1e-6, correlation_length=40e-6), speeds, first=first
@@ -426,9 +438,11 @@ def test_a_start_that_is_none_is_refused():
 
 
 def test_waviness_in_motion_is_the_unified_models_in_a_full_film():
-    """Pure rolling, a film that no cavity parts: both must press the wave down alike, each on its own scheme.
+    """Pure rolling, a film that no cavity parts: both must press the wave down alike, each on its
+    own scheme.
 
-    Elastic bodies under 6 kN, waves half as long as the Hertz zone; the unified step is second order in time.
+    Elastic bodies under 6 kN, waves half as long as the Hertz zone; the unified step is second
+    order in time.
     """
     heavy = contact(load=6000.0, surface_speeds=PURE_ROLLING)
     a, cells, waves = heavy.hertz.half_widths[0], 96, 4

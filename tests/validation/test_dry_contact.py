@@ -1,8 +1,10 @@
-"""Rough, dry contact against tamaas, with and without a cap of the pressure, and waves against Westergaard.
+"""Rough, dry contact against tamaas, with and without a cap of the pressure, and waves against
+Westergaard.
 
-tamaas repeats along x as well. Its domain is eight times as wide, and the parabola is flattened by what the images of
-the line load, a spacing L apart, bend it back: -(1/pi) ln|2 sin(pi X/L)| = -(1/pi) ln|X| + const + pi X^2/(6 L^2), so
-that a load of pi/2 adds (pi^2/6) (a/L)^2 of the parabola.
+tamaas repeats along x as well. Its domain is eight times as wide, and the parabola is flattened by
+what the images of the line load, a spacing L apart, bend it back: -(1/pi) ln|2 sin(pi X/L)| =
+-(1/pi) ln|X| + const + pi X^2/(6 L^2), so that a load of pi/2 adds (pi^2/6) (a/L)^2 of the
+parabola.
 """
 
 import numpy as np
@@ -87,7 +89,9 @@ def test_signorini_holds_in_every_cell():
 
 
 def test_a_wave_pressed_flat_adds_its_own_pressure():
-    """A cosine of height d and wavenumber q under full contact takes the pressure E* q d/2: Johnson (1985) eq 13.7."""
+    """A cosine of height d and wavenumber q under full contact takes the pressure E* q d/2: Johnson
+    (1985) eq 13.7.
+    """
     q = 2.0 * np.pi * 4 / ON.extent[1]
     height = 0.1 * P_H * 2.0 / (contact().pair.reduced_modulus * q)
     wave = np.cos(q * ON.y)
@@ -108,10 +112,12 @@ def test_a_wave_pressed_flat_adds_its_own_pressure():
 
 @pytest.mark.parametrize("full", [0.8, 1.5, 3.0])
 def test_short_waves_are_westergaards(full):
-    """Waves along y much shorter than the contact is wide feel its mean pressure as if it went on for ever.
+    """Waves along y much shorter than the contact is wide feel its mean pressure as if it went on
+    for ever.
 
-    `full` is the pressure p* = π E* Δ/λ that presses them flat, over Hertz's. Contact on the share (2/π) asin √s of a
-    wave and the mean gap Δ (1 - s + s ln s) at s = p/p*: Westergaard (1939), Johnson (1985) eqs 13.8-13.10.
+    `full` is the pressure p* = π E* Δ/λ that presses them flat, over Hertz's. Contact on the share
+    (2/π) asin √s of a wave and the mean gap Δ (1 - s + s ln s) at s = p/p*: Westergaard (1939),
+    Johnson (1985) eqs 13.8-13.10.
     """
     conditions, cells = contact(), 128
     a, p_max = conditions.hertz.half_widths[0], conditions.hertz.p_max
@@ -132,7 +138,9 @@ def test_short_waves_are_westergaards(full):
 
 @pytest.mark.parametrize(("sq", "seed"), [(0.1e-6, 1), (0.3e-6, 2)])
 def test_a_rough_ball_is_tamaas_without_images(sq, seed):
-    """Neither repeats anywhere: the same cells, the same Love kernel, another solver (Polonsky and Keer)."""
+    """Neither repeats anywhere: the same cells, the same Love kernel, another solver (Polonsky and
+    Keer).
+    """
     ball = contact(geometry="point", radius=10e-3, length=None, load=20.0)
     a, cells = ball.hertz.half_widths[0], 96
     corners = (-1.6 * a, -1.6 * a), (1.6 * a, 1.6 * a)

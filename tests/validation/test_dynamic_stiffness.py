@@ -1,4 +1,6 @@
-"""Stiffness and damping of solved contacts: another program's table, dense twins, closed forms, conserved power."""
+"""Stiffness and damping of solved contacts: another program's table, dense twins, closed forms,
+conserved power.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -33,8 +35,9 @@ from support.shaken import shaken_cells
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 MICRO = 1e6  # N/m in a N/um
-# Independent program (linearised Reynolds, deflection, squeeze; dense), paper's contact at 96 x 48, seed 7, unified:
-# Sq um: CLR, k in N/um at 0, 3 and 10 kHz, ζ at 1, 3, 5 kHz; capped cells flowing, then elastic. None: not printed.
+# Independent program (linearised Reynolds, deflection, squeeze; dense), paper's contact at 96 x 48,
+# seed 7, unified: Sq um: CLR, k in N/um at 0, 3 and 10 kHz, ζ at 1, 3, 5 kHz; capped cells flowing,
+# then elastic. None: not printed.
 TABLE = {
     (0.0, "flowing"): (0.0, 330.0, 347.0, 357.0, 0.014, 0.025, 0.017),
     (0.5, "flowing"): (0.10, 291.0, 299.0, 334.0, 0.015, 0.039, 0.052),
@@ -81,7 +84,9 @@ def test_another_programs_table_comes_out(sq_um, yielded):
 
 @cache
 def own_line(nodes):
-    """The smooth contact of paper.toml by the one-dimensional reference, and its speed number and oil."""
+    """The smooth contact of paper.toml by the one-dimensional reference, and its speed number and
+    oil.
+    """
     conditions, alpha = contact(), 18.2e-9
     a, p_h = conditions.hertz.half_widths[0], conditions.hertz.p_max
     law = DowsonHigginson(880.0)
@@ -132,7 +137,9 @@ def ball():
 @pytest.mark.parametrize("kind", ["line", "ball"])
 @pytest.mark.parametrize("yielded", ["flowing", "elastic"])
 def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
-    """Slopes by complex steps of Reynolds' equation as the tests write it, all cells in one dense system."""
+    """Slopes by complex steps of Reynolds' equation as the tests write it, all cells in one dense
+    system.
+    """
     if kind == "ball":
         conditions, surface = ball()
         solution = solve_contact(conditions, barus(), surface, options=Options(model=model))
@@ -180,7 +187,9 @@ def test_without_yielding_both_limits_coincide(hardness):
 
 
 def test_a_sweep_that_cannot_move_begins_anew(monkeypatch):
-    """Where corrections of one frequency tell nothing new at the next, the resonance is the same."""
+    """Where corrections of one frequency tell nothing new at the next, the resonance is the
+    same.
+    """
     solution = papers(1.0, "mixed")
     expected = OscillatingContact(solution).resonance(0.1)
 
@@ -201,7 +210,9 @@ def stencil_times(lines, change):
 
 
 def test_the_lines_follow_how_the_wedge_leans():
-    """Their stencil is the linearisation of a contact in which a cell gives way to its own pressure alone."""
+    """Their stencil is the linearisation of a contact in which a cell gives way to its own pressure
+    alone.
+    """
     balance = elastic(balance_of(papers(2.5, "mixed")))
     linear = MixedLinear(balance, float, with_limiter=True)
     _, lines = linear.inverse
@@ -233,7 +244,9 @@ def test_an_oscillating_contact_with_asperities_takes_few_steps():
     [("mixed", 0.5), ("mixed", 1.0), ("mixed", 4.0), ("unified", 1.0), ("unified", 0.0)],
 )
 def test_the_resonance_is_that_of_equations_met_to_the_end(model, sq_um):
-    """Its damping ratio to 1 %, however small: 0.0003 at Sq 4 um; and the mass does resonate there, to 0.5 %."""
+    """Its damping ratio to 1 %, however small: 0.0003 at Sq 4 um; and the mass does resonate there,
+    to 0.5 %.
+    """
     solution, mass = papers(sq_um, model), 0.1
     own = own_resonance(solution, mass)
     for found in (own.elastic, own.virgin):
@@ -257,9 +270,11 @@ def test_a_slow_change_meets_the_tangent_of_contacts_solved_anew(model, sq_um):
 
 @pytest.mark.parametrize(("sq_um", "printed"), [(1.0, 324.0), (2.5, 335.0), (4.0, 337.0)])
 def test_a_contact_that_bore_its_load_before_is_level_in_roughness(sq_um, printed):
-    """The plastic overlap off the heights, the cap raised, solved and differentiated: physics of issue 14.
+    """The plastic overlap off the heights, the cap raised, solved and differentiated: physics of
+    issue 14.
 
-    The linear answer is 2 % stiffer at Sq 1 um: oil at the cap, which a raised cap lets flow again, is elastic in it.
+    The linear answer is 2 % stiffer at Sq 1 um: oil at the cap, which a raised cap lets flow
+    again, is elastic in it.
     """
     solution = papers(sq_um, cells=(128, 128))
     again = tangent_stiffness(solution, yielded="elastic")
@@ -288,9 +303,11 @@ def test_oil_that_has_no_time_is_shut_in():
 
 @pytest.mark.parametrize("frequency_hz", [100.0, 1e4])
 def test_damping_equals_the_dissipation_of_the_squeezed_oil(frequency_hz):
-    """Bodies that hardly bend, oil of one viscosity: with h³p'/12η = C - x the flow of oil squeezed out at 1 m/s,
+    """Bodies that hardly bend, oil of one viscosity: with h³p'/12η = C - x the flow of oil squeezed
+    out at 1 m/s,
 
-    dissipation is 12 η ∫ (x - C)²/h³ dx, least for the C that leaves no pressure at both ends: c by quadrature.
+    dissipation is 12 η ∫ (x - C)²/h³ dx, least for the C that leaves no pressure at both ends: c
+    by quadrature.
     """
     eta0 = 3e-3
     oil = Lubricant(

@@ -1,4 +1,6 @@
-"""What a solution says of its own error, against solutions on much finer grids; and how a failed attempt is mended."""
+"""What a solution says of its own error, against solutions on much finer grids; and how a failed
+attempt is mended.
+"""
 
 from dataclasses import replace
 
@@ -45,7 +47,9 @@ def test_smooth_films_are_off_by_no_more_than_stated(cells):
 
 @pytest.mark.parametrize("sq", [1e-6, 2e-6])
 def test_load_shares_are_off_by_about_what_is_stated(sq):
-    """One surface on two grids; the median over four surfaces, because a bound from two grids is no certainty."""
+    """One surface on two grids; the median over four surfaces, because a bound from two grids is no
+    certainty.
+    """
     ratios = []
     for seed in range(4):
         coarse, fine = (
@@ -94,7 +98,9 @@ def test_smooth_films_of_conserved_oil_are_within_their_bars_of_first_order():
 
 @pytest.mark.parametrize("seed", [10, 11, 14])
 def test_the_way_back_to_first_order_is_gone_to_its_end(seed):
-    """Sharp elastic roughness: one step back told as little as a seventh, and no interval held the truth."""
+    """Sharp elastic roughness: one step back told as little as a seventh, and no interval held the
+    truth.
+    """
     fine = rough(grid((384, 32), y=(-1.0, 1.0)), 0.5e-6, seed=seed, correlation_length=30e-6)
     here = replace(
         fine, grid=grid((96, 32), y=(-1.0, 1.0)), heights=average(fine.heights, (96, 32))
@@ -109,7 +115,9 @@ def figures(clr):
 
 
 def test_an_interval_reaches_further_the_way_that_the_grids_went():
-    """By hand: 0.60 on the coarser grid, 0.56 on the finer of cells a twentieth of the half-width long."""
+    """By hand: 0.60 on the coarser grid, 0.56 on the finer of cells a twentieth of the half-width
+    long.
+    """
     unresolved = 2.4 * 0.05**2
     falling = grid_error([figures(0.60), figures(0.56)], smooth=False, cell=0.05)
     assert falling.sides("clr") == pytest.approx((2.5 * 0.04 + unresolved, 1.5 * 0.04 + unresolved))
@@ -136,7 +144,9 @@ def test_grids_that_agree_by_chance_are_not_believed():
 
 
 def test_three_grids_and_both_orders_say_that_the_load_share_keeps_its_way():
-    """By hand: 0.70, 0.60, 0.56, and 0.57 by first order; other figures are not told so much by it."""
+    """By hand: 0.70, 0.60, 0.56, and 0.57 by first order; other figures are not told so much
+    by it.
+    """
     found = grid_error(
         [figures(0.70), figures(0.60), figures(0.56)],
         smooth=False,
@@ -174,7 +184,9 @@ def test_two_pressures_ask_the_first_order_wedge_too(monkeypatch):
 
 @pytest.mark.parametrize("model", ["mixed", "unified"])
 def test_intervals_hold_the_load_share_of_a_finer_grid(model):
-    """Of contacts that no factor was chosen on, 96 cells against 192; the whole table is in docs/validation.md."""
+    """Of contacts that no factor was chosen on, 96 cells against 192; the whole table is in
+    docs/validation.md.
+    """
     fixed, wide = [], []
     for one in (contacts()[number] for number in (53, 153, 161, 353, 411, 503)):
         here, finer = (
@@ -242,7 +254,9 @@ def test_where_the_dry_contact_leads_nowhere_hertzs_pressure_is_the_start(monkey
 @pytest.mark.parametrize("way", [COARSE_TO_FINE, FROM_DRY])
 @pytest.mark.parametrize("model", ["mixed", "conserving"])
 def test_a_way_is_judged_by_its_own_steps(model, way):
-    """What a way that failed has left says nothing of the next one's error; how wide cells are always does."""
+    """What a way that failed has left says nothing of the next one's error; how wide cells are
+    always does.
+    """
     options = Options(model=model)
     scales = Scales.from_conditions(CONDITIONS, OIL)
     problem = contact_problem(

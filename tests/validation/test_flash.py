@@ -1,4 +1,6 @@
-"""Flash temperature against the closed forms of moving heat sources, heat balances and a dense twin."""
+"""Flash temperature against the closed forms of moving heat sources, heat balances and a dense
+twin.
+"""
 
 from dataclasses import replace
 
@@ -28,7 +30,9 @@ def speed_at(peclet):
 
 
 def band_rise(peclet, across=32, cells=128):
-    """Rise along x under a band of `across` cells in the grid's middle, and the cells' distance from its middle."""
+    """Rise along x under a band of `across` cells in the grid's middle, and the cells' distance
+    from its middle.
+    """
     dx = 2.0 * B / across
     body = moving_source((cells, 8), (dx, dx), speed_at(peclet), STEEL, length=ENDLESS)
     x = (np.arange(cells) + 0.5 - cells / 2) * dx
@@ -45,7 +49,9 @@ def test_a_band_source_is_jaegers(peclet):
 
 
 def test_a_fast_band_is_bloks():
-    """T = 1.128 q sqrt(l/(k ρ c u)) at the trailing edge, the square root of the way before it; nothing ahead."""
+    """T = 1.128 q sqrt(l/(k ρ c u)) at the trailing edge, the square root of the way before it;
+    nothing ahead.
+    """
     x, rise = band_rise(1e4)
     inside = np.abs(x) < B
     passed = 2.0 / K * np.sqrt(KAPPA * (x[inside] + B) / (np.pi * speed_at(1e4)))
@@ -132,7 +138,9 @@ SPEEDS = [(2.101, 1.719), (1.719, 2.101), (3.8, 0.02), (5.0, -1.2), (4.0, 0.0)]
 
 @pytest.mark.parametrize("speeds", SPEEDS)
 def test_the_bodies_take_up_all_frictional_heat(speeds):
-    """Heat that flows through planes far from the contact in both bodies, from their own temperatures in depth."""
+    """Heat that flows through planes far from the contact in both bodies, from their own
+    temperatures in depth.
+    """
     solution = warm_contact(speeds)
     rubbing = friction(solution)
     heat = flash_temperature(solution, rubbing)
@@ -172,7 +180,9 @@ def test_the_bodies_take_up_all_frictional_heat(speeds):
 
 @pytest.mark.parametrize("speeds", SPEEDS[:4])
 def test_sharing_is_the_two_coupled_equations(speeds):
-    """q_1 = q/2 + k_f (T_2 - T_1)/h, q_2 = q/2 - k_f (T_2 - T_1)/h, both temperatures from their own heat."""
+    """q_1 = q/2 + k_f (T_2 - T_1)/h, q_2 = q/2 - k_f (T_2 - T_1)/h, both temperatures from their
+    own heat.
+    """
     solution = warm_contact(speeds)
     thermal = Thermal(bulk=(313.15, 330.0), solids=(STEEL, Solid(conductivity=9.0)))
     heat = flash_temperature(solution, thermal=thermal)

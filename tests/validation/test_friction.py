@@ -1,4 +1,6 @@
-"""Friction of whole contacts against closed forms, quadrature, and what must come out when all is dry."""
+"""Friction of whole contacts against closed forms, quadrature, and what must come out when all is
+dry.
+"""
 
 from dataclasses import replace
 
@@ -35,7 +37,9 @@ def hertz_film(law, conditions=None):
 
 
 def test_newtonian_traction_of_a_line_contact():
-    """∫ η0 exp(α p) Δu/h dx = η0 Δu a/h * π (I1(α p_h) + L-1(α p_h)), modified Bessel and Struve functions."""
+    """∫ η0 exp(α p) Δu/h dx = η0 Δu a/h * π (I1(α p_h) + L-1(α p_h)), modified Bessel and Struve
+    functions.
+    """
     beta = ALPHA * P_H
     force = ETA0 * SLIDING / GAP * A * np.pi * (iv(1, beta) + modstruve(-1, beta))
     found = friction(hertz_film(NewtonianShear()))
@@ -47,7 +51,9 @@ def test_newtonian_traction_of_a_line_contact():
 
 
 def test_eyring_traction_of_a_line_contact():
-    """Far above τ0 the stress is τ0 (ln(2 η0 Δu/(τ0 h)) + α p): its mean needs Hertz's mean pressure alone."""
+    """Far above τ0 the stress is τ0 (ln(2 η0 Δu/(τ0 h)) + α p): its mean needs Hertz's mean
+    pressure alone.
+    """
     tau0 = 2e3
     mean = tau0 * (np.log(2.0 * ETA0 * SLIDING / (tau0 * GAP)) + ALPHA * np.pi / 4.0 * P_H)
     found = friction(hertz_film(EyringShear(tau0)))
@@ -69,7 +75,9 @@ def test_bair_winer_traction_without_elasticity_is_a_quadrature():
 
 
 def test_bair_winer_traction_with_elasticity_is_the_equation_integrated():
-    """The paper's Eq 14 with dτ/dt of oil that crosses at the mean speed, by an ODE solver on the continuous fields."""
+    """The paper's Eq 14 with dτ/dt of oil that crosses at the mean speed, by an ODE solver on the
+    continuous fields.
+    """
     law, slow = BairWiner(), contact(surface_speeds=(1.915, 1.905))
 
     def slope(x, stress):
@@ -104,7 +112,9 @@ def test_a_dry_contact_has_the_boundary_friction():
 
 
 def test_down_the_stribeck_curve_the_asperities_friction_is_left():
-    """The oil's part fades with the speed; what stays is f_b times the load share (the model's valleys keep theirs)."""
+    """The oil's part fades with the speed; what stays is f_b times the load share (the model's
+    valleys keep theirs).
+    """
     surface = rough(grid((64, 64)), 1e-6, correlation_length=30e-6)
     solved = [
         solve_contact(contact(speed=speed, hardness=2e9), barus(), surface)

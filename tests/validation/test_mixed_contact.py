@@ -1,4 +1,6 @@
-"""Rough, lubricated contact: what must hold whatever the surface, checked from pressure and gap alone."""
+"""Rough, lubricated contact: what must hold whatever the surface, checked from pressure and gap
+alone.
+"""
 
 import numpy as np
 import pytest
@@ -41,7 +43,9 @@ def tight(request):
 
 
 def flowing(solution):
-    """Pressure of the oil, and the cells in which Reynolds' equation decides it: touching ones too if it can."""
+    """Pressure of the oil, and the cells in which Reynolds' equation decides it: touching ones too
+    if it can.
+    """
     if solution.oil is None:
         return solution.pressure, (solution.pressure > 0.0) & (
             solution.pressure < CAP
@@ -60,7 +64,9 @@ def test_the_load_is_carried(tight):
 
 
 def test_pressure_gap_and_contact_keep_their_bounds(tight):
-    """0 <= p <= cap, h >= the contact film, and where p is below the cap a contact cell is closed to that film."""
+    """0 <= p <= cap, h >= the contact film, and where p is below the cap a contact cell is closed
+    to that film.
+    """
     assert tight.pressure.min() >= 0.0
     assert tight.pressure.max() <= CAP
     assert tight.gap.min() >= FLOOR * (1.0 - 1e-12)
@@ -84,7 +90,9 @@ def test_the_gap_is_the_surface_bent_by_the_pressure(tight):
 
 
 def test_lubricated_cells_conserve_oil(tight):
-    """Net mass outflow of each, in SI and by plain NumPy, against what the surfaces drag through the contact."""
+    """Net mass outflow of each, in SI and by plain NumPy, against what the surfaces drag through
+    the contact.
+    """
     _, wet = flowing(tight)
     assert wet.mean() > 0.3
     dragged = 880.0 * 1.91 * tight.gap[np.abs(tight.grid.x) < A].mean()
@@ -102,7 +110,9 @@ def test_ruptured_cells_only_let_oil_appear(tight):
 
 
 def test_the_equations_are_the_physical_ones(tight):
-    """The solver's own net outflow, made dimensional, is rho u h - rho h^3/(12 eta) dp/dx face by face."""
+    """The solver's own net outflow, made dimensional, is rho u h - rho h^3/(12 eta) dp/dx face by
+    face.
+    """
     problem = contact_problem(tight.conditions, tight.lubricant, tight.surface, tight.options)
     approach = tight.rigid_approach * RADIUS / A**2
     if tight.oil is None:
@@ -156,7 +166,9 @@ def test_a_wider_strip_of_the_same_surface_is_the_same_contact():
 
 
 def test_units_do_not_matter():
-    """Everything twice as long, loads fourfold, viscosity twofold: the same pressures, gaps twice as wide."""
+    """Everything twice as long, loads fourfold, viscosity twofold: the same pressures, gaps twice
+    as wide.
+    """
     surface = rough(COARSE, SQ)
     larger_grid = Grid(
         COARSE.cells, *(tuple(2.0 * c for c in corner) for corner in (COARSE.lower, COARSE.upper))
@@ -200,7 +212,9 @@ def test_a_thin_film_on_a_smooth_surface_is_nearly_hertz():
 
 @pytest.mark.parametrize("model", ["mixed", "conserving"])
 def test_hardly_any_oil_on_a_rough_surface_is_the_dry_contact(model):
-    """At a crawl an oil that does not thicken leaves the contact; one pressure for both would keep CLR near 0.5."""
+    """At a crawl an oil that does not thicken leaves the contact; one pressure for both would keep
+    CLR near 0.5.
+    """
     surface = rough(COARSE, SQ)
     options = Options(contact_film=0.1e-9, model=model)
     crawl = solve_contact(
@@ -287,9 +301,11 @@ def test_a_start_or_grid_that_does_not_fit_says_so(usual):
 
 
 def test_a_smooth_contact_too_slow_for_a_film_is_nearly_all_contact():
-    """At 10 um/s the oil's own film would be far below the contact film: the solids carry the load, as when dry.
+    """At 10 um/s the oil's own film would be far below the contact film: the solids carry the load,
+    as when dry.
 
-    Not quite all of it: contact cells at the rim press oil into their neighbours (see the dry limit above).
+    Not quite all of it: contact cells at the rim press oil into their neighbours (see the dry
+    limit above).
     """
     slow = contact(surface_speeds=(1e-5, 1e-5))
     state = contact_state(solve_contact(slow, barus(), flat_surface(grid((128, 8)))))

@@ -1,4 +1,6 @@
-"""Moving roughness: published amplitudes of waviness, orders, what stays when nothing moves, where the power goes."""
+"""Moving roughness: published amplitudes of waviness, orders, what stays when nothing moves, where
+the power goes.
+"""
 
 from itertools import islice, pairwise
 
@@ -26,7 +28,10 @@ CELLS = {4.0: 64, 2.0: 64, 1.0: 64, 0.5: 64, 0.25: 128, 0.125: 64}  # a half-wid
             0.125,
             marks=pytest.mark.xfail(
                 strict=True,
-                reason="0.917 here, 0.882 in the limit, 5.1 % above the number as it came; docs/theory/motion.md",
+                reason=(
+                    "0.917 here, 0.882 in the limit, 5.1 % above the number as it came;"
+                    " docs/theory/motion.md"
+                ),
             ),
         ),
     ],
@@ -38,7 +43,9 @@ def test_amplitude_of_moving_waviness_is_venners_within_5_percent(wavelength):
 
 
 def test_waves_do_not_care_how_high_they_are_below_the_film():
-    """The same paper: below the film's thickness the ratio depends on nothing but the wavelength."""
+    """The same paper: below the film's thickness the ratio depends on nothing but the
+    wavelength.
+    """
     low, high = waves(1.0, 32).central, waves(1.0, 32, share=0.4).central
     assert low == pytest.approx(high, rel=0.03)
 
@@ -112,7 +119,9 @@ def test_a_contact_at_rest_fills_until_it_is_the_steady_one(time_step):
 
 @pytest.fixture(scope="module")
 def full_film():
-    """Waves in an oil that is not compressed, over a film thick enough to part the bodies; sliding."""
+    """Waves in an oil that is not compressed, over a film thick enough to part the bodies;
+    sliding.
+    """
     conditions = paper.contact()
     on = paper.grid((384, 8))
     oil = Lubricant(
@@ -129,7 +138,9 @@ def full_film():
 
 
 def test_what_walls_do_on_the_oil_is_what_its_flow_turns_to_heat(full_film):
-    """∫ p (∂h/∂t + u ∂h/∂x) = -∫ h³/(12 η) |∂p/∂x|²: both sides by differences of the fields alone."""
+    """∫ p (∂h/∂t + u ∂h/∂x) = -∫ h³/(12 η) |∂p/∂x|²: both sides by differences of the fields
+    alone.
+    """
     conditions, oil, (before, now, after) = full_film
     on, length = now.solution.grid, conditions.length
     pressure, gap = now.solution.pressure[:, 0], now.solution.gap[:, 0]
@@ -145,7 +156,9 @@ def test_what_walls_do_on_the_oil_is_what_its_flow_turns_to_heat(full_film):
 
 
 def test_elastic_energy_changes_by_the_work_of_pressure_on_the_deflection(full_film):
-    """dE = ∫ p dV: the half-space answers alike both ways. V is gap less shape, approach and roughness."""
+    """dE = ∫ p dV: the half-space answers alike both ways. V is gap less shape, approach and
+    roughness.
+    """
     conditions, _, (before, now, after) = full_film
     on = now.solution.grid
 
@@ -258,7 +271,9 @@ def test_tracks_lose_what_overlapped_and_nothing_else(run_in):
 
 
 def test_what_is_flat_stays_flat(run_in):
-    """Asperities that have been through once carry the load on more area: the second pass takes off less."""
+    """Asperities that have been through once carry the load on more area: the second pass takes off
+    less.
+    """
     _, taken = run_in
     first, second = (
         taken[48].flattened - taken[0].flattened,

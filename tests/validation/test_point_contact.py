@@ -1,7 +1,8 @@
-"""Point and elliptic contacts, dry and smooth-lubricated, against closed forms and a second-order reference.
+"""Point and elliptic contacts, dry and smooth-lubricated, against closed forms and a second-order
+reference.
 
-Reference films: Richardson-extrapolated from 257 and 513 points a side, X -4.5..1.5, Y -3..3, in Moes units
-H = (h/R)(2U)^-1/2, M = W (2U)^-3/4, L = G (2U)^1/4 with the mean speed in U.
+Reference films: Richardson-extrapolated from 257 and 513 points a side, X -4.5..1.5, Y -3..3, in
+Moes units H = (h/R)(2U)^-1/2, M = W (2U)^-3/4, L = G (2U)^1/4 with the mean speed in U.
 """
 
 import numpy as np
@@ -69,7 +70,9 @@ def test_films_of_a_ball_on_a_flat(m, l, oil, h_central, h_min):  # noqa: E741
 
 
 def test_oil_that_hardly_thickens_parts_a_ball_in_few_steps():
-    """From the hard fit's film, half of the soft one's, the bodies touched, and 270 steps hardly got them apart."""
+    """From the hard fit's film, half of the soft one's, the bodies touched, and 270 steps hardly
+    got them apart.
+    """
     conditions, _ = moes_contact(20, 0.5)
     a = conditions.hertz.half_widths[0]
     grid = Grid((129, 129), (-4.5 * a, -3.0 * a), (1.5 * a, 3.0 * a), periodic=(False, False))

@@ -62,7 +62,9 @@ def test_fitted_crf_of_a_record_is_the_oscillators_within_three_deviations(clr, 
     ("filtered", "rate_hz"), [("bilinear", 10e3), ("continuous", 10e3), ("bilinear", 20e3)]
 )
 def test_a_coarsely_sampled_record_is_fitted_within_its_deviations(filtered, rate_hz):
-    """At 10 kHz behind the bilinear filter a continuous oscillator's line lay 11 deviations too low."""
+    """At 10 kHz behind the bilinear filter a continuous oscillator's line lay 11 deviations too
+    low.
+    """
     off = []
     for seed in range(24):
         model = VibrationModel.preset(
@@ -90,7 +92,9 @@ def test_a_coarsely_sampled_record_is_fitted_within_its_deviations(filtered, rat
 
 @pytest.mark.parametrize("filtered", ["bilinear", "continuous"])
 def test_the_line_as_sampling_leaves_it_is_the_records_own_spectrum(filtered):
-    """The closed form of the sampled record, line and factor apart; and means of 300 pieces of a record about it."""
+    """The closed form of the sampled record, line and factor apart; and means of 300 pieces of a
+    record about it.
+    """
     model = VibrationModel.preset(
         "paper",
         mass=0.1,
@@ -118,7 +122,9 @@ def test_the_line_as_sampling_leaves_it_is_the_records_own_spectrum(filtered):
 
 @pytest.mark.parametrize(("window", "segment"), [("boxcar", None), ("hann", 4000)])
 def test_over_200_records_the_stated_deviation_is_the_scatter_within_a_fifth(window, segment):
-    """Item 6 of issue 2: 200 records of 0.8 s, the pieces of one long one, fitted in the contact model's band."""
+    """Item 6 of issue 2: 200 records of 0.8 s, the pieces of one long one, fitted in the contact
+    model's band.
+    """
     records, samples, rate = 200, 40_000, 50e3
     state = touching(0.5, 0.4)
     model = VibrationModel(
@@ -143,7 +149,8 @@ def test_over_200_records_the_stated_deviation_is_the_scatter_within_a_fifth(win
     assert np.std(errors) == pytest.approx(stated, rel=0.2)
     assert abs(np.mean(errors)) < 0.35 * stated
 
-    # CRFA in the continuum, by hand: height^2 2 sqrt(2)/(pi fc) (fc/f0)^4 (2 pi f0)^4 (1 + 4 zeta^2)/(4 zeta^2)
+    # CRFA in the continuum, by hand: height^2 2 sqrt(2)/(pi fc) (fc/f0)^4 (2 pi f0)^4 (1 + 4
+    # zeta^2)/(4 zeta^2)
     fc, zeta = model.excitation.cutoff_hz(state.car), 0.02
     truth = (
         4e-12

@@ -1,8 +1,9 @@
-"""Rollers that end: dry against reference solutions, the moment against the energy, the middle against a line contact,
+"""Rollers that end: dry against reference solutions, the moment against the energy, the middle
+against a line contact,
 a strong crown against a point contact, and the ends of the range.
 
-Reference pressures: an own half-space solver and tamaas, not periodic, which agree to 2e-8 of Hertz's pressure; 48 x
-1024 cells over 3.2 half-widths and the length, values at cell centres.
+Reference pressures: an own half-space solver and tamaas, not periodic, which agree to 2e-8 of
+Hertz's pressure; 48 x 1024 cells over 3.2 half-widths and the length, values at cell centres.
 """
 
 from dataclasses import replace
@@ -120,7 +121,9 @@ def test_an_untilted_roller_is_symmetric_to_rounding():
 
 
 def test_the_moment_is_what_the_energy_asks_for():
-    """Of p V/2 + p (x²/2R + drop + tilt y), in sum the least there is at a load, the tilt's slope is the moment."""
+    """Of p V/2 + p (x²/2R + drop + tilt y), in sum the least there is at a load, the tilt's slope
+    is the moment.
+    """
 
     def energy(tilt: float) -> float:
         solution = solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-7)
@@ -234,7 +237,9 @@ def test_the_lubricated_edge_pressure_is_that_of_every_grid_and_its_spike_no_par
 
 
 def test_a_pressure_that_still_grows_is_no_edge_pressure():
-    """A circle that falls back by 5 um ends at 0.5 of the mean load per length: 1.1 to 2.4 GPa from 128 to 1024."""
+    """A circle that falls back by 5 um ends at 0.5 of the mean load per length: 1.1 to 2.4 GPa from
+    128 to 1024.
+    """
     circle = RollerShape(crown_radius=LENGTH**2 / 8.0 / 5e-6)
     for oil in (None, OIL):
         assert edges(circle, oil, (48 if oil is None else 96, 256)) == [(None, None)]
@@ -310,7 +315,9 @@ def test_a_film_ends_alike_between_smooth_bodies_and_all_but_smooth_ones():
 
 
 def test_a_roller_is_as_stiff_as_a_strip_of_its_length():
-    """π E* L/(2 ln(2L/a)): the middle of a strip on a half-space; the shaken contact without haste is the tangent."""
+    """π E* L/(2 ln(2L/a)): the middle of a strip on a half-space; the shaken contact without haste
+    is the tangent.
+    """
     conditions = roller(lundberg(1.2 * LOAD))
     solution = solved(conditions, OIL, cells=(64, 64))
     a, modulus = conditions.hertz.half_widths[0], STEEL.reduced_modulus
@@ -321,7 +328,9 @@ def test_a_roller_is_as_stiff_as_a_strip_of_its_length():
 
 
 def test_models_agree_where_the_film_is_full():
-    """One pressure or two; where no oil may be lost the wedge is of first order, and films some per cent thicker."""
+    """One pressure or two; where no oil may be lost the wedge is of first order, and films some per
+    cent thicker.
+    """
     conditions = roller(ISO.tilted(0.3e-3))
     mixed, paper, conserving = (
         asp.contact_state(solved(conditions, OIL, cells=(96, 96), model=model))

@@ -1,4 +1,6 @@
-"""Stresses below known pressures against closed forms; Hertz's pressure is sampled on the grid, nothing is solved."""
+"""Stresses below known pressures against closed forms; Hertz's pressure is sampled on the grid,
+nothing is solved.
+"""
 
 import numpy as np
 import pytest
@@ -36,7 +38,9 @@ def von_mises(xx, yy, zz, xy, yz, xz):
 
 
 def test_the_largest_stresses_below_a_line_contact_are_the_textbook_ones():
-    """0.300 p_h in shear at 0.786 a, von Mises 0.558 p_h at 0.704 a (Johnson, section 4.2; plane strain, nu = 0.3)."""
+    """0.300 p_h in shear at 0.786 a, von Mises 0.558 p_h at 0.704 a (Johnson, section 4.2; plane
+    strain, nu = 0.3).
+    """
     stress = below_line(0.0)
     assert stress.shear_peak.value == pytest.approx(0.300, rel=0.002)
     assert stress.shear_peak.depth == pytest.approx(0.786, rel=0.01)
@@ -53,7 +57,9 @@ def test_the_largest_stress_below_a_point_contact_is_the_textbook_one():
 
 
 def mcewen_peak(friction: float) -> tuple[float, float]:
-    """The largest von Mises stress below a sliding line contact, and its depth, from the closed form."""
+    """The largest von Mises stress below a sliding line contact, and its depth, from the closed
+    form.
+    """
 
     def negative(place):
         xx, yy, zz, xz = sliding.line(place[0], np.abs(place[1]), friction, NU)
@@ -117,7 +123,9 @@ def test_the_peak_below_a_sliding_ball_is_hamiltons(friction):
 
 
 def test_the_summed_point_loads_meet_the_closed_form_on_the_axis():
-    """Shear below the middle of a sliding ball, sigma_xz/q = -1 + 3/2 z atan(1/z) - z^2/(2 (1 + z^2))."""
+    """Shear below the middle of a sliding ball, sigma_xz/q = -1 + 3/2 z atan(1/z) - z^2/(2 (1 +
+    z^2)).
+    """
     z = np.array([0.1, 0.5, 1.0])
     on_axis = (
         sliding.point(np.zeros(3), np.zeros(3), z, 1.0, NU)[5]
@@ -128,7 +136,9 @@ def test_the_summed_point_loads_meet_the_closed_form_on_the_axis():
 
 
 def test_traction_alone_stretches_the_surface_of_a_ball_as_hamilton_and_goodman_found():
-    """sigma_xx = -(4 + nu) pi q x/8, sigma_yy = -3 nu pi q x/8 inside the contact (J. Appl. Mech. 33 (1966) 371)."""
+    """sigma_xx = -(4 + nu) pi q x/8, sigma_yy = -3 nu pi q x/8 inside the contact (J. Appl. Mech.
+    33 (1966) 371).
+    """
     grid = Grid((256, 256), (-1.2, -1.2), (1.2, 1.2), (False, False))
     radius = np.hypot(grid.x[:, None], grid.y)
     traction = np.sqrt(np.maximum(1.0 - radius**2, 0.0))

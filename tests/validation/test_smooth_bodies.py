@@ -1,4 +1,6 @@
-"""Smooth bodies are solved in a few steps a grid: the approximate inverse, the worst cells first, a roller's start."""
+"""Smooth bodies are solved in a few steps a grid: the approximate inverse, the worst cells first, a
+roller's start.
+"""
 
 from dataclasses import replace
 
@@ -125,7 +127,9 @@ def test_few_steps_a_grid_and_few_vectors_a_step(monkeypatch, load_number, oil_n
 
 
 def test_a_fine_line_keeps_the_narrow_inverse():
-    """Lines of five lead nowhere on one line of many cells: M 300 took 68 steps there, and pivots vanished."""
+    """Lines of five lead nowhere on one line of many cells: M 300 took 68 steps there, and pivots
+    vanished.
+    """
     conditions, oil, unit = line_case(300, 10, "Roelands")
     a = conditions.hertz.half_widths[0]
     surface = flat_surface(Grid((1024, 8), (-2.5 * a, -a), (1.4 * a, a)))
@@ -137,7 +141,9 @@ def test_a_fine_line_keeps_the_narrow_inverse():
 
 @pytest.mark.parametrize("shape", ["straight", "the load's own drop"])
 def test_a_roller_starts_from_its_dry_contact(shape):
-    """Sharp ends carry what no coarser grid foretells; before, a straight one took 345 steps and 25 times as long."""
+    """Sharp ends carry what no coarser grid foretells; before, a straight one took 345 steps and 25
+    times as long.
+    """
     contact = rollers.conditions(RollerShape() if shape == "straight" else rollers.lundberg(1.0))
     wide = contact.sliced_load.peak**0.5
     surface = flat_surface(rollers.between(contact, (96, 192), (-4.5 * wide, 1.5 * wide)))

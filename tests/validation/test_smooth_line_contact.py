@@ -1,8 +1,9 @@
 """The smooth lubricated line contact against a table and a solver that shares no code with ours.
 
-The table is `../reference/smooth_line_contact.csv`: micrometres, or units of R sqrt(2 eta0 u/(E' R)) (Moes). Its
-Roelands rows come out with Dowson and Higginson's density as first printed, (5.9e8 + 1.34 p)/(5.9e8 + p); with the
-rounded coefficients of the package, 0.6 and 1.7 1/GPa, central films are 0.5 % thinner.
+The table is `../reference/smooth_line_contact.csv`: micrometres, or units of R sqrt(2 eta0 u/(E'
+R)) (Moes). Its Roelands rows come out with Dowson and Higginson's density as first printed, (5.9e8
++ 1.34 p)/(5.9e8 + p); with the rounded coefficients of the package, 0.6 and 1.7 1/GPa, central
+films are 0.5 % thinner.
 """
 
 import csv

@@ -1,4 +1,6 @@
-"""Generated surfaces hold what was asked for, over 20 seeds; and the same seed is the same surface anywhere."""
+"""Generated surfaces hold what was asked for, over 20 seeds; and the same seed is the same surface
+anywhere.
+"""
 
 import numpy as np
 import pytest
@@ -142,7 +144,8 @@ def test_a_sandblasted_surface_has_no_lay_and_pits_as_wide_as_its_craters():
     assert [surface.sq for surface in made] == pytest.approx([1e-6] * 20, rel=1e-12)
     lengths = np.mean([correlation_lengths(surface) for surface in made], axis=0)
     assert lengths[0] == pytest.approx(lengths[1], rel=0.03)
-    # a crater z = -R (1 - u)^2 (1 - 4 u) correlates with itself like this, by brute force over radii that scatter
+    # a crater z = -R (1 - u)^2 (1 - 4 u) correlates with itself like this, by brute force over
+    # radii that scatter
     x = np.linspace(-4.0, 4.0, 401)
     u = np.minimum((x[:, None] ** 2 + x[None, :] ** 2) / 4.0, 1.0)
     power = np.abs(np.fft.fft2((1.0 - u) ** 2 * (1.0 - 4.0 * u), (1024, 1024))) ** 2
@@ -167,7 +170,8 @@ def test_a_sandblasted_surface_has_no_lay_and_pits_as_wide_as_its_craters():
 )
 def test_a_finer_grid_shows_the_same_physical_surface(make):
     coarse, fine = (make(grid(cells), np.random.default_rng(5)).heights for cells in (64, 192))
-    # the middle one of three fine cells has the coarse cell's centre; only the sample's mean and Sq differ
+    # the middle one of three fine cells has the coarse cell's centre; only the sample's mean and Sq
+    # differ
     slope, offset = np.polyfit(fine[1::3, 1::3].ravel(), coarse.ravel(), 1)
     assert slope == pytest.approx(1.0, abs=0.03)
     assert abs(offset) < 0.03e-6

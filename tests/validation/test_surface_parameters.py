@@ -57,7 +57,9 @@ def test_gaussian_surfaces_have_gaussian_heights():
 
 @pytest.mark.parametrize("length", [(8e-6, 8e-6), (6e-6, 12e-6)])
 def test_gaussian_surfaces_have_the_slope_and_lengths_of_their_autocorrelation(length):
-    """R = exp(-(x/lx)^2 - (y/ly)^2): Sdq^2 = 2 Sq^2 (1/lx^2 + 1/ly^2), Sal = lx sqrt(ln 5), Str = lx/ly."""
+    """R = exp(-(x/lx)^2 - (y/ly)^2): Sdq^2 = 2 Sq^2 (1/lx^2 + 1/ly^2), Sal = lx sqrt(ln 5), Str =
+    lx/ly.
+    """
     on = grid((512, 256), (256e-6, 256e-6))
     mean = np.mean(
         [np.fft.fftshift(correlation(gaussian(seed, length, on))) for seed in range(12)], axis=0

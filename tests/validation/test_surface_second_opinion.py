@@ -1,4 +1,6 @@
-"""Parameters of maps and profiles against surfalize, an implementation by others, and closed forms on sinusoids."""
+"""Parameters of maps and profiles against surfalize, an implementation by others, and closed forms
+on sinusoids.
+"""
 
 import numpy as np
 import pytest
@@ -73,7 +75,9 @@ def test_profile_parameters_agree_with_surfalize(kind):
 
 
 def test_the_bearing_curve_of_a_sinusoid():
-    """Heights follow the arcsine law, flattest at its ends: the core line fits the outer 40 %, on either side."""
+    """Heights follow the arcsine law, flattest at its ends: the core line fits the outer 40 %, on
+    either side.
+    """
     on = Grid((4000, 16), (0.0, 0.0), (100e-6, 0.4e-6), (True, True))
     found = surface_parameters(
         Surface(1e-6 * np.sin(2.0 * np.pi * on.x / 20e-6)[:, None] * np.ones(16), on)

@@ -33,7 +33,9 @@ def test_the_printed_rows_are_the_papers_twelve():
 
 @pytest.mark.parametrize("number", range(12))
 def test_median_crf_is_the_printed_one_within_035_percent(ours, number):
-    """E = 207 GPa (section 4's, E* = 113.74 GPa): the printed 219.78 GPa taken as E* would give 25 % more."""
+    """E = 207 GPa (section 4's, E* = 113.74 GPa): the printed 219.78 GPa taken as E* would give 25
+    % more.
+    """
     assert ours[number].crf_hz == pytest.approx(ours[number].paper_crf_hz, rel=0.0035)
 
 

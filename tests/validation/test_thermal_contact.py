@@ -1,4 +1,6 @@
-"""Heat that acts back on the film: what is fed back, that it settles, and which way it moves things."""
+"""Heat that acts back on the film: what is fed back, that it settles, and which way it moves
+things.
+"""
 
 from dataclasses import replace
 
@@ -81,7 +83,9 @@ def test_without_feedback_heat_is_only_a_result():
 
 
 def test_a_runaway_law_is_tamed(monkeypatch):
-    """Newtonian oil at full Barus viscosity makes thousands of kelvins isothermally; its own heat thins it."""
+    """Newtonian oil at full Barus viscosity makes thousands of kelvins isothermally; its own heat
+    thins it.
+    """
     cold = solve_contact(contact(), barus(), SMOOTH)
     unlimited = replace(cold, lubricant=oil(NewtonianShear()))
     isothermal, fed_back = friction_and_heat(unlimited), friction_and_heat(unlimited, thermal=WARM)
@@ -108,7 +112,9 @@ def test_an_unfinished_contact_is_told():
 
 
 def test_a_film_that_would_thin_too_much_at_once_is_warmed_in_steps():
-    """At 19 m/s and 238 K the oil loses all but a ten-thousandth of its viscosity: Newton loses its way in one go."""
+    """At 19 m/s and 238 K the oil loses all but a ten-thousandth of its viscosity: Newton loses its
+    way in one go.
+    """
     given = (
         contact(speed=19.1, hardness=2e9),
         barus(),

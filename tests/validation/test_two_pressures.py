@@ -1,4 +1,6 @@
-"""The mixed contact with a pressure each for oil and asperities: its limits, and one answer whatever the start."""
+"""The mixed contact with a pressure each for oil and asperities: its limits, and one answer
+whatever the start.
+"""
 
 from dataclasses import replace
 from itertools import islice
@@ -114,7 +116,9 @@ def test_what_oil_changed_on_a_coarse_grid_is_granted_to_the_finer_one():
 
 @pytest.mark.parametrize("sq", [1e-6, 4e-6])
 def test_a_dry_start_follows_from_the_coarser_grids(sq, monkeypatch):
-    """The answer from Hertz's pressure, without its conjugate gradients, which a cap that holds most cells defeats."""
+    """The answer from Hertz's pressure, without its conjugate gradients, which a cap that holds
+    most cells defeats.
+    """
     fine, coarse = grid_levels(
         contact_problem(contact(hardness=2e9), barus(), rough(grid((96, 96)), sq), MIXED)
     )[:2]
@@ -130,7 +134,9 @@ def test_a_dry_start_follows_from_the_coarser_grids(sq, monkeypatch):
 
 @pytest.mark.parametrize("sq", [1e-6, 4e-6])
 def test_a_dry_start_by_sets_of_cells_is_newtons(sq, monkeypatch):
-    """From Hertz's pressure and from the coarser grid; in single precision and on its own, without Newton's steps."""
+    """From Hertz's pressure and from the coarser grid; in single precision and on its own, without
+    Newton's steps.
+    """
     levels = grid_levels(
         contact_problem(contact(hardness=2e9), barus(), rough(grid((96, 96)), sq), MIXED)
     )
@@ -159,7 +165,9 @@ def test_a_dry_start_that_sets_of_cells_do_not_find_is_found_all_the_same(monkey
 
 
 def test_a_hard_dry_start_needs_no_steps_that_bear_the_cap(monkeypatch):
-    """Newton's from the coarser grid's pressures stood still at a hundredth of p_h on this ellipse, for seconds."""
+    """Newton's from the coarser grid's pressures stood still at a hundredth of p_h on this ellipse,
+    for seconds.
+    """
     hard = contact(
         geometry="elliptic",
         radius=(19.5e-3, 0.233),
@@ -202,7 +210,9 @@ def test_a_step_that_leads_away_from_a_solution_is_cut_short():
 
 
 def test_a_cell_in_deep_overlap_is_not_freed_again_and_again():
-    """One cell of this surface went round between the cap and the oil, for seventy steps on the finest grid."""
+    """One cell of this surface went round between the cap and the oil, for seventy steps on the
+    finest grid.
+    """
     surface = gaussian_surface(
         grid((256, 256)), sq=0.5e-6, correlation_length=20e-6, rng=np.random.default_rng(1)
     )
@@ -236,7 +246,9 @@ def hertz_pressure(problem):
 
 
 def test_steps_of_time_lead_where_newtons_steps_alone_do_not():
-    """Hard steel: eighty of Newton's steps from the dry contact go round, the film that builds up in time arrives."""
+    """Hard steel: eighty of Newton's steps from the dry contact go round, the film that builds up
+    in time arrives.
+    """
     problem, dry, search = hard_ball()
     search.run(problem, newton(problem, dry, second_order=False), 1e-2, 80)
     assert not search.converged(1e-2)
@@ -257,7 +269,9 @@ def test_steps_of_time_lead_where_newtons_steps_alone_do_not():
 
 
 def test_newtons_steps_know_how_the_wedge_leans():
-    """The linearised equations of an open, rough film are its outflow's slopes, second order too."""
+    """The linearised equations of an open, rough film are its outflow's slopes, second order
+    too.
+    """
     problem = contact_problem(
         contact(load=500.0), barus(), rough(COARSE, 0.2e-6, correlation_length=80e-6), MIXED
     )
@@ -282,7 +296,9 @@ def test_newtons_steps_know_how_the_wedge_leans():
 
 
 def test_newtons_steps_know_how_the_wedge_opens_where_the_gap_has_settled():
-    """Cells that open by half a contact film lean over: the outflow's slopes, but for what has not settled."""
+    """Cells that open by half a contact film lean over: the outflow's slopes, but for what has not
+    settled.
+    """
     surface = rough(COARSE, 1e-6, correlation_length=20e-6)
     problem = contact_problem(contact(load=500.0), barus(), surface, Options(contact_film=0.1e-6))
     start = 0.01 + 0.1 * hertz_pressure(problem)  # so that no mobility is the least one
@@ -310,7 +326,9 @@ def test_newtons_steps_know_how_the_wedge_opens_where_the_gap_has_settled():
 
 
 def test_oil_that_fills_a_streak_of_closed_cells_goes_on_in_one_step():
-    """Ruptured cells that the cap holds closed are solved with those that fill, downstream and no farther."""
+    """Ruptured cells that the cap holds closed are solved with those that fill, downstream and no
+    farther.
+    """
     problem = contact_problem(
         contact(speed=10.0, hardness=0.9e9), barus(), rough(COARSE, 2e-6, seed=7), MIXED
     )
@@ -349,7 +367,9 @@ def test_the_asperities_bear_what_the_oil_does_not():
 
 
 def test_a_closed_cells_equation_grows_with_its_own_pressure():
-    """Scaled by an open cell's derivative it would hardly move, and shut-in oil would count as balanced."""
+    """Scaled by an open cell's derivative it would hardly move, and shut-in oil would count as
+    balanced.
+    """
     fast = contact(speed=10.0, hardness=7e9)
     problem = contact_problem(fast, barus(), rough(COARSE, 1e-6, seed=7), MIXED)
     hertz = np.sqrt(np.maximum(1.0 - problem.x**2, 0.0))[:, None] * np.ones(problem.cells)
@@ -394,7 +414,9 @@ def test_a_dry_contact_is_the_same_in_every_model():
 
 
 def test_the_oil_that_lubricated_cells_lose_is_counted():
-    """Slow, sharp and elastic: all that any cell of the Hertz zone is left with, of the oil that is carried there."""
+    """Slow, sharp and elastic: all that any cell of the Hertz zone is left with, of the oil that is
+    carried there.
+    """
     slow, surface = (
         contact(hardness=None, speed=0.05),
         rough(grid((96, 32)), 2.5e-6, correlation_length=30e-6),
@@ -412,7 +434,9 @@ def test_the_oil_that_lubricated_cells_lose_is_counted():
 
 
 def test_blocks_are_nested_where_bodies_touch_firmly_and_not_where_films_are_nearly_closed():
-    """Hard steel on 192 x 144 cells, nested and not: 192 and 176 steps, on another processor 261 and 234."""
+    """Hard steel on 192 x 144 cells, nested and not: 192 and 176 steps, on another processor 261
+    and 234.
+    """
     case = load_case(PAPER).with_overrides({"grid.cells": "[128, 128]"})
     soft = solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
     sample = next(islice(samples(6), 5, None))

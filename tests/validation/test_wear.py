@@ -1,7 +1,8 @@
-"""Wear of solved contacts against closed forms: volume, depth a passage, Hertz's profile, the decay of a wave.
+"""Wear of solved contacts against closed forms: volume, depth a passage, Hertz's profile, the decay
+of a wave.
 
-Equations of Archard's wear; J. F. Archard, J. Appl. Phys. 24 (1953) 981, and K. L. Johnson, Contact Mechanics (1985)
-for pressures.
+Equations of Archard's wear; J. F. Archard, J. Appl. Phys. 24 (1953) 981, and K. L. Johnson,
+Contact Mechanics (1985) for pressures.
 """
 
 import math
@@ -33,7 +34,9 @@ def worn(hours: float, overrides: dict[str, object] | None = None) -> WearHistor
 
 
 def jump_by_jump(history: WearHistory, body: int) -> float:
-    """The sum of k times the load of touching cells times the sliding distance, from the table's own columns."""
+    """The sum of k times the load of touching cells times the sliding distance, from the table's
+    own columns.
+    """
     case, table = history.case, history.table
     load, sliding = case.conditions.load, case.conditions.sliding_speed
     k, clr = history.contact.model.coefficients[body].k, table["clr"].to_numpy()[:-1]
@@ -89,7 +92,9 @@ def test_depth_a_passage_does_not_ask_for_the_shape_of_the_pressure():
 
 @pytest.mark.parametrize("cells", [[64, 64], [128, 128]])
 def test_a_ball_wears_a_parabola_across_its_track(cells):
-    """A Hertz contact, dry and smooth: k (pi/2) p0 a (1 - y^2/a^2) |u_s|/u_i over the track, within 1 %."""
+    """A Hertz contact, dry and smooth: k (pi/2) p0 a (1 - y^2/a^2) |u_s|/u_i over the track, within
+    1 %.
+    """
     ball = {"contact.load": "20 N", "surface": "flat", "grid.cells": cells}
     ends = {"grid.x": [-1.6, 1.6], "grid.y": [-1.6, 1.6]}
     case = worn_case({**LINE, **DRY, **ball, **ends}, POINT)
@@ -134,9 +139,11 @@ def decay_of_ridges(half_width: float, hours: float) -> tuple[float, float]:
 
 
 def test_ridges_in_full_contact_decay_by_the_way_that_slides_past_them():
-    """A factor exp(-k E* q b |u_s|/u_1) a passage, where the pressure is more than E* q A/2 all over: within 2 %.
+    """A factor exp(-k E* q b |u_s|/u_1) a passage, where the pressure is more than E* q A/2 all
+    over: within 2 %.
 
-    The closed form is that of waves much shorter than the contact is wide, and is come nearer to as they are.
+    The closed form is that of waves much shorter than the contact is wide, and is come nearer to
+    as they are.
     """
     (wide, of_wide), (narrow, of_narrow) = decay_of_ridges(0.1, 0.006), decay_of_ridges(0.05, 0.003)
     assert of_wide == pytest.approx(of_narrow)
@@ -200,7 +207,9 @@ def test_halving_the_jump_moves_roughness_and_load_share_little():
 
 @pytest.mark.skipif(not MEASURED.is_file(), reason="the measured surface is not beside the project")
 def test_a_measured_surface_runs_in(tmp_path):
-    """Its files before and after hold, opened by SurfaceTopography, the parameters that the table has."""
+    """Its files before and after hold, opened by SurfaceTopography, the parameters that the table
+    has.
+    """
     surface = {"file": str(MEASURED), "fit": "tile"}
     surface_less = {key: value for key, value in LINE.items() if not key.startswith("surface")}
     case = worn_case({**surface_less, "surface": surface, "wear.k": ["2e-16 1/Pa", "0 1/Pa"]})
