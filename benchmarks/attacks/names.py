@@ -15,7 +15,7 @@ NAMES = (
     "<img src=x onerror=alert(1)>",
     '"><svg onload=alert(1)>',
     "';alert(1)//",
-    "{{7*7}}",
+    "{{1237*8081}}",
     "{% raw %}",
     "=1+1",
     "+1+1",
@@ -80,7 +80,7 @@ def _in_page(page: Path) -> str | None:
     if not page.exists():
         return None
     text = page.read_text("utf-8")
-    bad = re.search(r"<script>alert|<img src=x|<svg onload|</style><b>|(?<![\d.])49</", text)
+    bad = re.search(r"<script>alert|<img src=x|<svg onload|</style><b>|9996197", text)
     return f"{page.name} holds {bad[0]!r}" if bad else None
 
 

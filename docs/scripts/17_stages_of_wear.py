@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 
 import asperity as asp
 from asperity import paper, resonance
+from asperity.trend import StageErrors
 
 rig = paper.simulate_rig(
     paper.RigSettings(repeats=2, duration_s=5.0), disturbance=paper.Disturbance(snr_db=6.0)
@@ -25,7 +26,7 @@ found = resonance.series_resonances(
 sq = [1e6 * one.sq_m for one in rig.recordings]
 sq_std = [1e6 * one.sq_std_m for one in rig.recordings]
 crf = [one.crf_hz for one in found]
-stages = asp.split_stages(sq, crf, errors=asp.StageErrors(x=sq_std), unit="um")
+stages = asp.split_stages(sq, crf, errors=StageErrors(x=sq_std), unit="um")
 
 figure, axis = plt.subplots(figsize=(7, 4))
 points = axis.scatter(

@@ -25,7 +25,6 @@ from .lubricant import Newtonian as Newtonian
 from .lubricant import OilSheet as OilSheet
 from .lubricant import ReeEyring as ReeEyring
 from .lubricant import Roelands as Roelands
-from .monitoring import TrackSettings as TrackSettings
 from .monitoring import track_recordings as track_recordings
 from .recording import read_recording as read_recording
 from .report import write_report as write_report
@@ -50,7 +49,6 @@ from .surface import gaussian_surface as gaussian_surface
 from .surface import read_surface as read_surface
 from .surface import self_affine_surface as self_affine_surface
 from .surface import surface_parameters as surface_parameters
-from .trend import StageErrors as StageErrors
 from .trend import Stages as Stages
 from .trend import split_stages as split_stages
 from .vibration import ContactOscillator as ContactOscillator

@@ -126,11 +126,7 @@ def infer(
             )
     answering = emulated(setting, emulator, count, quiet=quiet)
     ahead = _forecast(setting, answering, observations, limit, history, seed)
-    latest = (
-        inference.latest_observations(observations)
-        if ahead is not None and ahead.change_detected
-        else observations
-    )
+    latest = _latest(observations, ahead)
     now = replace(latest, notes=(*latest.notes, *known))
     by = cast("Sampler", sampler)
     found = inference.infer_series(setting, answering, now, sampler=by, seed=seed)
@@ -138,11 +134,9 @@ def infer(
         found = inference.refine_emulator(found, extend, sampler=by, workers=count, progress=step)
     if found.emulator is not answering:
         ahead = _forecast(setting, found.emulator, observations, limit, history, seed)
-    designed = (
-        None
-        if design is None
-        else inference.design_contact(found.forward, found.draws.z, clr=design)
-    )
+    designed = None
+    if design is not None:
+        designed = inference.design_contact(found.forward, found.draws.z, clr=design)
     if page is not None:
         report.write_inference_report(found, page, forecast=ahead, design=designed)
     _show(found, ahead, designed, page, as_json=as_json, quiet=quiet)
@@ -167,6 +161,12 @@ def _required(
     if design is not None:
         inference.require_share("--design", design)
     return case_file
+
+
+def _latest(observations: "ObservedSeries", ahead: "Forecast | None") -> "ObservedSeries":
+    """Return the last tenth of a series whose contact changes, otherwise all of it."""
+    changes = ahead is not None and ahead.change_detected
+    return inference.latest_observations(observations) if changes else observations
 
 
 def _forecast(

@@ -32,6 +32,39 @@ EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # by state of the alarm
 PAGE = "report.html"
 
 
+DataFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="FILE", help="Write the table (.csv, .parquet) or all data (.nc); repeatable."
+    ),
+]
+WatchedFolder = Annotated[
+    Path, typer.Argument(metavar="DIR", help="Folder where recordings arrive.")
+]
+ResultFolder = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Folder of results; default: DIR/asperity-watch."),
+]
+Once = Annotated[
+    bool, typer.Option("--once", help="Process the present recordings and end, for cron.")
+]
+PollInterval = Annotated[
+    float,
+    typer.Option(metavar="SECONDS", min=0.05, help="Time between two looks into the folder."),
+]
+SettleTime = Annotated[
+    float, typer.Option(metavar="SECONDS", min=0.0, help="Time for which a file must be unchanged.")
+]
+ExpectedInterval = Annotated[
+    float | None,
+    typer.Option(
+        metavar="SECONDS",
+        min=0.0,
+        help="Report blind without a recording for this time; default: 5 usual intervals.",
+    ),
+]
+
+
 @app.command()
 def track(
     paths: options.RecordingFiles,
@@ -55,12 +88,7 @@ def track(
     point: options.Point = None,
     sensor: options.SensorName = None,
     page: options.Page = None,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="FILE", help="Write the table (.csv, .parquet) or all data (.nc); repeatable."
-        ),
-    ] = None,
+    out: DataFiles = None,
     workers: options.Workers = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -71,15 +99,9 @@ def track(
             files.require_writable(path)
     for path in out or ():
         require_output(path, ".csv", ".parquet", ".nc")
+    read = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
     settings = _track_settings(
-        recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale),
-        workers,
-        band=band,
-        shaft=shaft,
-        method=method,
-        stages_from=stages_from,
-        false_alarms=false_alarms,
-        acknowledge=acknowledge,
+        read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
     )
     forecaster = series_forecaster(
         forecast, case_file, worn, emulator, workers=settings.workers, quiet=quiet
@@ -103,52 +125,19 @@ def track(
             sensor=sensor,
             acknowledge=acknowledge,
         )
-    files_written = [*_write(tracked, out or (), page), *([] if store is None else [store])]
-    hint = ["  Add --report track.html for the page, --out track.csv for the table."]
-    show(
-        tracked.verdict(),
-        lambda: (
-            tracked.scalars()
-            | {
-                "report": None if page is None else str(page),
-                "written": [str(path) for path in files_written],
-            }
-        ),
-        _series(tracked),
-        _searched(tracked),
-        written("  Written", *files_written) if files_written else hint,
-        as_json=as_json,
-        quiet=quiet,
-    )
+    paths_written = [*_write(tracked, out or (), page), *([] if store is None else [store])]
+    _show_track(tracked, page, paths_written, as_json=as_json, quiet=quiet)
     _end(tracked.alarm.state)
 
 
 @app.command()
 def watch(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder where recordings arrive.")],
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder of results; default: DIR/asperity-watch."),
-    ] = None,
-    once: Annotated[
-        bool, typer.Option("--once", help="Process the present recordings and end, for cron.")
-    ] = False,
-    every: Annotated[
-        float,
-        typer.Option(metavar="SECONDS", min=0.05, help="Time between two looks into the folder."),
-    ] = 5.0,
-    settle: Annotated[
-        float,
-        typer.Option(metavar="SECONDS", min=0.0, help="Time for which a file must be unchanged."),
-    ] = 2.0,
-    expect: Annotated[
-        float | None,
-        typer.Option(
-            metavar="SECONDS",
-            min=0.0,
-            help="Report blind without a recording for this time; default: 5 usual intervals.",
-        ),
-    ] = None,
+    folder: WatchedFolder,
+    out: ResultFolder = None,
+    once: Once = False,
+    every: PollInterval = 5.0,
+    settle: SettleTime = 2.0,
+    expect: ExpectedInterval = None,
     workers: options.Workers = None,
     rate: options.Rate = None,
     unit: options.Unit = None,
@@ -178,15 +167,9 @@ def watch(
 ) -> None:
     """Track recordings as they arrive in a folder, until Ctrl-C; a later watch continues it."""
     results = out if out is not None else folder / "asperity-watch"
+    read = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
     settings = _track_settings(
-        recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale),
-        workers,
-        band=band,
-        shaft=shaft,
-        method=method,
-        stages_from=stages_from,
-        false_alarms=false_alarms,
-        acknowledge=acknowledge,
+        read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
     )
     watching = monitoring.WatchSettings(
         store=store,
@@ -222,7 +205,6 @@ def watch(
 def _track_settings(
     read: "ReadOptions",
     workers: int | None,
-    *,
     band: tuple[float, float] | None,
     shaft: list[float] | None,
     method: str | None,
@@ -243,6 +225,28 @@ def _track_settings(
         false_alarm_rate=false_alarms,
         acknowledge=acknowledge,
         workers=workers or processes.cores(),
+    )
+
+
+def _show_track(
+    tracked: "Track", page: Path | None, paths_written: list[Path], *, as_json: bool, quiet: bool
+) -> None:
+    """Show the verdict of a track, its series and what was written."""
+    hint = ["  Add --report track.html for the page, --out track.csv for the table."]
+    show(
+        tracked.verdict(),
+        lambda: (
+            tracked.scalars()
+            | {
+                "report": None if page is None else str(page),
+                "written": [str(path) for path in paths_written],
+            }
+        ),
+        _series(tracked),
+        _searched(tracked),
+        written("  Written", *paths_written) if paths_written else hint,
+        as_json=as_json,
+        quiet=quiet,
     )
 
 
