@@ -121,7 +121,7 @@ def progress(
         return
     label = printable(label)
     notice = (
-        f"{label}: no step yet; the first solve after installation compiles the solver, "
+        f"{label}: no iteration yet; the first solve after installation compiles the solver, "
         "up to a minute ..."
     )
     if not sys.stderr.isatty():
