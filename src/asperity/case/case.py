@@ -354,6 +354,13 @@ def load_case(
         if the file is missing or not TOML.
     BadInput
         for an invalid key, law, unit or value, in one sentence that names it.
+
+    Examples
+    --------
+    >>> from asperity.case import case_template, load_case
+    >>> case = load_case(case_template("line"))
+    >>> f"{case.conditions.load:.0f} N, {case.conditions.entrainment_speed} m/s"
+    '500 N, 2.0 m/s'
     """
     if isinstance(source, str) and "\n" in source:
         text, name, folder = source, name or "case", folder or Path()

@@ -95,7 +95,14 @@ KINDS = ("line", "point", "elliptic", "roller", "dry", "measured", "motion", "st
 
 
 def case_template(kind: str) -> str:
-    """Return the template of a case file, one of `KINDS`."""
+    """Return the template of a case file, one of `KINDS`.
+
+    Examples
+    --------
+    >>> from asperity.case import case_template
+    >>> case_template("line").splitlines()[0]
+    '# Template of a case: adapt its values. `asperity solve` reports invalid ones.'
+    """
     contact = f"[contact]\n{CONTACTS.get(kind, CONTACTS['line'])}{MOVES}"
     parts = [
         HEAD,

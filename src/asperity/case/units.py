@@ -219,6 +219,12 @@ def read_amount(name: str, unit: str, text: str) -> float:
     """Read a positive quantity from the command line, such as "300 s", in the SI unit `unit`.
 
     The message of BadInput begins with `name`.
+
+    Examples
+    --------
+    >>> from asperity.case import read_amount
+    >>> round(read_amount("speed", "rad/s", "1500 rpm"), 2)
+    157.08
     """
     try:
         return float(parse_amount(unit, text))
@@ -227,7 +233,14 @@ def read_amount(name: str, unit: str, text: str) -> float:
 
 
 def read_length(name: str, text: str) -> float:
-    """Read a length from the command line, such as "0.25 mm", in m; raises as `read_amount`."""
+    """Read a length from the command line, such as "0.25 mm", in m; raises as `read_amount`.
+
+    Examples
+    --------
+    >>> from asperity.case import read_length
+    >>> read_length("pixel", "0.5 um")
+    5e-07
+    """
     return read_amount(name, "m", text)
 
 
@@ -235,6 +248,12 @@ def split_amount(value: object, unit: str | None = None) -> tuple[Decimal, str]:
     """Split a quantity into number and unit as written, or convert the number to `unit`.
 
     A bare number has the unit "". Raises BadInput for anything else, or if it cannot be converted.
+
+    Examples
+    --------
+    >>> from asperity.case import split_amount
+    >>> split_amount("2.5 um")
+    (Decimal('2.5'), 'um')
     """
     bare = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     parts = (str(value), "") if bare else _split(value)
@@ -255,7 +274,14 @@ def split_amount(value: object, unit: str | None = None) -> tuple[Decimal, str]:
 
 
 def to_si(value: object) -> Any:
-    """Return a value of a case file in SI; two equal values as one; anything else unchanged."""
+    """Return a value of a case file in SI; two equal values as one; anything else unchanged.
+
+    Examples
+    --------
+    >>> from asperity.case import to_si
+    >>> to_si("20 N/mm")
+    20000.0
+    """
     if isinstance(value, list | tuple):
         entries = [to_si(entry) for entry in value]
         return entries[0] if len(entries) == 2 and entries[0] == entries[1] else entries

@@ -13,7 +13,15 @@ Geometry = Literal["line", "point", "elliptic", "roller"]
 
 @dataclass(frozen=True)
 class ElasticPair:
-    """Elastic constants of the two bodies: Young's moduli [Pa] and Poisson's ratios."""
+    """Elastic constants of the two bodies: Young's moduli [Pa] and Poisson's ratios.
+
+    Examples
+    --------
+    >>> from asperity.contact.conditions import ElasticPair
+    >>> pair = ElasticPair(youngs_moduli=(206e9, 206e9), poisson_ratios=(0.3, 0.3))
+    >>> f"{pair.reduced_modulus / 1e9:.1f} GPa"
+    '113.2 GPa'
+    """
 
     youngs_moduli: tuple[float, float]
     poisson_ratios: tuple[float, float]
@@ -61,6 +69,21 @@ class ContactConditions:
     ------
     BadInput
         A quantity is not positive, the length is missing, or the entrainment speed is zero.
+
+    Examples
+    --------
+    >>> from asperity.contact.conditions import ContactConditions, ElasticPair
+    >>> pair = ElasticPair(youngs_moduli=(206e9, 206e9), poisson_ratios=(0.3, 0.3))
+    >>> conditions = ContactConditions(
+    ...     pair=pair,
+    ...     geometry="line",
+    ...     radius=0.01,
+    ...     length=0.01,
+    ...     load=1000.0,
+    ...     surface_speeds=(2.0, 1.0),
+    ... )
+    >>> f"{conditions.entrainment_speed} m/s, {conditions.hertz.p_max / 1e9:.2f} GPa"
+    '1.5 m/s, 0.60 GPa'
     """
 
     pair: ElasticPair

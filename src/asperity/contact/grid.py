@@ -24,6 +24,13 @@ class Grid:
     ------
     BadInput
         An axis has fewer than 8 cells, or the upper corner is not beyond the lower one.
+
+    Examples
+    --------
+    >>> from asperity.contact.grid import Grid
+    >>> grid = Grid(cells=(64, 32), lower=(-2e-4, 0.0), upper=(2e-4, 1e-4))
+    >>> grid.spacing
+    (6.25e-06, 3.125e-06)
     """
 
     cells: tuple[int, int]

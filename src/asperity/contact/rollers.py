@@ -177,6 +177,14 @@ def sliced_load(
 
     A slice under w' deflects by w'/(πE*) (2 ln(2 l/a) + 1), like the middle of a strip of the
     loaded length l. Source: K. L. Johnson, Contact Mechanics (1985), section 5.6.
+
+    Examples
+    --------
+    >>> from asperity.contact.rollers import RollerShape, sliced_load
+    >>> shape = RollerShape(crown_radius=2.0)
+    >>> sliced = sliced_load(shape, length=0.01, load=1000.0, radius=0.01, reduced_modulus=227e9)
+    >>> f"{sliced.line_load.max() / 1e3:.0f} N/mm"
+    '214 N/mm'
     """
     between = shape.between_chamfers(length)
     y = between * ((np.arange(SLICES) + 0.5) / SLICES - 0.5)

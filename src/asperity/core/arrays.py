@@ -12,5 +12,14 @@ Codes: TypeAlias = npt.NDArray[np.int8]
 
 
 def finite_or_none(value: float | None) -> float | None:
-    """Return the number as a float; None if it is missing, nan or infinite (JSON has neither)."""
+    """Return the number as a float; None if it is missing, nan or infinite (JSON has neither).
+
+    Examples
+    --------
+    >>> from asperity.core.arrays import finite_or_none
+    >>> finite_or_none(1.5)
+    1.5
+    >>> print(finite_or_none(float("nan")))
+    None
+    """
     return float(value) if value is not None and math.isfinite(value) else None

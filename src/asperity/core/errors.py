@@ -28,12 +28,26 @@ class NotConverged(AsperityError):
 
 
 def with_article(noun: str) -> str:
-    """Return the noun with its indefinite article."""
+    """Return the noun with its indefinite article.
+
+    Examples
+    --------
+    >>> from asperity.core.errors import with_article
+    >>> with_article("oil"), with_article("lubricant")
+    ('an oil', 'a lubricant')
+    """
     return f"{'an' if noun[:1] in 'aeiou' else 'a'} {noun}"
 
 
 def require_positive(name: str, value: float, unit: str = "") -> float:
-    """Return `value`; raise BadInput unless it is positive and finite."""
+    """Return `value`; raise BadInput unless it is positive and finite.
+
+    Examples
+    --------
+    >>> from asperity.core.errors import require_positive
+    >>> require_positive("load", 20.0, "N")
+    20.0
+    """
     if not 0.0 < value < float("inf"):
         raise BadInput(
             f"{name} must be positive and finite, got {value:g} {unit}".rstrip()

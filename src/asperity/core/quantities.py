@@ -196,6 +196,12 @@ def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> 
 
     A fixed number of decimals (`.1f`) is an upper limit; `.3g` and `.1e` use powers of ten for
     small and large numbers. The deviation has two digits, the value the same number of decimals.
+
+    Examples
+    --------
+    >>> from asperity.core.quantities import with_deviation
+    >>> with_deviation(12.345, 0.678)
+    '12.35 ± 0.68'
     """
     exponent = math.floor(math.log10(abs(value))) if value and not form.endswith("f") else 0
     if not form.endswith("e") and -3 <= exponent < 6:
@@ -216,7 +222,14 @@ def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> 
 
 
 def in_print(text: str) -> str:
-    """Typeset prose: 1.3e-05 as 1.3×10⁻⁵, um as µm, and no line break before a unit."""
+    """Typeset prose: 1.3e-05 as 1.3×10⁻⁵, um as µm, and no line break before a unit.
+
+    Examples
+    --------
+    >>> from asperity.core.quantities import in_print
+    >>> in_print("N/um^2")
+    'N/µm^2'
+    """
     text = re.sub(r"\bum\b|(?<=\d )us\b", lambda unit: f"µ{unit[0][1]}", text)
     text = re.sub(
         r"\b\d(\.\d+)?e[+-]\d+",
@@ -242,6 +255,12 @@ def quantity(key: str) -> Quantity:
 
     A key may name a vibration preset (`crf_sound_hz`: `crf_hz` of the preset sound) or a body
     (`sq_1_m`: `sq_m` of body 1).
+
+    Examples
+    --------
+    >>> from asperity.core.quantities import quantity
+    >>> quantity("clr").unit
+    '1'
     """
     known = catalogue()
     if key in known:

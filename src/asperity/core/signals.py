@@ -22,6 +22,15 @@ class Signal:
 
     `values` has shape (samples,), in `unit` (an SI unit in pint's notation, such as "m/s^2");
     `rate_hz` is the sampling rate [Hz].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.core.signals import Signal
+    >>> time = np.arange(1000) / 1000.0
+    >>> signal = Signal(np.sin(2.0 * np.pi * 50.0 * time), rate_hz=1000.0, unit="m/s^2")
+    >>> f"{signal.duration_s} s, rms {signal.values.std():.3f} {signal.unit}"
+    '1.0 s, rms 0.707 m/s^2'
     """
 
     values: Field
@@ -94,6 +103,15 @@ def power_spectrum(signal: Signal, *, segment: int | None = None, window: str = 
     BadInput
         Values are not finite, the segment is longer than the record or shorter than 8 samples, or
         the window is unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.core.signals import Signal, power_spectrum
+    >>> noise = np.random.default_rng(1).standard_normal(20_000)
+    >>> spectrum = power_spectrum(Signal(noise, rate_hz=2000.0, unit="m/s^2"), segment=500)
+    >>> f"resolution {spectrum.resolution_hz:.1f} Hz, mean {spectrum.density.mean() * 1e3:.2f}e-3"
+    'resolution 6.0 Hz, mean 0.99e-3'
     """
     samples = signal.values.size
     length = samples if segment is None else segment
@@ -121,6 +139,15 @@ def averaged_spectrum(
     Segments with a value that is not finite, such as a gap marked by nan, are skipped. Raises
     BadInput for a record without a complete segment, a segment shorter than 8 samples or an
     unknown window.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.core.signals import averaged_spectrum
+    >>> blocks = np.random.default_rng(1).standard_normal((4, 1000))
+    >>> spectrum = averaged_spectrum(blocks, rate_hz=1000.0, unit="m/s^2", segment=500)
+    >>> f"{spectrum.averages:.1f} independent segments"
+    '7.1 independent segments'
     """
     require_positive("sampling rate", rate_hz, "Hz")
     if segment < 8:
@@ -213,7 +240,14 @@ def _averages(weights: Field, complete: Mask, step: int) -> float:
 
 
 def taper(window: str, samples: int) -> Field:
-    """Return the window of a segment, by its name in scipy.signal.get_window (a slow import)."""
+    """Return the window of a segment, by its name in scipy.signal.get_window (a slow import).
+
+    Examples
+    --------
+    >>> from asperity.core.signals import taper
+    >>> taper("hann", 4)
+    array([0. , 0.5, 1. , 0.5])
+    """
     if window == "boxcar":
         return np.ones(samples)
     if window == "hann":
@@ -226,6 +260,13 @@ def recursion(numerator: Field, denominator: Field, values: Field) -> Field:
 
     Equals scipy.signal.lfilter, solved by LAPACK's banded triangular solver block by block, because
     importing scipy.signal takes longer than filtering a record.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.core.signals import recursion
+    >>> recursion(np.array([1.0]), np.array([1.0, -0.5]), np.array([1.0, 0.0, 0.0]))
+    array([1.  , 0.5 , 0.25])
     """
     driven: Field = np.convolve(values, numerator)[: values.size] / denominator[0]
     feedback = denominator[1:] / denominator[0]
@@ -243,6 +284,15 @@ def smooth(spectrum: Spectrum, passes: int) -> Spectrum:
     """Smooth the density `passes` times with the five-point cubic filter (Savitzky-Golay 5, 3).
 
     The paper uses three passes. Raises BadInput for fewer than one pass or fewer than 5 lines.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.core.signals import Signal, power_spectrum, smooth
+    >>> noise = np.random.default_rng(1).standard_normal(20_000)
+    >>> spectrum = power_spectrum(Signal(noise, rate_hz=2000.0, unit="m/s^2"), segment=500)
+    >>> smooth(spectrum, passes=3).smoothing_passes
+    3
     """
     if passes < 1:
         raise BadInput(f"smoothing needs at least 1 pass, got {passes}; leave it out for none")

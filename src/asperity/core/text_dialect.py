@@ -73,7 +73,14 @@ class Dialect:
 
 
 def sniff_dialect(sample: Sequence[str], fewest_columns: int = 1) -> Dialect:
-    """Detect the dialect of lines that mostly hold rows of at least `fewest_columns` numbers."""
+    """Detect the dialect of lines that mostly hold rows of at least `fewest_columns` numbers.
+
+    Examples
+    --------
+    >>> from asperity.core.text_dialect import sniff_dialect
+    >>> sniff_dialect(["1,5;2,0", "1,6;2,1"])
+    Dialect(separator=';', comma=True)
+    """
     sample = [_DATE.sub("", line) for line in sample]
     rows = [line for line in sample if re.fullmatch(r"[\s\d.,;+\-eE\"]+", line)] or sample
     numbers = "\n".join(rows)

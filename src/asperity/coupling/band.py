@@ -44,7 +44,14 @@ def search_band(conditions: ContactConditions, model: VibrationModel) -> tuple[f
 
 
 def band_about(frequency_hz: float, highest_hz: float = np.inf) -> tuple[float, float]:
-    """Return the search band about an estimated resonance, limited to `highest_hz`."""
+    """Return the search band about an estimated resonance, limited to `highest_hz`.
+
+    Examples
+    --------
+    >>> from asperity.coupling import band_about
+    >>> [round(edge) for edge in band_about(800.0)]
+    [533, 1200]
+    """
     return frequency_hz / BAND_FACTOR, min(frequency_hz * BAND_FACTOR, highest_hz)
 
 

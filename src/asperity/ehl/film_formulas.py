@@ -58,7 +58,17 @@ class _Asymptotes(NamedTuple):
 
 
 def film_numbers(conditions: ContactConditions, lubricant: Lubricant) -> FilmNumbers:
-    """Return the dimensionless numbers that film thickness fits use."""
+    """Return the dimensionless numbers that film thickness fits use.
+
+    Examples
+    --------
+    >>> from asperity.case import case_template, load_case
+    >>> from asperity.ehl import film_numbers
+    >>> contact = load_case(case_template("line"))
+    >>> numbers = film_numbers(contact.conditions, contact.lubricant)
+    >>> f"M {numbers.moes_load:.0f}, L {numbers.moes_oil:.1f}"
+    'M 2, L 15.6'
+    """
     radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
     line = conditions.long
     material = float(lubricant.viscosity.log_slope(np.zeros(1))[0]) * modulus
@@ -83,6 +93,14 @@ def lubrication_regime(conditions: ContactConditions, lubricant: Lubricant) -> R
     For an isoviscous oil the thicker film applies, for a piezoviscous one the thinner, and of both
     the thicker: each fit omits an effect, rigid bodies the widening of the contact, elastic ones
     their remaining curvature.
+
+    Examples
+    --------
+    >>> from asperity.case import case_template, load_case
+    >>> from asperity.ehl import lubrication_regime
+    >>> contact = load_case(case_template("line"))
+    >>> lubrication_regime(contact.conditions, contact.lubricant)
+    'piezoviscous-rigid'
     """
     films = {regime: fit.film for regime, fit in least_films(conditions, lubricant).items()}
     thin = max(films["isoviscous-rigid"], films["isoviscous-elastic"])

@@ -69,6 +69,14 @@ class OilSheet:
     BadInput
         Values contradict each other, viscosity does not fall with temperature, or a missing value
         cannot be estimated.
+
+    Examples
+    --------
+    >>> from asperity.lubricant import OilSheet, oil_facts
+    >>> oil = OilSheet(grade="ISO VG 46")
+    >>> viscosity_100 = oil_facts(oil, temperature=313.15)[2]
+    >>> viscosity_100.key, viscosity_100.origin
+    ('oil_viscosity_100_m2_s', 'computed')
     """
 
     grade: str | None = None

@@ -25,7 +25,15 @@ class DensityLaw(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class DowsonHigginson(Parametric):
-    """Dowson-Higginson density ρ = ρ₀ (1 + 0.6e-9 p/(1 + 1.7e-9 p)). Source: the paper's Eq 8."""
+    """Dowson-Higginson density ρ = ρ₀ (1 + 0.6e-9 p/(1 + 1.7e-9 p)). Source: the paper's Eq 8.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.lubricant import DowsonHigginson
+    >>> DowsonHigginson(rho0=870.0)(np.array([0.0, 1e9])).round(1)
+    array([ 870. , 1063.3])
+    """
 
     rho0: Annotated[float, Parameter("kg/m^3", "ρ₀", "density rho0")]  # at ambient pressure
 
@@ -40,7 +48,15 @@ class DowsonHigginson(Parametric):
 
 @dataclass(frozen=True, slots=True)
 class Incompressible(Parametric):
-    """Constant density ρ = ρ₀."""
+    """Constant density ρ = ρ₀.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.lubricant import Incompressible
+    >>> Incompressible(rho0=870.0)(np.array([0.0, 1e9]))
+    array([870., 870.])
+    """
 
     rho0: Annotated[float, Parameter("kg/m^3", "ρ₀", "density rho0")]
 

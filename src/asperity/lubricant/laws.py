@@ -39,7 +39,16 @@ def describe_law(family: LawFamily, law: Any) -> dict[str, Any]:
 
 
 def make_law(family: LawFamily, description: Mapping[str, Any]) -> Any:
-    """Create a law from the result of `describe_law`."""
+    """Create a law from the result of `describe_law`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.lubricant import make_law
+    >>> viscosity = make_law("viscosity", {"law": "barus", "eta0": 0.1, "alpha": 20e-9})
+    >>> viscosity(np.array([0.1e9])).round(3)
+    array([0.739])
+    """
     return LAWS[family][description["law"]](
         **{name: value for name, value in description.items() if name != "law"}
     )

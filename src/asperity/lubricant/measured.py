@@ -76,7 +76,14 @@ def _pair(low: int) -> list[tuple[int, int]]:
 
 @cache
 def measured_oils() -> dict[str, MeasuredOil]:
-    """Return the table of measured oils by name."""
+    """Return the table of measured oils by name.
+
+    Examples
+    --------
+    >>> from asperity.lubricant import measured_oils
+    >>> sorted(measured_oils())[:2]
+    ['cylinder high-VI', 'cylinder low-VI']
+    """
     lines = files("asperity.lubricant").joinpath("measured.csv").read_text("utf-8").splitlines()
     oils = {}
     for row in csv.DictReader(lines):

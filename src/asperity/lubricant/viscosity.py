@@ -28,7 +28,15 @@ class ViscosityLaw(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Barus(Parametric):
-    """Barus' law η = η₀ exp(α p). Source: the paper's Eq 10."""
+    """Barus' law η = η₀ exp(α p). Source: the paper's Eq 10.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.lubricant import Barus
+    >>> Barus(eta0=0.1, alpha=20e-9)(np.array([0.0, 0.1e9])).round(3)
+    array([0.1  , 0.739])
+    """
 
     eta0: Annotated[float, Parameter("Pa s", "η₀", "viscosity eta0")]  # at ambient pressure
     alpha: Annotated[float, Parameter("1/Pa", "α", "pressure-viscosity coefficient alpha")]
@@ -47,6 +55,13 @@ class Roelands(Parametric):
     """Roelands' law η = η₀ exp((ln η₀ + 9.67) ((1 + p/p₀)^z − 1)), z = α p₀/(ln η₀ + 9.67).
 
     Source: Roelands (1966), isothermal form with α matched at ambient pressure.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.lubricant import Roelands
+    >>> Roelands(eta0=0.1, alpha=20e-9)(np.array([0.0, 0.1e9, 1e9])).round(3)
+    array([1.0000000e-01, 6.0900000e-01, 1.5004778e+04])
     """
 
     eta0: Annotated[float, Parameter("Pa s", "η₀", "viscosity eta0")]  # at ambient pressure

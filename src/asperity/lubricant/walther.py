@@ -93,6 +93,12 @@ def viscosity_index(viscosity_40: float, viscosity_100: float) -> float:
 
     L and H follow the standard's fits to its table, accurate to 0.1 %. Raises BadInput below 2
     mm²/s at 100 °C. Source: ASTM D2270, ISO 2909.
+
+    Examples
+    --------
+    >>> from asperity.lubricant import viscosity_index
+    >>> f"{viscosity_index(viscosity_40=46e-6, viscosity_100=6.8e-6):.0f}"
+    '102'
     """
     warm, hot = viscosity_40 / MM2, viscosity_100 / MM2
     if viscosity_100 < MIN_VISCOSITY_OF_INDEX:
@@ -111,6 +117,12 @@ def viscosity_100_of(viscosity_40: float, index: float) -> float:
     """Return the kinematic viscosity [m^2/s] at 100 °C from that at 40 °C and the viscosity index.
 
     Raises BadInput if no viscosity above 2 mm²/s has that index.
+
+    Examples
+    --------
+    >>> from asperity.lubricant import viscosity_100_of
+    >>> f"{viscosity_100_of(viscosity_40=46e-6, index=100.0) * 1e6:.2f} mm2/s"
+    '6.76 mm2/s'
     """
     from scipy.optimize import brentq  # slow import, rarely needed
 

@@ -56,6 +56,17 @@ class BallBearing:
     BadInput
         The balls do not fit or carry no load, the osculation is invalid, clearance and contact
         angle are both given, or the thrust does not hold an angular-contact bearing together.
+
+    Examples
+    --------
+    >>> from asperity.contact.conditions import ElasticPair
+    >>> from asperity.machine import BallBearing
+    >>> steel = ElasticPair(youngs_moduli=(206e9, 206e9), poisson_ratios=(0.3, 0.3))
+    >>> bearing = BallBearing(
+    ...     balls=9, ball_diameter=7.94e-3, pitch_diameter=39.04e-3, speed=188.0, radial_load=1000.0
+    ... )
+    >>> f"{max(contact.load for contact in bearing.contacts(steel)):.0f} N"
+    '487 N'
     """
 
     place: ClassVar[str] = "cycle_angle"

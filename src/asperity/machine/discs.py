@@ -27,6 +27,16 @@ class TwinDisc:
     BadInput
         A quantity is not positive, length and crown_radius are both or neither given, or so are
         speeds and entrainment_speed.
+
+    Examples
+    --------
+    >>> from asperity.contact.conditions import ElasticPair
+    >>> from asperity.machine import TwinDisc
+    >>> steel = ElasticPair(youngs_moduli=(206e9, 206e9), poisson_ratios=(0.3, 0.3))
+    >>> discs = TwinDisc(radii=(0.02, 0.02), load=500.0, speeds=(105.0, 95.0), length=0.01)
+    >>> contact = discs.contacts(steel)[0]
+    >>> f"{contact.radius * 1e3:.0f} mm, {contact.entrainment_speed:.2f} m/s"
+    '10 mm, 2.00 m/s'
     """
 
     place: ClassVar[str] = "cycle_angle"

@@ -46,6 +46,21 @@ class SpurGear:
     BadInput
         The teeth do not mesh, jam, interfere with the roots, are pointed, or undercut within the
         path of contact.
+
+    Examples
+    --------
+    >>> import math
+    >>> from asperity.machine import SpurGear
+    >>> gear = SpurGear(
+    ...     module=4.5e-3,
+    ...     teeth=(16, 24),
+    ...     pressure_angle=math.radians(20.0),
+    ...     face_width=0.014,
+    ...     torque=94.1,
+    ...     speed=227.0,
+    ... )
+    >>> f"{gear.contact_ratio:.2f}"
+    '1.55'
     """
 
     place: ClassVar[str] = "path_position_m"

@@ -52,6 +52,22 @@ class CylindricalRollerBearing:
     ------
     BadInput
         The rollers do not fit, or none carries load.
+
+    Examples
+    --------
+    >>> from asperity.contact.conditions import ElasticPair
+    >>> from asperity.machine import CylindricalRollerBearing
+    >>> steel = ElasticPair(youngs_moduli=(206e9, 206e9), poisson_ratios=(0.3, 0.3))
+    >>> bearing = CylindricalRollerBearing(
+    ...     rollers=14,
+    ...     roller_diameter=9e-3,
+    ...     roller_length=10e-3,
+    ...     pitch_diameter=45e-3,
+    ...     radial_load=4000.0,
+    ...     speed=157.0,
+    ... )
+    >>> f"{max(contact.load for contact in bearing.contacts(steel)):.0f} N"
+    '1167 N'
     """
 
     place: ClassVar[str] = "cycle_angle"

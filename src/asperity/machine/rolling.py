@@ -22,6 +22,13 @@ class RollingKinematics:
     pitch_diameter : diameter of the circle of their centres [m]
     speed : speed of the inner ring [rad/s]
     contact_angle : [rad]
+
+    Examples
+    --------
+    >>> from asperity.machine import RollingKinematics
+    >>> bearing = RollingKinematics(count=9, diameter=7.94e-3, pitch_diameter=39.04e-3, speed=188.0)
+    >>> {name: round(hz, 1) for name, hz in bearing.frequencies.items()}
+    {'shaft_hz': 29.9, 'bpfo_hz': 107.3, 'bpfi_hz': 162.0, 'bsf_hz': 70.5, 'ftf_hz': 11.9}
     """
 
     count: int

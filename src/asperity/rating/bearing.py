@@ -47,6 +47,12 @@ def reference_viscosity(speed: float, pitch_diameter: float) -> float:
 
     45 000 n^-0.83 D^-0.5, above 1000 r/min 4500 (n D)^-0.5, in mm²/s, r/min and mm (ISO 281). The
     branches differ by 2.3 % at 1000 r/min.
+
+    Examples
+    --------
+    >>> from asperity.rating import reference_viscosity
+    >>> f"{reference_viscosity(speed=314.16, pitch_diameter=0.039) * 1e6:.1f} mm2/s"
+    '13.2 mm2/s'
     """
     rpm, diameter = speed * 30.0 / math.pi, 1e3 * pitch_diameter
     law = 45000.0 * rpm**-0.83 if rpm < BRANCH_SPEED else 4500.0 * rpm**-0.5
@@ -69,6 +75,14 @@ def life_factor(element: RollingElement, kappa: float, contamination: float) -> 
     ------
     BadInput
         The contamination is negative.
+
+    Examples
+    --------
+    >>> from asperity.rating import life_factor
+    >>> f"{life_factor('ball', kappa=1.5, contamination=0.2):.2f}"
+    '10.92'
+    >>> print(life_factor("ball", kappa=0.05, contamination=0.2))
+    None
     """
     if contamination < 0.0:
         raise BadInput(
@@ -130,6 +144,14 @@ def roller_life(loads: Field, rating: float, ratio: float, *, straight: bool) ->
     ratio : γ, roller diameter over pitch diameter
     straight : rollers without a profile, whose slice loads are multiplied by 1 - 0.01/ln(1.985
         |x|), x from -1/2 to 1/2 along a roller
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.rating import roller_life
+    >>> loads = np.full((2, 30), 200.0)
+    >>> f"{roller_life(loads, rating=4000.0, ratio=0.2, straight=False):.0f}"
+    '1291333'
     """
     require_positive("dynamic_load_rating", rating, "N")
     rollers, slices = loads.shape

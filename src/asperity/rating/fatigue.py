@@ -25,6 +25,12 @@ def dang_van_slope(torsion: float, bending: float) -> float:
     ------
     BadInput
         The ratio of the limits is impossible for metals.
+
+    Examples
+    --------
+    >>> from asperity.rating import dang_van_slope
+    >>> f"{dang_van_slope(torsion=400e6, bending=600e6):.3f}"
+    '0.500'
     """
     if not 0.5 <= torsion / bending <= 1.0:
         raise BadInput(

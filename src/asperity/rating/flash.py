@@ -75,6 +75,12 @@ def scuffing_temperature(stage: float, oil_factor: float, structure: float = 1.0
     ------
     BadInput
         The stage is not one of the test.
+
+    Examples
+    --------
+    >>> from asperity.rating import scuffing_temperature
+    >>> f"{scuffing_temperature(stage=12, oil_factor=1.0):.0f} degC"
+    '404 degC'
     """
     if not STAGES[0] <= stage <= STAGES[1]:
         raise BadInput(

@@ -35,6 +35,14 @@ def velocity_rms(frequency_hz: Field, density: Field) -> float:
     ----------
     frequency_hz, density : power spectral density of an acceleration [(m/s²)²/Hz], on evenly spaced
         lines from 0
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.rating import velocity_rms
+    >>> frequency_hz = np.arange(0.0, 1001.0)
+    >>> f"{velocity_rms(frequency_hz, np.full(1001, 1e-3)) * 1e3:.2f} mm/s"
+    '1.62 mm/s'
     """
     spacing = float(frequency_hz[1])
     if spacing > MAX_SPACING_HZ or frequency_hz[-1] < HIGHEST_HZ:
@@ -58,6 +66,12 @@ def severity_zone(velocity: float, machine_class: str) -> str:
     ------
     BadInput
         The class is unknown.
+
+    Examples
+    --------
+    >>> from asperity.rating import severity_zone
+    >>> severity_zone(0.0035, "medium-rigid")
+    'C'
     """
     require_choice("machine class", machine_class, tuple(LIMITS))
     return "ABCD"[int(np.searchsorted(LIMITS[machine_class], velocity))]

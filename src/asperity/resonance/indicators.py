@@ -63,6 +63,18 @@ def contact_resonance(
         for an unknown method, `sampling_factor` with another method than "likelihood", a band
         outside the spectrum or with fewer than 20 lines, a spectrum that is not finite, or a
         smoothed one where its statistics matter.
+
+    Examples
+    --------
+    >>> from asperity.core.signals import power_spectrum
+    >>> from asperity.resonance import contact_resonance
+    >>> from asperity.vibration import ContactOscillator, FilteredNoise, acceleration
+    >>> excitation = FilteredNoise(height=0.5e-6, cutoff_hz=100.0)
+    >>> oscillator = ContactOscillator(mass=1.0, stiffness=1e7, damping_ratio=0.03)
+    >>> signal = acceleration(oscillator, excitation.profile(200_000, 10_000.0, seed=1))
+    >>> found = contact_resonance(power_spectrum(signal, segment=5000), band_hz=(300.0, 800.0))
+    >>> f"{oscillator.natural_frequency_hz:.1f} Hz; {found.crf_hz:.1f} +- {found.crf_std:.1f} Hz"
+    '503.3 Hz; 503.7 +- 0.4 Hz'
     """
     if method not in INDICATOR_METHODS:
         raise BadInput(

@@ -117,6 +117,13 @@ def line_shape(frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field |
     T(f)/T(f0) with T = (f0^4 + (2ζ f0 f)^2) / ((f0^2 - f^2)^2 + (2ζ f0 f)^2), T(f0) = (1 +
     4ζ^2)/(4ζ^2). Roughness whose spectrum falls as f^-4 (a second-order low pass, far above its
     cut-off) is white base acceleration.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.resonance import line_shape
+    >>> line_shape(np.array([400.0, 500.0, 600.0]), f0_hz=500.0, damping_ratio=0.05)
+    array([0.07326733, 1.        , 0.04828637])
     """
     return _line_and_parts(frequency_hz, f0_hz, damping_ratio)[0]
 

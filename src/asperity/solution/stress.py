@@ -180,6 +180,17 @@ def hertz_stress(
     """Compute the stresses below the smooth, dry, frictionless contact of the same conditions.
 
     It has its own grid.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.case import case_template, load_case
+    >>> from asperity.solution import hertz_stress
+    >>> contact = load_case(case_template("line"))
+    >>> half_width = contact.conditions.hertz.half_widths[0]
+    >>> stress = hertz_stress(contact.conditions, np.linspace(0.1, 2.0, 40) * half_width)
+    >>> f"largest von Mises stress at {stress.peak.depth / half_width:.1f} half-widths"
+    'largest von Mises stress at 0.7 half-widths'
     """
     line = conditions.long
     (a, b), cells = conditions.hertz.half_widths, HERTZ_CELLS

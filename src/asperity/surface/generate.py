@@ -44,6 +44,17 @@ def gaussian_surface(
     ------
     BadInput
         A correlation length is below 2 cells, the resolution of the grid, or above half the domain.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import gaussian_surface
+    >>> grid = Grid(cells=(64, 64), lower=(0.0, 0.0), upper=(1e-3, 1e-3), periodic=(True, True))
+    >>> rng = np.random.default_rng(1)
+    >>> surface = gaussian_surface(grid, sq=0.5e-6, correlation_length=50e-6, rng=rng)
+    >>> f"Sq {surface.heights.std() * 1e6:.2f} um"
+    'Sq 0.50 um'
     """
     lengths = _lengths(grid, correlation_length, direction)
     return _filtered_noise(grid, sq, *_gaussian_spectrum(lengths, direction), rng)
@@ -131,6 +142,19 @@ def non_gaussian_surface(
     BadInput
         The moments are impossible (kurtosis below 1 + skewness^2) or not attainable by this sample;
         and as `gaussian_surface`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import height_parameters, non_gaussian_surface
+    >>> grid = Grid(cells=(64, 64), lower=(0.0, 0.0), upper=(1e-3, 1e-3), periodic=(True, True))
+    >>> rng = np.random.default_rng(1)
+    >>> surface = non_gaussian_surface(
+    ...     grid, sq=0.5e-6, skewness=-1.0, kurtosis=5.0, correlation_length=50e-6, rng=rng
+    ... )
+    >>> f"Ssk {height_parameters(surface).ssk:.1f}, Sku {height_parameters(surface).sku:.1f}"
+    'Ssk -1.0, Sku 5.0'
     """
     if not kurtosis > 1.0 + skewness**2:
         raise BadInput(
@@ -181,6 +205,22 @@ def run_in_surface(
     ------
     BadInput
         The share is out of range or the roughness negative; and as `gaussian_surface`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import height_parameters, run_in_surface
+    >>> grid = Grid(cells=(64, 64), lower=(0.0, 0.0), upper=(1e-3, 1e-3), periodic=(True, True))
+    >>> surface = run_in_surface(
+    ...     grid,
+    ...     sq=0.5e-6,
+    ...     correlation_length=50e-6,
+    ...     plateau_share=0.6,
+    ...     rng=np.random.default_rng(1),
+    ... )
+    >>> f"Ssk {height_parameters(surface).ssk:.1f}"
+    'Ssk -2.4'
     """
     if not 0.0 < plateau_share < 1.0:
         raise BadInput(
@@ -220,6 +260,18 @@ def self_affine_surface(
     BadInput
         The Hurst exponent is out of range, or the cut-offs are swapped, below 2 cells or beyond the
         domain.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import self_affine_surface
+    >>> grid = Grid(cells=(64, 64), lower=(0.0, 0.0), upper=(1e-3, 1e-3), periodic=(True, True))
+    >>> surface = self_affine_surface(
+    ...     grid, sq=0.5e-6, hurst=0.8, cutoffs=(50e-6, 500e-6), rng=np.random.default_rng(1)
+    ... )
+    >>> f"Sq {surface.heights.std() * 1e6:.2f} um"
+    'Sq 0.50 um'
     """
     if not 0.0 < hurst <= 1.0:
         raise BadInput(

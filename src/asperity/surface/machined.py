@@ -59,6 +59,17 @@ def ground_surface(
     ------
     BadInput
         Grooves are narrower than 4 cells or longer than half the domain.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import ground_surface
+    >>> grid = Grid(cells=(64, 64), lower=(0.0, 0.0), upper=(1e-3, 1e-3), periodic=(True, True))
+    >>> rng = np.random.default_rng(1)
+    >>> surface = ground_surface(grid, sq=0.5e-6, groove_width=80e-6, groove_length=400e-6, rng=rng)
+    >>> f"Sq {surface.heights.std() * 1e6:.2f} um"
+    'Sq 0.50 um'
     """
     require_lengths(
         grid,
@@ -103,6 +114,17 @@ def sandblasted_surface(
     ------
     BadInput
         Craters are smaller than 2 cells or larger than an eighth of the domain.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import sandblasted_surface
+    >>> grid = Grid(cells=(64, 64), lower=(0.0, 0.0), upper=(1e-3, 1e-3), periodic=(True, True))
+    >>> rng = np.random.default_rng(1)
+    >>> surface = sandblasted_surface(grid, sq=1e-6, crater_radius=60e-6, rng=rng)
+    >>> f"Sq {surface.heights.std() * 1e6:.2f} um"
+    'Sq 1.00 um'
     """
     require_positive("crater_radius", crater_radius, "m")
     least, most = 2.0 * max(grid.spacing), min(grid.extent) / 8.0

@@ -28,6 +28,16 @@ class Surface:
     ------
     BadInput
         The shape is not the grid's, or a height is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import Surface
+    >>> grid = Grid(cells=(64, 32), lower=(0.0, 0.0), upper=(2e-3, 1e-3))
+    >>> heights = np.where(grid.x[:, np.newaxis] < 1e-3, 1e-6, -1e-6) * np.ones(32)
+    >>> Surface(heights, grid).sq
+    1e-06
     """
 
     heights: Field
@@ -131,7 +141,14 @@ def flat_surface(grid: Grid) -> Surface:
 
 
 def length_text(metres: float) -> str:
-    """Format a length with four digits in the unit that suits its size."""
+    """Format a length with four digits in the unit that suits its size.
+
+    Examples
+    --------
+    >>> from asperity.surface import length_text
+    >>> length_text(0.25e-3)
+    '250 um'
+    """
     for unit, size in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
         if abs(metres) >= 0.9995 * size:
             return f"{metres / size:.4g} {unit}"

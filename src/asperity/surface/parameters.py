@@ -166,7 +166,20 @@ class HeightParameters(NamedTuple):
 
 
 def height_parameters(surface: Surface | MeasuredSurface) -> HeightParameters:
-    """Compute mean heights, skewness, kurtosis and core heights, without form removal."""
+    """Compute mean heights, skewness, kurtosis and core heights, without form removal.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import Surface, height_parameters
+    >>> x = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
+    >>> grid = Grid(cells=(400, 8), lower=(0.0, 0.0), upper=(1e-3, 2e-5))
+    >>> wave = Surface(1e-6 * np.sin(x)[:, np.newaxis] * np.ones(8), grid)
+    >>> parameters = height_parameters(wave)
+    >>> f"Sa {parameters.sa * 1e6:.3f} um, Sku {parameters.sku:.2f}"
+    'Sa 0.637 um, Sku 1.50'
+    """
     heights = surface.heights - np.nanmean(surface.heights)
     sq = float(np.sqrt(np.nanmean(heights**2)))
     if sq == 0.0:
@@ -186,7 +199,19 @@ def height_parameters(surface: Surface | MeasuredSurface) -> HeightParameters:
 
 
 def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
-    """Compute the ISO 25178-2 parameters; remove the form of a measured surface first (`level`)."""
+    """Compute the ISO 25178-2 parameters; remove the form of a measured surface first (`level`).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import gaussian_surface, surface_parameters
+    >>> grid = Grid(cells=(64, 64), lower=(0.0, 0.0), upper=(1e-3, 1e-3), periodic=(True, True))
+    >>> rng = np.random.default_rng(1)
+    >>> surface = gaussian_surface(grid, sq=0.5e-6, correlation_length=50e-6, rng=rng)
+    >>> f"Sal {surface_parameters(surface).sal * 1e6:.0f} um"
+    'Sal 59 um'
+    """
     heights = surface.heights - np.nanmean(surface.heights)
     of_heights = height_parameters(surface)
     if of_heights.sq == 0.0:
@@ -233,6 +258,17 @@ def correlation_lengths(
 
     At this distance the autocorrelation falls to 1/e; nan if it does not within half the map.
     Generators take these lengths; the threshold of Sal is 0.2.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import correlation_lengths, gaussian_surface
+    >>> grid = Grid(cells=(128, 128), lower=(0.0, 0.0), upper=(2e-3, 2e-3), periodic=(True, True))
+    >>> rng = np.random.default_rng(1)
+    >>> surface = gaussian_surface(grid, sq=0.5e-6, correlation_length=(80e-6, 40e-6), rng=rng)
+    >>> [round(length * 1e6) for length in correlation_lengths(surface)]
+    [75, 39]
     """
     return _correlation_lengths(surface, direction)
 

@@ -46,6 +46,15 @@ def profile_parameters(heights: Field, spacing: float) -> ProfileParameters:
     ----------
     heights : shape (n,) [m], nan for missing points
     spacing : distance of the points [m]
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.surface import profile_parameters
+    >>> x = np.arange(5000) * 1e-6
+    >>> p = profile_parameters(1e-6 * np.sin(2.0 * np.pi * x / 0.25e-3), spacing=1e-6)
+    >>> f"Ra {p.ra * 1e6:.3f} um, Rsm {p.rsm * 1e3:.3f} mm"
+    'Ra 0.637 um, Rsm 0.250 mm'
     """
     z = heights - np.nanmean(heights)
     rq = float(np.sqrt(np.nanmean(z**2)))

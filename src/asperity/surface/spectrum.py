@@ -40,6 +40,17 @@ def surface_spectrum(surface: Surface | MeasuredSurface) -> SurfaceSpectrum:
     """Compute the spectra of a levelled surface.
 
     Missing cells are set to the mean; axes that are not periodic have a Hann taper.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.contact.grid import Grid
+    >>> from asperity.surface import gaussian_surface, surface_spectrum
+    >>> grid = Grid(cells=(64, 64), lower=(0.0, 0.0), upper=(1e-3, 1e-3), periodic=(True, True))
+    >>> rng = np.random.default_rng(1)
+    >>> surface = gaussian_surface(grid, sq=0.5e-6, correlation_length=50e-6, rng=rng)
+    >>> f"{surface_spectrum(surface).wavenumber.min():.0f} rad/m"
+    '6283 rad/m'
     """
     grid = surface.grid
     heights = np.nan_to_num(surface.heights - np.nanmean(surface.heights))

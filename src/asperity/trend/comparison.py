@@ -49,6 +49,16 @@ def asperity_load_share(
     ------
     BadInput
         for a full-load resonance that is not positive, or a negative standard deviation.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.trend import asperity_load_share
+    >>> share = asperity_load_share(
+    ...     np.array([300.0, 400.0]), crf_std_hz=np.array([3.0, 3.0]), full_load_crf_hz=500.0
+    ... )
+    >>> share.clr.round(2)
+    array([0.05, 0.26])
     """
     require_positive("full-load resonance", full_load_crf_hz, "Hz")
     std = np.asarray(crf_std_hz, dtype=float)

@@ -80,6 +80,14 @@ class FilteredNoise(NoiseFilter):
     `reference_cutoff_hz` is the cut-off [Hz] at which the noise coefficient is set to give that
     height, and then kept: spectra at the resonance grow as cut-off^4 (order 2). None: readjusted at
     each cut-off, ^3. Raises BadInput for a quantity out of range.
+
+    Examples
+    --------
+    >>> from asperity.vibration import FilteredNoise
+    >>> noise = FilteredNoise(height=0.5e-6, cutoff_hz=100.0)
+    >>> profile = noise.profile(100_000, rate_hz=10_000.0, seed=1)
+    >>> f"rms {profile.values.std() * 1e6:.2f} um"
+    'rms 0.49 um'
     """
 
     height: float
@@ -186,7 +194,14 @@ class FilteredNoise(NoiseFilter):
 
 
 def white_noise(samples: int, seed: int) -> Field:
-    """Return independent Gaussian samples of variance 1, as in the paper's Fig 3a."""
+    """Return independent Gaussian samples of variance 1, as in the paper's Fig 3a.
+
+    Examples
+    --------
+    >>> from asperity.vibration import white_noise
+    >>> round(float(white_noise(100_000, seed=1).std()), 1)
+    1.0
+    """
     return np.random.default_rng(seed).standard_normal(samples)
 
 

@@ -63,6 +63,14 @@ def turning_by_speed(speed_hz: Field, rate_hz: float) -> Turning:
     ------
     BadInput
         for a shaft that reverses or stops.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.vibration import turning_by_speed
+    >>> turning = turning_by_speed(np.full(1000, 25.0), rate_hz=1000.0)
+    >>> f"{turning.turns[-1]:.2f} turns, {turning.speed_hz:.1f} Hz"
+    '24.98 turns, 25.0 Hz'
     """
     if not np.all(speed_hz > 0.0):
         raise BadInput("the shaft stops or reverses at times; omit its speed channel")

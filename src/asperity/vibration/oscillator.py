@@ -29,6 +29,13 @@ class ContactOscillator:
     y_i is the profile under the mass. `mass` [kg], `stiffness` S [N/m], `damping_ratio` ζ between 0
     and 1, `load` F [N] that the spring carries at rest (for the nonlinear response only). Raises
     BadInput outside these ranges.
+
+    Examples
+    --------
+    >>> from asperity.vibration import ContactOscillator
+    >>> oscillator = ContactOscillator(mass=0.1, stiffness=350e6, damping_ratio=0.02)
+    >>> f"{oscillator.natural_frequency_hz:.0f} Hz"
+    '9416 Hz'
     """
 
     mass: float
@@ -112,7 +119,14 @@ class ContactOscillator:
 
 
 def require_damping_ratio(damping_ratio: float) -> float:
-    """Return the ratio if it is between 0 and 1; raise BadInput otherwise."""
+    """Return the ratio if it is between 0 and 1; raise BadInput otherwise.
+
+    Examples
+    --------
+    >>> from asperity.vibration import require_damping_ratio
+    >>> require_damping_ratio(0.02)
+    0.02
+    """
     if not 0.0 < damping_ratio < 1.0:
         raise BadInput(
             f"damping ratio must be between 0 and 1, got {damping_ratio:g}; typical of steel is "
@@ -183,7 +197,18 @@ def mass_motion(
     method: ResponseMethod = "exact",
     substeps: int = SUBSTEPS,
 ) -> MassMotion:
-    """Compute the motion of the mass (the paper's Fig 4); arguments as for `acceleration`."""
+    """Compute the motion of the mass (the paper's Fig 4); arguments as for `acceleration`.
+
+    Examples
+    --------
+    >>> from asperity.core.signals import Signal
+    >>> from asperity.vibration import ContactOscillator, mass_motion, white_noise
+    >>> oscillator = ContactOscillator(mass=1.0, stiffness=1e6, damping_ratio=0.05, load=100.0)
+    >>> profile = Signal(1e-6 * white_noise(2000, seed=1), rate_hz=20_000.0, unit="m")
+    >>> motion = mass_motion(oscillator, profile)
+    >>> f"rms {motion.displacement.std() * 1e6:.2f} um"
+    'rms 2.15 um'
+    """
     _check(profile, method)
     slopes: Field = np.diff(profile.values) * profile.rate_hz
     if method == "exact":
@@ -308,6 +333,16 @@ def expected_spectrum(
     ------
     BadInput
         for a spectrum of anything but heights in metres.
+
+    Examples
+    --------
+    >>> from asperity.core.signals import Signal, power_spectrum
+    >>> from asperity.vibration import ContactOscillator, expected_spectrum, white_noise
+    >>> oscillator = ContactOscillator(mass=1.0, stiffness=1e6, damping_ratio=0.05)
+    >>> profile = power_spectrum(Signal(white_noise(20_000, seed=1), rate_hz=2000.0, unit="m"))
+    >>> response = expected_spectrum(oscillator, profile)
+    >>> f"{oscillator.natural_frequency_hz:.0f} Hz, {response.unit}"
+    '159 Hz, (m/s^2)^2/Hz'
     """
     if profile.unit != "m^2/Hz":
         raise BadInput(

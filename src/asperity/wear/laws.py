@@ -64,6 +64,16 @@ class Archard(Parametric):
 
     Source: J. F. Archard, J. Appl. Phys. 24 (1953) 981; on the contact pressure of mixed contacts
     D. Zhu, A. Martini, W. Wang, Y. Hu, B. Lisowsky, Q. J. Wang, J. Tribol. 129 (2007) 544.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.wear import Archard, RubbingConditions
+    >>> conditions = RubbingConditions(
+    ...     pressure=np.array([1e9]), shear=np.array([1e8]), sliding_speed=0.5
+    ... )
+    >>> Archard()(conditions)
+    array([5.e+08])
     """
 
     needs_temperature: ClassVar[bool] = False
@@ -149,7 +159,14 @@ REMOVAL_LAWS: dict[str, type[RemovalLaw]] = {
 
 @dataclass(frozen=True, slots=True)
 class WearCoefficient:
-    """Wear coefficient k [1/Pa], and the ends of its 90 % interval relative to k."""
+    """Wear coefficient k [1/Pa], and the ends of its 90 % interval relative to k.
+
+    Examples
+    --------
+    >>> from asperity.wear import WearCoefficient
+    >>> WearCoefficient.from_value(1e-17)
+    WearCoefficient(k=1e-17, low=0.4393641049274925, high=2.276016608514317)
+    """
 
     k: float
     low: float
