@@ -1,6 +1,4 @@
-"""A wear history in its folder: killed and gone on with, gone on to more hours, in processes,
-refused.
-"""
+"""Wear histories in a folder: resuming after a kill, extension, parallel workers, refusals."""
 
 import shutil
 import signal
@@ -32,21 +30,21 @@ HOURS = 1.0
 
 
 class Stop(Exception):
-    """A run that is stopped where it stands."""
+    """Raised to interrupt a run."""
 
 
 def case(overrides: dict[str, object] | None = None):
     return worn_case({**FEW, "wear.step": 0.1, **(overrides or {})})
 
 
-def same(one: WearHistory, other: WearHistory) -> None:
-    pandas.testing.assert_frame_equal(one.table, other.table, check_exact=True)
+def assert_same(actual: WearHistory, expected: WearHistory) -> None:
+    pandas.testing.assert_frame_equal(actual.table, expected.table, check_exact=True)
     for a, b in (
-        (one.final_surfaces.first, other.final_surfaces.first),
-        (one.final_surfaces.second, other.final_surfaces.second),
+        (actual.final_surfaces.first, expected.final_surfaces.first),
+        (actual.final_surfaces.second, expected.final_surfaces.second),
     ):
         np.testing.assert_array_equal(a.heights, b.heights)
-    assert one.worn_volume == other.worn_volume
+    assert actual.worn_volume == expected.worn_volume
 
 
 @pytest.fixture(scope="module")
@@ -54,9 +52,7 @@ def unbroken() -> WearHistory:
     return run_wear(case(), hours=HOURS)
 
 
-def test_stopped_at_any_jump_it_goes_on_to_the_same_to_the_last_bit(
-    unbroken, tmp_path, monkeypatch
-):
+def test_a_run_stopped_at_any_jump_resumes_bit_for_bit(unbroken, tmp_path, monkeypatch):
     monkeypatch.setattr(folder, "SAVE_INTERVAL_S", 0.0)
     jumps = len(unbroken.table) - 1
     assert jumps >= 10
@@ -71,12 +67,12 @@ def test_stopped_at_any_jump_it_goes_on_to_the_same_to_the_last_bit(
             run_wear(case(), hours=HOURS, out=tmp_path / "worn", progress=stop)
     again = run_wear(case(), hours=HOURS, out=tmp_path / "worn")
     assert again.computed < jumps
-    same(again, unbroken)
-    same(load_wear(tmp_path / "worn"), unbroken)
+    assert_same(again, unbroken)
+    assert_same(load_wear(tmp_path / "worn"), unbroken)
     assert run_wear(case(), hours=HOURS, out=tmp_path / "worn").computed == 0
 
 
-def test_killed_by_the_system_it_goes_on_to_the_same(unbroken, tmp_path):
+def test_a_killed_run_resumes_to_the_same_result(unbroken, tmp_path):
     (tmp_path / "case.toml").write_text(CASE + "patches = 4\nstep = 0.1\n", "utf-8")
     command = [
         sys.executable,
@@ -97,38 +93,38 @@ def test_killed_by_the_system_it_goes_on_to_the_same(unbroken, tmp_path):
         time.sleep(seconds)
         process.send_signal(signal.SIGKILL)
         process.wait()
-    same(run_wear(case(), hours=HOURS, out=tmp_path / "worn"), unbroken)
+    assert_same(run_wear(case(), hours=HOURS, out=tmp_path / "worn"), unbroken)
 
 
-def test_more_hours_go_on_as_if_they_had_been_asked_for_at_first(unbroken, tmp_path):
+def test_an_extended_run_equals_a_run_of_the_full_duration(unbroken, tmp_path):
     short = run_wear(case(), hours=0.55 * HOURS, out=tmp_path / "worn")
     assert short.hours == pytest.approx(0.55 * HOURS, rel=1e-12, abs=0.0)
-    same(run_wear(case(), hours=HOURS, out=tmp_path / "worn"), unbroken)
+    assert_same(run_wear(case(), hours=HOURS, out=tmp_path / "worn"), unbroken)
     with pytest.raises(BadInput, match=r"holds .* h of wear, got 0.1 h"):
         run_wear(case(), hours=0.1, out=tmp_path / "worn")
 
 
-def test_fewer_hours_than_are_kept_are_refused_and_nothing_is_lost(tmp_path):
-    """Between the last jump but one and the end too."""
-    kept = run_wear(case(), hours=0.5, out=tmp_path / "worn")
+def test_fewer_hours_than_stored_are_refused_and_files_stay_unchanged(tmp_path):
+    """Also for a time between the last two jumps."""
+    stored = run_wear(case(), hours=0.5, out=tmp_path / "worn")
     files = [
         path
         for path in (tmp_path / "worn").rglob("*")
         if path.is_file() and path.name != folder.LOCK
     ]
     before = [path.read_bytes() for path in files]
-    last = float(kept.table["hours"].iloc[-2])
+    last = float(stored.table["hours"].iloc[-2])
     with pytest.raises(BadInput, match=r"holds 0.5 h of wear, got 0.\d+ h"):
         run_wear(case(), hours=0.5 * (last + 0.5), out=tmp_path / "worn")
     assert [path.read_bytes() for path in files] == before
-    same(load_wear(tmp_path / "worn"), kept)
+    assert_same(load_wear(tmp_path / "worn"), stored)
 
 
-def test_processes_change_nothing(unbroken):
-    same(run_wear(case(), hours=HOURS, workers=2), unbroken)
+def test_the_number_of_workers_does_not_change_the_result(unbroken):
+    assert_same(run_wear(case(), hours=HOURS, workers=2), unbroken)
 
 
-def test_surfaces_are_files_that_others_open(tmp_path):
+def test_other_software_opens_the_surface_files(tmp_path):
     worn = run_wear(case(), hours=0.2, out=tmp_path / "worn")
     assert [path.name for path in worn.files] == [
         "first-before.x3p",
@@ -139,14 +135,14 @@ def test_surfaces_are_files_that_others_open(tmp_path):
     for path, surface in zip(
         worn.files[:2], (worn.initial_surfaces.first, worn.final_surfaces.first), strict=True
     ):
-        theirs = surface_topography().open_topography(str(path)).topography()
-        assert theirs.unit == "m"
-        np.testing.assert_array_equal(theirs.heights(), surface.heights)
-        np.testing.assert_allclose(theirs.physical_sizes, surface.grid.extent, rtol=1e-12)
-        ours = read_surface(path)
-        np.testing.assert_array_equal(ours.heights, surface.heights)
+        topography = surface_topography().open_topography(str(path)).topography()
+        assert topography.unit == "m"
+        np.testing.assert_array_equal(topography.heights(), surface.heights)
+        np.testing.assert_allclose(topography.physical_sizes, surface.grid.extent, rtol=1e-12)
+        surface_read = read_surface(path)
+        np.testing.assert_array_equal(surface_read.heights, surface.heights)
         row = worn.table.iloc[0 if "before" in path.name else -1]
-        parameters = height_parameters(ours)
+        parameters = height_parameters(surface_read)
         for key, value in (
             ("sq_m", parameters.sq),
             ("spk_m", parameters.spk),
@@ -155,7 +151,7 @@ def test_surfaces_are_files_that_others_open(tmp_path):
             assert row[body_column(key, 0)] == pytest.approx(value, rel=1e-9, abs=0.0)
 
 
-def test_a_moment_lies_between_its_rows(unbroken):
+def test_values_are_interpolated_between_rows(unbroken):
     table = unbroken.table
     between = unbroken.values_at(0.5 * (table["hours"][3] + table["hours"][4]))
     assert between["clr"] == pytest.approx(0.5 * (table["clr"][3] + table["clr"][4]))
@@ -164,10 +160,8 @@ def test_a_moment_lies_between_its_rows(unbroken):
         unbroken.values_at(HOURS + 0.5)
 
 
-def test_the_interval_of_k_is_another_clock(unbroken):
-    """What happens by the end with k at the ends of its interval, computed: it lies where the
-    interval says.
-    """
+def test_the_interval_of_k_rescales_time(unbroken):
+    """A run with k at the end of its interval reproduces the stated bound."""
     band = unbroken.interval_by_k("sq_m")
     slow, fast = unbroken.k_interval
     assert (slow, fast) == pytest.approx((np.exp(-0.8224), np.exp(0.8224)), rel=1e-4, abs=0.0)
@@ -177,19 +171,19 @@ def test_the_interval_of_k_is_another_clock(unbroken):
     low, high = unbroken.volume_interval(0)
     assert low < unbroken.worn_volume[0] < high
     later = run_wear(case(), hours=HOURS * fast).worn_volume[0]
-    assert later < high < 1.25 * later  # wear slows down, and the interval goes on as it last went
+    assert later < high < 1.25 * later  # wear slows down; the interval extrapolates the last rate
     assert run_wear(case({"wear.flattening": True}), hours=1e-4).interval_by_k("sq_m") is None
 
 
-def test_a_law_of_film_defects_runs_with_its_own_values():
-    """The bare metal's k, at which Archard's law asks for thousands of jumps: few of its sites are
+def test_the_film_defect_law_runs_with_its_own_parameters():
+    """With this k, bare metal needs thousands of jumps under Archard's law; here few sites are
     bare.
     """
     defects = {"wear.law": "film-defect", "wear.k": "severe"}
     assert len(run_wear(case(defects), hours=10.0).table) < 20
 
 
-def test_flattening_is_kept_apart_from_what_is_lost():
+def test_flattening_is_reported_separately_from_wear():
     soft = {"wear.flattening": True, "material.hardness": "1 GPa", "wear.k": "0 1/Pa"}
     worn = run_wear(case(soft), hours=0.01)
     assert worn.worn_volume == (0.0, 0.0)
@@ -198,10 +192,10 @@ def test_flattening_is_kept_apart_from_what_is_lost():
     assert worn.final_surfaces.first.sq < worn.initial_surfaces.first.sq
     np.testing.assert_array_equal(
         worn.final_surfaces.second.heights, worn.initial_surfaces.second.heights
-    )  # smooth, and lies below
+    )  # the smooth lower body
 
 
-def test_what_cannot_be_meant_is_refused_and_nothing_is_left(tmp_path):
+def test_invalid_runs_are_refused_and_leave_no_files(tmp_path):
     with pytest.raises(BadInput, match=r"add \[wear\] with k"):
         run_wear(case({"wear": "none"}), hours=1.0)
     with pytest.raises(BadInput, match="hours of wear must be positive"):
@@ -225,7 +219,7 @@ def test_a_folder_of_another_case_or_a_damaged_one_is_refused(tmp_path):
         shutil.copytree(tmp_path / "worn", tmp_path / name)
         path: Path = tmp_path / name / name
         content = bytearray(path.read_bytes())
-        third = len(content) // 3  # of a table's single bytes some hold nothing
+        third = len(content) // 3  # single bytes of a table may be unused
         content[third : 2 * third] = bytes(byte ^ 1 for byte in content[third : 2 * third])
         path.write_bytes(content)
         with pytest.raises(UnreadableFile, match="damaged"):
@@ -235,30 +229,30 @@ def test_a_folder_of_another_case_or_a_damaged_one_is_refused(tmp_path):
         load_wear(tmp_path / "worn")
 
 
-def test_contacts_that_cannot_be_solved_stop_it_with_a_reason(tmp_path):
-    few = {"solver.max_iterations": 1, "solver.tolerance": 1e-6}
+def test_unsolvable_contacts_stop_the_run_with_a_reason(tmp_path):
+    iteration_limit = {"solver.max_iterations": 1, "solver.tolerance": 1e-6}
     with pytest.raises(
         NotConverged, match=r"4 of 4 contacts .*; raise solver.tolerance or solver.max_iterations$"
     ):
-        run_wear(case(few), hours=1.0)
+        run_wear(case(iteration_limit), hours=1.0)
     with pytest.raises(
         NotConverged, match=r"4 of 4 contacts could not be solved after 0 h: contact not solved"
     ):
-        run_wear(case(few), hours=1.0, out=tmp_path / "worn")
+        run_wear(case(iteration_limit), hours=1.0, out=tmp_path / "worn")
 
 
-def test_a_standing_body_that_cannot_be_solved_is_told_what_helps():
-    """It has one position, solved from nothing: going on would fail in the same way."""
-    few = {"solver.max_iterations": 1, "solver.tolerance": 1e-6, "contact.slip": 2.0}
-    few |= {"motion.rough": "second"}
+def test_an_unsolvable_standing_body_raises_a_message_with_remedies():
+    """It has one position, solved from a cold start: a retry would fail in the same way."""
+    iteration_limit = {"solver.max_iterations": 1, "solver.tolerance": 1e-6, "contact.slip": 2.0}
+    iteration_limit |= {"motion.rough": "second"}
     with pytest.raises(
         NotConverged,
         match=r"1 of 1 contacts .*; raise solver.tolerance or solver.max_iterations, .*",
     ):
-        run_wear(case(few), hours=1.0)
+        run_wear(case(iteration_limit), hours=1.0)
 
 
-def test_a_contact_that_outgrows_its_grid_is_stopped():
+def test_a_contact_that_outgrows_its_grid_stops_the_run():
     narrow = {"contact.load": "60 N", "lubricant": "none", "surface": "flat", "grid.y": [-1.6, 1.6]}
     with pytest.raises(
         AsperityError, match=r"as wide as its grid after .* h; state a wider grid.y"
@@ -282,14 +276,12 @@ def test_a_rig_records_a_contact_as_it_wears(unbroken, tmp_path):
     write_rig(rig, tmp_path / "rig")
     table = pandas.read_csv(tmp_path / "rig" / "table.csv")
     assert table["hours"].tolist() == [0.0, 0.0, HOURS, HOURS]
-    assert table.columns[1] == "hours"  # which `asperity track` takes for x
+    assert table.columns[1] == "hours"  # the column that `asperity track` uses as x
     assert len(unbroken.moments()) == 12
 
 
-def test_a_longer_run_that_is_killed_leaves_the_shorter_one_as_it_was(tmp_path, monkeypatch):
-    """Its rows, its end and the surfaces' files hang together; the longer run's own rows are not
-    among them.
-    """
+def test_killing_a_longer_run_leaves_the_shorter_one_unchanged(tmp_path, monkeypatch):
+    """Rows, end state and surface files stay consistent and exclude the rows of the longer run."""
     monkeypatch.setattr(folder, "SAVE_INTERVAL_S", 0.0)
     short = run_wear(case(), hours=0.5, out=tmp_path / "worn")
     last = int(short.table["jump"].iloc[-1])
@@ -302,13 +294,13 @@ def test_a_longer_run_that_is_killed_leaves_the_shorter_one_as_it_was(tmp_path, 
     with pytest.raises(Stop):
         run_wear(case(), hours=HOURS, out=tmp_path / "worn", progress=stop)
     again = load_wear(tmp_path / "worn")
-    same(again, short)
+    assert_same(again, short)
     assert [path.read_bytes() for path in again.files] == files
     assert again.table["hours"].iloc[-1] == 0.5
 
 
-def test_a_folder_of_another_layout_is_refused_in_a_sentence(tmp_path, monkeypatch):
-    """By its number; and where that was forgotten, by what its files hold."""
+def test_a_folder_with_another_layout_is_refused(tmp_path, monkeypatch):
+    """By its version number or, if the number was not raised, by the content of its files."""
     with monkeypatch.context() as before:
         older = replace(store.LAYOUT, version=store.LAYOUT.version - 1)
         before.setattr(store, "LAYOUT", older)
@@ -340,15 +332,15 @@ def test_a_folder_of_another_layout_is_refused_in_a_sentence(tmp_path, monkeypat
             run_wear(case(), hours=0.1, out=tmp_path / name)
 
 
-def test_the_layout_has_a_number_of_its_own():
-    """What is kept of a jump, by name; where this changes, store.LAYOUT.version counts up."""
+def test_the_stored_names_match_the_layout_version():
+    """Names stored for each jump; when they change, increase store.LAYOUT.version."""
     kept = WearState.unworn(case().moving_surfaces()).arrays()
     names = {"worn", "flattened", "changed", "rates"}
     assert set(kept) == {f"{name}_{body}" for name in names for body in (0, 1)} | {"numbers"}
     assert (store.LAYOUT.version, kept["numbers"].size) == (3, 9)
 
 
-def test_frames_show_the_contact_spread_over_the_history(unbroken, tmp_path):
+def test_frames_are_spread_over_the_history(unbroken, tmp_path):
     jumps = len(unbroken.table) - 1
     numbers = [frame.number for frame in unbroken.frames]
     assert numbers[0] == 0
@@ -359,18 +351,22 @@ def test_frames_show_the_contact_spread_over_the_history(unbroken, tmp_path):
         unbroken.table["hours"][number] for number in numbers
     ]
     first = unbroken.frames[0]
-    seen_first = unbroken.contact.solver(
+    first_solution = unbroken.contact.solver(
         combined_roughness(unbroken.initial_surfaces, first.position)
     )
-    np.testing.assert_array_equal(first.pressure, seen_first.pressure.astype(np.float32))
-    np.testing.assert_array_equal(first.in_contact, seen_first.asperity_pressure > 0.0)
+    np.testing.assert_array_equal(first.pressure, first_solution.pressure.astype(np.float32))
+    np.testing.assert_array_equal(first.in_contact, first_solution.asperity_pressure > 0.0)
     kept = run_wear(case(), hours=0.5, out=tmp_path / "worn")
-    for one, other in zip(kept.frames, load_wear(tmp_path / "worn").frames, strict=True):
-        assert (one.number, one.hours, one.position) == (other.number, other.hours, other.position)
-        np.testing.assert_array_equal(one.gap, other.gap)
+    for actual, expected in zip(kept.frames, load_wear(tmp_path / "worn").frames, strict=True):
+        assert (actual.number, actual.hours, actual.position) == (
+            expected.number,
+            expected.hours,
+            expected.position,
+        )
+        np.testing.assert_array_equal(actual.gap, expected.gap)
 
 
-def test_frames_are_few_however_many_jumps_there_are():
+def test_the_number_of_frames_is_bounded():
     for latest in (0, 23, 24, 47, 48, 1000):
         kept = [number for number in range(latest + 1) if is_kept(number, latest)]
         assert kept[0] == 0

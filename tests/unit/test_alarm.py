@@ -1,4 +1,4 @@
-"""The sequential alarm on series of indicators whose truth is known."""
+"""Sequential alarm on series of indicators with known truth."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,9 @@ PER_THOUSAND = threshold(1e-3)
 
 
 def knee_at(place, scatter, seed, after=0.18):
-    """The paper's rise of CRF, 2922 to 3640 Hz, and its slower one behind, over its first value."""
+    """Simulate the paper's CRF, 2922 to 3640 Hz with a slower rise after the knee, relative to the
+    start.
+    """
     pace = 718.0 / place
     course = 2922.0 + np.where(
         place > NUMBER, pace * NUMBER, 718.0 + after * pace * (NUMBER - place)
@@ -26,15 +28,15 @@ def knee_at(place, scatter, seed, after=0.18):
     return (course + scatter * np.random.default_rng(seed).standard_normal(NUMBER.size)) / 2922.0
 
 
-def first(test, values, smallest_change, above=PER_THOUSAND):
-    """After how many recordings a test speaks first, judged after each."""
+def recordings_to_alarm(test, values, smallest_change, above=PER_THOUSAND):
+    """Return the number of recordings after which a test first raises an alarm."""
     for count in range(1, values.size + 1):
         if test(NUMBER[:count], values[:count], smallest_change=smallest_change).log_ratio > above:
             return count
     return None
 
 
-def watched(values, contact=True, smallest_change=0.05):
+def monitored(values, contact=True, smallest_change=0.05):
     return MonitoredSeries(
         name="CRF",
         values=np.asarray(values),
@@ -44,16 +46,18 @@ def watched(values, contact=True, smallest_change=0.05):
     )
 
 
-def judged(values, statuses=None, **choices):
+def alarm_state(values, statuses=None, **choices):
     values = np.asarray(values)
-    seen = statuses or [RecordingStatus()] * values.size
-    return sequential_alarm(np.arange(float(values.size)), [watched(values)], seen, **choices)
+    status_list = statuses or [RecordingStatus()] * values.size
+    return sequential_alarm(
+        np.arange(float(values.size)), [monitored(values)], status_list, **choices
+    )
 
 
 @pytest.mark.parametrize("place", [12, 18, 24])
-def test_a_knee_is_found_soon_and_where_it_is(place):
+def test_a_knee_is_detected_early_and_located(place):
     values = knee_at(place, 5.0, place)
-    count = first(knee_test, values, 0.05)
+    count = recordings_to_alarm(knee_test, values, 0.05)
     assert place < count <= place + 5
     found = knee_test(NUMBER[:count], values[:count], smallest_change=0.05)
     assert found.x == pytest.approx(place, abs=2.0)
@@ -78,29 +82,29 @@ HEALTHY = {
 
 
 @pytest.mark.parametrize("name", HEALTHY)
-def test_what_is_no_knee_raises_nothing_after_any_recording(name):
-    assert first(knee_test, HEALTHY[name] + scatter(3), 0.05) is None
+def test_a_course_without_knee_raises_no_alarm_after_any_recording(name):
+    assert recordings_to_alarm(knee_test, HEALTHY[name] + scatter(3), 0.05) is None
 
 
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e6])
 def test_the_evidence_of_a_knee_does_not_depend_on_the_unit_of_x(unit):
     values = knee_at(18, 5.0, 1)[:24]
-    one, other = (
+    unscaled, scaled = (
         knee_test(NUMBER[:24], values, smallest_change=0.05),
         knee_test(7.0 * unit + NUMBER[:24] * unit, values, smallest_change=0.05),
     )
-    assert other.log_ratio == pytest.approx(one.log_ratio, rel=1e-4)
-    assert (other.x - 7.0 * unit) / unit == pytest.approx(one.x, rel=1e-4)
+    assert scaled.log_ratio == pytest.approx(unscaled.log_ratio, rel=1e-4)
+    assert (scaled.x - 7.0 * unit) / unit == pytest.approx(unscaled.x, rel=1e-4)
 
 
 def test_the_likelihood_ratio_of_white_scatter_is_that_of_least_squares():
-    """Slow twin: with independent scatter alone, n/2 ln of the ratio of the squares left by two
-    straight fits.
+    """Slow reference: with independent scatter, n/2 ln of the ratio of the two straight fits'
+    residual squares.
     """
     values = knee_at(10, 20.0, 5)[:20]
     at = NUMBER[:20]
 
-    def left(columns):
+    def residual_squares(columns):
         design = np.stack([np.ones(20), *columns], axis=1)
         return float(
             np.sum((values - design @ np.linalg.lstsq(design, values, rcond=None)[0]) ** 2)
@@ -115,15 +119,15 @@ def test_the_likelihood_ratio_of_white_scatter_is_that_of_least_squares():
     straight = sequential._log_likelihoods(values, at[None])[
         list(sequential.CORRELATIONS).index(0.0)
     ]
-    twin = [10.0 * np.log(left([at]) / left([at, hinge])) for hinge in hinges]
-    assert own - straight == pytest.approx(twin, rel=1e-6)
+    reference = [
+        10.0 * np.log(residual_squares([at]) / residual_squares([at, hinge])) for hinge in hinges
+    ]
+    assert own - straight == pytest.approx(reference, rel=1e-6)
 
 
 @pytest.mark.parametrize("memory", [-0.3, 0.7, 0.9])
-def test_scatter_that_remembers_has_the_likelihood_of_its_whole_covariance(memory):
-    """Slow twin: generalised least squares with the dense covariance, its determinant by its own
-    factors.
-    """
+def test_correlated_scatter_has_the_likelihood_of_its_full_covariance(memory):
+    """Slow reference: generalised least squares with the dense covariance and its determinant."""
     from scipy.linalg import toeplitz
 
     from asperity.trend import sequential
@@ -143,80 +147,83 @@ def test_scatter_that_remembers_has_the_likelihood_of_its_whole_covariance(memor
     assert own == pytest.approx([likelihood(row) for row in rows], abs=1e-6)
 
 
-def test_an_alarm_stays_though_what_raised_it_is_gone():
+def test_an_alarm_persists_after_its_cause_disappears():
     values = np.concatenate([knee_at(12, 5.0, 2)[:20], 1.0 + scatter(7)[:20]])
-    count = judged(values).states.index("alarm") + 1
+    count = alarm_state(values).states.index("alarm") + 1
     assert knee_test(NUMBER, values, smallest_change=0.05).log_ratio < PER_THOUSAND
     assert count < 20
-    assert set(judged(values).states[count:]) == {"alarm"}
-    assert judged(values, acknowledged=20).state != "alarm"
+    assert set(alarm_state(values).states[count:]) == {"alarm"}
+    assert alarm_state(values, acknowledged=20).state != "alarm"
 
 
-def test_a_level_that_grows_is_told_from_one_that_steps():
+def test_a_growing_level_is_distinguished_from_a_step():
     growing = np.log(np.where(NUMBER < 25, 1.0, np.exp(0.15 * (NUMBER - 25)))) + scatter(1, 0.05)
     stepping = np.log(3.0) * (NUMBER >= 20) + scatter(2, 0.05)
-    assert 25 < first(growth_test, growing, np.log(2.0)) <= 34
-    assert first(growth_test, stepping, np.log(2.0)) is None
-    assert first(step_test, stepping, np.log(2.0)) in range(22, 26)
-    assert first(step_test, scatter(3, 0.05), np.log(2.0)) is None
+    assert 25 < recordings_to_alarm(growth_test, growing, np.log(2.0)) <= 34
+    assert recordings_to_alarm(growth_test, stepping, np.log(2.0)) is None
+    assert recordings_to_alarm(step_test, stepping, np.log(2.0)) in range(22, 26)
+    assert recordings_to_alarm(step_test, scatter(3, 0.05), np.log(2.0)) is None
 
 
-def test_an_alarm_stays_until_it_is_acknowledged_and_then_learns_anew():
+def test_an_acknowledged_alarm_restarts_the_baseline():
     values = knee_at(15, 5.0, 2)
-    alarm = judged(values)
+    alarm = alarm_state(values)
     raised = alarm.states.index("alarm")
     assert (alarm.state, alarm.since, alarm.raised_by) == ("alarm", raised, "CRF")
     assert set(alarm.states[raised:]) == {"alarm"}
     assert "has flattened since" in alarm.reason
-    after = judged(values, acknowledged=raised + 1)
+    after = alarm_state(values, acknowledged=raised + 1)
     assert after.states[raised + 1] == "cannot-tell"
     assert "alarm" not in after.states
     assert after.state == "none"
-    everything = judged(values, acknowledged=40)
-    assert (everything.state, everything.since) == ("none", None)
-    assert "all 40 recordings are acknowledged" in everything.reason
+    all_acknowledged = alarm_state(values, acknowledged=40)
+    assert (all_acknowledged.state, all_acknowledged.since) == ("none", None)
+    assert "all 40 recordings are acknowledged" in all_acknowledged.reason
 
 
-def test_an_alarm_by_the_contact_asks_the_stage():
+def test_an_alarm_on_the_contact_checks_the_wear_stage():
     values = knee_at(15, 5.0, 2)
-    asked = []
-    alarm = judged(
-        values, checks=AlarmChecks(confirmed=lambda number: asked.append(number) or False)
+    confirmations = []
+    alarm = alarm_state(
+        values, checks=AlarmChecks(confirmed=lambda number: confirmations.append(number) or False)
     )
-    assert asked
+    assert confirmations
     assert set(alarm.states) == {"cannot-tell", "none", "alert"}
 
 
-def test_what_nobody_can_see_is_said_and_is_not_healthy():
+def test_an_unobservable_state_is_reported_and_not_called_healthy():
     level = 1.0 + scatter(4)
     off = [RecordingStatus()] * 39 + [RecordingStatus("blind", "the machine was off")]
-    assert judged(level, off).state == "blind"
-    assert judged(level, off).since == 39
+    assert alarm_state(level, off).state == "blind"
+    assert alarm_state(level, off).since == 39
     unseen = [RecordingStatus()] * 38 + [RecordingStatus("cannot-tell", "nothing heard")] * 2
-    assert (judged(level, unseen).state, judged(level, unseen).since) == ("cannot-tell", 38)
-    assert judged(level[:5]).state == "cannot-tell"
-    assert "5 of 8 points" in judged(level[:5]).reason
-    assert judged(level).state == "none"
+    assert (alarm_state(level, unseen).state, alarm_state(level, unseen).since) == (
+        "cannot-tell",
+        38,
+    )
+    assert alarm_state(level[:5]).state == "cannot-tell"
+    assert "5 of 8 points" in alarm_state(level[:5]).reason
+    assert alarm_state(level).state == "none"
 
 
-def test_a_step_of_load_or_gain_is_not_told_from_damage():
-    alarm = judged(HEALTHY["load step"] + scatter(5))
+def test_a_step_of_load_or_gain_cannot_be_distinguished_from_damage():
+    alarm = alarm_state(HEALTHY["load step"] + scatter(5))
     assert alarm.state == "cannot-tell"
     assert "in one step at 15" in alarm.reason
     assert "alarm" not in alarm.states
-    assert judged(HEALTHY["load step"] + scatter(5), acknowledged=15).state == "none"
+    assert alarm_state(HEALTHY["load step"] + scatter(5), acknowledged=15).state == "none"
 
 
 @pytest.mark.parametrize(
     ("level", "state"), [(0.0, "alarm"), (0.4, "cannot-tell")], ids=["fault", "moved sensor"]
 )
-def test_a_depth_that_jumps_is_a_fault_unless_all_that_is_loud_moves_with_it(level, state):
-    """A sensor that is moved hears a bearing better: the level moves too, which a fault hardly
-    does.
+def test_a_jump_in_depth_is_a_fault_unless_the_level_jumps_with_it(level, state):
+    """A relocated sensor may receive a bearing better: the level jumps too, which a fault hardly
+    causes.
     """
     jump = (NUMBER >= 20).astype(float)
     series = {"depth": 0.9 * jump + scatter(1, 0.1), "rms": level * jump + scatter(2, 0.05)}
-    watching = [
+    monitored_series = [
         MonitoredSeries(
             name=name,
             values=values,
@@ -228,34 +235,36 @@ def test_a_depth_that_jumps_is_a_fault_unless_all_that_is_loud_moves_with_it(lev
         )
         for name, values in series.items()
     ]
-    assert sequential_alarm(NUMBER, watching, [RecordingStatus()] * 40).state == state
+    assert sequential_alarm(NUMBER, monitored_series, [RecordingStatus()] * 40).state == state
 
 
-def test_a_knee_weighs_much_and_a_step_or_a_bend_little():
-    weights = {name: knee_weight(NUMBER, [watched(HEALTHY[name] + scatter(3))]) for name in HEALTHY}
+def test_a_knee_has_a_high_weight_and_a_step_or_a_bend_a_low_one():
+    weights = {
+        name: knee_weight(NUMBER, [monitored(HEALTHY[name] + scatter(3))]) for name in HEALTHY
+    }
     assert max(weights.values()) < 0.25
-    assert knee_weight(NUMBER, [watched(knee_at(18, 5.0, 1))]) > 0.99
-    assert knee_weight(NUMBER[:20], [watched(knee_at(18, 15.0, 1)[:20])]) < 0.9  # barely behind it
-    assert knee_weight(NUMBER[:5], [watched(np.ones(5))]) == 1.0  # nobody can tell
+    assert knee_weight(NUMBER, [monitored(knee_at(18, 5.0, 1))]) > 0.99
+    assert knee_weight(NUMBER[:20], [monitored(knee_at(18, 15.0, 1)[:20])]) < 0.9  # just after it
+    assert knee_weight(NUMBER[:5], [monitored(np.ones(5))]) == 1.0  # undetermined
 
 
 def test_a_smaller_rate_of_false_alarms_takes_longer():
     values = knee_at(15, 15.0, 3)
     delays = [
-        judged(values, false_alarm_rate=rate).states.index("alarm")
+        alarm_state(values, false_alarm_rate=rate).states.index("alarm")
         for rate in (1e-1 - 1e-9, 1e-3, 1e-5)
     ]
     assert delays[0] < delays[1] < delays[2]
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, 0.5, np.nan])
-def test_a_rate_that_is_none_is_refused(rate):
+def test_an_invalid_rate_is_refused(rate):
     with pytest.raises(BadInput, match="false-alarm rate"):
-        judged(np.ones(3), false_alarm_rate=rate)
+        alarm_state(np.ones(3), false_alarm_rate=rate)
 
 
-def test_repeats_of_one_test_are_one_place():
+def test_repeats_of_one_test_count_as_one_point():
     repeated = np.repeat(NUMBER[:4], 5)
     values = 1.0 + 0.1 * repeated
-    alarm = sequential_alarm(repeated, [watched(values)], [RecordingStatus()] * 20)
+    alarm = sequential_alarm(repeated, [monitored(values)], [RecordingStatus()] * 20)
     assert "4 of 8 points" in alarm.reason

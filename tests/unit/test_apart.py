@@ -1,6 +1,4 @@
-"""Readers in a process of their own: what becomes of them there is a sentence, and the next read
-works.
-"""
+"""Readers in a subprocess: failures become messages, and the next read works."""
 
 import ctypes
 import os
@@ -14,49 +12,49 @@ from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.sandbox import read_in_subprocess
 
 
-def reads(path, factor):
+def return_values(path, factor):
     return path.name, factor * np.arange(3.0)
 
 
-def refuses(path):
+def raise_bad_input(path):
     raise BadInput(f"{path.name} has no unit")
 
 
-def stumbles(path):
+def raise_unexpected(path):
     raise ZeroDivisionError(f"{path.name}\nsecond line")
 
 
-def crashes(path):  # noqa: ARG001
+def crash(path):  # noqa: ARG001
     ctypes.string_at(0)
 
 
-def ends(path):  # noqa: ARG001
+def exit_early(path):  # noqa: ARG001
     os._exit(0)
 
 
-def hangs(path):  # noqa: ARG001
+def sleep_forever(path):  # noqa: ARG001
     time.sleep(60)
 
 
-def turns(path):  # noqa: ARG001
+def loop_forever(path):  # noqa: ARG001
     while True:
         pass
 
 
-def swells(path):  # noqa: ARG001
+def use_much_memory(path):  # noqa: ARG001
     return np.ones(10**8).sum()
 
 
-def prints(path):
+def print_noise(path):
     os.system("echo noise; echo noise >&2")
     return path.name
 
 
-def misses(path):  # noqa: ARG001
+def import_missing(path):  # noqa: ARG001
     import no_such_library  # noqa: F401
 
 
-def who(path):  # noqa: ARG001
+def process_id(path):  # noqa: ARG001
     return os.getpid()
 
 
@@ -68,65 +66,65 @@ def read(tmp_path):
     )
 
 
-def test_what_is_read_comes_back(read):
-    name, values = read(reads, 2.0)
+def test_read_values_are_returned(read):
+    name, values = read(return_values, 2.0)
     assert name == "file.dat"
     np.testing.assert_array_equal(values, [0.0, 2.0, 4.0])
 
 
-def test_a_refusal_is_the_readers_own(read):
+def test_a_refusal_passes_through_unchanged(read):
     with pytest.raises(BadInput, match=r"^file\.dat has no unit$"):
-        read(refuses)
+        read(raise_bad_input)
     with pytest.raises(ImportError, match="no_such_library"):
-        read(misses)
+        read(import_missing)
 
 
 @pytest.mark.parametrize(
     ("reader", "reason"),
     [
-        (stumbles, r"file.dat is damaged \(file.dat\); export it again"),
-        (crashes, "file.dat is damaged: its reader crashed; export it again"),
-        (ends, "its reader crashed"),
-        (swells, "needs more than 0.51 GB of memory"),
+        (raise_unexpected, r"file.dat is damaged \(file.dat\); export it again"),
+        (crash, "file.dat is damaged: its reader crashed; export it again"),
+        (exit_early, "its reader crashed"),
+        (use_much_memory, "needs more than 0.51 GB of memory"),
     ],
 )
-def test_what_a_reader_does_not_survive_is_a_sentence_and_the_next_read_works(read, reader, reason):
+def test_a_failing_reader_raises_a_message_and_the_next_read_works(read, reader, reason):
     with pytest.raises(UnreadableFile, match=reason):
         read(reader)
-    assert read(reads, 1.0)[0] == "file.dat"
+    assert read(return_values, 1.0)[0] == "file.dat"
 
 
-@pytest.mark.parametrize("reader", [hangs, turns])
+@pytest.mark.parametrize("reader", [sleep_forever, loop_forever])
 def test_a_reader_that_hangs_is_stopped(read, monkeypatch, reader):
     monkeypatch.setattr(apart, "BASE_SECONDS", 1.0)
     with pytest.raises(UnreadableFile, match="took longer than 1 s"):
         read(reader)
-    assert read(reads, 1.0)[0] == "file.dat"
+    assert read(return_values, 1.0)[0] == "file.dat"
 
 
-def test_loading_a_library_is_no_reading(tmp_path, monkeypatch):
+def test_loading_a_library_does_not_count_as_reading_time(tmp_path, monkeypatch):
     monkeypatch.setattr(apart, "BASE_SECONDS", 1.0)
     monkeypatch.syspath_prepend(tmp_path)
     slow = "import time\nbegun = time.process_time()\nwhile time.process_time() < begun + 3: pass\n"
     (tmp_path / "slow_library.py").write_text(slow)
-    apart._servers.clear()  # one that knows of the library's folder
+    apart._servers.clear()  # start a server that has the library's folder on its path
     (tmp_path / "file.dat").write_bytes(b"content")
-    about = {"remedy": "", "library": "slow_library"}
+    options = {"remedy": "", "library": "slow_library"}
     assert (
-        read_in_subprocess(tmp_path / "file.dat", f"{__name__}:reads", 1.0, **about)[0]
+        read_in_subprocess(tmp_path / "file.dat", f"{__name__}:return_values", 1.0, **options)[0]
         == "file.dat"
     )
 
 
-def test_what_a_library_prints_is_not_taken_for_its_answer(read, capfd):
-    assert read(prints) == "file.dat"
+def test_output_of_a_library_is_not_mistaken_for_its_result(read, capfd):
+    assert read(print_noise) == "file.dat"
     assert capfd.readouterr() == ("", "")
 
 
-def test_one_process_serves_all_reads_and_is_none_of_ours(read):
-    assert read(who) == read(who) != os.getpid()
+def test_one_subprocess_serves_all_reads(read):
+    assert read(process_id) == read(process_id) != os.getpid()
 
 
-def test_a_raised_limit_lets_more_be_read(read, monkeypatch):
+def test_a_raised_memory_limit_allows_larger_reads(read, monkeypatch):
     monkeypatch.setenv("ASPERITY_MEMORY_GB", "10")
-    assert read(swells) == 1e8
+    assert read(use_much_memory) == 1e8

@@ -1,6 +1,4 @@
-"""The page on the architecture lists every room in its row, and the solver's modules in their
-layers.
-"""
+"""The architecture page lists every package in its layer and every solver module."""
 
 import re
 import tomllib
@@ -12,7 +10,7 @@ PAGE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
 
 
 def layers() -> list[set[str]]:
-    """The rows that import-linter holds."""
+    """Layers enforced by import-linter."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
         "contracts"
     ]
@@ -22,8 +20,8 @@ def layers() -> list[set[str]]:
     return [{name.strip() for name in row.split("|")} for row in rows]
 
 
-def rooms() -> list[tuple[int, str, str]]:
-    """Row, room and what is said of it, as the page has them."""
+def listed_packages() -> list[tuple[int, str, str]]:
+    """Layer, package and description from the page."""
     table = PAGE.split("## Rooms")[1].split("Inside `ehl/`")[0]
     return [
         (int(row), room, text)
@@ -31,9 +29,9 @@ def rooms() -> list[tuple[int, str, str]]:
     ]
 
 
-def test_rooms_stand_in_the_rows_that_are_held():
+def test_packages_are_listed_in_their_enforced_layers():
     for number, names in enumerate(layers(), 1):
-        assert {room for row, room, _ in rooms() if row == number} == names
+        assert {room for row, room, _ in listed_packages() if row == number} == names
 
 
 def test_every_module_of_the_solver_is_listed():
@@ -44,21 +42,21 @@ def test_every_module_of_the_solver_is_listed():
     }
 
 
-def test_every_module_says_what_it_holds_in_one_line():
+def test_every_module_opens_with_a_docstring():
     lines = {path: path.read_text("utf-8").splitlines()[:1] for path in PACKAGE.rglob("*.py")}
     assert [path for path, line in lines.items() if not line or not line[0].startswith('"""')] == []
 
 
 def test_folders_hold_at_most_25_modules():
     folders = {path.parent for path in PACKAGE.rglob("*.py")}
-    crowded = {folder.name: len(list(folder.glob("*.py"))) for folder in folders}
-    assert {name: count for name, count in crowded.items() if count > 26} == {}  # with __init__
+    sizes = {folder.name: len(list(folder.glob("*.py"))) for folder in folders}
+    assert {name: count for name, count in sizes.items() if count > 26} == {}  # with __init__
 
 
-def test_every_folder_has_a_face_that_is_held():
+def test_every_package_has_an_enforced_public_interface():
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
         "contracts"
     ]
-    held = {name for contract in contracts for name in contract.get("protected_modules", ())}
-    for face in PACKAGE.glob("*/__init__.pyi"):
-        assert f"asperity.{face.parent.name}.*" in held
+    protected = {name for contract in contracts for name in contract.get("protected_modules", ())}
+    for interface in PACKAGE.glob("*/__init__.pyi"):
+        assert f"asperity.{interface.parent.name}.*" in protected

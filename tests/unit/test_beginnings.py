@@ -4,7 +4,7 @@ from asperity.case import KINDS, case_template, load_case
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_case_to_start_from_is_a_case(kind):
+def test_every_starting_case_is_valid(kind):
     case = load_case(case_template(kind), name=kind)
     assert case.conditions.geometry == (kind if kind in ("point", "elliptic", "roller") else "line")
     assert (case.lubricant is None) == (kind == "dry")

@@ -1,6 +1,4 @@
-"""The benchmark: its certified values by both ways where these are quick, its runner, and adapters
-of others.
-"""
+"""Benchmark set: certified values by two independent methods where quick, runner and adapters."""
 
 import csv
 import json
@@ -19,7 +17,7 @@ from asperity.core.errors import BadInput
 from support.source import ROOT
 
 CASES = {case.name: case for case in load_benchmark()}
-QUICK = {  # by the beginning of a name: both ways that take less than a second
+QUICK = {  # by prefix of the name: two methods that take less than a second
     "dry-wavy-line": (
         lambda given: ways.dense_line(given, 1601),
         lambda given: solver_named("asperity").solve(given, 512),
@@ -39,7 +37,7 @@ QUICK = {  # by the beginning of a name: both ways that take less than a second
         lambda given: solver_named("asperity").solve(given, 512),
     ),
 }
-# how near the second way is on fewer nodes than it was certified on
+# relative error of the second method on fewer nodes than used for certification
 FEWER_NODES = {
     "dry-line": 3e-4,
     "dry-wavy-line": 3e-3,
@@ -49,14 +47,14 @@ FEWER_NODES = {
 }
 
 
-SLOW = [f"ehl-line-{number}" for number in (1, 3, 4, 5, 6, 7)]  # as the other
+SLOW = [f"ehl-line-{number}" for number in (1, 3, 4, 5, 6, 7)]  # same method as ehl-line-2
 
 
-def ways_of(name):
-    return next((both for start, both in QUICK.items() if name.startswith(start)), None)
+def methods_for(name):
+    return next((methods for start, methods in QUICK.items() if name.startswith(start)), None)
 
 
-def test_every_value_has_two_ways_and_an_uncertainty_of_at_most_two_per_cent():
+def test_every_value_has_two_methods_and_at_most_two_per_cent_uncertainty():
     assert len(CASES) == 41
     values = sum(len(case.certified) for case in CASES.values())
     shared = sum(
@@ -72,7 +70,7 @@ def test_every_value_has_two_ways_and_an_uncertainty_of_at_most_two_per_cent():
             assert 0.0 < entry.uncertainty <= 0.02 * abs(entry.value), (case.name, entry)
 
 
-def test_the_table_is_that_of_the_cases():
+def test_the_table_matches_the_cases():
     with (ROOT / "benchmark" / "certified.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     entries = [(case.name, entry) for case in CASES.values() for entry in case.certified]
@@ -88,22 +86,22 @@ def test_the_table_is_that_of_the_cases():
         )
 
 
-@pytest.mark.parametrize("name", [name for name in CASES if ways_of(name) and name not in SLOW])
-def test_both_ways_give_the_certified_value(name):
+@pytest.mark.parametrize("name", [name for name in CASES if methods_for(name) and name not in SLOW])
+def test_both_methods_reproduce_the_certified_value(name):
     case = CASES[name]
-    off = next((share for start, share in FEWER_NODES.items() if name.startswith(start)), 0.0)
-    first, second = (way(case.given) for way in ways_of(name))
+    tolerance = next((share for start, share in FEWER_NODES.items() if name.startswith(start)), 0.0)
+    first, second = (way(case.given) for way in methods_for(name))
     for entry in case.certified:
         assert first[entry.quantity] == pytest.approx(
-            entry.value, rel=off, abs=1.01 * entry.uncertainty
+            entry.value, rel=tolerance, abs=1.01 * entry.uncertainty
         )
         assert second[entry.quantity] == pytest.approx(
-            entry.value, rel=off, abs=1.01 * entry.uncertainty
+            entry.value, rel=tolerance, abs=1.01 * entry.uncertainty
         )
 
 
 @pytest.mark.parametrize(
-    ("name", "cells", "within"),
+    ("name", "cells", "tolerance"),
     [
         ("dry-line-1", 128, 0.01),
         ("dry-ellipse-1", 64, 0.02),
@@ -111,20 +109,20 @@ def test_both_ways_give_the_certified_value(name):
         ("cavity-journal-0.6", 200, 0.01),
     ],
 )
-def test_our_solver_meets_a_case_of_each_kind(name, cells, within):
+def test_asperity_reproduces_a_case_of_each_kind(name, cells, tolerance):
     found = solver_named("asperity").solve(CASES[name].given, cells)
     for entry in CASES[name].certified:
-        assert found[entry.quantity] == pytest.approx(entry.value, rel=within), entry.quantity
+        assert found[entry.quantity] == pytest.approx(entry.value, rel=tolerance), entry.quantity
 
 
-def test_a_rough_contact_holds_on_a_grid_between_those_it_was_certified_on():
+def test_a_rough_contact_agrees_on_an_intermediate_grid():
     (entry,) = CASES["dry-rough-3"].certified
     found = solver_named("tamaas").solve(CASES["dry-rough-3"].given, 320)[entry.quantity]
     assert found == pytest.approx(entry.value, abs=2.0 * entry.uncertainty)
 
 
 def assert_same(actual, expected, where=""):
-    """Floats to a relative 1e-12 (libm differs in the last bit), everything else exactly."""
+    """Compare floats to a relative 1e-12 (libm differs in the last bit), all else exactly."""
     if isinstance(expected, float):
         assert isinstance(actual, float), where
         assert actual == pytest.approx(expected, rel=1e-12, abs=0.0), where
@@ -135,19 +133,19 @@ def assert_same(actual, expected, where=""):
     elif isinstance(expected, list | tuple):
         assert type(actual) is type(expected), where
         assert len(actual) == len(expected), where
-        for index, (one, other) in enumerate(zip(actual, expected, strict=True)):
-            assert_same(one, other, f"{where}[{index}]")
+        for index, (item, expected_item) in enumerate(zip(actual, expected, strict=True)):
+            assert_same(item, expected_item, f"{where}[{index}]")
     else:
         assert actual == expected, where
         assert type(actual) is type(expected), where
 
 
-def test_every_case_is_stated_as_its_maker_states_it():
+def test_stored_cases_match_the_script_that_generates_them():
     made = {name: given for name, given, _ in stated()}
     assert_same(made, {case.name: {"kind": case.kind, **case.given} for case in CASES.values()})
 
 
-# both ways of a case of each oiled family on fewer nodes and cells, and how near that is
+# nodes, cells and relative tolerance of one case per lubricated family
 TWINNED = {
     "ehl-ball-2": ([(28, 13), (37, 17), (55, 25)], 128, 0.015),
     "mixed-line-2": ([(151, 1), (301, 1), (601, 1)], 512, 0.01),
@@ -158,44 +156,54 @@ TWINNED = {
 
 @pytest.mark.parametrize("name", TWINNED)
 def test_lubricated_cases_agree_with_reference_solver_and_asperity(name):
-    grids, cells, near = TWINNED[name]
+    grids, cells, tolerance = TWINNED[name]
     given = CASES[name].given
-    twins, _ = oiled.limit(oiled.steady(given, grids), [1.0 / (along - 1) for along, _ in grids])
-    ours = solver_named("asperity").solve(given, cells)
+    reference_values, _ = oiled.limit(
+        oiled.steady(given, grids), [1.0 / (points - 1) for points, _ in grids]
+    )
+    own_values = solver_named("asperity").solve(given, cells)
     for entry in CASES[name].certified:
-        assert twins[entry.quantity] == pytest.approx(entry.value, rel=near), entry.quantity
-        assert ours[entry.quantity] == pytest.approx(entry.value, rel=near), entry.quantity
+        assert reference_values[entry.quantity] == pytest.approx(entry.value, rel=tolerance), (
+            entry.quantity
+        )
+        assert own_values[entry.quantity] == pytest.approx(entry.value, rel=tolerance), (
+            entry.quantity
+        )
 
 
 def test_moving_waves_agree_with_reference_solver_and_asperity():
     given = CASES["moving-line-1"].given
-    twins, ours = oiled.moving(given, 121), solver_named("asperity").solve(given, 128)
-    for entry in CASES["moving-line-1"].certified:
-        assert twins[entry.quantity] == pytest.approx(entry.value, rel=0.12), (
-            entry.quantity
-        )  # a fourth of the nodes
-        assert ours[entry.quantity] == pytest.approx(entry.value, rel=0.05), entry.quantity
-
-
-def test_the_twins_bodies_bend_as_hertz_and_a_wave_ask():
-    line = twin.line(-1.5, 1.5, 601)
-    bent = twin.compliance(line) @ np.sqrt(np.maximum(1.0 - line.x**2, 0.0)) + line.x**2 / 2.0
-    assert np.ptp(bent[np.abs(line.x) < 0.95]) < 1e-3
-    ball = twin.half_ball(-1.4, 1.4, 1.4, (57, 29))
-    apart = ball.x[:, None] ** 2 + ball.y[None, :] ** 2
-    bent = (
-        twin.compliance(ball) @ np.sqrt(np.maximum(1.0 - apart, 0.0)).ravel() + apart.ravel() / 2.0
+    reference_values, own_values = (
+        oiled.moving(given, 121),
+        solver_named("asperity").solve(given, 128),
     )
-    assert np.ptp(bent[apart.ravel() < 0.8]) < 5e-3
-    strip = twin.strip(-4.0, 4.0, 1.0, (161, 16))  # long: in its middle as if it had no ends
+    for entry in CASES["moving-line-1"].certified:
+        assert reference_values[entry.quantity] == pytest.approx(entry.value, rel=0.12), (
+            entry.quantity
+        )  # a quarter of the nodes
+        assert own_values[entry.quantity] == pytest.approx(entry.value, rel=0.05), entry.quantity
+
+
+def test_compliance_of_the_reference_solver_matches_hertz_and_a_wave():
+    line = twin.line(-1.5, 1.5, 601)
+    displaced = twin.compliance(line) @ np.sqrt(np.maximum(1.0 - line.x**2, 0.0)) + line.x**2 / 2.0
+    assert np.ptp(displaced[np.abs(line.x) < 0.95]) < 1e-3
+    ball = twin.half_ball(-1.4, 1.4, 1.4, (57, 29))
+    squared_radius = ball.x[:, None] ** 2 + ball.y[None, :] ** 2
+    displaced = (
+        twin.compliance(ball) @ np.sqrt(np.maximum(1.0 - squared_radius, 0.0)).ravel()
+        + squared_radius.ravel() / 2.0
+    )
+    assert np.ptp(displaced[squared_radius.ravel() < 0.8]) < 5e-3
+    strip = twin.strip(-4.0, 4.0, 1.0, (161, 16))  # long: no end effects in the middle
     wave = np.cos(2.0 * np.pi * strip.y)
-    bent = (twin.compliance(strip) @ np.tile(wave, 161)).reshape(strip.shape)[80]
+    displaced = (twin.compliance(strip) @ np.tile(wave, 161)).reshape(strip.shape)[80]
     np.testing.assert_allclose(
-        bent, wave / (2.0 * np.pi), atol=1e-3
+        displaced, wave / (2.0 * np.pi), atol=1e-3
     )  # 2 p/(E* k), and p_h is E* a/(2 R)
 
 
-def test_the_twin_keeps_its_oil_and_its_load():
+def test_the_reference_solver_conserves_mass_and_load():
     given = CASES["conserving-line-3"].given
     *_, (solver, state) = oiled.solved(given, [(201, 1)])
     assert (state.oil < -0.01).sum() > 10  # there are cavities
@@ -214,7 +222,7 @@ def test_reference_solutions_are_converged():
 
 
 @pytest.mark.parametrize("path", sorted(FIELDS.glob("*.nc")), ids=lambda path: path.stem)
-def test_fields_bear_the_load_and_give_the_certified_values(path):
+def test_fields_carry_the_load_and_give_the_certified_values(path):
     case, fields = CASES[path.stem], xr.load_dataset(path, engine="h5netcdf")
     given, pressure = case.given, fields.pressure
     if "y" in fields.dims and "load_n" in given:
@@ -247,7 +255,7 @@ def test_steady_cases_have_fields():
     }
 
 
-def test_errors_fall_as_cells_are_added():
+def test_errors_decrease_with_grid_refinement():
     def errors(cells):
         found = solver_named("asperity").solve(CASES["ehl-line-2"].given, cells)
         return [
@@ -258,18 +266,18 @@ def test_errors_fall_as_cells_are_added():
     assert all(fine < coarse / 2.0 for fine, coarse in zip(errors(128), errors(64), strict=True))
 
 
-def test_tamaas_meets_waves_and_balls():
+def test_tamaas_reproduces_waves_and_balls():
     tamaas = solver_named("tamaas")
-    for name, within in (("dry-wave-2", 1e-3), ("dry-ball-1", 0.01)):
+    for name, tolerance in (("dry-wave-2", 1e-3), ("dry-ball-1", 0.01)):
         found = tamaas.solve(CASES[name].given, 64)
         for entry in CASES[name].certified:
-            loose = 0.05 if entry.quantity == "contact_area_m2" else within
-            assert found[entry.quantity] == pytest.approx(entry.value, rel=loose), entry.quantity
+            rel = 0.05 if entry.quantity == "contact_area_m2" else tolerance
+            assert found[entry.quantity] == pytest.approx(entry.value, rel=rel), entry.quantity
     assert tamaas.solve(CASES["dry-line-1"].given, 64) == {}
 
 
 class Exact:
-    """An adapter that answers with what is certified, but for one case."""
+    """Adapter that returns the certified values, but refuses one kind."""
 
     name = "exact"
     kinds = ("dry", "slider")
@@ -283,7 +291,7 @@ class Exact:
         }
 
 
-def test_errors_are_in_uncertainties_and_unsolved_cases_are_listed(tmp_path):
+def test_errors_are_scaled_by_uncertainty_and_unsolved_cases_are_listed(tmp_path):
     result = run_benchmark(Exact(), cells=(64,))
     dry = [case for case in CASES.values() if case.kind == "dry"]
     assert len(result.rows) == len(dry)
@@ -315,10 +323,10 @@ def test_invalid_solvers_and_cases_are_refused(tmp_path):
         run_benchmark(Exact(), cells=(4,))
 
 
-def test_contactmechanics_meets_waves_balls_and_rough_ones():
+def test_contactmechanics_reproduces_waves_balls_and_rough_contacts():
     pytest.importorskip("ContactMechanics", reason="a package of the development group")
     solver = solver_named("contactmechanics")
-    for name, within in (
+    for name, tolerance in (
         ("dry-wave-2", 2e-3),
         ("dry-ellipse-1", 1e-3),
         ("dry-ball-1", 2e-3),
@@ -326,33 +334,33 @@ def test_contactmechanics_meets_waves_balls_and_rough_ones():
     ):
         found = solver.solve(CASES[name].given, 64)
         for entry in CASES[name].certified:
-            loose = 0.05 if entry.quantity == "contact_area_m2" else within
-            assert found[entry.quantity] == pytest.approx(entry.value, rel=loose), entry.quantity
+            rel = 0.05 if entry.quantity == "contact_area_m2" else tolerance
+            assert found[entry.quantity] == pytest.approx(entry.value, rel=rel), entry.quantity
     assert solver.solve(CASES["dry-line-1"].given, 64) == {}
 
 
-def test_a_solver_is_not_scored_by_uncertainties_that_it_made():
+def test_a_solver_is_not_scored_on_values_that_it_certified():
     rows = run_benchmark(solver_named("tamaas"), cells=(32,)).rows
     made = {"dry-ringed-ball-1", "dry-ringed-ball-2", "dry-rough-1", "dry-rough-2", "dry-rough-3"}
     assert {row.case for row in rows if row.over_uncertainty is None} == made
 
 
-def test_a_solver_that_lies_is_seen():
-    class Lying(Exact):
+def test_wrong_results_are_detected():
+    class Biased(Exact):
         def solve(self, given, cells):
             return {key: 1.1 * value for key, value in super().solve(given, cells).items()}
 
-    assert all(row.error > 0.05 for row in run_benchmark(Lying(), cells=(64,)).rows)
+    assert all(row.error > 0.05 for row in run_benchmark(Biased(), cells=(64,)).rows)
 
 
 @pytest.mark.parametrize(
-    ("lasting", "least", "solves"), [((0.5, 0.25, 0.75), 0.25, 4), ((1.5,), 1.5, 2)]
+    ("durations", "reported", "solves"), [((0.5, 0.25, 0.75), 0.25, 4), ((1.5,), 1.5, 2)]
 )
-def test_seconds_are_the_least_of_three_and_count_no_first_solve(
-    monkeypatch, lasting, least, solves
+def test_time_is_the_minimum_of_three_runs_after_a_warm_up(
+    monkeypatch, durations, reported, solves
 ):
     case = CASES["dry-ball-1"]
-    clock = iter([time for seconds in lasting for time in (10.0, 10.0 + seconds)])
+    clock = iter([time for seconds in durations for time in (10.0, 10.0 + seconds)])
     monkeypatch.setattr("asperity.benchmark.run.load_benchmark", lambda _: (case,))
     monkeypatch.setattr("asperity.benchmark.run.time.process_time", lambda: next(clock))
     calls = []
@@ -364,7 +372,7 @@ def test_seconds_are_the_least_of_three_and_count_no_first_solve(
             calls.append(cells)
             return {entry.quantity: entry.value for entry in case.certified}
 
-    assert {row.seconds for row in run_benchmark(Counted(), cells=(64,)).rows} == {least}
+    assert {row.seconds for row in run_benchmark(Counted(), cells=(64,)).rows} == {reported}
     assert len(calls) == solves
 
 
@@ -392,17 +400,17 @@ def test_the_command_runs_a_folder_of_cases(tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit) as end:
         main([*arguments, "--json"])
     assert (end.value.code or 0) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert {row["cells"] for row in said["rows"]} == {32, 48}
-    assert {row["case"] for row in said["rows"]} == {"dry-ellipse-1", "cavity-journal-0.3"}
-    assert said["written"] == ["a.csv", "a.png"]
-    assert all(Path(name).is_file() for name in said["written"])
+    summary = json.loads(capsys.readouterr().out)
+    assert {row["cells"] for row in summary["rows"]} == {32, 48}
+    assert {row["case"] for row in summary["rows"]} == {"dry-ellipse-1", "cavity-journal-0.3"}
+    assert summary["written"] == ["a.csv", "a.png"]
+    assert all(Path(name).is_file() for name in summary["written"])
     with pytest.raises(SystemExit) as end:
         main(["benchmark", "--solver", "abaqus"])
     assert end.value.code == 2
 
 
-def test_a_certified_value_that_moves_is_seen():
+def test_a_changed_certified_value_is_detected():
     moved = replace(
         CASES["dry-ball-1"].certified[0], value=1.001 * CASES["dry-ball-1"].certified[0].value
     )

@@ -1,4 +1,4 @@
-"""What benchmarks keep: csv that the page includes, and what changed since."""
+"""Benchmark results: csv files included in the page, and reported changes."""
 
 import importlib
 from functools import partial
@@ -22,7 +22,7 @@ LINES = [
 ]
 
 
-def test_lines_come_back_as_a_page(tmp_path):
+def test_stored_lines_are_rendered_as_a_page(tmp_path):
     assert kept.keep("cost", LINES, tmp_path) == ["cost.csv: new", "cost-said.csv: new"]
     assert (tmp_path / "cost.csv").read_text("utf-8") == "cells,time [s]\n256,0.50\n512,2.0 ± 0.1\n"
     page = kept.page(tmp_path, ["absent", "cost"])
@@ -32,7 +32,7 @@ def test_lines_come_back_as_a_page(tmp_path):
     )
 
 
-def test_a_line_of_nothing_parts_two_tables(tmp_path):
+def test_an_empty_line_separates_two_tables(tmp_path):
     kept.keep(
         "cost",
         [*LINES[:5], "", "| what | first | second |", "|---|---|---|", "| a | 1 | 2 |", ""],
@@ -42,7 +42,7 @@ def test_a_line_of_nothing_parts_two_tables(tmp_path):
     assert kept.read(tmp_path / "cost-2.csv") == [["what", "first", "second"], ["a", "1", "2"]]
 
 
-def test_two_tables_have_a_file_each_and_one_that_is_gone_leaves_none(tmp_path):
+def test_each_table_has_a_file_and_a_removed_table_has_none(tmp_path):
     kept.keep("cost", [*LINES, "| a |", "|---|", "| 1 |"], tmp_path)
     assert kept.read(tmp_path / "cost-2.csv") == [["a"], ["1"]]
     kept.keep("cost", LINES, tmp_path)
@@ -50,7 +50,7 @@ def test_two_tables_have_a_file_each_and_one_that_is_gone_leaves_none(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ("| 256 | 0.50 |", "| 256 | 0.54 |", []),
         ("| 256 | 0.50 |", "| 256 | 0.60 |", ["cost.csv: 256, time [s]: 0.50 is now 0.60"]),
@@ -74,15 +74,15 @@ def test_two_tables_have_a_file_each_and_one_that_is_gone_leaves_none(tmp_path):
         ("\nMedian 0.48 s.", "", ["cost-said.csv: has another shape"]),
     ],
 )
-def test_what_moved_by_more_than_a_tenth_is_told(tmp_path, old, new, told):
+def test_changes_above_ten_per_cent_are_reported(tmp_path, old, new, reported):
     text = "\n".join(LINES)
     assert old in text
     kept.keep("cost", text.splitlines(), tmp_path)
-    assert kept.keep("cost", text.replace(old, new).splitlines(), tmp_path) == told
+    assert kept.keep("cost", text.replace(old, new).splitlines(), tmp_path) == reported
 
 
 @pytest.mark.parametrize(
-    ("had", "have", "replaced"),
+    ("stored", "current", "replaced"),
     [
         ("Sample: 52 machines.", "Sample: 6 machines.", False),
         ("Sample: 52 machines.", "Sample: 53 machines.", True),
@@ -93,70 +93,71 @@ def test_what_moved_by_more_than_a_tenth_is_told(tmp_path, old, new, told):
         ("", kept.IN_SHORT, True),
     ],
 )
-def test_a_smaller_sample_is_compared_and_replaces_nothing(tmp_path, had, have, replaced):
-    kept.keep("cost", [*LINES, "", "| a |", "|---|", "| 1 |", had], tmp_path)
+def test_a_smaller_sample_is_compared_but_not_stored(tmp_path, stored, current, replaced):
+    kept.keep("cost", [*LINES, "", "| a |", "|---|", "| 1 |", stored], tmp_path)
     files = {path.name: path.read_text("utf-8") for path in tmp_path.iterdir()}
-    told = kept.keep(
-        "cost", [*"\n".join(LINES).replace("0.50", "0.60").splitlines(), have], tmp_path
+    reported = kept.keep(
+        "cost", [*"\n".join(LINES).replace("0.50", "0.60").splitlines(), current], tmp_path
     )
-    assert "cost.csv: 256, time [s]: 0.50 is now 0.60" in told
+    assert "cost.csv: 256, time [s]: 0.50 is now 0.60" in reported
     assert replaced == (
         {path.name: path.read_text("utf-8") for path in tmp_path.iterdir()} != files
     )
     assert (tmp_path / "cost-2.csv").exists() != replaced
-    assert told[0].startswith("cost: stays as it was; ") != replaced
+    assert reported[0].startswith("cost: stays as it was; ") != replaced
 
 
-def test_the_page_of_the_docs_includes_the_files_as_they_are():
+def test_the_docs_page_includes_the_current_files():
     assert kept.PAGE.read_text("utf-8") == kept.page(parts=(*PARTS, TIMES))
 
 
-def test_a_run_that_was_cut_off_goes_on_after_the_parts_that_ended(tmp_path):
-    where = {"whole": False, "file": tmp_path / "build" / "run.json"}
-    run = Unfinished.of(["one", "two", "three"], afresh=False, **where)
+def test_an_interrupted_run_resumes_after_its_completed_parts(tmp_path):
+    options = {"whole": False, "file": tmp_path / "build" / "run.json"}
+    run = Unfinished.of(["one", "two", "three"], afresh=False, **options)
     run.end("two", 3.5, "", ["two.csv: new"])
-    again = Unfinished.of(["one", "two", "three"], afresh=False, **where)
+    again = Unfinished.of(["one", "two", "three"], afresh=False, **options)
     assert again.left == ["one", "three"]
     assert again.began == run.began
     assert again.done == {"two": (3.5, "", ["two.csv: new"])}
-    assert Unfinished.of(["one", "two", "three"], afresh=True, **where).left == [
+    assert Unfinished.of(["one", "two", "three"], afresh=True, **options).left == [
         "one",
         "two",
         "three",
     ]
-    assert Unfinished.of(["one", "two"], afresh=False, **where).left == ["one", "two"]
+    assert Unfinished.of(["one", "two"], afresh=False, **options).left == ["one", "two"]
     assert (
-        Unfinished.of(["one", "two", "three"], afresh=False, **(where | {"whole": True})).done == {}
+        Unfinished.of(["one", "two", "three"], afresh=False, **(options | {"whole": True})).done
+        == {}
     )
     again.forget()
-    assert Unfinished.of(["one", "two", "three"], afresh=False, **where).done == {}
+    assert Unfinished.of(["one", "two", "three"], afresh=False, **options).done == {}
 
 
 @pytest.mark.parametrize(
-    ("said", "whole", "last"),
+    ("output", "whole", "last"),
     [
         (["| 1 |"], True, kept.IN_FULL),
         (["| 1 |"], False, kept.IN_SHORT),
         (["Sample: 7 rings.", "| 1 |"], False, "| 1 |"),
     ],
 )
-def test_a_part_ends_with_how_much_of_it_that_was_unless_it_says_so(monkeypatch, said, whole, last):
+def test_a_part_ends_with_its_sample_size(monkeypatch, output, whole, last):
     monkeypatch.setattr(
-        importlib, "import_module", lambda _: SimpleNamespace(lines=lambda **_: iter(said))
+        importlib, "import_module", lambda _: SimpleNamespace(lines=lambda **_: iter(output))
     )
     assert list(bench_main._said("intervals", whole=whole, seconds=1.0))[-1] == last
     assert kept.sample(bench_main._said("certified", whole=whole, seconds=1.0)) == (
-        7.0 if len(said) > 1 else 0.0
+        7.0 if len(output) > 1 else 0.0
     )
 
 
-def test_a_part_that_had_no_time_says_so(tmp_path, monkeypatch):
+def test_a_part_without_rows_reports_an_empty_sample(tmp_path, monkeypatch):
     for part in (forecast, next_points):
         monkeypatch.setattr(part, "ROWS", tmp_path / "none.csv")
         assert any(line.startswith("Sample: 0 ") for line in part.tables())
 
 
-def test_hard_contacts_are_gone_on_with_and_kept_as_they_are_solved(tmp_path, monkeypatch):
+def test_solved_contacts_are_stored_and_resumed(tmp_path, monkeypatch):
     solved = []
 
     def solve(sample, _model, _most, finer):
@@ -174,7 +175,7 @@ def test_hard_contacts_are_gone_on_with_and_kept_as_they_are_solved(tmp_path, mo
     )
 
 
-def test_what_other_code_has_done_is_not_gone_on_with(tmp_path, monkeypatch):
+def test_results_of_other_code_are_not_resumed(tmp_path, monkeypatch):
     monkeypatch.setattr(unfinished, "PACKAGE", tmp_path)
     (tmp_path / "room").mkdir()
     for path in ("room/first.py", "room/second.py", "alone.py"):
@@ -193,7 +194,7 @@ def test_what_other_code_has_done_is_not_gone_on_with(tmp_path, monkeypatch):
     }
 
 
-def test_every_part_is_one_that_can_be_run():
+def test_every_part_can_be_run():
     assert len(set(PARTS)) == len(PARTS)
     assert set(WHOLE) < set(PARTS)
     assert all(callable(importlib.import_module(f"benchmarks.{part}").lines) for part in PARTS)
@@ -201,15 +202,15 @@ def test_every_part_is_one_that_can_be_run():
 
 @pytest.fixture
 def bench(tmp_path, monkeypatch, capsys):
-    """The command on two timed parts and a row of two counted ones, none of which is run; what it
-    prints, its code.
+    """Run the command on two sequential and two parallel dummy parts; return its output and exit
+    code.
     """
-    ran: list[str] = []
-    troubles: dict[str, str] = {}
+    calls: list[str] = []
+    failures: dict[str, str] = {}
 
     def run(part, *, whole, **_):
-        ran.append(f"{part} {whole}")
-        return "| cells |\n|---|\n| 1 |", troubles.get(part, "")
+        calls.append(f"{part} {whole}")
+        return "| cells |\n|---|\n| 1 |", failures.get(part, "")
 
     monkeypatch.setattr(bench_main, "ALONE", ("a", "b"))
     monkeypatch.setattr(bench_main, "ABREAST", (("c", "d"),))
@@ -219,62 +220,60 @@ def bench(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(kept, "PAGE", tmp_path / "benchmarks.md")
     monkeypatch.setattr(kept, "keep", partial(kept.keep, folder=tmp_path))
 
-    def command(*words):
-        monkeypatch.setattr("sys.argv", ["benchmarks", *words])
+    def command(*arguments):
+        monkeypatch.setattr("sys.argv", ["benchmarks", *arguments])
         with pytest.raises(SystemExit) as end:
             bench_main.main()
         return capsys.readouterr().out, end.value.code
 
-    return command, ran, troubles
+    return command, calls, failures
 
 
-def test_all_parts_run_once_and_the_next_run_starts_anew(bench):
-    command, ran, _ = bench
+def test_all_parts_run_once_and_the_next_run_starts_afresh(bench):
+    command, calls, _ = bench
     printed, code = command()
-    assert (ran, code) == (["a False", "b False", "c False", "d False"], 0)
+    assert (calls, code) == (["a False", "b False", "c False", "d False"], 0)
     assert "a.csv: new" in printed
     printed, _ = command("--whole")
-    assert ran[4:] == ["a True", "b True", "c True", "d True"]
-    assert "a.csv" not in printed  # the same as the last
+    assert calls[4:] == ["a True", "b True", "c True", "d True"]
+    assert "a.csv" not in printed  # unchanged since the last run
 
 
-def test_out_of_time_goes_on_with_what_is_left(bench, monkeypatch):
-    command, ran, _ = bench
-    clock = iter(
-        [0.0, 0.0, 1.0, *[1e6] * 9]
-    )  # all of the time has gone once the first part has ended
+def test_running_out_of_time_reports_the_remaining_parts(bench, monkeypatch):
+    command, calls, _ = bench
+    clock = iter([0.0, 0.0, 1.0, *[1e6] * 9])  # the time is used up after the first part
     monkeypatch.setattr(bench_main, "perf_counter", lambda: next(clock))
     printed, code = command("--minutes", "1")
-    assert (ran, code) == (["a False"], 1)
+    assert (calls, code) == (["a False"], 1)
     assert "Out of time before b, c, d" in printed
 
 
-def test_a_part_that_fails_is_named_and_the_others_run(bench):
-    command, ran, troubles = bench
-    troubles["b"] = "failed with exit code 1"
+def test_a_failed_part_is_reported_and_the_others_run(bench):
+    command, calls, failures = bench
+    failures["b"] = "failed with exit code 1"
     printed, code = command()
-    assert (len(ran), code) == (4, 1)
+    assert (len(calls), code) == (4, 1)
     assert "| b | 0 | failed with exit code 1 |" in printed
     assert "b.csv" not in printed
 
 
-def test_named_parts_run_alone_and_leave_a_cut_off_run_as_it_is(bench):
-    command, ran, _ = bench
+def test_selected_parts_leave_an_interrupted_run_unchanged(bench):
+    command, calls, _ = bench
     unfinished.FILE.write_text(
         '{"parts": ["a", "b", "c", "d"], "whole": false, "began": "then", "done": {}}'
     )
     command("d")
-    assert ran == ["d False"]
+    assert calls == ["d False"]
     run = Unfinished.of(["a", "b", "c", "d"], whole=False, afresh=False, file=unfinished.FILE)
     assert run.began == "then"
     run.end("a", 2.0, "", [])
     printed, _ = command()
-    assert ran[1:] == ["b False", "c False", "d False"]
+    assert calls[1:] == ["b False", "c False", "d False"]
     assert "Going on with the run of then, after a" in printed
     assert "| a | 2 | measured |" in printed
 
 
-def test_rows_of_many_runs_add_up_and_say_whose_they_are(tmp_path):
+def test_rows_of_several_runs_accumulate_with_their_code_version(tmp_path):
     path = tmp_path / "machines.csv"
     first = Rows(path, ("machine", "law"))
     first.code = "abc"
@@ -294,7 +293,7 @@ def test_rows_of_many_runs_add_up_and_say_whose_they_are(tmp_path):
     assert Rows(path, ("machine", "law")).codes() == "abc (2), def+ (1)"
 
 
-def test_the_rows_that_are_kept_make_the_tables():
+def test_stored_rows_produce_the_tables():
     from benchmarks.inference import ROWS, tables
 
     lines = list(tables())
@@ -302,10 +301,10 @@ def test_the_rows_that_are_kept_make_the_tables():
     assert lines[-1].startswith(
         f"{len({row['machine'] for row in rows})} machines with 12 surfaces"
     )
-    told = [line for line in lines if line.startswith("| as the emulator has it | 6 |")]
-    heard = [
+    table_rows = [line for line in lines if line.startswith("| as the emulator has it | 6 |")]
+    complete_rows = [
         row
         for row in rows
         if (row["law"], row["points"]) == ("as the emulator has it", "6") and row["clr_true"]
     ]
-    assert f"| {len(heard)} |" in told[0]
+    assert f"| {len(complete_rows)} |" in table_rows[0]

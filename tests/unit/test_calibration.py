@@ -1,8 +1,6 @@
-"""Calibration: parameters that made the anchors come back, closed forms, and what cannot be told is
-called so.
+"""Calibration: recovery of the generating parameters, closed forms, unidentifiable parameters.
 
-Dry contacts, mostly: all load is on asperities, and the resonance is Hertz's, which needs no
-solver to be known.
+Mostly dry contacts: asperities carry the whole load, and the Hertzian resonance needs no solver.
 """
 
 import json
@@ -43,8 +41,8 @@ def dry():
 
 
 @pytest.fixture(scope="module")
-def silent(dry):
-    """Without vibration, which takes longer than a small contact."""
+def without_vibration(dry):
+    """Case without vibration, which takes longer to compute than a small contact."""
     return dry.with_overrides({"vibration": "none"})
 
 
@@ -55,17 +53,19 @@ def threads():
 
 
 def full_load_crf(modulus):
-    """The paper's Eqs 2 to 4 for two bodies of that modulus [Pa], 500 N, 5.4 mm and 0.1 kg."""
+    """CRF by the paper's Eqs 2 to 4 for two bodies of this modulus [Pa], 500 N, 5.4 mm, 0.1 kg."""
     reduced = modulus / 2.0 / (1.0 - 0.3**2)
     depth = (9.0 * 500.0**2 / (16.0 * reduced**2 * 5.4e-3)) ** (1.0 / 3.0)
     return math.sqrt(1.5 * 500.0 / depth / 0.1) / (2.0 * math.pi)
 
 
-def test_what_made_the_anchors_is_found_and_what_they_do_not_see_is_said(dry, threads, tmp_path):
+def test_calibration_recovers_the_parameters_and_reports_unidentifiable_ones(
+    dry, threads, tmp_path
+):
     truth = dry.with_overrides(
         {"material.hardness": "1.3 GPa", "material.youngs_modulus": "230 GPa"}
     )
-    made = run_study(
+    simulated = run_study(
         plan_points(truth, [{"surface.sq": "3 um"}], seeding="common"), executor=threads
     ).table
     anchors = [
@@ -73,7 +73,7 @@ def test_what_made_the_anchors_is_found_and_what_they_do_not_see_is_said(dry, th
             name="CAR",
             quantity="car_domain",
             sq=3e-6,
-            value=float(made["car_domain"].iloc[0]),
+            value=float(simulated["car_domain"].iloc[0]),
             tolerance=0.01,
         ),
         Anchor(name="CRF", quantity="crf_hz", sq=3e-6, value=full_load_crf(230e9), tolerance=10.0),
@@ -91,10 +91,10 @@ def test_what_made_the_anchors_is_found_and_what_they_do_not_see_is_said(dry, th
     assert cap.low < 1.3 < cap.high
     assert found.directions[-1].weights == pytest.approx((0.0, 0.0, 1.0), abs=1e-9)
     assert not found.directions[-1].determined
-    # CRF ~ E^(1/3) is all that tells E here: its standard deviation follows from that of CRF
+    # here E is determined by CRF ~ E^(1/3) alone: its standard deviation follows from that of CRF
     crf_alone = 3.0 * 10.0 / full_load_crf(230e9)
-    reached = 0.5 * math.log(modulus.high / modulus.low)
-    assert reached == pytest.approx(crf_alone, rel=0.4)
+    half_width = 0.5 * math.log(modulus.high / modulus.low)
+    assert half_width == pytest.approx(crf_alone, rel=0.4)
     assert "Not determined by the anchors: material.boundary_friction." in found.verdict()
     stated = found.calibrated.conditions
     assert stated.hardness == pytest.approx(1e9 * cap.value)
@@ -105,19 +105,22 @@ def test_what_made_the_anchors_is_found_and_what_they_do_not_see_is_said(dry, th
     parts = sorted((tmp_path / "evaluations" / "parts").iterdir())
     again = calibrate(
         dry, anchors, settings=settings, out=tmp_path, executor=threads
-    )  # from the folder
+    )  # resumed from the folder
     assert again.parameters == found.parameters
     assert sorted((tmp_path / "evaluations" / "parts").iterdir()) == parts
 
 
-def test_anchors_that_contradict_each_other_are_met_halfway_and_named(silent, threads):
-    """Two CARs for one cap: the misses are equal and opposite, and each is what the other costs."""
+def test_contradictory_anchors_are_fitted_halfway_and_named(without_vibration, threads):
+    """Two CARs for one hardness: the misfits are equal and opposite and trade off one to one."""
     anchors = [
         Anchor(name="little", quantity="car_domain", sq=2e-6, value=0.25, tolerance=0.01),
         Anchor(name="much", quantity="car_domain", sq=2e-6, value=0.35, tolerance=0.01),
     ]
     found = calibrate(
-        silent, anchors, settings=CalibrationSettings(free=[CAP], **QUICK), executor=threads
+        without_vibration,
+        anchors,
+        settings=CalibrationSettings(free=[CAP], **QUICK),
+        executor=threads,
     )
     miss = found.fit.set_index("anchor")["miss"]
     assert miss["little"] == pytest.approx(0.05, abs=0.01)
@@ -133,32 +136,39 @@ def test_anchors_that_contradict_each_other_are_met_halfway_and_named(silent, th
     assert "0 of 2 anchors are met" in found.verdict()
 
 
-def test_a_bound_that_is_kept_does_not_pull(silent, threads):
+def test_a_satisfied_bound_does_not_affect_the_fit(without_vibration, threads):
     car = Anchor(name="CAR", quantity="car_domain", sq=2e-6, value=0.3, tolerance=0.01)
     bound = Anchor(
         name="above", quantity="car_domain", sq=2e-6, value=0.1, tolerance=0.001, sense="at least"
     )
     found = calibrate(
-        silent, [car, bound], settings=CalibrationSettings(free=[CAP], **QUICK), executor=threads
+        without_vibration,
+        [car, bound],
+        settings=CalibrationSettings(free=[CAP], **QUICK),
+        executor=threads,
     )
     alone = calibrate(
-        silent, [car], settings=CalibrationSettings(free=[CAP], **QUICK), executor=threads
+        without_vibration,
+        [car],
+        settings=CalibrationSettings(free=[CAP], **QUICK),
+        executor=threads,
     )
     assert found.parameters == alone.parameters
     assert found.fit.set_index("anchor").loc["above", "miss"] == 0.0
-    beyond = replace(bound, value=0.95)  # more than the softest cap can give
+    infeasible = replace(bound, value=0.95)  # above the CAR at the lowest hardness
     pushed = calibrate(
-        silent, [beyond], settings=CalibrationSettings(free=[CAP], **QUICK), executor=threads
+        without_vibration,
+        [infeasible],
+        settings=CalibrationSettings(free=[CAP], **QUICK),
+        executor=threads,
     )
     assert pushed.parameters[0].at_end
     assert pushed.parameters[0].value == pytest.approx(0.5, rel=0.03)
     assert "At the end of the range: material.hardness." in pushed.verdict()
 
 
-def test_scatter_over_surfaces_is_no_information():
-    """Slopes of pure noise: their products over different surfaces cancel, where their squares add
-    up.
-    """
+def test_scatter_over_surfaces_adds_no_information():
+    """Slopes of pure noise: products over different surfaces cancel, whereas squares accumulate."""
     rng = np.random.default_rng(3)
     learnt, naive = [], []
     for _ in range(200):
@@ -167,15 +177,13 @@ def test_scatter_over_surfaces_is_no_information():
         naive.append(float(np.sum(slopes.mean**2)))
     assert np.mean(naive) == pytest.approx(4 * 25.0 / 6.0, rel=0.1)
     assert np.median(learnt) < 0.25 * np.mean(naive)
-    assert (
-        np.mean(np.array(learnt) > 12.0) < 0.2
-    )  # seldom enough to count as determined; the squares mostly are
+    assert np.mean(np.array(learnt) > 12.0) < 0.2  # rarely determined; with squares mostly
     assert np.mean(np.array(naive) > 12.0) > 0.5
     true = MisfitSlopes(np.zeros((6, 4)), 5.0 + 5.0 * rng.standard_normal((6, 4, 1)))
     assert true.information[0, 0] == pytest.approx(4 * 25.0, rel=0.5)
 
 
-def test_information_of_a_line_is_that_of_least_squares():
+def test_information_of_a_linear_model_matches_least_squares():
     rng = np.random.default_rng(4)
     jacobian = rng.standard_normal((5, 3))
     slopes = MisfitSlopes(np.zeros((3, 5)), np.repeat(jacobian[None], 3, axis=0))
@@ -185,7 +193,7 @@ def test_information_of_a_line_is_that_of_least_squares():
     assert covariance == pytest.approx(np.linalg.inv(jacobian.T @ jacobian + 12.0 * np.eye(3)))
 
 
-def test_levels_are_the_anchors_and_near_ones_are_solved_once():
+def test_levels_match_the_anchors_and_close_ones_are_merged():
     anchors = [
         Anchor(name=f"{sq}", quantity="clr", sq=1e-6 * sq, since=None, value=0.5, tolerance=0.1)
         for sq in (0.5, 0.54, 2.5, 3.49, 3.5, 4.0)
@@ -202,7 +210,7 @@ CRF = Anchor(name="CRF", quantity="crf_hz", sq=2e-6, value=3800.0, tolerance=10.
 
 
 @pytest.mark.parametrize(
-    ("anchors", "settings", "said"),
+    ("anchors", "settings", "message"),
     [
         ([], {}, "needs a fitted anchor"),
         ([replace(CRF, fitted=False)], {}, "needs a fitted anchor"),
@@ -217,11 +225,11 @@ CRF = Anchor(name="CRF", quantity="crf_hz", sq=2e-6, value=3800.0, tolerance=10.
         ([replace(CRF, quantity="crv_hz")], {}, "no column 'crv_hz'"),
     ],
 )
-def test_what_cannot_be_asked_is_refused_in_a_sentence(dry, threads, anchors, settings, said):
+def test_invalid_settings_are_refused(dry, threads, anchors, settings, message):
     chosen = CalibrationSettings(**{"free": [MODULUS], **QUICK, **settings})
     with pytest.raises(BadInput) as refused:
         calibrate(dry, anchors, settings=chosen, executor=threads)
-    assert said in str(refused.value)
+    assert message in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
@@ -234,9 +242,11 @@ def test_an_anchor_of_the_resonance_needs_a_vibration(dry):
         )
 
 
-def test_the_command_writes_a_case_that_a_study_can_run(silent, tmp_path, monkeypatch, capsys):
+def test_the_command_writes_a_case_that_a_study_can_run(
+    without_vibration, tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
-    Path("case.toml").write_text(silent.text, "utf-8")
+    Path("case.toml").write_text(without_vibration.text, "utf-8")
     Path("anchors.toml").write_text(
         '[[anchor]]\nname = "CAR"\nquantity = "car_domain"\nsq = "2 um"\nvalue = 0.3\ntolerance ='
         " 0.01\n",
@@ -274,7 +284,7 @@ def test_the_command_writes_a_case_that_a_study_can_run(silent, tmp_path, monkey
     assert Path("found/anchors.csv").read_text("utf-8").count("\n") == 4
     with pytest.raises(SystemExit):
         main([*arguments, "--json"])
-    said = json.loads(capsys.readouterr().out)
-    assert said["verdict"] == out.splitlines()[0]
-    assert said["parameters"][0]["identifiable"] is True
-    assert said["calibrated"] == str(Path("found", "calibrated.toml"))
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["verdict"] == out.splitlines()[0]
+    assert summary["parameters"][0]["identifiable"] is True
+    assert summary["calibrated"] == str(Path("found", "calibrated.toml"))

@@ -28,7 +28,7 @@ def paper():
     return load_case(EXAMPLES / "paper.toml")
 
 
-def test_the_papers_table_2_arrives_in_si(paper):
+def test_the_papers_table_2_is_converted_to_si(paper):
     conditions, oil = paper.conditions, paper.lubricant
     assert (conditions.geometry, conditions.radius, conditions.length, conditions.load) == (
         "line",
@@ -47,27 +47,25 @@ def test_the_papers_table_2_arrives_in_si(paper):
     assert paper.options == Options()
 
 
-def test_the_grid_is_measured_in_half_widths_of_the_papers_contact(paper):
+def test_grid_limits_are_in_hertz_half_widths(paper):
     a = math.sqrt(8.0 * 5e4 * 0.0054 / (math.pi * 219.78e9))  # physics: a = sqrt(8 w' R/(pi E'))
     assert paper.grid.lower == pytest.approx((-4.5 * a, -1.6 * a), rel=1e-5)
     assert paper.grid.upper == pytest.approx((1.9 * a, 1.6 * a), rel=1e-5)
 
 
-def test_the_packaged_case_is_the_example():
+def test_the_packaged_case_equals_the_example():
     packaged = Path(__file__).parents[2] / "src" / "asperity" / "paper" / "paper.toml"
     assert packaged.read_bytes() == (EXAMPLES / "paper.toml").read_bytes()
 
 
-def test_a_domain_that_starves_says_by_how_much(paper):
-    """Against the films that docs/case-file.md states for alpha 20 1/GPa: 0.448 um from -1.9, 0.722
-    from -4.5.
-    """
+def test_a_short_inlet_reports_the_film_deficit(paper):
+    """Films in docs/case-file.md for alpha 20 1/GPa: 0.448 um from -1.9, 0.722 um from -4.5."""
     printed = load_case(EXAMPLES / "paper-as-printed.toml")
     assert printed.with_overrides({"grid.x": [-4.5, 1.9], "model": "mixed"}) == paper
     for case, film in ((printed, 0.448), (paper, 0.722)):
         case = case.with_overrides({"lubricant.viscosity.alpha": "20 1/GPa"})
-        said = float(re.search(r"the film is about ([\d.]+) % too thin", case.notes[0])[1])
-        assert said == pytest.approx(
+        deficit = float(re.search(r"the film is about ([\d.]+) % too thin", case.notes[0])[1])
+        assert deficit == pytest.approx(
             100.0 * (1.0 - film / 0.772), rel=0.25
         )  # 0.772: 0.763 um from -8 is 1.2 % thin
     assert paper.with_overrides({"grid.x": [-12, 3]}).notes == ()
@@ -114,30 +112,28 @@ def test_the_text_of_a_case_loads_to_an_equal_case(paper, overrides):
 COPIES = {
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,
-    "pickle": lambda thing: pickle.loads(pickle.dumps(thing)),
+    "pickle": lambda value: pickle.loads(pickle.dumps(value)),
 }
 
 
-@pytest.mark.parametrize("how", COPIES)
-def test_a_case_and_its_contents_can_be_copied_and_sent_to_another_process(how):
+@pytest.mark.parametrize("method", COPIES)
+def test_a_case_and_its_contents_can_be_copied_and_sent_to_another_process(method):
     copied = 0
     for path in sorted(EXAMPLES.glob("*.toml")):
         if "machine" in tomllib.loads(path.read_text("utf-8")):
             continue
         case, copied = load_case(path), copied + 1
-        again, contents = COPIES[how](case), COPIES[how](case.contents)
+        again, contents = COPIES[method](case), COPIES[method](case.contents)
         assert again == case
         assert again.text == case.text
         assert again.folder == case.folder
         assert contents == case.contents
         assert contents.contact.load.text == case.contents.contact.load.text
-        assert contents.material is case.contents.material or how != "copy"
+        assert contents.material is case.contents.material or method != "copy"
     assert copied > 3
 
 
-@settings(
-    deadline=None
-)  # the first case read loads what reads cases; a busy machine took 0.25 s for it
+@settings(deadline=None)  # the first read imports the parser, which takes 0.25 s on a busy machine
 @given(
     st.floats(1e-3, 1e6), st.sampled_from([("mm", 1e-3), ("um", 1e-6), ("m", 1.0), ("nm", 1e-9)])
 )
@@ -165,7 +161,7 @@ def test_roelands_takes_its_own_reference_pressure(paper):
     assert case.lubricant.viscosity == Roelands(0.096, 18.2e-9, 1.96e8)
 
 
-def test_one_seed_is_one_surface_at_any_roughness(paper):
+def test_one_seed_gives_one_surface_at_any_roughness(paper):
     coarse = paper.with_overrides({"grid.cells": [64, 64]})
     rougher = coarse.with_overrides({"surface.sq": "2 um"})
     assert coarse.surface().sq == pytest.approx(1e-6, rel=1e-12)
@@ -176,7 +172,7 @@ def test_one_seed_is_one_surface_at_any_roughness(paper):
     assert not np.allclose(other.heights, coarse.surface().heights)
 
 
-def test_stored_roughness_stays_until_surface_or_grid_change(paper):
+def test_stored_roughness_is_reused_until_surface_or_grid_change(paper):
     small = paper.with_overrides({"grid.cells": [64, 64]})
     stored = Surface(np.full((64, 64), 1e-7), small.grid)
     case = load_case(small.text, stored=stored)
@@ -229,10 +225,10 @@ BAD = [
 
 
 @pytest.mark.parametrize(("key", "value", "sentence"), BAD)
-def test_what_cannot_be_meant_is_refused_in_one_sentence(paper, key, value, sentence):
-    with pytest.raises(BadInput) as refused:
+def test_an_invalid_value_raises_one_sentence(paper, key, value, sentence):
+    with pytest.raises(BadInput) as error:
         paper.with_overrides({key: value})
-    message = str(refused.value)
+    message = str(error.value)
     assert sentence in message
     assert message.startswith(paper.source)
     assert "\n" not in message
@@ -261,7 +257,7 @@ def test_any_text_for_a_unit_is_a_force_or_refused(text):
         assert load_case(case.text) == case
 
 
-def test_files_that_are_no_case_are_named(tmp_path):
+def test_unreadable_files_are_named(tmp_path):
     (tmp_path / "binary.toml").write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
     (tmp_path / "broken.toml").write_text("[contact\n")
     for name in ("absent.toml", "binary.toml", "broken.toml", "."):
@@ -271,7 +267,7 @@ def test_files_that_are_no_case_are_named(tmp_path):
             load_case(tmp_path / name)
 
 
-def test_ball_and_barrel_are_measured_in_their_own_half_widths(paper):
+def test_grids_of_point_and_elliptic_contacts_use_their_own_half_widths(paper):
     ball = paper.with_overrides(
         {
             "contact.geometry": "point",
@@ -296,7 +292,7 @@ def test_ball_and_barrel_are_measured_in_their_own_half_widths(paper):
 
 @pytest.mark.parametrize("text", amounts._COMMON)
 @pytest.mark.parametrize("number", ["1", "5.4", "1e-3", "219.78"])
-def test_a_common_unit_is_worth_what_pint_says(text, number):
+def test_a_common_unit_converts_as_in_pint(text, number):
     amount = amounts._units().Quantity(Decimal(number), text)
     for unit, expected in (
         (None, amount.to_base_units()),
@@ -305,7 +301,7 @@ def test_a_common_unit_is_worth_what_pint_says(text, number):
         assert str(amounts._convert(number, text, unit)) == str(expected.magnitude)
 
 
-def test_one_common_unit_in_another():
+def test_a_common_unit_converts_to_another():
     assert amounts._convert("5", "nm", "um") == Decimal("0.005")
     with pytest.raises(ValueError, match="another quantity"):
         amounts._convert("5", "nm", "s")

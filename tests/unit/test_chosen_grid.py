@@ -1,6 +1,4 @@
-"""[grid] of a case left out, whole or in part: what is chosen then, for every kind of surface, and
-what is kept.
-"""
+"""Automatic grid when [grid] is missing or partial, for every kind of surface."""
 
 import numpy as np
 import pytest
@@ -49,33 +47,33 @@ def case_of(surface, grid=""):
 
 
 @pytest.mark.parametrize("surface", SURFACES, ids=lambda text: text.split('"')[1])
-def test_every_kind_of_surface_can_be_made_on_the_grid_that_is_chosen_and_is_resolved(surface):
+def test_the_automatic_grid_resolves_every_kind_of_surface(surface):
     case = case_of(surface)
-    made = case.surface()
-    assert made.grid == case.grid
+    surface_sample = case.surface()
+    assert surface_sample.grid == case.grid
     assert load_case(case.text) == case
     assert load_case(case.text).grid == case.grid
-    if made.sq > 0.0:
-        cells = np.divide(correlation_lengths(made), case.grid.spacing)
-        assert cells.min() > 6.0  # 8 are asked for, of the kind; one sample's length scatters
+    if surface_sample.sq > 0.0:
+        cells = np.divide(correlation_lengths(surface_sample), case.grid.spacing)
+        assert cells.min() > 6.0  # the target is 8 for the ensemble; one sample scatters
 
 
-def test_what_is_given_is_obeyed():
+def test_given_grid_values_are_kept():
     surface = SURFACES[1]
-    whole = case_of(surface).grid
-    some = case_of(surface, "[grid]\nx = [-4.5, 1.9]").grid
-    assert (some.lower[0], some.upper[0]) == pytest.approx((-4.5 * A, 1.9 * A), rel=1e-5)
-    assert (some.lower[1], some.upper[1]) == (whole.lower[1], whole.upper[1])
-    assert some.spacing[0] == pytest.approx(whole.spacing[0], rel=0.05)
+    automatic = case_of(surface).grid
+    partial = case_of(surface, "[grid]\nx = [-4.5, 1.9]").grid
+    assert (partial.lower[0], partial.upper[0]) == pytest.approx((-4.5 * A, 1.9 * A), rel=1e-5)
+    assert (partial.lower[1], partial.upper[1]) == (automatic.lower[1], automatic.upper[1])
+    assert partial.spacing[0] == pytest.approx(automatic.spacing[0], rel=0.05)
     given = case_of(surface, "[grid]\ncells = [64, 32]").grid
     assert given.cells == (64, 32)
-    assert given.extent == whole.extent
+    assert given.extent == automatic.extent
     fine = case_of(surface, "[grid]\naccuracy = 0.0025").grid
-    assert fine.spacing[0] == pytest.approx(whole.spacing[0] / 2.0, rel=0.05)
+    assert fine.spacing[0] == pytest.approx(automatic.spacing[0] / 2.0, rel=0.05)
 
 
 @pytest.mark.parametrize(
-    ("grid", "said"),
+    ("grid", "message"),
     [
         (
             "cells = [64, 64]\nx = [-4.5, 1.9]\ny = [-1, 1]\naccuracy = 0.01",
@@ -86,16 +84,14 @@ def test_what_is_given_is_obeyed():
         ("x = [-0.5, 1.9]", "x must reach beyond the contact on both sides"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(grid, said):
-    with pytest.raises(BadInput) as refused:
+def test_invalid_grids_are_refused(grid, message):
+    with pytest.raises(BadInput) as error:
         case_of(SURFACES[1], f"[grid]\n{grid}")
-    assert said in str(refused.value)
+    assert message in str(error.value)
 
 
 def test_a_measured_map_limits_its_grid_and_is_resolved(tmp_path):
-    """A map of 640 x 160 um whose hills are 16 um wide: the contact would ask for more of y than
-    there is.
-    """
+    """Hills 16 um wide on a map of 640 x 160 um; the contact needs a longer y than the map has."""
     hills = np.kron(np.random.default_rng(3).standard_normal((40, 10)), np.ones((8, 8)))
     x3pio.write(tmp_path / "ring.x3p", 1e-6 * hills.T, x_scale=2e-6, y_scale=2e-6)
     text = f'{CONTACT}[surface]\nfile = "ring.x3p"\nsq = "0.8 um"\n'
@@ -105,10 +101,10 @@ def test_a_measured_map_limits_its_grid_and_is_resolved(tmp_path):
     assert case.grid.extent[1] <= 160.001e-6
     assert case.grid.spacing[0] < 16e-6 / 8.0
     stored = load_case(text, folder=tmp_path / "elsewhere", stored=case.surface())
-    assert stored.grid == case.grid  # of a run: the file is not asked for again
+    assert stored.grid == case.grid  # a stored run does not read the file again
 
 
-def test_a_flat_line_is_solved_on_as_few_lines_as_a_grid_has():
+def test_a_smooth_line_contact_uses_the_minimum_number_of_rows():
     case = case_of(SURFACES[-1])
     assert case.grid.cells[1] == 8
     assert not case.surface().heights.any()

@@ -6,8 +6,8 @@ from asperity.core.errors import BadInput
 from support.paper import contact
 
 
-def test_the_papers_modulus_is_the_effective_one():
-    """The printed 219.78 GPa is E/(1 - nu^2), so E', twice the E* that Hertz needs."""
+def test_the_papers_modulus_is_the_effective_modulus():
+    """The printed 219.78 GPa is E/(1 - nu^2) = E', twice the E* of Hertz."""
     pair = ElasticPair((200e9, 200e9), (0.3, 0.3))
     assert pair.effective_modulus == pytest.approx(219.78e9, rel=1e-5)
     assert pair.reduced_modulus == pytest.approx(109.89e9, rel=1e-5)
@@ -19,7 +19,7 @@ def test_a_rigid_partner_leaves_the_others_plane_strain_modulus():
     )
 
 
-def test_the_papers_contact_has_the_papers_size():
+def test_the_papers_contact_has_the_documented_size():
     """physics.md section 2: a = 55.93 um, p_h = 0.5691 GPa, a^2/R = 0.5793 um."""
     paper = contact()
     a = paper.hertz.half_widths[0]
@@ -30,8 +30,8 @@ def test_the_papers_contact_has_the_papers_size():
 
 
 def test_speeds_of_the_papers_rig():
-    """Roller 12 mm at 3375 r/min, ring 108 mm at 300 r/min: slide-to-roll ratio 0.2 as in its Table
-    2.
+    """Roller 12 mm at 3375 r/min, ring 108 mm at 300 r/min: slide-to-roll ratio 0.2 (paper's Table
+    2).
     """
     rig = contact(surface_speeds=(2.12, 1.70))
     assert rig.entrainment_speed == pytest.approx(1.91)
@@ -40,7 +40,7 @@ def test_speeds_of_the_papers_rig():
     assert contact(surface_speeds=(1.70, 2.12)).sliding_speed == pytest.approx(0.42)
 
 
-def test_each_geometry_meets_its_own_hertz():
+def test_each_geometry_uses_its_own_hertz_formula():
     modulus = contact().pair.reduced_modulus
     ball = contact(geometry="point", length=None)
     assert ball.hertz == point_contact(500.0, 5.4e-3, modulus)
@@ -52,7 +52,7 @@ def test_each_geometry_meets_its_own_hertz():
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"geometry": "plane"}, "line, point, elliptic, roller, got 'plane'"),
         ({"radius": -5.4e-3}, "radius must be positive and finite, got -0.0054 m"),
@@ -67,14 +67,14 @@ def test_each_geometry_meets_its_own_hertz():
         ({"surface_speeds": (1.0, -1.0)}, "entrainment speed must be positive"),
     ],
 )
-def test_a_contact_that_cannot_be_is_refused_in_one_sentence(changes, said):
-    with pytest.raises(BadInput, match=said):
+def test_an_impossible_contact_is_refused(changes, message):
+    with pytest.raises(BadInput, match=message):
         contact(**changes)
 
 
 @pytest.mark.parametrize(
     ("moduli", "ratios"), [((0.0, 2e11), (0.3, 0.3)), ((2e11, 2e11), (0.3, 0.51))]
 )
-def test_a_material_that_cannot_be_is_refused(moduli, ratios):
+def test_an_impossible_material_is_refused(moduli, ratios):
     with pytest.raises(BadInput, match=r"must"):
         ElasticPair(moduli, ratios)

@@ -7,13 +7,14 @@ from asperity import Surface, contact_state, solve_contact
 from support.paper import contact, grid
 
 
-def test_the_mean_slope_of_waves_is_that_of_their_cosine():
-    where = grid((96, 48))
-    length, height = where.extent[0] / 4.0, 0.2e-6
+def test_the_mean_slope_of_waves_matches_the_closed_form():
+    wave_grid = grid((96, 48))
+    length, height = wave_grid.extent[0] / 4.0, 0.2e-6
     waves = (
-        height * np.sin(2.0 * np.pi * (where.x[:, None] - where.lower[0]) / length) + 0.0 * where.y
+        height * np.sin(2.0 * np.pi * (wave_grid.x[:, None] - wave_grid.lower[0]) / length)
+        + 0.0 * wave_grid.y
     )
-    solution = solve_contact(contact(), None, Surface(waves, where), strict=False)
+    solution = solve_contact(contact(), None, Surface(waves, wave_grid), strict=False)
     assert solution.in_contact.any()
     everywhere = replace(solution, in_contact=np.ones_like(solution.in_contact))
     exact = height * 2.0 * np.pi / length * 2.0 / np.pi

@@ -1,4 +1,4 @@
-"""What the library returns can be copied and sent to another process, and says the same there."""
+"""Results can be copied and sent to another process, with identical content."""
 
 import copy
 import json
@@ -21,13 +21,13 @@ from asperity.surface import describe_surface
 COPIES = {
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,
-    "pickle": lambda thing: pickle.loads(pickle.dumps(thing)),
+    "pickle": lambda value: pickle.loads(pickle.dumps(value)),
 }
 
 
 @pytest.fixture(scope="module")
-def told(tmp_path_factory):
-    """Results, and what is to be the same of each."""
+def results(tmp_path_factory):
+    """Results by name, each with a function that returns the content to compare."""
     folder = tmp_path_factory.mktemp("copies")
     case = papers_case().with_overrides(
         {"grid.cells": [32, 32], "surface.correlation_length": "60 um"}
@@ -73,11 +73,11 @@ def told(tmp_path_factory):
     }
 
 
-def in_words(value):
+def as_text(value):
     if hasattr(value, "to_json"):
         return value.to_json(double_precision=15)
     return json.dumps(
-        value, default=lambda other: getattr(other, "tolist", lambda: str(other))(), sort_keys=True
+        value, default=lambda item: getattr(item, "tolist", lambda: str(item))(), sort_keys=True
     )
 
 
@@ -96,15 +96,15 @@ RESULTS = (
 )
 
 
-@pytest.mark.parametrize("how", COPIES)
+@pytest.mark.parametrize("method", COPIES)
 @pytest.mark.parametrize("name", RESULTS)
-def test_a_result_can_be_copied_and_sent_to_another_process(told, name, how):
-    result, tells = told[name]
-    again = COPIES[how](result)
+def test_a_result_can_be_copied_and_sent_to_another_process(results, name, method):
+    result, content = results[name]
+    again = COPIES[method](result)
     assert type(again) is type(result)
-    both = [tells(each) for each in (result, again)]
+    both = [content(item) for item in (result, again)]
     first, second = (
-        [in_words(part) for part in parts] if isinstance(parts, list) else in_words(parts)
+        [as_text(part) for part in parts] if isinstance(parts, list) else as_text(parts)
         for parts in both
     )
     assert first == second

@@ -62,7 +62,7 @@ def state(clr: float = 1.0, car: float = 1.0, sq: float = 2e-6) -> ContactState:
     )
 
 
-def test_full_load_gives_the_stiffness_worked_out_by_hand():
+def test_full_load_stiffness_matches_the_hand_calculation():
     """physics.md section 4: z0 6.855 um, S0 4.3765e7 N/m, f0 3329.5 Hz at 200 N, E* 113.74 GPa, R
     5.4 mm.
     """
@@ -86,14 +86,14 @@ def test_cutoff_follows_the_area_share():
     assert proportional.excitation.cutoff_hz(0.25) == pytest.approx(15.0)
 
 
-def test_band_follows_from_the_contact_alone():
+def test_the_search_band_follows_from_the_contact_alone():
     low, high = search_band(CONDITIONS, MODEL)
     assert low == pytest.approx(0.95 * 3329.5 * 0.01 ** (1 / 6), rel=1e-4)
     assert high == pytest.approx(1.05 * 3329.5, rel=1e-4)
     assert contact_vibration(state(clr=0.4), CONDITIONS, MODEL).band_hz == (low, high)
 
 
-def test_one_seed_is_one_record():
+def test_one_seed_gives_one_record():
     first, again = (contact_vibration(state(clr=0.5, car=0.3), CONDITIONS, MODEL) for _ in range(2))
     assert np.array_equal(first.response.values, again.response.values)
     assert first.resonance == again.resonance
@@ -104,38 +104,38 @@ def test_one_seed_is_one_record():
 
 
 def test_record_scatters_about_the_expected_spectrum():
-    seen = contact_vibration(state(clr=0.5, car=0.3), CONDITIONS, MODEL)
-    inside = (seen.spectrum.frequency_hz > seen.band_hz[0]) & (
-        seen.spectrum.frequency_hz < seen.band_hz[1]
+    result = contact_vibration(state(clr=0.5, car=0.3), CONDITIONS, MODEL)
+    inside = (result.spectrum.frequency_hz > result.band_hz[0]) & (
+        result.spectrum.frequency_hz < result.band_hz[1]
     )
-    ratio = seen.spectrum.density[inside] / seen.expected.density[inside]
+    ratio = result.spectrum.density[inside] / result.expected.density[inside]
     assert np.mean(ratio) == pytest.approx(1.0, abs=4.0 / np.sqrt(ratio.size) + 0.01)
 
 
 @pytest.mark.parametrize(
-    ("silent", "why"),
+    ("contact", "reason"),
     [
         (state(clr=0.0, car=0.0), "no asperity"),
         (state(car=0.0), "outside"),
         (state(sq=0.0), "flat"),
     ],
 )
-def test_without_touching_asperities_there_is_no_resonance_but_a_reason(silent, why):
-    seen = contact_vibration(silent, CONDITIONS, MODEL)
-    assert seen.oscillator is None
-    assert seen.spectrum is None
-    assert not seen.resonance.found
-    assert why in seen.resonance.reason
-    assert seen.full_load_crf_hz == pytest.approx(3329.5, rel=1e-4)
+def test_without_touching_asperities_a_reason_replaces_the_resonance(contact, reason):
+    result = contact_vibration(contact, CONDITIONS, MODEL)
+    assert result.oscillator is None
+    assert result.spectrum is None
+    assert not result.resonance.found
+    assert reason in result.resonance.reason
+    assert result.full_load_crf_hz == pytest.approx(3329.5, rel=1e-4)
 
 
-def test_a_share_too_small_for_the_band_is_not_found():
-    seen = contact_vibration(state(clr=0.003, car=0.02), CONDITIONS, MODEL)
-    assert not seen.resonance.found
-    assert "edge" in seen.resonance.reason
+def test_a_load_share_too_small_for_the_band_is_not_detected():
+    result = contact_vibration(state(clr=0.003, car=0.02), CONDITIONS, MODEL)
+    assert not result.resonance.found
+    assert "edge" in result.resonance.reason
 
 
-def test_bad_input_is_named():
+def test_invalid_input_is_named():
     slow = VibrationModel(mass=0.1, damping_ratio=0.02, rate_hz=20e3)
     with pytest.raises(
         BadInput, match=r"15 times the full-load resonance of 33\d\d Hz, got 20000 Hz"
@@ -184,7 +184,7 @@ def test_bad_input_is_named():
             contact_vibration(state(), CONDITIONS, fast)
 
 
-def test_the_presets_differ_in_what_the_paper_did_and_sound_is_the_default():
+def test_presets_differ_in_the_papers_choices_and_sound_is_the_default():
     sound = VibrationModel.preset("sound", mass=0.1, damping_ratio=0.02)
     assert sound == MODEL
     assert set(preset_choices("sound")) == set(PRESETS["paper"])
@@ -202,7 +202,7 @@ def test_the_presets_differ_in_what_the_paper_did_and_sound_is_the_default():
     )  # physics.md section 4: 0.002 F
 
 
-def test_a_law_is_stated_by_its_name_with_its_parameters_or_is_given_itself():
+def test_a_law_is_given_by_name_and_parameters_or_as_an_object():
     line = VibrationModel(
         mass=0.1, damping_ratio=0.02, stiffness_law="hertz-line", reference_depth=1e-3
     )
@@ -217,7 +217,7 @@ def test_a_law_is_stated_by_its_name_with_its_parameters_or_is_given_itself():
         VibrationModel(mass=0.1, damping_ratio=0.02, filtre="bilinear")
 
 
-def test_parameters_of_laws_not_in_use_are_kept_for_when_they_are():
+def test_parameters_of_unused_laws_are_retained():
     model = VibrationModel(mass=0.1, damping_ratio=0.02, reference_depth=1e-3, cutoff_exponent=1.0)
     assert model.stiffness_law == HertzPoint()
     assert model.with_choices(stiffness_law="tangent").stiffness_law == Tangent(1e-3)
@@ -230,7 +230,7 @@ def test_parameters_of_laws_not_in_use_are_kept_for_when_they_are():
 
 @dataclass(frozen=True)
 class Cushioned(StiffnessLaw):
-    """A law by the recipe of CONTRIBUTING."""
+    """A law written by the recipe in CONTRIBUTING."""
 
     cushion: Annotated[float, Parameter("N/m", "k")] = 1e6
     name = "cushioned"
@@ -240,7 +240,7 @@ class Cushioned(StiffnessLaw):
         return self.cushion * contact.clr
 
 
-def test_a_new_law_is_a_class_and_a_line_in_its_table(monkeypatch):
+def test_a_new_law_needs_a_class_and_a_table_entry(monkeypatch):
     monkeypatch.setitem(STIFFNESS_LAWS, Cushioned.name, Cushioned)
     assert vibration_choices()["cushion"] == (float, 1e6, "N/m")
     model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="cushioned", cushion=2e6)
@@ -263,7 +263,7 @@ def test_damping_laws_are_eq_5_with_radians_with_hertz_and_a_constant():
     assert springs["constant"].damping == pytest.approx(50.0)
 
 
-def test_damping_of_the_contact_itself_needs_it_solved():
+def test_the_contacts_own_damping_needs_a_solved_contact():
     model = VibrationModel(mass=0.1, damping_ratio=0.02, damping_law="contact")
     assert model.needs_solution
     with pytest.raises(BadInput, match="damping law contact needs the solved contact"):
@@ -271,8 +271,8 @@ def test_damping_of_the_contact_itself_needs_it_solved():
     assert search_band(CONDITIONS, model) == search_band(CONDITIONS, MODEL)
 
 
-def test_a_film_that_feeds_more_than_the_rest_damps_is_refused():
-    """The smooth film's own damping ratio at 10 kHz is -0.0075."""
+def test_negative_total_damping_is_refused():
+    """The smooth film alone has a damping ratio of -0.0075 at 10 kHz."""
     conditions = replace(CONDITIONS, pair=ElasticPair((200e9, 200e9), (0.3, 0.3)), load=500.0)
     a = conditions.hertz.half_widths[0]
     on = Grid((96, 8), (-4.5 * a, -a), (1.9 * a, a))
@@ -289,9 +289,9 @@ def test_a_film_that_feeds_more_than_the_rest_damps_is_refused():
         DAMPING_LAWS["contact"]()(mass=0.1, stiffness=stiffness, damping_ratio=0.005, solution=film)
 
 
-def test_a_line_contacts_own_spring_is_the_slope_of_its_approach():
-    """dF/dδ of δ = (P'/πE*) (2 ln(4R/a) - 1), a cylinder pressed at its centre (Johnson 1985,
-    section 5.6).
+def test_the_stiffness_of_a_line_contact_is_the_slope_of_its_approach():
+    """dF/dδ of δ = (P'/πE*) (2 ln(4R/a) - 1), cylinder loaded at its centre (Johnson 1985, section
+    5.6).
     """
     modulus, radius, length = CONDITIONS.pair.reduced_modulus, 5.4e-3, 10e-3
 
@@ -313,10 +313,10 @@ def test_the_film_beside_the_asperities_is_softer_than_the_bodies_and_stiffer_th
     assert layers == pytest.approx(0.3 * 200 / (0.48 * 1e-6) + 0.7 * 200 / (0.13 * 0.7e-6))
     assert (
         oscillator(replace(oily, clr=0.0), CONDITIONS, law).stiffness < bodies
-    )  # no asperity touches: still a spring
+    )  # the spring remains without asperity contact
 
 
-def test_the_excitations_choices_reach_the_noise():
+def test_excitation_choices_are_passed_to_the_noise():
     model = VibrationModel.preset(
         "paper", mass=0.1, damping_ratio=0.02, filter_order=3, patch="line"
     )

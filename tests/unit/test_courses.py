@@ -1,5 +1,5 @@
-"""Contacts that change: the filter against a normal distribution written out, forecasts, and what
-keeps CLR low.
+"""Drifting contacts: filter against an explicit normal distribution, forecasts, and design for low
+CLR.
 """
 
 import json
@@ -47,11 +47,11 @@ from asperity.inference.visits import MAX_POINTS, MAX_VISITS, visit_series
 from support.emulated import formula, formula_emulator, formula_setting
 
 TIMES = np.array([0.0, 0.15, 0.4, 0.75, 1.0])
-SIZE, RESTLESS, SCATTER = {"crf": 0.02, "damping": 0.005, "crfa": 0.08}, 0.2, 0.003
-EMULATED, ALIKE = (
+SIZE, DIFFUSION, SCATTER = {"crf": 0.02, "damping": 0.005, "crfa": 0.08}, 0.2, 0.003
+EMULATED, POINT_CORRELATION = (
     {"crf": 0.01, "damping": 0.02, "crfa": EMULATED_HEIGHT_STD},
     0.6,
-)  # deviations, and their correlation
+)  # standard deviations, and their correlation
 
 
 @pytest.fixture(scope="module")
@@ -68,34 +68,34 @@ def recording(x, crf=3000.0, std=6.0, **more):
     return Observation(load_n=500.0, entrainment_m_s=1.91, crf_hz=crf, crf_std_hz=std, x=x, **more)
 
 
-HEARD = ObservedSeries(observations=(recording(1.0),))
+OBSERVED = ObservedSeries(observations=(recording(1.0),))
 
 
-def heard_along(setting, emulator, shares, *, seed=0, std=2e-3):
-    """What a contact in the middle of its priors shows while its Sq goes along its range."""
+def simulated_series(setting, emulator, shares, *, seed=0, std=2e-3):
+    """Simulate observations of a contact at prior medians while its Sq moves through its range."""
     rng = np.random.default_rng(seed)
     forward = ForwardModel(setting, emulator, (ObservationPoint(500.0, 1.91),))
     z = np.zeros((len(shares), len(setting.unknowns)))
     z[:, 0] = setting.unknowns[0].at_share(shares)
-    shown = forward.predict(z, "hertz-point")
+    predicted = forward.predict(z, "hertz-point")
     clr = forward.states(z, ["clr"])["clr"][:, 0]
     x = np.linspace(0.0, 100.0, len(shares))
-    hertz = np.exp(shown.crf[:, 0] + std * rng.standard_normal(len(shares)))
-    damping = np.exp(shown.damping[:, 0] + 0.05 * rng.standard_normal(len(shares)))
-    heard = [
+    hertz = np.exp(predicted.crf[:, 0] + std * rng.standard_normal(len(shares)))
+    damping = np.exp(predicted.damping[:, 0] + 0.05 * rng.standard_normal(len(shares)))
+    observations = [
         recording(time, crf, std * crf, damping_ratio=zeta, damping_std=0.05 * zeta)
         for time, crf, zeta in zip(x, hertz, damping, strict=True)
     ]
-    return heard, clr
+    return observations, clr
 
 
-def test_a_kept_forecast_knows_how_many_contacts_its_emulator_had(setting, emulator):
-    asked = SeriesForecaster(setting, emulator, Limit("clr", 0.5))
+def test_a_stored_forecast_depends_on_the_number_of_emulator_points(setting, emulator):
+    forecaster = SeriesForecaster(setting, emulator, Limit("clr", 0.5))
     extended = SeriesForecaster(
         setting, replace(emulator, points=emulator.points + 8), Limit("clr", 0.5)
     )
-    assert asked.question != extended.question
-    assert asked.question == SeriesForecaster(setting, emulator, Limit("clr", 0.5)).question
+    assert forecaster.question != extended.question
+    assert forecaster.question == SeriesForecaster(setting, emulator, Limit("clr", 0.5)).question
 
 
 # The filter
@@ -103,21 +103,24 @@ def test_a_kept_forecast_knows_how_many_contacts_its_emulator_had(setting, emula
 
 
 def straight_table(share, memory, places=2):
-    """Contacts whose channels are straight lines over the range: one of them here, twice."""
+    """Channels that are linear over the range, for two identical contacts."""
     knots = np.linspace(0.0, 1.0, KNOTS)
     lines = {"crf": 8.0 + 0.4 * knots, "damping": -4.0 - 0.1 * knots, "crfa": 1.0 + 2.0 * knots}
     count = 2
     return ChannelTable(
         {key: np.tile(line, (count, places, 1)) for key, line in lines.items()},
         {
-            key: np.tile(std**2 * np.array([[1.0, ALIKE], [ALIKE, 1.0]]), (count, 1, 1))
+            key: np.tile(
+                std**2 * np.array([[1.0, POINT_CORRELATION], [POINT_CORRELATION, 1.0]]),
+                (count, 1, 1),
+            )
             for key, std in EMULATED.items()
         },
         np.tile([-0.3, 0.3], (count, 1)),
         np.full(count, share),
         DriftParameters(
             {key: np.full(count, size) for key, size in SIZE.items()},
-            *(np.full(count, value) for value in (RESTLESS, SCATTER, memory)),
+            *(np.full(count, value) for value in (DIFFUSION, SCATTER, memory)),
         ),
     )
 
@@ -126,11 +129,11 @@ def straight_table(share, memory, places=2):
     ("changing", "memory", "offset"),
     [(False, 0.0, 0.0), (True, 0.0, 0.0), (True, 0.65, 0.0), (True, 0.0, 0.02)],
 )
-def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(
+def test_the_filter_equals_the_joint_normal_distribution_of_all_observations(
     setting, emulator, changing, memory, offset
 ):
-    """Twenty logarithms' joint density, their covariance by the integrated Wiener process's own
-    formula.
+    """Joint density of twenty logarithms, with the integrated Wiener process's covariance in closed
+    form.
     """
     rng = np.random.default_rng(3)
     observations = [
@@ -146,9 +149,9 @@ def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(
     series = visit_series(observations)
     forward = ForwardModel(setting, emulator, series.points)
     model = DriftModel(forward, series, "hertz-point", "sq_m")
-    walked = model._filter(straight_table(0.4, memory), changing=changing)
+    filtered = model._filter(straight_table(0.4, memory), changing=changing)
     measurements = model.measurements
-    assert len(model.slope_scatter) == (3 if offset else 0)  # of each channel, with load
+    assert len(model.slope_scatter) == (3 if offset else 0)  # per channel, with respect to load
     slope = np.array([{"crf": 0.4, "crfa": 2.0}[entry.channel] for entry in measurements])
     begin = (
         np.array([{"crf": 8.0, "crfa": 1.0}[entry.channel] for entry in measurements]) + 0.4 * slope
@@ -157,48 +160,53 @@ def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(
         [(-0.3, 0.3)[entry.point] if entry.channel == "crf" else 0.0 for entry in measurements]
     )
     time = np.array([entry.time for entry in measurements])
-    early, late = np.minimum.outer(time, time), np.maximum.outer(time, time)
-    wandered = RESTLESS**2 * (early**2 * late / 2.0 - early**3 / 6.0)
-    covariance = (
-        np.outer(slope, slope) * changing * (DRIFT_STD**2 * np.outer(time, time) + wandered)
-    )
+    earlier, later = np.minimum.outer(time, time), np.maximum.outer(time, time)
+    wiener = DIFFUSION**2 * (earlier**2 * later / 2.0 - earlier**3 / 6.0)
+    covariance = np.outer(slope, slope) * changing * (DRIFT_STD**2 * np.outer(time, time) + wiener)
     covariance += EXPONENT_STD**2 * np.outer(log_force, log_force)
-    for row, one in enumerate(measurements):
-        weight, emulated = WEIGHTS[one.channel], EMULATED[one.channel]
-        for column, other in enumerate(measurements):
-            if one.channel == other.channel == "crfa":
+    for row, row_entry in enumerate(measurements):
+        weight, emulated = WEIGHTS[row_entry.channel], EMULATED[row_entry.channel]
+        for column, column_entry in enumerate(measurements):
+            if row_entry.channel == column_entry.channel == "crfa":
                 covariance[row, column] += GAIN_STD**2
-            if one.channel == other.channel:
+            if row_entry.channel == column_entry.channel:
                 covariance[row, column] += emulated**2 * (
-                    1.0 if one.point == other.point else ALIKE
+                    1.0 if row_entry.point == column_entry.point else POINT_CORRELATION
                 )
-            if one.channel == other.channel:
-                apart = 0.0 if one.point == other.point else 0.6  # of their levers
-                alike = POINT_SHARE * (apart == 0.0) + (1.0 - POINT_SHARE) * np.exp(
-                    -0.5 * (apart / FORCE_LENGTH) ** 2
-                )
-                covariance[row, column] += (weight * SIZE[one.channel]) ** 2 * alike
-            if (
-                offset and one.channel == other.channel
-            ):  # a contact that is moved too far once is so each time
-                lean = model.slope_scatter[one.channel, 0]
+            if row_entry.channel == column_entry.channel:
+                force_distance = (
+                    0.0 if row_entry.point == column_entry.point else 0.6
+                )  # difference of log force
+                total_correlation = POINT_SHARE * (force_distance == 0.0) + (
+                    1.0 - POINT_SHARE
+                ) * np.exp(-0.5 * (force_distance / FORCE_LENGTH) ** 2)
                 covariance[row, column] += (
-                    one.offset[0] * lean[one.point] * other.offset[0] * lean[other.point]
+                    weight * SIZE[row_entry.channel]
+                ) ** 2 * total_correlation
+            if (
+                offset and row_entry.channel == column_entry.channel
+            ):  # the error of moving to the common load is fully correlated
+                slope_std = model.slope_scatter[row_entry.channel, 0]
+                covariance[row, column] += (
+                    row_entry.offset[0]
+                    * slope_std[row_entry.point]
+                    * column_entry.offset[0]
+                    * slope_std[column_entry.point]
                 )
-            if memory and one.channel == other.channel == "crf":
+            if memory and row_entry.channel == column_entry.channel == "crf":
                 covariance[row, column] += SCATTER**2 * memory ** (
-                    abs(one.time - other.time) * (len(TIMES) - 1)
+                    abs(row_entry.time - column_entry.time) * (len(TIMES) - 1)
                 )
-        white = one.channel != "crf" or not memory
-        covariance[row, row] += one.measured.std**2 + white * (weight * SCATTER) ** 2
+        white = row_entry.channel != "crf" or not memory
+        covariance[row, row] += row_entry.measured.std**2 + white * (weight * SCATTER) ** 2
     values = np.array([entry.measured.value for entry in measurements])
-    assert walked.log == pytest.approx(
+    assert filtered.log == pytest.approx(
         multivariate_normal(begin, covariance).logpdf(values), abs=1e-6
     )
 
 
-def test_errors_of_near_operating_points_are_nearly_the_same():
-    """The process's own posterior covariance, written out."""
+def test_errors_of_close_operating_points_are_highly_correlated():
+    """Posterior covariance of the process in closed form."""
     rng = np.random.default_rng(2)
     x, at = rng.random((20, 2)), rng.random((4, 3, 2))
     at[:, 1] = at[:, 0] + 1e-3
@@ -215,7 +223,7 @@ def test_errors_of_near_operating_points_are_nearly_the_same():
         assert found[0, 1] > 0.99
 
 
-def test_tables_are_straight_between_knots_and_level_beyond():
+def test_tables_are_linear_between_knots_and_constant_beyond():
     table = np.tile(np.linspace(0.0, 1.0, KNOTS) ** 2, (3, 1))
     value, slope = between_knots(table, np.array([0.5, -0.2, 1.3]))
     assert value == pytest.approx([0.25, 0.0, 1.0])
@@ -223,7 +231,7 @@ def test_tables_are_straight_between_knots_and_level_beyond():
     assert list(slope[1:]) == [0.0, 0.0]
 
 
-def test_a_share_of_a_range_goes_both_ways(setting):
+def test_share_and_value_of_a_range_are_inverse_functions(setting):
     for unknown in setting.unknowns:
         if unknown.key != "grid_error":
             assert unknown.share(unknown.at_share(np.array([0.2, 0.5, 0.8]))) == pytest.approx(
@@ -235,17 +243,21 @@ def test_a_share_of_a_range_goes_both_ways(setting):
 # -------------------------------------------------------------------------------------------------
 
 
-def test_a_roughening_contact_is_foretold(setting, emulator):
-    """Sq goes along its range at a steady rate; the load share reaches one half after the last
-    recording.
-    """
+def test_the_forecast_interval_covers_the_crossing_of_a_roughening_contact(setting, emulator):
+    """Sq rises at a constant rate; CLR reaches one half after the last recording."""
     shares = np.linspace(0.3, 1.0, 61)
-    heard, clr = heard_along(setting, emulator, shares)
-    there, limit = int(np.argmax(clr >= 0.5)), 0.5
-    seen = there - 12
-    found = forecast_observations(setting, emulator, heard[: seen + 1 : 2], limit=("clr", limit))
-    crossing = np.interp(limit, clr[there - 1 : there + 1], [heard[there - 1].x, heard[there].x])
-    crossing -= heard[: seen + 1 : 2][-1].x
+    observations, clr = simulated_series(setting, emulator, shares)
+    crossing_index, limit = int(np.argmax(clr >= 0.5)), 0.5
+    last = crossing_index - 12
+    found = forecast_observations(
+        setting, emulator, observations[: last + 1 : 2], limit=("clr", limit)
+    )
+    crossing = np.interp(
+        limit,
+        clr[crossing_index - 1 : crossing_index + 1],
+        [observations[crossing_index - 1].x, observations[crossing_index].x],
+    )
+    crossing -= observations[: last + 1 : 2][-1].x
     assert found.change_detected
     assert found.alarm
     assert found.rising
@@ -253,20 +265,24 @@ def test_a_roughening_contact_is_foretold(setting, emulator):
     assert found.time.high < 10.0 * found.time.low
     assert found.by.median <= found.time.median * (1.0 + 1e-9) or found.within < 1.0
     assert (found.by.high == np.inf) == (found.within < 0.95 * (1.0 - found.already))
-    assert found.clr.low < clr[seen] < found.clr.high
+    assert found.clr.low < clr[last] < found.clr.high
     assert "rises above 50.0 %" in found.sentence()
     json.dumps(found.scalars(), allow_nan=False)
-    falling = replace(found, rising=False, already=0.0, within=0.9)  # from above, where it still is
+    falling = replace(found, rising=False, already=0.0, within=0.9)  # from above, not yet crossed
     assert falling.alarm
-    fallen = replace(falling, already=1.0, within=0.0)  # run in
+    fallen = replace(falling, already=1.0, within=0.0)  # after running-in
     assert not fallen.alarm
     assert fallen.sentence() == "CLR is below 50.0 % (probability 1.00)."
-    assert replace(fallen, limit=Limit("oil_viscosity_pa_s", 0.02)).alarm  # of oil less is worse
+    assert replace(
+        fallen, limit=Limit("oil_viscosity_pa_s", 0.02)
+    ).alarm  # for oil a lower viscosity is worse
 
 
-def test_a_contact_that_stays_as_it_is_is_not_said_to_change(setting, emulator):
-    heard, _ = heard_along(setting, emulator, np.full(20, 0.55), seed=5)
-    found = forecast_observations(setting, emulator, heard, limit=read_limit("sq=3 um", setting))
+def test_a_constant_contact_is_not_classed_as_changing(setting, emulator):
+    observations, _ = simulated_series(setting, emulator, np.full(20, 0.55), seed=5)
+    found = forecast_observations(
+        setting, emulator, observations, limit=read_limit("sq=3 um", setting)
+    )
     assert (found.change_detected, found.alarm) == (False, False)
     assert found.sentence().startswith("No change of the contact is detected over 20 visits")
     assert found.drifting == "sq_m"
@@ -274,7 +290,7 @@ def test_a_contact_that_stays_as_it_is_is_not_said_to_change(setting, emulator):
 
 
 class Worn:
-    """Sq that grows from 0.5 to 1 um in 200 h."""
+    """Stand-in for a wear history: Sq grows from 0.5 to 1 um in 200 h."""
 
     def __init__(self, hours=200.0):
         self.hours = hours
@@ -284,16 +300,18 @@ class Worn:
         return {"sq_m": 0.5e-6 * 2.0 ** (hours / 200.0)}
 
 
-def test_a_wear_history_is_the_first_drift(setting, emulator):
-    """A fourth of a range of 0.25 to 4 um, an eighth of it in 100 h."""
+def test_a_wear_history_gives_the_prior_of_the_drift(setting, emulator):
+    """A quarter of the range 0.25 to 4 um, that is an eighth in 100 h."""
     assert wear_drift(setting, Worn(), 100.0) == pytest.approx((0.125, 0.125))
     assert wear_drift(setting, Worn(), 400.0) == pytest.approx((0.5, 0.5))
-    heard, _ = heard_along(
+    observations, _ = simulated_series(
         setting, emulator, np.full(6, 0.5), std=0.3
-    )  # which tells next to nothing
+    )  # almost uninformative
     ends = []
     for drift in ((0.6, 0.05), (-0.6, 0.05)):
-        found = forecast_observations(setting, emulator, heard, drift=drift, laws=("hertz-point",))
+        found = forecast_observations(
+            setting, emulator, observations, drift=drift, laws=("hertz-point",)
+        )
         ends.append(found.bands.ends[:, -1])
     assert np.all(ends[0] > ends[1] + 0.03)
     assert ends[0][1] > ends[1][1] + 0.2
@@ -303,7 +321,7 @@ def test_a_wear_history_is_the_first_drift(setting, emulator):
         wear_drift(setting, Worn(0.0), 1.0)
 
 
-def test_many_visits_are_taken_together_and_none_is_lost():
+def test_many_visits_are_grouped_without_loss():
     series = visit_series([recording(float(number), 3000.0 + number) for number in range(200)])
     assert len(series.x) == MAX_VISITS
     assert series.span == pytest.approx(199.0, abs=3.0)
@@ -312,34 +330,30 @@ def test_many_visits_are_taken_together_and_none_is_lost():
     )
 
 
-def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_for(
-    setting, emulator
-):
-    """A load that differs at every visit: one table, and CRF moved to it to within what contacts
-    differ by.
-    """
+def test_close_operating_points_are_merged_and_their_difference_is_corrected(setting, emulator):
+    """Load varies between visits: one table; CRF is corrected within the spread of contacts."""
     rng = np.random.default_rng(8)
     loads = 500.0 * np.exp(0.012 * rng.standard_normal(12))
-    heard = [
+    observations = [
         replace(recording(float(number)), load_n=load)
         for number, load in enumerate([500.0, *loads, 800.0])
     ]
-    series = visit_series(heard)
+    series = visit_series(observations)
     assert [place.load_n for place in series.points] == [500.0, 800.0]
     assert series.main_point == 0
     forward = ForwardModel(setting, emulator, series.points)
     model = DriftModel(forward, series, "hertz-point", "sq_m")
     z = rng.standard_normal((400, forward.dims))
-    there = (
+    moved_predictions = (
         ForwardModel(setting, emulator, tuple(ObservationPoint(load, 1.91) for load in loads))
         .predict(z, "hertz-point")
         .crf
     )
-    here = forward.predict(z, "hertz-point").crf[:, 0]
+    predicted = forward.predict(z, "hertz-point").crf[:, 0]
     for load, moved, raw, entry in zip(
-        loads, there.T, series.measurements[1:], model.measurements[1:], strict=False
+        loads, moved_predictions.T, series.measurements[1:], model.measurements[1:], strict=False
     ):
-        change = moved - here
+        change = moved - predicted
         assert raw.measured.value - entry.measured.value == pytest.approx(change.mean(), abs=2e-4)
         assert entry.measured.std == raw.measured.std
         assert (entry.offset[0] * model.slope_scatter["crf", 0][0]) ** 2 == pytest.approx(
@@ -348,24 +362,24 @@ def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_fo
         assert np.sign(change.mean()) == np.sign(load - 500.0)
     many = [replace(recording(float(number)), load_n=250.0 + 45.0 * number) for number in range(15)]
     assert len(visit_series(many).points) <= MAX_POINTS
-    near = [replace(recording(float(number)), load_n=500.0 * 1.02**number) for number in range(8)]
-    assert visit_series(near[::-1]) == visit_series(near)  # who is whose place hangs on no order
+    close = [replace(recording(float(number)), load_n=500.0 * 1.02**number) for number in range(8)]
+    assert visit_series(close[::-1]) == visit_series(close)  # grouping does not depend on the order
 
 
-def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
-    heard = [
+def test_only_recent_recordings_describe_a_changing_contact():
+    observations = [
         replace(recording(x), load_n=load)
         for x, load in ((0.0, 300.0), (80.0, 700.0), (91.0, 500.0))
     ]
-    now = latest_observations(ObservedSeries(observations=(*heard, recording(100.0))))
-    assert [one.x for one in now.observations] == [
+    latest = latest_observations(ObservedSeries(observations=(*observations, recording(100.0))))
+    assert [entry.x for entry in latest.observations] == [
         100.0
-    ]  # 500 N; 700 N was last heard too long ago
-    assert now.notes[-1].endswith("Operating points recorded only before: 2.")
+    ]  # 500 N; the last recording at 700 N is too old
+    assert latest.notes[-1].endswith("Operating points recorded only before: 2.")
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "message"),
     [
         (
             lambda _: visit_series(
@@ -407,18 +421,20 @@ def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
         ),
         (
             lambda setting: forecast_series(
-                setting, None, HEARD, read_limit("hardness=2 GPa", setting), worn="worn"
+                setting, None, OBSERVED, read_limit("hardness=2 GPa", setting), worn="worn"
             ),
             "--worn is a prior for the drift of Sq, but the limit is of hardness_pa",
         ),
         (
-            lambda setting: forecast_series(setting, None, HEARD, Limit("clr", 0.5), worn="worn"),
+            lambda setting: forecast_series(
+                setting, None, OBSERVED, Limit("clr", 0.5), worn="worn"
+            ),
             "at least 4 recordings at different times, got 1",
         ),
     ],
 )
-def test_a_forecast_of_nothing_is_refused(setting, call, said):
-    with pytest.raises(BadInput, match=said):
+def test_a_forecast_without_basis_is_refused(setting, call, message):
+    with pytest.raises(BadInput, match=message):
         call(setting)
 
 
@@ -426,20 +442,20 @@ def test_a_forecast_of_nothing_is_refused(setting, call, said):
 # -------------------------------------------------------------------------------------------------
 
 
-def test_what_keeps_the_load_share_low_does_so_in_nineteen_contacts_of_twenty(setting, emulator):
-    """At the bound that is stated, asked of the formula itself and of other contacts."""
+def test_the_design_bound_keeps_the_load_share_low_in_95_per_cent_of_contacts(setting, emulator):
+    """At the stated bound, evaluated with the exact formula and with other contacts."""
     rng = np.random.default_rng(11)
     conditions = setting.case.conditions
     forward = ForwardModel(
         setting, emulator, (ObservationPoint(conditions.load, conditions.entrainment_speed),)
     )
     found = design_contact(forward, rng.standard_normal((600, forward.dims)), clr=0.3)
-    ways = {entry.key: entry for entry in found.levers}
-    assert list(ways) == ["sq_m", "oil_viscosity_pa_s", "load_n", "entrainment_speed_m_s"]
-    assert ways["sq_m"].way == "at most"
+    levers = {entry.key: entry for entry in found.levers}
+    assert list(levers) == ["sq_m", "oil_viscosity_pa_s", "load_n", "entrainment_speed_m_s"]
+    assert levers["sq_m"].way == "at most"
     z = rng.standard_normal((4000, forward.dims))
     sq = setting.unknowns[0]
-    for bound, expected in ((ways["sq_m"].bound, 0.95), (None, found.now)):
+    for bound, expected in ((levers["sq_m"].bound, 0.95), (None, found.now)):
         if bound is not None:
             z[:, 0] = sq.at_share(
                 np.interp(
@@ -450,18 +466,18 @@ def test_what_keeps_the_load_share_low_does_so_in_nineteen_contacts_of_twenty(se
         clr = formula(x[:, len(setting.contact) + 1], sq.value(z[:, 0]))["clr"]
         assert np.mean(clr < 0.3) == pytest.approx(expected, abs=0.02)
         z = rng.standard_normal((4000, forward.dims))
-    chances = ways["entrainment_speed_m_s"].chances
+    chances = levers["entrainment_speed_m_s"].chances
     assert np.all(np.diff(chances) > -1e-9)
-    assert np.all(np.diff(ways["load_n"].chances) < 0.0)
+    assert np.all(np.diff(levers["load_n"].chances) < 0.0)
     assert "composite roughness: at most" in found.sentence()
     json.dumps(found.scalars(), allow_nan=False)
     with pytest.raises(BadInput, match="--design must be a load share"):
         design_contact(forward, z, clr=1.2)
 
 
-def test_a_posterior_that_is_hard_to_find_is_drawn_for_longer_unless_it_is_ruled_out():
-    """A narrow ridge in six dimensions: evidence in closed form; a model far behind costs no
-    further round.
+def test_a_difficult_posterior_gets_more_rounds_unless_its_model_is_ruled_out():
+    """A narrow ridge in six dimensions, evidence in closed form; a ruled-out model costs no further
+    round.
     """
     direction = np.array([1.0, -2.0, 3.0, 1.0, -1.0, 2.0])
 

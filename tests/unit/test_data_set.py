@@ -1,6 +1,4 @@
-"""`asperity check --set DIR`: a folder that is a set of data, and the same with one thing missing
-at a time.
-"""
+"""`asperity check --set DIR`: a complete data set, and the same with one item missing at a time."""
 
 import csv
 import json
@@ -31,8 +29,8 @@ STEPS = [(200, 1.0), (300, 1.5), (500, 2.0), (500, 2.0)]
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """A set with four recordings and four maps."""
+def complete_set(tmp_path_factory):
+    """A data set with four recordings and four maps."""
     folder = tmp_path_factory.mktemp("set")
     (folder / "set.toml").write_text(STATED, "utf-8")
     shutil.copy(ROOT / "examples" / "paper.toml", folder / "contact.toml")
@@ -63,45 +61,45 @@ def write_recording(path, *, rate=20_000, seconds=10.5, unit="m/s^2", seed=0):
 
 
 @pytest.fixture
-def copy(whole, tmp_path):
-    return Path(shutil.copytree(whole, tmp_path / "set"))
+def copy(complete_set, tmp_path):
+    return Path(shutil.copytree(complete_set, tmp_path / "set"))
 
 
-def test_a_whole_set_is_one(whole, capsys):
-    found = check_set(whole)
+def test_a_complete_set_is_accepted(complete_set, capsys):
+    found = check_set(complete_set)
     assert found.missing == ()
     assert (found.whole, found.recordings, found.maps) == (True, 4, 4)
     with pytest.raises(SystemExit) as end:
-        main(["check", "--set", str(whole), "--json"])
-    said = json.loads(capsys.readouterr().out)
-    assert (end.value.code or 0, said["whole"], said["title"]) == (0, True, "Rings in VG 100")
+        main(["check", "--set", str(complete_set), "--json"])
+    summary = json.loads(capsys.readouterr().out)
+    assert (end.value.code or 0, summary["whole"], summary["title"]) == (0, True, "Rings in VG 100")
 
 
 def without(key):
-    def spoil(folder):
+    def damage(folder):
         text = "".join(
             line for line in STATED.splitlines(keepends=True) if not line.startswith(f"{key} ")
         )
         (folder / "set.toml").write_text(text, "utf-8")
 
-    return spoil
+    return damage
 
 
 def replaced(old, new):
-    def spoil(folder):
+    def damage(folder):
         assert old in STATED
         (folder / "set.toml").write_text(STATED.replace(old, new), "utf-8")
 
-    return spoil
+    return damage
 
 
 def steps(*rows):
-    def spoil(folder):
+    def damage(folder):
         write_table(
             folder, [(f"run-{i}.csv", i, load, speed, 40) for i, (load, speed) in enumerate(rows)]
         )
 
-    return spoil
+    return damage
 
 
 def coarse_map(folder):
@@ -112,7 +110,7 @@ def coarse_map(folder):
     write_surface(surface, folder / "maps/ring-after.x3p")
 
 
-SPOILT = {
+DEFECTS = {
     "set.toml does not state sensor": without("sensor"),
     "its licence all rights reserved is not one of": replaced("CC-BY-4.0", "all rights reserved"),
     "maps before and after are not of the same number": replaced(', "maps/roller-after.x3p"', ""),
@@ -145,18 +143,18 @@ SPOILT = {
 }
 
 
-@pytest.mark.parametrize(("says", "spoil"), SPOILT.items(), ids=SPOILT)
-def test_what_is_missing_is_said(copy, says, spoil):
-    spoil(copy)
+@pytest.mark.parametrize(("sentence_part", "damage"), DEFECTS.items(), ids=DEFECTS)
+def test_missing_items_are_reported(copy, sentence_part, damage):
+    damage(copy)
     found = check_set(copy)
     assert not found.whole
-    assert any(says in sentence for sentence in found.missing), found.missing
+    assert any(sentence_part in sentence for sentence in found.missing), found.missing
     assert found.verdict().startswith(f"{copy} is not a complete data set: ")
 
 
-def test_the_command_refuses_what_is_no_set(copy, tmp_path, capsys):
+def test_the_command_refuses_an_invalid_set(copy, tmp_path, capsys):
     without("case")(copy)
-    for arguments, says in (
+    for arguments, sentence_part in (
         (["--set", str(copy)], "not a complete data set: set.toml does not state case"),
         (["--set", str(tmp_path / "absent")], "is not a folder"),
         (["--set", str(copy / "maps")], "has no set.toml"),
@@ -165,6 +163,6 @@ def test_the_command_refuses_what_is_no_set(copy, tmp_path, capsys):
     ):
         with pytest.raises(SystemExit) as end:
             main(["check", *arguments])
-        said = capsys.readouterr()
+        output = capsys.readouterr()
         assert end.value.code == 2
-        assert says in said.out + said.err
+        assert sentence_part in output.out + output.err

@@ -1,6 +1,4 @@
-"""Ploughing: a mark's volume and square, what is cut off and what stands beside it, and the
-roughness of many.
-"""
+"""Ploughing: volume and mean square of a mark, cut and piled-up material, roughness."""
 
 from dataclasses import replace
 
@@ -36,9 +34,9 @@ def test_a_groove_is_two_thirds_of_width_times_depth_across():
     assert across.max() == pytest.approx(1e-6, rel=1e-3, abs=0.0)
 
 
-def test_a_mark_lies_on_a_coarse_grid_as_on_a_fine_one():
-    """Cells hold their mean of it: its volume does not hang on where it lies, though it is a cell
-    wide; ends meet.
+def test_the_volume_of_a_mark_does_not_depend_on_the_grid():
+    """Cells store the mean depth: the volume is independent of position even for marks one cell
+    wide.
     """
     grid = track((64, 32))
     mark = WearMark.with_ridge(30e-6, 6e-6, 0.5e-6, 0.3)
@@ -61,16 +59,16 @@ def ploughed(cutting, seed=0, concentration=1e14):
 
 
 @pytest.mark.parametrize("cutting", [0.0, 0.3, 1.0])
-def test_what_is_not_cut_off_stands_beside_to_rounding(cutting):
+def test_displaced_material_is_conserved_to_rounding(cutting):
     _, jump, change = ploughed(cutting)
     cell = float(np.prod(jump.grid.spacing))
     assert change.facts["marks"] > 10
-    lost = -change.heights_change.sum() * cell
+    removed = -change.heights_change.sum() * cell
     dug = change.facts["volume_m3"]
-    assert lost == pytest.approx(cutting * dug, abs=1e-12 * dug)
+    assert removed == pytest.approx(cutting * dug, abs=1e-12 * dug)
 
 
-def test_as_many_particles_come_as_the_oil_holds():
+def test_the_number_of_particles_follows_the_concentration():
     _, jump, _ = ploughed(0.3)
     film = jump.loaded_film
     assert film == pytest.approx(0.5e-6, rel=1e-9, abs=0.0)
@@ -79,10 +77,8 @@ def test_as_many_particles_come_as_the_oil_holds():
     assert np.mean(counts) == pytest.approx(expected, abs=4.0 * np.sqrt(expected / 40))
 
 
-def test_a_ball_is_struck_only_on_its_track():
-    """Beside the track nothing presses a particle in: marks lie on it, as many as its area asks
-    for, at any width.
-    """
+def test_a_ball_is_marked_only_on_its_track():
+    """Off the track no particle is pressed in; the number of marks follows the track's area."""
     expected = 1e14 * 0.5e-6 * 20.0 * 400e-6 * 100e-6
     for cells, width in ((48, 200e-6), (96, 400e-6)):
         grid = Grid((96, cells), (-200e-6, -0.5 * width), (200e-6, 0.5 * width), (False, False))
@@ -108,16 +104,16 @@ def test_a_ball_is_struck_only_on_its_track():
         assert np.mean(marks) == pytest.approx(expected, abs=4.0 * np.sqrt(expected / 10))
 
 
-def test_a_jump_brings_one_mark_at_least():
-    """However smooth the body and thin the film: shorter ones would bring nothing and never end."""
+def test_a_jump_contains_at_least_one_mark():
+    """Even for a smooth body and a thin film: shorter jumps would contain no mark and never end."""
     grid = track()
     ploughing = Ploughing(concentration=1e9, smallest=8e-6, largest=20e-6)
     jump = passage(grid, hertz_patches(grid, 50e-6, 1e9, 4, film=1e-10), jump=1.0)
-    one = 1.0 / (1e9 * 1e-10 * 400e-6 * 200e-6)
-    assert ploughing(jump).longest == pytest.approx(one, rel=1e-9, abs=0.0)
+    time_of_one_mark = 1.0 / (1e9 * 1e-10 * 400e-6 * 200e-6)
+    assert ploughing(jump).longest == pytest.approx(time_of_one_mark, rel=1e-9, abs=0.0)
 
 
-def test_sizes_follow_the_power_law():
+def test_particle_sizes_follow_the_power_law():
     ploughing = Ploughing(concentration=1e9, smallest=4e-6, largest=40e-6, exponent=3.0)
     sizes = ploughing.sizes((np.arange(20_000) + 0.5) / 20_000)
     assert sizes.min() == pytest.approx(4e-6, rel=1e-3, abs=0.0)
@@ -135,9 +131,9 @@ def test_particles_thinner_than_the_film_pass_through():
     assert not change.heights_change.any()
 
 
-def test_roughness_of_many_marks_is_campbells():
-    """Mean and variance of shot noise: density times the integral of a mark, and of its square. All
-    marks alike.
+def test_roughness_of_many_marks_follows_campbells_theorem():
+    """Shot noise of equal marks: mean and variance are density times the integral of mark and
+    square.
     """
     grid = track((128, 64))
     cutting, density = 0.4, 60.0 / float(np.prod(grid.extent))
@@ -159,8 +155,8 @@ def test_roughness_of_many_marks_is_campbells():
     )
 
 
-def test_the_next_jump_ends_before_sq_has_risen_much():
-    """Campbell's rise of Sq squared by a tenth, of marks of nearly one size."""
+def test_the_next_jump_limits_the_rise_of_sq():
+    """Campbell's theorem: Sq squared rises by a tenth, for marks of nearly one size."""
     grid = track()
     ploughing = Ploughing(concentration=1e12, smallest=10e-6, largest=10.001e-6)
     waves = 1e-6 * np.cos(0.2 * np.arange(64.0))[:, None] + np.zeros(grid.cells)
@@ -171,12 +167,12 @@ def test_the_next_jump_ends_before_sq_has_risen_much():
     )
     smooth = ploughing(
         replace(jump, heights=1e-13 * waves)
-    ).longest  # not none: as if as rough as the film is thick
+    ).longest  # finite: a smooth body counts as rough as the film is thick
     assert smooth == pytest.approx(
         0.1 * 0.25e-12 / (1e12 * 0.5e-6 * mark.square), rel=1e-3, abs=0.0
     )
-    thick = hertz_patches(grid, 50e-6, 1e9, 4, film=20e-6)
-    assert ploughing(replace(jump, patches=thick)).longest == np.inf
+    thick_film = hertz_patches(grid, 50e-6, 1e9, 4, film=20e-6)
+    assert ploughing(replace(jump, patches=thick_film)).longest == np.inf
 
 
 def test_without_sliding_a_mark_is_a_dent():
@@ -189,7 +185,7 @@ def test_without_sliding_a_mark_is_a_dent():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "message"),
     [
         ({"concentration": 0.0}, "ploughing concentration must be positive"),
         ({"concentration": 1e9, "cutting": 1.2}, "ploughing cutting must lie between 0 and 1"),
@@ -197,11 +193,11 @@ def test_without_sliding_a_mark_is_a_dent():
         ({"concentration": 1e9, "largest": 1e-6}, "ploughing largest must exceed smallest"),
     ],
 )
-def test_what_ploughing_refuses(wrong, said):
-    with pytest.raises(BadInput, match=said):
+def test_invalid_ploughing_parameters_are_refused(wrong, message):
+    with pytest.raises(BadInput, match=message):
         Ploughing(**wrong)
 
 
-def test_too_many_marks_are_refused_before_they_are_made():
+def test_too_many_marks_are_refused_before_the_computation():
     with pytest.raises(BadInput, match="marks in one jump"):
         ploughed(0.3, concentration=1e22)

@@ -18,10 +18,8 @@ def deflection():
     return line_deflection(CELLS, SPACING)
 
 
-def test_one_loaded_cell_dents_as_the_sum_of_its_images_does(deflection):
-    """Love's rectangle and 6000 images of it: no logarithmic kernel, no Bessel function, no
-    transform.
-    """
+def test_one_loaded_cell_deflects_as_the_sum_over_its_images(deflection):
+    """Love's rectangle and 6000 images: no logarithmic kernel, Bessel function or transform."""
     pressure = np.zeros(CELLS)
     pressure[3, 5] = 1.0
     (dx, dy), (nx, ny) = SPACING, CELLS
@@ -49,9 +47,7 @@ def test_cells_of_any_shape(cells, spacing, tolerance):
 def alias_by_alias(
     cells: tuple[int, int], spacing: tuple[float, float], aliases: int
 ) -> np.ndarray:
-    """The transformed kernel with each alias' cells integrated one by one, as far as the sum is
-    told to go.
-    """
+    """Transformed kernel with each alias' cells integrated separately up to the truncation."""
     (nx, ny), (dx, dy) = cells, spacing
     kernel = np.zeros((nx, ny // 2 + 1))
     edges = (np.arange(nx + 1) - 0.5) * dx
@@ -72,7 +68,7 @@ def alias_by_alias(
 
 @pytest.mark.parametrize("cells", [(20, 16), (20, 15), (16, 3), (16, 2), (9, 1)])
 @pytest.mark.parametrize("aspect", [0.01, 0.05, 0.3, 1.0, 4.0, 20.0])
-def test_the_sum_over_aliases_is_that_of_four_thousand(cells, aspect):
+def test_the_alias_sum_matches_four_thousand_terms(cells, aspect):
     spacing = (0.1, 0.1 / aspect)
     found, expected = (
         scipy.fft.rfft(np.concatenate([kernel, kernel[:0:-1]]), axis=0).real
@@ -81,8 +77,8 @@ def test_the_sum_over_aliases_is_that_of_four_thousand(cells, aspect):
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-11 * np.abs(expected).max())
 
 
-def test_what_is_left_of_k0_beyond_an_argument():
-    """By quadrature, on both sides of where the polynomial begins."""
+def test_the_tail_integral_of_k0_matches_quadrature():
+    """On both sides of the argument where the polynomial takes over."""
     argument = np.array([1e-3, 0.5, 2.999, 3.001, 5.0, 12.0, 20.0, 31.9])
     expected = [
         scipy.integrate.quad(scipy.special.k0, z, z + 40.0, epsabs=1e-15, epsrel=1e-11)[0]
@@ -91,8 +87,8 @@ def test_what_is_left_of_k0_beyond_an_argument():
     np.testing.assert_allclose(_k0_integral(argument), expected, rtol=1e-12, atol=1e-13)
 
 
-def test_a_pressure_that_does_not_vary_in_y_meets_the_logarithm(deflection):
-    """-(1/pi) int ln|x - s| ds over each cell, cell by cell."""
+def test_a_pressure_constant_in_y_gives_the_logarithmic_kernel(deflection):
+    """-(1/pi) int ln|x - s| ds, integrated cell by cell."""
     line = np.random.default_rng(1).random(CELLS[0])
     x = np.arange(CELLS[0]) * SPACING[0]
     edge = x[:, None] - x[None, :]
@@ -106,7 +102,7 @@ def test_a_pressure_that_does_not_vary_in_y_meets_the_logarithm(deflection):
     )
 
 
-def test_some_lines_deflect_as_among_all(deflection):
+def test_selected_rows_deflect_as_in_the_full_grid(deflection):
     pressure = np.zeros(CELLS)
     pressure[5:9] = np.random.default_rng(2).random((4, CELLS[1]))
     np.testing.assert_allclose(
@@ -119,9 +115,7 @@ def test_some_lines_deflect_as_among_all(deflection):
 
 @pytest.mark.parametrize("cells", [64, 128, 256])
 def test_a_hertz_pressure_flattens_the_parabola(cells):
-    """V = const - X^2/2 inside |X| < 1, within 3/cells^1.5 of it; the pressure's edge sets the
-    order.
-    """
+    """V = const - X^2/2 inside |X| < 1, to 3/cells^1.5; the pressure's edge limits the order."""
     dx = 4.0 / cells
     x = -2.0 + (np.arange(cells) + 0.5) * dx
     pressure = np.repeat(np.sqrt(np.maximum(1.0 - x**2, 0.0))[:, None], 8, axis=1)
@@ -129,14 +123,12 @@ def test_a_hertz_pressure_flattens_the_parabola(cells):
         np.abs(x) < 1.0
     ]
     assert np.ptp(flat) < 3.0 * cells**-1.5
-    # and the constant: int sqrt(1 - s^2) ln|s| ds = -(pi/2)(ln 2 + 1/2), over -pi
+    # the constant: int sqrt(1 - s^2) ln|s| ds = -(pi/2)(ln 2 + 1/2), over -pi
     assert flat.mean() == pytest.approx((np.log(2.0) + 0.5) / 2.0, abs=3.0 * cells**-1.5)
 
 
-def test_a_wave_along_y_sinks_as_a_half_space_does():
-    """cos(q y) on a band far wider than a wave: V = P/q, wave by wave of the staircase that the
-    cells make of it.
-    """
+def test_a_wave_along_y_deflects_as_on_a_half_space():
+    """cos(q y) on a band much wider than a wave: V = P/q for each harmonic of the staircase."""
     cells, dy = 32, 0.05
     y = (np.arange(cells) + 0.5) * dy
     wave = np.tile(np.cos(2.0 * np.pi * y / (cells * dy)), (256, 1))
@@ -146,28 +138,26 @@ def test_a_wave_along_y_sinks_as_a_half_space_does():
     np.testing.assert_allclose(found, wave[128] * sinks, rtol=2e-5)
 
 
-def test_linear_reciprocal_and_mirrored(deflection):
+def test_the_kernel_is_linear_reciprocal_and_symmetric(deflection):
     rng = np.random.default_rng(2)
-    one, other = rng.random(CELLS), rng.random(CELLS)
+    first, second = rng.random(CELLS), rng.random(CELLS)
     np.testing.assert_allclose(
-        deflection(2.0 * one - 3.0 * other),
-        2.0 * deflection(one) - 3.0 * deflection(other),
+        deflection(2.0 * first - 3.0 * second),
+        2.0 * deflection(first) - 3.0 * deflection(second),
         atol=1e-13,
     )
-    assert np.sum(other * deflection(one)) == pytest.approx(
-        np.sum(one * deflection(other)), rel=1e-12
-    )  # Betti
-    np.testing.assert_allclose(deflection(one[::-1]), deflection(one)[::-1], atol=1e-13)
-    np.testing.assert_allclose(deflection(one[:, ::-1]), deflection(one)[:, ::-1], atol=1e-13)
+    assert np.sum(second * deflection(first)) == pytest.approx(
+        np.sum(first * deflection(second)), rel=1e-12
+    )  # Betti's theorem
+    np.testing.assert_allclose(deflection(first[::-1]), deflection(first)[::-1], atol=1e-13)
+    np.testing.assert_allclose(deflection(first[:, ::-1]), deflection(first)[:, ::-1], atol=1e-13)
     np.testing.assert_allclose(
-        deflection(np.roll(one, 5, 1)), np.roll(deflection(one), 5, 1), atol=1e-13
+        deflection(np.roll(first, 5, 1)), np.roll(deflection(first), 5, 1), atol=1e-13
     )
 
 
-def test_every_pressure_costs_work(deflection):
-    """The elastic energy of a pressure without net load on any line is positive: else a solver may
-    run away.
-    """
+def test_every_pressure_has_positive_energy(deflection):
+    """Elastic energy is positive for zero net load on every row; otherwise a solver may diverge."""
     rng = np.random.default_rng(3)
     for _ in range(20):
         pressure = rng.standard_normal(CELLS)
@@ -175,7 +165,7 @@ def test_every_pressure_costs_work(deflection):
         assert np.sum(pressure * deflection(pressure)) > 0.0
 
 
-def test_the_near_row_is_the_compliance_itself(deflection):
+def test_the_first_kernel_row_is_the_compliance(deflection):
     pressure = np.zeros(CELLS)
     pressure[0, 0] = 1.0
     np.testing.assert_allclose(
@@ -184,8 +174,8 @@ def test_the_near_row_is_the_compliance_itself(deflection):
 
 
 def test_a_hertz_pressure_on_a_circle_flattens_the_sphere():
-    """V = const - (X^2 + Y^2)/2 inside the circle for compliance 2/pi^2, and const = 1; second
-    order, edge and all.
+    """V = const - (X^2 + Y^2)/2 in the circle at compliance 2/pi^2, const = 1; second order at the
+    edge too.
     """
     errors = []
     for cells in (32, 64, 128):
@@ -193,10 +183,10 @@ def test_a_hertz_pressure_on_a_circle_flattens_the_sphere():
         x = -1.5 + (np.arange(cells) + 0.5) * step
         squared = x[:, None] ** 2 + x**2
         pressure = np.sqrt(np.maximum(1.0 - squared, 0.0))
-        bent = (
+        displaced = (
             half_space((cells, cells), (step, step), 2.0 / np.pi**2, False)(pressure)
             + squared / 2.0
         )
-        errors.append(float(np.abs(bent[squared < 0.8] - 1.0).max()))
+        errors.append(float(np.abs(displaced[squared < 0.8] - 1.0).max()))
     assert errors[-1] < 1e-3
     assert errors[0] / errors[-1] > 4.0**2 / 2.0

@@ -1,4 +1,4 @@
-"""Every usual way to write rows of numbers is read alike, by surfaces and recordings."""
+"""Surfaces and recordings read all usual notations for rows of numbers alike."""
 
 import itertools
 
@@ -27,9 +27,9 @@ def test_rows_are_read_however_they_are_written(separator, comma, tmp_path):
         ("NaN", "", "BAD"), ("", "x;y\n", "x, z [um]\n"), (False, True), (False, True)
     ):
         blank = not separator.strip() and separator != "\t"
-        unseen = missing == "" and (blank or not (trailing or quoted))
-        if unseen or (comma and not quoted and separator.startswith(",")):
-            continue  # nobody could tell
+        ambiguous = missing == "" and (blank or not (trailing or quoted))
+        if ambiguous or (comma and not quoted and separator.startswith(",")):
+            continue  # ambiguous
 
         def field(value, missing=missing, quoted=quoted):
             text = missing if np.isnan(value) else f"{value:g}".replace(".", "," if comma else ".")
@@ -46,7 +46,7 @@ def test_rows_are_read_however_they_are_written(separator, comma, tmp_path):
         )
 
 
-def test_one_column_may_have_decimal_commas_two_whole_numbers_may_not():
+def test_decimal_commas_are_read_in_one_column_but_not_in_two_integers():
     lines = ["0,5", "1,2", "3,4"]
     assert sniff_dialect(lines) == Dialect(None, True)
     assert sniff_dialect(lines, fewest_columns=2) == Dialect(",", False)

@@ -1,7 +1,7 @@
 """Every name, key, file, option and recipe step in README, CONTRIBUTING and docs exists.
 
-How a span of code is judged stands in `support.judging`; what is right all the same is in
-`EXCEPTIONS`.
+`support.judging` defines how a code span is checked; `EXCEPTIONS` lists valid spans of no known
+kind.
 """
 
 import ast
@@ -27,81 +27,79 @@ from support.vocabulary import (
     toml,
 )
 
-EXCEPTIONS = {  # what is right but of none of these kinds
+EXCEPTIONS = {  # valid spans of no known kind
     "CLR 0.884, CAR 0.109, CRF 3756 Hz": "printed, see test_readme",
     "lint-imports": "the command of import-linter",
-    "is_...(head)": "of many",
+    "is_...(head)": "a pattern for several functions",
     '["Rx", "Ry"]': "stands for two lengths",
-    "linspace(0, fs/2, n/2)": "of another program",
-    "NUMBA_CACHE_DIR": "a variable of the environment, of numba",
-    "milled_1.opd": "among the developers' data",
-    "ground_lay.plu": "among the developers' data",
+    "linspace(0, fs/2, n/2)": "code of another program",
+    "NUMBA_CACHE_DIR": "an environment variable of numba",
+    "milled_1.opd": "a file of the developers' data",
+    "ground_lay.plu": "a file of the developers' data",
     "build/robustness.csv": "written by a benchmark",
-    "bearing.gs": "in somebody's file",
-    "2/name": "in somebody's file",
-    "acc_g": "in somebody's file",
-    "acc [g]": "in somebody's file",
-    "8.0 X (100g)": "in somebody's file",
-    "sampling rate: 20 kHz": "in somebody's file",
-    "acc (m/s²)": "in somebody's file",
-    "ring-07.csv.toml": "somebody's file",
-    "ring-07.toml": "somebody's file",
+    "bearing.gs": "content of a user's file",
+    "2/name": "content of a user's file",
+    "acc_g": "content of a user's file",
+    "acc [g]": "content of a user's file",
+    "8.0 X (100g)": "content of a user's file",
+    "sampling rate: 20 kHz": "content of a user's file",
+    "acc (m/s²)": "content of a user's file",
+    "ring-07.csv.toml": "a user's file",
+    "ring-07.toml": "a user's file",
 }
-OF_JSON = {  # what golden numbers do not show of `--json`
-    "null": "of JSON itself",
-    "seconds": "no two runs share it",
-    "hears": "of several sensors",
+JSON_EXCEPTIONS = {  # `--json` keys and values missing from the golden numbers
+    "null": "a JSON literal",
+    "seconds": "differs between runs",
+    "hears": "several sensors only",
     "alert": "a state that the golden series does not reach",
     "blind": "a state that the golden series does not reach",
-    "reason": "of a file that is refused",
-    "pass": "of a history with flattening, and longer than the golden one",
-    "whole": "of a set of data",
-    "title": "of a set of data",
-    "maps": "of a set of data",
-    "ra_m": "of a profile",
-    "rq_m": "of a profile",
-    "letter": "of a profile",
-    "stribeck": "the section is about two commands",
-    "traction": "the section is about two commands",
+    "reason": "refused files only",
+    "pass": "long histories with flattening only",
+    "whole": "data sets only",
+    "title": "data sets only",
+    "maps": "data sets only",
+    "ra_m": "profiles only",
+    "rq_m": "profiles only",
+    "letter": "profiles only",
+    "stribeck": "the section covers two commands",
+    "traction": "the section covers two commands",
 }
-TABLES_BESIDE = {"study": {"rows"}, "run": {"rows"}}  # golden numbers have the table, too
+TABLE_KEYS = {"study": {"rows"}, "run": {"rows"}}  # golden numbers include the table
 PAGES = pytest.mark.parametrize(
     "page", pages(), ids=lambda page: page.path.relative_to(ROOT).as_posix()
 )
 
 
 @PAGES
-def test_what_a_page_names_exists(page):
+def test_names_on_a_page_exist(page):
     wrong = [line for line in problems(page) if line.split("`")[1] not in EXCEPTIONS]
     assert not wrong, "\n".join(wrong)
 
 
 @PAGES
-def test_links_lead_somewhere(page):
-    wrong = [
+def test_links_resolve(page):
+    defects = [
         f"{place(page, line)}: {target}" for line, target in page.links() if not leads(page, target)
     ]
-    assert not wrong, "\n".join(wrong)
+    assert not defects, "\n".join(defects)
 
 
 @PAGES
 def test_blocks_can_be_run(page):
-    wrong = [f"{place(page, line)}: {wrong}" for line, wrong in block_problems(page)]
-    assert not wrong, "\n".join(wrong)
+    defects = [f"{place(page, line)}: {defects}" for line, defects in block_problems(page)]
+    assert not defects, "\n".join(defects)
 
 
 COMMAND_LINE, STUDY = read(ROOT / "docs" / "command-line.md"), read(ROOT / "docs" / "study.md")
 
 
 def sections(page: Page = COMMAND_LINE) -> dict[str, list[Line]]:
-    """The lines of docs/command-line.md by the command that they are about; a study has a page of
-    its own.
-    """
-    about: dict[str, list[Line]] = {"study": STUDY.prose}
+    """Lines of docs/command-line.md by command; `study` has a page of its own."""
+    by_command: dict[str, list[Line]] = {"study": STUDY.prose}
     for line in page.prose:
         for name in line.headings[1].split(", ") if len(line.headings) > 1 else ():
-            about.setdefault(name, []).append(line)
-    return {name: lines for name, lines in about.items() if name in commands()}
+            by_command.setdefault(name, []).append(line)
+    return {name: lines for name, lines in by_command.items() if name in commands()}
 
 
 def test_every_command_has_its_section():
@@ -115,19 +113,19 @@ def test_json_keys_are_those_of_the_golden_numbers(command):
     words = names_in(texts) | (
         set(catalogue()) if any("](quantities.md)" in text for text in texts) else set()
     )
-    keys = {key for tree in golden(command) for key in tree} - TABLES_BESIDE.get(command, set())
-    assert sorted(key for key in keys if not any(stands_for(word, key) for word in words)) == []
+    keys = {key for tree in golden(command) for key in tree} - TABLE_KEYS.get(command, set())
+    assert sorted(key for key in keys if not any(matches_key(word, key) for word in words)) == []
 
 
 def unknown_keys(command: str, lines: list[Line]) -> list[str]:
-    """Names in what is said of `--json` that the command's JSON has nowhere."""
-    known = json_keys(command) | json_texts(command) | set(OF_JSON)
+    """Names in descriptions of `--json` that the command's JSON lacks."""
+    known = json_keys(command) | json_texts(command) | set(JSON_EXCEPTIONS)
     words = names_in(json_lines(lines))
-    return sorted(word for word in words if not any(stands_for(word, key) for key in known))
+    return sorted(word for word in words if not any(matches_key(word, key) for key in known))
 
 
 def json_lines(lines: list[Line]) -> Iterator[str]:
-    """What paragraphs say of `--json`."""
+    """Text after `--json` in each line."""
     return (line.text.partition("`--json`")[2] for line in lines if "`--json`" in line.text)
 
 
@@ -141,8 +139,8 @@ def names_in(texts: Iterable[str]) -> set[str]:
     }
 
 
-def stands_for(word: str, key: str) -> bool:
-    """Is this the key, or with dots for what varies, a pattern of it?"""
+def matches_key(word: str, key: str) -> bool:
+    """Return whether `word` is the key or a pattern of it, with dots for the variable part."""
     return bool(re.fullmatch(word.replace("...", r"\w*"), key))
 
 
@@ -150,11 +148,11 @@ CONTRIBUTING, ARCHITECTURE = read(ROOT / "CONTRIBUTING.md"), read(ROOT / "docs" 
 CASE_FILE = read(ROOT / "docs" / "case-file.md")
 
 
-IN_STUDY = {"[study]": "What is swept"}  # the heading in docs/study.md that has its table
+IN_STUDY = {"[study]": "What is swept"}  # heading of its table in docs/study.md
 
 
 def case_tables() -> dict[str, dict[str, str]]:
-    """Key and default, as docs/case-file.md has them: by the heading, or by the kind of surface."""
+    """Keys and defaults in docs/case-file.md by heading or kind of surface."""
     tables: dict[str, dict[str, str]] = {}
     columns: list[str] = []
     name = ""
@@ -175,7 +173,7 @@ def case_tables() -> dict[str, dict[str, str]]:
         table = tables.setdefault(name, {})
         if not line.text.startswith("|"):
             columns = []
-            if kind:  # of one without a table, the keys stand in the sentence
+            if kind:  # a kind without a table lists its keys in the sentence
                 table |= dict.fromkeys(re.findall(r"`(\w+)`", line.text), "")
             continue
         cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line.text)[1:-1]]
@@ -197,7 +195,7 @@ def test_the_case_file_has_every_key_with_its_default(name):
         key for key in fields if key not in ("kind", "file", "axes") and not is_table(name, key)
     }
     if name != "[surface]":
-        values -= {"second"}  # every surface has it, and the page says so once
+        values -= {"second"}  # common to all surfaces, documented once
     assert set(documented) - {"file", "kind"} == values
     stated = {key: text for key, text in documented.items() if text and text != "as above"}
     wrong = {
@@ -213,7 +211,7 @@ def is_table(name: str, key: str) -> bool:
 
 
 def is_default(text: str, field: FieldInfo) -> bool:
-    """Is this what the model takes where nothing is said?"""
+    """Return whether `text` states the default of the field."""
     if field.is_required() or text == "required":
         return field.is_required() and text == "required"
     value = toml(f"value = {text.strip('`')}")
@@ -228,26 +226,26 @@ def is_default(text: str, field: FieldInfo) -> bool:
 
 
 @PAGES
-def test_tests_stand_in_the_files_that_are_named_beside_them(page):
+def test_named_tests_are_in_the_named_files(page):
     for line in page.prose:
         spans = re.findall(r"`(?:[\w/]*/)?(test_\w+(?:\.py)?)`", line.text)
         files = [
             file for name in spans if name.endswith(".py") for file in ROOT.glob(f"tests/*/{name}")
         ]
-        there = {function.name for file in files for function in functions(parsed(file))}
+        defined = {function.name for file in files for function in functions(parsed(file))}
         named = {name for name in spans if not name.endswith(".py")}
-        assert not files or named <= there, place(page, line)
+        assert not files or named <= defined, place(page, line)
 
 
-def test_every_validation_is_told_of():
+def test_every_validation_is_documented():
     text = "".join(page.text for page in pages() if page.path.parent.name in ("docs", "theory"))
     tests = sorted(path.name for path in (ROOT / "tests" / "validation").glob("test_*.py"))
     assert len(tests) > 20
     assert [name for name in tests if f"{name}`" not in text] == []
 
 
-def test_docstrings_name_what_exists():
-    """In the package, where names of the same function's own are right, too."""
+def test_names_in_docstrings_exist():
+    """In the package; names local to the same function are valid, too."""
     wrong = []
     for module, tree in modules():
         for node in ast.walk(tree):
@@ -263,7 +261,7 @@ def test_docstrings_name_what_exists():
 
 
 def recipes() -> dict[str, str]:
-    """The text of each recipe in CONTRIBUTING."""
+    """Text of each recipe in CONTRIBUTING."""
     texts: dict[str, str] = {}
     for line in CONTRIBUTING.prose:
         if line.headings[1:2] == ("Recipes",) and len(line.headings) == 3:
@@ -271,7 +269,7 @@ def recipes() -> dict[str, str]:
     return texts
 
 
-def test_tables_stand_in_the_files_that_recipes_name_beside_them():
+def test_tables_named_in_recipes_are_in_the_named_files():
     rows = [
         line.text for line in ARCHITECTURE.prose if line.headings[-1:] == ("Where to add things",)
     ]
@@ -283,7 +281,7 @@ def test_tables_stand_in_the_files_that_recipes_name_beside_them():
         assert not files or tables <= {name for file in files for name in top_level(file)}, text
 
 
-def test_every_recipe_ends_in_its_proof():
+def test_every_recipe_ends_with_its_proof():
     proof = re.compile(r"\*\*Proof\*\*, `tests/\w+/test_\w+\.py`")
     assert len(recipes()) > 5
     assert [name for name, text in recipes().items() if not proof.search(text)] == []
@@ -304,11 +302,11 @@ def top_level(file: Path) -> set[str]:
     }
 
 
-def test_the_page_of_quantities_is_that_of_the_catalogue():
+def test_the_page_of_quantities_matches_the_catalogue():
     script = spec_from_file_location("make_quantities", ROOT / "docs" / "make_quantities.py")
     module = module_from_spec(script)
     script.loader.exec_module(module)
-    assert module.PAGE.read_text("utf-8") == module.page(), "make docs writes it anew"
+    assert module.PAGE.read_text("utf-8") == module.page(), "make docs regenerates it"
 
 
 MISTAKES = {
@@ -364,11 +362,11 @@ MISTAKES = {
 @pytest.mark.parametrize(
     ("kind", "text"), [(kind, text) for kind, texts in MISTAKES.items() for text in texts]
 )
-def test_a_mistake_of_each_kind_is_seen(kind, text):
+def test_a_mistake_of_each_kind_is_detected(kind, text):
     assert judged(text, ROOT / "docs" / "a.md") is not None, kind
 
 
-def test_a_mistake_is_seen_where_it_stands():
+def test_a_mistake_is_reported_with_its_line():
     text = (
         "# T\n\n## track\n\n`--band` or\n`--cells`; [x](gone.md), [y](#gone), [T](#t).\n\n`--json`:"
         " `clr`, `crl`.\n"
@@ -391,7 +389,7 @@ def test_a_mistake_is_seen_where_it_stands():
         ("python", "from asperity.ehl import solve_contract"),
     ],
 )
-def test_a_mistake_in_a_block_is_seen(language, text):
+def test_a_mistake_in_a_block_is_detected(language, text):
     page = Page(ROOT / "docs" / "a.md", f"```{language}\n{text}\n```\n")
     assert len(list(block_problems(page))) == 1
 
@@ -399,16 +397,16 @@ def test_a_mistake_in_a_block_is_seen(language, text):
 def test_every_exception_is_needed():
     spans = {span.text: (page, span) for page in pages() for span in page.spans()}
     assert sorted(EXCEPTIONS.keys() - spans.keys()) == []
-    told = ((text, *spans[text]) for text in EXCEPTIONS)
+    located = ((text, *spans[text]) for text in EXCEPTIONS)
     assert [
-        text for text, page, span in told if judged(text, page.path, span.line.headings) is None
+        text for text, page, span in located if judged(text, page.path, span.line.headings) is None
     ] == []
-    shown = {
+    texts = {
         word: [name for name in sections() if word in names_in(json_lines(sections()[name]))]
-        for word in OF_JSON
+        for word in JSON_EXCEPTIONS
     }
     assert [
         w
-        for w, names in shown.items()
+        for w, names in texts.items()
         if all(w in json_keys(n) | json_texts(n) for n in names if golden(n))
     ] == []

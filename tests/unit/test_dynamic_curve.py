@@ -1,6 +1,4 @@
-"""k and c of a solved contact over frequency, as a run states them: only where asked for, through
-the resonance.
-"""
+"""Stiffness and damping of a solved contact over frequency in a run's output: on request only."""
 
 import json
 from dataclasses import replace
@@ -35,24 +33,26 @@ def run():
 def test_the_curve_passes_through_the_reported_resonance(run):
     curve, own = run.dynamic_curve, run.own_resonance.elastic
     assert curve.frequency_hz.shape == (COUNT,)
-    at = int(np.argmin(np.abs(curve.frequency_hz - own.frequency_hz)))
-    assert curve.frequency_hz[at] == own.frequency_hz
-    assert curve.elastic.stiffness[at] == pytest.approx(own.stiffness, rel=1e-4)
-    assert curve.elastic.damping[at] == pytest.approx(own.damping, rel=1e-2)
-    assert curve.virgin.stiffness[at] == pytest.approx(run.own_resonance.virgin.stiffness, rel=1e-4)
+    points = int(np.argmin(np.abs(curve.frequency_hz - own.frequency_hz)))
+    assert curve.frequency_hz[points] == own.frequency_hz
+    assert curve.elastic.stiffness[points] == pytest.approx(own.stiffness, rel=1e-4)
+    assert curve.elastic.damping[points] == pytest.approx(own.damping, rel=1e-2)
+    assert curve.virgin.stiffness[points] == pytest.approx(
+        run.own_resonance.virgin.stiffness, rel=1e-4
+    )
     assert curve.frequency_hz[0] == pytest.approx(own.frequency_hz / 10.0, rel=0.1)
     assert curve.frequency_hz[-1] > 3.0 * own.frequency_hz
 
 
 def test_every_point_equals_the_dynamic_stiffness_at_its_frequency(run):
     curve = run.dynamic_curve
-    for place in (0, COUNT - 1):
+    for index in (0, COUNT - 1):
         for yielded, branch in (("elastic", curve.elastic), ("flowing", curve.virgin)):
             alone = dynamic_stiffness(
-                run.solution, float(curve.frequency_hz[place]), yielded=yielded
+                run.solution, float(curve.frequency_hz[index]), yielded=yielded
             )
-            assert branch.stiffness[place] == pytest.approx(alone.stiffness, rel=1e-3)
-            assert branch.damping[place] == pytest.approx(
+            assert branch.stiffness[index] == pytest.approx(alone.stiffness, rel=1e-3)
+            assert branch.damping[index] == pytest.approx(
                 alone.damping, rel=2e-2, abs=1e-3 * abs(curve.elastic.damping[0])
             )
     assert curve.elastic.slow == pytest.approx(
@@ -61,12 +61,16 @@ def test_every_point_equals_the_dynamic_stiffness_at_its_frequency(run):
 
 
 def test_the_curve_is_in_json_and_file_only_if_requested(run, tmp_path):
-    said = json.loads(json.dumps(run.summary()))["dynamic_curve"]
-    assert said["frequency_hz"] == run.dynamic_curve.frequency_hz.tolist()
-    assert said["stiffness_n_m"] == run.dynamic_curve.elastic.stiffness.tolist()
-    assert said["damping_ns_m"] == run.dynamic_curve.elastic.damping.tolist()
-    assert said["slow_stiffness_n_m"] == run.dynamic_curve.elastic.slow
-    assert set(said) > {"stiffness_virgin_n_m", "damping_virgin_ns_m", "slow_stiffness_virgin_n_m"}
+    summary = json.loads(json.dumps(run.summary()))["dynamic_curve"]
+    assert summary["frequency_hz"] == run.dynamic_curve.frequency_hz.tolist()
+    assert summary["stiffness_n_m"] == run.dynamic_curve.elastic.stiffness.tolist()
+    assert summary["damping_ns_m"] == run.dynamic_curve.elastic.damping.tolist()
+    assert summary["slow_stiffness_n_m"] == run.dynamic_curve.elastic.slow
+    assert set(summary) > {
+        "stiffness_virgin_n_m",
+        "damping_virgin_ns_m",
+        "slow_stiffness_virgin_n_m",
+    }
     with xarray.open_dataset(run.save(tmp_path / "run.nc")) as kept:
         np.testing.assert_array_equal(kept["dynamic_frequency"], run.dynamic_curve.frequency_hz)
         np.testing.assert_array_equal(
@@ -77,16 +81,16 @@ def test_the_curve_is_in_json_and_file_only_if_requested(run, tmp_path):
     np.testing.assert_allclose(
         again.dynamic_curve.elastic.stiffness, run.dynamic_curve.elastic.stiffness, rtol=1e-6
     )
-    plain = replace(run, case=run.case.with_overrides({"solver.dynamic": 0}))
-    assert plain.dynamic_curve is None
-    assert "dynamic_curve" not in plain.summary()
-    assert "dynamic_stiffness" not in plain.contents().variables
+    without_curve = replace(run, case=run.case.with_overrides({"solver.dynamic": 0}))
+    assert without_curve.dynamic_curve is None
+    assert "dynamic_curve" not in without_curve.summary()
+    assert "dynamic_stiffness" not in without_curve.contents().variables
     assert "stiffness-over-frequency" not in (tmp_path / "p.html").name
-    page = write_report([plain], tmp_path / "p.html").read_text("utf-8")
+    page = write_report([without_curve], tmp_path / "p.html").read_text("utf-8")
     assert "Stiffness over frequency" not in page
 
 
-def test_the_page_shows_it_with_the_resonance_marked(run, tmp_path):
+def test_the_page_shows_the_curve_with_the_resonance_marked(run, tmp_path):
     page = write_report([run], tmp_path / "page.html").read_text("utf-8")
     assert "Stiffness and damping of the solved contact" in page
     above, below = stiffness_over_frequency(run).figure().axes
@@ -96,27 +100,27 @@ def test_the_page_shows_it_with_the_resonance_marked(run, tmp_path):
     assert "N s/m" in below.get_ylabel()
 
 
-def test_without_a_mass_the_curve_lies_about_the_oils_crossing(run):
-    free = replace(run, case=run.case.with_overrides({"vibration": "none"}), vibration=None)
+def test_without_a_mass_the_curve_is_centred_on_the_film_crossing_frequency(run):
+    without_mass = replace(run, case=run.case.with_overrides({"vibration": "none"}), vibration=None)
     conditions = run.case.conditions
     crossing = conditions.entrainment_speed / (2.0 * np.pi * conditions.hertz.half_widths[0])
-    assert np.min(np.abs(free.dynamic_curve.frequency_hz / crossing - 1.0)) < 1e-12
+    assert np.min(np.abs(without_mass.dynamic_curve.frequency_hz / crossing - 1.0)) < 1e-12
 
 
 def test_frequencies_that_fail_are_nan_and_noted(run, monkeypatch):
-    class Stuck(dynamic.OscillatingContact):
+    class FailingContact(dynamic.OscillatingContact):
         def evaluate(self, frequency_hz):
             if frequency_hz > 20e3:
                 raise AsperityError(f"not found at {frequency_hz:.0f} Hz")
             return super().evaluate(frequency_hz)
 
-    monkeypatch.setattr(dynamic, "OscillatingContact", Stuck)
-    stuck = replace(run)
-    curve = stuck.dynamic_curve
+    monkeypatch.setattr(dynamic, "OscillatingContact", FailingContact)
+    failing_run = replace(run)
+    curve = failing_run.dynamic_curve
     assert np.isnan(curve.elastic.stiffness[-1])
     assert np.isfinite(curve.elastic.stiffness[0])
-    assert stuck.summary()["dynamic_curve"]["stiffness_n_m"][-1] is None
-    assert any("Not found at" in note for note in stuck.remarks)
+    assert failing_run.summary()["dynamic_curve"]["stiffness_n_m"][-1] is None
+    assert any("Not found at" in note for note in failing_run.remarks)
 
 
 def test_a_contact_without_dynamic_stiffness_has_a_note(run):
@@ -128,14 +132,14 @@ def test_a_contact_without_dynamic_stiffness_has_a_note(run):
     )
 
 
-def test_the_command_takes_an_option_and_refuses_a_senseless_number(capsys):
+def test_the_command_takes_an_option_and_refuses_an_invalid_number(capsys):
     arguments = ["solve", "examples/paper.toml", "--surfaces", "1", "--json"]
     for key, value in SMALL.items():
         arguments += ["--set", f"{key}={value}"]
-    with pytest.raises(SystemExit) as ended:
+    with pytest.raises(SystemExit) as exit_info:
         main([*arguments, "--dynamic"])
-    assert not ended.value.code
-    said = json.loads(capsys.readouterr().out)
-    assert len(said["dynamic_curve"]["frequency_hz"]) == dynamic.FREQUENCIES
+    assert not exit_info.value.code
+    summary = json.loads(capsys.readouterr().out)
+    assert len(summary["dynamic_curve"]["frequency_hz"]) == dynamic.FREQUENCIES
     with pytest.raises(BadInput, match=r"solver\.dynamic"):
         load_case("examples/paper.toml").with_overrides({"solver.dynamic": 1})

@@ -1,6 +1,4 @@
-"""The dry elastic contact by its own solver: beside Newton's steps, which share nothing with it but
-the equations.
-"""
+"""Dry elastic contact by its own solver, compared with Newton's method on the same equations."""
 
 from dataclasses import replace
 
@@ -17,18 +15,20 @@ from support.paper import contact, grid, rough
 TIGHT = Options(tolerance=1e-9)
 
 
-def by_newton(conditions, surface, monkeypatch):
-    with monkeypatch.context() as alone:
-        alone.setattr(solving, "ElasticSearch", Search)
+def newton_solution(conditions, surface, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(solving, "ElasticSearch", Search)
         return solve_contact(conditions, None, surface, options=TIGHT)
 
 
-@pytest.mark.parametrize("sq", [0.2e-6, 1e-6, 4e-6])  # the last touches far outside the Hertz zone
-def test_it_is_newtons_contact_and_one_step_of_newtons_says_so(sq, monkeypatch):
+@pytest.mark.parametrize(
+    "sq", [0.2e-6, 1e-6, 4e-6]
+)  # the last one has contact far outside the Hertz zone
+def test_the_elastic_solver_agrees_with_newton_to_one_iteration(sq, monkeypatch):
     surface = rough(grid((96, 80)), sq)
     found, expected = (
         solve_contact(contact(), None, surface, options=TIGHT),
-        by_newton(contact(), surface, monkeypatch),
+        newton_solution(contact(), surface, monkeypatch),
     )
     np.testing.assert_array_equal(found.in_contact, expected.in_contact)
     np.testing.assert_allclose(
@@ -38,31 +38,31 @@ def test_it_is_newtons_contact_and_one_step_of_newtons_says_so(sq, monkeypatch):
     assert found.convergence.iterations == 1 < expected.convergence.iterations
 
 
-def test_only_lines_that_can_touch_take_part(monkeypatch):
+def test_only_rows_that_can_touch_are_solved(monkeypatch):
     windows = []
-    around = elastic._ContactLines.window
+    original = elastic._ContactLines.window
 
-    def seen(self, touching):
-        windows.append(around(self, touching)[0].undeformed.shape[0] / self.undeformed.shape[0])
-        return around(self, touching)
+    def recorded_window(self, touching):
+        windows.append(original(self, touching)[0].undeformed.shape[0] / self.undeformed.shape[0])
+        return original(self, touching)
 
-    monkeypatch.setattr(elastic._ContactLines, "window", seen)
+    monkeypatch.setattr(elastic._ContactLines, "window", recorded_window)
     solve_contact(contact(), None, rough(grid((96, 80)), 0.2e-6), options=TIGHT)
     assert windows
     assert max(windows) < 0.6
 
 
-def test_yielding_bodies_and_gradients_out_of_steps_are_left_to_newton(monkeypatch):
+def test_plastic_contacts_and_failed_conjugate_gradients_fall_back_to_newton(monkeypatch):
     surface = rough(grid((96, 80)), 1e-6)
-    expected = by_newton(contact(), surface, monkeypatch)
-    asked = []
+    expected = newton_solution(contact(), surface, monkeypatch)
+    calls = []
     exact = solving.elastic_contact
     monkeypatch.setattr(
-        solving, "elastic_contact", lambda *given: asked.append(given) or exact(*given)
+        solving, "elastic_contact", lambda *arguments: calls.append(arguments) or exact(*arguments)
     )
     solve_contact(contact(hardness=2e9), None, surface)
-    assert asked == []
+    assert calls == []
     monkeypatch.setattr(elastic, "ELASTIC_DRY", replace(ELASTIC_DRY, max_krylov_steps=3))
     found = solve_contact(contact(), None, surface, options=TIGHT)
-    assert len(asked) == 1
+    assert len(calls) == 1
     np.testing.assert_array_equal(found.pressure, expected.pressure)

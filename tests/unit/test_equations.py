@@ -1,7 +1,7 @@
-"""The tables "equation, source, function, test" of the theory pages, both ways.
+"""Tables "equation, source, function, test" of the theory pages, in both directions.
 
-What a row of docs/theory/equations.md names exists, function and test, and every public law that
-states an equation in its docstring stands in a row of some page.
+Functions and tests named in docs/theory/equations.md exist, and every public law that states an
+equation in its docstring has a row on some page.
 """
 
 import inspect
@@ -15,7 +15,7 @@ from support.source import ROOT, exported, faces, functions, parsed
 
 THEORY = [read(path) for path in sorted(ROOT.glob("docs/theory/*.md"))]
 EQUATION = re.compile(r"\S = \S")
-NO_LAW = {  # public, with an equation in what is said of them, but no law of physics
+NO_LAW = {  # public, with an equation in the docstring, but no physical law
     "CaseFile": "a key and its value",
     "Condition": "what an indicator may follow, and how much of it",
     "recursion": "a digital filter",
@@ -23,17 +23,17 @@ NO_LAW = {  # public, with an equation in what is said of them, but no law of ph
 
 
 def tables(page: Page) -> Iterator[tuple[Line, dict[str, str]]]:
-    """Rows of tables that have a column of functions and one of tests, by their column."""
-    heads: list[str] = []
+    """Table rows with columns for functions and tests, as dictionaries by heading."""
+    headings: list[str] = []
     for line, cells in page.rows():
         if "equation" in cells[0] or cells[0] in ("what", "step", "claim"):
-            heads = cells
-        elif {"function", "test"} <= set(heads) and len(cells) == len(heads):
-            yield line, dict(zip(heads, cells, strict=True))
+            headings = cells
+        elif {"function", "test"} <= set(headings) and len(cells) == len(headings):
+            yield line, dict(zip(headings, cells, strict=True))
 
 
 ROWS = [(page, line, row) for page in THEORY for line, row in tables(page)]
-NAMED = [  # rows that name a public thing and a test's file
+NAMED = [  # rows that name a public object and a test file
     (page, line, row)
     for page, line, row in ROWS
     if page.path.stem == "equations" and re.search(r"`test_\w+\.py`", row["test"])
@@ -65,20 +65,21 @@ def test_a_row_names_a_public_function_and_a_test_that_uses_it(page, line, row):
     )
 
 
-def test_every_public_law_stands_in_a_table():
-    told = " ".join(cell for page in THEORY for _, cells in page.rows() for cell in cells)
+def test_every_public_law_has_a_table_row():
+    documented = " ".join(cell for page in THEORY for _, cells in page.rows() for cell in cells)
     laws = {
         name
         for face in faces().values()
-        for name, thing in exported(face).items()
-        if inspect.isroutine(thing) or inspect.isclass(thing)
-        if EQUATION.search((thing.__doc__ or "").split("\n\n")[0])
-        if not (thing.__doc__ or "").startswith(
+        for name, member in exported(face).items()
+        if inspect.isroutine(member) or inspect.isclass(member)
+        if EQUATION.search((member.__doc__ or "").split("\n\n")[0])
+        if not (member.__doc__ or "").startswith(
             f"{name}("
-        )  # what dataclasses write where nobody did
+        )  # the generated docstring of a dataclass
     }
     assert len(laws) > 30
     assert (
-        sorted(name for name in laws - NO_LAW.keys() if not re.search(rf"\b{name}\b", told)) == []
+        sorted(name for name in laws - NO_LAW.keys() if not re.search(rf"\b{name}\b", documented))
+        == []
     )
     assert sorted(NO_LAW.keys() - laws) == []

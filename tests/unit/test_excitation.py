@@ -24,10 +24,10 @@ def test_density_integrates_to_the_height(filter_name, order, height_as, rms):
     density = noise(filter=filter_name, filter_order=order, height_as=height_as).density(
         frequency, rate
     )
-    beyond = (
+    tail = (
         density[-1] * 5000.0 if filter_name == "continuous" and order == 1 else 0.0
-    )  # f^-2 from 5 kHz on
-    assert np.trapezoid(density, frequency) + beyond == pytest.approx(rms**2, rel=1e-4)
+    )  # f^-2 above 5 kHz
+    assert np.trapezoid(density, frequency) + tail == pytest.approx(rms**2, rel=1e-4)
 
 
 def test_the_papers_filter_is_scipys_butterworth():
@@ -52,14 +52,14 @@ def test_height_of_the_record_is_exact_and_of_the_process_scatters():
 
 
 def test_noise_with_its_height_before_the_filter_loses_the_filtered_power():
-    """Of white noise up to rate/2, a filter of noise bandwidth B = fc (π/4)/sin(π/4) passes
+    """White noise up to rate/2: a filter of noise bandwidth B = fc (π/4)/sin(π/4) passes
     B/(rate/2).
     """
     profile = noise(height_of="noise", filter="bilinear").profile(800_000, 10e3, seed=1).values
     assert np.std(profile) == pytest.approx(2e-6 * np.sqrt(30.0 * 1.1107 / 5e3), rel=0.02)
 
 
-def test_a_kept_coefficient_leaves_the_noise_alone_and_a_readjusted_one_the_height():
+def test_a_fixed_coefficient_keeps_the_noise_and_a_readjusted_one_the_height():
     at = np.array([3000.0])
     rate = 100e3
     kept = [
@@ -88,16 +88,14 @@ def test_a_kept_coefficient_leaves_the_noise_alone_and_a_readjusted_one_the_heig
     ids=str,
 )
 def test_records_have_the_expected_spectrum(choices):
-    """Mean ratio over bands below, at and above the cut-off, each to its statistical error, through
-    a strong taper.
-    """
+    """Mean ratio below, around and above the cut-off, within its statistical error."""
     source = noise(cutoff_hz=400.0, **choices)
     rate, segment = 10e3, 10_000
     spectrum = power_spectrum(
         source.profile(2_000_000, rate, seed=5), segment=segment, window="blackmanharris"
     )
     expected = source.density(spectrum.frequency_hz, rate)
-    if not choices:  # the exactly sampled process folds; what is summed from waves does not
+    if not choices:  # the sampled process aliases; a sum of waves does not
         expected = sum(
             source.density(np.abs(spectrum.frequency_hz + k * rate), rate) for k in range(-40, 41)
         )
@@ -109,10 +107,8 @@ def test_records_have_the_expected_spectrum(choices):
         )
 
 
-def test_both_ways_of_making_a_record_agree():
-    """The recursion in time (order 2) and the sum of waves: autocovariances at a few lags, over 400
-    s.
-    """
+def test_both_generators_give_the_same_autocovariance():
+    """Time recursion (order 2) and sum of waves: autocovariance at a few lags, over 400 s."""
     source = noise()
     rate, samples = 4e3, 1_600_000
     a = np.sqrt(2.0) * np.pi * 30.0
@@ -130,9 +126,7 @@ def test_both_ways_of_making_a_record_agree():
 
 
 def test_profile_at_the_resonance_has_the_continuous_filters_power():
-    """Where a bilinear filter would lack 1.6 % and more: band power against the closed form, to
-    statistical error.
-    """
+    """A bilinear filter lacks 1.6 % or more there; band power against the closed form."""
     source = noise()
     spectrum = power_spectrum(
         source.profile(2_000_000, 20e3, seed=1), segment=20_000, window="blackmanharris"
@@ -146,7 +140,7 @@ def test_profile_at_the_resonance_has_the_continuous_filters_power():
 GRID = Grid((512, 64), (-4e-4, -1e-4), (4e-4, 1e-4))
 
 
-def test_a_sine_runs_over_as_a_line_at_speed_over_wavelength():
+def test_a_sine_gives_a_line_at_speed_over_wavelength():
     heights = np.repeat(1e-6 * np.sin(2 * np.pi * GRID.x / 1e-4)[:, None], 64, axis=1)
     track = SurfaceTrack.from_surface(Surface(heights, GRID), speed=0.5)
     frequency = np.linspace(0.0, 20e3, 20_001)
@@ -155,13 +149,13 @@ def test_a_sine_runs_over_as_a_line_at_speed_over_wavelength():
     assert np.trapezoid(density, frequency) == pytest.approx(0.5e-12, rel=1e-3)
 
 
-def test_a_generated_surface_has_its_own_spectrum():
+def test_a_generated_surface_has_the_specified_spectrum():
     """R = Sq^2 exp(-(x/l)^2) gives Φ(q) = 2 Sq^2 l √π exp(-(π q l)^2); mean over 30 surfaces, S(f)
     = Φ(f/v)/v.
     """
     length, speed = 20e-6, 0.42
     frequency = np.linspace(1500.0, 12e3, 50)
-    seen = np.mean(
+    measured = np.mean(
         [
             SurfaceTrack.from_surface(
                 gaussian_surface(
@@ -175,11 +169,11 @@ def test_a_generated_surface_has_its_own_spectrum():
     )
     q = frequency / speed
     expected = 2e-12 * length * np.sqrt(np.pi) * np.exp(-((np.pi * q * length) ** 2)) / speed
-    assert np.mean(seen / expected) == pytest.approx(1.0, abs=0.05)
-    assert np.max(np.abs(seen / expected - 1.0)) < 0.2
+    assert np.mean(measured / expected) == pytest.approx(1.0, abs=0.05)
+    assert np.max(np.abs(measured / expected - 1.0)) < 0.2
 
 
-def test_a_tracks_record_has_the_tracks_spectrum_and_nothing_finer_than_two_pixels():
+def test_a_tracks_record_has_its_spectrum_up_to_two_pixels_per_wave():
     surface = gaussian_surface(
         GRID, sq=1e-6, correlation_length=20e-6, rng=np.random.default_rng(1)
     )
@@ -192,8 +186,8 @@ def test_a_tracks_record_has_the_tracks_spectrum_and_nothing_finer_than_two_pixe
 
 
 @pytest.mark.parametrize("shape", ["line", "point"])
-def test_the_patchs_weight_is_the_mean_of_a_wave_under_hertzs_pressure(shape):
-    """∫ p cos(kx) / ∫ p, by quadrature over the strip or the disc."""
+def test_the_patch_weight_is_the_hertz_weighted_mean_of_a_wave(shape):
+    """∫ p cos(kx) / ∫ p, by quadrature over the strip or disc."""
     patch = PatchAverage(source=noise(), shape=shape, half_width=50e-6, speed=0.42)
     for frequency in (10.0, 1000.0, 3300.0, 9000.0):
         k = 2 * np.pi * frequency / 0.42
@@ -206,24 +200,22 @@ def test_the_patchs_weight_is_the_mean_of_a_wave_under_hertzs_pressure(shape):
         assert patch.weight(np.array([frequency]))[0] == pytest.approx(expected, abs=1e-5)
 
 
-def test_a_patch_averages_the_record_it_is_given():
-    """A record of the averaged noise is the moving mean, under Hertz's pressure, of the record of
-    the noise.
-    """
+def test_a_patch_averages_its_record():
+    """The averaged record is the moving mean of the noise record, weighted by Hertz's pressure."""
     source = noise(cutoff_hz=2000.0)
     rate, speed, a = 100e3, 0.42, 56e-6
     patch = PatchAverage(source=source, shape="line", half_width=a, speed=speed)
     samples = 4000
     averaged = patch.profile(samples, rate, seed=4).values
-    reach = int(np.ceil(4.0 * a / speed * rate)) + 64
-    raw = source.profile(samples + 2 * reach, rate, seed=4).values
+    margin = int(np.ceil(4.0 * a / speed * rate)) + 64
+    raw = source.profile(samples + 2 * margin, rate, seed=4).values
     x = np.linspace(-1.0, 1.0, 4001)
     weight = np.sqrt(1 - x**2)
     shifts = x * a / speed * rate
-    at = np.arange(100, 3900) + reach
+    centres = np.arange(100, 3900) + margin
     direct = np.mean(
         [
-            w * np.interp(at + s, np.arange(raw.size), raw)
+            w * np.interp(centres + s, np.arange(raw.size), raw)
             for w, s in zip(weight, shifts, strict=True)
         ],
         axis=0,
@@ -232,7 +224,7 @@ def test_a_patch_averages_the_record_it_is_given():
     assert averaged[100:3900] == pytest.approx(direct, abs=0.01 * np.std(raw))
 
 
-def test_a_wide_patch_silences_the_resonance():
+def test_a_wide_patch_suppresses_the_resonance():
     patch = PatchAverage(source=noise(), shape="line", half_width=1e-3, speed=0.42)
     assert (
         patch.density(np.array([3330.0]), 1e5)[0]
@@ -240,7 +232,7 @@ def test_a_wide_patch_silences_the_resonance():
     )
 
 
-def test_bad_input_is_named():
+def test_invalid_input_is_named():
     with pytest.raises(BadInput, match="order"):
         noise(filter_order=9)
     with pytest.raises(BadInput, match="continuous, bilinear"):

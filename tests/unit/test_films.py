@@ -1,5 +1,5 @@
-"""Fits of smooth films: their constants by quadrature, their values against solved films, and which
-one holds.
+"""Fits of smooth films: constants by quadrature, values against solved films, and the choice of
+regime.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ PAIR = ElasticPair((200e9, 200e9), (0.3, 0.3))
 
 
 def line(load_number, oil_number, *, alpha=22e-9, eta0=0.04, radius=5.4e-3):
-    """A line contact with these Moes numbers, its oil, and the film [m] that H = 1 stands for."""
+    """Line contact with these Moes numbers, its oil, and the film thickness [m] at H = 1."""
     modulus = PAIR.effective_modulus
     twice_u = (oil_number / (alpha * modulus)) ** 4
     speed = twice_u * modulus * radius / (2.0 * eta0)
@@ -36,11 +36,11 @@ def line(load_number, oil_number, *, alpha=22e-9, eta0=0.04, radius=5.4e-3):
 
 
 def rigid_cylinder():
-    """Reynolds' equation between a parabola and a plane, p = dp/dx = 0 where it ruptures.
+    """Solve Reynolds' equation between a parabola and a plane with p = dp/dx = 0 at rupture.
 
-    In s = x/sqrt(2 R h0): dq/ds = 12 eta u sqrt(2R) h0^-1.5 (1 + s² - c)/(1 + s²)³. Gives c, the
-    film under the highest pressure over the least one; q_max of 12 eta u sqrt(2R) h0^-1.5; and the
-    load over 24 eta u R/h0.
+    With s = x/sqrt(2 R h0): dq/ds = 12 eta u sqrt(2R) h0^-1.5 (1 + s² - c)/(1 + s²)³. Returns c,
+    the film at the pressure maximum over the minimum film; q_max in 12 eta u sqrt(2R) h0^-1.5; and
+    the load in 24 eta u R/h0.
     """
 
     def slope(s, c):
@@ -56,9 +56,9 @@ def rigid_cylinder():
     return c, pressure(-np.sqrt(c - 1.0), c), load
 
 
-def test_the_rigid_films_of_a_line_contact_are_those_of_reynolds_equation():
-    """Martin's h0 w/(eta u R) = 4.898; Blok's, at which alpha q reaches 1, 1.666 (alpha eta u)^2/3;
-    Moes' times c.
+def test_rigid_films_of_a_line_contact_match_reynolds_equation():
+    """Martin h0 w/(eta u R) = 4.898; Blok 1.666 (alpha eta u)^2/3 at alpha q = 1; Moes' multiplied
+    by c.
     """
     c, highest, load = rigid_cylinder()
     conditions, oil, unit = line(0.1, 1.0)
@@ -84,7 +84,7 @@ def martin_of(conditions, oil):
 
 @pytest.mark.parametrize(
     ("m", "l", "solved", "rho"),
-    # central H, Roelands, and the density at p_h: physics of smooth line contacts, own non-uniform
+    # central H with Roelands' law, and density at p_h: smooth line contacts by a non-uniform-grid
     # solver
     [
         (5, 10, 5.301, 1.145),
@@ -94,14 +94,14 @@ def martin_of(conditions, oil):
         (500, 10, 2.688, 1.308),
     ],
 )
-def test_moes_central_film_is_the_solved_one_at_ambient_density(m, l, solved, rho):  # noqa: E741
+def test_moes_central_film_matches_the_solved_film_at_ambient_density(m, l, solved, rho):  # noqa: E741
     conditions, oil, unit = line(m, l)
     assert central_film(conditions, oil) / unit == pytest.approx(solved * rho, rel=0.04)
 
 
 @pytest.mark.parametrize(("m", "l", "solved"), [(20, 10, 4.803), (100, 5, 3.102)])
-def test_nijenbannings_central_film_is_the_solved_ball(m, l, solved):  # noqa: E741
-    """Barus, incompressible, Richardson from 257 and 513 points; it is 11 and 13 % below."""
+def test_nijenbannings_central_film_matches_the_solved_ball(m, l, solved):  # noqa: E741
+    """Barus, incompressible, extrapolated from 257 and 513 points; the fit is 11 and 13 % lower."""
     conditions, unit = ball(m, l)
     oil = Lubricant(
         viscosity=Barus(0.04, 22e-9), density=Incompressible(870.0), rheology=Newtonian()
@@ -124,8 +124,8 @@ def test_the_corners_of_the_chart(m, l, regime):  # noqa: E741
     assert {fit.place for fit in film_fits(conditions, oil)} == {"central", "least"}
 
 
-def test_the_papers_contact_keeps_dowsons_film():
-    """Its film ratio was Dowson's (1968) before regimes were told apart, and is."""
+def test_the_papers_contact_uses_dowsons_film():
+    """Dowson's formula (1968) of the paper applies in the regime of its contact."""
     conditions, oil = contact(), barus()
     numbers = film_numbers(conditions, oil)
     dowson = (
@@ -137,8 +137,8 @@ def test_the_papers_contact_keeps_dowsons_film():
     )
 
 
-def test_the_film_has_no_step_from_regime_to_regime():
-    """Over six decades of speed, from thin films of stiff oil to bodies that stay rigid."""
+def test_the_film_is_continuous_between_regimes():
+    """Over six decades of speed, from thin piezoviscous films to rigid bodies."""
     speeds = np.geomspace(1e-4, 1e3, 400)
     films = np.array([least_film(contact(speed=speed), barus()) for speed in speeds])
     assert len({lubrication_regime(contact(speed=speed), barus()) for speed in speeds}) == 3
@@ -146,7 +146,7 @@ def test_the_film_has_no_step_from_regime_to_regime():
     assert 0.6 < steps.min() <= steps.max() < 1.01
 
 
-def test_no_fit_is_said_to_hold_for_a_contact_narrow_across_rolling():
+def test_no_fit_applies_to_a_contact_narrow_across_rolling():
     narrow = ContactConditions(
         pair=PAIR, geometry="elliptic", radius=(0.02, 0.01), load=20.0, surface_speeds=(1, 1)
     )

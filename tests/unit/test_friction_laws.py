@@ -1,6 +1,4 @@
-"""The shear stress of the film by each law, and what warmth does to an oil, against closed forms
-and twins.
-"""
+"""Shear stress of the film under each law, and thermal effects on the oil, against closed forms."""
 
 import numpy as np
 import pytest
@@ -49,17 +47,17 @@ def film(
     )
 
 
-def test_newton_and_eyring_by_hand():
+def test_newton_and_eyring_match_hand_calculations():
     sheared = film(1e4)
     np.testing.assert_allclose(NewtonianShear()(sheared)[:, 0], VISCOSITY * 1e4)
     stress = EyringShear(5e6)(sheared)
     np.testing.assert_allclose(
         5e6 * np.sinh(stress[:, 1] / 5e6), VISCOSITY * 1e4
-    )  # the law solved for the rate
+    )  # the law inverted for the rate
     np.testing.assert_allclose(EyringShear(5e6)(film(1.0)), NewtonianShear()(film(1.0)), rtol=1e-6)
 
 
-def test_dysons_limits_by_hand():
+def test_dysons_limits_match_hand_calculations():
     limit, modulus = BairWiner().limits(
         np.array([1e9, 0.5e9, 0.2e9]), np.array([313.15, 373.15, 313.15])
     )
@@ -68,7 +66,7 @@ def test_dysons_limits_by_hand():
     np.testing.assert_allclose(limit, 0.25 * modulus)
 
 
-def test_a_measured_limit_by_hand():
+def test_a_measured_limit_matches_hand_calculations():
     limit, modulus = LinearBairWiner(2e6, 0.05, 0.01, ratio=0.2).limits(
         np.array([1e9]), np.array([333.15])
     )
@@ -79,11 +77,11 @@ def test_a_measured_limit_by_hand():
 
 
 @pytest.mark.parametrize("rate", [1e3, 1e5, 1e7])
-def test_rigid_oil_shears_as_its_law_says(rate):
-    """G without bound: τ is where γ' = -(τ_L/η) ln(1 - τ/τ_L), wherever the oil came from."""
+def test_rigid_oil_follows_its_flow_law(rate):
+    """For G → ∞, τ satisfies γ' = -(τ_L/η) ln(1 - τ/τ_L), independent of history."""
     law = LinearBairWiner(2e6, 0.05, ratio=1e-9)
     stress, limit = law(film(rate))[:, 0], 2e6 + 0.05 * PRESSURE
-    twin = [
+    reference = [
         (
             brentq(
                 lambda t, top=top, eta=eta: rate + top / eta * np.log1p(-t / top),
@@ -95,11 +93,11 @@ def test_rigid_oil_shears_as_its_law_says(rate):
         )
         for top, eta in zip(limit, VISCOSITY, strict=True)
     ]
-    np.testing.assert_allclose(stress, twin, rtol=1e-7)
+    np.testing.assert_allclose(stress, reference, rtol=1e-7)
 
 
 def test_stiff_oil_far_below_its_limit_is_a_spring():
-    """η and τ_L without bound: τ grows by G times the strain."""
+    """For η and τ_L → ∞, τ grows by G times the strain."""
     law = LinearBairWiner(1e12, 1e-9, ratio=1e12 / 50e6)  # G = 50 MPa
     stress = law(film(1e3, viscosity=np.where(np.arange(X.size) == 0, 1e-3, 1e15), transit=1e-7))[
         :, 0
@@ -108,10 +106,8 @@ def test_stiff_oil_far_below_its_limit_is_a_spring():
 
 
 @pytest.mark.parametrize("rate", [3e3, 2e4])
-def test_carried_oil_follows_the_equation(rate):
-    """Maxwell's memory through the paper's contact, against an ODE solver on the same fields
-    between cells.
-    """
+def test_convected_oil_follows_the_maxwell_equation(rate):
+    """Maxwell model through the paper's contact, against an ODE solver on interpolated fields."""
     law, speed = BairWiner(), 1.91
     limit, modulus = law.limits(PRESSURE, np.full(X.size, 313.15))
 
@@ -127,14 +123,14 @@ def test_carried_oil_follows_the_equation(rate):
     ).y[0]
     stress = law(film(rate))[:, 0]
     steady = -limit * np.expm1(-VISCOSITY * rate / limit)
-    assert np.max(np.abs(steady - exact)) > 0.2 * exact.max()  # the memory matters here ...
+    assert np.max(np.abs(steady - exact)) > 0.2 * exact.max()  # the history matters here,
     assert np.max(np.abs(stress - exact)) < 0.03 * exact.max()
     assert stress.mean() == pytest.approx(
         exact.mean(), rel=0.005
-    )  # ... and friction has it to half a per cent
+    )  # and friction includes it to 0.5 %
 
 
-def test_the_kernel_agrees_with_its_twin():
+def test_the_kernel_agrees_with_its_reference_implementation():
     rng = np.random.default_rng(1)
     rate, limit, modulus = (10.0 ** rng.uniform(low, low + 1.5, (12, 3)) for low in (4, 6, 7))
     viscosity = 10.0 ** rng.uniform(-2, 4, (12, 3))
@@ -168,7 +164,7 @@ def test_the_kernel_agrees_with_its_twin():
             assert out[i, j] == pytest.approx(stress, rel=1e-9)
 
 
-def test_warm_oil_by_hand():
+def test_heated_oil_matches_hand_calculations():
     viscosity = np.array([0.096, 3.0])
     halved = ExponentialWarmth(0.037).factor(
         viscosity, np.array([313.15 + np.log(2.0) / 0.037] * 2), 313.15
@@ -179,8 +175,8 @@ def test_warm_oil_by_hand():
     ] == pytest.approx(11.0, rel=0.02)
 
 
-def test_roelands_warmth_is_his_law_at_another_temperature():
-    """η = η0 exp((ln η0 + 9.67)((1 + p/p0)^z ((T - 138)/(T0 - 138))^-S0 - 1)), written out."""
+def test_roelands_thermal_factor_matches_his_law_at_another_temperature():
+    """η = η0 exp((ln η0 + 9.67)((1 + p/p0)^z ((T - 138)/(T0 - 138))^-S0 - 1)) in explicit form."""
     law, pressure, temperature = (
         Roelands(0.096, 18.2e-9),
         np.array([0.0, 0.3e9, 1e9]),
@@ -208,6 +204,6 @@ def test_roelands_warmth_is_his_law_at_another_temperature():
         lambda: Thermal(oil_conductivity=0.0),
     ],
 )
-def test_what_cannot_be_is_refused(wrong):
+def test_invalid_parameters_are_refused(wrong):
     with pytest.raises(BadInput, match="must"):
         wrong()

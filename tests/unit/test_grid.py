@@ -5,7 +5,7 @@ from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
 
 
-def test_samples_sit_at_cell_centres():
+def test_samples_are_at_cell_centres():
     grid = Grid((8, 10), (-3.0, 0.0), (1.0, 5.0))
     assert grid.spacing == (0.5, 0.5)
     assert grid.extent == (4.0, 5.0)
@@ -17,7 +17,7 @@ def test_samples_sit_at_cell_centres():
 
 
 @pytest.mark.parametrize(
-    ("cells", "upper", "said"),
+    ("cells", "upper", "message"),
     [
         ((3, 64), (1.0, 1.0), "at least 8 cells along x, got 3"),
         ((64, 7), (1.0, 1.0), "at least 8 cells along y, got 7"),
@@ -26,6 +26,6 @@ def test_samples_sit_at_cell_centres():
         ((64, 64), (float("nan"), 1.0), "upper x"),
     ],
 )
-def test_a_grid_that_holds_nothing_is_refused(cells, upper, said):
-    with pytest.raises(BadInput, match=said):
+def test_an_empty_or_too_coarse_grid_is_refused(cells, upper, message):
+    with pytest.raises(BadInput, match=message):
         Grid(cells, (0.0, 0.0), upper)

@@ -1,4 +1,4 @@
-"""Hertz's closed forms against relations that they are not written from, to 1e-12."""
+"""Hertz's closed forms against independent relations, to 1e-12."""
 
 import numpy as np
 import pytest
@@ -19,16 +19,14 @@ LOAD, RADIUS, LENGTH, MODULUS = 200.0, 5.4e-3, 0.01, 113.74e9
 
 
 def test_line_pressure_carries_the_load_and_flattens_the_curve():
-    """p = p_h sqrt(1 - X^2) integrates to the load; inside, deflection has the curvature p_h 2/(E*
-    a) = 1/R.
+    """p = p_h sqrt(1 - X^2) integrates to the load; inside, deflection has curvature p_h 2/(E* a) =
+    1/R.
     """
     hertz = line_contact(LOAD, LENGTH, RADIUS, MODULUS)
     a, p_h = hertz.half_widths[0], hertz.p_max
-    angle = (
-        (np.arange(40) + 0.5) * np.pi / 40.0
-    )  # Chebyshev's nodes integrate sqrt(1 - X^2) exactly
-    carried = np.sum(line_pressure(a * np.cos(angle), a, p_h) * np.sin(angle)) * a * np.pi / 40.0
-    assert carried * LENGTH == pytest.approx(LOAD, rel=1e-12)
+    angle = (np.arange(40) + 0.5) * np.pi / 40.0  # Chebyshev nodes integrate sqrt(1 - X^2) exactly
+    total_load = np.sum(line_pressure(a * np.cos(angle), a, p_h) * np.sin(angle)) * a * np.pi / 40.0
+    assert total_load * LENGTH == pytest.approx(LOAD, rel=1e-12)
     assert 2.0 * p_h / (MODULUS * a) == pytest.approx(1.0 / RADIUS, rel=1e-12)
     assert hertz.p_mean * hertz.area == pytest.approx(LOAD, rel=1e-12)
     assert hertz.approach is None
@@ -41,7 +39,7 @@ def test_line_pressure_ends_at_the_half_width():
 
 
 @pytest.mark.parametrize("x", [1.0001, 1.3, -2.0, 6.0])
-def test_line_gap_is_what_the_pressure_leaves_open(x):
+def test_line_gap_equals_the_deflected_parabola(x):
     """h = x^2/2 - (1/pi) int P ln|(x - s)/(1 - s)| ds - 1/2, with s = cos(t), in units of a and
     a^2/R.
     """
@@ -56,12 +54,12 @@ def test_line_gap_is_what_the_pressure_leaves_open(x):
     assert line_gap(np.array([0.3]), 3.0, 9.0)[0] == 0.0
 
 
-def test_line_gap_opens_as_its_slope_says():
+def test_line_gap_is_the_integral_of_its_slope():
     """dh/dX = sqrt(X^2 - 1) a^2/R, integrated numerically."""
     x = np.array([1.0 + 1e-6, 1.5, 4.0])
     expected = [
-        quad(lambda s: np.sqrt((s - 1.0) * (s + 1.0)), 1.0, one, epsrel=1e-13, epsabs=0.0)[0]
-        for one in x
+        quad(lambda s: np.sqrt((s - 1.0) * (s + 1.0)), 1.0, end, epsrel=1e-13, epsabs=0.0)[0]
+        for end in x
     ]
     np.testing.assert_allclose(line_gap(x, 1.0, 1.0), expected, rtol=1e-12, atol=1e-15)
 
@@ -78,10 +76,10 @@ def test_point_contact_is_johnsons():
         (9.0 * LOAD**2 / (16.0 * RADIUS * MODULUS**2)) ** (1 / 3), rel=1e-12
     )
     a = hertz.half_widths[0]
-    carried, _ = quad(
+    total_load, _ = quad(
         lambda c: 2.0 * np.pi * a**2 * hertz.p_max * c**2, 0.0, 1.0
     )  # c = sqrt(1 - r^2/a^2)
-    assert carried == pytest.approx(LOAD, rel=1e-12)
+    assert total_load == pytest.approx(LOAD, rel=1e-12)
     assert hertz.p_mean * hertz.area == pytest.approx(LOAD, rel=1e-12)
 
 
@@ -102,12 +100,11 @@ def test_the_papers_contact_at_200_n():
 
 @pytest.mark.parametrize("ratio", [1.0, 1.0001, 1.1, 2.0, 10.0, 1e3])
 @pytest.mark.parametrize("swapped", [False, True])
-def test_elliptic_contact_meets_both_curvatures(ratio, swapped):
-    """The ellipsoid of pressure p0 on semi-axes a, b displaces by (L - M x^2 - N y^2)/(pi E*)
-    (Johnson eq 3.29).
+def test_elliptic_contact_matches_both_curvatures(ratio, swapped):
+    """The pressure ellipsoid p0 on semi-axes a, b displaces by (L - M x^2 - N y^2)/(pi E*).
 
-    M, N and L as Carlson's integrals; M/(pi E*) must be 1/(2 Rx), N/(pi E*) 1/(2 Ry), L/(pi E*)
-    the approach.
+    Johnson eq 3.29, with L, M and N as Carlson integrals: M/(pi E*) = 1/(2 Rx), N/(pi E*) = 1/(2
+    Ry) and L/(pi E*) is the approach.
     """
     radii = (RADIUS, RADIUS * ratio) if not swapped else (RADIUS * ratio, RADIUS)
     hertz = elliptic_contact(LOAD, radii, MODULUS)
@@ -123,8 +120,8 @@ def test_elliptic_contact_meets_both_curvatures(ratio, swapped):
     assert hertz.p_mean * hertz.area == pytest.approx(LOAD, rel=1e-12)
 
 
-def test_a_contact_of_nanometres_is_the_same_contact_in_small():
-    """Lengths scale with R when the load scales with R^2, pressures stay."""
+def test_a_contact_of_nanometres_scales_geometrically():
+    """Lengths scale with R if the load scales with R^2; pressures are unchanged."""
     tip, ring = (
         elliptic_contact(1e-9, (5e-9, 10e-9), MODULUS),
         elliptic_contact(1e3, (5e-3, 10e-3), MODULUS),
@@ -134,7 +131,7 @@ def test_a_contact_of_nanometres_is_the_same_contact_in_small():
 
 
 @pytest.mark.parametrize("excess", [1e-13, 1e-11, 1e-9, 1e-6])
-def test_nearly_equal_radii_are_nearly_a_ball(excess):
+def test_nearly_equal_radii_approach_a_ball(excess):
     ball = point_contact(LOAD, RADIUS, MODULUS)
     nearly = elliptic_contact(LOAD, (RADIUS, RADIUS * (1.0 + excess)), MODULUS)
     assert nearly.p_max == pytest.approx(ball.p_max, rel=excess + 1e-12)

@@ -1,6 +1,4 @@
-"""Histories: what is read off each step, kept and gone on with; where moving surfaces are; the page
-and the command.
-"""
+"""Histories: values of each step, storage and resuming, motion of surfaces, page and command."""
 
 import json
 import os
@@ -45,17 +43,17 @@ def rough(grid=GRID, seed=1):
     return gaussian_surface(grid, sq=1e-6, correlation_length=8e-6, rng=np.random.default_rng(seed))
 
 
-# Where surfaces are
+# Positions of surfaces
 
 
-def test_whole_cells_are_the_same_heights_further_on():
+def test_a_shift_by_whole_cells_moves_the_heights():
     surfaces = MovingSurfaces.one_rough(rough(), (2.0, 0.0))
     np.testing.assert_array_equal(
         surfaces.composite_at(3e-6).heights, np.roll(rough().heights, 3, axis=0)
     )
 
 
-def test_the_second_surface_moves_at_its_own_speed_face_down():
+def test_the_second_surface_moves_at_its_own_speed_and_is_mirrored():
     composite = CompositeSurface(rough(seed=1), rough(seed=2), (4.0, 2.0))
     surfaces = MovingSurfaces.from_composite(composite)
     np.testing.assert_allclose(surfaces.composite_at(0.0).heights, composite.surface.heights)
@@ -66,7 +64,7 @@ def test_the_second_surface_moves_at_its_own_speed_face_down():
     np.testing.assert_allclose(surfaces.composite_at(2e-6).heights, moved)
 
 
-def test_parts_of_a_cell_move_every_wave_exactly():
+def test_a_shift_by_part_of_a_cell_is_exact_for_every_wave():
     x = GRID.x[:, None] * np.ones(16)
     waves = [(2.0 * np.pi * k / 64e-6, phase) for k, phase in ((1, 0.3), (5, 1.1), (13, 2.0))]
 
@@ -78,7 +76,7 @@ def test_parts_of_a_cell_move_every_wave_exactly():
         np.testing.assert_allclose(surfaces.composite_at(shift).heights, heights(shift), atol=1e-16)
 
 
-def test_a_surface_neither_fades_nor_strays_however_long_it_runs():
+def test_a_long_motion_neither_smooths_nor_displaces_a_surface():
     surfaces = MovingSurfaces.one_rough(rough(), (1.0, 0.0))
     assert surfaces.composite_at(123.4567e-3).sq == pytest.approx(
         surfaces.composite_at(0.0).sq, rel=1e-6
@@ -99,7 +97,7 @@ def test_a_track_may_be_longer_than_the_contact():
 
 
 @pytest.mark.parametrize("index", [0, 1])
-def test_what_a_contact_leaves_lies_where_it_was_left(index):
+def test_marks_stay_in_place_on_the_track(index):
     surfaces = MovingSurfaces(rough(), rough(seed=2), (1.0, 1.0), GRID)
     mark = np.zeros(GRID.cells)
     mark[10, 3], side = 1.0, 3 if index == 0 else 12
@@ -118,7 +116,7 @@ def test_a_track_shorter_than_the_contact_is_refused():
 
 
 @pytest.mark.parametrize("which", ["first", "second"])
-def test_a_case_begins_with_the_roughness_that_it_solves(which):
+def test_a_history_starts_with_the_roughness_of_the_case(which):
     chosen = case(**{"motion.rough": which})
     surfaces = chosen.moving_surfaces()
     np.testing.assert_allclose(
@@ -129,15 +127,15 @@ def test_a_case_begins_with_the_roughness_that_it_solves(which):
 
 def test_both_bodies_share_the_roughness():
     surfaces = case(**{"motion.rough": "both", "motion.track": 2}).moving_surfaces()
-    for one in (surfaces.first, surfaces.second):
-        assert one.sq == pytest.approx(1e-6 / np.sqrt(2.0))
-    together = np.corrcoef(surfaces.first.heights.ravel(), surfaces.second.heights.ravel())[0, 1]
-    assert abs(together) < 0.3
+    for surface in (surfaces.first, surfaces.second):
+        assert surface.sq == pytest.approx(1e-6 / np.sqrt(2.0))
+    correlation = np.corrcoef(surfaces.first.heights.ravel(), surfaces.second.heights.ravel())[0, 1]
+    assert abs(correlation) < 0.3
 
 
 @pytest.fixture
 def measured(tmp_path):
-    """A case in a folder with two measured surfaces, each larger than the contact."""
+    """Case in a folder with two measured surfaces, each larger than the contact."""
     import x3pio
 
     for name, seed in (("ring.x3p", 1), ("roller.x3p", 2)):
@@ -148,7 +146,7 @@ def measured(tmp_path):
     return replace(case(), folder=tmp_path)
 
 
-def test_measured_surfaces_run_on_the_bodies_they_lie_on_their_ends_joined(measured):
+def test_measured_surfaces_move_with_their_bodies_as_closed_tracks(measured):
     two = measured.with_overrides(
         {"surface": {"file": "ring.x3p", "sq": "1 um", "second": {"file": "roller.x3p"}}}
     )
@@ -156,26 +154,26 @@ def test_measured_surfaces_run_on_the_bodies_they_lie_on_their_ends_joined(measu
     assert surfaces.speeds == two.conditions.surface_speeds
     assert surfaces.first.sq == pytest.approx(1e-6)
     assert surfaces.rough == (True, True)
-    for one in (surfaces.first, surfaces.second):
-        inside = np.abs(np.diff(one.heights, axis=0)).mean()
-        assert np.abs(one.heights[0] - one.heights[-1]).mean() < 3.0 * inside
+    for body in (surfaces.first, surfaces.second):
+        inside = np.abs(np.diff(body.heights, axis=0)).mean()
+        assert np.abs(body.heights[0] - body.heights[-1]).mean() < 3.0 * inside
     assert run_history(two, steps=1).failed == ()
 
 
-def test_one_measured_surface_cannot_lie_on_both_bodies(measured):
-    alone = measured.with_overrides({"surface": {"file": "ring.x3p"}, "motion.rough": "both"})
+def test_one_measured_surface_cannot_be_used_for_both_bodies(measured):
+    single = measured.with_overrides({"surface": {"file": "ring.x3p"}, "motion.rough": "both"})
     with pytest.raises(BadInput, match=r"state the other as surface\.second"):
-        alone.moving_surfaces()
+        single.moving_surfaces()
 
 
-def test_roughness_kept_in_a_run_has_no_track():
+def test_roughness_stored_in_a_run_has_no_track():
     kept = replace(case(), stored=case().surface())
     with pytest.raises(BadInput, match="use the case file"):
         run_history(kept, steps=1)
 
 
 @pytest.mark.parametrize(
-    ("overrides", "said"),
+    ("overrides", "message"),
     [
         ({"lubricant": "none"}, "dry contact"),
         ({"thermal.feedback": True}, "thermal.feedback=false"),
@@ -184,8 +182,8 @@ def test_roughness_kept_in_a_run_has_no_track():
         ({"motion.rugh": "both"}, "did you mean rough"),
     ],
 )
-def test_motions_that_cannot_be_meant_are_refused(overrides, said):
-    with pytest.raises(BadInput, match=said):
+def test_invalid_motions_are_refused(overrides, message):
+    with pytest.raises(BadInput, match=message):
         run_history(case(**overrides), steps=1)
 
 
@@ -197,7 +195,7 @@ def history():
     return run_history(case(), steps=12, every=5)
 
 
-def test_a_row_is_what_the_step_says(history):
+def test_a_row_matches_its_step(history):
     chosen, table = history.case, history.table
     assert list(table["step"]) == list(range(13))
     dx = chosen.grid.spacing[0]
@@ -208,27 +206,27 @@ def test_a_row_is_what_the_step_says(history):
     np.testing.assert_allclose(table["friction_power_w"], slid)
     power = (table["friction_power_w"] + table["flow_power_w"]).to_numpy()
     assert table["heat_j"].iloc[-1] == pytest.approx(np.trapezoid(power, table["time_s"]))
-    # Hertz's point spring stiffens as the cube root of its load, the resonance as the sixth
+    # Hertz point spring: stiffness grows with load^(1/3), resonance with load^(1/6)
     ratio = table["resonance_hz"].iloc[-1] / table["resonance_hz"].iloc[0]
     assert ratio == pytest.approx((table["clr"].iloc[-1] / table["clr"].iloc[0]) ** (1.0 / 6.0))
     assert [frame.number for frame in history.frames] == [0, 5, 10]
     assert history.frames[1].time == table["time_s"][5]
 
 
-def test_what_it_says_is_of_the_later_steps(history):
-    said, late = history.scalars(), history.table.iloc[6:]
-    assert said["settled_from_step"] == 6
-    assert said["clr"] == pytest.approx(late["clr"].mean())
-    assert said["clr_std"] == pytest.approx(np.std(late["clr"].to_numpy()))
-    assert said["clr_start"] == history.table["clr"].iloc[0]
-    assert said["crf_hz"] == pytest.approx(late["resonance_hz"].mean(), rel=0.01)
-    json.dumps(said, allow_nan=False)
+def test_scalars_describe_the_later_steps(history):
+    scalars, later_rows = history.scalars(), history.table.iloc[6:]
+    assert scalars["settled_from_step"] == 6
+    assert scalars["clr"] == pytest.approx(later_rows["clr"].mean())
+    assert scalars["clr_std"] == pytest.approx(np.std(later_rows["clr"].to_numpy()))
+    assert scalars["clr_start"] == history.table["clr"].iloc[0]
+    assert scalars["crf_hz"] == pytest.approx(later_rows["resonance_hz"].mean(), rel=0.01)
+    json.dumps(scalars, allow_nan=False)
 
 
-def test_it_begins_with_the_snapshot(history):
+def test_the_first_row_equals_the_steady_solution(history):
     from asperity.results import solve_case
 
-    alone = solve_case(history.case).scalars()
+    single = solve_case(history.case).scalars()
     first = history.table.iloc[0]
     for name in (
         "clr",
@@ -239,23 +237,23 @@ def test_it_begins_with_the_snapshot(history):
         "p_max_pa",
         "friction_coefficient",
     ):
-        assert first[name] == pytest.approx(alone[name]), name
+        assert first[name] == pytest.approx(single[name]), name
 
 
-def test_a_history_goes_on_bit_for_bit(history, tmp_path):
+def test_a_history_resumes_bit_for_bit(history, tmp_path):
     folder = tmp_path / "kept"
     for steps in (4, 5, 12):
         last = run_history(case(), steps=steps, every=5, out=folder)
         assert last.computed == {4: 5, 5: 1, 12: 7}[steps]
     pd.testing.assert_frame_equal(last.table, history.table, check_exact=True)
-    for ours, theirs in zip(last.frames, history.frames, strict=True):
-        assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
+    for resumed_frame, frame in zip(last.frames, history.frames, strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(resumed_frame, frame, strict=True))
     loaded = load_history(folder)
     pd.testing.assert_frame_equal(loaded.table, history.table, check_exact=True)
     assert loaded.case == history.case
 
 
-def test_a_history_killed_before_its_manifest_is_begun_again(tmp_path):
+def test_a_history_killed_before_its_manifest_restarts(tmp_path):
     folder = tmp_path / "begun"
     (folder / "fields").mkdir(parents=True)
     for name in (".lock", ".manifest.json.123.part"):
@@ -267,7 +265,7 @@ def test_a_history_killed_before_its_manifest_is_begun_again(tmp_path):
         run_history(case(), steps=1, out=tmp_path / "other")
 
 
-def test_a_history_killed_at_any_moment_goes_on_bit_for_bit(history, tmp_path):
+def test_a_history_killed_at_any_time_resumes_bit_for_bit(history, tmp_path):
     folder = tmp_path / "killed"
     script = f"""
 from asperity.case import load_case
@@ -301,13 +299,13 @@ run_history(case, steps=10000, every=5, out=Path({str(folder)!r}))
         {"motion.start": "stationary"},
     ],
 )
-def test_a_folder_keeps_one_history(tmp_path, change):
+def test_a_folder_stores_one_history(tmp_path, change):
     run_history(case(), steps=1, out=tmp_path / "kept")
     with pytest.raises(BadInput, match="another case"):
         run_history(case(**change), steps=2, out=tmp_path / "kept")
 
 
-def test_folders_that_hold_no_history_are_left_alone(tmp_path):
+def test_folders_without_history_are_left_unchanged(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(BadInput, match="holds no history"):
         run_history(case(), steps=1, out=tmp_path)
@@ -315,7 +313,7 @@ def test_folders_that_hold_no_history_are_left_alone(tmp_path):
         load_history(tmp_path)
 
 
-def test_a_damaged_memory_is_said_to_be(tmp_path):
+def test_a_damaged_state_file_is_reported(tmp_path):
     run_history(case(), steps=1, out=tmp_path / "kept")
     (tmp_path / "kept" / "memory.npz").write_bytes(b"half")
     with pytest.raises(UnreadableFile, match="damaged"):
@@ -324,7 +322,7 @@ def test_a_damaged_memory_is_said_to_be(tmp_path):
 
 @pytest.fixture
 def fails_at_three(monkeypatch):
-    """A model whose third step does not converge."""
+    """Model whose third step does not converge."""
 
     def steps(*arguments, **options):
         for snapshot in moving_contact(*arguments, **options):
@@ -341,7 +339,7 @@ def fails_at_three(monkeypatch):
 
 
 @pytest.mark.usefixtures("fails_at_three")
-def test_the_first_bad_step_stops_a_history_and_is_done_again(history, tmp_path, monkeypatch):
+def test_the_first_failed_step_stops_a_history_and_is_repeated(history, tmp_path, monkeypatch):
     with pytest.raises(NotConverged, match="step 3 of 5") as stopped:
         run_history(case(), steps=5, out=tmp_path / "kept")
     unfinished = stopped.value.solution
@@ -354,20 +352,20 @@ def test_the_first_bad_step_stops_a_history_and_is_done_again(history, tmp_path,
 
 
 @pytest.mark.usefixtures("fails_at_three")
-def test_bad_steps_are_marked_where_it_shall_go_on():
+def test_failed_steps_are_marked_if_the_history_continues():
     marked = run_history(case(), steps=5, strict=False)
     assert marked.steps == 5
     assert marked.failed == (3,)
 
 
-def test_a_model_without_steps_in_time_is_refused(monkeypatch):
+def test_a_model_without_time_steps_is_refused(monkeypatch):
     monkeypatch.delitem(MODELS, "mixed")
     monkeypatch.setitem(MODELS, "another", moving_contact)
     with pytest.raises(BadInput, match="choose one of unified, paper, conserving, another"):
         run_history(case(), steps=1)
 
 
-def test_passes_are_of_the_rough_surface():
+def test_passes_refer_to_the_rough_surface():
     chosen = case(**{"contact.slip": 0.2, "motion.rough": "second"})
     done = run_history(chosen, passes=0.1)
     assert done.steps == int(np.ceil(0.1 * 48 / 0.9))
@@ -375,7 +373,7 @@ def test_passes_are_of_the_rough_surface():
         run_history(chosen, passes=1.0, steps=3)
 
 
-def test_passes_are_told_apart_where_surfaces_are_flattened():
+def test_passes_are_reported_separately_with_flattening():
     chosen = case(
         **{"motion.flattening": True, "material.hardness": "0.7 GPa", "contact.slip": 0.0}
     )
@@ -394,19 +392,19 @@ def test_passes_are_told_apart_where_surfaces_are_flattened():
 # Page and command
 
 
-def test_the_page_has_every_map_and_loads_nothing(history):
+def test_the_page_has_every_map_and_loads_no_resources(history):
     page = render_motion_page(history)
     assert page == render_motion_page(history)
     data = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
     assert len(data["frames"]) == len(data["captions"]) == 3
     assert data["size"] == [48, 32]
     assert "step 10 of 12" in data["captions"][2]
-    beside_the_data = re.sub(r'"data:[^"]*"', '"#"', page)
-    assert not re.findall(r"""(?:src|href)=["'](?!#)|url\(|@import|fetch\(""", beside_the_data)
+    without_data = re.sub(r'"data:[^"]*"', '"#"', page)
+    assert not re.findall(r"""(?:src|href)=["'](?!#)|url\(|@import|fetch\(""", without_data)
     assert all(uri.startswith("data:image/png;base64,") for uri in data["frames"])
 
 
-def test_a_picture_shows_what_the_step_has(history):
+def test_a_picture_shows_the_contact_state_of_its_step(history):
     from io import BytesIO
 
     from PIL import Image
@@ -423,32 +421,32 @@ def test_a_picture_shows_what_the_step_has(history):
     np.testing.assert_array_equal(touching[::-1].T, frame.in_contact)
 
 
-def test_the_command_runs_goes_on_and_makes_the_page(tmp_path, capsys):
+def test_the_command_runs_resumes_and_writes_the_page(tmp_path, capsys):
     arguments = ["run", "examples/paper.toml", "--out", str(tmp_path / "kept"), "--json"]
     for key, value in SMALL.items():
         arguments += ["--set", f"{key}={value}"]
     for steps, computed in ((3, 4), (5, 2)):
-        with pytest.raises(SystemExit) as ended:
+        with pytest.raises(SystemExit) as exit_info:
             main([*arguments, "--steps", str(steps), "--report", str(tmp_path / "page.html")])
-        assert not ended.value.code
-        said = json.loads(capsys.readouterr().out)
-        assert (said["steps"], said["computed"], said["failed"]) == (steps, computed, [])
+        assert not exit_info.value.code
+        summary = json.loads(capsys.readouterr().out)
+        assert (summary["steps"], summary["computed"], summary["failed"]) == (steps, computed, [])
     assert (tmp_path / "page.html").stat().st_size > 10_000
-    with pytest.raises(SystemExit) as ended:
+    with pytest.raises(SystemExit) as exit_info:
         main(["report", str(tmp_path / "kept")])
-    assert not ended.value.code
+    assert not exit_info.value.code
     assert (tmp_path / "kept" / "report.html").exists()
 
 
-def test_the_command_says_why_not(capsys, tmp_path):
+def test_the_command_reports_errors(capsys, tmp_path):
     for arguments in (
         ["--steps", "0"],
         ["--steps", "2", "--passes", "1"],
         ["--out", str(tmp_path), "--every", "0"],
     ):
-        with pytest.raises(SystemExit) as ended:
+        with pytest.raises(SystemExit) as exit_info:
             main(["run", "examples/paper.toml", *arguments])
-        assert ended.value.code == 2
-        said = capsys.readouterr()
-        assert said.out == ""
-        assert said.err.count("\n") == 1
+        assert exit_info.value.code == 2
+        output = capsys.readouterr()
+        assert output.out == ""
+        assert output.err.count("\n") == 1

@@ -1,5 +1,5 @@
-"""What a mass on a contact hears of its history: the profile that repeats, the steady answer to it,
-the paper's way.
+"""Vibration of a mass on a moving contact: periodic profile, steady response, and the paper's
+model.
 """
 
 import html
@@ -48,38 +48,40 @@ def waves(period, numbers, samples, rate):
     return sum(1e-9 * k * np.cos(2.0 * np.pi * k * time / period + k) for k in numbers)
 
 
-# The profile that repeats
+# Periodic profile
 
 
-def test_waves_of_a_period_that_is_no_whole_number_of_steps_are_found():
+def test_waves_are_recovered_for_a_non_integer_period():
     period, rate = 43.21e-6, 1e6
     time = np.arange(100) / rate
-    profile, left, objection = repeating(time, 5e-7 + waves(period, (1, 3, 11), 100, rate), period)
+    profile, aperiodic_share, objection = repeating(
+        time, 5e-7 + waves(period, (1, 3, 11), 100, rate), period
+    )
     assert objection is None
-    assert left < 1e-9
+    assert aperiodic_share < 1e-9
     assert profile.duration_s == pytest.approx(period, rel=1e-12)
     expected = waves(period, (1, 3, 11), profile.values.size, profile.rate_hz)
     np.testing.assert_allclose(profile.values, expected, atol=1e-16)
 
 
-def test_what_does_not_repeat_is_said():
+def test_the_aperiodic_share_is_reported():
     period, rate = 40e-6, 1e6
     steady = waves(period, (1, 3), 200, rate)
     drift = np.random.default_rng(1).standard_normal(200) * 0.5 * np.std(steady)
-    profile, left, _ = repeating(np.arange(200) / rate, steady + drift, period)
-    # noise of 0.5 beside 1; of 200 numbers 33 are the period's own, and take their share of the
+    profile, aperiodic_share, _ = repeating(np.arange(200) / rate, steady + drift, period)
+    # noise of 0.5 relative to 1; the 33 periodic parameters of 200 values absorb their share of the
     # noise
-    assert left == pytest.approx(np.sqrt(0.25 * (1 - 33 / 200) / 1.25), rel=0.1)
+    assert aperiodic_share == pytest.approx(np.sqrt(0.25 * (1 - 33 / 200) / 1.25), rel=0.1)
     assert np.std(profile.values - waves(period, (1, 3), 40, rate)) < np.std(drift)
 
 
-def test_less_than_a_passage_says_how_many_steps_are_missing():
+def test_less_than_a_passage_reports_the_missing_steps():
     profile, _, objection = repeating(np.arange(30) * 1e-6, np.zeros(30), 41.5e-6)
     assert profile is None
     assert "by 12 steps" in objection
 
 
-def test_a_finer_rate_keeps_the_waves():
+def test_resampling_preserves_the_waves():
     coarse = Signal(waves(50e-6, (1, 4, 9), 50, 1e6), 1e6, "m")
     fine = resampled(coarse, 7.3e6)
     assert fine.rate_hz >= 7.3e6
@@ -89,39 +91,45 @@ def test_a_finer_rate_keeps_the_waves():
     )
 
 
-# The mass on it
+# Response of the mass
 
 
 @pytest.mark.parametrize("ratio", [0.02, 0.5, 1.0, 2.0])
-def test_the_answer_to_a_sine_is_the_closed_form(ratio):
+def test_the_response_to_a_sine_matches_the_closed_form(ratio):
     f = ratio * SPRING.natural_frequency_hz
-    samples = round(400 / min(ratio, 1.0))  # kinks of the straight lines far above f0
+    samples = round(400 / min(ratio, 1.0))  # kinks of the linear interpolation lie far above f0
     profile = Signal(1e-8 * np.cos(2.0 * np.pi * np.arange(samples) / samples), samples * f, "m")
-    answer = steady_response(SPRING, profile)
+    response = steady_response(SPRING, profile)
     m, c, s, w = 0.1, 2 * 0.02 * np.sqrt(2.0e8 * 0.1), 2.0e8, 2j * np.pi * f
     transfer = w**2 * (c * w + s) / (m * w**2 + c * w + s)
     expected = 1e-8 * np.real(transfer * np.exp(2j * np.pi * np.arange(samples) / samples))
-    np.testing.assert_allclose(answer.values, expected, atol=3e-4 * abs(1e-8 * transfer))
+    np.testing.assert_allclose(response.values, expected, atol=3e-4 * abs(1e-8 * transfer))
 
 
-def test_a_slow_wave_is_followed():
+def test_the_mass_follows_a_slow_wave():
     f = SPRING.natural_frequency_hz / 100.0
     profile = Signal(1e-6 * np.cos(2.0 * np.pi * np.arange(20_000) / 20_000), 20_000 * f, "m")
-    answer = steady_response(SPRING, profile)
+    response = steady_response(SPRING, profile)
     followed = -((2.0 * np.pi * f) ** 2) * profile.values
-    np.testing.assert_allclose(answer.values, followed, atol=2e-4 * np.max(np.abs(followed)))
+    np.testing.assert_allclose(response.values, followed, atol=2e-4 * np.max(np.abs(followed)))
 
 
-def test_answers_add_up():
-    one, other = (
+def test_the_response_is_linear():
+    first, second = (
         Signal(waves(200e-6, numbers, 300, 1.5e6), 1.5e6, "m") for numbers in ((1, 2), (5,))
     )
-    both = steady_response(SPRING, replace(one, values=one.values + 3.0 * other.values)).values
-    apart = steady_response(SPRING, one).values + 3.0 * steady_response(SPRING, other).values
-    np.testing.assert_allclose(both, apart, rtol=1e-9, atol=1e-9 * np.max(np.abs(both)))
+    response_of_sum = steady_response(
+        SPRING, replace(first, values=first.values + 3.0 * second.values)
+    ).values
+    sum_of_responses = (
+        steady_response(SPRING, first).values + 3.0 * steady_response(SPRING, second).values
+    )
+    np.testing.assert_allclose(
+        response_of_sum, sum_of_responses, rtol=1e-9, atol=1e-9 * np.max(np.abs(response_of_sum))
+    )
 
 
-def test_a_long_track_shows_the_resonance_to_its_own_error():
+def test_a_long_track_shows_the_resonance_within_its_stated_error():
     f0, samples, period = SPRING.natural_frequency_hz, 20_000, 0.05
     rng = np.random.default_rng(3)
     number = np.arange(1, samples // 2 + 1)
@@ -140,7 +148,7 @@ def test_a_long_track_shows_the_resonance_to_its_own_error():
     assert found.crf_std_hz == pytest.approx(deviation, rel=0.5)
 
 
-# On a contact
+# Contact
 
 
 def test_the_approach_follows_a_wave_much_longer_than_the_contact():
@@ -150,27 +158,27 @@ def test_the_approach_follows_a_wave_much_longer_than_the_contact():
     height = 20e-9 * np.cos(2.0 * np.pi * (track.x - track.lower[0]) / track.extent[0])
     surface = Surface(np.repeat(height[:, None], grid.cells[1], axis=1), track)
     surfaces = MovingSurfaces.one_rough(surface, conditions.surface_speeds, grid)
-    taken = list(
+    snapshots = list(
         islice(
             moving_contact(conditions, chosen.lubricant, surfaces, options=chosen.options), 48 + 481
         )
     )
-    rows = taken[49:]
-    profile, left, objection = repeating(
-        np.array([one.time for one in rows]),
-        np.array([one.solution.rigid_approach for one in rows]),
+    rows = snapshots[49:]
+    profile, aperiodic_share, objection = repeating(
+        np.array([first.time for first in rows]),
+        np.array([first.solution.rigid_approach for first in rows]),
         surfaces.passage_time(0),
     )
     assert objection is None
-    assert left < 0.01
+    assert aperiodic_share < 0.01
     line = np.fft.rfft(profile.values)[1] * 2.0 / profile.values.size
-    begun = -grid.lower[0] / grid.extent[0] / 10  # x = 0 lies so far along the track
-    expected = 20e-9 * np.exp(-2j * np.pi * begun)
+    offset = -grid.lower[0] / grid.extent[0] / 10  # position of x = 0 along the track
+    expected = 20e-9 * np.exp(-2j * np.pi * offset)
     assert abs(line - expected) < 0.1 * 20e-9
     assert abs(line) == pytest.approx(20e-9, rel=0.04)
 
 
-def test_a_history_is_heard_by_its_own_approach_and_stiffness(history, vibration):
+def test_vibration_uses_the_historys_own_approach_and_stiffness(history, vibration):
     chosen, rows = history.case, history.settled
     assert vibration.unsolved == ()
     number = vibration.moments[0]
@@ -185,7 +193,7 @@ def test_a_history_is_heard_by_its_own_approach_and_stiffness(history, vibration
     assert np.std(vibration.profile.values) == pytest.approx(
         rows["rigid_approach_m"].std(ddof=0), rel=0.15
     )
-    # the power of the answer is that of the profile's lines by the closed form
+    # power of the response: closed form applied to the lines of the profile
     lines = (
         np.abs(np.fft.rfft(vibration.profile.values)[1:] / vibration.profile.values.size) ** 2 * 2.0
     )
@@ -195,7 +203,7 @@ def test_a_history_is_heard_by_its_own_approach_and_stiffness(history, vibration
     assert np.var(vibration.response.values) == pytest.approx(power, rel=0.05)
 
 
-def test_its_damping_is_that_of_its_moments_solved_apart(history, vibration):
+def test_damping_matches_separately_solved_moments(history, vibration):
     chosen, rows = history.case, history.settled
     assert vibration.damping.shape == vibration.dynamic.shape == (2,)
     number = vibration.moments[1]
@@ -213,7 +221,7 @@ def test_its_damping_is_that_of_its_moments_solved_apart(history, vibration):
     assert "damping ratio of the oil film" in vibration.verdict()
 
 
-def test_where_the_model_cannot_be_shaken_the_damping_is_not_determined():
+def test_damping_is_undetermined_without_a_dynamic_model():
     conserving = run_history(case(model="conserving"), steps=3)
     vibration = history_vibration(conserving, moments=1)
     assert np.isfinite(vibration.stiffness).all()
@@ -222,28 +230,28 @@ def test_where_the_model_cannot_be_shaken_the_damping_is_not_determined():
     assert vibration.scalars()["history_damping_ratio"] is None
 
 
-def test_a_track_as_short_as_the_contact_shows_no_resonance_and_says_so(history, vibration):
+def test_a_track_as_short_as_the_contact_reports_no_resonance(history, vibration):
     speed, track = history.case.conditions.surface_speeds[0], history.case.grid.extent[0]
     assert vibration.spacing_hz == pytest.approx(speed / track)
     assert not vibration.resonance.found
     assert "motion.track" in vibration.resonance.reason
 
 
-def test_the_papers_way_stands_beside_it(history, vibration):
+def test_the_papers_model_is_reported_too(history, vibration):
     assert vibration.coupled.oscillator == history.vibration.oscillator
     model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="tangent", rate_hz=2e5)
-    other = history_vibration(history, model, moments=1)
-    assert other.coupled.oscillator.stiffness == pytest.approx(
+    second = history_vibration(history, model, moments=1)
+    assert second.coupled.oscillator.stiffness == pytest.approx(
         vibration.coupled.oscillator.stiffness
     )
 
 
-def test_a_kept_history_is_heard_alike(history, vibration):
+def test_a_loaded_history_gives_the_same_vibration(history, vibration):
     again = history_vibration(load_history(history.folder), moments=2)
     np.testing.assert_allclose(again.response.values, vibration.response.values, rtol=1e-9)
 
 
-def test_a_smooth_contact_hears_nothing():
+def test_a_smooth_contact_has_no_vibration():
     flat = case(**{"surface": {"kind": "flat"}})
     vibration = history_vibration(run_history(flat, steps=3), moments=1)
     assert vibration.profile is None
@@ -252,12 +260,14 @@ def test_a_smooth_contact_hears_nothing():
     assert vibration.oscillator.natural_frequency_hz > 5000.0
 
 
-def test_two_rough_surfaces_that_slide_do_not_repeat():
-    both = run_history(case(**{"motion.rough": "both"}), steps=2)
-    assert "move at different speeds" in history_vibration(both, moments=1).resonance.reason
+def test_two_sliding_rough_surfaces_are_not_periodic():
+    response_of_sum = run_history(case(**{"motion.rough": "both"}), steps=2)
+    assert (
+        "move at different speeds" in history_vibration(response_of_sum, moments=1).resonance.reason
+    )
 
 
-def test_what_is_pressed_flat_is_heard_flat():
+def test_vibration_uses_flattened_surfaces():
     chosen = case(**{"motion.flattening": True, "material.hardness": "0.7 GPa"})
     history = run_history(chosen, steps=4)
     first = history.surfaces().first
@@ -268,12 +278,12 @@ def test_what_is_pressed_flat_is_heard_flat():
 def test_without_a_model_or_moments_it_is_refused(history):
     with pytest.raises(BadInput, match="moments must be 1 or more"):
         history_vibration(history, moments=0)
-    mute = run_history(case(vibration="none"), steps=1)
+    without_vibration = run_history(case(vibration="none"), steps=1)
     with pytest.raises(BadInput, match="vibration is missing"):
-        history_vibration(mute)
+        history_vibration(without_vibration)
 
 
-def test_the_command_listens(history, capsys, tmp_path):
+def test_the_command_computes_the_vibration(history, capsys, tmp_path):
     arguments = [
         "run",
         "examples/paper.toml",
@@ -285,9 +295,9 @@ def test_the_command_listens(history, capsys, tmp_path):
     ]
     for key, value in SMALL.items():
         arguments += ["--set", f"{key}={value}"]
-    with pytest.raises(SystemExit) as ended:
+    with pytest.raises(SystemExit) as exit_info:
         main([*arguments, "--json"])
-    assert not ended.value.code
+    assert not exit_info.value.code
     scalars = json.loads(capsys.readouterr().out)
     vibration = history_vibration(history)
     assert scalars["computed"] == 0

@@ -1,6 +1,6 @@
-"""Size limits: files, functions, argument lists, folders; and what a face must export.
+"""Size limits of files, functions, argument lists and folders, and the exports of each package.
 
-Where the package does not yet meet a limit, a ratchet holds what it has reached: it may only fall.
+A limit that is not yet met has a ratchet: the current value, which may only decrease.
 """
 
 import ast
@@ -18,11 +18,11 @@ from support.source import (
 )
 
 LONGEST_FILE = 450  # lines
-LONGEST_FUNCTION = 70  # lines, docstring and all
+LONGEST_FUNCTION = 70  # lines, including the docstring
 MOST_NODES = 350  # syntax nodes of a function
-MOST_PARAMETERS = 8  # of the library; commands have an option each
+MOST_PARAMETERS = 8  # library only; a command has one parameter per option
 DEEPEST = 3  # folders below src
-IMPORTS_INSIDE_FUNCTIONS = 80  # fewer than that, and only where they save start-up time
+IMPORTS_INSIDE_FUNCTIONS = 80  # upper limit; allowed only where they save start-up time
 LARGE_FUNCTIONS = 206  # ratchet: functions above MOST_NODES; aim 0
 MOST_ANY = 810  # ratchet; aim 300
 MOST_LINES = 74_500  # ratchet; aim 57 000
@@ -53,7 +53,7 @@ def test_no_function_is_too_long():
     assert not long, "\n".join(long)
 
 
-def test_functions_of_many_nodes_get_fewer():
+def test_the_number_of_large_functions_decreases():
     sizes = {
         f"{name} {function.name}": sum(1 for _ in ast.walk(function))
         for name, tree in modules()
@@ -75,7 +75,7 @@ def test_argument_lists_are_short():
     assert {name: count for name, count in counts.items() if count > MOST_PARAMETERS} == {}
 
 
-def test_any_is_used_less_and_less():
+def test_the_use_of_any_decreases():
     count = sum(
         len(re.findall(r"\bAny\b", path.read_text("utf-8"))) for path in PACKAGE.rglob("*.py")
     )
@@ -95,7 +95,7 @@ def test_the_source_does_not_grow_and_is_not_dense():
     assert nodes / code <= NODES_PER_LINE
 
 
-def test_imports_stand_at_the_top():
+def test_imports_are_at_module_level():
     inside = [(len(imports_inside_functions(tree)), name) for name, tree in modules()]
     listed = "\n".join(f"{name}: {count}" for count, name in sorted(inside, reverse=True) if count)
     assert sum(count for count, _ in inside) < IMPORTS_INSIDE_FUNCTIONS, listed
@@ -107,13 +107,13 @@ def test_an_import_inside_a_nested_function_is_counted_once():
 
 
 def test_types_that_public_functions_use_are_public():
-    handed_out = {name: exported(face) for name, face in faces().items()}
-    public = {id(thing) for names in handed_out.values() for thing in names.values()}
+    exports = {name: exported(face) for name, face in faces().items()}
+    public = {id(value) for names in exports.values() for value in names.values()}
     hidden = {
-        f"{used.__module__}.{used.__qualname__}, of {face}.{name}"
-        for face, names in handed_out.items()
-        for name, thing in names.items()
-        for used in own_types(thing)
+        f"{used.__module__}.{used.__qualname__}, used by {face}.{name}"
+        for face, names in exports.items()
+        for name, value in names.items()
+        for used in own_types(value)
         if id(used) not in public
     }
     assert not hidden, "\n".join(sorted(hidden))

@@ -27,7 +27,7 @@ HEAVY = (
     "plotly",
     "SurfaceTopography",
 )
-HEAVY += ("importlib.resources", "importlib.metadata", "multiprocessing")  # of the standard library
+HEAVY += ("importlib.resources", "importlib.metadata", "multiprocessing")  # standard library
 
 
 def loaded_after(statement: str) -> list[str]:
@@ -48,11 +48,11 @@ def loaded_after(statement: str) -> list[str]:
         "import asperity; asperity.BadInput",
     ],
 )
-def test_nothing_heavy_is_imported_at_the_start(statement):
+def test_importing_the_package_loads_no_heavy_modules(statement):
     assert loaded_after(statement) == []
 
 
-def test_help_imports_nothing_heavy():
+def test_help_loads_no_heavy_modules():
     statement = "import asperity.cli\ntry: asperity.cli.main(['--help'])\nexcept SystemExit: pass\n"
     probe = f"import sys\n{statement}print(*[m for m in {HEAVY!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
@@ -94,16 +94,16 @@ READ = {
     "nptdms",
     "pyuff",
     "idelib",
-}  # libraries of single formats
+}  # libraries for single file formats
 TABLES = {"pandas", "pyarrow", "xarray"}
-NOT_LOADED = {  # a command, and what it must not load
+NOT_LOADED = {  # commands and the modules that they must not load
     ("--version",): (
         {"numpy", "scipy", "pydantic", "pint", "rich"} | COMPUTE | DRAW | STUDY | READ | TABLES
     ),
     ("solve", "absent.toml"): {"rich"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES,
     ("surface", "ring.x3p"): (
         {"rich", "numba", "xarray", "jinja2"} | STUDY
-    ),  # SurfaceTopography brings matplotlib
+    ),  # SurfaceTopography imports matplotlib
     ("check", "noise.npy", "--rate", "20000"): (
         {"rich", "scipy.fft", "h5py"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES
     ),
@@ -156,34 +156,34 @@ def test_a_command_loads_only_what_it_needs(tmp_path, arguments):
 COMPILES = {"numba.np.linalg", "numba.np.npyimpl", "numba.typed.typeddict"}
 
 
-def test_kernels_that_were_compiled_before_load_nothing_that_compiles(tmp_path):
+def test_cached_kernels_load_no_compiler(tmp_path):
     probe = (
         f"import sys\nfrom asperity.cli import main\ntry: main(['solve', {str(PAPER)!r},"
         f" *{VIBRATED!r}])\nexcept SystemExit: print('loaded', *[m for m in {sorted(COMPILES)!r} if"
         " m in sys.modules])"
     )
-    for _ in range(2):  # the first one may have to compile
+    for _ in range(2):  # the first run may have to compile
         done = subprocess.run(
             [sys.executable, "-c", probe], cwd=tmp_path, capture_output=True, text=True, check=False
         )
     assert done.stdout.splitlines()[-1].split() == ["loaded"], done.stderr
 
 
-def test_a_solve_begins_without_a_search_for_garbage():
+def test_a_solve_starts_without_garbage_collection():
     probe = (
         "import atexit, gc\nfound = []\ngc.callbacks.append(lambda phase, told: found.append(told)"
         " if gc.get_threshold()[0] > 10_000 else None)\natexit.register(lambda: print('searched',"
         f" len(found)))\nfrom asperity.cli import main\nmain(['solve', {str(PAPER)!r},"
         f" *{VIBRATED!r}, '--quiet'])"
     )
-    for _ in range(2):  # the first one may have to compile
+    for _ in range(2):  # the first run may have to compile
         done = subprocess.run(
             [sys.executable, "-c", probe], capture_output=True, text=True, check=False
         )
     assert done.stdout.splitlines()[-1] == "searched 0", done.stderr
 
 
-def test_a_command_ends_without_a_search_for_garbage():
+def test_a_command_ends_without_garbage_collection():
     probe = (
         "import atexit, gc\natexit.register(lambda: print('left', gc.get_freeze_count() > 1000))\n"
         "from asperity.cli import main\nmain(['--version'])"
@@ -192,7 +192,7 @@ def test_a_command_ends_without_a_search_for_garbage():
     assert done.stdout.splitlines()[-1] == "left True"
 
 
-def test_numba_waits_for_a_solve():
+def test_numba_is_loaded_only_for_a_solve():
     assert "numba" not in loaded_after(
         "import asperity; asperity.read_surface; asperity.power_spectrum"
     )
@@ -202,23 +202,21 @@ def test_a_case_is_read_without_numba():
     assert "numba" not in loaded_after(f"import asperity; asperity.load_case({str(PAPER)!r})")
 
 
-def test_every_public_name_is_there():
+def test_every_public_name_exists():
     assert len(asperity.__all__) <= 55
     for name in asperity.__all__:
         assert getattr(asperity, name).__module__.startswith("asperity.")
     assert set(asperity.__all__) <= set(dir(asperity))
 
 
-def test_a_name_that_is_not_there_is_named():
+def test_an_unknown_name_is_reported():
     with pytest.raises(AttributeError, match="slove_case"):
         _ = asperity.slove_case
 
 
-@pytest.mark.skipif(
-    platform.libc_ver()[0] != "glibc", reason="memory is kept where the C library is glibc"
-)
-def test_what_is_freed_is_kept():
-    """Fields of 16 MB: the system clears 4096 pages of memory that it hands out."""
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="memory is reused with glibc only")
+def test_freed_memory_is_reused():
+    """Fields of 16 MB: the system clears 4096 pages of newly allocated memory."""
     probe = (
         "import resource, numpy as np\nfrom asperity.core.processes import"
         " tune_memory_use\ntune_memory_use()\ndef faults():\n  before ="
@@ -235,6 +233,6 @@ def test_what_is_freed_is_kept():
     assert later < 400
 
 
-def test_workers_save_time_too():
+def test_workers_use_the_same_garbage_collection_threshold():
     with ProcessPoolExecutor(1, get_context("spawn"), set_up_worker) as pool:
         assert pool.submit(gc.get_threshold).result()[0] == GC_THRESHOLD

@@ -11,8 +11,8 @@ BAND = (2500.0, 4000.0)
 FREQUENCY = np.arange(0.0, 10_000.0, 1.25)
 
 
-def chance_periodogram(density, seed) -> Spectrum:
-    """An ideal 0.8 s periodogram: independent exponential ordinates about `density`."""
+def random_periodogram(density, seed) -> Spectrum:
+    """Ideal 0.8 s periodogram: independent exponential ordinates around `density`."""
     drawn = density * np.random.default_rng(seed).exponential(size=density.size)
     return Spectrum(
         frequency_hz=FREQUENCY,
@@ -26,7 +26,7 @@ def chance_periodogram(density, seed) -> Spectrum:
     )
 
 
-def test_the_line_is_the_oscillators_gain_over_white_base_acceleration():
+def test_the_line_is_the_oscillators_response_to_white_base_acceleration():
     oscillator = ContactOscillator(mass=0.1, stiffness=4.3765e7, damping_ratio=0.07)
     f0 = oscillator.natural_frequency_hz
     f = np.linspace(100.0, 9000.0, 50)
@@ -34,7 +34,7 @@ def test_the_line_is_the_oscillators_gain_over_white_base_acceleration():
     assert line_shape(f, f0, 0.07) == pytest.approx(transmissibility, rel=1e-10)
 
 
-def test_slopes_of_the_line_are_its_derivatives():
+def test_stated_line_slopes_are_its_derivatives():
     f = np.linspace(2000.0, 5000.0, 40)
     _, by_f0, by_damping = line_and_slopes(f, 3300.0, 0.03)
     d = 1e-6
@@ -50,9 +50,9 @@ def test_slopes_of_the_line_are_its_derivatives():
     )
 
 
-def test_without_scatter_the_fit_returns_what_was_put_in():
+def test_without_scatter_the_fit_returns_its_inputs():
     floor = 0.02 + 0.03 * (FREQUENCY - BAND[0]) / (BAND[1] - BAND[0])
-    clean = chance_periodogram(np.ones(FREQUENCY.size), 0)
+    clean = random_periodogram(np.ones(FREQUENCY.size), 0)
     clean = Spectrum(
         frequency_hz=FREQUENCY,
         density=0.7 * line_shape(FREQUENCY, 3210.0, 0.025) + floor,
@@ -73,10 +73,8 @@ def test_without_scatter_the_fit_returns_what_was_put_in():
     assert found.curve(FREQUENCY[inside]) == pytest.approx(clean.density[inside], rel=1e-4)
 
 
-def test_a_line_blurred_by_a_short_hann_window_is_fitted_unblurred():
-    """The mean of a Welch spectrum is the density convolved with |W|^2: here on a grid 100 times
-    finer.
-    """
+def test_the_fit_corrects_for_the_blur_of_a_short_hann_window():
+    """The mean Welch spectrum is the density convolved with |W|^2, on a grid 100 times finer."""
     rate, segment, finer = 20e3, 500, 100
     frequency = np.fft.fftfreq(segment * finer, 1 / rate)
     density = 0.7 * line_shape(np.abs(frequency), 3210.0, 0.02)
@@ -98,15 +96,15 @@ def test_a_line_blurred_by_a_short_hann_window_is_fitted_unblurred():
     assert fit.crf_hz == pytest.approx(3210.0, rel=3e-4)
     assert fit.crfa == pytest.approx(
         0.7, rel=0.002
-    )  # a fit that took the blur for damping would be 1.7 % low
+    )  # a fit that mistakes blur for damping is 1.7 % low
     assert fit.damping_ratio == pytest.approx(0.02, rel=0.002)
 
 
 @pytest.mark.parametrize("damping_ratio", [0.01, 0.02, 0.05])
-def test_the_fit_scatters_as_it_says_and_about_the_truth(damping_ratio):
+def test_the_fit_is_unbiased_and_scatters_as_stated(damping_ratio):
     density = line_shape(FREQUENCY, 3200.0, damping_ratio) + 0.02
     fits = [
-        contact_resonance(chance_periodogram(density, seed), band_hz=BAND) for seed in range(150)
+        contact_resonance(random_periodogram(density, seed), band_hz=BAND) for seed in range(150)
     ]
     assert all(fit.found for fit in fits)
     pulls = {
@@ -130,7 +128,7 @@ def test_the_stated_deviation_is_the_cramer_rao_bound_of_a_lone_line():
     """sd(f0) = sqrt(zeta f0 / (2 pi T)) for a line without floor in a band much wider than it."""
     density = line_shape(FREQUENCY, 3200.0, 0.01)
     stated = [
-        contact_resonance(chance_periodogram(density, s), band_hz=(1500.0, 6500.0)).crf_std
+        contact_resonance(random_periodogram(density, s), band_hz=(1500.0, 6500.0)).crf_std
         for s in range(20)
     ]
     assert np.median(stated) == pytest.approx(np.sqrt(0.01 * 3200.0 / (2 * np.pi * 0.8)), rel=0.1)
@@ -141,27 +139,27 @@ def test_noise_has_no_resonance_and_the_reason_is_given(window, segment):
     false = 0
     for seed in range(60):
         noise = Signal(np.random.default_rng(seed).standard_normal(16_000), 20e3, "m/s^2")
-        seen = contact_resonance(
+        resonance = contact_resonance(
             power_spectrum(noise, segment=segment, window=window), band_hz=BAND
         )
-        false += seen.found
-        assert seen.found or "stands out" in seen.reason
+        false += resonance.found
+        assert resonance.found or "stands out" in resonance.reason
     assert false == 0
 
 
-def test_what_is_not_found_has_no_figures_but_a_floor_to_draw():
-    seen = contact_resonance(chance_periodogram(np.full(FREQUENCY.size, 3.0), 1), band_hz=BAND)
-    assert not seen.found
-    assert np.isnan([seen.crf_hz, seen.crfa, seen.crf_std, seen.crfa_std]).all()
-    assert seen.curve(np.array([3000.0])) == pytest.approx(3.0, rel=0.1)
+def test_an_undetected_resonance_has_no_values_but_a_floor():
+    resonance = contact_resonance(random_periodogram(np.full(FREQUENCY.size, 3.0), 1), band_hz=BAND)
+    assert not resonance.found
+    assert np.isnan([resonance.crf_hz, resonance.crfa, resonance.crf_std, resonance.crfa_std]).all()
+    assert resonance.curve(np.array([3000.0])) == pytest.approx(3.0, rel=0.1)
 
 
 @pytest.mark.parametrize("f0", [2300.0, 4200.0])
-def test_a_line_outside_the_band_is_not_taken_for_one_inside(f0):
+def test_a_line_outside_the_band_is_not_detected_inside(f0):
     density = line_shape(FREQUENCY, f0, 0.03) + 1e-3
-    seen = contact_resonance(chance_periodogram(density, 3), band_hz=BAND)
-    assert not seen.found
-    assert "edge" in seen.reason
+    resonance = contact_resonance(random_periodogram(density, 3), band_hz=BAND)
+    assert not resonance.found
+    assert "edge" in resonance.reason
 
 
 def test_a_tone_is_not_a_resonance():
@@ -169,24 +167,24 @@ def test_a_tone_is_not_a_resonance():
     values = np.random.default_rng(0).standard_normal(16_000) + 3.0 * np.sin(
         2 * np.pi * 3000.7 * time
     )
-    seen = contact_resonance(power_spectrum(Signal(values, 20e3, "m/s^2")), band_hz=BAND)
-    assert not seen.found
-    assert "tone" in seen.reason
+    resonance = contact_resonance(power_spectrum(Signal(values, 20e3, "m/s^2")), band_hz=BAND)
+    assert not resonance.found
+    assert "tone" in resonance.reason
 
 
 def test_the_papers_peak_is_the_highest_smoothed_point():
-    spectrum = chance_periodogram(line_shape(FREQUENCY, 3200.0, 0.02) + 0.01, 4)
-    seen = contact_resonance(spectrum, band_hz=BAND, method="peak")
+    spectrum = random_periodogram(line_shape(FREQUENCY, 3200.0, 0.02) + 0.01, 4)
+    resonance = contact_resonance(spectrum, band_hz=BAND, method="peak")
     smoothed = smooth(spectrum, 3).density
     inside = np.flatnonzero(np.abs(FREQUENCY - np.mean(BAND)) <= np.ptp(BAND) / 2)
     at = inside[np.argmax(smoothed[inside])]
-    assert (seen.crf_hz, seen.crfa) == (FREQUENCY[at], smoothed[at])
-    assert np.isnan([seen.crf_std, seen.crfa_std, seen.damping_ratio]).all()
-    assert np.isnan(seen.curve(FREQUENCY)).all()
+    assert (resonance.crf_hz, resonance.crfa) == (FREQUENCY[at], smoothed[at])
+    assert np.isnan([resonance.crf_std, resonance.crfa_std, resonance.damping_ratio]).all()
+    assert np.isnan(resonance.curve(FREQUENCY)).all()
 
 
-def test_bad_input_is_named():
-    spectrum = chance_periodogram(np.ones(FREQUENCY.size), 0)
+def test_invalid_input_is_named():
+    spectrum = random_periodogram(np.ones(FREQUENCY.size), 0)
     with pytest.raises(BadInput, match="likelihood, modes, peak"):
         contact_resonance(spectrum, band_hz=BAND, method="kurtosis")
     for band in ((0.0, 100.0), (3000.0, 2000.0), (3000.0, 20e3)):
@@ -202,13 +200,11 @@ def several(lines, seed):
     density = np.full(FREQUENCY.size, 0.02) + sum(
         a * line_shape(FREQUENCY, f, z) for a, f, z in lines
     )
-    return chance_periodogram(density, seed)
+    return random_periodogram(density, seed)
 
 
-def test_the_strongest_of_several_lines_is_found_and_scatters_as_it_says():
-    """0.8 s of three lines; alone, the one-line fit takes them for one wide line or trips over
-    them.
-    """
+def test_the_strongest_of_several_lines_is_found_and_scatters_as_stated():
+    """0.8 s of three lines; the single-line fit merges them into one wide line or fails."""
     lines = [(1.0, 3200.0, 0.02), (0.6, 2800.0, 0.008), (0.5, 3650.0, 0.006)]
     fits = [
         contact_resonance(several(lines, seed), band_hz=BAND, method="modes") for seed in range(25)
@@ -227,30 +223,30 @@ def test_the_strongest_of_several_lines_is_found_and_scatters_as_it_says():
     assert np.mean(np.abs(fits[0].curve(FREQUENCY[inside]) / truth[inside] - 1.0)) < 0.15
 
 
-def test_lines_about_as_strong_are_not_told_apart():
-    seen = contact_resonance(
+def test_equally_strong_lines_are_not_resolved():
+    resonance = contact_resonance(
         several([(1.0, 3200.0, 0.02), (1.0, 2800.0, 0.02)], 0), band_hz=BAND, method="modes"
     )
-    assert not seen.found
-    assert "cannot tell" in seen.reason
+    assert not resonance.found
+    assert "cannot tell" in resonance.reason
 
 
-def test_one_line_is_the_same_by_modes_and_noise_has_none():
+def test_both_methods_agree_on_one_line_and_find_none_in_noise():
     spectrum = several([(1.0, 3200.0, 0.02)], 3)
-    one, alone = (
+    modes, likelihood = (
         contact_resonance(spectrum, band_hz=BAND, method=method)
         for method in ("modes", "likelihood")
     )
-    assert one.crf_hz == pytest.approx(alone.crf_hz, abs=0.2 * alone.crf_std)
-    assert one.crf_std == pytest.approx(alone.crf_std, rel=0.05)
+    assert modes.crf_hz == pytest.approx(likelihood.crf_hz, abs=0.2 * likelihood.crf_std)
+    assert modes.crf_std == pytest.approx(likelihood.crf_std, rel=0.05)
     noise = [
         contact_resonance(several([], seed), band_hz=BAND, method="modes") for seed in range(25)
     ]
-    assert not any(seen.found for seen in noise)
+    assert not any(resonance.found for resonance in noise)
     assert "no line stands out" in noise[0].reason
 
 
-def test_sampling_is_for_the_fit_alone():
+def test_the_sampling_factor_applies_to_the_fit_only():
     spectrum = Spectrum(
         frequency_hz=np.arange(0.0, 5e3, 2.0),
         density=np.ones(2500),

@@ -1,6 +1,4 @@
-"""Contact spectroscopy: against closed forms, libraries, and a contact whose emulator is a
-formula.
-"""
+"""Contact spectroscopy: closed forms, reference libraries, and an emulator that is a formula."""
 
 import json
 from dataclasses import replace
@@ -48,7 +46,7 @@ from asperity.inference.sampling import Pool, importance, nested
 from asperity.surface import MeasuredSurface
 from support.emulated import CASE, formula_emulator, formula_setting
 
-SIX = [(load, speed) for load in (300.0, 500.0, 900.0) for speed in (0.8, 2.5)]
+SIX_POINTS = [(load, speed) for load in (300.0, 500.0, 900.0) for speed in (0.8, 2.5)]
 
 
 @pytest.fixture(scope="module")
@@ -62,27 +60,27 @@ def emulator(setting):
 
 
 def truth(setting):
-    """Unknowns in the middle of their priors, but for a smoother surface."""
+    """Return the unknowns at the centre of their priors, with a smoother surface."""
     z = np.zeros((1, len(setting.unknowns)))
     z[0, 0] = -0.4
     return z
 
 
-def heard(setting, emulator, points, *, law="hertz-point", std=1e-3, seed=1):
-    """What the true contact shows at operating points, with errors of measurement."""
+def simulated_observations(setting, emulator, points, *, law="hertz-point", std=1e-3, seed=1):
+    """Simulate the true contact at operating points, with measurement errors."""
     rng = np.random.default_rng(seed)
     forward = ForwardModel(
         setting, emulator, tuple(ObservationPoint(load, speed) for load, speed in points)
     )
-    shown = forward.predict(truth(setting), law)
-    crf = np.exp(shown.crf[0] + std * rng.standard_normal(len(points)))
+    predicted = forward.predict(truth(setting), law)
+    crf = np.exp(predicted.crf[0] + std * rng.standard_normal(len(points)))
     return [
         Observation(
             load_n=load,
             entrainment_m_s=speed,
             crf_hz=float(hertz),
             crf_std_hz=float(std * hertz),
-            damping_ratio=float(np.exp(shown.damping[0, number])),
+            damping_ratio=float(np.exp(predicted.damping[0, number])),
             damping_std=0.001,
             name=f"{load:g}-{speed:g}",
         )
@@ -91,42 +89,46 @@ def heard(setting, emulator, points, *, law="hertz-point", std=1e-3, seed=1):
 
 
 @pytest.fixture(scope="module")
-def of_one(setting, emulator):
-    return infer_observations(setting, emulator, heard(setting, emulator, SIX[2:3]))
+def one_point(setting, emulator):
+    return infer_observations(
+        setting, emulator, simulated_observations(setting, emulator, SIX_POINTS[2:3])
+    )
 
 
 @pytest.fixture(scope="module")
-def of_six(setting, emulator):
-    return infer_observations(setting, emulator, heard(setting, emulator, SIX))
+def six_points(setting, emulator):
+    return infer_observations(
+        setting, emulator, simulated_observations(setting, emulator, SIX_POINTS)
+    )
 
 
 # Parts
 # -------------------------------------------------------------------------------------------------
 
 
-def test_a_process_says_what_scikit_learn_says():
+def test_the_process_agrees_with_scikit_learn():
     rng = np.random.default_rng(0)
     x, at = rng.random((30, 2)), rng.random((7, 2))
     noise = rng.uniform(0.01, 0.05, 30)
     y = np.sin(5.0 * x[:, 0]) + x[:, 1] + np.sqrt(noise) * rng.standard_normal(30)
     process = fit_process(x, y, noise)
     kernel = ConstantKernel(process.level, "fixed") * Matern(process.lengths, "fixed", nu=2.5)
-    twin = GaussianProcessRegressor(
+    reference = GaussianProcessRegressor(
         kernel + WhiteKernel(process.rough, "fixed"), alpha=noise / process._scale**2
     )
     trend = np.hstack([np.ones((30, 1)), x]) @ process._trend
-    twin.fit(x, (y - trend) / process._scale)
-    mean, std = twin.predict(at, return_std=True)
-    ours, deviation = process(at)
-    assert ours == pytest.approx(
+    reference.fit(x, (y - trend) / process._scale)
+    mean, std = reference.predict(at, return_std=True)
+    own_mean, own_std = process(at)
+    assert own_mean == pytest.approx(
         np.hstack([np.ones((7, 1)), at]) @ process._trend + process._scale * mean, abs=1e-5
     )
-    assert deviation == pytest.approx(process._scale * std, rel=1e-4)
-    assert np.array_equal(process.mean(at), ours)
+    assert own_std == pytest.approx(process._scale * std, rel=1e-4)
+    assert np.array_equal(process.mean(at), own_mean)
 
 
 @pytest.mark.parametrize("key", list(OUTPUTS))
-def test_a_scale_goes_both_ways_and_knows_its_slope(key):
+def test_a_scale_inverts_and_gives_its_slope(key):
     output, value = OUTPUTS[key], np.array([1e-3, 0.02, 0.4, 0.97])
     assert output.back(output.forward(value)) == pytest.approx(value, rel=1e-9)
     by_differences = (output.forward(value * (1 + 1e-6)) - output.forward(value * (1 - 1e-6))) / (
@@ -135,13 +137,15 @@ def test_a_scale_goes_both_ways_and_knows_its_slope(key):
     assert output.slope(value) == pytest.approx(by_differences, rel=1e-5)
 
 
-def test_priors_have_the_quantiles_that_are_stated():
+def test_priors_have_the_stated_quantiles():
     z = norm.ppf(np.array([0.05, 0.5, 0.95]))
     span = formula_setting().unknowns[0]
     assert 1e6 * span.value(z) == pytest.approx([0.25 * 16**0.05, 1.0, 0.25 * 16**0.95], rel=1e-9)
     known = Unknown.stated("sq_m", "surface.sq", 0.8, 0.1, "um")
     assert 1e6 * known.value(z) == pytest.approx([0.8 - 0.1645, 0.8, 0.8 + 0.1645], abs=1e-4)
-    wide = Unknown.stated("sq_m", "surface.sq", 0.8, 0.5, "um")  # normal, it would reach below 0
+    wide = Unknown.stated(
+        "sq_m", "surface.sq", 0.8, 0.5, "um"
+    )  # a normal distribution would reach below 0
     assert 1e6 * wide.value(z) == pytest.approx(
         0.8 * np.exp(np.sqrt(np.log1p((5 / 8) ** 2)) * z), rel=1e-9
     )
@@ -154,56 +158,57 @@ def test_priors_have_the_quantiles_that_are_stated():
 
 @pytest.mark.parametrize("discrepancy", [True, False])
 def test_the_likelihood_is_the_multivariate_normal(discrepancy):
-    """Of three channels, each with a size of the law's error of its own, covariances written
-    out.
-    """
+    """Three channels, each with its own size of the law's error; covariances written out."""
     rng = np.random.default_rng(2)
     crf, damping, crfa, log_force = rng.standard_normal((4, 3, 4))
     stds = rng.uniform(0.1, 0.3, (3, 3, 4))
-    shown = ChannelPrediction(crf, stds[0], damping, stds[1], crfa, stds[2], log_force)
-    said = [
+    predicted = ChannelPrediction(crf, stds[0], damping, stds[1], crfa, stds[2], log_force)
+    measured = [
         LogMeasurement(0.3, 0.2),
         LogMeasurement(),
         LogMeasurement(-0.1, 0.5),
         LogMeasurement(1.0, 0.1),
     ]
     points = [
-        ObservationPoint(500.0 * 1.01**i, 1.0, crf=one, damping=one, crfa=one)
-        for i, one in enumerate(said)
+        ObservationPoint(500.0 * 1.01**i, 1.0, crf=value, damping=value, crfa=value)
+        for i, value in enumerate(measured)
     ]
-    here = [0, 2, 3]
-    near = norm.pdf(np.subtract.outer(here, here) * np.log(1.01) / 0.03) / norm.pdf(0.0)
+    used = [0, 2, 3]
+    correlation = norm.pdf(np.subtract.outer(used, used) * np.log(1.01) / 0.03) / norm.pdf(0.0)
     sizes = SIZES if discrepancy else (0.0,)
     for row in range(3):
-        force, expected = log_force[row, here], 0.0
+        force, expected = log_force[row, used], 0.0
         steep = EXPONENT_STD * discrepancy * (force - force.mean())
         common = {"crf": np.outer(steep, steep), "damping": 0.0, "crfa": GAIN_STD**2}
-        beyond = {"crf": 0.0, "damping": 0.0, "crfa": EMULATED_HEIGHT_STD}
+        emulator_std = {"crf": 0.0, "damping": 0.0, "crfa": EMULATED_HEIGHT_STD}
         for number, (channel, weight) in enumerate(
             {"crf": 1.0, "damping": 5.0, "crfa": 10.0}.items()
         ):
-            std = np.hypot(stds[number, row, here], beyond[channel])
+            std = np.hypot(stds[number, row, used], emulator_std[channel])
             known = common[channel] + np.outer(std, std) * (
-                COMMON_SHARE + (1.0 - COMMON_SHARE) * near
+                COMMON_SHARE + (1.0 - COMMON_SHARE) * correlation
             )
-            known = known + np.diag([said[i].std ** 2 for i in here])
-            alike = POINT_SHARE * near + (1.0 - POINT_SHARE) * norm.pdf(
+            known = known + np.diag([measured[i].std ** 2 for i in used])
+            correlated = POINT_SHARE * correlation + (1.0 - POINT_SHARE) * norm.pdf(
                 np.subtract.outer(force, force) / FORCE_LENGTH
             ) / norm.pdf(0.0)
             densities = [
                 multivariate_normal(
-                    getattr(shown, channel)[row, here], known + (weight * size) ** 2 * alike
-                ).pdf([said[i].value for i in here])
+                    getattr(predicted, channel)[row, used],
+                    known + (weight * size) ** 2 * correlated,
+                ).pdf([measured[i].value for i in used])
                 for size in sizes
             ]
             expected += np.log(np.mean(densities))
-        assert log_likelihood(shown, points, discrepancy=discrepancy)[row] == pytest.approx(
+        assert log_likelihood(predicted, points, discrepancy=discrepancy)[row] == pytest.approx(
             expected, abs=1e-8
         )
 
 
 def test_importance_and_nested_sampling_find_a_known_posterior():
-    """A line of two unknowns heard once: mean, variance and evidence in closed form."""
+    """One measurement of a linear function of two unknowns: mean, variance and evidence in closed
+    form.
+    """
     gradient, value, noise = np.array([1.0, -2.0]), 3.0, 0.5
 
     def target(z):
@@ -220,20 +225,20 @@ def test_importance_and_nested_sampling_find_a_known_posterior():
         spread = np.sqrt(sampled.weights @ (sampled.z - found) ** 2)
         assert found == pytest.approx(mean, abs=0.12)
         assert spread == pytest.approx(np.sqrt(1.0 - gradient**2 / variance), rel=0.12)
-        told = 0.5 * np.log2(variance / noise**2) + 0.5 * (
+        bits = 0.5 * np.log2(variance / noise**2) + 0.5 * (
             mean @ mean + noise**2 / variance - 1.0
         ) / np.log(2.0)
-        assert sampled.information_bits == pytest.approx(told, abs=0.25)
+        assert sampled.information_bits == pytest.approx(bits, abs=0.25)
 
 
-def test_bits_are_those_of_a_narrowed_normal_and_nothing_of_chance():
+def test_information_bits_match_a_narrowed_normal_and_ignore_chance():
     rng = np.random.default_rng(3)
     prior = rng.standard_normal(40_000)
     narrow = 0.3 + 0.25 * rng.standard_normal(40_000)
-    told = -np.log2(0.25) + 0.5 * (0.25**2 + 0.3**2 - 1.0) / np.log(2.0)
+    bits = -np.log2(0.25) + 0.5 * (0.25**2 + 0.3**2 - 1.0) / np.log(2.0)
     assert information_gain(narrow, prior, 40_000.0) == pytest.approx(
-        told, abs=0.1
-    )  # of 20 classes
+        bits, abs=0.1
+    )  # error from 20 classes
     assert information_gain(rng.standard_normal(300), prior, 300.0) < 0.03
     against = quantity_estimate(2.0 + 0.2 * rng.standard_normal(4000), prior, 4000.0, bounded=True)
     assert (against.against, quantity_estimate(prior, prior, 4000.0, bounded=True).against) == (
@@ -246,32 +251,30 @@ def test_bits_are_those_of_a_narrowed_normal_and_nothing_of_chance():
 # -------------------------------------------------------------------------------------------------
 
 
-def test_crf_and_crfa_are_those_of_the_coupling(setting, emulator):
-    """The oscillator and its excitation as `solve` makes them, at the load share that is
-    emulated.
-    """
+def test_crf_and_crfa_agree_with_the_coupling(setting, emulator):
+    """Compared with the oscillator and excitation of `solve` at the emulated CLR."""
     forward = ForwardModel(
         setting, emulator, (ObservationPoint(300.0, 0.8), ObservationPoint(900.0, 2.5))
     )
     z = truth(setting)
-    shown, states = forward.predict(z, "hertz-point"), forward.states(z, ["clr", "car"])
+    predicted, states = forward.predict(z, "hertz-point"), forward.states(z, ["clr", "car"])
     model = replace_choices(setting, z)
     expected = []
-    for place, point in enumerate(forward.points):
+    for number, point in enumerate(forward.points):
         conditions = setting.case.with_overrides({"contact.load": f"{point.load_n} N"}).conditions
         state = replace(
             dry_full_load(conditions, float(setting.unknowns[0].value(z[:, 0])[0])),
-            clr=float(states["clr"][0, place]),
-            car=float(states["car"][0, place]),
+            clr=float(states["clr"][0, number]),
+            car=float(states["car"][0, number]),
         )
         spring = oscillator(state, conditions, model)
         at = np.array(spring.natural_frequency_hz)
         height = spring.gain(at) * excitation(state, conditions, model).density(at, 1e9)
         expected.append((float(at), spring.damping_ratio, float(height)))
     crf, damping, height = np.array(expected).T
-    assert np.exp(shown.crf[0]) == pytest.approx(crf, rel=1e-9)
-    assert np.exp(shown.damping[0]) == pytest.approx(damping, rel=1e-9)
-    assert shown.crfa[0, 1] - shown.crfa[0, 0] == pytest.approx(
+    assert np.exp(predicted.crf[0]) == pytest.approx(crf, rel=1e-9)
+    assert np.exp(predicted.damping[0]) == pytest.approx(damping, rel=1e-9)
+    assert predicted.crfa[0, 1] - predicted.crfa[0, 0] == pytest.approx(
         np.log(height[1] / height[0]), abs=1e-3
     )
 
@@ -287,14 +290,14 @@ def replace_choices(setting, z):
     )
 
 
-def test_the_own_law_hears_stiffness_and_damping(setting, emulator):
+def test_the_own_law_uses_contact_stiffness_and_damping(setting, emulator):
     forward = ForwardModel(setting, emulator, (ObservationPoint(500.0, 1.91),))
     z = truth(setting)
     state = forward.states(z, ["contact_stiffness_n_m", "contact_damping_ratio"])
-    shown = forward.predict(z, "own")
+    predicted = forward.predict(z, "own")
     hertz = np.sqrt(state["contact_stiffness_n_m"][0, 0] / 0.1) / (2.0 * np.pi)
-    assert np.exp(shown.crf[0, 0]) == pytest.approx(hertz, rel=1e-9)
-    assert np.exp(shown.damping[0, 0]) == pytest.approx(
+    assert np.exp(predicted.crf[0, 0]) == pytest.approx(hertz, rel=1e-9)
+    assert np.exp(predicted.damping[0, 0]) == pytest.approx(
         0.02 + state["contact_damping_ratio"][0, 0], rel=1e-3
     )
 
@@ -303,56 +306,66 @@ def test_the_own_law_hears_stiffness_and_damping(setting, emulator):
 # -------------------------------------------------------------------------------------------------
 
 
-def test_one_operating_point_leaves_sq_open_and_six_do_not(setting, emulator, of_one, of_six):
+def test_six_operating_points_identify_sq_and_one_does_not(
+    setting, emulator, one_point, six_points
+):
     sq = float(setting.unknowns[0].value(truth(setting)[:, 0])[0])
-    wide, narrow = of_one.posterior()["sq_m"], of_six.posterior()["sq_m"]
-    assert not of_one.identifiable
-    assert "one operating point gives one frequency" in of_one.reason
+    wide, narrow = one_point.posterior()["sq_m"], six_points.posterior()["sq_m"]
+    assert not one_point.identifiable
+    assert "one operating point gives one frequency" in one_point.reason
     assert narrow.information_bits > wide.information_bits + 0.5
     assert narrow.low < sq < narrow.high
-    assert of_six.identifiable
-    clr = ForwardModel(setting, emulator, of_six.forward.points[:1]).states(
+    assert six_points.identifiable
+    clr = ForwardModel(setting, emulator, six_points.forward.points[:1]).states(
         truth(setting), ["clr"]
     )["clr"][0, 0]
-    told = of_six.posterior()["clr"]
-    assert told.low < clr < told.high
-    assert told.information_bits > 2.0
-    assert of_six.verdict().startswith("CLR ")
+    posterior = six_points.posterior()["clr"]
+    assert posterior.low < clr < posterior.high
+    assert posterior.information_bits > 2.0
+    assert six_points.verdict().startswith("CLR ")
 
 
-def test_what_recordings_do_not_touch_is_as_assumed(of_six):
-    known = of_six.posterior()
+def test_an_unobserved_quantity_keeps_its_prior(six_points):
+    known = six_points.posterior()
     assert not known["oil_alpha_1_pa"].learnt
     assert known["oil_alpha_1_pa"].low == pytest.approx(14e-9 * (24 / 14) ** 0.05, rel=0.05)
 
 
-def test_the_law_that_made_the_recordings_has_the_evidence(setting, emulator, of_six):
-    assert of_six.law_probability("hertz-point") > 0.999
-    other = infer_observations(setting, emulator, heard(setting, emulator, SIX, law="own"))
+def test_the_law_that_generated_the_recordings_has_the_highest_evidence(
+    setting, emulator, six_points
+):
+    assert six_points.law_probability("hertz-point") > 0.999
+    other = infer_observations(
+        setting, emulator, simulated_observations(setting, emulator, SIX_POINTS, law="own")
+    )
     assert other.law_probability("own") > 0.999
     assert any("contact's own stiffness" in warning for warning in other.warnings())
 
 
-def test_a_wrong_law_widens_the_intervals_and_is_said(setting, emulator, of_six):
-    """Frequencies that jump by 10 % from point to point: no law does that."""
+def test_a_wrong_law_widens_the_intervals_and_raises_a_warning(setting, emulator, six_points):
+    """Frequencies that jump by 10 % from point to point, which no law predicts."""
     wrong = [
-        replace(one, crf_hz=one.crf_hz * (1.1 if number in (1, 2, 5) else 0.9))
-        for number, one in enumerate(of_six.observations)
+        replace(entry, crf_hz=entry.crf_hz * (1.1 if number in (1, 2, 5) else 0.9))
+        for number, entry in enumerate(six_points.observations)
     ]
     found = infer_observations(setting, emulator, wrong)
     assert found.law_error > 0.05
     assert any("model error of about" in warning for warning in found.warnings())
     assert (
         found.models[0].log_evidence > found.models[1].log_evidence + 10.0
-    )  # with the error against exact
+    )  # with model error against exact law
     assert (
-        found.posterior()["clr"].information_bits < of_six.posterior()["clr"].information_bits - 0.5
+        found.posterior()["clr"].information_bits
+        < six_points.posterior()["clr"].information_bits - 0.5
     )
-    ratio = [one.high / one.low for one in (found.posterior()["sq_m"], of_six.posterior()["sq_m"])]
-    assert ratio[0] > 1.1 * ratio[1]  # both allow for an exponent that is off
+    ratio = [
+        entry.high / entry.low
+        for entry in (found.posterior()["sq_m"], six_points.posterior()["sq_m"])
+    ]
+    assert ratio[0] > 1.1 * ratio[1]  # both include an uncertain exponent
 
 
-def test_nothing_heard_cannot_be_told(setting, emulator):
+def test_without_a_resonance_the_contact_is_not_identified(setting, emulator):
     excluded = (
         ("a.wav", "one spectrum cannot tell"),
         ("b.wav", "too short"),
@@ -363,93 +376,95 @@ def test_nothing_heard_cannot_be_told(setting, emulator):
         "Not identified: no recording shows a contact resonance (2 of 3: one spectrum"
     )
     assert not found.identifiable
-    assert all(one.information_bits < 0.1 for one in found.posterior().values())
+    assert all(entry.information_bits < 0.1 for entry in found.posterior().values())
     json.dumps(found.scalars(), allow_nan=False)
 
 
-def test_json_has_the_contract(of_six):
-    said = json.loads(json.dumps(of_six.scalars(), allow_nan=False))
-    assert {"posterior", "identifiable", "reason", "next_point", "evidence", "verdict"} <= set(said)
-    assert {"clr", "sq_m", "car"} <= set(said["posterior"])
-    assert {"median", "low", "high", "information_bits"} <= set(said["posterior"]["clr"])
-    assert {"load_n", "entrainment_m_s"} <= set(said["next_point"])
-    assert [len(point["files"]) for point in said["points"]] == [1] * 6
-    assert sum(model["probability"] for model in said["evidence"]) == pytest.approx(1.0)
+def test_json_has_the_documented_keys(six_points):
+    summary = json.loads(json.dumps(six_points.scalars(), allow_nan=False))
+    assert {"posterior", "identifiable", "reason", "next_point", "evidence", "verdict"} <= set(
+        summary
+    )
+    assert {"clr", "sq_m", "car"} <= set(summary["posterior"])
+    assert {"median", "low", "high", "information_bits"} <= set(summary["posterior"]["clr"])
+    assert {"load_n", "entrainment_m_s"} <= set(summary["next_point"])
+    assert [len(point["files"]) for point in summary["points"]] == [1] * 6
+    assert sum(model["probability"] for model in summary["evidence"]) == pytest.approx(1.0)
 
 
-def test_the_same_seed_gives_the_same_numbers(setting, emulator, of_one):
-    again = infer_observations(setting, emulator, of_one.observations)
-    assert again.scalars() == of_one.scalars()
-    other = infer_observations(setting, emulator, of_one.observations, seed=1)
-    assert other.posterior()["sq_m"] != of_one.posterior()["sq_m"]
+def test_the_same_seed_gives_the_same_numbers(setting, emulator, one_point):
+    again = infer_observations(setting, emulator, one_point.observations)
+    assert again.scalars() == one_point.scalars()
+    other = infer_observations(setting, emulator, one_point.observations, seed=1)
+    assert other.posterior()["sq_m"] != one_point.posterior()["sq_m"]
     assert other.posterior()["sq_m"].median == pytest.approx(
-        of_one.posterior()["sq_m"].median, rel=0.1
+        one_point.posterior()["sq_m"].median, rel=0.1
     )
 
 
-def test_one_recording_more_is_what_all_together_are(setting, emulator, of_six):
-    five = infer_observations(setting, emulator, of_six.observations[:5])
-    added: Inference = with_observation(five, of_six.observations[5])
+def test_adding_one_recording_agrees_with_the_joint_inference(setting, emulator, six_points):
+    five = infer_observations(setting, emulator, six_points.observations[:5])
+    added: Inference = with_observation(five, six_points.observations[5])
     for key in ("clr", "sq_m"):
-        ours, whole = added.posterior()[key], of_six.posterior()[key]
-        assert [ours.low, ours.median, ours.high] == pytest.approx(
-            [whole.low, whole.median, whole.high], rel=0.15
+        updated, joint = added.posterior()[key], six_points.posterior()[key]
+        assert [updated.low, updated.median, updated.high] == pytest.approx(
+            [joint.low, joint.median, joint.high], rel=0.15
         )
     assert [model.log_evidence for model in added.models[:2]] == pytest.approx(
-        [model.log_evidence for model in of_six.models[:2]], abs=0.4
+        [model.log_evidence for model in six_points.models[:2]], abs=0.4
     )
 
 
-def test_repeats_are_surer_together_and_no_surer_than_their_scatter(setting, emulator):
-    one = heard(setting, emulator, SIX[:1])[0]
-    repeats = [replace(one, crf_hz=one.crf_hz * factor) for factor in (0.98, 1.0, 1.02)]
+def test_repeats_reduce_the_deviation_no_further_than_their_scatter(setting, emulator):
+    first = simulated_observations(setting, emulator, SIX_POINTS[:1])[0]
+    repeats = [replace(first, crf_hz=first.crf_hz * factor) for factor in (0.98, 1.0, 1.02)]
     found = infer_observations(setting, emulator, repeats)
     point = found.forward.points[1]
     assert point.crf.std == pytest.approx(0.02 / np.sqrt(3.0), rel=0.01)
-    assert point.crf.value == pytest.approx(np.log(one.crf_hz), abs=1e-3)
+    assert point.crf.value == pytest.approx(np.log(first.crf_hz), abs=1e-3)
 
 
-def test_what_repeats_have_in_common_does_not_average_away():
-    one = Observation(
+def test_a_shared_error_of_repeats_does_not_average_out():
+    observation = Observation(
         load_n=500.0, entrainment_m_s=1.0, crf_hz=3000.0, crf_std_hz=5.0, crf_shared_std_hz=3.0
     )
     for count in (1, 4, 1000):
-        assert 3000.0 * operating_points([one] * count)[0].crf.std == pytest.approx(
+        assert 3000.0 * operating_points([observation] * count)[0].crf.std == pytest.approx(
             np.hypot(3.0, 4.0 / np.sqrt(count))
         )
 
 
-def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
-    """Five recordings that agree at what is as good as one place do not speak for a small error."""
-    said = LogMeasurement(8.0, 2e-3)
-    off = np.linspace(-0.4, 0.4, 2001)[:, None]
+def test_practically_equal_loads_do_not_reduce_the_model_error():
+    """Five recordings that agree at practically one load are no evidence of a small model error."""
+    measured = LogMeasurement(8.0, 2e-3)
+    error = np.linspace(-0.4, 0.4, 2001)[:, None]
 
     def width(loads):
-        points = [ObservationPoint(load, 1.0, crf=said) for load in loads]
-        nothing, log_force = (
-            np.full((len(off), len(loads)), np.nan),
-            np.tile(np.log(loads), (len(off), 1)),
+        points = [ObservationPoint(load, 1.0, crf=measured) for load in loads]
+        missing, log_force = (
+            np.full((len(error), len(loads)), np.nan),
+            np.tile(np.log(loads), (len(error), 1)),
         )
-        crf = 8.0 + off + np.zeros_like(nothing)
-        shown = ChannelPrediction(
-            crf, np.full_like(crf, 0.01), nothing, nothing, nothing, nothing, log_force
+        crf = 8.0 + error + np.zeros_like(missing)
+        predicted = ChannelPrediction(
+            crf, np.full_like(crf, 0.01), missing, missing, missing, missing, log_force
         )
-        weights = np.exp(log_likelihood(shown, points, discrepancy=True))
-        return np.sqrt(weights @ off[:, 0] ** 2 / weights.sum())
+        weights = np.exp(log_likelihood(predicted, points, discrepancy=True))
+        return np.sqrt(weights @ error[:, 0] ** 2 / weights.sum())
 
     assert width([200.0]) == pytest.approx(np.sqrt(np.mean(np.square(SIZES)) + 0.01**2), rel=0.02)
     assert width(200.0 + 1e-6 * np.arange(5)) == pytest.approx(width([200.0]), rel=1e-3)
     assert width([100.0, 150.0, 200.0, 300.0, 400.0]) < 0.5 * width(
         [200.0]
-    )  # there agreement tells
+    )  # agreement at distinct loads is evidence
 
 
-# What is refused
+# Refusals
 # -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"infer.sq": {"from": "1 um", "to": "0.5 um"}}, "must have an ascending range"),
         ({"infer.sq": {"from": "0.5 um", "to": "2 N"}}, "infer.sq.to must have the unit um"),
@@ -472,12 +487,12 @@ def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
         ({"surface": {"kind": "flat"}}, "surface is flat"),
     ],
 )
-def test_what_cannot_be_inferred_is_refused(change, said):
-    with pytest.raises(BadInput, match=said):
+def test_invalid_inference_settings_are_refused(change, message):
+    with pytest.raises(BadInput, match=message):
         inference_setting(load_case(CASE).with_overrides(change))
 
 
-def test_an_operating_point_beyond_the_emulator_is_refused(setting, emulator):
+def test_an_operating_point_outside_the_emulator_is_refused(setting, emulator):
     far = Observation(
         load_n=2000.0, entrainment_m_s=1.0, crf_hz=3000.0, crf_std_hz=3.0, name="far.wav"
     )
@@ -492,7 +507,7 @@ def test_an_operating_point_beyond_the_emulator_is_refused(setting, emulator):
 @pytest.mark.parametrize(
     "wrong", [{"load_n": 0.0}, {"crf_std_hz": float("nan")}, {"crf_shared_std_hz": 6.0}]
 )
-def test_an_observation_that_is_none_is_refused(wrong):
+def test_an_invalid_observation_is_refused(wrong):
     with pytest.raises(
         BadInput, match=r"must be positive|must be at most crf_std_hz, 3 Hz, got 6 Hz"
     ):
@@ -507,14 +522,14 @@ def test_an_observation_that_is_none_is_refused(wrong):
         )
 
 
-def test_a_missing_extra_is_said_with_its_remedy(monkeypatch, tmp_path):
+def test_a_missing_extra_is_reported_with_its_remedy(monkeypatch, tmp_path):
     monkeypatch.setitem(__import__("sys").modules, "sklearn.gaussian_process", None)
     with pytest.raises(BadInput, match=r"pip install 'asperity\[infer\]'"):
         infer_contact([], case=load_case(CASE), emulator=tmp_path / "emulator")
     assert not (tmp_path / "emulator").exists()
 
 
-def test_a_process_of_no_slope_is_flat():
+def test_a_process_of_constant_data_is_constant():
     x = np.linspace(0.0, 1.0, 12)[:, None]
     process = GaussianProcess(x, np.full(12, 2.0), np.full(12, 1e-4), np.ones(1), 1.0, 1e-4)
     mean, std = process(np.array([[0.35], [0.9]]))
@@ -522,56 +537,53 @@ def test_a_process_of_no_slope_is_flat():
     assert np.all(std >= 0.0)
 
 
-def test_the_height_of_one_line_says_nothing_of_the_contact(setting, emulator):
-    """The gain of what excites and hears it is free: any CRFA at all leaves Sq and damping where
-    they are.
-    """
-    plain = heard(setting, emulator, SIX[2:3])[0]
-    loud = [replace(plain, crfa=height, crfa_std=0.03 * height) for height in (1e-6, 1e6)]
-    quiet, noisy = (
-        infer_observations(setting, emulator, [one]).posterior()["sq_m"] for one in loud
+def test_the_height_of_one_line_carries_no_information_about_the_contact(setting, emulator):
+    """The gain of excitation and measurement chain is free: any CRFA leaves Sq unchanged."""
+    plain = simulated_observations(setting, emulator, SIX_POINTS[2:3])[0]
+    scaled = [replace(plain, crfa=height, crfa_std=0.03 * height) for height in (1e-6, 1e6)]
+    low, high = (
+        infer_observations(setting, emulator, [observation]).posterior()["sq_m"]
+        for observation in scaled
     )
-    assert [quiet.low, quiet.median, quiet.high] == pytest.approx(
-        [noisy.low, noisy.median, noisy.high], rel=0.2
+    assert [low.low, low.median, low.high] == pytest.approx(
+        [high.low, high.median, high.high], rel=0.2
     )
 
 
-def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
-    """Its Sq, with what places and instruments differ by; recordings are then told from a narrower
-    prior.
+def test_a_measured_surface_gives_the_prior_of_sq(setting, emulator, one_point):
+    """The prior is the measured Sq with the scatter between places and instruments; the posterior
+    narrows.
     """
     rng = np.random.default_rng(6)
     grid = Grid((64, 64), (-1e-3, -1e-3), (1e-3, 1e-3), (False, False))
     measured = MeasuredSurface(0.7e-6 * rng.standard_normal((64, 64)), grid, "ring.csv", "text")
-    known, said = with_measured_surface(setting, measured)
+    known, note = with_measured_surface(setting, measured)
     z = np.array([-1.0, 0.0, 1.0])
     assert 1e6 * known.contact[0].value(z) == pytest.approx(
         [0.7 - 0.022, 0.7, 0.7 + 0.022], abs=0.006
     )
-    assert known.ranges == setting.ranges  # the emulator's own
-    assert said.startswith("The prior of Sq is that of ring.csv, 0.7")
-    told = infer_observations(known, emulator, of_one.observations).posterior()["clr"]
-    alone = of_one.posterior()["clr"]
-    assert told.high - told.low < 0.8 * (alone.high - alone.low)
+    assert known.ranges == setting.ranges  # those of the emulator
+    assert note.startswith("The prior of Sq is that of ring.csv, 0.7")
+    informed = infer_observations(known, emulator, one_point.observations).posterior()["clr"]
+    alone = one_point.posterior()["clr"]
+    assert informed.high - informed.low < 0.8 * (alone.high - alone.low)
     with pytest.raises(BadInput, match=r"widen infer\.sq"):
         with_measured_surface(setting, replace(measured, heights=10.0 * measured.heights))
     with pytest.raises(BadInput, match="Sq is known in the case"):
         with_measured_surface(replace(setting, contact=setting.contact[1:]), measured)
 
 
-def test_further_points_never_take_a_folder_that_is_there(monkeypatch, tmp_path):
-    """A damaged one is deleted, as its error says, and the next stands behind those that are
-    left.
-    """
+def test_further_points_never_overwrite_a_folder(monkeypatch, tmp_path):
+    """After a damaged folder is deleted, the next number follows the highest remaining one."""
     base = formula_emulator(formula_setting())
-    held = replace(base, folder=tmp_path)
+    stored = replace(base, folder=tmp_path)
     (tmp_path / "emulator.json").write_text("{}")
-    monkeypatch.setattr(emulator_module, "build_emulator", lambda *_, **__: held)
+    monkeypatch.setattr(emulator_module, "build_emulator", lambda *_, **__: stored)
     for _ in range(3):
-        emulator_module.extend_emulator(formula_setting(), held, np.full((1, 2), 0.5))
+        emulator_module.extend_emulator(formula_setting(), stored, np.full((1, 2), 0.5))
     (tmp_path / "further" / "001" / "shares.json").unlink()
     (tmp_path / "further" / "001").rmdir()
-    emulator_module.extend_emulator(formula_setting(), held, np.full((1, 2), 0.25))
+    emulator_module.extend_emulator(formula_setting(), stored, np.full((1, 2), 0.25))
     kept = {
         path.parent.name: path.read_text() for path in (tmp_path / "further").glob("*/shares.json")
     }

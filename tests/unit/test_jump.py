@@ -1,4 +1,4 @@
-"""What bounds a jump and what is worn in it, of contacts made up: nothing is solved."""
+"""Length of a wear jump and the wear within it, for synthetic contacts without a solver."""
 
 import math
 from dataclasses import replace
@@ -39,88 +39,88 @@ STATE = ContactState(
 )
 
 
-def ageing(overrides: dict[str, object] | None = None) -> WearingContact:
+def wearing_contact(overrides: dict[str, object] | None = None) -> WearingContact:
     case = worn_case({**FEW, "wear.k": "1e-14 1/Pa", **(overrides or {})})
     assert case.wear is not None
     return WearingContact(case, case.wear, case.moving_surfaces())
 
 
-def rubbed(
-    model: WearingContact, rise: float = 0.0, touching: float = 1.0
+def loaded_position(
+    model: WearingContact, temperature_rise: float = 0.0, asperity_share: float = 1.0
 ) -> list[tuple[TrackPosition, SolvedPosition]]:
-    """Hertz's pressure at one position, borne by asperities to a share, on surfaces hotter than
-    ambient by `rise`.
-    """
+    """Return one position under Hertz pressure, a share of it carried by asperities."""
     grid, hertz = model.case.grid, model.case.conditions.hertz
     half_widths = [*hertz.half_widths, math.inf][:2]
     off = (grid.x[:, None] / half_widths[0]) ** 2 + (grid.y / half_widths[1]) ** 2
     pressure = hertz.p_max * np.sqrt(np.maximum(1.0 - off, 0.0))
     solved = SolvedPosition(
         pressure=pressure,
-        asperity_pressure=touching * pressure,
+        asperity_pressure=asperity_share * pressure,
         shear=model.case.boundary_friction * pressure,
         film=np.full(grid.cells, 1e-7),
         overlap=None,
-        temperatures=(np.full(grid.cells, rise), np.full(grid.cells, rise)),
+        temperatures=(np.full(grid.cells, temperature_rise), np.full(grid.cells, temperature_rise)),
         state=STATE,
         friction_coefficient=0.1,
-        flash_temperature=rise,
+        flash_temperature=temperature_rise,
         at_edge=False,
     )
     return [(TrackPosition(0, 0), solved)]
 
 
-def test_a_jump_is_as_long_as_the_coefficient_that_acts_allows():
-    """Bare metal all over wears as by Archard; with a share ψ of defects all takes 1/ψ as long."""
+def test_the_effective_coefficient_limits_the_jump():
+    """Fully bare metal follows Archard's law; a share ψ of defects takes 1/ψ times as long."""
     defects = {"wear.law": {"law": "film-defect", "heat": "49 kJ/mol"}}
-    archard, film = ageing(), ageing(defects)
+    archard, film = wearing_contact(), wearing_contact(defects)
     new = WearState.unworn(film.surfaces)
-    bare = archard.seconds(new, rubbed(archard))
-    assert film.seconds(new, rubbed(film, rise=1e9)) == pytest.approx(bare, rel=1e-9, abs=0.0)
+    bare = archard.seconds(new, loaded_position(archard))
+    assert film.seconds(new, loaded_position(film, temperature_rise=1e9)) == pytest.approx(
+        bare, rel=1e-9, abs=0.0
+    )
     conditions = film.case.conditions
     crossing = 3e-10 / (3e-12 * conditions.sliding_speed)
-    hot = 4.9e4 / (GAS_CONSTANT * math.log(crossing / 1e-5))  # where 1e-5 of the sites are bare
-    rise = hot - film.case.thermal.ambient
-    assert film.seconds(new, rubbed(film, rise)) == pytest.approx(1e5 * bare, rel=1e-4, abs=0.0)
+    hot_temperature = 4.9e4 / (
+        GAS_CONSTANT * math.log(crossing / 1e-5)
+    )  # temperature at which 1e-5 of the sites are bare
+    temperature_rise = hot_temperature - film.case.thermal.ambient
+    assert film.seconds(new, loaded_position(film, temperature_rise)) == pytest.approx(
+        1e5 * bare, rel=1e-4, abs=0.0
+    )
     cold = film.exposures()[0].k / 1e-14
     assert cold == pytest.approx(
         crossing * math.exp(-4.9e4 / GAS_CONSTANT / film.case.thermal.ambient), rel=1e-4
     )
 
 
-def test_what_a_jump_takes_off_is_spread_by_the_coefficient_that_acts():
-    """A cold film wears a hundred thousandth, and z with it: next to nothing is spread, where bare
-    metal would be.
-    """
-    film = ageing({"wear.law": {"law": "film-defect", "heat": "49 kJ/mol"}})
-    new, at = WearState.unworn(film.surfaces), rubbed(film, 0.0)
+def test_wear_is_distributed_by_the_effective_coefficient():
+    """A cold film wears a hundred-thousandth of bare metal, so hardly any material is spread."""
+    film = wearing_contact({"wear.law": {"law": "film-defect", "heat": "49 kJ/mol"}})
+    new, at = WearState.unworn(film.surfaces), loaded_position(film, 0.0)
     seconds = 1e-3 * film.seconds(new, at)
-    lost = film.after_jump(new, at, seconds).worn[0]
+    worn_depth = film.after_jump(new, at, seconds).worn[0]
     np.testing.assert_allclose(
-        lost, film.rate(new, at, 0) * seconds, rtol=0.0, atol=1e-3 * lost.max()
+        worn_depth, film.rate(new, at, 0) * seconds, rtol=0.0, atol=1e-3 * worn_depth.max()
     )
 
 
 BALL = {**DRY, "contact.load": "10 N", "wear.k": "1e-14 1/Pa", "wear.patches": 1}
 
 
-def ball(overrides: dict[str, object], wide: float = 1.8, cells: int = 24) -> WearingContact:
-    grid = {"grid.x": [-1.8, 1.8], "grid.y": [-wide, wide], "grid.cells": [24, cells]}
+def ball(overrides: dict[str, object], half_width: float = 1.8, cells: int = 24) -> WearingContact:
+    grid = {"grid.x": [-1.8, 1.8], "grid.y": [-half_width, half_width], "grid.cells": [24, cells]}
     case = worn_case(BALL | grid | overrides, POINT)
     assert case.wear is not None
     return WearingContact(case, case.wear, case.moving_surfaces())
 
 
-def test_a_balls_track_is_as_wide_as_its_contact_whatever_the_grid():
-    """Worn depth is the volume over the Hertz zone's width and the way round; beside it nothing
-    counts for Sq.
-    """
+def test_a_balls_track_has_the_width_of_its_contact_on_any_grid():
+    """Worn depth is the volume per Hertz width and circumference; Sq ignores the rest."""
     rows = []
-    for wide, cells in ((1.8, 24), (3.6, 48)):
-        model = ball({"surface": "flat"}, wide, cells)
-        new, at = WearState.unworn(model.surfaces), rubbed(model)
+    for half_width, cells in ((1.8, 24), (3.6, 48)):
+        model = ball({"surface": "flat"}, half_width, cells)
+        new, at = WearState.unworn(model.surfaces), loaded_position(model)
         worn = model.after_jump(new, at, model.seconds(new, at))
-        rows.append(_row(model, worn, rubbed(model), 0))
+        rows.append(_row(model, worn, loaded_position(model), 0))
         for body in (0, 1):
             width = 2.0 * model.case.conditions.hertz.half_widths[1]
             over_all = model.volume(worn.worn[body], body) / model.perimeter(body) / width
@@ -136,7 +136,7 @@ def test_a_balls_track_is_as_wide_as_its_contact_whatever_the_grid():
     )
 
 
-def test_a_track_that_has_grown_beyond_the_hertz_zone_counts_whole():
+def test_a_track_wider_than_the_hertz_zone_counts_entirely():
     model = ball({"surface": "flat"}, 3.6, 48)
     new = WearState.unworn(model.surfaces)
     y, a = model.surfaces.grid.y, model.case.conditions.hertz.half_widths[1]
@@ -155,32 +155,36 @@ def test_a_track_that_has_grown_beyond_the_hertz_zone_counts_whole():
             )
 
 
-def test_a_standing_bodys_scar_is_no_roughness():
-    """A smooth ball at rest, worn to a flat: its Sq is 0; its mean depth is the cap's over the
-    square about it.
+def test_the_scar_of_a_standing_body_does_not_count_as_roughness():
+    """A smooth ball at rest, worn flat: Sq is 0; the mean depth is that of the cap over its
+    bounding square.
     """
     model = ball({"surface": "flat", "contact.slip": 2.0})
-    (still,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
+    (standing,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
     new, grid = WearState.unworn(model.surfaces), model.surfaces.grid
     a = model.case.conditions.hertz.half_widths[0]
     cap = 2e-6 * np.maximum(1.0 - (grid.x[:, None] / a) ** 2 - (grid.y / a) ** 2, 0.0)
     maps = [0.0 * cap, 0.0 * cap]
-    maps[still] = cap
+    maps[standing] = cap
     worn = replace(new, worn=(maps[0], maps[1]))
-    row = _row(model, worn, rubbed(model), 0)
-    assert row[body_column("sq_m", still)] == 0.0
+    row = _row(model, worn, loaded_position(model), 0)
+    assert row[body_column("sq_m", standing)] == 0.0
     assert row["sq_m"] == 0.0
-    assert row[body_column("worn_depth_m", still)] == pytest.approx(
+    assert row[body_column("worn_depth_m", standing)] == pytest.approx(
         2e-6 * math.pi / 8.0, rel=0.1, abs=0.0
     )
 
 
 @pytest.mark.parametrize("geometry", ["ball", "roller"])
-def test_a_rough_standing_body_keeps_its_sq_below_a_scar_many_times_deeper(geometry):
-    standing = {"contact.slip": 2.0, "motion.rough": "second"}
-    model = ball(standing | {"grid.cells": [96, 96]}) if geometry == "ball" else ageing(standing)
-    (still,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
-    assert model.surfaces.rough[still]
+def test_sq_of_a_rough_standing_body_excludes_a_much_deeper_scar(geometry):
+    overrides = {"contact.slip": 2.0, "motion.rough": "second"}
+    model = (
+        ball(overrides | {"grid.cells": [96, 96]})
+        if geometry == "ball"
+        else wearing_contact(overrides)
+    )
+    (standing,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
+    assert model.surfaces.rough[standing]
     new, grid, half_widths = (
         WearState.unworn(model.surfaces),
         model.surfaces.grid,
@@ -189,58 +193,56 @@ def test_a_rough_standing_body_keeps_its_sq_below_a_scar_many_times_deeper(geome
     across = (grid.y / half_widths[1]) ** 2 if geometry == "ball" else 0.0 * grid.y
     cap = 5e-6 * np.maximum(1.0 - (grid.x[:, None] / half_widths[0]) ** 2 - across, 0.0)
     maps = [0.0 * cap, 0.0 * cap]
-    maps[still] = cap
-    before = model.levelled(new)[still].sq
-    assert model.levelled(replace(new, worn=(maps[0], maps[1])))[still].sq == pytest.approx(
+    maps[standing] = cap
+    before = model.levelled(new)[standing].sq
+    assert model.levelled(replace(new, worn=(maps[0], maps[1])))[standing].sq == pytest.approx(
         before, rel=0.05, abs=0.0
     )
 
 
-@pytest.mark.parametrize("touching", [1.0, 0.6])
-def test_the_energy_law_counts_the_friction_work_where_bodies_touch(touching):
+@pytest.mark.parametrize("asperity_share", [1.0, 0.6])
+def test_the_energy_law_uses_the_friction_work_of_asperities(asperity_share):
     """V = α f_b F_a s."""
-    model = ageing({"wear.law": "energy", "wear.k": "1e-13 1/Pa"})
-    at, conditions = rubbed(model, touching=touching), model.case.conditions
+    model = wearing_contact({"wear.law": "energy", "wear.k": "1e-13 1/Pa"})
+    at, conditions = loaded_position(model, asperity_share=asperity_share), model.case.conditions
     (dx, dy), (_, solved) = model.surfaces.grid.spacing, at[0]
     load = solved.pressure.sum() * dx * dy * model.width / model.surfaces.grid.extent[1]
     assert load == pytest.approx(500.0, rel=0.02)
-    expected = 1e-13 * 0.15 * touching * load * conditions.sliding_speed
+    expected = 1e-13 * 0.15 * asperity_share * load * conditions.sliding_speed
     new = WearState.unworn(model.surfaces)
     assert model.booked_rate(at, 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
     assert model.volume(model.rate(new, at, 0), 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
 
 
-def test_a_smooth_bodys_grooves_are_said_to_be_the_tracks():
-    model = ageing({"motion.rough": "second"})
-    said = grooves_note(model)
+def test_grooves_of_a_smooth_body_are_noted_as_those_of_the_track():
+    model = wearing_contact({"motion.rough": "second"})
+    note = grooves_note(model)
     tracks = model.perimeter(1) / model.surfaces.second.grid.extent[0]
     assert tracks > 100.0
-    assert said is not None
-    assert f"one of {tracks:.0f} around its partner" in said
+    assert note is not None
+    assert f"one of {tracks:.0f} around its partner" in note
     for other in (
-        ageing({"motion.rough": "both"}),
-        ageing({"surface": "flat"}),
-        ageing({"motion.rough": "second", "wear.k": ["0 1/Pa", "1e-16 1/Pa"]}),
-        ageing({"motion.rough": "second", "contact.slip": -2.0}),
+        wearing_contact({"motion.rough": "both"}),
+        wearing_contact({"surface": "flat"}),
+        wearing_contact({"motion.rough": "second", "wear.k": ["0 1/Pa", "1e-16 1/Pa"]}),
+        wearing_contact({"motion.rough": "second", "contact.slip": -2.0}),
         ball({"motion.rough": "second"}),
     ):
         assert grooves_note(other) is None
 
 
-def test_rates_that_make_other_bodies_than_the_contacts_are_said():
-    """A roller of 12 mm on a ring of 108 mm turning as the example's do, and the pair the wrong way
-    round.
-    """
-    radii, speeds = (6e-3, 54e-3), ageing().case.conditions.surface_speeds
+def test_overrolling_rates_inconsistent_with_the_radius_are_noted():
+    """A roller of 12 mm on a ring of 108 mm at the speeds of the example, and the swapped pair."""
+    radii, speeds = (6e-3, 54e-3), wearing_contact().case.conditions.surface_speeds
     assert 1.0 / (1.0 / radii[0] + 1.0 / radii[1]) == pytest.approx(5.4e-3)
     rates = [speed / (2.0 * math.pi * radius) for speed, radius in zip(speeds, radii, strict=True)]
     right, wrong = ([f"{rate!r} Hz" for rate in order] for order in (rates, rates[::-1]))
-    assert radii_note(ageing({"wear.overrolling": right})) is None
-    said = radii_note(ageing({"wear.overrolling": wrong}))
-    assert said is not None
-    assert "which do not give the contact's 5.4 mm" in said
-    assert radii_note(ageing({"wear.overrolling": "none"})) is None
-    assert radii_note(ageing({"contact.slip": 2.0})) is None
+    assert radii_note(wearing_contact({"wear.overrolling": right})) is None
+    note = radii_note(wearing_contact({"wear.overrolling": wrong}))
+    assert note is not None
+    assert "which do not give the contact's 5.4 mm" in note
+    assert radii_note(wearing_contact({"wear.overrolling": "none"})) is None
+    assert radii_note(wearing_contact({"contact.slip": 2.0})) is None
 
 
 def test_a_body_shorter_than_the_contact_is_refused():
@@ -248,30 +250,30 @@ def test_a_body_shorter_than_the_contact_is_refused():
         BadInput,
         match=r"overrolling of 1e\+07 Hz at .* implies a circumference of .* less than the contact",
     ):
-        ageing({"wear.overrolling": "1e7 Hz"})
+        wearing_contact({"wear.overrolling": "1e7 Hz"})
 
 
-def test_a_standing_body_is_said_to_be_spared():
+def test_a_standing_body_is_noted_as_free_of_fatigue():
     pits = {"wear.fatigue": {"law": "von-mises", "limit": "700 MPa"}}
-    said = standing_note(ageing(pits | {"contact.slip": 2.0}))
-    assert said is not None
-    assert said.endswith("not over-rolled: no fatigue acts on it.")
-    assert standing_note(ageing(pits)) is None
-    assert standing_note(ageing({"contact.slip": 2.0})) is None
+    note = standing_note(wearing_contact(pits | {"contact.slip": 2.0}))
+    assert note is not None
+    assert note.endswith("not over-rolled: no fatigue acts on it.")
+    assert standing_note(wearing_contact(pits)) is None
+    assert standing_note(wearing_contact({"contact.slip": 2.0})) is None
 
 
-def test_few_jumps_are_said():
-    model = ageing()
+def test_few_jumps_are_noted():
+    model = wearing_contact()
     new = WearState.unworn(model.surfaces)
     assert few_jumps_note(model, 5, new) is None
-    said = few_jumps_note(model, 4, new)
-    assert said is not None
-    assert said.startswith("In 4 jumps of 4 positions")
-    assert few_jumps_note(ageing({"surface": "flat"}), 4, new) is None
+    note = few_jumps_note(model, 4, new)
+    assert note is not None
+    assert note.startswith("In 4 jumps of 4 positions")
+    assert few_jumps_note(wearing_contact({"surface": "flat"}), 4, new) is None
 
 
-def test_what_is_smooth_to_rounding_has_no_shape():
-    model = ageing({"surface": "flat"})
+def test_a_surface_smooth_to_rounding_has_no_skewness():
+    model = wearing_contact({"surface": "flat"})
     grid = model.surfaces.first.grid
     noise = np.random.default_rng(1).standard_normal(grid.cells)
     row = roughness((Surface(1e-20 * noise, grid), Surface(1e-8 * noise, grid)))
@@ -280,15 +282,13 @@ def test_what_is_smooth_to_rounding_has_no_shape():
     assert row["sku_2"] == pytest.approx(3.0, rel=0.3)
 
 
-def test_a_jump_that_differs_too_much_from_the_one_before_going_on_is_shortened():
-    """Of rates that jump from one place to another, Sq of two jumps and of one of both together
-    differ.
-    """
-    model = ageing({"wear.step": 0.5})
+def test_a_jump_is_shortened_when_the_rates_change_too_much():
+    """Wear moves to another place: Sq after two jumps differs from Sq after one combined jump."""
+    model = wearing_contact({"wear.step": 0.5})
     new = WearState.unworn(model.surfaces)
-    at = rubbed(model)
+    at = loaded_position(model)
     assert model.seconds(new, at) == pytest.approx(
-        0.5 * 10.0 * ageing().seconds(new, at) / 0.5, rel=1e-9, abs=0.0
+        0.5 * 10.0 * wearing_contact().seconds(new, at) / 0.5, rel=1e-9, abs=0.0
     )
     other = [(TrackPosition(20, 20), at[0][1])]
     free = model.seconds(replace(new, number=1), other) / 0.5
@@ -302,21 +302,25 @@ def test_a_jump_that_differs_too_much_from_the_one_before_going_on_is_shortened(
     )
 
 
-def test_a_law_of_friction_without_friction_is_refused():
+def test_the_energy_law_without_friction_is_refused():
     with pytest.raises(BadInput, match="boundary friction of 0"):
-        ageing({"wear.law": "energy", "material.boundary_friction": 0.0})
+        wearing_contact({"wear.law": "energy", "material.boundary_friction": 0.0})
 
 
-def fallen(
-    slope: float, curve: float = 0.0, scatter: float = 0.0, seed: int = 0, scaled: float = 0.5
+def drifting_history(
+    slope: float,
+    curvature: float = 0.0,
+    scatter: float = 0.0,
+    seed: int = 0,
+    k_scatter: float = 0.5,
 ) -> WearHistory:
-    """A history, made up, of a CLR that falls by so much an hour, over ten hours."""
-    model = ageing({"wear.scatter": scaled})
+    """Return a synthetic history of ten hours with a linear drift of CLR."""
+    model = wearing_contact({"wear.scatter": k_scatter})
     hours = np.linspace(0.0, 10.0, 41)
     clr = (
         0.7
         + slope * hours
-        + curve * hours**2
+        + curvature * hours**2
         + scatter * np.random.default_rng(seed).standard_normal(hours.size)
     )
     table = pandas.DataFrame({"hours": hours, "clr": clr})
@@ -324,10 +328,10 @@ def fallen(
 
 
 def test_the_drift_of_a_line_is_its_slope_with_the_interval_of_k():
-    history = fallen(-0.01)
+    history = drifting_history(-0.01)
     slow, fast = history.k_interval
     assert history.drift("clr") == pytest.approx((-0.01, -0.01 * fast, -0.01 * slow), rel=1e-9)
-    assert fallen(-0.01, scaled=0.0).drift("clr", 2.0, 4.0) == pytest.approx(
+    assert drifting_history(-0.01, k_scatter=0.0).drift("clr", 2.0, 4.0) == pytest.approx(
         (-0.01, -0.01, -0.01), rel=1e-9
     )
     with pytest.raises(
@@ -338,11 +342,9 @@ def test_the_drift_of_a_line_is_its_slope_with_the_interval_of_k():
         history.drift("clear")
 
 
-def test_the_drift_with_another_k_is_that_of_another_time():
-    """Of a parabola, read from 2 to 4 h, k so much larger is the slope so much later, and so much
-    faster.
-    """
-    history = fallen(-0.01, 0.0005)
+def test_a_factor_on_k_rescales_the_time_of_the_drift():
+    """For a parabola between 2 and 4 h, a factor on k scales both the time and the rate."""
+    history = drifting_history(-0.01, 0.0005)
     slow, fast = history.k_interval
     at = {factor: factor * (-0.01 + 0.001 * 3.0 * factor) for factor in (slow, 1.0, fast)}
     drift = history.drift("clr", 2.0, 4.0)
@@ -351,20 +353,18 @@ def test_the_drift_with_another_k_is_that_of_another_time():
     assert drift.high == pytest.approx(max(at.values()), rel=0.1)
 
 
-def test_the_interval_of_a_drift_holds_nine_times_in_ten():
-    held = 0
+def test_the_interval_of_a_drift_covers_90_per_cent():
+    covered = 0
     for seed in range(300):
-        drift = fallen(-0.01, scatter=0.02, seed=seed, scaled=0.0).drift("clr")
-        held += drift.low <= -0.01 <= drift.high
-    assert 0.86 < held / 300 < 0.94
+        drift = drifting_history(-0.01, scatter=0.02, seed=seed, k_scatter=0.0).drift("clr")
+        covered += drift.low <= -0.01 <= drift.high
+    assert 0.86 < covered / 300 < 0.94
 
 
-def test_the_mean_over_positions_has_students_interval():
-    """Four shares: mean .5, deviation .1291, t(3, 95 %) = 2.353 from a printed table: .5 ±
-    .1519.
-    """
-    model = ageing()
-    solved = rubbed(model)[0][1]
+def test_the_mean_over_positions_has_students_t_interval():
+    """Four values: mean 0.5, deviation 0.1291, t(3, 95 %) = 2.353 from a table: 0.5 ± 0.1519."""
+    model = wearing_contact()
+    solved = loaded_position(model)[0][1]
     shares = (0.35, 0.45, 0.55, 0.65)
     row = contact_row(
         model.case, [replace(solved, state=replace(STATE, clr=share)) for share in shares], 1e-6

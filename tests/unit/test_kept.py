@@ -1,6 +1,4 @@
-"""What lies on disk is what was written: damage, another case's files and another version are said,
-not believed.
-"""
+"""Stored files: damage, files of another case and other versions are detected and reported."""
 
 import json
 import shutil
@@ -31,14 +29,14 @@ TABLE = pyarrow.Table.from_pylist(
 )
 
 
-def flipped(content: bytes, seed: int, count: int):
-    for place in np.random.default_rng(seed).integers(8 * len(content), size=count):
+def with_flipped_bits(content: bytes, seed: int, count: int):
+    for bit in np.random.default_rng(seed).integers(8 * len(content), size=count):
         changed = bytearray(content)
-        changed[place // 8] ^= 1 << place % 8
+        changed[bit // 8] ^= 1 << bit % 8
         yield bytes(changed)
 
 
-def test_a_digest_is_of_names_types_shapes_and_values():
+def test_a_digest_depends_on_names_types_shapes_and_values():
     array = np.arange(6.0)
     contents = [
         {"a": array},
@@ -54,7 +52,7 @@ def test_a_digest_is_of_names_types_shapes_and_values():
     assert digest({"a": 1, "b": 2}) == digest({"b": 2, "a": 1})
 
 
-def test_what_was_sealed_comes_back_and_nothing_else_does(tmp_path):
+def test_a_file_without_its_digest_is_refused(tmp_path):
     path = tmp_path / "file"
     for body in (b"", b"some bytes"):
         write_with_digest(path, body)
@@ -65,11 +63,11 @@ def test_what_was_sealed_comes_back_and_nothing_else_does(tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_flipped_bit_in_a_table_gives_the_same_table_or_a_refusal(tmp_path, seed):
+def test_a_flipped_bit_in_a_table_is_refused_or_changes_nothing(tmp_path, seed):
     path = tmp_path / "table.parquet"
     write_table(path, TABLE, "this case")
     refused = 0
-    for changed in flipped(path.read_bytes(), seed, 50):
+    for changed in with_flipped_bits(path.read_bytes(), seed, 50):
         path.write_bytes(changed)
         try:
             assert read_table(path, "this case", "compute it again").equals(TABLE)
@@ -78,9 +76,9 @@ def test_a_flipped_bit_in_a_table_gives_the_same_table_or_a_refusal(tmp_path, se
     assert refused > 20
 
 
-def test_a_table_of_lists_comes_back(tmp_path):
-    """As a study of the vibration model alone has, of its bands: parquet calls a list's items by a
-    name of its own.
+def test_a_table_of_lists_is_restored(tmp_path):
+    """A study that varies only the vibration model stores lists of bands; parquet renames the items
+    of a list.
     """
     table = pyarrow.table({"band_hz": [[2e3, 4e3], None, [1e3, 2e3]], "names": [["a"], [], ["b"]]})
     write_table(tmp_path / "table.parquet", table, "this case")
@@ -106,7 +104,7 @@ def test_a_changed_value_in_a_manifest_is_refused(tmp_path):
         read_json(path, "compute it again")
 
 
-def test_another_version_is_said():
+def test_another_version_is_reported():
     assert version_notes({"asperity": "0.0.1"})[0].startswith("Computed by asperity 0.0.1")
 
 
@@ -128,8 +126,8 @@ def histories(tmp_path_factory):
     "name", ["memory.npz", "history.parquet", "fields/step-000001.nc", "manifest.json"]
 )
 def test_files_of_another_case_are_refused(histories, tmp_path, name):
-    mine, other = histories
-    folder = shutil.copytree(mine, tmp_path / "mixed")
+    own, other = histories
+    folder = shutil.copytree(own, tmp_path / "mixed")
     load_history(folder)
     shutil.copy(other / name, folder / name)
     with pytest.raises(UnreadableFile, match="another case"):
@@ -141,12 +139,12 @@ def test_files_of_another_case_are_refused(histories, tmp_path, name):
 )
 def test_a_flipped_bit_in_a_history_is_refused_or_changes_nothing(histories, tmp_path, name):
     folder = shutil.copytree(histories[0], tmp_path / "damaged")
-    whole, told = (folder / name).read_bytes(), load_history(folder)
-    for changed in flipped(whole, 1, 25):
+    content, history = (folder / name).read_bytes(), load_history(folder)
+    for changed in with_flipped_bits(content, 1, 25):
         (folder / name).write_bytes(changed)
         try:
             again = load_history(folder)
         except UnreadableFile:
             continue
-        assert again.table.equals(told.table)
-        assert again.case == told.case
+        assert again.table.equals(history.table)
+        assert again.case == history.case

@@ -1,6 +1,4 @@
-"""A law is one class and one line in its table: the case file, the run file and the report need
-nothing else.
-"""
+"""A new law is one class and one table entry; case file, run file and report support it."""
 
 import json
 from dataclasses import dataclass
@@ -51,7 +49,7 @@ y = [-1.6, 1.6]
 
 @dataclass(frozen=True, slots=True)
 class MadeUp:
-    """Roelands' law by its exponent, and an energy that counts for nothing."""
+    """Roelands' law by its exponent, with an energy that has no effect."""
 
     eta0: Annotated[float, Parameter("Pa s", "η₀")]
     z: float
@@ -73,7 +71,7 @@ class MadeUp:
 
 @dataclass(frozen=True, slots=True)
 class MadeUpShear:
-    """A Newtonian film with a number that the law does not name."""
+    """A Newtonian film with an additional parameter."""
 
     twist: Annotated[float, Parameter("rad/s", "ω")] = 2.0
 
@@ -82,13 +80,13 @@ class MadeUpShear:
 
 
 @pytest.fixture
-def recipe(monkeypatch):
+def added_laws(monkeypatch):
     monkeypatch.setitem(VISCOSITY_LAWS, "made-up", MadeUp)
     monkeypatch.setitem(FRICTION_LAWS, "made-up", MadeUpShear)
 
 
-@pytest.mark.usefixtures("recipe")
-def test_a_law_by_the_recipe_goes_from_case_to_report(tmp_path):
+@pytest.mark.usefixtures("added_laws")
+def test_a_new_law_works_from_case_to_report(tmp_path):
     case = load_case(CASE)
     assert case.lubricant.viscosity == MadeUp(0.096, 0.6, 196e6, 14e3)
     assert load_case(case.text) == case
@@ -101,7 +99,7 @@ def test_a_law_by_the_recipe_goes_from_case_to_report(tmp_path):
     assert "made-up, ω = 2 rad/s" in page
 
 
-@pytest.mark.usefixtures("recipe")
+@pytest.mark.usefixtures("added_laws")
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -117,13 +115,13 @@ def test_a_law_by_the_recipe_goes_from_case_to_report(tmp_path):
         ({"lubricant.viscosity.law": "made-dawn"}, 'did you mean "made-up"?'),
     ],
 )
-def test_what_a_law_by_the_recipe_is_refused_for(change, message):
+def test_invalid_parameters_of_a_new_law_are_refused(change, message):
     with pytest.raises(BadInput) as refused:
         load_case(CASE).with_overrides(change)
     assert message in str(refused.value)
 
 
-def test_every_has_its_table():
+def test_every_law_family_has_its_table():
     assert tuple(LAWS) == get_args(LawFamily)
     assert LAWS["viscosity"] is VISCOSITY_LAWS
     assert law_name("warmth", WARMTH_LAWS["exponential"]()) == "exponential"

@@ -1,4 +1,4 @@
-"""What is too large is refused before the work, with the estimate and how to raise the limit."""
+"""Oversized requests are refused before computing, with the estimate and the remedy."""
 
 import os
 
@@ -16,7 +16,7 @@ from asperity.recording import read_recording
 from asperity.simulation import run_history
 
 
-def test_the_estimate_and_the_remedy_are_said(monkeypatch):
+def test_the_message_gives_the_estimate_and_the_remedy(monkeypatch):
     monkeypatch.setenv("ASPERITY_MEMORY_GB", "2")
     with pytest.raises(
         BadInput,
@@ -36,18 +36,18 @@ def test_the_estimate_and_the_remedy_are_said(monkeypatch):
 
 
 @pytest.mark.parametrize("text", ["much", "-1", "inf", "0", "nan"])
-def test_a_limit_that_is_none_is_refused(monkeypatch, text):
+def test_an_invalid_limit_is_refused(monkeypatch, text):
     monkeypatch.setenv("ASPERITY_MEMORY_GB", text)
     with pytest.raises(BadInput, match="ASPERITY_MEMORY_GB must be a positive number"):
         memory_limit()
 
 
-def test_the_machines_own_memory_is_the_limit(monkeypatch):
+def test_the_default_limit_is_the_memory_of_the_machine(monkeypatch):
     monkeypatch.delenv("ASPERITY_MEMORY_GB", raising=False)
     assert 1e8 < memory_limit() <= 0.8 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
-def test_a_file_may_unpack_to_what_measured_data_do(tmp_path, monkeypatch):
+def test_a_file_may_unpack_by_the_usual_factor_of_measured_data(tmp_path, monkeypatch):
     path = tmp_path / "x.h5"
     path.write_bytes(bytes(range(256)) * 40000)  # 10 MB
     require_unpacked(path, 5e8, "export it again")
@@ -60,7 +60,7 @@ def test_a_file_may_unpack_to_what_measured_data_do(tmp_path, monkeypatch):
     require_unpacked(path, 6e8, "export it again")
 
 
-ASKED = {
+OVERSIZED = {
     "a grid of 20000 x 20000 cells": lambda: papers_case().with_overrides(
         {"grid.cells": [20000, 20000]}
     ),
@@ -80,14 +80,14 @@ ASKED = {
 }
 
 
-@pytest.mark.parametrize("what", ASKED)
-def test_what_no_machine_has_is_refused_before_the_work(monkeypatch, what):
+@pytest.mark.parametrize("description", OVERSIZED)
+def test_oversized_requests_are_refused_before_computing(monkeypatch, description):
     monkeypatch.setenv("ASPERITY_MEMORY_GB", "16")
-    with pytest.raises(BadInput, match=f"{what}.* would take about .*; reduce it"):
-        ASKED[what]()
+    with pytest.raises(BadInput, match=f"{description}.* would take about .*; reduce it"):
+        OVERSIZED[description]()
 
 
-def test_a_scale_that_is_no_number_is_refused(tmp_path):
+def test_an_invalid_scale_is_refused(tmp_path):
     np.save(tmp_path / "x.npy", np.arange(100.0))
     for scale in (float("inf"), float("nan"), 0.0):
         with pytest.raises(BadInput, match="scale must be finite and not 0"):
@@ -95,26 +95,26 @@ def test_a_scale_that_is_no_number_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["x = " + "[" * 3000 + "]" * 3000, "x = " + "9" * 5000])
-def test_a_case_beyond_what_python_reads_is_refused(text):
+def test_a_case_beyond_the_limits_of_the_parser_is_refused(text):
     with pytest.raises(UnreadableFile, match="not valid TOML"):
         load_case(f"{text}\n", name="case.toml")
     with pytest.raises(BadInput, match="cannot be read"):
         papers_case().with_overrides({"contact.load": text.removeprefix("x = ")})
 
 
-def test_a_line_of_another_key_is_no_part_of_a_value():
+def test_a_value_cannot_add_another_key():
     with pytest.raises(BadInput, match=r"contact\.load must be a force"):
         papers_case().with_overrides({"contact.load": "'500 N'\nsurface = 1"})
 
 
-def test_a_long_value_is_shown_by_its_beginning():
+def test_a_long_value_is_abbreviated_in_the_message():
     with pytest.raises(BadInput) as caught:
         papers_case().with_overrides({"contact.load": "x" * 10**6})
     assert len(str(caught.value)) < 400
     assert "(1000002 characters)" in str(caught.value)
 
 
-def test_no_formula_gets_into_a_spreadsheet(tmp_path):
+def test_formulas_are_escaped_in_csv_files(tmp_path):
     table = pandas.DataFrame(
         {
             "file": ["=1+1", "a.csv"],

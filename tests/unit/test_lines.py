@@ -25,7 +25,7 @@ def spectrum(values, segment=40_000, window="hann"):
     return power_spectrum(Signal(values, RATE, "m/s^2"), segment=segment, window=window)
 
 
-def test_tones_are_taken_out_named_and_measured():
+def test_tones_are_removed_identified_and_measured():
     clean = remove_lines(
         spectrum(noise() + tones(SHAFT, range(1, 60, 3), 0.3) + tones(50.0, (1, 2, 3, 5, 7), 0.2))
     )
@@ -43,7 +43,7 @@ def test_tones_are_taken_out_named_and_measured():
     assert clean.speeds_hz == pytest.approx((SHAFT, 50.0), abs=0.005)
 
 
-def test_what_is_left_is_the_noise_beside_them():
+def test_the_cleaned_spectrum_is_that_of_the_noise():
     before, clean = (
         spectrum(noise()),
         remove_lines(spectrum(noise() + tones(SHAFT, range(1, 60, 3), 0.3))),
@@ -52,43 +52,43 @@ def test_what_is_left_is_the_noise_beside_them():
         clean.spectrum.density[clean.kept],
         remove_lines(clean.spectrum).spectrum.density[clean.kept],
     )
-    # Parseval: all that the tones brought is gone
-    power = [np.sum(one.density) * one.spacing_hz for one in (before, clean.spectrum)]
+    # Parseval: the power of the tones is removed
+    power = [np.sum(entry.density) * entry.spacing_hz for entry in (before, clean.spectrum)]
     assert power[1] == pytest.approx(power[0], rel=0.005)
-    far = clean.kept & (
+    distant = clean.kept & (
         np.abs(before.frequency_hz[:, None] - SHAFT * np.arange(1, 60, 3)).min(axis=1) > 5.0
     )
-    assert clean.spectrum.density[far] == pytest.approx(before.density[far], rel=0.05)
+    assert clean.spectrum.density[distant] == pytest.approx(before.density[distant], rel=0.05)
 
 
-def test_noise_alone_loses_nothing():
+def test_no_lines_are_removed_from_noise():
     for window, segment in (("hann", 40_000), ("hann", None), ("boxcar", None)):
-        lost = sum(
+        removed_count = sum(
             len(remove_lines(spectrum(noise(seed), segment, window)).removed) for seed in range(10)
         )
-        assert lost <= 1  # 0.1 expected
+        assert removed_count <= 1  # 0.1 expected
 
 
 @pytest.mark.parametrize("damping_ratio", [0.0005, 0.003])  # 8 and 48 spectral lines wide
-def test_a_resonance_is_no_tone(damping_ratio):
+def test_a_resonance_is_not_removed_as_a_tone(damping_ratio):
     spring = ContactOscillator(
         mass=0.1, stiffness=0.1 * (2 * np.pi * 2000.0) ** 2, damping_ratio=damping_ratio
     )
-    ridden = acceleration(spring, Signal(np.cumsum(np.cumsum(noise())) * 1e-9, RATE, "m")).values
-    ridden = ridden / np.std(ridden)
-    seen = spectrum(ridden + 0.01 * noise(1) + tones(SHAFT, range(60, 76), 0.05))
-    clean = remove_lines(seen, shaft_hz=[SHAFT])
-    near = np.abs(seen.frequency_hz - 2000.0) < 4.0  # no harmonic within: the top of the resonance
-    assert np.all(clean.kept[near])
+    response = acceleration(spring, Signal(np.cumsum(np.cumsum(noise())) * 1e-9, RATE, "m")).values
+    response = response / np.std(response)
+    measured = spectrum(response + 0.01 * noise(1) + tones(SHAFT, range(60, 76), 0.05))
+    clean = remove_lines(measured, shaft_hz=[SHAFT])
+    peak = np.abs(measured.frequency_hz - 2000.0) < 4.0  # no harmonic falls on the resonance peak
+    assert np.all(clean.kept[peak])
     found = contact_resonance(clean.spectrum, band_hz=(1600.0, 2400.0))
     assert found.crf_hz == pytest.approx(2000.0, abs=4.0 * found.crf_std)
 
 
-def test_known_speeds_show_weaker_tones():
+def test_a_known_speed_reveals_weaker_tones():
     values = noise() + tones(SHAFT, range(1, 90), 0.015)
     found, given = remove_lines(spectrum(values)), remove_lines(spectrum(values), shaft_hz=[29.36])
     assert len(given.removed) > 3 * len(found.removed)
-    assert given.speeds_hz[0] == pytest.approx(SHAFT, abs=0.01)  # put right
+    assert given.speeds_hz[0] == pytest.approx(SHAFT, abs=0.01)  # corrected
     false = [
         line
         for line in given.removed
@@ -97,24 +97,24 @@ def test_known_speeds_show_weaker_tones():
     assert len(false) <= 1
 
 
-def test_only_the_band_is_touched():
-    seen = spectrum(noise() + tones(SHAFT, range(1, 60), 0.3))
-    clean = remove_lines(seen, band_hz=(600.0, 1200.0))
+def test_only_the_band_is_cleaned():
+    measured = spectrum(noise() + tones(SHAFT, range(1, 60), 0.3))
+    clean = remove_lines(measured, band_hz=(600.0, 1200.0))
     assert all(590.0 < line.frequency_hz < 1210.0 for line in clean.removed)
-    outside = (seen.frequency_hz < 590.0) | (seen.frequency_hz > 1210.0)
+    outside = (measured.frequency_hz < 590.0) | (measured.frequency_hz > 1210.0)
     assert np.all(clean.kept[outside])
-    assert clean.removed[0].source.startswith("21 x")  # the speed is judged by all tones
+    assert clean.removed[0].source.startswith("21 x")  # the speed is estimated from all tones
 
 
 @pytest.mark.parametrize(
-    ("spoil", "arguments", "named"),
+    ("damage", "arguments", "message"),
     [
-        (lambda one: smooth(one, 3), {}, "unsmoothed"),
-        (lambda one: one, {"shaft_hz": [-1.0]}, "shaft speed"),
-        (lambda one: replace(one, density=one.density * np.nan), {}, "finite"),
-        (lambda one: replace(one, density=one.density[:30]), {}, "too short"),
+        (lambda valid: smooth(valid, 3), {}, "unsmoothed"),
+        (lambda valid: valid, {"shaft_hz": [-1.0]}, "shaft speed"),
+        (lambda valid: replace(valid, density=valid.density * np.nan), {}, "finite"),
+        (lambda valid: replace(valid, density=valid.density[:30]), {}, "too short"),
     ],
 )
-def test_what_cannot_be_judged_is_refused(spoil, arguments, named):
-    with pytest.raises(BadInput, match=named):
-        remove_lines(spoil(spectrum(noise())), **arguments)
+def test_an_invalid_spectrum_or_speed_is_refused(damage, arguments, message):
+    with pytest.raises(BadInput, match=message):
+        remove_lines(damage(spectrum(noise())), **arguments)

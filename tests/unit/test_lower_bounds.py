@@ -1,6 +1,4 @@
-"""The lowest versions that are allowed are those that `lowest.txt` has, which CI installs and
-tests.
-"""
+"""The lowest allowed versions are those in `lowest.txt`, which CI installs and tests."""
 
 import re
 import tomllib
@@ -9,7 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 
 
-def test_what_is_allowed_is_what_is_tested():
+def test_the_lowest_allowed_versions_are_tested():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     extras = [entry for names in project["optional-dependencies"].values() for entry in names]
     allowed = {entry.replace(">=", "==") for entry in (*project["dependencies"], *extras)}

@@ -29,15 +29,15 @@ def test_density_slope_is_the_derivative():
 
 
 def test_barus_decades():
-    """Viscosity grows tenfold every ln(10)/alpha."""
+    """Viscosity increases tenfold every ln(10)/alpha."""
     law = Barus(0.05, 20e-9)
     np.testing.assert_allclose(
         law(np.array([0.0, 1.0, 2.0]) * np.log(10.0) / 20e-9), [0.05, 0.5, 5.0], rtol=1e-12
     )
 
 
-def test_roelands_is_the_formula_as_textbooks_print_it():
-    """eta = eta0 exp((ln eta0 + 9.67) (-1 + (1 + 5.1e-9 p)^z)): Hamrock, Fundamentals of fluid film
+def test_roelands_law_agrees_with_the_textbook_formula():
+    """eta = eta0 exp((ln eta0 + 9.67) (-1 + (1 + 5.1e-9 p)^z)), Hamrock, Fundamentals of fluid film
     lubrication.
     """
     z, eta0 = 0.6, 0.04
@@ -47,10 +47,8 @@ def test_roelands_is_the_formula_as_textbooks_print_it():
     np.testing.assert_allclose(law(PRESSURES), printed, rtol=1e-12)
 
 
-def test_density_levels_off_a_third_higher():
-    """Dowson and Higginson (1966): at most 0.6/1.7 = 35 % denser; the printed value at 1 GPa is 22
-    %.
-    """
+def test_density_saturates_a_third_higher():
+    """Dowson and Higginson (1966): at most 0.6/1.7 = 35 % denser, 22 % at 1 GPa."""
     density = DowsonHigginson(1.0)(np.array([0.0, 1e9, 1e15]))
     np.testing.assert_allclose(density, [1.0, 1.0 + 0.6 / 2.7, 1.0 + 6.0 / 17.0], rtol=1e-5)
 
@@ -66,6 +64,6 @@ def test_density_levels_off_a_third_higher():
         (lambda: Incompressible(float("inf")), "density rho0"),
     ],
 )
-def test_an_oil_that_cannot_be_is_refused(build, message):
+def test_an_invalid_oil_is_refused(build, message):
     with pytest.raises(BadInput, match=message):
         build()

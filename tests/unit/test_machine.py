@@ -1,5 +1,5 @@
-"""Machines to contacts: closed forms, catalogue and published values, independent twins, and bad
-machines refused.
+"""Contacts of machines: closed forms, catalogue and published values, reference implementations,
+and refusals.
 """
 
 import math
@@ -98,7 +98,7 @@ CAM = {
         ),
     ],
 )
-def test_the_fzg_gears_along_their_path(gears, table):
+def test_fzg_gears_along_the_path_of_contact(gears, table):
     pair = SpurGear(**gears)
     found = {contact.name: contact for contact in pair.contacts(STEEL)}
     for name, (s, radius, first, second, sliding, share, pressure) in table.items():
@@ -114,7 +114,7 @@ def test_the_fzg_gears_along_their_path(gears, table):
     )
 
 
-def test_the_fzg_c_profile_without_tip_shortening_is_gearpies():
+def test_the_fzg_c_profile_without_tip_shortening_agrees_with_gearpie():
     given = C_GEAR | {"tip_diameters": None, "torque": 200.0}
     pair = SpurGear(**given)
     path = pair.path
@@ -127,7 +127,7 @@ def test_the_fzg_c_profile_without_tip_shortening_is_gearpies():
     assert 1e6 * pitch.hertz(STEEL).half_widths[0] == pytest.approx(199.5, rel=1e-3)
 
 
-def test_a_gears_torque_is_the_load_stage_of_the_standard():
+def test_the_torque_matches_the_load_stage_of_the_standard():
     nominal = SpurGear(**A_GEAR)
     pitch = nominal.contact("C", nominal.path["C"])
     whole = pitch.hertz(STEEL).p_max / math.sqrt(nominal.share(nominal.path["C"]))
@@ -135,24 +135,24 @@ def test_a_gears_torque_is_the_load_stage_of_the_standard():
     assert any("never reached" in note for note in nominal.notes(STEEL))
 
 
-def test_a_path_by_its_definition():
-    """A twin: meshing teeth as curves, met by their distance from the axes alone."""
+def test_the_path_of_contact_agrees_with_its_definition():
+    """Reference: the path as points on the line of action, limited by distances from the axes."""
     pair = SpurGear(**C_GEAR)
     (base_1, base_2), (tip_1, tip_2), centres = pair.base_radii, pair.tip_radii, pair.centres
     angle = math.acos((base_1 + base_2) / centres)
 
-    def place(s):  # on the plane, pinion at the origin, wheel on x
+    def point(s):  # in the plane, pinion at the origin, wheel on x
         foot = base_1 * np.array([math.cos(angle), math.sin(angle)])
         return foot + s * np.array([math.sin(angle), -math.cos(angle)])
 
     def to_wheel(s):
-        return float(np.linalg.norm(place(s) - [centres, 0.0]))
+        return float(np.linalg.norm(point(s) - [centres, 0.0]))
 
     start = scipy.optimize.brentq(lambda s: to_wheel(s) - tip_2, 0.0, pair.line_of_action)
     end = scipy.optimize.brentq(
-        lambda s: float(np.linalg.norm(place(s))) - tip_1, 0.0, pair.line_of_action
+        lambda s: float(np.linalg.norm(point(s))) - tip_1, 0.0, pair.line_of_action
     )
-    pitch = scipy.optimize.brentq(lambda s: place(s)[1], 0.0, pair.line_of_action)
+    pitch = scipy.optimize.brentq(lambda s: point(s)[1], 0.0, pair.line_of_action)
     assert (pair.path["A"], pair.path["E"], pair.path["C"]) == pytest.approx(
         (start, end, pitch), rel=1e-9
     )
@@ -174,7 +174,7 @@ def test_the_frequencies_of_gears():
 
 
 @pytest.mark.parametrize(
-    ("changed", "words"),
+    ("changed", "message"),
     [
         ({"centre_distance": 80e-3}, "base circles overlap"),
         ({"centre_distance": 90.6e-3}, "jams the teeth"),
@@ -189,15 +189,13 @@ def test_the_frequencies_of_gears():
         ({"torque": -1.0}, "torque must be positive"),
     ],
 )
-def test_gears_that_cannot_be_are_refused(changed, words):
-    with pytest.raises(BadInput, match=words):
+def test_invalid_gears_are_refused(changed, message):
+    with pytest.raises(BadInput, match=message):
         SpurGear(**(C_GEAR | changed))
 
 
-def cut_away_up_to(count, module, angle):
-    """A twin: the largest radius at which some position of the rack's tooth reaches into the
-    involute.
-    """
+def undercut_radius(count, module, angle):
+    """Reference: largest radius at which the rack's tooth cuts into the involute."""
     pitch = module * count / 2.0
     travel = np.linspace(-2.0 * pitch, 2.0 * pitch, 4001)
     cut = 0.0
@@ -213,16 +211,16 @@ def cut_away_up_to(count, module, angle):
     return cut
 
 
-def test_teeth_undercut_where_they_bear_are_refused():
+def test_teeth_undercut_on_the_active_flank_are_refused():
     nine = FZG | {"teeth": (9, 40), "centre_distance": None, "face_width": 0.01, "torque": 10.0}
-    limit = 1e3 * cut_away_up_to(9, nine["module"], nine["pressure_angle"])
+    limit = 1e3 * undercut_radius(9, nine["module"], nine["pressure_angle"])
     with pytest.raises(BadInput, match=r"raise its profile shift to 0\.474") as refused:
         SpurGear(**(nine | {"tip_diameters": (49.5e-3, 184e-3)}))
-    said = float(str(refused.value).split("radius of ")[1].split(" mm")[0])
-    assert said == pytest.approx(limit, abs=2e-3)
+    stated = float(str(refused.value).split("radius of ")[1].split(" mm")[0])
+    assert stated == pytest.approx(limit, abs=2e-3)
     assert (
         SpurGear(**(nine | {"tip_diameters": (49.5e-3, 183.2e-3)})).contact_ratio > 1.0
-    )  # bears further out
+    )  # engages further out
     assert (
         SpurGear(
             **(nine | {"profile_shift": (0.48, 0.0), "tip_diameters": (53.8e-3, 187e-3)})
@@ -231,11 +229,11 @@ def test_teeth_undercut_where_they_bear_are_refused():
     )
 
 
-def test_an_undercut_below_the_bearing_flank_is_no_harm():
+def test_an_undercut_below_the_active_flank_is_accepted():
     wheel, shift = A_GEAR["teeth"][1], A_GEAR["profile_shift"][1]
     assert (
         shift < 1.0 - wheel * math.sin(FZG["pressure_angle"]) ** 2 / 2.0
-    )  # the A wheel is undercut, and serves
+    )  # the A wheel is undercut below its active flank
     assert SpurGear(**A_GEAR).contact_ratio > 1.0
 
 
@@ -244,23 +242,23 @@ def test_an_undercut_below_the_bearing_flank_is_no_harm():
 
 
 @pytest.mark.parametrize(
-    ("count", "diameter", "pitch", "factors", "within"),
+    ("count", "diameter", "pitch", "factors", "tolerance"),
     [
         (13, 9.0e-3, 46.5e-3, (5.24, 7.76, 2.49, 0.40), 1e-2),  # NU 206, Schnur 2025
         (9, 7.940e-3, 39.04e-3, (3.5848, 5.4152, 2.3567, 0.3983), 1e-4),  # 6205 of the CWRU data
     ],
 )
-def test_characteristic_frequencies(count, diameter, pitch, factors, within):
+def test_characteristic_frequencies(count, diameter, pitch, factors, tolerance):
     found = RollingKinematics(
         count=count, diameter=diameter, pitch_diameter=pitch, speed=2.0 * math.pi
     ).frequencies
     assert [found[name] for name in ("bpfo_hz", "bpfi_hz", "bsf_hz", "ftf_hz")] == pytest.approx(
-        factors, rel=within
+        factors, rel=tolerance
     )
 
 
-def test_speeds_are_those_of_the_cages_frame():
-    """A twin: a ring's speed less the cage's, in the laboratory's frame."""
+def test_speeds_are_relative_to_the_cage():
+    """Reference: ring speed minus cage speed in the laboratory frame."""
     kinematics = CylindricalRollerBearing(**NU206).kinematics
     inner = (46.5e-3 - 9e-3) / 2.0 * (kinematics.speed - kinematics.cage_speed)
     outer = (46.5e-3 + 9e-3) / 2.0 * kinematics.cage_speed
@@ -298,8 +296,8 @@ def test_slices_of_iso_16281(clearance, profile, shift, loads):
     assert float(bearing.loads @ np.cos(bearing.angles)) == pytest.approx(4000.0, rel=1e-9)
 
 
-def test_slices_against_a_twin():
-    """The same balance, slice by slice in plain loops and by bisection."""
+def test_slices_agree_with_a_reference_implementation():
+    """The same equilibrium with plain loops over slices and bisection."""
     length, diameter, slices, clearance, load = (
         22.0,
         8.0,
@@ -307,7 +305,7 @@ def test_slices_against_a_twin():
         0.012,
         9000.0,
     )  # N, mm; longer than 2.5 diameters
-    places = [length * ((k + 0.5) / slices - 0.5) for k in range(slices)]
+    positions = [length * ((k + 0.5) / slices - 0.5) for k in range(slices)]
     ends = 2.5 * diameter
 
     def drop(x):
@@ -317,16 +315,16 @@ def test_slices_against_a_twin():
     def rollers(shift):
         loads = []
         for j in range(15):
-            near = shift * math.cos(2.0 * math.pi * j / 15) - clearance / 2.0
-            each = (max(near - 2.0 * drop(x), 0.0) ** (10.0 / 9.0) for x in places)
-            loads.append(35948.0 * length ** (8.0 / 9.0) / slices * sum(each))
+            approach = shift * math.cos(2.0 * math.pi * j / 15) - clearance / 2.0
+            deflections = (max(approach - 2.0 * drop(x), 0.0) ** (10.0 / 9.0) for x in positions)
+            loads.append(35948.0 * length ** (8.0 / 9.0) / slices * sum(deflections))
         return loads
 
     low, high = 0.0, 1.0
     for _ in range(80):
         middle = (low + high) / 2.0
-        carried = sum(q * math.cos(2.0 * math.pi * j / 15) for j, q in enumerate(rollers(middle)))
-        low, high = (middle, high) if carried < load else (low, middle)
+        forces = sum(q * math.cos(2.0 * math.pi * j / 15) for j, q in enumerate(rollers(middle)))
+        low, high = (middle, high) if forces < load else (low, middle)
     bearing = CylindricalRollerBearing(
         rollers=15,
         roller_diameter=1e-3 * diameter,
@@ -341,7 +339,7 @@ def test_slices_against_a_twin():
     assert bearing.loads == pytest.approx(rollers(low), rel=1e-9, abs=1e-6)
 
 
-def sjovall(eps, exponent):
+def sjovall_integral(eps, exponent):
     """J_r(ε) = (1/π) ∫ [1 - (1 - cos ψ)/(2ε)]^n cos ψ dψ over the load zone's half."""
     end = math.pi if eps > 1.0 else math.acos(1.0 - 2.0 * eps)
     whole = scipy.integrate.quad(
@@ -352,18 +350,20 @@ def sjovall(eps, exponent):
     return whole[0] / math.pi
 
 
-def test_the_load_zones_integral_is_the_printed_one():
-    assert sjovall(0.5, 1.5) == pytest.approx(0.22883, rel=1e-4)
-    assert sjovall(0.5, 1.1) == pytest.approx(0.24530, rel=1e-4)
-    assert sjovall(0.5, 10.0 / 9.0) == pytest.approx(0.24480, rel=1e-4)
+def test_the_load_zone_integral_has_its_published_values():
+    assert sjovall_integral(0.5, 1.5) == pytest.approx(0.22883, rel=1e-4)
+    assert sjovall_integral(0.5, 1.1) == pytest.approx(0.24530, rel=1e-4)
+    assert sjovall_integral(0.5, 10.0 / 9.0) == pytest.approx(0.24480, rel=1e-4)
 
 
 @pytest.mark.parametrize("clearance", [-4e-6, 0.0, 20e-6])
-def test_the_load_zone_is_sjovalls_with_many_rollers(clearance):
+def test_the_load_zone_of_many_rollers_approaches_sjovalls_integral(clearance):
     thin = NU206 | {"rollers": 400, "roller_diameter": 0.3e-3, "roller_length": 1e-3}
     bearing = CylindricalRollerBearing(**thin, clearance=clearance / 10.0)
     eps = (1.0 - bearing.clearance / (2.0 * bearing.shift)) / 2.0
-    assert bearing.loads[0] == pytest.approx(4000.0 / (400 * sjovall(eps, 10.0 / 9.0)), rel=1e-4)
+    assert bearing.loads[0] == pytest.approx(
+        4000.0 / (400 * sjovall_integral(eps, 10.0 / 9.0)), rel=1e-4
+    )
 
 
 def test_the_load_zone_with_few_elements():
@@ -376,7 +376,7 @@ def test_the_load_zone_with_few_elements():
 
 def test_a_rollers_contacts():
     contacts = CylindricalRollerBearing(**NU206, clearance=20e-6).contacts(STEEL)
-    assert len(contacts) == 10  # five rollers bear, each on both rings
+    assert len(contacts) == 10  # five loaded rollers, each on both rings
     inner, outer = contacts[:2]
     assert (inner.name, outer.name) == ("roller 0, inner ring", "roller 0, outer ring")
     assert inner.line_load == pytest.approx(163.95e3, rel=1e-4)
@@ -407,7 +407,7 @@ def test_a_profiled_roller_is_solved_for_its_heaviest_slice():
         (1000.0, 1000.0, 10e-6, (19.592, 146.460)),
     ],
 )
-def test_ball_bearings_move_as_iso_16281_has_it(radial, axial, clearance, shifts):
+def test_displacements_of_ball_bearings_agree_with_iso_16281(radial, axial, clearance, shifts):
     pair = ElasticPair((210e9, 210e9), (0.3, 0.3))
     bearing = BallBearing(
         **BALLS, radial_load=radial, axial_load=axial, clearance=clearance, tilt=None
@@ -428,8 +428,8 @@ def test_ball_bearings_move_as_iso_16281_has_it(radial, axial, clearance, shifts
         )
 
 
-def test_thrust_alone_meets_the_closed_form():
-    """F_a/(Z c_p A^1.5) = sin α (cos α0/cos α - 1)^1.5, of an angular-contact bearing."""
+def test_pure_thrust_satisfies_the_closed_form():
+    """F_a/(Z c_p A^1.5) = sin α (cos α0/cos α - 1)^1.5 for an angular-contact bearing."""
     free, load = math.radians(25.0), 3000.0
     bearing = BallBearing(**BALLS, axial_load=load, contact_angle=free)
     _, angles = bearing.loads(STEEL)
@@ -457,22 +457,20 @@ def random_bearing(rng, *, tilt, thrusts):
     )
 
 
-def carried(bearing):
-    """Radial and axial force on all balls, and the moment over the radius of their grooves' centres
-    [N].
-    """
+def forces(bearing):
+    """Return radial force, axial force and moment per groove-centre radius on all balls [N]."""
     radial, axial, tilt = bearing.shifts(STEEL)
     return bearing._forces(np.array([radial, axial, tilt * bearing._arm]), bearing.stiffness(STEEL))
 
 
 @pytest.mark.parametrize("tilt", [None, 0.0, 1e-3])
-def test_every_angular_contact_bearing_finds_its_balance(tilt):
-    """Under hardly any thrust too, where a ring that moves axially is hardly held."""
+def test_every_angular_contact_bearing_reaches_equilibrium(tilt):
+    """Includes very small thrust, which hardly restrains the ring axially."""
     rng = np.random.default_rng(11)
     for _ in range(60):
         bearing = random_bearing(rng, tilt=tilt, thrusts=(-5.0, 1.0))
         force = max(bearing.radial_load, bearing.axial_load)
-        found = carried(bearing)
+        found = forces(bearing)
         assert found[:2] == pytest.approx(
             [bearing.radial_load, bearing.axial_load], abs=1e-7 * force
         )
@@ -483,7 +481,7 @@ def test_every_angular_contact_bearing_finds_its_balance(tilt):
             assert angles[loads > 0.0].min() > 0.0
 
 
-def test_an_angular_contact_bearing_that_comes_apart_says_so():
+def test_an_angular_contact_bearing_without_enough_thrust_is_refused():
     loose = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=5.0, tilt=None)
     with pytest.raises(
         BadInput, match=r"comes apart under a thrust of 5 N with 1000 N.* at least about 1.02e.03 N"
@@ -491,35 +489,35 @@ def test_an_angular_contact_bearing_that_comes_apart_says_so():
         loose.loads(STEEL)
 
 
-def test_an_angular_contact_bearing_bears_as_its_catalogue_supposes():
-    """7205 B, 1 kN across and 1.14 kN along, e of ISO 281: half of the balls, at 40 degrees, for
-    (C/P)³ million turns.
+def test_the_load_zone_of_an_angular_contact_bearing_agrees_with_its_catalogue():
+    """7205 B, 1 kN radial and 1.14 kN axial, e of ISO 281: half of the balls at 40 degrees, (C/P)³
+    million turns.
 
-    C 15.6 kN, P the radial load. Free to tilt it would bear at 20 degrees, on balls opposite the
-    load too.
+    C is 15.6 kN, P the radial load. Free to tilt, it would have 20 degrees and load balls opposite
+    the radial load as well.
     """
-    upright, free = (
+    fixed, free = (
         BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=1140.0, tilt=tilt)
         for tilt in (0.0, None)
     )
-    loads, angles = upright.loads(STEEL)
+    loads, angles = fixed.loads(STEEL)
     assert np.count_nonzero(loads) == 7
     assert loads.max() == pytest.approx(430.0, rel=2e-3)
     assert math.degrees(angles[0]) == pytest.approx(40.0, abs=3.0)
-    ratio = upright.ball_diameter * math.cos(upright.contact_angle) / upright.pitch_diameter
-    raceway = BallRaceway(ratio, upright.osculation, upright.contact_angle)
+    ratio = fixed.ball_diameter * math.cos(fixed.contact_angle) / fixed.pitch_diameter
+    raceway = BallRaceway(ratio, fixed.osculation, fixed.contact_angle)
     assert ball_life(loads, 15.6e3, raceway) == pytest.approx(15.6**3 * 1e6, rel=0.25)
-    tilting, aslant = free.loads(STEEL)
-    assert tilting.max() > 1.5 * loads.max()
-    assert math.degrees(aslant[0]) < 25.0
+    free_loads, tilted_angles = free.loads(STEEL)
+    assert free_loads.max() > 1.5 * loads.max()
+    assert math.degrees(tilted_angles[0]) < 25.0
     assert any("tilts by -5.22 mrad" in note for note in free.notes(STEEL))
-    assert any("with a moment of 16.1 N m" in note for note in upright.notes(STEEL))
+    assert any("with a moment of 16.1 N m" in note for note in fixed.notes(STEEL))
     few = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=600.0)
     assert any("The thrust loads 3 of 12 balls" in note for note in few.notes(STEEL))
 
 
-def test_the_moment_of_a_held_ring_is_what_the_energy_asks_for():
-    """A tilt's slope of the elastic energy less the loads' work, least at the other shifts."""
+def test_the_moment_of_a_fixed_ring_is_the_derivative_of_the_energy():
+    """Derivative by tilt of elastic energy minus work of the loads, minimised over the shifts."""
 
     def energy(tilt):
         bearing = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=900.0, tilt=tilt)
@@ -528,14 +526,14 @@ def test_the_moment_of_a_held_ring_is_what_the_energy_asks_for():
         elastic = (loads / bearing.stiffness(STEEL)) ** (2.0 / 3.0)
         return 0.4 * float(loads @ elastic) - 1000.0 * radial - 900.0 * axial
 
-    held = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=900.0, tilt=-1e-3)
+    fixed_tilt = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=900.0, tilt=-1e-3)
     step = 1e-5
-    assert held.moment(STEEL) == pytest.approx(
+    assert fixed_tilt.moment(STEEL) == pytest.approx(
         (energy(-1e-3 + step) - energy(-1e-3 - step)) / (2.0 * step), rel=1e-5
     )
 
 
-def test_preload_alone_bears_on_every_ball():
+def test_preload_alone_loads_every_ball_equally():
     bearing = BallBearing(**BALLS_6206, clearance=-10e-6)
     loads, angles = bearing.loads(STEEL)
     assert loads == pytest.approx([bearing.stiffness(STEEL) * 5e-6**1.5] * 9)
@@ -543,8 +541,8 @@ def test_preload_alone_bears_on_every_ball():
     assert len(bearing.contacts(STEEL)) == 18
 
 
-def test_a_clearance_sets_the_angle_that_frequencies_are_for():
-    """6206, 20 um: arccos(1 - s/(2 A)) is 11.76 deg; without thrust the balls bear upright."""
+def test_clearance_sets_the_contact_angle_of_the_frequencies():
+    """6206, 20 um: arccos(1 - s/(2 A)) = 11.76 deg; without thrust the contact angle is 0."""
     thrust, across = (
         BallBearing(**BALLS_6206, clearance=20e-6, **load)
         for load in ({"axial_load": 500.0}, {"radial_load": 500.0})
@@ -554,7 +552,7 @@ def test_a_clearance_sets_the_angle_that_frequencies_are_for():
     assert thrust.frequencies["bpfi_hz"] < across.frequencies["bpfi_hz"]
 
 
-def test_a_6206_under_two_kilonewtons():
+def test_a_6206_under_2_kn():
     bearing = BallBearing(**BALLS_6206, radial_load=2000.0)
     assert bearing.loads(STEEL)[0][:4] == pytest.approx([974.49, 653.37, 70.52, 0.0], rel=1e-4)
     inner, outer = (contact.hertz(STEEL) for contact in bearing.contacts(STEEL)[:2])
@@ -570,7 +568,7 @@ def test_a_6206_under_two_kilonewtons():
 
 
 @pytest.mark.parametrize(
-    ("machine", "given", "words"),
+    ("machine", "given", "message"),
     [
         (
             CylindricalRollerBearing,
@@ -613,16 +611,16 @@ def test_a_6206_under_two_kilonewtons():
         (BallBearing, BALLS | {"axial_load": -10.0}, "axial_load"),
     ],
 )
-def test_bearings_that_cannot_be_are_refused(machine, given, words):
-    with pytest.raises(BadInput, match=words):
+def test_invalid_bearings_are_refused(machine, given, message):
+    with pytest.raises(BadInput, match=message):
         machine(**given)
 
 
-def test_what_is_left_out_of_a_bearing_is_said():
+def test_neglected_effects_of_a_bearing_are_noted():
     fast = CylindricalRollerBearing(**(NU206 | {"speed": 20000.0 * RPM}))
     assert any(
         "centrifugal load of 82" in note for note in fast.notes(STEEL)
-    )  # 1.85 N at 3000 r/min, by its square
+    )  # 1.85 N at 3000 r/min, times speed squared
     assert not any("centrifugal" in note for note in CylindricalRollerBearing(**NU206).notes(STEEL))
     loose = CylindricalRollerBearing(**(NU206 | {"clearance": 200e-6, "radial_load": 100.0}))
     assert any("A single roller" in note for note in loose.notes(STEEL))
@@ -634,7 +632,7 @@ def test_what_is_left_out_of_a_bearing_is_said():
 # -------------------------------------------------------------------------------------------------
 
 
-def test_discs_keep_the_sign_of_their_sliding():
+def test_discs_preserve_the_sign_of_sliding():
     slow = TwinDisc(radii=(0.02, 0.03), speeds=(100.0, 50.0), load=500.0, length=5e-3)
     (contact,) = slow.contacts(STEEL)
     assert contact.radius == pytest.approx(0.012)
@@ -664,11 +662,13 @@ def test_an_eccentric_disc_under_a_flat_follower():
     assert [contacts[at].entrainment_speed for at in (8, 4, 0)] == pytest.approx(
         [1.25, 1.0, 0.75], rel=1e-9
     )
-    assert contacts[0].slide_to_roll > 2.0  # the nose runs against the follower
+    assert (
+        contacts[0].slide_to_roll > 2.0
+    )  # at the nose, cam and follower surfaces move in opposite directions
     assert any("opposite directions" in note for note in FlatCam(**CAM).notes(STEEL))
 
 
-def test_where_a_cam_entrains_backwards_the_solver_sees_it_from_the_other_side():
+def test_negative_entrainment_is_reversed_for_the_solver():
     cam = FlatCam(**(CAM | {"base_radius": 30e-3, "half_angle": math.radians(70.0)}))
     contacts = cam.contacts(STEEL)
     nose, flank = contacts[0], contacts[-1]
@@ -680,7 +680,7 @@ def test_where_a_cam_entrains_backwards_the_solver_sees_it_from_the_other_side()
     assert any("passes zero" in note for note in cam.notes(STEEL))
 
 
-def test_a_contact_that_draws_no_oil_in_is_not_solved_but_pressed():
+def test_a_contact_without_entrainment_has_only_hertz_pressure():
     balanced = TwinDisc(radii=(0.02, 0.02), speeds=(1.0, 1.0), load=10.0, length=1e-3).contacts(
         STEEL
     )[0]
@@ -693,7 +693,7 @@ def test_a_contact_that_draws_no_oil_in_is_not_solved_but_pressed():
 
 
 @pytest.mark.parametrize(
-    ("changed", "words"),
+    ("changed", "message"),
     [
         ({"half_angle": math.radians(40.0)}, "undercut"),
         ({"follower_mass": 1.0, "speed": 200.0}, "lifts off"),
@@ -701,8 +701,8 @@ def test_a_contact_that_draws_no_oil_in_is_not_solved_but_pressed():
         ({"lift": 0.0}, "lift must be positive"),
     ],
 )
-def test_cams_that_cannot_be_are_refused(changed, words):
-    with pytest.raises(BadInput, match=words):
+def test_invalid_cams_are_refused(changed, message):
+    with pytest.raises(BadInput, match=message):
         FlatCam(**(CAM | changed))
 
 
@@ -722,9 +722,7 @@ ROLLER_CAM = {
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, 1.5, 3.0])
 def test_an_eccentric_disc_under_a_roller(angle):
-    """The roller's centre stays on a circle: the cam's radius is the disc's, and so is the path
-    that is passed.
-    """
+    """The roller centre moves on a circle: cam radius and path are those of the disc."""
     disc, off, roller = 20e-3, 6e-3, 8e-3
 
     def reach(theta):
@@ -737,11 +735,11 @@ def test_an_eccentric_disc_under_a_roller(angle):
     bend = (reach(angle + step) - 2.0 * reach(angle) + reach(angle - step)) / step**2
     point = CamPoint.from_pitch_curve(reach(angle), slope, bend, roller)
     assert point.cam_radius == pytest.approx(disc, rel=1e-6)
-    assert point.path == pytest.approx(disc * _swing(reach, angle, off, step), rel=1e-6)
+    assert point.path == pytest.approx(disc * _centre_rate(reach, angle, off, step), rel=1e-6)
 
 
-def _swing(reach, angle, off, step):
-    """How fast the roller's centre goes round the disc's, by differences of places."""
+def _centre_rate(reach, angle, off, step):
+    """Return the angular rate of the roller centre about the disc centre by differences."""
 
     def direction(theta):
         x, y = reach(theta) * math.sin(theta), reach(theta) * math.cos(theta) - off
@@ -750,10 +748,8 @@ def _swing(reach, angle, off, step):
     return (direction(angle + step) - direction(angle - step)) / (2.0 * step)
 
 
-def test_a_roller_cam_by_its_outline():
-    """A twin: the cam as the envelope of the roller's places, its curvature and path by
-    differences.
-    """
+def test_a_roller_cam_agrees_with_its_envelope():
+    """Reference: the cam as envelope of roller positions; curvature and path by differences."""
     cam = RollerCam(**ROLLER_CAM)
     angles = np.linspace(0.02, cam.half_angle - 0.02, 4001)
     reach = (
@@ -762,8 +758,8 @@ def test_a_roller_cam_by_its_outline():
         + 0.5 * cam.lift * (1.0 + np.cos(math.pi * angles / cam.half_angle))
     )
     centres = reach * np.exp(1j * (0.5 * math.pi - angles))
-    way = np.gradient(centres, angles, edge_order=2)
-    outline = centres + cam.roller_radius * way / np.abs(way) * -1j
+    tangent = np.gradient(centres, angles, edge_order=2)
+    outline = centres + cam.roller_radius * tangent / np.abs(tangent) * -1j
     passed = np.gradient(outline, angles, edge_order=2)
     turned = np.gradient(np.unwrap(np.angle(passed)), angles)
     for place in (400, 1500, 2600, 3500):
@@ -784,7 +780,7 @@ def test_a_roller_cams_contacts():
     assert nose.radius == pytest.approx(1.0 / (1.0 / (sharp - 9e-3) + 1.0 / 9e-3), rel=1e-12)
     assert nose.surface_speeds[0] == pytest.approx(
         150.0 * 36e-3 * (1.0 - 9e-3 / sharp), rel=1e-12
-    )  # slip or none
+    )  # independent of slip
     assert last.load == pytest.approx(600.0)
     assert [contact.slide_to_roll for contact in contacts] == pytest.approx([0.1] * len(contacts))
     middle = contacts[4]
@@ -806,10 +802,8 @@ def test_a_roller_cams_contacts():
 
 
 @pytest.mark.parametrize("slip", [-0.5, 0.0, 0.2, 1.5])
-def test_a_roller_that_slips_changes_its_own_speed_and_not_the_cams(slip):
-    """What it turns in a turn of the cam is its surface speed, by the contacts' ratio, over the
-    cam's outline.
-    """
+def test_slip_changes_the_speed_of_the_roller_only(slip):
+    """Roller turns per cam turn follow from the surface-speed ratio and the cam's perimeter."""
     cam = RollerCam(**ROLLER_CAM, slip=slip)
     contacts = cam.contacts(STEEL)
     cams, rollers = (
@@ -826,20 +820,22 @@ def test_a_roller_that_slips_changes_its_own_speed_and_not_the_cams(slip):
 
 
 def _perimeter(cam):
-    """Of the cam, summed over its outline's places."""
+    """Return the perimeter of the cam, summed over its outline."""
     angles = np.linspace(-math.pi, math.pi, 20001)
-    near = np.minimum(np.abs(angles), cam.half_angle)
+    active = np.minimum(np.abs(angles), cam.half_angle)
     reach = (
         cam.base_radius
         + cam.roller_radius
-        + 0.5 * cam.lift * (1.0 + np.cos(math.pi * near / cam.half_angle))
+        + 0.5 * cam.lift * (1.0 + np.cos(math.pi * active / cam.half_angle))
     )
     centres = reach * np.exp(1j * angles)
-    way = np.gradient(centres, angles)
-    return float(np.abs(np.diff(centres + 1j * cam.roller_radius * way / np.abs(way))).sum())
+    tangent = np.gradient(centres, angles)
+    return float(
+        np.abs(np.diff(centres + 1j * cam.roller_radius * tangent / np.abs(tangent))).sum()
+    )
 
 
-def test_bad_roller_cams_are_refused():
+def test_invalid_roller_cams_are_refused():
     with pytest.raises(BadInput, match="undercuts it; lower roller_radius"):
         RollerCam(**(ROLLER_CAM | {"lift": 16e-3, "half_angle": math.radians(35.0)}))
     with pytest.raises(BadInput, match="opposite directions"):
@@ -848,7 +844,7 @@ def test_bad_roller_cams_are_refused():
         RollerCam(**ROLLER_CAM, follower_mass=2.0)
 
 
-def test_discs_by_entrainment_and_slide_to_roll():
+def test_discs_given_by_entrainment_and_slide_to_roll():
     by_speeds = TwinDisc(radii=(20e-3, 30e-3), speeds=(105.0, 49.0), load=100.0, length=5e-3)
     (given,) = by_speeds.contacts(STEEL)
     stated = TwinDisc(

@@ -1,6 +1,4 @@
-"""Ratings of a whole machine: that each standard gets the machine's own numbers, and says what it
-lacks.
-"""
+"""Ratings of a machine: each standard gets the machine's values and reports missing inputs."""
 
 import math
 from dataclasses import replace
@@ -26,7 +24,7 @@ def by_key(case):
     return {rating.key: rating for rating in rated.machine_ratings(case)}
 
 
-def test_every_rating_is_a_quantity_and_says_where_it_is_from():
+def test_every_rating_is_a_quantity_and_states_its_source():
     assert set(FACTS) == {key for key, entry in catalogue().items() if entry.group == "rating"}
     for facts in FACTS.values():
         assert all(facts)
@@ -34,35 +32,41 @@ def test_every_rating_is_a_quantity_and_says_where_it_is_from():
 
 def test_a_roller_bearings_viscosity_ratio_and_life():
     case = load_machine(EXAMPLES / "nu206.toml")
-    few = by_key(case)
-    assert few["viscosity_ratio"].machine_value == pytest.approx(
+    incomplete = by_key(case)
+    assert incomplete["viscosity_ratio"].machine_value == pytest.approx(
         1.648, rel=1e-3
     )  # VG 68 of index 95 at 70 degC, 3000 r/min
-    assert few["reference_viscosity_m2_s"].machine_value * 1e6 == pytest.approx(12.048, rel=1e-4)
-    assert few["life_factor"].machine_value is None
-    assert few["life_factor"].reason == "[rating] has no dynamic_load_rating"
-    whole = {"dynamic_load_rating": "44 kN", "fatigue_load_limit": "4.5 kN", "contamination": 0.5}
-    found = by_key(case.with_overrides({"rating": whole}))
+    assert incomplete["reference_viscosity_m2_s"].machine_value * 1e6 == pytest.approx(
+        12.048, rel=1e-4
+    )
+    assert incomplete["life_factor"].machine_value is None
+    assert incomplete["life_factor"].reason == "[rating] has no dynamic_load_rating"
+    complete = {
+        "dynamic_load_rating": "44 kN",
+        "fatigue_load_limit": "4.5 kN",
+        "contamination": 0.5,
+    }
+    found = by_key(case.with_overrides({"rating": complete}))
     assert found["equivalent_load_n"].machine_value == pytest.approx(
         4000.0, rel=0.12
     )  # half a load zone would give 4000 N
     factor = found["life_factor"].machine_value
     turns = found["reference_life"].machine_value * factor
     assert found["modified_life_s"].machine_value == pytest.approx(turns / 50.0, rel=1e-9)
-    assert by_key(case.with_overrides({"rating": whole | {"contamination": 0.0}}))[
+    assert by_key(case.with_overrides({"rating": complete | {"contamination": 0.0}}))[
         "life_factor"
     ].machine_value == pytest.approx(0.1)
     missing = by_key(case.with_overrides({"rating": {"dynamic_load_rating": "44 kN"}}))[
         "life_factor"
     ]
     assert missing.reason == "[rating] has no fatigue_load_limit and no contamination"
-    cold = by_key(case.with_overrides({"rating": whole, "machine.speed": "10 r/min"}))
-    assert "below 0.1" in cold["life_factor"].reason
-    assert cold["modified_life_s"].machine_value is None
+    slow = by_key(case.with_overrides({"rating": complete, "machine.speed": "10 r/min"}))
+    assert "below 0.1" in slow["life_factor"].reason
+    assert slow["modified_life_s"].machine_value is None
 
 
-def test_a_ball_bearings_life_is_a_commercial_programs():
-    """Z 7, D 11.5 mm, d_m 43.5 mm, C 23.4 kN under 1 kN: 13 163 million turns."""
+def test_the_life_of_a_ball_bearing_agrees_with_a_commercial_program():
+    """Z = 7, D = 11.5 mm, d_m = 43.5 mm, C = 23.4 kN under 1 kN: 13 163 million turns."""
     case = load_machine(EXAMPLES / "6206.toml").with_overrides(
         {
             "machine": {
@@ -80,10 +84,8 @@ def test_a_ball_bearings_life_is_a_commercial_programs():
     assert by_key(case)["reference_life"].machine_value == pytest.approx(13163.0e6, rel=2e-4)
 
 
-def test_gears_get_their_own_numbers():
-    """Against the formulas called by hand, with Ra and the bulk temperature given and by the
-    roughness.
-    """
+def test_gears_are_rated_with_their_own_values():
+    """Compared with direct calls of the formulas, with Ra and bulk temperature given or derived."""
     case = load_machine(EXAMPLES / "fzg-c.toml")
     given = case.with_overrides(
         {"rating": {"roughness_ra": "0.5 um", "bulk_temperature": "100 degC"}}
@@ -101,7 +103,7 @@ def test_gears_get_their_own_numbers():
     assert found["mesh_friction"].machine_value == pytest.approx(friction, rel=1e-4)
     effusivity = math.sqrt(46.0 * 7800.0 * 460.0)
     mesh = Mesh(0.5e-6, case.pair.effective_modulus, (effusivity, effusivity))
-    contact = next(one for one in case.contacts if one.name == "D")
+    contact = next(entry for entry in case.contacts if entry.name == "D")
     hertz = contact.hertz(case.pair)
     point = MeshPoint(
         contact.radius, hertz.p_max, contact.line_load, hertz.half_widths[0], contact.surface_speeds
@@ -112,9 +114,7 @@ def test_gears_get_their_own_numbers():
     assert found["rated_flash_k"].values["C"] == pytest.approx(0.0, abs=1e-9)
     assert found["rated_film"].machine_value is None
     smoother = by_key(case.with_overrides({"surface.sq": "0.25 um"}))["rated_film"].values["A"]
-    assert (
-        smoother > 2.0 * by_key(case)["rated_film"].values["A"]
-    )  # of Ra itself, and of a cooler mesh
+    assert smoother > 2.0 * by_key(case)["rated_film"].values["A"]  # due to Ra and to a cooler mesh
 
 
 def test_ra_of_both_flanks():
@@ -122,10 +122,12 @@ def test_ra_of_both_flanks():
     composite = case.case(case.contacts[0])
     assert rated._mean_ra(composite) == pytest.approx(0.5e-6 / math.sqrt(math.pi), rel=1e-6)
     kind = {"kind": "gaussian", "correlation_length": "30 um"}
-    apart = composite.with_overrides(
+    two_surfaces = composite.with_overrides(
         {"surface": kind | {"sq": "0.6 um", "second": kind | {"sq": "0.2 um"}}}
     )
-    assert rated._mean_ra(apart) == pytest.approx(math.sqrt(2.0 / math.pi) * 0.4e-6, rel=1e-6)
+    assert rated._mean_ra(two_surfaces) == pytest.approx(
+        math.sqrt(2.0 / math.pi) * 0.4e-6, rel=1e-6
+    )
 
 
 def test_limits_of_gears_are_given_or_missing():
@@ -170,7 +172,7 @@ def test_limits_of_gears_are_given_or_missing():
         ),
     ],
 )
-def test_what_cannot_be_rated_says_why(changed, reason):
+def test_gears_that_cannot_be_rated_state_the_reason(changed, reason):
     found = rated.machine_ratings(load_machine(EXAMPLES / "fzg-c.toml").with_overrides(changed))
     assert [rating.key for rating in found] == list(rated.GEAR_KEYS)
     assert all(reason in rating.reason for rating in found)
@@ -179,17 +181,17 @@ def test_what_cannot_be_rated_says_why(changed, reason):
 
 @pytest.mark.parametrize("grade", ["VG 32", "VG 46", "VG 68"])
 def test_gears_in_thin_oil_are_rated(grade):
-    """The standard's alpha is one of the oil at 38 °C: how thin a flash makes it is no matter."""
+    """The standard uses alpha at 38 °C, whatever viscosity the flash temperature gives."""
     case = load_machine(EXAMPLES / "fzg-c.toml", {"lubricant.grade": grade})
     found = by_key(case)
     assert not any(found[key].reason for key in rated.GEAR_KEYS)
     films = found["rated_film"].values
     assert min(films, key=films.get) == "A"
-    assert 0.02 < films["A"] < 0.25  # of VG 220: 0.256
+    assert 0.02 < films["A"] < 0.25  # 0.256 with VG 220
     assert machine_conditions(case).scalars()["ratings"]
 
 
-def test_a_flash_beyond_the_oils_alpha_is_said():
+def test_a_flash_temperature_beyond_the_estimate_of_alpha_is_reported():
     hot = {"machine.torque": "900 N m", "machine.speed": "12000 r/min", "surface.sq": "2 um"}
     found = by_key(load_machine(EXAMPLES / "fzg-c.toml", hot | {"rating.permissible_film": 0.2}))
     assert found["rated_flash_k"].values["A"] > 300.0
@@ -212,7 +214,7 @@ def test_a_flash_beyond_the_oils_alpha_is_said():
         ),
     ],
 )
-def test_what_lies_outside_a_standards_range_is_said(changed, beyond):
+def test_values_outside_the_range_of_a_standard_are_reported(changed, beyond):
     case = load_machine(EXAMPLES / "fzg-c.toml", changed)
     found = by_key(case)
     assert found["rated_flash_k"].beyond == beyond
@@ -220,10 +222,8 @@ def test_what_lies_outside_a_standards_range_is_said(changed, beyond):
     assert ("rated λGF" in machine_conditions(case)._rated()) == (beyond == "")
 
 
-def test_the_life_factor_of_rollers_is_of_the_bearings_load_at_least():
-    """NJ 208 under 10 kN: slices and clearance make the equivalent load less than the load, no
-    stress less.
-    """
+def test_the_life_factor_of_rollers_uses_at_least_the_bearing_load():
+    """NJ 208 under 10 kN: slices and clearance lower the equivalent load, but no stress."""
     case = load_machine(EXAMPLES / "nu206.toml").with_overrides(
         {
             "machine": {
@@ -246,21 +246,21 @@ def test_the_life_factor_of_rollers_is_of_the_bearings_load_at_least():
     )
     found = by_key(case)
     assert found["equivalent_load_n"].machine_value == pytest.approx(7590.0, rel=1e-3)
-    whole = life_factor("roller", found["viscosity_ratio"].machine_value, 0.5 * 6.7 / 10.0)
-    assert found["life_factor"].machine_value == pytest.approx(whole)
+    expected = life_factor("roller", found["viscosity_ratio"].machine_value, 0.5 * 6.7 / 10.0)
+    assert found["life_factor"].machine_value == pytest.approx(expected)
 
 
-def test_teeth_that_are_warmer_than_their_oil_are_said():
-    """fzg-c: 390 K against 363 K, where VG 220 of index 95 has 0.47 of its viscosity."""
+def test_teeth_warmer_than_their_oil_are_noted():
+    """fzg-c: 390 K against 363 K, where VG 220 with index 95 keeps 0.47 of its viscosity."""
     case = load_machine(EXAMPLES / "fzg-c.toml")
-    (said,) = [note for note in machine_conditions(case).notes if "bulk temperature" in note]
-    assert "supply temperature of 90 degC" in said
-    assert "of 117 degC it has 0.47 of that viscosity" in said
-    same = load_machine(EXAMPLES / "fzg-c.toml", {"rating.bulk_temperature": "90 degC"})
-    assert not any("bulk temperature" in note for note in machine_conditions(same).notes)
+    (warning,) = [note for note in machine_conditions(case).notes if "bulk temperature" in note]
+    assert "supply temperature of 90 degC" in warning
+    assert "of 117 degC it has 0.47 of that viscosity" in warning
+    cold = load_machine(EXAMPLES / "fzg-c.toml", {"rating.bulk_temperature": "90 degC"})
+    assert not any("bulk temperature" in note for note in machine_conditions(cold).notes)
 
 
-def test_a_pressure_that_no_bearing_bears_is_said():
+def test_a_pressure_above_the_static_limit_is_noted():
     case = load_machine(EXAMPLES / "6206.toml", {"machine.clearance": "-450 um"})
     assert any(
         "above 4.2000 GPa, the static limit" in note for note in machine_conditions(case).notes
@@ -279,9 +279,9 @@ def test_machines_without_a_standard_have_no_ratings():
     assert machine_conditions(other).scalars()["ratings"] == []
 
 
-def test_fatigue_below_a_smooth_contact_is_hertz():
-    """The solved smooth, dry contact and Hertz' pressure agree; both are a line contact's quarter
-    at a = 0.
+def test_fatigue_below_a_smooth_contact_agrees_with_hertz():
+    """The solved smooth, dry contact agrees with Hertz; at a = 0 both give the quarter of a line
+    contact.
     """
     case = load_machine(EXAMPLES / "nu206.toml").with_overrides(LIMITS)
     dry = {"surface": "flat", "lubricant": "none", "grid.cells": [192, 24], "grid.x": [-3.0, 3.0]}
@@ -301,7 +301,7 @@ def test_fatigue_below_a_smooth_contact_is_hertz():
     assert "dang_van_pa" in [rating.key for rating in result.ratings]
 
 
-def test_asperities_raise_the_measure():
+def test_asperities_raise_the_fatigue_measure():
     case = load_machine(EXAMPLES / "nu206.toml").with_overrides(LIMITS | {"surface.sq": "0.4 um"})
     rough = {"grid.cells": [96, 48], "solver.surfaces": 1}
     run = solve_case(case.case(case.contacts[0]).with_overrides(rough))

@@ -1,4 +1,4 @@
-"""The page of a machine: what stands on it, and that what is drawn is the machine."""
+"""Report of a machine: its content, and drawings that match the geometry."""
 
 import math
 import re
@@ -60,7 +60,7 @@ def page(result, tmp_path, **about):
     )
 
 
-def test_the_first_thing_on_the_page_is_what_is_concluded(tmp_path):
+def test_the_report_opens_with_the_verdict(tmp_path):
     gears = load_machine(EXAMPLES / "fzg-c.toml")
     run = solve_case(
         gears.case(gears.contacts[4]).with_overrides({"grid.cells": [96, 48]}), strict=False
@@ -75,19 +75,19 @@ def test_the_first_thing_on_the_page_is_what_is_concluded(tmp_path):
     assert 'href="worst.html"' in body
     assert (
         body.count("<img ") == 8
-    )  # the machine, its path, and six of the worst contact, which slides
-    for words in (
+    )  # the machine, its path, and six of the worst contact, which is sliding
+    for text_part in (
         "ISO/TR 15144-1:2014",
         "not rated: [rating] has no scuffing_stage",
         'kind = "spur-gear"',
         "mesh",
     ):
-        assert words in text
+        assert text_part in text
     assert len(re.findall(r'<tr class="worst">', text)) == 1
     assert "8.0 (5.0 to 13.0)" in text
 
 
-def test_the_page_loads_nothing_and_runs_nothing(tmp_path):
+def test_the_report_loads_no_resources_and_runs_no_scripts(tmp_path):
     text = page(machine_conditions(load_machine(EXAMPLES / "nu206.toml")), tmp_path)
     assert "default-src 'none'; img-src data:;" in text
     assert "script-src 'none'" in text
@@ -97,20 +97,20 @@ def test_the_page_loads_nothing_and_runs_nothing(tmp_path):
         assert len(alternative) > 20
 
 
-def test_what_was_not_solved_is_loud(tmp_path):
+def test_unsolved_contacts_are_marked(tmp_path):
     text = page(solved(load_machine(EXAMPLES / "fzg-c.toml"), failed=("B",)), tmp_path)
     assert "⚠" in text
     assert "1 of 7 contacts were NOT SOLVED" in text
     assert "not solved: did not converge" in text
 
 
-def test_the_same_result_gives_the_same_bytes(tmp_path):
+def test_the_report_is_reproducible_byte_for_byte(tmp_path):
     result = machine_conditions(load_machine(EXAMPLES / "6206.toml"))
     first = write_machine_report(result, tmp_path / "one.html").read_bytes()
     assert first == write_machine_report(result, tmp_path / "two.html").read_bytes()
 
 
-def test_both_sides_of_a_load_zone_are_drawn_in_their_order():
+def test_both_sides_of_a_load_zone_are_drawn_in_order():
     bearing = solved(load_machine(EXAMPLES / "nu206.toml"))
     figure = along_path(bearing).figure()
     line = figure.axes[0].get_lines()[0]
@@ -121,7 +121,7 @@ def test_both_sides_of_a_load_zone_are_drawn_in_their_order():
     assert (low, high) == pytest.approx((5.0, 13.0))
 
 
-def test_a_rating_is_drawn_beside_what_was_solved():
+def test_a_rating_is_drawn_next_to_the_solved_values():
     figure = along_path(solved(load_machine(EXAMPLES / "fzg-c.toml"))).figure()
     heat = next(
         axes for axes in figure.axes if axes.get_title(loc="left").startswith("maximum flash")
@@ -131,46 +131,49 @@ def test_a_rating_is_drawn_beside_what_was_solved():
     assert rating.get_ydata()[0] > 50.0
 
 
-def drawn(case):
+def result_and_axes(case):
     figure = Figure()
     axes = figure.add_subplot()
     result = machine_conditions(case)
     return result, axes
 
 
-def test_the_teeth_drawn_meet_where_the_contact_is():
-    """Both outlines pass through the worst point, and there along the same flank."""
+def test_the_drawn_teeth_touch_at_the_contact():
+    """Both outlines pass through the worst point with a common tangent."""
     gears = load_machine(EXAMPLES / "fzg-c.toml")
     pair = gears.machine
     assert isinstance(pair, SpurGear)
-    result, axes = drawn(gears)
+    result, axes = result_and_axes(gears)
     sketch._gears(pair, result, axes)
     pinion, wheel = (patch.get_xy() for patch in axes.patches[:2])
-    met = next(
+    contact_point = next(
         line
         for line in axes.get_lines()
         if (line.get_marker(), line.get_markersize()) == ("o", 6.0)
     ).get_xydata()[0]
-    assert np.hypot(*met) == pytest.approx(
+    assert np.hypot(*contact_point) == pytest.approx(
         1e3 * math.hypot(pair.base_radii[0], pair.path["B"]), rel=1e-6
     )
     slopes = []
     for outline in (pinion, wheel):
         start, end = outline[:-1], outline[1:]
-        way = end - start
+        segment = end - start
         share = np.clip(
-            ((met - start) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12), 0.0, 1.0
+            ((contact_point - start) * segment).sum(axis=1)
+            / np.maximum((segment**2).sum(axis=1), 1e-12),
+            0.0,
+            1.0,
         )
-        off = np.hypot(*(start + share[:, None] * way - met).T)
+        off = np.hypot(*(start + share[:, None] * segment - contact_point).T)
         nearest = int(np.argmin(off))
         assert off[nearest] < 0.01  # mm
-        slopes.append(math.atan2(*way[nearest][::-1]) % math.pi)
+        slopes.append(math.atan2(*segment[nearest][::-1]) % math.pi)
     assert slopes[0] == pytest.approx(slopes[1], abs=0.1)
-    along = math.atan2(math.sin(pair.working_angle), -math.cos(pair.working_angle))
-    assert (slopes[0] - along) % math.pi == pytest.approx(math.pi / 2.0, abs=0.1)
+    flank_angle = math.atan2(math.sin(pair.working_angle), -math.cos(pair.working_angle))
+    assert (slopes[0] - flank_angle) % math.pi == pytest.approx(math.pi / 2.0, abs=0.1)
 
 
-def test_the_cam_drawn_touches_its_roller(tmp_path):
+def test_the_drawn_cam_touches_its_roller(tmp_path):
     path = tmp_path / "cam.toml"
     path.write_text(CAM, "utf-8")
     cam = load_machine(path).machine

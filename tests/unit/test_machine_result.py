@@ -1,4 +1,4 @@
-"""Which contact of a machine is worst, what is said of it, and which contacts a study of it has."""
+"""Results of a machine: worst contact, verdict, and the contacts of its study."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +19,7 @@ def gears():
 
 
 def solved(gears, **changed):
-    """A result with numbers of one's own: name=(CLR, film ratio, central film)."""
+    """Return a result with given values: name=(CLR, film ratio, central film)."""
     rows = []
     for row in machine_conditions(gears).rows:
         clr, film_ratio, film = changed.get(row["name"], (0.0, 2.0, 1e-6))
@@ -30,12 +30,12 @@ def solved(gears, **changed):
             "h_min_m": film,
             "determined": True,
         }
-        why = "did not converge" if clr is None else ""
-        rows.append({**row, **numbers, "flash_temperature_max_k": 12.5, "reason": why})
+        reason = "did not converge" if clr is None else ""
+        rows.append({**row, **numbers, "flash_temperature_max_k": 12.5, "reason": reason})
     return MachineResult(gears, tuple(rows), True, 1.0)
 
 
-def test_the_worst_is_where_asperities_carry_most(gears):
+def test_the_worst_contact_has_the_highest_clr(gears):
     found = solved(gears, A=(0.3, 0.9, 1e-7), D=(0.4, 1.1, 2e-7), E=(0.2, 0.2, 1e-8))
     assert found.worst["name"] == "D"
     assert (
@@ -46,20 +46,20 @@ def test_the_worst_is_where_asperities_carry_most(gears):
     )
 
 
-def test_an_interval_is_in_the_verdict(gears):
+def test_the_verdict_gives_the_interval(gears):
     found = solved(gears, D=(0.4, 1.1, 2e-7))
     found.worst.update(clr_low=0.31, clr_high=0.52)
     assert "asperities carry 40.0 % (31 to 52 %) of the load" in found.verdict()
 
 
-def test_a_full_film_that_may_be_none_says_so(gears):
+def test_the_verdict_mentions_possible_mixed_lubrication(gears):
     found = solved(gears, A=(0.0, 0.5, 1e-7))
     assert ": full film; worst" in found.verdict()
     found.worst.update(clr_low=0.0, clr_high=0.05)
     assert ": full film, or mixed lubrication at 1 of 7 contacts; worst is A" in found.verdict()
 
 
-def test_in_full_film_the_worst_has_the_least_film(gears):
+def test_in_full_film_the_worst_contact_has_the_lowest_film_ratio(gears):
     assert solved(gears, A=(0.009, 1.9, 1e-6), E=(0.0, 1.7, 1e-6)).worst["name"] == "E"
     smooth = {row["name"]: (0.0, None, 1e-6) for row in machine_conditions(gears).rows}
     found = solved(gears, **smooth | {"DE": (0.0, None, 4e-7)})
@@ -70,7 +70,7 @@ def test_in_full_film_the_worst_has_the_least_film(gears):
     )
 
 
-def test_not_solved_the_worst_is_pressed_hardest(gears):
+def test_unsolved_the_worst_contact_has_the_highest_pressure(gears):
     found = machine_conditions(gears)
     assert found.worst["p_hertz_pa"] == max(row["p_hertz_pa"] for row in found.rows)
     assert found.verdict().endswith(
@@ -78,57 +78,59 @@ def test_not_solved_the_worst_is_pressed_hardest(gears):
     )
 
 
-def test_what_failed_is_in_the_verdict(gears):
-    some = solved(gears, B=(None, None, None))
-    assert [row["name"] for row in some.failures] == ["B"]
-    assert some.worst["name"] != "B"
-    assert some.verdict().endswith("; rated λGF 0.256 at A; 1 of 7 contacts were NOT SOLVED.")
-    all_of_them = {row["name"]: (None, None, None) for row in some.rows}
-    assert "NOT SOLVED, 7 of 7 contacts failed" in solved(gears, **all_of_them).verdict()
+def test_failed_contacts_are_in_the_verdict(gears):
+    partly_failed = solved(gears, B=(None, None, None))
+    assert [row["name"] for row in partly_failed.failures] == ["B"]
+    assert partly_failed.worst["name"] != "B"
+    assert partly_failed.verdict().endswith(
+        "; rated λGF 0.256 at A; 1 of 7 contacts were NOT SOLVED."
+    )
+    all_failed = {row["name"]: (None, None, None) for row in partly_failed.rows}
+    assert "NOT SOLVED, 7 of 7 contacts failed" in solved(gears, **all_failed).verdict()
 
 
-def test_a_chosen_grid_is_made_smaller_where_all_are_too_many(gears, monkeypatch):
+def test_chosen_grids_shrink_to_the_limit_of_cells(gears, monkeypatch):
     def cells(case):
         plan, _ = machine._plan(case, case.contacts)
         return [plan.case.with_overrides(point).grid.cells for point in plan.points]
 
-    free = cells(gears)
+    unlimited = cells(gears)
     monkeypatch.setattr(machine, "ALL_CELLS", 7 * 12_000)
-    few = cells(gears)
-    assert max(nx * ny for nx, ny in few) <= 12_000 < max(nx * ny for nx, ny in free)
-    assert [a for a, b in zip(few, free, strict=True) if b[0] * b[1] <= 12_000] == [
-        b for b in free if b[0] * b[1] <= 12_000
+    limited = cells(gears)
+    assert max(nx * ny for nx, ny in limited) <= 12_000 < max(nx * ny for nx, ny in unlimited)
+    assert [a for a, b in zip(limited, unlimited, strict=True) if b[0] * b[1] <= 12_000] == [
+        b for b in unlimited if b[0] * b[1] <= 12_000
     ]
-    asked = gears.with_overrides({"grid.accuracy": 0.01})
-    assert max(nx * ny for nx, ny in cells(asked)) > 12_000  # what is asked for stands
+    stated = gears.with_overrides({"grid.accuracy": 0.01})
+    assert max(nx * ny for nx, ny in cells(stated)) > 12_000  # a stated accuracy is kept
 
 
-def test_a_changed_machine_leaves_the_first_as_it_was(gears):
+def test_overrides_do_not_change_the_original_machine(gears):
     gears.with_overrides({"surface.sq": "0.1 um", "machine.torque": "10 N m"})
     assert gears.case(gears.contacts[0]).surface().sq == pytest.approx(0.5e-6, rel=1e-6)
     assert gears.with_overrides({}).machine.torque == 265.1
 
 
-def test_both_sides_of_a_load_zone_are_one_point():
+def test_both_sides_of_a_load_zone_share_one_point():
     bearing = load_machine(EXAMPLES / "nu206.toml")
-    plan, places = machine._plan(bearing, bearing.contacts)
+    plan, indices = machine._plan(bearing, bearing.contacts)
     assert (len(bearing.contacts), len(plan.points)) == (10, 6)
-    assert places["roller 2, outer ring"] == places["roller 11, outer ring"]
+    assert indices["roller 2, outer ring"] == indices["roller 11, outer ring"]
     for contact in bearing.contacts:
-        stated = plan.case.with_overrides(plan.points[places[contact.name]]).conditions
+        stated = plan.case.with_overrides(plan.points[indices[contact.name]]).conditions
         assert stated.load == pytest.approx(contact.load, rel=1e-9)
         assert stated.radius == pytest.approx(contact.radius, rel=1e-9)
 
 
-def test_a_contact_that_draws_no_oil_in_has_its_reason(gears, monkeypatch):
+def test_a_contact_without_entrainment_states_the_reason(gears, monkeypatch):
     first, second, *_ = gears.contacts
-    against = replace(second, surface_speeds=(1.0, -1.0))
+    opposed = replace(second, surface_speeds=(1.0, -1.0))
     flat = gears.with_overrides({"surface": "flat", "grid.cells": [48, 24]})
-    monkeypatch.setitem(vars(flat), "contacts", (first, against))
+    monkeypatch.setitem(vars(flat), "contacts", (first, opposed))
     found = solve_machine(flat, workers=1)
     assert found.rows[0]["h_central_m"] > 0.0
     assert found.rows[1]["slide_to_roll"] is None
     assert "entrain no oil" in found.rows[1]["reason"]
-    monkeypatch.setitem(vars(flat), "contacts", (against,))
+    monkeypatch.setitem(vars(flat), "contacts", (opposed,))
     with pytest.raises(BadInput, match="no contact entrains oil"):
         solve_machine(flat)
