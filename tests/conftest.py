@@ -1,5 +1,5 @@
-"""Puts this folder on the import path for `support`, and marks the slow files that `make quick`
-leaves out.
+"""Put this folder on the import path for `support`, and mark the slow files that `make quick`
+skips.
 """
 
 from pathlib import Path

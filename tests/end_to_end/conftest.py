@@ -1,4 +1,4 @@
-"""A command line to run commands on, in a folder that holds a small case."""
+"""Fixtures for the command-line tests: a command runner and a small emulator."""
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -15,7 +15,7 @@ PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8
 
 @pytest.fixture
 def asp(tmp_path, monkeypatch, capsys):
-    """Run a command in a folder that holds a small case; return exit code, stdout and stderr."""
+    """Return a function that runs a command beside a small case: exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
     alone = PAPER.replace("[256, 256]", "[64, 64]").replace("[solver]", "[solver]\nsurfaces = 1")
     Path("case.toml").write_text(alone, "utf-8")
@@ -23,16 +23,16 @@ def asp(tmp_path, monkeypatch, capsys):
     def run(*arguments: str) -> tuple[int, str, str]:
         with pytest.raises(SystemExit) as end:
             main(arguments)
-        said = capsys.readouterr()
-        return end.value.code or 0, said.out, said.err
+        captured = capsys.readouterr()
+        return end.value.code or 0, captured.out, captured.err
 
     return run
 
 
 @pytest.fixture(scope="session")
 def small(tmp_path_factory):
-    """A setting, its emulator of a few small contacts, and the folder that holds it: what extends
-    it takes a copy.
+    """Settings, an emulator of a few small contacts, and its folder; tests that extend it use a
+    copy.
     """
     folder = tmp_path_factory.mktemp("infer") / "emulator"
     setting = inference_setting(load_case(CASE).with_overrides(SMALL))

@@ -1,6 +1,4 @@
-"""The alarm of `asperity track` and `watch` as a user meets it: states, exit codes, levels, log,
-acknowledgement.
-"""
+"""Alarms of `asperity track` and `watch`: states, exit codes, levels, log and acknowledgement."""
 
 import json
 import sqlite3
@@ -14,9 +12,7 @@ STEADY, LOUD = 12, 24
 
 
 def snapshots(folder, levels, seconds=0.1, first=0):
-    """Noise of a machine without a contact resonance, as a logger keeps it: a tenth of a second
-    each.
-    """
+    """Write noise without a contact resonance, in recordings of 0.1 s."""
     Path(folder).mkdir(exist_ok=True)
     for number, level in enumerate(levels, first):
         rng = np.random.default_rng(number)
@@ -25,42 +21,44 @@ def snapshots(folder, levels, seconds=0.1, first=0):
 
 
 def failing():
-    """Steady, then up twenty times."""
+    """Return constant levels followed by a rise to twenty times that level."""
     grown = np.exp(np.log(20.0) * np.arange(LOUD) / (LOUD - 1))
     return np.concatenate([np.ones(STEADY), grown]) * (
         1.0 + 0.05 * np.random.default_rng(9).standard_normal(STEADY + LOUD)
     )
 
 
-def test_a_level_that_grows_alarms_and_claims_no_resonance(asp):
+def test_a_rising_level_raises_an_alarm_without_a_resonance(asp):
     snapshots("in", failing())
     code, out, _ = asp("track", "in", "--json")
-    said = json.loads(out)
+    result = json.loads(out)
     assert code == 3
-    assert said["alarm"]["state"] == "alarm"
-    assert said["alarm"]["raised_by"] == "the level (rms)"
-    assert said["alarm"]["false_alarm_rate"] == 1e-3
-    assert STEADY < [row["state"] for row in said["recordings"]].index("alarm") < STEADY + LOUD - 5
-    assert said["verdict"].startswith("ALARM since s-")
-    assert "no contact resonance found in 36 recordings" in said["verdict"]
+    assert result["alarm"]["state"] == "alarm"
+    assert result["alarm"]["raised_by"] == "the level (rms)"
+    assert result["alarm"]["false_alarm_rate"] == 1e-3
+    assert (
+        STEADY < [row["state"] for row in result["recordings"]].index("alarm") < STEADY + LOUD - 5
+    )
+    assert result["verdict"].startswith("ALARM since s-")
+    assert "no contact resonance found in 36 recordings" in result["verdict"]
     assert not any(
-        "off" in row["reason"] for row in said["recordings"]
-    )  # the quiet ones were healthy
-    for row in said["recordings"]:
-        assert row["kurtosis"] == pytest.approx(3.0, abs=0.4)  # of Gaussian noise
+        "off" in row["reason"] for row in result["recordings"]
+    )  # the recordings before the rise are healthy
+    for row in result["recordings"]:
+        assert row["kurtosis"] == pytest.approx(3.0, abs=0.4)  # kurtosis of Gaussian noise
         assert row["crest"] == pytest.approx(3.8, abs=1.2)
 
 
-def test_a_machine_that_is_off_is_not_healthy(asp):
+def test_a_stopped_machine_is_not_healthy(asp):
     snapshots("in", [1.0] * 12 + [0.02])
     code, out, _ = asp("track", "in", "--json")
-    said = json.loads(out)
-    assert (code, said["alarm"]["state"]) == (5, "blind")
-    assert said["alarm"]["since"].endswith("s-012.npz")
-    assert "machine was off, or the sensor disconnected: rms is 2 %" in said["verdict"]
+    result = json.loads(out)
+    assert (code, result["alarm"]["state"]) == (5, "blind")
+    assert result["alarm"]["since"].endswith("s-012.npz")
+    assert "machine was off, or the sensor disconnected: rms is 2 %" in result["verdict"]
 
 
-def test_a_machine_that_was_off_before_it_ran_is_told_by_its_first_run(asp):
+def test_recordings_before_the_first_run_are_judged_stopped_after_it(asp):
     snapshots("in", [0.02, 0.02] + [1.0] * 8)
     states = [row["reason"] for row in json.loads(asp("track", "in", "--json")[1])["recordings"]]
     assert ["machine was off" in reason for reason in states] == [True, True] + [False] * 8
@@ -73,7 +71,7 @@ def test_a_watch_keeps_its_alarm_until_it_is_acknowledged(asp):
     code, out, _ = asp("watch", "in", *rates)
     assert code == 3
     since = json.loads(out)["alarm"]["since"]
-    for number in range(STEADY, levels.size):  # what raised it is gone; the alarm is not
+    for number in range(STEADY, levels.size):  # the cause has gone, the alarm remains
         Path(f"in/s-{number:03}.npz").unlink()
     code, out, _ = asp("watch", "in", *rates)
     assert code == 3
@@ -88,7 +86,7 @@ def test_a_watch_keeps_its_alarm_until_it_is_acknowledged(asp):
     assert (code, json.loads(out)["alarm"]["state"]) == (
         4,
         "cannot-tell",
-    )  # the baseline is learned anew
+    )  # the baseline is estimated anew
     log = rows("SELECT state, since, time FROM judgement ORDER BY id")
     assert [state for state, _, _ in log] == [
         "alarm",
@@ -103,7 +101,7 @@ def test_a_watch_keeps_its_alarm_until_it_is_acknowledged(asp):
 
 
 def rows(query, store="in/asperity-watch/asperity.db"):
-    """What a store answers, asked as anybody may."""
+    """Read the judgements of a store with SQL."""
     with closing(sqlite3.connect(store)) as connection:
         return connection.execute(query).fetchall()
 
@@ -116,7 +114,7 @@ def test_an_empty_folder_is_not_healthy(asp):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (("--false-alarms", "often"), "must be a rate such as 0.001 or 1/1000, got 'often'"),
         (("--false-alarms", "0.5"), "must lie between 0 and 0.1 per recording, got 0.5"),
@@ -124,8 +122,8 @@ def test_an_empty_folder_is_not_healthy(asp):
         (("--acknowledge", "s-999.npz"), "s-999.npz is not among the 3 recordings"),
     ],
 )
-def test_a_rate_or_a_recording_that_is_none_is_refused(asp, arguments, said):
+def test_an_invalid_rate_or_recording_is_refused(asp, arguments, message):
     snapshots("in", [1.0] * 3)
     code, out, err = asp("track", "in", *arguments)
     assert (code, out) == (2, "")
-    assert said in err
+    assert message in err

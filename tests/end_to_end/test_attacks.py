@@ -1,4 +1,4 @@
-"""A short part of the attacks of `python -m benchmarks.attacks`, of each kind that is quick."""
+"""A short selection of the attacks of `python -m benchmarks.attacks`, from each fast kind."""
 
 import pytest
 from benchmarks.attacks import damage, endings, inputs, names, runner
@@ -34,19 +34,19 @@ QUICK = (
         (names.injections, 6),
     ],
 )
-def test_attacks_hold(tmp_path, kind, count):
+def test_attacks_find_no_fault(tmp_path, kind, count):
     attack = kind(tmp_path)
     assert [fault for fault in map(attack, range(count)) if fault is not None] == []
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_a_hostile_file_is_refused_in_a_sentence(tmp_path, name):
+def test_a_hostile_file_is_refused_in_one_sentence(tmp_path, name):
     outcome = runner.run(name, HOSTILE[name](tmp_path), tmp_path)
     assert outcome.faults == []
     assert outcome.code == 2 or name.startswith("tdms")
 
 
-def test_ends_that_nobody_asked_for_leave_nothing_half_written():
+def test_kills_and_full_disks_leave_no_partial_output():
     assert [
         fault for fault in (*endings.kills("", 2), *endings.full_disks("", 2)) if fault is not None
     ] == []

@@ -1,4 +1,4 @@
-"""Bad input of every kind: exit code 2, one sentence that names the thing, and no file written."""
+"""Bad input of every kind: exit code 2, one sentence that names the value, and no file written."""
 
 from pathlib import Path
 
@@ -17,20 +17,20 @@ PAPER = (
 
 @pytest.fixture
 def refused(tmp_path, monkeypatch, capsys):
-    """Run a command that must be refused in a folder of its own; return what it says on stderr."""
+    """Run a command that must be refused, in its own folder; return its stderr."""
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: str) -> str:
         before = sorted(tmp_path.rglob("*"))
         with pytest.raises(SystemExit) as end:
             main(arguments)
-        said = capsys.readouterr()
+        captured = capsys.readouterr()
         assert end.value.code == 2
-        assert said.out == ""
-        assert said.err.startswith("error: ")
-        assert said.err.count("\n") == 1
+        assert captured.out == ""
+        assert captured.err.startswith("error: ")
+        assert captured.err.count("\n") == 1
         assert sorted(tmp_path.rglob("*")) == before
-        return said.err
+        return captured.err
 
     return run
 
@@ -84,13 +84,13 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_in_the_case_is_named(refused, mistake):
+def test_an_error_in_the_case_is_named(refused, mistake):
     old, new, names = MISTAKES[mistake]
     write_case(old, new)
-    said = refused("solve", "case.toml", "--out", "run.nc", "--json")
-    assert "case.toml" in said
+    message = refused("solve", "case.toml", "--out", "run.nc", "--json")
+    assert "case.toml" in message
     for name in names:
-        assert name in said
+        assert name in message
 
 
 def measured(path: str, cells: tuple[int, int], pixel: float, missing: float = 0.0) -> None:
@@ -100,14 +100,14 @@ def measured(path: str, cells: tuple[int, int], pixel: float, missing: float = 0
     x3pio.write(path, heights.T, x_scale=pixel, y_scale=pixel)
 
 
-def test_an_oil_that_is_no_liquid_under_the_load_is_refused(refused):
+def test_an_oil_that_is_not_liquid_under_the_load_is_refused(refused):
     write_case('"18.2 1/GPa"', '"1e9 1/GPa"')
-    said = refused("solve", "case.toml", "--out", "run.nc")
+    message = refused("solve", "case.toml", "--out", "run.nc")
     for name in ("coefficient of 1e+09 1/GPa", "Hertz pressure of 0.569 GPa", "check its unit"):
-        assert name in said
+        assert name in message
 
 
-def test_a_surface_with_too_much_missing_is_refused(refused):
+def test_a_surface_with_too_many_missing_points_is_refused(refused):
     write_case()
     measured("ring.x3p", (300, 200), 2e-6, missing=0.6)
     assert "ring.x3p misses" in refused(
@@ -118,13 +118,13 @@ def test_a_surface_with_too_much_missing_is_refused(refused):
 def test_a_surface_smaller_than_the_contact_is_refused(refused):
     write_case()
     measured("ring.x3p", (100, 100), 1e-6)
-    said = refused("solve", "case.toml", "--surface", "ring.x3p", "--out", "run.nc")
-    assert "ring.x3p" in said
-    assert "100 um" in said.replace("100.0", "100")
+    message = refused("solve", "case.toml", "--surface", "ring.x3p", "--out", "run.nc")
+    assert "ring.x3p" in message
+    assert "100 um" in message.replace("100.0", "100")
 
 
 @pytest.mark.parametrize("name", ["ring.x3p", "ring.opd", "ring.al3d", "ring.sdf", "ring.xyz"])
-def test_a_surface_that_is_not_what_its_name_says_is_refused(refused, name):
+def test_a_surface_whose_content_contradicts_its_extension_is_refused(refused, name):
     write_case()
     Path(name).write_bytes(b"This is a letter, not a surface.\n")
     assert name in refused("solve", "case.toml", "--surface", name, "--out", "run.nc")
@@ -153,7 +153,7 @@ def test_a_surface_that_is_not_what_its_name_says_is_refused(refused, name):
         (("solve",), "CASE"),
     ],
 )
-def test_files_and_arguments_that_cannot_be_used_are_named(refused, arguments, name):
+def test_unusable_files_and_arguments_are_named(refused, arguments, name):
     write_case()
     Path("letter.nc").write_text("Dear ring,")
     assert name in refused(*arguments)

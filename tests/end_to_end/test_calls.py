@@ -1,6 +1,4 @@
-"""Who is called when a state changes, as a user meets it: a command, a web address, an MQTT broker;
-all on loopback.
-"""
+"""Notifications on a change of state by command, web address and MQTT broker, all on loopback."""
 
 import json
 import socket
@@ -24,20 +22,20 @@ from asperity.monitoring.store.sensors import Sensors
 STORE = "in/asperity-watch/asperity.db"
 LISTENER = """
 import json, sys
-with open(sys.argv[1], "a") as heard:
-    heard.write(json.dumps(json.load(sys.stdin)) + "\\n")
+with open(sys.argv[1], "a") as file:
+    file.write(json.dumps(json.load(sys.stdin)) + "\\n")
 """
 
 
 def snapshots(levels, first=0):
-    """Noise of a machine without a contact resonance: a tenth of a second each."""
+    """Write noise without a contact resonance, in recordings of 0.1 s."""
     Path("in").mkdir(exist_ok=True)
     for number, level in enumerate(levels, first):
         values = level * np.random.default_rng(number).standard_normal(2000)
         np.savez(Path("in") / f"s-{number:03}.npz", acc=values, fs=20e3, unit="m/s^2")
 
 
-def watched(asp, *more):
+def watch(asp, *more):
     return asp(
         "watch",
         "in",
@@ -53,74 +51,74 @@ def watched(asp, *more):
     )
 
 
-def kept(query):
+def query_store(query):
     with closing(sqlite3.connect(STORE)) as connection:
         return connection.execute(query).fetchall()
 
 
 @pytest.fixture
 def listener(tmp_path):
-    """A program that appends what it hears to a file whose name holds what a shell would take
-    apart.
-    """
+    """Return a program that appends its input to a file; its name contains shell characters."""
     Path(tmp_path / "listen.py").write_text(LISTENER)
-    heard = tmp_path / "heard; $(touch never).jsonl"
-    command = f"'{sys.executable}' '{tmp_path / 'listen.py'}' '{heard}'"
+    log = tmp_path / "log; $(touch never).jsonl"
+    command = f"'{sys.executable}' '{tmp_path / 'listen.py'}' '{log}'"
     return (
         command,
-        lambda: (
-            [json.loads(line) for line in heard.read_text().splitlines()] if heard.exists() else []
-        ),
+        lambda: [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else [],
     )
 
 
-def test_a_command_is_called_once_a_change_of_state(asp, listener):
-    command, heard = listener
+def test_a_command_is_called_once_per_change_of_state(asp, listener):
+    command, events = listener
     send = ("--on-alarm", command)
     snapshots(np.ones(12))
     for _ in range(2):
-        assert watched(asp, *send)[0] == 4  # no resonance in snapshots
-    assert [(said["state"], said["before"]) for said in heard()] == [("cannot-tell", None)]
+        assert watch(asp, *send)[0] == 4  # snapshots contain no resonance
+    assert [(event["state"], event["before"]) for event in events()] == [("cannot-tell", None)]
     snapshots(np.exp(np.log(20.0) * np.arange(24) / 23), first=12)
     for _ in range(2):
-        assert watched(asp, *send)[0] == 3
-    assert [(said["state"], said["before"]) for said in heard()[1:]] == [("alarm", "cannot-tell")]
-    said = heard()[1]
-    assert (said["machine"], said["point"], said["sensor"]) == ("Pump 3", "DE", "sensor")
-    assert said["raised_by"] == "the level (rms)"
-    assert said["verdict"].startswith("ALARM since s-")
-    assert said["recording"].endswith("s-035.npz")
-    assert said["since"] < said["recording"]
-    assert watched(asp, *send, "--acknowledge", "last")[0] == 0
-    assert [said["state"] for said in heard()] == ["cannot-tell", "alarm", "none"]
-    assert len({said["id"] for said in heard()}) == 3
-    assert not Path("never").exists()  # no shell took the name apart
+        assert watch(asp, *send)[0] == 3
+    assert [(event["state"], event["before"]) for event in events()[1:]] == [
+        ("alarm", "cannot-tell")
+    ]
+    event = events()[1]
+    assert (event["machine"], event["point"], event["sensor"]) == ("Pump 3", "DE", "sensor")
+    assert event["raised_by"] == "the level (rms)"
+    assert event["verdict"].startswith("ALARM since s-")
+    assert event["recording"].endswith("s-035.npz")
+    assert event["since"] < event["recording"]
+    assert watch(asp, *send, "--acknowledge", "last")[0] == 0
+    assert [event["state"] for event in events()] == ["cannot-tell", "alarm", "none"]
+    assert len({event["id"] for event in events()}) == 3
+    assert not Path("never").exists()  # no shell split the name
 
 
-def test_a_call_that_fails_is_noted_and_made_again(asp, listener, tmp_path):
-    command, heard = listener
+def test_a_failed_call_is_recorded_and_repeated(asp, listener, tmp_path):
+    command, events = listener
     snapshots(np.ones(3))
     script = (tmp_path / "listen.py").read_text()
-    (tmp_path / "listen.py").write_text("import sys\nsys.exit('nobody is at home')")
-    code, out, err = watched(asp, "--on-alarm", command)
-    assert (code, heard()) == (4, [])
+    (tmp_path / "listen.py").write_text("import sys\nsys.exit('no receiver')")
+    code, out, err = watch(asp, "--on-alarm", command)
+    assert (code, events()) == (4, [])
     assert (
-        "could not be notified (exit code 1: nobody is at home); the notification will be sent"
+        "could not be notified (exit code 1: no receiver); the notification will be sent"
         " again" in err
     )
-    assert kept("SELECT attempts, answered, failure FROM call") == [
-        (1, None, "exit code 1: nobody is at home")
+    assert query_store("SELECT attempts, answered, failure FROM call") == [
+        (1, None, "exit code 1: no receiver")
     ]
     (tmp_path / "listen.py").write_text(script)
-    code, again, err = watched(
+    code, again, err = watch(
         asp, "--on-alarm", command
-    )  # nothing is new, but somebody still has to be told
+    )  # nothing is new, but a notification is pending
     assert (code, again, err) == (4, out, "")
-    assert [said["state"] for said in heard()] == ["cannot-tell"]
-    assert kept("SELECT attempts, failure FROM call WHERE answered IS NOT NULL") == [(2, None)]
+    assert [event["state"] for event in events()] == ["cannot-tell"]
+    assert query_store("SELECT attempts, failure FROM call WHERE answered IS NOT NULL") == [
+        (2, None)
+    ]
 
 
-def test_a_command_that_does_not_end_is_stopped_with_all_it_started(monkeypatch, tmp_path):
+def test_a_command_that_does_not_end_is_stopped_with_its_children(monkeypatch, tmp_path):
     monkeypatch.setattr(calls, "COMMAND_S", 1.0)
     late = tmp_path / "late"
     child = f"import time; time.sleep(3); open({str(late)!r}, 'w')"
@@ -138,19 +136,19 @@ def test_a_command_that_does_not_end_is_stopped_with_all_it_started(monkeypatch,
 
 @contextmanager
 def served(codes):
-    """A web address that answers with these codes, one after another; and what was posted to it."""
-    heard = []
+    """Serve a web address that answers with these codes in turn; yield it and the posts."""
+    posts = []
 
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self):
-            heard.append(
+            posts.append(
                 (
                     self.path,
                     self.headers["Content-Type"],
                     self.rfile.read(int(self.headers["Content-Length"])),
                 )
             )
-            code = codes[min(len(heard), len(codes)) - 1]
+            code = codes[min(len(posts), len(codes)) - 1]
             self.send_response(code)
             self.send_header("Location", "/elsewhere")
             self.send_header("Content-Length", "0")
@@ -163,7 +161,7 @@ def served(codes):
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
     try:
-        yield f"http://127.0.0.1:{server.server_port}/hook", heard
+        yield f"http://127.0.0.1:{server.server_port}/hook", posts
     finally:
         server.shutdown()
         server.server_close()
@@ -171,42 +169,42 @@ def served(codes):
 
 def test_a_web_address_is_posted_to_until_it_answers(asp):
     snapshots(np.ones(3))
-    with served([503, 302, 204]) as (url, heard):
-        assert "it answered 503 Service Unavailable" in watched(asp, "--webhook", url)[2]
-        assert "it answered 302 Found" in watched(asp, "--webhook", url)[2]
-        assert watched(asp, "--webhook", url)[2] == ""
-        assert watched(asp, "--webhook", url)[2] == ""
-    assert [path for path, _, _ in heard] == ["/hook"] * 3
-    bodies = [json.loads(body) for _, _, body in heard]
-    assert {kind for _, kind, _ in heard} == {"application/json"}
-    assert len({body["id"] for body in bodies}) == 1  # by which a receiver knows it again
+    with served([503, 302, 204]) as (url, posts):
+        assert "it answered 503 Service Unavailable" in watch(asp, "--webhook", url)[2]
+        assert "it answered 302 Found" in watch(asp, "--webhook", url)[2]
+        assert watch(asp, "--webhook", url)[2] == ""
+        assert watch(asp, "--webhook", url)[2] == ""
+    assert [path for path, _, _ in posts] == ["/hook"] * 3
+    bodies = [json.loads(body) for _, _, body in posts]
+    assert {kind for _, kind, _ in posts} == {"application/json"}
+    assert len({body["id"] for body in bodies}) == 1  # identifies the event to the receiver
     assert bodies[-1]["state"] == "cannot-tell"
-    assert kept("SELECT attempts FROM call") == [(3,)]
+    assert query_store("SELECT attempts FROM call") == [(3,)]
 
 
-def test_passwords_and_tokens_are_used_and_not_kept(asp):
+def test_passwords_and_tokens_are_used_and_not_stored(asp):
     snapshots(np.ones(3))
-    with served([500]) as (url, heard):
+    with served([500]) as (url, posts):
         secret = url.replace("http://", "http://bob:hunter2@") + "?token=S3CRET"
-        err = watched(asp, "--webhook", secret)[2]
-    path, _, _ = heard[0]
+        err = watch(asp, "--webhook", secret)[2]
+    path, _, _ = posts[0]
     assert path == "/hook?token=S3CRET"
     assert "it answered 500" in err
     kept_there = Path(STORE).read_bytes() + err.encode()
     assert not any(word in kept_there for word in (b"hunter2", b"S3CRET"))
 
 
-def test_an_answer_that_drips_is_not_waited_for():
+def test_a_slow_answer_is_abandoned():
     began = time.monotonic()
     with pytest.raises(calls.NotificationFailed, match=r"no complete answer within 0\.2 s"):
         calls._within(0.2, partial(time.sleep, 5.0))
     assert time.monotonic() - began < 3.0
 
 
-def test_what_waits_is_told_in_its_order(asp):
+def test_pending_notifications_are_delivered_in_order(asp):
     snapshots(np.ones(3))
-    with served([500, 500, 204]) as (url, heard):
-        watched(asp, "--webhook", url)
+    with served([500, 500, 204]) as (url, posts):
+        watch(asp, "--webhook", url)
         sensor = Sensors(Store(STORE), SensorAddress("Pump 3", "DE", "sensor"), {})
         last = sensor.last_judgement()
         sensor.queue_notifications(
@@ -214,19 +212,19 @@ def test_what_waits_is_told_in_its_order(asp):
         )
         assert len(calls.deliver(sensor, [calls.Webhook(url)], now=True)) == 1
         assert calls.deliver(sensor, [calls.Webhook(url)], now=True) == ()
-    states = [json.loads(body)["state"] for _, _, body in heard]
+    states = [json.loads(body)["state"] for _, _, body in posts]
     assert states == ["cannot-tell", "cannot-tell", "cannot-tell", "alarm"]
 
 
-def test_a_call_that_keeps_failing_is_made_ever_more_seldom(asp):
+def test_a_call_that_keeps_failing_is_repeated_ever_less_often(asp):
     snapshots(np.ones(3))
-    with served([500]) as (url, heard):
-        watched(asp, "--webhook", url)
+    with served([500]) as (url, posts):
+        watch(asp, "--webhook", url)
         sensor = Sensors(Store(STORE), SensorAddress("Pump 3", "DE", "sensor"), {})
         assert calls.deliver(sensor, [calls.Webhook(url)]) == ()  # not due yet
-        assert len(heard) == 1
+        assert len(posts) == 1
         with sensor.store.transaction() as run:
-            run("UPDATE call SET attempts = 5000")  # a month at every start of cron's
+            run("UPDATE call SET attempts = 5000")  # a month of runs started by cron
         calls.deliver(sensor, [calls.Webhook(url)], now=True)
         ((_, attempts, due, _),) = sensor.pending_notifications(calls.Webhook(url).name)
     assert attempts == 5001
@@ -250,7 +248,7 @@ asyncio.run(serve())
 
 @contextmanager
 def broker():
-    """A small MQTT broker on loopback, in a process of its own; its port."""
+    """Start a small MQTT broker on loopback in its own process; return its port."""
     with closing(socket.socket()) as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -266,7 +264,7 @@ def broker():
 
 
 def retained(port, topic):
-    """What a broker holds for who asks later."""
+    """Return the messages that a broker retains for later subscribers."""
     from paho.mqtt import subscribe
 
     return json.loads(
@@ -278,23 +276,23 @@ def test_an_mqtt_broker_holds_the_last_state(asp):
     pytest.importorskip("amqtt", reason="the small broker is a development package")
     snapshots(np.ones(3))
     with broker() as port:
-        assert watched(asp, "--mqtt", f"mqtt://127.0.0.1:{port}/plant/alarms")[2] == ""
+        assert watch(asp, "--mqtt", f"mqtt://127.0.0.1:{port}/plant/alarms")[2] == ""
         assert retained(port, "plant/alarms")["state"] == "cannot-tell"
-        assert watched(asp, "--mqtt", f"mqtt://127.0.0.1:{port}")[2] == ""
+        assert watch(asp, "--mqtt", f"mqtt://127.0.0.1:{port}")[2] == ""
         assert retained(port, "asperity/Pump 3/DE/sensor")["machine"] == "Pump 3"
     snapshots([1.0], first=3)
-    watched(
+    watch(
         asp, "--mqtt", f"mqtt://127.0.0.1:{port}/plant/alarms"
-    )  # the state is the same: nobody is called
-    assert kept("SELECT count(*) FROM call WHERE answered IS NULL") == [(0,)]
-    code, _, err = watched(asp, "--mqtt", f"mqtt://somebody:secret@127.0.0.1:{port}/other")
+    )  # the state is unchanged: no notification
+    assert query_store("SELECT count(*) FROM call WHERE answered IS NULL") == [(0,)]
+    code, _, err = watch(asp, "--mqtt", f"mqtt://user:secret@127.0.0.1:{port}/other")
     assert code == 4
     assert f"mqtt mqtt://127.0.0.1:{port}/other could not be notified" in err
     assert "secret" not in Path(STORE).read_bytes().decode("latin-1")
 
 
 @pytest.mark.parametrize(
-    ("option", "value", "said"),
+    ("option", "value", "message"),
     [
         ("--on-alarm", "no-such-program --now", "there is no program 'no-such-program' to run"),
         ("--on-alarm", "", "there is no program '' to run"),
@@ -311,17 +309,17 @@ def test_an_mqtt_broker_holds_the_last_state(asp):
         ("--mqtt", "mqtt://broker/plant#1", "has neither + nor #"),
     ],
 )
-def test_who_cannot_be_called_is_refused_before_anything_is_read(asp, option, value, said):
+def test_invalid_notification_targets_are_refused_before_reading(asp, option, value, message):
     snapshots(np.ones(3))
-    code, out, err = watched(asp, option, value)
+    code, out, err = watch(asp, option, value)
     assert (code, out) == (2, "")
-    assert said in err
+    assert message in err
     assert not Path(STORE).exists()
 
 
-def test_mqtt_without_its_library_says_what_to_install(asp, monkeypatch):
+def test_mqtt_without_its_library_names_the_package_to_install(asp, monkeypatch):
     snapshots(np.ones(3))
     monkeypatch.setitem(sys.modules, "paho.mqtt.client", None)
-    code, _, err = watched(asp, "--mqtt", "mqtt://127.0.0.1/x")
+    code, _, err = watch(asp, "--mqtt", "mqtt://127.0.0.1/x")
     assert code == 2
     assert "pip install 'asperity[monitor]'" in err

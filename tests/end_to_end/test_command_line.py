@@ -1,4 +1,4 @@
-"""The commands as a user types them, on the real solver and small grids."""
+"""The commands of `asperity`, on the real solver and small grids."""
 
 import json
 import subprocess
@@ -15,8 +15,8 @@ from asperity.solution import OscillatingContact, OwnResonance
 from asperity.surface import flat_surface
 
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
-# design.md, section 4, errors, the load on capped oil, parts of friction, shear, the last two's
-# deviations
+# keys of design.md, section 4: errors, load on capped oil, parts of friction, shear and the
+# deviations of both
 KEYS = [
     *("car", "car_error", "car_domain", "clr", "clr_error", "capped_oil_load_ratio"),
     *(
@@ -68,7 +68,7 @@ def numbers(text: str) -> dict[str, float]:
     return scalars
 
 
-def test_json_holds_the_contract_and_nothing_else_is_on_stdout(asp):
+def test_json_has_the_documented_keys_and_stdout_nothing_else(asp):
     code, out, _ = asp("solve", "case.toml", "--json")
     assert code == 0
     assert sorted(json.loads(out)) == sorted(KEYS)
@@ -77,24 +77,26 @@ def test_json_holds_the_contract_and_nothing_else_is_on_stdout(asp):
 
 
 def test_quantities_not_shown_are_not_computed(asp, monkeypatch):
-    """The virgin contact's stiffness stands in no short table, and costs as much as the other
-    limit.
-    """
+    """The virgin contact's stiffness is in no short table and costs as much as the other limit."""
     expected = asp("solve", "case.toml")
     monkeypatch.setattr(
-        OwnResonance, "virgin", property(lambda _: pytest.fail("shaken without being asked to"))
+        OwnResonance,
+        "virgin",
+        property(lambda _: pytest.fail("the dynamic contact was solved unnecessarily")),
     )
     found = asp("solve", "case.toml")
     assert [line for line in found[1].splitlines() if " s" not in line] == [
         line for line in expected[1].splitlines() if " s" not in line
     ]
     monkeypatch.setattr(
-        OscillatingContact, "resonance", lambda *_: pytest.fail("shaken without being asked to")
+        OscillatingContact,
+        "resonance",
+        lambda *_: pytest.fail("the dynamic contact was solved unnecessarily"),
     )
     assert asp("solve", "case.toml", "--quiet")[:2] == (0, f"{expected[1].splitlines()[0]}\n")
 
 
-def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
+def test_the_verdict_comes_first_and_is_the_only_output_of_quiet(asp):
     code, out, _ = asp("solve", "case.toml")
     assert code == 0
     scalars = json.loads(asp("solve", "case.toml", "--json")[1])
@@ -111,13 +113,13 @@ def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
     assert asp("solve", "case.toml", "--quiet")[1:] == (out.splitlines()[0] + "\n", "")
 
 
-def test_an_accuracy_chooses_the_cells_and_keeps_the_domain(asp):
+def test_a_required_accuracy_sets_the_cells_and_keeps_the_domain(asp):
     quick = ("--surfaces", "1", "--set", "surface=flat", "--set", "vibration=none")
-    said = json.loads(asp("solve", "case.toml", "--accuracy", "0.05", "--json", *quick)[1])
+    coarser = json.loads(asp("solve", "case.toml", "--accuracy", "0.05", "--json", *quick)[1])
     finer = json.loads(asp("solve", "case.toml", "--accuracy", "0.005", "--json", *quick)[1])
-    assert said["cells"][0] < finer["cells"][0] / 1.5
-    assert said["determined"] is finer["determined"] is True
-    assert said["h_central_m"] == pytest.approx(finer["h_central_m"], rel=0.05)
+    assert coarser["cells"][0] < finer["cells"][0] / 1.5
+    assert coarser["determined"] is finer["determined"] is True
+    assert coarser["h_central_m"] == pytest.approx(finer["h_central_m"], rel=0.05)
     card = finer["regime_card"]
     assert card["regime"] == "piezoviscous-elastic"
     assert card["half_width_m"] == pytest.approx(55.93e-6, rel=1e-3)
@@ -126,13 +128,14 @@ def test_an_accuracy_chooses_the_cells_and_keeps_the_domain(asp):
     assert asp("solve", "case.toml", "--accuracy", "3")[:2] == (2, "")
 
 
-def test_several_surfaces_are_solved_and_kept(asp):
+def test_several_surfaces_are_solved_and_stored(asp):
     quick = ("--set", "grid.cells=[48, 48]", "--set", "vibration.duration=0.2 s")
     code, out, _ = asp("solve", "case.toml", "--surfaces", "2", "--out", "run.nc", "--json", *quick)
     assert code == 0
     assert json.loads(out)["surfaces"] == 2
     assert load_run("run.nc").summary() == json.loads(out)
-    assert numbers(asp("solve", "run.nc", "--json")[1]) == numbers(out)  # it states how many, too
+    # the number of surfaces is stated, too
+    assert numbers(asp("solve", "run.nc", "--json")[1]) == numbers(out)
     code, out, _ = asp("solve", "case.toml", "--set", "solver={}", "--json", *quick)
     assert json.loads(out)["surfaces"] == 5
     assert asp("solve", "case.toml", "--surfaces", "0")[:2] == (2, "")
@@ -146,7 +149,7 @@ def test_several_surfaces_are_solved_and_kept(asp):
         (("surface", "ring.x3p", "absent.x3p"), "arithmetic mean height, Sa"),
     ],
 )
-def test_a_terminal_without_our_signs_shows_plain_ones(asp, monkeypatch, arguments, plain):
+def test_a_terminal_without_unicode_shows_ascii_signs(asp, monkeypatch, arguments, plain):
     x3pio.write(
         "ring.x3p",
         np.random.default_rng(5).standard_normal((32, 48)) * 1e-6,
@@ -207,7 +210,7 @@ def test_set_changes_the_case(asp):
     assert run.case.contents.surface.seed == 3
 
 
-def test_a_dry_smooth_contact_is_hertz_and_rings_at_full_load(asp):
+def test_a_dry_smooth_contact_is_hertzian_and_has_all_load_on_asperities(asp):
     _, out, _ = asp(
         "solve", "case.toml", "--set", "lubricant=none", "--set", "surface=flat", "--json"
     )
@@ -215,7 +218,7 @@ def test_a_dry_smooth_contact_is_hertz_and_rings_at_full_load(asp):
     assert dry["clr"] == pytest.approx(1.0, abs=1e-3)
     assert dry["p_max_pa"] == pytest.approx(0.5691e9, rel=0.02)  # physics: p_h of the paper's case
     assert dry["lambda_ratio"] is None
-    assert dry["crf_hz"] is None  # nothing rough passes: no excitation
+    assert dry["crf_hz"] is None  # no roughness passes: no excitation
 
 
 def test_python_and_command_line_agree(asp):
@@ -233,7 +236,7 @@ def test_a_case_without_vibration_has_no_resonance(asp):
     assert asp("report", "run.nc")[0] == 0
 
 
-def test_a_solve_that_does_not_converge_is_loud_and_kept(asp):
+def test_a_solve_that_does_not_converge_is_reported_and_stored(asp):
     code, out, err = asp(
         "solve", "case.toml", "--set", "solver.max_iterations=1", "--out", "run.nc"
     )
@@ -241,16 +244,16 @@ def test_a_solve_that_does_not_converge_is_loud_and_kept(asp):
     assert out.startswith("NOT CONVERGED")
     assert err.startswith("error: not converged")
     assert "run.nc" in err
-    kept = load_run("run.nc")
-    assert not kept.solution.convergence.converged
-    assert kept.scalars()["converged"] is False
-    assert "Not converged" in kept.notes[0]
+    stored = load_run("run.nc")
+    assert not stored.solution.convergence.converged
+    assert stored.scalars()["converged"] is False
+    assert "Not converged" in stored.notes[0]
     with pytest.raises(NotConverged) as unfinished:
-        solve_case(kept.case)
-    assert unfinished.value.solution.attributes["case"] == kept.case.text
+        solve_case(stored.case)
+    assert unfinished.value.solution.attributes["case"] == stored.case.text
 
 
-def test_ctrl_c_leaves_nothing(asp, monkeypatch, tmp_path):
+def test_ctrl_c_leaves_no_files(asp, monkeypatch, tmp_path):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
@@ -261,7 +264,7 @@ def test_ctrl_c_leaves_nothing(asp, monkeypatch, tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["case.toml"]
 
 
-def test_report_makes_a_page_of_one_run_or_several(asp):
+def test_report_writes_a_page_of_one_run_or_several(asp):
     asp("solve", "case.toml", "--out", "run.nc", "--quiet")
     code, out, _ = asp("report", "run.nc")
     assert code == 0
@@ -294,7 +297,7 @@ def test_a_surface_on_another_grid_is_refused():
         solve_case(case, surface=flat_surface(case.with_overrides({"grid.cells": [32, 32]}).grid))
 
 
-def test_demo_goes_from_case_to_report(asp):
+def test_demo_runs_from_case_to_report(asp):
     code, out, _ = asp("demo", "--out", "shown")
     assert code == 0
     assert out.startswith("From Sq 0.5 um to 3 um the asperity load share changes from ")
@@ -308,9 +311,9 @@ def test_demo_goes_from_case_to_report(asp):
 
 
 def test_new_writes_a_case_once(asp):
-    code, said, _ = asp("new", "point")
+    code, output, _ = asp("new", "point")
     assert code == 0
-    assert "point.toml" in said
+    assert "point.toml" in output
     assert 'geometry = "point"' in Path("point.toml").read_text("utf-8")
     code, _, refused = asp("new", "point")
     assert code == 2

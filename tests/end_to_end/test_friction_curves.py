@@ -1,4 +1,4 @@
-"""`asperity stribeck` and `asperity traction` as a user types them, and the same from Python."""
+"""`asperity stribeck` and `asperity traction` from the command line and from Python."""
 
 import json
 from itertools import pairwise
@@ -15,20 +15,20 @@ PNG = b"\x89PNG"
 
 
 @pytest.fixture
-def case(asp):  # noqa: ARG001 - it makes the folder
+def case(asp):  # noqa: ARG001 - it creates the folder
     overrides = {"grid.cells": [48, 32], "surface.correlation_length": "40 um"}
     return load_case("case.toml").with_overrides(overrides)
 
 
-def test_stribeck_falls_from_boundary_friction_to_the_oils(asp):
+def test_stribeck_falls_from_boundary_friction_to_that_of_the_oil(asp):
     code, out, err = asp(
         "stribeck", "case.toml", *SMALL, "--sq", "0.5 um", "--json", "--out", "curve.png"
     )
     assert (code, err) == (0, "")
-    told = json.loads(out)
-    assert told["figures"] == ["curve.png"]
+    result = json.loads(out)
+    assert result["figures"] == ["curve.png"]
     assert Path("curve.png").read_bytes().startswith(PNG)
-    (curve,) = told["curves"]
+    (curve,) = result["curves"]
     points = curve["points"]
     assert len(points) == 13
     assert all(point["converged"] for point in points)
@@ -41,14 +41,14 @@ def test_stribeck_falls_from_boundary_friction_to_the_oils(asp):
         point["friction_coefficient"] == pytest.approx(point["asperity_part"] + point["oil_part"])
         for point in points
     )
-    assert told["verdict"].startswith(
+    assert result["verdict"].startswith(
         f"The friction coefficient changes from {friction[0]:.4f} at 0.0191 m/s to"
         f" {friction[-1]:.4f}"
     )
 
 
 def test_traction_rises_from_zero_to_its_limit(asp):
-    wanted = [argument for slip in ("0", "0.3", "0.001", "3") for argument in ("--slip", slip)]
+    slips = [argument for slip in ("0", "0.3", "0.001", "3") for argument in ("--slip", slip)]
     code, out, _ = asp(
         "traction",
         "case.toml",
@@ -57,7 +57,7 @@ def test_traction_rises_from_zero_to_its_limit(asp):
         "0.5 um",
         "--sq",
         "1 um",
-        *wanted,
+        *slips,
         "--out",
         "curve.png",
     )
@@ -66,7 +66,7 @@ def test_traction_rises_from_zero_to_its_limit(asp):
     assert first.startswith("The largest friction coefficient is 0.0")
     assert "(Sq 1 um, boundary friction 0.15)" in second
     assert out.count("1.91") == 8
-    assert "thermal.feedback=true" in out  # it is hot at 300 % of sliding
+    assert "thermal.feedback=true" in out  # the film is hot at 300 % sliding
     assert Path("curve.png").read_bytes().startswith(PNG)
 
 
@@ -86,7 +86,7 @@ def test_a_traction_curve_in_python(case):
     assert seen
     assert (
         len({round(point.clr, 4) for point in curve.points}) == 1
-    )  # Newtonian in the film: sliding moves nothing else
+    )  # Newtonian oil: sliding changes only the traction
 
 
 def test_thermal_feedback_changes_the_curve(case):
@@ -110,7 +110,7 @@ def test_points_that_do_not_converge_are_marked_and_fail_the_command(asp):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "message"),
     [
         (
             ("stribeck", "case.toml", "--set", "contact.slip=0.0"),
@@ -125,10 +125,10 @@ def test_points_that_do_not_converge_are_marked_and_fail_the_command(asp):
         ),
     ],
 )
-def test_what_cannot_be_is_one_line(asp, arguments, says):
+def test_invalid_curves_are_refused_in_one_line(asp, arguments, message):
     code, out, err = asp(*arguments, "--quiet")
     assert (code, out) == (2, "")
-    assert says in err
+    assert message in err
     assert err.count("\n") == 1
 
 

@@ -1,6 +1,4 @@
-"""A disk that is full, or a quota: one sentence, nothing half written, whatever is being
-written.
-"""
+"""A full disk or quota: one sentence, and no partial output, whatever is being written."""
 
 import resource
 import subprocess
@@ -12,13 +10,11 @@ SMALL = ("--set", "grid.cells=[32, 24]", "--set", "surface.correlation_length=40
 
 
 def limited(kilobytes: int):
-    """What lets the files of a process grow no further; the system's own limit is as good as a full
-    disk.
-    """
+    """Return a function that limits a process's file size; the limit acts like a full disk."""
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (kilobytes << 10, kilobytes << 10))
 
 
-COMMANDS = {  # what writes, and kilobytes that are too few for it
+COMMANDS = {  # the command, and a size in kB that is too small for its output
     "run": (("solve", "case.toml", "--surfaces", "1", *SMALL, "--out", "new/run.nc"), 30),
     "history": (("run", "case.toml", "--steps", "2", *SMALL, "--out", "new/history"), 5),
     "study": (
@@ -43,7 +39,7 @@ COMMANDS = {  # what writes, and kilobytes that are too few for it
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_full_disk_is_one_sentence(asp, tmp_path, name):
+def test_a_full_disk_is_reported_in_one_sentence(asp, tmp_path, name):
     assert asp
     arguments, kilobytes = COMMANDS[name]
     (tmp_path / "new").mkdir()

@@ -1,6 +1,4 @@
-"""Every number that commands state stays what it was, unless a change is meant; see
-`golden_numbers`.
-"""
+"""Regression of every number that the commands state; see `golden_numbers`."""
 
 import json
 import os
@@ -9,17 +7,18 @@ import pytest
 
 from support.golden_numbers import CASES, REFERENCE, differences, numbers
 
-# Another processor sums in another order, and Newton then stops elsewhere within the solver's 1e-4.
+# Another processor sums in another order, so Newton's method stops elsewhere within the solver's
+# tolerance of 1e-4.
 TOLERANCE = float(os.environ.get("ASPERITY_GOLDEN_TOLERANCE", "2e-3"))
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_numbers_are_what_they_were(name):
+def test_numbers_match_the_reference(name):
     then = json.loads((REFERENCE / f"{name}.json").read_text("utf-8"))
     assert differences(then, numbers(name), TOLERANCE) == []
 
 
-def test_a_difference_is_seen():
+def test_a_difference_is_detected():
     then = {"rows": [{"clr": 0.5, "found": True, "reason": None}]}
     assert (
         differences(

@@ -1,5 +1,5 @@
-"""`asperity infer` from files to verdict: a small emulator that is solved, kept and gone on from;
-what is refused.
+"""`asperity infer` from files to verdict: a small emulator is solved, stored and extended;
+refusals.
 """
 
 import json
@@ -40,7 +40,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "infer.toml"
 REAL = ("mfpt", "ims", "mfpt-formats", "endaq", "uff")
 
 
-def test_an_emulator_foretells_contacts_and_says_how_well(small):
+def test_an_emulator_predicts_contacts_and_states_its_error(small):
     _, emulator, _ = small
     quality = emulator.quality["clr"]
     assert quality.error < 3.0 * quality.scatter
@@ -48,7 +48,7 @@ def test_an_emulator_foretells_contacts_and_says_how_well(small):
     rough, smooth = (
         emulator.values(np.array([[share, 0.5, 0.5]]), "clr")[0] for share in (0.9, 0.1)
     )
-    assert rough > smooth + 0.2  # more of the load on rougher surfaces
+    assert rough > smooth + 0.2  # more load on asperities for rougher surfaces
     slow, fast = (
         emulator.values(np.array([[0.5, 0.5, share]]), "clr")[0] for share in (0.05, 0.95)
     )
@@ -56,7 +56,7 @@ def test_an_emulator_foretells_contacts_and_says_how_well(small):
     assert "this is corrected" in emulator.sentence()
 
 
-def test_an_emulator_comes_back_as_it_was_and_is_no_other_cases(small):
+def test_an_emulator_reloads_unchanged_and_only_for_its_own_case(small):
     setting, emulator, folder = small
     again = build_emulator(setting, folder=folder)
     at = np.random.default_rng(0).random((5, 3))
@@ -68,7 +68,7 @@ def test_an_emulator_comes_back_as_it_was_and_is_no_other_cases(small):
         build_emulator(other, folder=folder)
 
 
-def test_an_emulator_interrupted_goes_on(small, tmp_path):
+def test_an_interrupted_emulator_resumes(small, tmp_path):
     setting, emulator, folder = small
     shutil.copytree(folder, tmp_path / "half")
     (tmp_path / "half" / "emulator.json").unlink()
@@ -80,28 +80,26 @@ def test_an_emulator_interrupted_goes_on(small, tmp_path):
 
 
 def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
-    """Its deviation there falls, contacts solved anew keep to it, and the extended one is what
-    comes back.
-    """
+    """Its deviation falls there, new contacts agree, and the extended emulator is stored."""
     setting, first, folder = small
     shutil.copytree(folder, tmp_path / "own")
     emulator = replace(first, folder=tmp_path / "own")
     points = [ObservationPoint(load, speed) for load in (420.0, 580.0) for speed in (1.2, 2.8)]
     z = np.zeros((1, len(setting.unknowns)))
     shown = ForwardModel(setting, emulator, tuple(points)).predict(z, "hertz-point")
-    heard = [
+    observations = [
         Observation(
             load_n=point.load_n, entrainment_m_s=point.entrainment_m_s, crf_hz=hertz, crf_std_hz=3.0
         )
         for point, hertz in zip(points, np.exp(shown.crf[0]), strict=True)
     ]
-    found = infer_observations(setting, emulator, heard)
+    found = infer_observations(setting, emulator, observations)
     with ThreadPoolExecutor(1) as executor:
         wider = refine_emulator(found, 24, executor=executor)
-        near = posterior_shares(found.forward, found.draws, 12, seed=99)
+        samples = posterior_shares(found.forward, found.draws, 12, seed=99)
         plan = plan_points(
             setting.case,
-            [overrides_at(setting.case, setting.ranges, one) for one in near],
+            [overrides_at(setting.case, setting.ranges, sample) for sample in samples],
             seeds=6,
             kind="still",
         )
@@ -110,8 +108,10 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     truth = groups.mean().to_numpy()
     by_chance = np.sqrt(np.mean(groups.var() / 6)) * scale.slope(
         truth
-    )  # as much as the emulators are off
-    (_, before), (mean, after) = (one(near, ["clr"])["clr"] for one in (emulator, wider.emulator))
+    )  # as large as the errors of the emulators
+    (_, before), (mean, after) = (
+        process(samples, ["clr"])["clr"] for process in (emulator, wider.emulator)
+    )
     assert after.mean() < 0.75 * before.mean()
     assert np.sqrt(np.mean(((scale.forward(truth) - mean) / np.hypot(after, by_chance)) ** 2)) < 2.0
     assert (wider.emulator.points, wider.emulator.further) == (40, 24)
@@ -121,17 +121,17 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     )
     assert "before 24 points were added" in wider.notes[-1]
     again = build_emulator(setting, folder=tmp_path / "own")
-    assert np.array_equal(again(near, ["clr"])["clr"], wider.emulator(near, ["clr"])["clr"])
+    assert np.array_equal(again(samples, ["clr"])["clr"], wider.emulator(samples, ["clr"])["clr"])
     assert again.quality == wider.emulator.quality
-    kept = refine_emulator(infer_observations(setting, formula_emulator(setting), heard), 8)
+    kept = refine_emulator(infer_observations(setting, formula_emulator(setting), observations), 8)
     assert "it was not extended" in kept.notes[-1]
     with pytest.raises(BadInput, match="holds no emulator"):
-        extend_emulator(setting, replace(emulator, folder=tmp_path), near)
+        extend_emulator(setting, replace(emulator, folder=tmp_path), samples)
     with pytest.raises(BadInput, match="has at most 4096 points"):
-        extend_emulator(setting, replace(emulator, points=4090), near)
+        extend_emulator(setting, replace(emulator, points=4090), samples)
 
 
-def test_noise_cannot_be_told_by_command(asp, small):
+def test_noise_gives_no_estimate(asp, small):
     rng = np.random.default_rng(1)
     for number in range(2):
         wavfile.write(f"noise-{number}.wav", 20_000, rng.standard_normal(40_000).astype(np.float32))
@@ -151,13 +151,13 @@ def test_noise_cannot_be_told_by_command(asp, small):
     )
     code, out, err = asp(*command, "--json", "--report", "page.html")
     assert (code, err) == (0, "")
-    said = json.loads(out)
-    assert said["verdict"].startswith("Not identified: no recording shows a contact resonance")
-    assert said["identifiable"] is False
-    assert len(said["silent"]) == 2
+    result = json.loads(out)
+    assert result["verdict"].startswith("Not identified: no recording shows a contact resonance")
+    assert result["identifiable"] is False
+    assert len(result["silent"]) == 2
     assert "<script" not in Path("page.html").read_text("utf-8")
-    assert asp(*command, "--quiet")[1] == said["verdict"] + "\n"
-    assert (said["forecast"], said["design"]) == (None, None)
+    assert asp(*command, "--quiet")[1] == result["verdict"] + "\n"
+    assert (result["forecast"], result["design"]) == (None, None)
     code, out, err = asp(*command, "--forecast", "clr=0.5")
     assert (code, out) == (2, "")
     assert "a forecast needs resonances of at least 4 recordings at different times, got 0" in err
@@ -184,7 +184,7 @@ def test_refusals_are_one_sentence(asp):
     Path("kilo.csv").write_text("file,load_kn\na.wav,0.5\n", "utf-8")
     Path("nan.csv").write_text("file,load_n\na.wav,nan\n", "utf-8")
     Path("empty").mkdir()
-    for arguments, said in (
+    for arguments, message in (
         (("a.wav",), "state --case"),
         (("--case", "infer.toml"), "asperity infer needs recordings"),
         (("a.wav", "--case", "infer.toml", "--worn", "d"), "add --forecast"),
@@ -221,7 +221,7 @@ def test_refusals_are_one_sentence(asp):
     ):
         code, out, err = asp("infer", *arguments)
         assert (code, out) == (2, "")
-        assert said in err
+        assert message in err
         assert err.count("\n") == 1
 
 
@@ -240,27 +240,25 @@ def test_a_table_of_operating_points_needs_no_x(tmp_path):
 
 
 @pytest.mark.parametrize("folder", REAL)
-def test_no_real_recording_is_told_anything_from(folder):
-    """Bearings with faults, a stopped machine, a shaker, a microphone: none shows a contact
-    resonance.
-    """
+def test_real_recordings_without_a_contact_resonance_give_no_estimate(folder):
+    """Faulty bearings, a stopped machine, a shaker and a microphone show no contact resonance."""
     if not (SHARED / "vibration" / folder).exists():
-        pytest.skip("the shared data are not here")
+        pytest.skip("the shared data are not available")
     setting = formula_setting()
     options = {"ims": {"rate_hz": 20_000.0, "unit": "g", "channel": "1"}, "endaq": {"channel": "1"}}
-    heard = observe_recordings(
+    observed = observe_recordings(
         [SHARED / "vibration" / folder], setting, source=RecordingInput(**options.get(folder, {}))
     )
     found = infer_observations(
-        setting, formula_emulator(setting), heard.observations, excluded=heard.excluded
+        setting, formula_emulator(setting), observed.observations, excluded=observed.excluded
     )
     assert found.verdict().startswith("Not identified")
     assert not found.identifiable
 
 
-def test_a_page_shows_what_was_heard(tmp_path):
+def test_a_page_shows_observations_forecast_and_design(tmp_path):
     setting = formula_setting()
-    heard = [
+    observations = [
         Observation(
             load_n=load,
             entrainment_m_s=1.0,
@@ -271,10 +269,11 @@ def test_a_page_shows_what_was_heard(tmp_path):
         for load in (300.0, 500.0, 900.0)
     ]
     found = infer_observations(
-        setting, formula_emulator(setting), heard, notes=("A note of its own.",)
+        setting, formula_emulator(setting), observations, notes=("A note of its own.",)
     )
     series = [
-        replace(heard[1], x=10.0 * number, crf_hz=3300.0 + 12.0 * number) for number in range(8)
+        replace(observations[1], x=10.0 * number, crf_hz=3300.0 + 12.0 * number)
+        for number in range(8)
     ]
     path = write_inference_report(
         found,

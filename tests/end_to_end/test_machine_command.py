@@ -1,6 +1,4 @@
-"""`asperity machine` as a user types it: conditions, solved contacts, what is kept, what is
-refused.
-"""
+"""`asperity machine`: conditions, solved contacts, stored results and refusals."""
 
 import json
 import shutil
@@ -14,7 +12,7 @@ from asperity.core.errors import BadInput
 from asperity.machines import machine_conditions
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-CONDITIONS = [  # of design.md, section 9, and the bodies' names
+CONDITIONS = [  # from design.md, section 9, and the bodies' names
     *(
         "name",
         "bodies",
@@ -28,7 +26,7 @@ CONDITIONS = [  # of design.md, section 9, and the bodies' names
     ),
     *("entrainment_m_s", "slide_to_roll", "p_hertz_pa", "overrolling_hz"),
 ]
-SOLVED = [  # of the same place, and more of what a solved contact has
+SOLVED = [  # from the same section, with further keys of a solved contact
     *(
         "h_central_m",
         "lambda_ratio",
@@ -63,7 +61,7 @@ QUICK = ("--workers", "1", "--set", "grid.cells=[48, 24]")
 
 @pytest.fixture
 def asp(tmp_path, monkeypatch, capsys):
-    """Run a command in a folder that holds the examples; return exit code, stdout and stderr."""
+    """Return a function that runs a command beside the examples: exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
     for name in ("fzg-c", "nu206", "6206"):
         shutil.copy(EXAMPLES / f"{name}.toml", tmp_path)
@@ -71,8 +69,8 @@ def asp(tmp_path, monkeypatch, capsys):
     def run(*arguments):
         with pytest.raises(SystemExit) as end:
             main(arguments)
-        said = capsys.readouterr()
-        return end.value.code or 0, said.out, said.err
+        captured = capsys.readouterr()
+        return end.value.code or 0, captured.out, captured.err
 
     return run
 
@@ -85,21 +83,21 @@ def asp(tmp_path, monkeypatch, capsys):
         ("6206", 10, "ball 0, inner ring", ("ftf_hz", 19.8234)),
     ],
 )
-def test_a_dry_run_gives_the_conditions_alone(asp, name, contacts, worst, frequency):
+def test_a_dry_run_gives_only_the_conditions(asp, name, contacts, worst, frequency):
     code, out, _ = asp("machine", f"{name}.toml", "--dry-run", "--json")
-    said = json.loads(out)
+    result = json.loads(out)
     assert code == 0
-    assert sorted(said) == KEYS
-    assert [sorted(row) for row in said["contacts"]] == [sorted(CONDITIONS)] * contacts
-    assert said["worst"] == worst
-    assert said["frequencies"][frequency[0]] == pytest.approx(frequency[1], rel=1e-5)
+    assert sorted(result) == KEYS
+    assert [sorted(row) for row in result["contacts"]] == [sorted(CONDITIONS)] * contacts
+    assert result["worst"] == worst
+    assert result["frequencies"][frequency[0]] == pytest.approx(frequency[1], rel=1e-5)
     first = asp("machine", f"{name}.toml", "--dry-run")[1].splitlines()[0]
-    assert first == said["verdict"]
+    assert first == result["verdict"]
     assert worst in first
     assert list(Path().glob("*")) == list(Path().glob("*.toml"))
 
 
-def test_a_dry_run_needs_neither_oil_nor_roughness_and_solving_does(asp):
+def test_only_solving_needs_oil_and_roughness(asp):
     lines = Path("nu206.toml").read_text("utf-8").splitlines()
     Path("bare.toml").write_text(
         "\n".join(line for line in lines if line.startswith("machine")), "utf-8"
@@ -111,7 +109,7 @@ def test_a_dry_run_needs_neither_oil_nor_roughness_and_solving_does(asp):
     assert not Path("kept").exists()
 
 
-def test_every_contact_is_solved_kept_and_not_solved_again(asp):
+def test_every_contact_is_solved_and_stored_once(asp):
     arguments = (
         "machine",
         "nu206.toml",
@@ -125,8 +123,8 @@ def test_every_contact_is_solved_kept_and_not_solved_again(asp):
     )
     code, out, _ = asp(*arguments, "--json")
     assert code == 0
-    said = json.loads(out)
-    rows = {row["name"]: row for row in said["contacts"]}
+    result = json.loads(out)
+    rows = {row["name"]: row for row in result["contacts"]}
     assert [sorted(row) for row in rows.values()] == [sorted(CONDITIONS + SOLVED)] * 10
     assert (
         rows["roller 1, inner ring"]["h_min_m"] == rows["roller 12, inner ring"]["h_min_m"]
@@ -134,30 +132,30 @@ def test_every_contact_is_solved_kept_and_not_solved_again(asp):
     films = [rows[f"roller {number}, inner ring"]["h_min_m"] for number in (0, 1, 2)]
     assert films == sorted(films)
     assert rows["roller 0, outer ring"]["h_min_m"] > films[0]  # of larger radius
-    assert (said["worst"], rows["roller 0, inner ring"]["clr"]) == ("roller 0, inner ring", 0.0)
-    assert json.loads(Path("kept/machine.json").read_text("utf-8")) == said
-    assert [sorted(rating)[:-1] for rating in said["ratings"]] == [RATING] * 5
+    assert (result["worst"], rows["roller 0, inner ring"]["clr"]) == ("roller 0, inner ring", 0.0)
+    assert json.loads(Path("kept/machine.json").read_text("utf-8")) == result
+    assert [sorted(rating)[:-1] for rating in result["ratings"]] == [RATING] * 5
     page = Path("kept/machine.html").read_text("utf-8")
-    assert said["verdict"].split(",")[0] in page
+    assert result["verdict"].split(",")[0] in page
     assert 'href="worst.html"' in page
     assert "roller 0, inner ring: the worst contact" in Path("kept/worst.html").read_text("utf-8")
     opened = Path("kept/worst.nc").stat().st_mtime_ns
     parts = sorted(Path("kept/parts").glob("*.parquet"))
     times = [part.stat().st_mtime_ns for part in parts]
-    parts[0].unlink()  # as if it had been killed before this one
+    parts[0].unlink()  # as if it had been killed before this contact
     again = json.loads(asp(*arguments, "--json")[1])
-    assert again["contacts"] == said["contacts"]
+    assert again["contacts"] == result["contacts"]
     assert [part.stat().st_mtime_ns for part in parts[1:]] == times[
         1:
-    ]  # the first may be told in other batches now
+    ]  # the first part may be batched differently now
     assert Path("kept/worst.nc").stat().st_mtime_ns == opened
     code, _, err = asp(*arguments, "--set", "machine.radial_load=3 kN")
     assert code == 2
     assert "holds a study of another case" in err
 
 
-def test_a_contacts_interval_is_what_solve_gives(asp):
-    """Over several surfaces of one kind."""
+def test_a_contacts_interval_is_that_of_solve(asp):
+    """The interval covers several surfaces of one kind."""
     rough = (
         'surface = { kind = "gaussian", sq = "0.6 um", correlation_length = "20 um", seed = 3 }\n'
     )
@@ -172,14 +170,14 @@ def test_a_contacts_interval_is_what_solve_gives(asp):
         assert row[key] == pytest.approx(alone[key], rel=1e-6)
 
 
-def test_a_contact_is_what_solve_makes_of_it(asp):
-    """A contact of the gears, typed in as one, has the machine's numbers."""
+def test_a_contact_equals_the_result_of_solve(asp):
+    """A gear contact entered as a single case has the machine's numbers."""
     changed = {"grid.cells": [48, 24], "surface": "flat"}
     gears = load_machine("fzg-c.toml").with_overrides(changed)
-    one = next(contact for contact in gears.contacts if contact.name == "D")
+    tooth_contact = next(contact for contact in gears.contacts if contact.name == "D")
     arguments = ("machine", "fzg-c.toml", *QUICK, "--set", "surface=flat", "--json")
     row = next(row for row in json.loads(asp(*arguments)[1])["contacts"] if row["name"] == "D")
-    Path("d.toml").write_text(gears.case(one).text, "utf-8")
+    Path("d.toml").write_text(gears.case(tooth_contact).text, "utf-8")
     alone = json.loads(asp("solve", "d.toml", "--json")[1])
     for key in ("h_central_m", "h_min_m", "friction_coefficient", "flash_temperature_max_k"):
         assert row[key] == pytest.approx(alone[key], rel=1e-9)
@@ -204,7 +202,7 @@ def test_sliding_keeps_its_sign(asp):
         )
 
 
-def test_what_is_not_solved_is_loud(asp):
+def test_unsolved_contacts_are_reported(asp):
     few = ("--set", "solver.max_iterations=1", "--set", "surface.correlation_length=60 um")
     code, out, err = asp("machine", "fzg-c.toml", *QUICK, *few)
     assert code == 1
@@ -269,7 +267,7 @@ def test_what_is_not_solved_is_loud(asp):
         ("6206", "contact.load=4 N", "a [machine] and a [contact]; leave one of them out"),
     ],
 )
-def test_bad_machines_are_one_sentence(asp, name, setting, words):
+def test_bad_machines_are_refused_in_one_sentence(asp, name, setting, words):
     code, out, err = asp("machine", f"{name}.toml", "--dry-run", "--set", setting)
     if words is None:
         assert code == 0
@@ -279,7 +277,7 @@ def test_bad_machines_are_one_sentence(asp, name, setting, words):
     assert words in err
 
 
-def test_what_states_a_machine_is_not_a_single_contact(asp):
+def test_a_machine_file_is_not_a_single_contact(asp):
     for command in ("solve", "study", "run", "vibrate"):
         code, _, err = asp(command, "nu206.toml", *(("--dry-run",) if command == "study" else ()))
         assert code == 2
@@ -288,13 +286,13 @@ def test_what_states_a_machine_is_not_a_single_contact(asp):
     assert "has no [machine]" in asp("machine", "paper.toml")[2]
 
 
-def test_a_setting_mends_a_file_that_is_refused(asp):
+def test_an_override_corrects_a_refused_file(asp):
     Path("discs.toml").write_text(DISCS.replace('"500 N"', '"-500 N"'), "utf-8")
     assert asp("machine", "discs.toml", "--dry-run")[0] == 2
     assert asp("machine", "discs.toml", "--dry-run", "--set", "machine.load=500 N")[0] == 0
 
 
-def test_a_disc_may_stand(asp):
+def test_a_disc_may_be_at_rest(asp):
     Path("discs.toml").write_text(DISCS, "utf-8")
     out = asp(
         "machine",
@@ -316,7 +314,7 @@ def test_a_disc_may_stand(asp):
         )
 
 
-def test_speeds_that_slip_backwards_are_said_or_refused(asp):
+def test_backward_slip_is_reported_or_refused(asp):
     Path("discs.toml").write_text(DISCS, "utf-8")
     for setting, words in (
         (

@@ -1,6 +1,4 @@
-"""`asperity track` with a machine's case: the rates at which its faults pass, at the speed of each
-recording.
-"""
+"""`asperity track` with a machine's case: fault frequencies at the speed of each recording."""
 
 import json
 from pathlib import Path
@@ -12,24 +10,22 @@ EXAMPLE = str(Path(__file__).parents[2] / "examples" / "6206.toml")
 RATE, SECONDS = 20e3, 2.0
 OUTER = (
     9.0 / 2.0 * (1.0 - 9.525 / 46.0)
-)  # passages over the outer ring in a turn, 9 balls of 9.525 on 46 mm
+)  # ball passes over the outer ring per revolution, 9 balls of 9.525 mm on 46 mm
 BAND = ("--band", "2000", "4000")
 
 
 def bearing(rng, speed, size):
-    """Noise, and a ring of 5 kHz that is struck whenever a ball passes; the shaft's angle beside it
-    [turns].
-    """
+    """Return noise with a 5 kHz resonance struck at each ball pass, and the shaft angle [turns]."""
     time = np.arange(round(RATE * SECONDS)) / RATE
     turns = np.cumsum(np.broadcast_to(speed, time.shape)) / RATE
-    struck = np.flatnonzero(np.diff(np.floor(OUTER * turns), prepend=0.0))
-    blows = np.zeros(time.size)
-    blows[struck] = 1.0 + 0.1 * rng.standard_normal(struck.size)
+    impacts = np.flatnonzero(np.diff(np.floor(OUTER * turns), prepend=0.0))
+    impulses = np.zeros(time.size)
+    impulses[impacts] = 1.0 + 0.1 * rng.standard_normal(impacts.size)
     ring = np.exp(-800.0 * time[:200]) * np.sin(2.0 * np.pi * 5000.0 * time[:200])
-    return rng.standard_normal(time.size) + size * np.convolve(blows, ring)[: time.size], turns
+    return rng.standard_normal(time.size) + size * np.convolve(impulses, ring)[: time.size], turns
 
 
-def test_a_growing_fault_is_called_by_its_name_at_any_speed(asp):
+def test_a_growing_fault_is_named_at_any_speed(asp):
     rows, rng = ["file,speed_hz"], np.random.default_rng(1)
     Path("in").mkdir()
     for number in range(26):
@@ -41,18 +37,18 @@ def test_a_growing_fault_is_called_by_its_name_at_any_speed(asp):
     code, out, _ = asp(
         "track", "in", "--table", "speeds.csv", "--case", EXAMPLE, *BAND, "--json", "--out", "t.csv"
     )
-    said = json.loads(out)
+    result = json.loads(out)
     assert code == 3
-    first, *_, last = said["recordings"]
+    first, *_, last = result["recordings"]
     assert {"BPFO", "BPFI", "BSF", "FTF", "shaft"} <= set(first["depths"])
     assert last["depths"]["BPFO"] > 4.0 * first["depths"]["BPFO"]
     assert last["depths"]["BPFO"] > 2.0 * last["depths"]["BPFI"]
-    assert said["alarm"]["raised_by"] == "the envelope at BPFO"
+    assert result["alarm"]["raised_by"] == "the envelope at BPFO"
     head = Path("t.csv").read_text().splitlines()[0]
     assert {"depth_BPFO", "line_BPFO", "band_1 to 5 kHz"} <= set(head.split(","))
 
 
-def test_a_tacho_gathers_a_fault_that_a_changing_speed_smears(asp):
+def test_a_tachometer_resolves_a_fault_at_varying_speed(asp):
     rng = np.random.default_rng(2)
     time = np.arange(round(RATE * SECONDS)) / RATE
     values, turns = bearing(rng, 25.0 + 10.0 * time, 2.0)
@@ -63,12 +59,12 @@ def test_a_tacho_gathers_a_fault_that_a_changing_speed_smears(asp):
         Path(f"{name}/a.npz.json").write_text(
             json.dumps({"channel": "acc", "faults_per_turn": {"BPFO": OUTER}} | stated)
         )
-    told, blind = (
+    with_tacho, without_tacho = (
         json.loads(asp("track", name, *BAND, "--json")[1])["recordings"][0]
         for name in ("with", "without")
     )
-    assert told["speed_hz"] == pytest.approx(35.0, rel=0.01)
-    assert told["depths"]["BPFO"] > 2.5 * blind["depths"]["BPFO"]
+    assert with_tacho["speed_hz"] == pytest.approx(35.0, rel=0.01)
+    assert with_tacho["depths"]["BPFO"] > 2.5 * without_tacho["depths"]["BPFO"]
 
 
 def test_conditions_are_read_from_channels_in_their_units(asp):
@@ -99,8 +95,8 @@ def test_conditions_are_read_from_channels_in_their_units(asp):
     assert "channel oil is in degC, but load_n needs N, kN, mN, MN" in row["remarks"]
 
 
-def heard_beside(asp, stated, **channels):
-    """What `track` says of a recording with other channels, and what is stated beside it."""
+def output_with_channels(asp, stated, **channels):
+    """Return the row of `track` for a recording with further channels and sidecar values."""
     Path("in").mkdir()
     acceleration = np.random.default_rng(3).standard_normal(40_000)
     np.savez("in/a.npz", acc=acceleration, fs=RATE, **channels)
@@ -113,8 +109,8 @@ def heard_beside(asp, stated, **channels):
     return row
 
 
-def test_a_speed_channel_without_a_number_is_told_beside_its_recording(asp):
-    row = heard_beside(
+def test_a_speed_channel_without_a_number_is_reported_with_its_recording(asp):
+    row = output_with_channels(
         asp, {"condition_channels": {"speed_hz": "shaft"}}, shaft=np.full(40_000, np.nan)
     )
     assert "channel shaft contains no number; leave it out" in row["remarks"]
@@ -122,8 +118,10 @@ def test_a_speed_channel_without_a_number_is_told_beside_its_recording(asp):
     assert row["depths"] == {}
 
 
-def test_a_tacho_of_other_samples_is_not_laid_beside_the_vibration(asp):
-    row = heard_beside(asp, {"tacho": "pulse"}, pulse=(np.arange(20_000) % 800 < 80).astype(float))
+def test_a_tachometer_of_another_length_is_not_used(asp):
+    row = output_with_channels(
+        asp, {"tacho": "pulse"}, pulse=(np.arange(20_000) % 800 < 80).astype(float)
+    )
     assert "the tacho in channel pulse has 20000 samples and the vibration 40000" in row["remarks"]
     assert row["speed_hz"] is None
 
@@ -140,7 +138,7 @@ def test_a_tacho_of_other_samples_is_not_laid_beside_the_vibration(asp):
         ({"pulses_per_turn": 0}, "pulses_per_turn must be a positive number"),
     ],
 )
-def test_what_a_sidecar_cannot_mean_is_refused(asp, stated, refusal):
+def test_an_invalid_sidecar_is_refused(asp, stated, refusal):
     np.savez("a.npz", acc=np.ones(100), fs=RATE, unit="m/s^2")
     Path("a.npz.json").write_text(json.dumps(stated))
     code, _, err = asp("track", "a.npz", *BAND)

@@ -1,6 +1,4 @@
-"""`asperity track` and `watch` where load, speed or oil temperature are stated beside
-recordings.
-"""
+"""`asperity track` and `watch` with load, speed or oil temperature given for the recordings."""
 
 import json
 from pathlib import Path
@@ -10,10 +8,8 @@ import numpy as np
 MANY = 24
 
 
-def loud(folder, loads, sidecar=False):
-    """Noise whose level goes with load, a tenth of a second each; the load in a table, or beside
-    each.
-    """
+def write_recordings(folder, loads, sidecar=False):
+    """Write noise of 0.1 s whose level follows load; the load is in a table or in sidecars."""
     Path(folder).mkdir()
     rows = ["file,load_n,temperature_degc"]
     for number, load in enumerate(loads):
@@ -29,35 +25,35 @@ def loud(folder, loads, sidecar=False):
     Path(f"{folder}.csv").write_text("\n".join(rows))
 
 
-def test_a_load_that_is_stated_explains_a_level_that_steps(asp):
+def test_a_stated_load_explains_a_step_in_level(asp):
     loads = [500.0] * 12 + [1200.0] * 12
-    loud("in", loads)
+    write_recordings("in", loads)
     unknown = json.loads(asp("track", "in", "--json")[1])
     code, out, _ = asp("track", "in", "--table", "in.csv", "--json")
     given = json.loads(out)
     assert "the level (rms) rose to" in unknown["alarm"]["reason"]
     assert unknown["alarm"]["explained"] is None
-    assert code == 4  # there is no resonance to see
+    assert code == 4  # the recordings contain no resonance
     assert "and has stayed there" not in given["alarm"]["reason"]
     assert "load from 500 to 1200 N explains it" in given["alarm"]["explained"]
     assert given["alarm"]["explained"] in given["verdict"].replace("The level", "the level")
     assert [row["load_n"] for row in given["recordings"]] == loads
     assert given["recordings"][1]["temperature_degc"] == 61.0
-    loud("beside", loads, sidecar=True)
+    write_recordings("beside", loads, sidecar=True)
     beside = json.loads(asp("track", "beside", "--json")[1])
     assert beside["alarm"]["explained"] == given["alarm"]["explained"]
 
 
-def test_a_watch_takes_loads_from_a_table_that_grows(asp):
-    loud("in", [500.0] * 12 + [1200.0] * 12)
+def test_watch_reads_loads_from_a_growing_table(asp):
+    write_recordings("in", [500.0] * 12 + [1200.0] * 12)
     code, out, _ = asp("watch", "in", "--table", "in.csv", "--once", "--settle", "0", "--json")
-    said = json.loads(out)
+    result = json.loads(out)
     assert code == 4
-    assert "load from 500 to 1200 N explains it" in said["alarm"]["explained"]
+    assert "load from 500 to 1200 N explains it" in result["alarm"]["explained"]
 
 
-def test_a_load_by_another_name_or_unit_is_refused(asp):
-    loud("in", [500.0] * 2)
+def test_a_load_with_another_name_or_unit_is_refused(asp):
+    write_recordings("in", [500.0] * 2)
     Path("kilo.csv").write_text("file,x,load_kn\ns-000.npz,1,0.5\ns-001.npz,2,0.5\n")
     code, _, err = asp("track", "in", "--table", "kilo.csv")
     assert code == 2

@@ -1,6 +1,4 @@
-"""The page of a contact in a browser: knobs, what becomes of them, files dropped, links, and who is
-let in.
-"""
+"""The contact page in a browser: sliders, results, dropped files, links and access control."""
 
 import http.client
 import json
@@ -62,7 +60,7 @@ def browser():
 
 
 @pytest.fixture(scope="module")
-def server(browser, tmp_path_factory):  # noqa: ARG001 - none is started where there is no browser
+def server(browser, tmp_path_factory):  # noqa: ARG001 - no server is started without a browser
     with serving(tmp_path_factory.mktemp("server")) as started:
         yield started
 
@@ -76,7 +74,7 @@ def visit(browser, server):
 
 @pytest.fixture(scope="module")
 def ring(tmp_path_factory):
-    """A measured surface, large enough for the contact."""
+    """Write a measured surface that is large enough for the contact."""
     path = tmp_path_factory.mktemp("surface") / "ring.x3p"
     rng = np.random.default_rng(3)
     waves = rng.standard_normal((40, 40)).repeat(8, axis=0).repeat(8, axis=1) * 5e-7
@@ -84,7 +82,7 @@ def ring(tmp_path_factory):
     return path
 
 
-# a message to the server is a header, metadata, content and buffers
+# a message to the server consists of a header, metadata, content and buffers
 NEVER_READY = """() => {
   const send = WebSocket.prototype.send
   let held = []
@@ -97,7 +95,7 @@ NEVER_READY = """() => {
 }"""
 
 
-# where the film map begins, in every picture that the browser draws
+# vertical position of the film map in every frame that the browser draws
 TOPS = """() => {
   window.tops = []
   const look = () => {
@@ -112,24 +110,24 @@ def tile(page, name="CLR"):
     return page.locator("dl div", has_text=name).locator("dd").first
 
 
-def changed(page, text, name="CLR"):
-    """Wait until a tile says something else, and that is no coarse solution."""
+def wait_for_change(page, text, name="CLR"):
+    """Wait until a tile shows another text that does not belong to a coarse solution."""
     expect(tile(page, name)).not_to_have_text(text, use_inner_text=True)
     expect(tile(page, name)).not_to_contain_text("coarse solution")
 
 
-def holds(page, text):
-    """Wait until the tile of the load share says this."""
+def wait_for_share(page, text):
+    """Wait until the tile of the load share shows this text."""
     expect(tile(page)).to_have_text(text, use_inner_text=True)
 
 
-def reads(page, name, text):
-    """Wait until a knob's box has this value."""
+def wait_for_value(page, name, text):
+    """Wait until the box of a slider has this value."""
     expect(page.get_by_role("textbox", name=name)).to_have_value(text)
 
 
 def film(page):
-    """The film map's numbers as the browser has them."""
+    """Return the numbers of the film map in the browser."""
     return page.evaluate(
         "() => { for (const d of Bokeh.documents) for (const m of d._all_models.values())"
         " if (m.type === 'ColumnDataSource' && m.data.image?.[0]?.dtype === 'float32')"
@@ -137,39 +135,39 @@ def film(page):
     )
 
 
-def turn(page, name, text):
+def set_slider(page, name, text):
     box = page.get_by_role("textbox", name=name)
     box.fill(text)
     box.press("Enter")
     return box
 
 
-def test_a_browser_that_never_says_it_is_ready_sees_the_contact(visit):
+def test_a_browser_that_never_reports_ready_shows_the_contact(visit):
     visit.context.add_init_script(f"({NEVER_READY})()")
     visit.solved()
 
 
-def test_a_knob_leads_to_new_maps_and_numbers_and_into_the_address(visit):
+def test_a_slider_updates_maps_numbers_and_address(visit):
     page = visit.solved()
     clr, crf, map_before = tile(page).inner_text(), tile(page, "CRF").inner_text(), film(page)
     page.evaluate(TOPS)
-    turn(page, "Load, F", "800 N")
+    set_slider(page, "Load, F", "800 N")
     page.wait_for_function("() => location.search.includes('contact.load=800')")
-    changed(page, clr)
-    changed(page, crf, "CRF")
+    wait_for_change(page, clr)
+    wait_for_change(page, crf, "CRF")
     assert film(page) != map_before
     assert (
         page.evaluate("() => Math.max(...window.tops) - Math.min(...window.tops)") < 4
-    )  # nothing jumps on the way
+    )  # the layout does not jump meanwhile
     again = tile(page).inner_text()
     page.reload()
     page.get_by_text("Solved on").wait_for()
     page.wait_for_function("() => location.search.includes('contact.load=800')")
-    holds(page, again)
-    reads(page, "Load, F", "800 N")
+    wait_for_share(page, again)
+    wait_for_value(page, "Load, F", "800 N")
 
 
-def test_a_slider_turns_by_the_keyboard_and_says_its_value(visit):
+def test_a_slider_moves_by_keyboard_and_announces_its_value(visit):
     page = visit.solved()
     handles = page.get_by_role("slider").all()
     assert len(handles) == sum(
@@ -178,12 +176,12 @@ def test_a_slider_turns_by_the_keyboard_and_says_its_value(visit):
     )
     assert all(handle.get_attribute("aria-label") for handle in handles)
     assert page.get_by_role("slider", name="Load, F").get_attribute("aria-valuetext") == "500 N"
-    assert "- slider:" not in page.locator("body").aria_snapshot()  # one without a name
+    assert "- slider:" not in page.locator("body").aria_snapshot()  # a slider without a name
     page.get_by_role("slider", name="Load, F").focus()
     page.keyboard.press("ArrowRight")
     page.wait_for_function("() => location.search.includes('contact.load=530')")
     expect(page.get_by_role("slider", name="Load, F")).to_have_attribute("aria-valuetext", "530 N")
-    reads(page, "Load, F", "530 N")
+    wait_for_value(page, "Load, F", "530 N")
 
 
 def test_every_control_is_named_and_reached_by_the_keyboard(visit):
@@ -193,9 +191,9 @@ def test_every_control_is_named_and_reached_by_the_keyboard(visit):
     require_operable(page)
 
 
-def test_a_wrong_value_is_named_beside_its_knob(visit):
+def test_a_wrong_value_is_reported_at_its_slider(visit):
     page = visit.solved()
-    box = turn(page, "Composite roughness, Sq", "2")
+    box = set_slider(page, "Composite roughness, Sq", "2")
     message = page.get_by_text(
         'surface.sq must be a length such as "5.4 mm", got the bare number 2'
     )
@@ -203,38 +201,38 @@ def test_a_wrong_value_is_named_beside_its_knob(visit):
     below, above = message.bounding_box(), box.bounding_box()
     assert 0 < below["y"] - above["y"] < 120
     expect(page.locator(".block.film")).not_to_have_css("opacity", "1")
-    turn(page, "Composite roughness, Sq", "1 um")
+    set_slider(page, "Composite roughness, Sq", "1 um")
     message.wait_for(state="hidden")
     expect(page.locator(".block.film")).to_have_css("opacity", "1")
 
 
-def test_a_pinned_contact_is_compared_with(visit):
+def test_a_pinned_contact_is_compared(visit):
     page = visit.solved()
     page.get_by_role("button", name="Pin to compare").click()
-    turn(page, "Entrainment speed, u", "3 m/s")
+    set_slider(page, "Entrainment speed, u", "3 m/s")
     page.wait_for_function("() => location.search.includes('entrainment')")
     expect(tile(page)).to_have_text(re.compile(r"[−-][\d.]+ % vs. pinned"))
     page.get_by_role("button", name="Unpin").click()
     page.get_by_text("vs. pinned").first.wait_for(state="hidden")
 
 
-def test_a_setting_that_was_tried_is_clicked_back(visit):
+def test_an_earlier_setting_is_restored_by_a_click(visit):
     page = visit.solved()
     first, speed = (
         tile(page).inner_text(),
         page.get_by_role("textbox", name="Entrainment speed, u").input_value(),
     )
-    turn(page, "Entrainment speed, u", "3 m/s")
+    set_slider(page, "Entrainment speed, u", "3 m/s")
     page.wait_for_function("() => location.search.includes('entrainment')")
-    changed(page, first)
+    wait_for_change(page, first)
     page.get_by_text(re.compile("^Solved on")).wait_for()
     click_mark(page, "Load share over roughness", 0)
     page.wait_for_function("() => !location.search.includes('entrainment')")
-    reads(page, "Entrainment speed, u", speed)
-    holds(page, first)
+    wait_for_value(page, "Entrainment speed, u", speed)
+    wait_for_share(page, first)
 
 
-def test_case_file_and_lines_are_taken_away(visit):
+def test_case_file_and_script_are_downloaded(visit):
     page = visit.solved("contact?contact.load=600+N")
     with page.expect_download() as taken:
         page.get_by_role("button", name="Case file").click()
@@ -251,21 +249,21 @@ def test_a_dropped_surface_is_solved(visit, ring):
     page.locator("input[type=file]").set_input_files(ring)
     page.get_by_text("Measured surface ring.x3p").wait_for()
     page.wait_for_function("() => location.search.includes('dropped=ring.x3p')")
-    changed(page, clr)
+    wait_for_change(page, clr)
     expect(page.get_by_role("textbox", name="Composite roughness, Sq")).to_have_count(0)
     clr = tile(page).inner_text()
-    turn(page, "Load, F", "700 N")
+    set_slider(page, "Load, F", "700 N")
     page.wait_for_function("() => location.search.includes('contact.load=700')")
-    changed(page, clr)  # a moment after the address
+    wait_for_change(page, clr)  # a moment after the address
     clr, link = tile(page).inner_text(), page.url
     page.close()
     visit.page = visit.context.new_page()
     page = visit.solved(link.removeprefix(visit.server.url))  # as long as the server runs
-    holds(page, clr)
+    wait_for_share(page, clr)
     assert page.get_by_text("dropped surface").count() == 0
 
 
-def test_a_law_is_chosen(visit):
+def test_a_law_is_selected(visit):
     page = visit.solved()
     page.get_by_role("button", name="More inputs").click()
     page.get_by_label("Viscosity law").select_option("roelands")
@@ -274,16 +272,16 @@ def test_a_law_is_chosen(visit):
     page.wait_for_function("() => location.search.includes('model=paper')")
 
 
-def test_a_damaged_file_is_refused_in_a_sentence(visit, ring, tmp_path):
+def test_a_damaged_file_is_refused_in_one_sentence(visit, ring, tmp_path):
     page = visit.solved()
     clr = tile(page).inner_text()
     (tmp_path / "cut.x3p").write_bytes(ring.read_bytes()[:3000])
     page.locator("input[type=file]").set_input_files(tmp_path / "cut.x3p")
     page.get_by_text(re.compile(r"cut\.x3p .*\.$")).wait_for()
-    holds(page, clr)
+    wait_for_share(page, clr)
 
 
-def test_a_files_name_is_a_name_and_nothing_more(visit, server):
+def test_a_file_name_is_only_shown_as_text(visit, server):
     page = visit.solved()
     for number, name in enumerate(HOSTILE_NAMES):
         content = f"no surface {number}".encode() * (number + 1)
@@ -297,25 +295,25 @@ def test_a_files_name_is_a_name_and_nothing_more(visit, server):
     assert not (server.log.parent / "pwned").exists()
 
 
-def test_an_address_is_values_and_nothing_more(visit, server):
+def test_an_address_only_sets_values(visit, server):
     for query in HOSTILE_ADDRESSES:
         page = visit.go(f"contact?{query}")
         page.get_by_text(re.compile("^The link ")).wait_for()
         assert page.evaluate("() => window.pwned") is None
-        reads(page, "Load, F", "500 N")
+        wait_for_value(page, "Load, F", "500 N")
         assert page.get_by_text("root:").count() == 0
     assert not (server.log.parent / "pwned").exists()
 
 
 @pytest.mark.parametrize("header", HOSTILE_HEADERS, ids=lambda header: next(iter(header)))
-def test_a_header_is_nowhere_in_the_page(server, header):
+def test_a_header_does_not_appear_in_the_page(server, header):
     connection = http.client.HTTPConnection(server.host)
     connection.request("GET", "/contact", headers=header)
-    answer = connection.getresponse()
-    said = f"{answer.getheaders()} {answer.read().decode('utf-8')}"
-    assert answer.status in (200, 400, 403)
+    reply = connection.getresponse()
+    response = f"{reply.getheaders()} {reply.read().decode('utf-8')}"
+    assert reply.status in (200, 400, 403)
     for text in ("pwned", "evil.example", "{{7*7}}"):
-        assert text not in said
+        assert text not in response
     connection.close()
 
 
@@ -342,7 +340,7 @@ def test_a_foreign_origin_gets_403(server, origin):
     assert handshake(server, origin) == 403
 
 
-def test_the_first_address_leads_to_the_contact(server):
+def test_the_first_address_opens_the_contact(server):
     connection = http.client.HTTPConnection(server.host)
     connection.request("GET", "/")
     answer = connection.getresponse()
@@ -350,7 +348,7 @@ def test_the_first_address_leads_to_the_contact(server):
     connection.close()
 
 
-def test_dark_and_light_have_legible_ink(browser, server):
+def test_dark_and_light_text_is_legible(browser, server):
     for scheme in ("dark", "light"):
         visit = Visit(browser, server, color_scheme=scheme)
         page = visit.solved()
@@ -367,14 +365,14 @@ def test_dark_and_light_have_legible_ink(browser, server):
         visit.close()
 
 
-def contrast(one, other):
-    """WCAG's ratio of two colours."""
+def contrast(first, second):
+    """Return the WCAG contrast ratio of two colours."""
 
     def luminance(colour):
         linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
         return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
-    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+    light, dark = sorted((luminance(first), luminance(second)), reverse=True)
     return (light + 0.05) / (dark + 0.05)
 
 

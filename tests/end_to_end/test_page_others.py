@@ -1,6 +1,4 @@
-"""Recordings, a study and a history in a browser: dropped, watched, clicked, moved; and who is let
-in with --listen.
-"""
+"""The pages of recordings, studies and histories in a browser, and the password of --listen."""
 
 import http.client
 import re
@@ -28,7 +26,7 @@ def browser():
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
-    """Seven short recordings of the simulated rig."""
+    """Write seven short recordings of the simulated rig."""
     folder = tmp_path_factory.mktemp("rig") / "rig"
     with pytest.raises(SystemExit):
         main(
@@ -48,7 +46,7 @@ def rig(tmp_path_factory):
     return folder
 
 
-def test_dropped_recordings_show_their_resonance_or_why_not(browser, tmp_path, rig):
+def test_dropped_recordings_show_their_resonance_or_a_reason(browser, tmp_path, rig):
     with serving(tmp_path) as server:
         visit = Visit(browser, server)
         page = visit.go("recordings")
@@ -92,7 +90,7 @@ def test_a_folder_is_watched(browser, tmp_path, rig):
         visit.close()
 
 
-def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tmp_path):
+def test_a_point_of_a_study_opens_as_an_adjustable_contact(browser, tmp_path):
     study = {"sq": ["0.5 um", "1.5 um"], "seeds": 2, "kind": "solve"}
     run_study(
         plan_study(papers_case().with_overrides({**SMALL, "study": study})),
@@ -123,7 +121,7 @@ def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tm
         visit.close()
 
 
-def test_a_history_moves(browser, tmp_path):
+def test_a_history_is_animated(browser, tmp_path):
     run_history(papers_case().with_overrides(SMALL), out=tmp_path / "moving", steps=4)
     with serving(tmp_path, "moving") as server:
         visit = Visit(browser, server)
@@ -140,7 +138,7 @@ def test_a_history_moves(browser, tmp_path):
         visit.close()
 
 
-def test_others_have_to_know_the_password(browser, tmp_path):
+def test_remote_users_need_the_password(browser, tmp_path):
     with serving(tmp_path, "--listen", "0.0.0.0", ASPERITY_PAGE_PASSWORD="long enough") as server:
         connection = http.client.HTTPConnection(server.host)
         connection.request("GET", "/contact")

@@ -1,4 +1,4 @@
-"""What README and docs/case-file.md show is what happens: first commands, Python, refusals."""
+"""README and docs/case-file.md show the actual output: first commands, Python and refusals."""
 
 import io
 import os
@@ -13,29 +13,30 @@ from support.pages import read
 from support.source import ROOT
 
 README = read(ROOT / "README.md")
-# Another processor sums in another order, see test_golden_numbers; nothing but 0 demands every
-# digit.
+# Another processor sums in another order, see test_golden_numbers; only 0 requires every digit.
 TOLERANCE = float(os.environ.get("ASPERITY_GOLDEN_TOLERANCE", "2e-3"))
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
-def same(printed: str, shown: str) -> bool:
-    """The same words, and numbers within the tolerance or one in the last digit."""
+def matches(printed: str, shown: str) -> bool:
+    """Return True for the same words, with numbers within the tolerance or one unit in the last
+    digit.
+    """
     if TOLERANCE == 0.0:
         return printed == shown
     pairs = zip(NUMBER.findall(printed), NUMBER.findall(shown), strict=False)
-    near = (
+    close = (
         float(a) == pytest.approx(float(b), rel=TOLERANCE, abs=1.01 * last_digit(b))
         for a, b in pairs
     )
-    return NUMBER.sub("", printed) == NUMBER.sub("", shown) and all(near)
+    return NUMBER.sub("", printed) == NUMBER.sub("", shown) and all(close)
 
 
 def last_digit(number: str) -> float:
     return 10.0 ** -len(number.partition(".")[2])
 
 
-def test_the_first_commands_print_the_verdict_that_is_shown(asp):
+def test_the_first_commands_print_the_verdict_shown(asp):
     shutil.copytree(ROOT / "examples", "examples")
     commands, verdict = next(
         (block, after)
@@ -45,11 +46,11 @@ def test_the_first_commands_print_the_verdict_that_is_shown(asp):
     solve, report = commands.text.splitlines()
     code, out, _ = asp(*shlex.split(solve)[1:])
     assert code == 0
-    assert same(out.splitlines()[0], verdict.text.strip())
+    assert matches(out.splitlines()[0], verdict.text.strip())
     assert asp(*shlex.split(report)[1:])[0] == 0
 
 
-def test_the_python_prints_what_is_shown():
+def test_the_python_example_prints_the_output_shown():
     (block,) = (block for block in README.blocks if block.language == "python")
     after = next(
         line.text
@@ -59,7 +60,7 @@ def test_the_python_prints_what_is_shown():
     printed = io.StringIO()
     with redirect_stdout(printed):
         exec(compile(block.text, "README.md", "exec"), {})
-    assert same(printed.getvalue().strip(), re.search(r"`([^`]+)`", after)[1])
+    assert matches(printed.getvalue().strip(), re.search(r"`([^`]+)`", after)[1])
 
 
 REFUSED = (
@@ -70,7 +71,7 @@ REFUSED = (
 )
 
 
-def test_refusals_are_those_that_are_shown(asp):
+def test_refusals_match_the_text_shown(asp):
     *_, shown = (
         block for block in read(ROOT / "docs" / "case-file.md").blocks if not block.language
     )
@@ -79,8 +80,8 @@ def test_refusals_are_those_that_are_shown(asp):
     ] == shown.text.splitlines()
 
 
-def test_a_difference_is_seen():
+def test_a_difference_is_detected():
     shown = "CLR 0.822, CRF 3711 Hz"
-    assert same(shown, shown)
-    assert not same("CLR 0.832, CRF 3711 Hz", shown)
-    assert not same("CAR 0.822, CRF 3711 Hz", shown)
+    assert matches(shown, shown)
+    assert not matches("CLR 0.832, CRF 3711 Hz", shown)
+    assert not matches("CAR 0.822, CRF 3711 Hz", shown)

@@ -1,4 +1,4 @@
-"""`asperity check`, `track` and `watch` as a user types them, on the simulated rig."""
+"""`asperity check`, `track` and `watch` on the simulated rig."""
 
 import json
 import re
@@ -11,24 +11,28 @@ import pytest
 
 from asperity.paper import Disturbance, RigSettings, simulate_rig
 
-KEYS = {"file", "x", "crf_hz", "crf_std_hz", "crfa", "found", "reason"}  # the contract
+KEYS = {"file", "x", "crf_hz", "crf_std_hz", "crfa", "found", "reason"}  # documented in design.md
 
 
 def write_rig(folder, trend, **shape):
-    """Recordings of the rig as HDF5, and the table of their roughness; the truth by file."""
+    """Write recordings of the rig as HDF5 and their roughness; return the true CRF by file."""
     rig = simulate_rig(
         RigSettings(trend=trend, duration_s=3.0, seed=4, **shape),
         disturbance=Disturbance(snr_db=15.0),
     )
     folder.mkdir()
     rows, truth = ["file,sq_um,sq_um_std,load_n"], {}
-    for one in rig.recordings:
-        name = f"{one.name}.h5"
+    for recording in rig.recordings:
+        name = f"{recording.name}.h5"
         with h5py.File(folder / name, "w") as file:
-            data = file.create_dataset("acceleration", data=one.signal().values.astype(np.float32))
-            data.attrs["fs_hz"], data.attrs["unit"] = one.rate_hz, "m/s^2"
-        rows.append(f"{name},{1e6 * one.sq_m:.4f},{1e6 * one.sq_std_m:.4f},{rig.load_n:g}")
-        truth[name] = one.crf_hz
+            data = file.create_dataset(
+                "acceleration", data=recording.signal().values.astype(np.float32)
+            )
+            data.attrs["fs_hz"], data.attrs["unit"] = recording.rate_hz, "m/s^2"
+        rows.append(
+            f"{name},{1e6 * recording.sq_m:.4f},{1e6 * recording.sq_std_m:.4f},{rig.load_n:g}"
+        )
+        truth[name] = recording.crf_hz
     (folder / "table.csv").write_text("\n".join(rows) + "\n")
     return truth
 
@@ -58,20 +62,24 @@ def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
         "t.parquet",
         "--json",
     )
-    said = json.loads(out)
+    result = json.loads(out)
     assert (code, err) == (3, "")
-    assert said["verdict"].startswith("ALARM since sample-")
-    assert len(said["recordings"]) == len(truth) == 24
-    for row in said["recordings"]:
+    assert result["verdict"].startswith("ALARM since sample-")
+    assert len(result["recordings"]) == len(truth) == 24
+    for row in result["recordings"]:
         assert set(row) >= KEYS
         assert row["crf_hz"] == pytest.approx(truth[Path(row["file"]).name], abs=50.0)
         assert row["clr_low"] < row["clr"] < row["clr_high"]
-    assert said["stages"]["kind"] == "severe"
-    assert said["stages"]["interval"][0] < said["stages"]["split"] < said["stages"]["interval"][1]
-    assert len(said["stages"]["probability"]) == len(said["stages"]["labels"]) == 24
-    assert said["method"] == "joint"
-    assert [row["x"] for row in said["recordings"]] == sorted(
-        row["x"] for row in said["recordings"]
+    assert result["stages"]["kind"] == "severe"
+    assert (
+        result["stages"]["interval"][0]
+        < result["stages"]["split"]
+        < result["stages"]["interval"][1]
+    )
+    assert len(result["stages"]["probability"]) == len(result["stages"]["labels"]) == 24
+    assert result["method"] == "joint"
+    assert [row["x"] for row in result["recordings"]] == sorted(
+        row["x"] for row in result["recordings"]
     )
     assert Path("t.csv").read_text().count("\n") == 25
     page = Path("page.html").read_text("utf-8")
@@ -81,16 +89,16 @@ def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
     import pandas
     import xarray
 
-    with xarray.open_dataset("t.nc", engine="h5netcdf") as kept:
-        assert kept["density"].shape[0] == 24
-        assert kept.attrs["verdict"] == said["verdict"]
-        assert kept["crf_hz"].values.tolist() == [row["crf_hz"] for row in said["recordings"]]
+    with xarray.open_dataset("t.nc", engine="h5netcdf") as stored:
+        assert stored["density"].shape[0] == 24
+        assert stored.attrs["verdict"] == result["verdict"]
+        assert stored["crf_hz"].values.tolist() == [row["crf_hz"] for row in result["recordings"]]
     assert pandas.read_parquet("t.parquet")["file"].tolist() == [
-        row["file"] for row in said["recordings"]
+        row["file"] for row in result["recordings"]
     ]
 
 
-def test_damping_decides_where_it_is_asked_to(asp, rig):
+def test_damping_determines_the_stage_on_request(asp, rig):
     folder, _ = rig
     series = (str(folder), "--table", str(folder / "table.csv"), "--case", "case.toml")
     by_crf, by_damping = (
@@ -109,16 +117,16 @@ def test_damping_decides_where_it_is_asked_to(asp, rig):
     assert "damping does not change" in out
 
 
-def test_a_long_series_is_separated_in_groups(asp, rig, monkeypatch):
+def test_a_long_series_is_fitted_in_groups(asp, rig, monkeypatch):
     folder, truth = rig
     monkeypatch.setattr("asperity.monitoring.judgement.MAX_GROUP", 12)
-    said = json.loads(asp("track", str(folder), "--case", "case.toml", "--json")[1])
-    for row in said["recordings"]:
+    result = json.loads(asp("track", str(folder), "--case", "case.toml", "--json")[1])
+    for row in result["recordings"]:
         assert row["crf_hz"] == pytest.approx(truth[Path(row["file"]).name], abs=50.0)
-    assert any("24 recordings were separated in 2 groups" in note for note in said["notes"])
+    assert any("24 recordings were separated in 2 groups" in note for note in result["notes"])
 
 
-def test_track_says_what_it_assumed_and_what_it_left_out(asp, rig):
+def test_track_reports_its_assumptions_and_omissions(asp, rig):
     folder, _ = rig
     shutil.copytree(folder, "copy")
     with h5py.File("copy/sample-01-test-1.h5", "r+") as file:
@@ -133,7 +141,7 @@ def test_track_says_what_it_assumed_and_what_it_left_out(asp, rig):
     assert Path("t.csv").is_file()
 
 
-def test_a_copy_is_named_and_too_few_places_have_no_stage(asp, rig, tmp_path):
+def test_a_copy_is_named_and_too_few_positions_give_no_stage(asp, rig, tmp_path):
     folder, _ = rig
     few = tmp_path / "few"
     few.mkdir()
@@ -141,14 +149,14 @@ def test_a_copy_is_named_and_too_few_places_have_no_stage(asp, rig, tmp_path):
         shutil.copy(file, few)
     shutil.copy(file, few / "copy.h5")
     code, out, _ = asp("track", str(few), "--method", "peak", "--rate", "20 kHz", "--json")
-    said = json.loads(out)
-    assert code == 4  # cannot tell
-    assert any("copy.h5" in note and "hold the same samples" in note for note in said["notes"])
-    assert said["stages"]["probability"] == [None] * 4
+    result = json.loads(out)
+    assert code == 4  # undetermined
+    assert any("copy.h5" in note and "hold the same samples" in note for note in result["notes"])
+    assert result["stages"]["probability"] == [None] * 4
     assert "± nan" not in asp("track", str(few), "--method", "peak")[1]
 
 
-def test_constant_wear_is_no_alarm(asp, tmp_path):
+def test_constant_wear_raises_no_alarm(asp, tmp_path):
     write_rig(tmp_path / "still", "constant", repeats=1)
     code, out, _ = asp(
         "track", "still", "--table", "still/table.csv", "--case", "case.toml", "--json"
@@ -157,7 +165,7 @@ def test_constant_wear_is_no_alarm(asp, tmp_path):
     assert json.loads(out)["stages"]["kind"] == "no change"
 
 
-def test_recordings_without_a_resonance_cannot_tell(asp):
+def test_recordings_without_a_resonance_give_no_verdict(asp):
     rng = np.random.default_rng(1)
     for number in range(7):
         np.savez(f"noise-{number}.npz", acc=rng.standard_normal(40_000), fs=20e3, unit="m/s^2")
@@ -168,17 +176,20 @@ def test_recordings_without_a_resonance_cannot_tell(asp):
     assert out.startswith("Cannot tell: no contact resonance found in 7 recordings")
 
 
-def test_check_shows_the_good_beside_the_bad(asp, rig):
+def test_check_reports_good_and_bad_files(asp, rig):
     folder, _ = rig
     good = str(folder / "sample-01-test-1.h5")
     np.savez("off.npz", acc=np.zeros(30_000), fs=20e3, unit="V")
     Path("cut.wav").write_bytes(b"RIFF")
     code, out, err = asp("check", good, "off.npz", "--json")
-    said = json.loads(out)
+    result = json.loads(out)
     assert (code, err) == (0, "")
-    assert [row["usable"] for row in said["recordings"]] == [True, False]
-    assert said["recordings"][0]["facts"]["rate"] == {"value": "20000.0", "source": "file (fs_hz)"}
-    assert said["recordings"][1]["off"]
+    assert [row["usable"] for row in result["recordings"]] == [True, False]
+    assert result["recordings"][0]["facts"]["rate"] == {
+        "value": "20000.0",
+        "source": "file (fs_hz)",
+    }
+    assert result["recordings"][1]["off"]
     code, out, err = asp("check", good, "off.npz", "cut.wav", "missing.wav")
     assert code == 2
     assert out.startswith("1 of 4 recordings can be used: the machine was off")
@@ -189,7 +200,7 @@ def test_check_shows_the_good_beside_the_bad(asp, rig):
     assert (code, out.splitlines()[0]) == (0, "sample-01-test-1.h5: can be used.")
 
 
-def test_watch_hears_each_file_once_and_goes_on(asp, rig):
+def test_watch_reads_each_file_once_and_resumes(asp, rig):
     folder, _ = rig
     files = sorted(folder.glob("*.h5"))
     Path("in").mkdir()
@@ -207,23 +218,23 @@ def test_watch_hears_each_file_once_and_goes_on(asp, rig):
     for name in ("track.csv", "track.nc", "report.html"):
         assert Path("in/asperity-watch", name).is_file()
     direct = json.loads(asp("track", str(Path("in").resolve()), "--case", "case.toml", "--json")[1])
-    assert direct["recordings"] == second["recordings"]  # what was kept is what was heard
+    assert direct["recordings"] == second["recordings"]  # stored results are those that were shown
     code, _, err = asp(*arguments, "--unit", "g")
     assert code == 2
     assert "was begun with unit None" in err
 
 
-def test_watch_waits_for_a_file_that_is_still_written(asp, rig):
+def test_watch_waits_for_a_file_that_is_still_being_written(asp, rig):
     folder, _ = rig
     Path("in").mkdir()
     shutil.copyfile(folder / "sample-01-test-1.h5", "in/a.h5")
-    said = json.loads(asp("watch", "in", "--once", "--settle", "60", "--json")[1])
-    assert said["new"] == []
-    assert said["waiting"] == 1
+    result = json.loads(asp("watch", "in", "--once", "--settle", "60", "--json")[1])
+    assert result["new"] == []
+    assert result["waiting"] == 1
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (("track", "bare.npy"), "states no sampling rate"),
         (("track", "empty"), "contains no recordings"),
@@ -249,11 +260,11 @@ def test_watch_waits_for_a_file_that_is_still_written(asp, rig):
         (("watch", "bare.npy"), "is not a folder"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_in_a_sentence(asp, arguments, said):
+def test_invalid_arguments_are_refused_in_one_sentence(asp, arguments, message):
     np.save("bare.npy", np.random.default_rng(0).standard_normal(40_000))
     Path("empty").mkdir()
     Path("t.csv").write_text("file,sq_um\na.npy,1.0\n")
     code, out, err = asp(*arguments)
     assert (code, out) == (2, "")
-    assert said in err
+    assert message in err
     assert err.count("\n") == 1

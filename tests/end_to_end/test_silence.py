@@ -1,4 +1,4 @@
-"""`asperity watch` where recordings stop coming: a sensor that delivers nothing is not healthy."""
+"""`asperity watch` without new recordings: a sensor that delivers nothing is not healthy."""
 
 import json
 import os
@@ -29,26 +29,26 @@ def snapshots(folder, levels, first=0):
         np.savez(Path(folder) / f"s-{number:03}.npz", acc=values, fs=20e3, unit="m/s^2")
 
 
-def judged(column):
+def judgements(column):
     with closing(sqlite3.connect("plant.db")) as connection:
         return [
             value for (value,) in connection.execute(f"SELECT {column} FROM judgement ORDER BY id")
         ]
 
 
-def test_what_is_usual_is_learned_from_when_recordings_came():
+def test_the_usual_interval_is_estimated_from_arrival_times():
     every_10_min = [NOON + timedelta(minutes=10 * number) for number in range(12)]
     last = every_10_min[-1]
     assert overdue_reason(every_10_min, None, last + timedelta(minutes=49)) == ""
-    said = overdue_reason(every_10_min, None, last + timedelta(minutes=51))
+    reason = overdue_reason(every_10_min, None, last + timedelta(minutes=51))
     assert (
-        said
+        reason
         == "no recording has come for 51 min, since 2026-11-22T13:50:00+00:00; the usual interval"
         " is 10 min"
     )
     assert (
         overdue_reason(every_10_min[:5], None, NOON + timedelta(days=300)) == ""
-    )  # nobody knows yet
+    )  # no interval is known yet
     assert "for 2 h" in overdue_reason(every_10_min[:1], 3600.0, NOON + timedelta(hours=2))
     assert [duration_text(120.0), duration_text(3600.0), duration_text(7 * 86400.0)] == [
         "2 min",
@@ -59,11 +59,11 @@ def test_what_is_usual_is_learned_from_when_recordings_came():
     fast = [NOON + timedelta(seconds=number) for number in range(12)]
     assert (
         overdue_reason(fast, None, fast[-1] + timedelta(seconds=59)) == ""
-    )  # never before a minute
+    )  # never less than a minute
 
 
 @pytest.mark.parametrize("time", ["nan", "0", "inf"])
-def test_a_time_that_nobody_can_wait_is_refused(asp, time):
+def test_an_impossible_interval_is_refused(asp, time):
     snapshots("in", np.ones(1))
     code, _, err = asp("watch", "in", *LOOK, "--expect", time)
     assert code == 2
@@ -71,81 +71,81 @@ def test_a_time_that_nobody_can_wait_is_refused(asp, time):
     assert not Path("plant.db").exists()
 
 
-def test_a_sensor_that_delivers_nothing_is_blind_and_told_once(asp):
+def test_a_sensor_that_delivers_nothing_is_blind_and_notified_once(asp):
     snapshots("in", np.ones(10))
     Path("listen.py").write_text(LISTENER)
-    command = f"'{sys.executable}' listen.py heard.jsonl"
+    command = f"'{sys.executable}' listen.py log.jsonl"
     assert asp("watch", "in", *LOOK, "--on-alarm", command, "--quiet")[0] == 4
     time.sleep(1.2)
     code, out, _ = asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "0.5", "--json")
-    said = json.loads(out)
-    assert (code, said["alarm"]["state"], said["alarm"]["raised_by"]) == (5, "blind", "silence")
-    assert said["verdict"].startswith("Blind: no recording has come for")
-    assert "the limit is 0.5 s" in said["alarm"]["reason"]
+    result = json.loads(out)
+    assert (code, result["alarm"]["state"], result["alarm"]["raised_by"]) == (5, "blind", "silence")
+    assert result["verdict"].startswith("Blind: no recording has come for")
+    assert "the limit is 0.5 s" in result["alarm"]["reason"]
     assert asp("store", "plant.db", "--quiet")[0] == 5
-    page = Path(said["results"], "report.html").read_text("utf-8")
+    page = Path(result["results"], "report.html").read_text("utf-8")
     assert "Blind: no recording has come for" in page
     assert "Check that the machine runs, then sensor, cable and supply" in page
     assert asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "0.5", "--quiet")[0] == 5
-    assert judged("state") == ["cannot-tell", "blind"]  # said again, kept once
+    assert judgements("state") == ["cannot-tell", "blind"]  # shown again, stored once
     snapshots("in", [1.0], first=10)
     assert asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "60", "--quiet")[0] == 4
-    told = [json.loads(line) for line in Path("heard.jsonl").read_text().splitlines()]
-    assert [one["state"] for one in told] == ["cannot-tell", "blind", "cannot-tell"]
-    assert told[1]["raised_by"] == "silence"
+    notifications = [json.loads(line) for line in Path("log.jsonl").read_text().splitlines()]
+    assert [event["state"] for event in notifications] == ["cannot-tell", "blind", "cannot-tell"]
+    assert notifications[1]["raised_by"] == "silence"
 
 
-def test_an_alarm_stands_in_silence(asp):
+def test_an_alarm_remains_without_recordings(asp):
     snapshots("in", np.exp(np.log(20.0) * np.clip(np.arange(36) - 12, 0, None) / 23))
     assert asp("watch", "in", *LOOK, "--quiet")[0] == 3
     time.sleep(0.2)
     code, out, _ = asp("watch", "in", *LOOK, "--expect", "0.1", "--json")
-    said = json.loads(out)
-    assert (code, said["alarm"]["state"], said["alarm"]["raised_by"]) == (
+    result = json.loads(out)
+    assert (code, result["alarm"]["state"], result["alarm"]["raised_by"]) == (
         3,
         "alarm",
         "the level (rms)",
     )
-    assert said["verdict"].startswith("Blind: no recording has come")
-    assert "ALARM since" in said["verdict"]
-    page = Path(said["results"], "report.html").read_text("utf-8")
+    assert result["verdict"].startswith("Blind: no recording has come")
+    assert "ALARM since" in result["verdict"]
+    page = Path(result["results"], "report.html").read_text("utf-8")
     assert "ALARM since" in page
     assert "No recording has come for" in page
 
 
 @pytest.mark.skipif(os.name == "nt", reason="clocks of Windows are too coarse for it")
-def test_a_watch_that_runs_says_so_by_itself(tmp_path):
+def test_a_running_watch_reports_a_blind_sensor_unprompted(tmp_path):
     snapshots(tmp_path / "in", np.ones(8))
-    looks = watch_folder(
+    updates = watch_folder(
         tmp_path / "in",
         tmp_path / "out",
         watching=WatchSettings(poll_interval_s=0.05, settle_time_s=0.0, overdue_after_s=0.6),
     )
-    assert next(looks).track is not None
-    silent = next(looks)
-    assert silent.judgement["alarm"]["state"] == silent.track.alarm.state == "blind"
-    assert silent.track.alarm.since == 7
+    assert next(updates).track is not None
+    overdue = next(updates)
+    assert overdue.judgement["alarm"]["state"] == overdue.track.alarm.state == "blind"
+    assert overdue.track.alarm.since == 7
     snapshots(tmp_path / "in", [1.0], first=8)
-    assert len(next(looks).new) == 1
-    looks.close()
+    assert len(next(updates).new) == 1
+    updates.close()
 
 
-def test_only_what_somebody_wants_to_be_told_is_told_and_its_end(asp):
-    """`--tell alarm`: neither the first judgement nor silence, but the alarm and that it is
-    over.
-    """
+def test_only_selected_states_and_their_end_are_notified(asp):
+    """`--tell alarm` reports the alarm and its end, not the first judgement or a blind sensor."""
     Path("listen.py").write_text(LISTENER)
-    tell = ("--on-alarm", f"'{sys.executable}' listen.py heard.jsonl", "--tell", "alarm", "--quiet")
+    tell = ("--on-alarm", f"'{sys.executable}' listen.py log.jsonl", "--tell", "alarm", "--quiet")
     snapshots("in", np.ones(12))
     asp("watch", "in", *LOOK, *tell)
     time.sleep(0.2)
     assert asp("watch", "in", *LOOK, *tell, "--expect", "0.1")[0] == 5
-    assert not Path("heard.jsonl").exists()
+    assert not Path("log.jsonl").exists()
     snapshots("in", np.exp(np.log(20.0) * np.arange(1, 25) / 24), first=12)
     assert asp("watch", "in", *LOOK, *tell)[0] == 3
     assert asp("watch", "in", *LOOK, *tell, "--acknowledge", "last")[0] == 0
-    told = [json.loads(line)["state"] for line in Path("heard.jsonl").read_text().splitlines()]
-    assert told == ["alarm", "none"]
+    notifications = [
+        json.loads(line)["state"] for line in Path("log.jsonl").read_text().splitlines()
+    ]
+    assert notifications == ["alarm", "none"]
     code, _, err = asp("watch", "in", *LOOK, "--tell", "alarm,loud")
     assert code == 2
     assert "tell must be one of" in err

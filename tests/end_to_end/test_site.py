@@ -1,8 +1,7 @@
-"""The built site: every link leads somewhere on it, no page asks another machine for anything,
-mathematics is drawn.
+"""The built site: links resolve within it, pages load nothing from elsewhere, mathematics is drawn.
 
-`make docs` builds it; without it these tests are skipped, but in CI, where ASPERITY_SITE asks for
-it.
+`make docs` builds it. Without it these tests are skipped, except in CI, where ASPERITY_SITE
+requires it.
 """
 
 import os
@@ -33,7 +32,7 @@ def site() -> Path:
 
 
 class Reader(HTMLParser):
-    """What a page links to, what it loads by itself, and what links can lead to on it."""
+    """Links of a page, the resources it loads, and the targets of links to it."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -60,11 +59,11 @@ def read(path: Path) -> Reader:
 
 
 def html() -> list[Path]:
-    """Pages; the theme keeps pieces of its own among what it serves."""
+    """Return the pages, without the fragments that the theme serves."""
     return sorted(path for path in SITE.rglob("*.html") if "_static" not in path.parts)
 
 
-def test_every_link_leads_somewhere(site):
+def test_every_link_resolves(site):
     broken = []
     for page in html():
         for link in (*read(page).links, *read(page).loaded):
@@ -124,13 +123,16 @@ def test_the_reference_has_every_name_command_and_key(site):
     ] == []
 
 
-def test_a_browser_asks_no_other_machine_and_draws_mathematics(site):
-    asked, errors = [], []
+def test_a_browser_contacts_no_other_host_and_draws_mathematics(site):
+    requests, errors = [], []
     with chromium() as browser:
         page = browser.new_page()
-        page.on("request", lambda request: asked.append(request.url))
+        page.on("request", lambda request: requests.append(request.url))
         page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
+        page.on(
+            "console",
+            lambda message: errors.append(message.text) if message.type == "error" else None,
+        )
         for name in (
             "index",
             "gallery/index",
@@ -155,6 +157,6 @@ def test_a_browser_asks_no_other_machine_and_draws_mathematics(site):
             if page.evaluate("document.documentElement.scrollWidth > window.innerWidth + 1"):
                 wide.append(name)
     assert drawn > 20
-    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
     assert errors == []
-    assert wide == [], "a telephone has to scroll sideways"
+    assert wide == [], "wider than a phone screen"

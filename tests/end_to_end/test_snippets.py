@@ -1,10 +1,9 @@
-"""Every snippet of every page is run, or says above itself why it is not: `<!-- not run: reason
--->`.
+"""Every snippet of every page is run, or states a reason above it: `<!-- not run: reason -->`.
 
-The snippets of a page are run in their order, in one folder that holds the examples, in this
-process; what Python defines stays for the page's next block of Python. README's are run in
-test_readme, which holds what they print. A block of `text` behind commands is what they print:
-each of its lines, where "..." stands for anything.
+The snippets of a page are run in order, in this process, in one folder that holds the examples;
+names that Python defines remain for the page's next block of Python. Those of README are run in
+test_readme, which compares their output. A block of `text` behind commands is their output: each
+line must be printed, where "..." matches any text.
 """
 
 import re
@@ -21,14 +20,14 @@ RUN = (
     "sh",
     "console",
     "python",
-)  # of other languages nothing can be run: cases and what is printed
+)  # other languages cannot be run: cases and output
 REASON = re.compile(r"<!-- not run: (\S.*\S) -->")
-FINE = {0, 3, 4, 5}  # exit codes of a command that did what it is for
+SUCCESS = {0, 3, 4, 5}  # exit codes of a command that did its work
 SHOWN = re.compile(r"(--[\w-]+|\S+\.\w+)")
 
 
 def reason(page: Page, block: Block) -> str | None:
-    """Why a block is not run; None if it is."""
+    """Return the reason why a block is not run, or None if it is run."""
     above = page.text.splitlines()[block.line.number - 2]
     found = REASON.fullmatch(above.strip())
     return found[1] if found else None
@@ -48,48 +47,48 @@ def with_snippets() -> list[Page]:
 def test_the_snippets_of_a_page_run(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples", "examples")
-    kept: dict[str, object] = {"__name__": "__main__"}
+    names: dict[str, object] = {"__name__": "__main__"}
     for block in snippets(page):
         if block.language == "python":
-            exec(compile(block.text, f"{page.path.name}:{block.line.number}", "exec"), kept)
+            exec(compile(block.text, f"{page.path.name}:{block.line.number}", "exec"), names)
             continue
-        after = next((one for one in page.blocks if one.line.number > block.line.number), None)
+        after = next(
+            (other for other in page.blocks if other.line.number > block.line.number), None
+        )
         shown = after.text if after is not None and after.language in ("", "text") else ""
         refused = shown if shown.startswith("error: ") else None
         lines = block.text.replace("\\\n", " ").splitlines()
-        said = "\n".join(run(line.removeprefix("$ "), refused, capsys) for line in lines)
-        assert refused is not None or unsaid(shown, said) == []
+        output = "\n".join(run(line.removeprefix("$ "), refused, capsys) for line in lines)
+        assert refused is not None or missing_lines(shown, output) == []
 
 
-def unsaid(shown: str, said: str) -> list[str]:
-    """The lines that a page shows and nothing printed."""
+def missing_lines(shown: str, output: str) -> list[str]:
+    """Return the lines that a page shows and no command printed."""
     patterns = {line: ".*".join(map(re.escape, line.split("..."))) for line in shown.splitlines()}
     return [
         line
         for line, pattern in patterns.items()
-        if not re.search(f"^{pattern}$", said, re.MULTILINE)
+        if not re.search(f"^{pattern}$", output, re.MULTILINE)
     ]
 
 
 def run(line: str, refusal: str | None, capsys) -> str:
-    """What a command prints that does what it is for, or is refused as the block behind it
-    shows.
-    """
+    """Return the output of a command that succeeds, or fails as the block behind it shows."""
     words = shlex.split(line, comments=True)
     if not words:
         return ""
-    assert words[0] == "asperity", f"{line}: mark what is no command of ours as not run"
+    assert words[0] == "asperity", f"{line}: mark commands of other programs as not run"
     with pytest.raises(SystemExit) as end:
         main(words[1:])
-    said = capsys.readouterr()
+    captured = capsys.readouterr()
     if refusal is not None and end.value.code == 2:
-        assert said.err.strip() == refusal.strip()
+        assert captured.err.strip() == refusal.strip()
     else:
-        assert (end.value.code or 0) in FINE, f"{line}: {said.err}"
-    return said.out
+        assert (end.value.code or 0) in SUCCESS, f"{line}: {captured.err}"
+    return captured.out
 
 
-def test_a_reason_stands_above_a_snippet_and_nowhere_else():
+def test_a_reason_is_given_only_above_snippets():
     for page in pages():
         marks = [
             number
@@ -100,7 +99,7 @@ def test_a_reason_stands_above_a_snippet_and_nowhere_else():
         assert [number for number in marks if number + 1 not in fences] == [], page.path
 
 
-def test_a_snippet_that_fails_is_seen(tmp_path, monkeypatch, capsys):
+def test_a_failing_snippet_is_detected(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(AssertionError, match="no-such-case"):
         run("asperity solve no-such-case.toml", None, capsys)
@@ -108,18 +107,18 @@ def test_a_snippet_that_fails_is_seen(tmp_path, monkeypatch, capsys):
         run("make test", None, capsys)
 
 
-def test_a_line_that_nothing_printed_is_seen():
-    said = "Full film: 0 %.\nReport: mine.html\n"
-    assert unsaid("Full film: ...\nReport: mine.html", said) == []
-    assert unsaid("Full ...\nMixed ...", said) == ["Mixed ..."]
-    assert unsaid("film: 0 %.", said) == ["film: 0 %."]
+def test_a_line_that_is_not_printed_is_detected():
+    output = "Full film: 0 %.\nReport: mine.html\n"
+    assert missing_lines("Full film: ...\nReport: mine.html", output) == []
+    assert missing_lines("Full ...\nMixed ...", output) == ["Mixed ..."]
+    assert missing_lines("film: 0 %.", output) == ["film: 0 %."]
 
 
-def test_readme_is_run_by_its_own_tests_or_says_why_not():
+def test_readme_is_run_by_its_own_tests_or_gives_a_reason():
     page = read(ROOT / "README.md")
     marked = [block for block in page.blocks if block.language in RUN and reason(page, block)]
     own = list(snippets(page))
     assert len(own) == 2, [
         block.text for block in own
-    ]  # the first commands and the Python, see test_readme
+    ]  # the first commands and the Python example, see test_readme
     assert marked

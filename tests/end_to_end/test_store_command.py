@@ -1,6 +1,4 @@
-"""One store for many machines, as a user meets it: filled by `watch` and `track`, shown, exported,
-killed, resumed.
-"""
+"""One store for many machines: filled by `watch` and `track`, shown, exported, resumed."""
 
 import json
 import os
@@ -25,44 +23,44 @@ ONCE = ("--once", "--settle", "0", "--quiet")
 
 
 def snapshots(folder, levels, seconds=0.1, first=0, sensors=("acc",)):
-    """Noise of a machine without a contact resonance: a tenth of a second each."""
+    """Write noise without a contact resonance, in recordings of 0.1 s."""
     Path(folder).mkdir(exist_ok=True)
     for number, level in enumerate(levels, first):
         rng = np.random.default_rng(number)
-        heard = {name: level * rng.standard_normal(round(seconds * 20e3)) for name in sensors}
-        np.savez(Path(folder) / f"s-{number:03}.npz", **heard, fs=20e3, unit="m/s^2")
+        signals = {name: level * rng.standard_normal(round(seconds * 20e3)) for name in sensors}
+        np.savez(Path(folder) / f"s-{number:03}.npz", **signals, fs=20e3, unit="m/s^2")
 
 
 def failing(steady=12, loud=24):
-    """Steady, then up twenty times."""
+    """Return constant levels followed by a rise to twenty times that level."""
     return np.concatenate([np.ones(steady), np.exp(np.log(20.0) * np.arange(loud) / (loud - 1))])
 
 
-def asked(store, query):
+def query_store(store, query):
     with closing(sqlite3.connect(store)) as connection:
         return connection.execute(query).fetchall()
 
 
 def without_times(store):
-    """All that a store holds, but for when it was written."""
+    """Return the content of a store without the times of writing."""
     return [
-        asked(
+        query_store(
             store,
             "SELECT sensor, file, started, state, row, reading FROM recording ORDER BY sensor,"
             " file",
         ),
-        asked(
+        query_store(
             store,
             "SELECT sensor, state, since, reason, raised_by, verdict, recordings FROM judgement"
             " ORDER BY id",
         ),
-        asked(
+        query_store(
             store, "SELECT name, settings, json_remove(said, '$.numbers') FROM sensor ORDER BY id"
         ),
     ]
 
 
-def test_one_store_holds_many_machines_and_says_which_needs_somebody(asp):
+def test_one_store_holds_many_machines_and_ranks_them_by_severity(asp):
     snapshots("drive", np.ones(10))
     snapshots("fan", failing())
     assert (
@@ -80,16 +78,17 @@ def test_one_store_holds_many_machines_and_says_which_needs_somebody(asp):
     code, out, _ = asp(
         "store", "plant.db", "--json", "--out", "plant.parquet", "--out", "plant.csv"
     )
-    said = json.loads(out)
-    assert (code, said["state"]) == (3, "alarm")
-    assert said["verdict"] == "2 sensors on 2 machines, 46 recordings: ALARM 1, cannot tell 1."
-    assert [row["machine"] for row in said["sensors"]] == ["Fan 1", "Pump 3"]  # the gravest first
-    assert said["sensors"][0]["reason"].startswith("the level (rms) rose to")
+    result = json.loads(out)
+    assert (code, result["state"]) == (3, "alarm")
+    assert result["verdict"] == "2 sensors on 2 machines, 46 recordings: ALARM 1, cannot tell 1."
+    # the most severe first
+    assert [row["machine"] for row in result["sensors"]] == ["Fan 1", "Pump 3"]
+    assert result["sensors"][0]["reason"].startswith("the level (rms) rose to")
     table = pandas.read_parquet("plant.parquet")
     assert list(table["machine"].value_counts().sort_index()) == [36, 10]
     assert table[table.machine == "Fan 1"]["state"].iloc[-1] == "alarm"
-    rms = asked("plant.db", "SELECT rms FROM trend WHERE machine = 'Fan 1' ORDER BY x")
-    assert np.allclose([value for (value,) in rms], failing(), rtol=0.1)  # as anybody may ask
+    rms = query_store("plant.db", "SELECT rms FROM trend WHERE machine = 'Fan 1' ORDER BY x")
+    assert np.allclose([value for (value,) in rms], failing(), rtol=0.1)  # plain SQL
     assert len(pandas.read_csv("plant.csv")) == 46
     code, out, _ = asp(
         "watch", "fan", *ONCE, "--store", "plant.db", "--machine", "Fan 1", "--point", "NDE"
@@ -98,7 +97,7 @@ def test_one_store_holds_many_machines_and_says_which_needs_somebody(asp):
     assert out.startswith("ALARM since s-")
 
 
-def test_what_is_known_is_not_judged_again(asp, monkeypatch):
+def test_judged_recordings_are_not_judged_again(asp, monkeypatch):
     snapshots("in", np.ones(10))
     first = asp("watch", "in", "--once", "--settle", "0", "--json")
     judged = []
@@ -106,7 +105,8 @@ def test_what_is_known_is_not_judged_again(asp, monkeypatch):
     second = asp("watch", "in", "--once", "--settle", "0", "--json")
     assert (judged, second[0]) == ([], first[0])
     before, after = json.loads(first[1]), json.loads(second[1])
-    before.pop("stages_by"), after.pop("stages_by")  # of the second, only what decides
+    # the second run states only the deciding source
+    before.pop("stages_by"), after.pop("stages_by")
     assert (len(before.pop("new")), after.pop("new")) == (10, [])
     assert after == before
 
@@ -114,18 +114,18 @@ def test_what_is_known_is_not_judged_again(asp, monkeypatch):
 @pytest.mark.parametrize(
     "change", [("--false-alarms", "1/500"), ("--acknowledge", "last"), ("--stages-from", "both")]
 )
-def test_another_question_is_judged_again(asp, change):
+def test_changed_settings_are_judged_again(asp, change):
     snapshots("in", np.ones(10))
     asp("watch", "in", *ONCE)
     asp("watch", "in", *ONCE, *change)
-    states = asked(
+    states = query_store(
         "in/asperity-watch/asperity.db", "SELECT state FROM judgement WHERE state != 'acknowledged'"
     )
     assert len(states) == 2
 
 
 @pytest.mark.parametrize("channels", [(), ("--channel", "acc,other")])
-def test_a_watch_killed_again_and_again_ends_with_the_same_store(tmp_path, channels):
+def test_a_watch_killed_repeatedly_ends_with_the_same_store(tmp_path, channels):
     levels = failing()
     snapshots(tmp_path / "in", levels, sensors=("acc", "other")[: 1 + bool(channels)])
     command = [
@@ -142,30 +142,30 @@ def test_a_watch_killed_again_and_again_ends_with_the_same_store(tmp_path, chann
     ]
     assert subprocess.run([*command, "whole.db"], cwd=tmp_path, check=False).returncode == 3
     store = tmp_path / "killed.db"
-    heard = [0]
-    every = len(levels) * (1 + bool(channels))
-    while len(heard) < 5 and heard[-1] < every - 6:
+    counts = [0]
+    total = len(levels) * (1 + bool(channels))
+    while len(counts) < 5 and counts[-1] < total - 6:
         process = subprocess.Popen([*command, "killed.db"], cwd=tmp_path)
-        while process.poll() is None and (not store.is_file() or _count(store) < heard[-1] + 6):
+        while process.poll() is None and (not store.is_file() or _count(store) < counts[-1] + 6):
             time.sleep(0.005)
         process.send_signal(signal.SIGKILL)
         process.wait()
-        heard.append(_count(store))
-    assert heard[1] > 0
-    assert heard[-1] < every  # it was killed before the end
+        counts.append(_count(store))
+    assert counts[1] > 0
+    assert counts[-1] < total  # it was killed before the end
     assert subprocess.run([*command, "killed.db"], cwd=tmp_path, check=False).returncode == 3
     assert without_times(store) == without_times(tmp_path / "whole.db")
 
 
 def _count(store):
     try:
-        return asked(store, "SELECT count(*) FROM recording")[0][0]
+        return query_store(store, "SELECT count(*) FROM recording")[0][0]
     except sqlite3.OperationalError:
-        return 0  # not begun yet
+        return 0  # not started yet
 
 
-def test_many_that_arrive_at_once_are_judged_one_after_another(tmp_path, monkeypatch):
-    """An alarm long before the latest recordings is not passed over, and stands."""
+def test_many_new_recordings_are_judged_one_after_another(tmp_path, monkeypatch):
+    """An alarm long before the latest recordings is not missed, and remains."""
     monkeypatch.setattr("asperity.monitoring.ordering.LATEST", 16)
     monkeypatch.setattr("asperity.monitoring.watch_state.STRIDE", 8)
     snapshots(tmp_path / "in", [*failing(), *np.ones(30)])
@@ -178,8 +178,8 @@ def test_many_that_arrive_at_once_are_judged_one_after_another(tmp_path, monkeyp
     assert len(update.track.recordings) in (
         24,
         25,
-    )  # the first eight, the latest, and the one that raised it
-    states = asked(tmp_path / "out/asperity.db", "SELECT state FROM recording ORDER BY file")
+    )  # the first eight, the latest, and the one that raised the alarm
+    states = query_store(tmp_path / "out/asperity.db", "SELECT state FROM recording ORDER BY file")
     assert all(state for (state,) in states)  # each was judged
     snapshots(tmp_path / "in", [1.0], first=66)
     (update,) = watch_folder(
@@ -188,7 +188,7 @@ def test_many_that_arrive_at_once_are_judged_one_after_another(tmp_path, monkeyp
     assert update.track.alarm.state == "alarm"
     assert (
         "raised before and not acknowledged" not in update.track.alarm.reason
-    )  # it is among those judged
+    )  # its recording is among those judged
     (update,) = watch_folder(
         tmp_path / "in",
         tmp_path / "out",
@@ -198,7 +198,7 @@ def test_many_that_arrive_at_once_are_judged_one_after_another(tmp_path, monkeyp
     assert update.track.alarm.state == "none"
 
 
-def test_a_file_that_is_no_store_is_refused(asp):
+def test_a_file_that_is_not_a_store_is_refused(asp):
     Path("text.db").write_text("not a database, but long enough to be taken for one\n" * 100)
     assert "is not a store of asperity, or damaged" in asp("store", "text.db")[2]
     with closing(sqlite3.connect("other.db")) as connection:
@@ -207,7 +207,7 @@ def test_a_file_that_is_no_store_is_refused(asp):
     code, _, err = asp("store", "other.db")
     assert code == 2
     assert "other.db is a database of another program" in err
-    assert asked("other.db", "SELECT name FROM sqlite_master") == [("theirs",)]
+    assert query_store("other.db", "SELECT name FROM sqlite_master") == [("theirs",)]
     assert len(before) == Path("other.db").stat().st_size
     assert asp("store", "absent.db")[0] == 2
     snapshots("in", np.ones(3))
@@ -224,7 +224,7 @@ def _empty(path):
     return path
 
 
-def test_a_store_that_another_program_holds_says_so(tmp_path, monkeypatch):
+def test_a_store_locked_by_another_program_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("asperity.monitoring.store.database.BUSY_S", 0.05)
     snapshots(tmp_path / "in", [1.0])
     store = Store(tmp_path / "plant.db")
@@ -251,7 +251,7 @@ def test_a_damaged_recording_of_the_store_is_read_again(tmp_path):
     assert len(update.track.recordings) == 8
 
 
-def test_a_file_that_changed_is_another_recording_and_its_past_is_kept(tmp_path):
+def test_a_changed_file_is_a_new_recording_and_its_history_remains(tmp_path):
     snapshots(tmp_path / "in", np.ones(8))
     look = WatchSettings(once=True, settle_time_s=0.0)
     next(watch_folder(tmp_path / "in", tmp_path / "out", watching=look))
@@ -260,14 +260,12 @@ def test_a_file_that_changed_is_another_recording_and_its_past_is_kept(tmp_path)
     update = next(watch_folder(tmp_path / "in", tmp_path / "out", watching=look))
     assert len(update.track.recordings) == 8
     assert update.track.recordings[3].reading.quality.rms == pytest.approx(2.0, rel=0.1)
-    assert asked(tmp_path / "out/asperity.db", "SELECT count(*) FROM recording") == [(9,)]
+    assert query_store(tmp_path / "out/asperity.db", "SELECT count(*) FROM recording") == [(9,)]
     shutil.rmtree(tmp_path / "in")
 
 
 def test_every_file_of_an_untidy_folder_is_accounted_for(asp):
-    """Of a clock that is ahead, empty, cut, foreign, half copied, a duplicate, and one that comes
-    late.
-    """
+    """Files with future times; empty, cut, foreign, half-copied, duplicate and late files."""
     snapshots("in", np.ones(8))
     ahead = time.time() + 7200.0
     os.utime("in/s-005.npz", (ahead, ahead))
@@ -278,9 +276,9 @@ def test_every_file_of_an_untidy_folder_is_accounted_for(asp):
     shutil.copy("in/s-002.npz", "in/s-002-copy.npz")
     look = ("watch", "in", "--once", "--settle", "0.2", "--json")
     time.sleep(0.3)
-    said = json.loads(asp(*look)[1])
-    assert said["waiting"] == 1  # the empty one
-    rows = {Path(row["file"]).name: row for row in said["recordings"]}
+    result = json.loads(asp(*look)[1])
+    assert result["waiting"] == 1  # the empty file
+    rows = {Path(row["file"]).name: row for row in result["recordings"]}
     assert len(rows) == 11
     assert rows["s-005.npz"]["rms"] == pytest.approx(1.0, rel=0.1)
     assert {name for name, row in rows.items() if row["x"] is None} == {"cut.npz", "notes.txt"}
@@ -288,51 +286,49 @@ def test_every_file_of_an_untidy_folder_is_accounted_for(asp):
     snapshots("in", [1.0], first=3)  # written again, later
     snapshots("in", [1.0], first=9)
     time.sleep(0.3)
-    said = json.loads(asp(*look)[1])
-    assert sorted(Path(file).name for file in said["new"]) == ["s-003.npz", "s-009.npz"]
-    assert len(said["recordings"]) == 12
-    assert asked("in/asperity-watch/asperity.db", "SELECT count(*) FROM recording") == [(13,)]
+    result = json.loads(asp(*look)[1])
+    assert sorted(Path(file).name for file in result["new"]) == ["s-003.npz", "s-009.npz"]
+    assert len(result["recordings"]) == 12
+    assert query_store("in/asperity-watch/asperity.db", "SELECT count(*) FROM recording") == [(13,)]
 
 
-def test_lines_that_another_program_changed_are_written_again(tmp_path):
-    """Lines that stand as they were judged are not written again, unless somebody else has written
-    meanwhile.
-    """
+def test_rows_changed_by_another_program_are_written_again(tmp_path):
+    """Unchanged rows are rewritten only if another process has written meanwhile."""
     snapshots(tmp_path / "in", np.ones(9))
-    looks = watch_folder(
+    updates = watch_folder(
         tmp_path / "in",
         tmp_path / "out",
         watching=WatchSettings(poll_interval_s=0.0, settle_time_s=0.0),
     )
-    next(looks)
+    next(updates)
     rows = "SELECT id, row FROM recording WHERE id <= 9 ORDER BY id"
-    before = asked(tmp_path / "out/asperity.db", rows)
+    before = query_store(tmp_path / "out/asperity.db", rows)
     with closing(sqlite3.connect(tmp_path / "out/asperity.db")) as connection:
         connection.execute("UPDATE recording SET row = '{}' WHERE id = 3")
         connection.commit()
     for number in (9, 10):
         snapshots(tmp_path / "in", [1.0], first=number)
-        next(looks)
-        assert asked(tmp_path / "out/asperity.db", rows) == before
-    looks.close()
+        next(updates)
+        assert query_store(tmp_path / "out/asperity.db", rows) == before
+    updates.close()
 
 
-def test_what_one_process_acknowledges_another_does_not_raise_again(asp):
-    """A watch that runs for months, and a person who looks."""
+def test_an_alarm_acknowledged_by_one_process_is_not_raised_by_another(asp):
+    """One process watches for months; another acknowledges."""
     snapshots("in", failing())
-    looks = watch_folder(
+    updates = watch_folder(
         "in",
         "out",
         watching=WatchSettings(poll_interval_s=0.0, settle_time_s=0.0, machine="Fan 1", point="DE"),
     )
-    assert next(looks).track.alarm.state == "alarm"
+    assert next(updates).track.alarm.state == "alarm"
     assert asp("store", "out/asperity.db", "--quiet")[0] == 3
     assert (
         asp("store", "out/asperity.db", "--quiet", "--acknowledge", "Fan 1/DE/sensor")[0] == 3
-    )  # nothing new is said
+    )  # no new output
     snapshots("in", [1.0], first=40)
-    assert next(looks).track.alarm.state == "cannot-tell"
-    looks.close()
+    assert next(updates).track.alarm.state == "cannot-tell"
+    updates.close()
     assert asp("store", "out/asperity.db", "--quiet")[0] == 4
     assert (
         "the store has no sensor 'Fan 2'; it has Fan 1/DE/sensor"
@@ -341,11 +337,11 @@ def test_what_one_process_acknowledges_another_does_not_raise_again(asp):
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_a_store_of_an_older_version_goes_on(asp, version):
+def test_a_store_of_an_older_version_is_continued(asp, version):
     snapshots("in", failing())
     asp("watch", "in", *ONCE, "--store", "plant.db")
     with closing(sqlite3.connect("plant.db")) as connection:
-        if version == 1:  # as 0.2.0 left it
+        if version == 1:  # as version 0.2.0 left it
             connection.execute("ALTER TABLE recording DROP COLUMN duration")
         connection.execute("DROP TABLE learned")
         connection.execute("ALTER TABLE sensor ADD COLUMN learned BLOB")
@@ -353,19 +349,19 @@ def test_a_store_of_an_older_version_goes_on(asp, version):
         connection.execute(f"PRAGMA user_version = {version}")
         connection.commit()
     with closing(Store("plant.db")):
-        assert asked("plant.db", "SELECT body FROM learned") == [(b"\x01\x02",)]
+        assert query_store("plant.db", "SELECT body FROM learned") == [(b"\x01\x02",)]
     snapshots("in", [20.0], first=36)
     assert asp("watch", "in", *ONCE, "--store", "plant.db")[0] == 3
-    durations = asked("plant.db", "SELECT duration FROM recording")
+    durations = query_store("plant.db", "SELECT duration FROM recording")
     assert durations == [(pytest.approx(0.1),)] * 37
 
 
-def test_a_track_acknowledges_in_the_store_and_ends_as_the_store_does(asp):
+def test_track_acknowledges_in_the_store_and_agrees_with_it(asp):
     snapshots("in", failing())
     assert asp("track", "in", "--store", "plant.db", "--quiet")[0] == 3
     assert (
         asp("track", "in/s-001.npz", "in/s-002.npz", "--store", "plant.db", "--quiet")[0] == 3
-    )  # it stands
+    )  # the alarm remains
     assert asp("track", "in", "--store", "plant.db", "--quiet", "--acknowledge", "last")[0] == 0
     assert asp("store", "plant.db", "--quiet")[0] == 0
 
@@ -375,8 +371,8 @@ def test_two_folders_of_one_name_are_two_machines(asp):
         Path(machine).mkdir()
         snapshots(f"{machine}/DE", failing() if machine == "pump1" else np.ones(10))
         asp("watch", f"{machine}/DE", *ONCE, "--store", "plant.db")
-    said = json.loads(asp("store", "plant.db", "--json")[1])
-    assert [(row["machine"], row["state"]) for row in said["sensors"]] == [
+    result = json.loads(asp("store", "plant.db", "--json")[1])
+    assert [(row["machine"], row["state"]) for row in result["sensors"]] == [
         ("pump1", "alarm"),
         ("pump2", "cannot-tell"),
     ]
@@ -388,24 +384,24 @@ def test_two_folders_of_one_name_are_two_machines(asp):
     absolute = str(Path("pump1/DE").resolve())
     assert (
         asp("watch", absolute, *ONCE, "--store", "plant.db")[0] == 3
-    )  # the same folder, named otherwise
+    )  # the same folder under another path
     assert json.loads(asp("store", "plant.db", "--json")[1])["sensors"][0]["recordings"] == 36
 
 
-def test_what_is_stated_later_beside_a_recording_counts(asp):
+def test_conditions_stated_later_take_effect(asp):
     Path("in").mkdir()
     for number in range(3):
         np.save(f"in/s-{number}.npy", np.random.default_rng(number).standard_normal(2000))
     look = ("watch", "in", "--once", "--settle", "0", "--json")
     assert {row["rate_hz"] for row in json.loads(asp(*look)[1])["recordings"]} == {None}
     Path("in/recordings.json").write_text('{"rate_hz": 20000}')
-    said = json.loads(asp(*look)[1])
-    assert len(said["new"]) == len(said["recordings"]) == 3
-    assert {row["rate_hz"] for row in said["recordings"]} == {20000.0}
+    result = json.loads(asp(*look)[1])
+    assert len(result["new"]) == len(result["recordings"]) == 3
+    assert {row["rate_hz"] for row in result["recordings"]} == {20000.0}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
-def test_a_name_that_is_not_utf_8_is_left_out_with_a_word(asp):
+def test_a_name_that_is_not_utf_8_is_skipped_and_reported(asp):
     snapshots("in", np.ones(3))
     shutil.copy("in/s-000.npz", b"in/r\xff\xe9.npz")
     code, out, err = asp("watch", "in", *ONCE)
@@ -415,17 +411,17 @@ def test_a_name_that_is_not_utf_8_is_left_out_with_a_word(asp):
 
 
 @pytest.mark.parametrize("sensors", [1, 2])
-def test_a_watch_that_is_killed_ends_with_the_store_of_one_that_is_not(monkeypatch, sensors):
-    """`python -m benchmarks.hostile` in seconds: an untidy folder, two watches, one of them
+def test_a_killed_watch_ends_with_the_store_of_an_uninterrupted_one(monkeypatch, sensors):
+    """Run `python -m benchmarks.hostile` for seconds: an untidy folder, two watches, one of them
     killed.
     """
     from benchmarks import hostile
 
     monkeypatch.setattr(hostile, "PARTS_S", 0.4)
-    said = hostile.run(0.12, 2, sensors, every=0.2, settle=0.3, say=lambda _: None)
-    rows = [line.split("|")[1:3] for line in said if line.startswith("|")]
-    told = {name.strip(): value.strip() for name, value in rows}
-    assert told["nobody says what became of"] == "0"
-    same, differ = told["files of which both stores hold the same, and not"].split(",")
+    lines = hostile.run(0.12, 2, sensors, every=0.2, settle=0.3, say=lambda _: None)
+    rows = [line.split("|")[1:3] for line in lines if line.startswith("|")]
+    values = {name.strip(): value.strip() for name, value in rows}
+    assert values["nobody says what became of"] == "0"
+    same, differ = values["files of which both stores hold the same, and not"].split(",")
     assert (int(same) > 10, int(differ)) == (True, 0)
-    assert int(told["heard and judged"]) > 10
+    assert int(values["heard and judged"]) > 10

@@ -1,6 +1,4 @@
-"""asperity study as a user runs it: processes that are killed, dask workers that are killed,
-shards, bad input.
-"""
+"""`asperity study`: killed processes and dask workers, shards and bad input."""
 
 import json
 import os
@@ -29,7 +27,7 @@ SETTINGS = {
 WORDS = [word for key, value in SETTINGS.items() for word in ("--set", f"{key}={value}")]
 
 
-def study(out, *more):
+def run_study(out, *more):
     command = [
         sys.executable,
         "-m",
@@ -44,7 +42,7 @@ def study(out, *more):
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def started(out, *more):
+def start_study(out, *more):
     command = [
         sys.executable,
         "-m",
@@ -63,49 +61,53 @@ def rows(out):
     return pandas.read_parquet(out / "table.parquet").drop(columns="seconds")
 
 
-def parts(out):
+def part_files(out):
     return len(list((out / "parts").glob("*.parquet")))
 
 
 def wait_for(condition, seconds=60.0):
-    begun = time.monotonic()
+    start = time.monotonic()
     while not condition():
-        assert time.monotonic() - begun < seconds
+        assert time.monotonic() - start < seconds
         time.sleep(0.01)
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    out = tmp_path_factory.mktemp("whole")
-    done = study(out, "--workers", "2", "--json")
+def complete(tmp_path_factory):
+    out = tmp_path_factory.mktemp("complete")
+    done = run_study(out, "--workers", "2", "--json")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    told = json.loads(done.stdout)
-    assert (told["cases"], told["failed"], told["table"]) == (24, 0, str(out / "table.parquet"))
-    assert told["seconds"] > 0.0
+    result = json.loads(done.stdout)
+    assert (result["cases"], result["failed"], result["table"]) == (
+        24,
+        0,
+        str(out / "table.parquet"),
+    )
+    assert result["seconds"] > 0.0
     return rows(out)
 
 
-def test_a_study_whose_parent_is_killed_goes_on_to_the_same_table(whole, tmp_path):
-    running = started(tmp_path, "--workers", "2")
-    wait_for(lambda: parts(tmp_path) >= 2)
+def test_a_study_whose_parent_is_killed_resumes_to_the_same_table(complete, tmp_path):
+    running = start_study(tmp_path, "--workers", "2")
+    wait_for(lambda: part_files(tmp_path) >= 2)
     workers = subprocess.run(
         ["pgrep", "-P", str(running.pid)], capture_output=True, text=True, check=False
     ).stdout
     running.kill()
     running.communicate()
-    there = parts(tmp_path)
+    finished = part_files(tmp_path)
     wait_for(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers.split()), 20.0)
-    assert parts(tmp_path) == there
-    resumed = study(tmp_path, "--workers", "2", "--json")
+    assert part_files(tmp_path) == finished
+    resumed = run_study(tmp_path, "--workers", "2", "--json")
     assert resumed.returncode == 0, resumed.stderr
     assert json.loads(resumed.stdout)["computed"] < 24
-    pandas.testing.assert_frame_equal(rows(tmp_path), whole, check_exact=True)
+    pandas.testing.assert_frame_equal(rows(tmp_path), complete, check_exact=True)
 
 
-def test_a_study_survives_a_killed_worker(whole, tmp_path):
-    running = started(tmp_path, "--workers", "2")
-    wait_for(lambda: parts(tmp_path) >= 2)
+def test_a_study_survives_a_killed_worker(complete, tmp_path):
+    running = start_study(tmp_path, "--workers", "2")
+    wait_for(lambda: part_files(tmp_path) >= 2)
     found = subprocess.run(
         ["pgrep", "-P", str(running.pid), "-f", "spawn_main"],
         capture_output=True,
@@ -115,7 +117,7 @@ def test_a_study_survives_a_killed_worker(whole, tmp_path):
     os.kill(int(found.stdout.split()[0]), signal.SIGKILL)
     _, complaint = running.communicate(timeout=120)
     assert running.returncode == 0, complaint
-    pandas.testing.assert_frame_equal(rows(tmp_path), whole, check_exact=True)
+    pandas.testing.assert_frame_equal(rows(tmp_path), complete, check_exact=True)
 
 
 @contextmanager
@@ -155,19 +157,19 @@ def dask_cluster(folder):
             process.wait()
 
 
-def test_dask_workers_of_which_one_is_killed_give_the_same_rows(whole, tmp_path):
+def test_a_killed_dask_worker_does_not_change_the_rows(complete, tmp_path):
     out = tmp_path / "out"
     with dask_cluster(tmp_path) as (address, workers):
-        running = started(out, "--executor", f"dask:{address}", "--json")
-        wait_for(lambda: parts(out) >= 2)
+        running = start_study(out, "--executor", f"dask:{address}", "--json")
+        wait_for(lambda: part_files(out) >= 2)
         workers[0].kill()
-        told, complaint = running.communicate(timeout=180)
-    assert running.returncode == 0, complaint
-    assert json.loads(told)["computed"] == 24
-    pandas.testing.assert_frame_equal(rows(out), whole, check_exact=True)
+        output, errors = running.communicate(timeout=180)
+    assert running.returncode == 0, errors
+    assert json.loads(output)["computed"] == 24
+    pandas.testing.assert_frame_equal(rows(out), complete, check_exact=True)
 
 
-def test_shards_merge_to_the_whole(whole, asp):
+def test_shards_merge_to_the_complete_table(complete, asp):
     for k in ("1", "2"):
         code, out, _ = asp(
             "study", str(CASE), "--out", k, *WORDS, "--shard", f"{k}/2", "--workers", "1", "--json"
@@ -179,10 +181,10 @@ def test_shards_merge_to_the_whole(whole, asp):
     )
     assert code == 0
     assert json.loads(out)["computed"] == 0
-    pandas.testing.assert_frame_equal(rows(Path("merged")), whole, check_exact=True)
+    pandas.testing.assert_frame_equal(rows(Path("merged")), complete, check_exact=True)
 
 
-def test_the_verdict_comes_first_and_failures_are_loud(asp):
+def test_the_verdict_comes_first_and_failures_are_reported(asp):
     sweep = 'study={sq=["1 um"], correlation_length=["30 um", "3 um"]}'
     code, out, err = asp(
         "study", str(CASE), "--out", "out", *WORDS[:-4], "--set", sweep, "--workers", "1"
@@ -193,19 +195,25 @@ def test_the_verdict_comes_first_and_failures_are_loud(asp):
     assert re.fullmatch(r"error: 1 of 2 cases failed; the first: .*\n", err)
 
 
-def test_a_dry_run_tells_what_it_would_cost(asp):
+def test_a_dry_run_estimates_the_cost(asp):
     code, out, err = asp("study", str(CASE), "--dry-run", *WORDS, "--workers", "4", "--json")
     assert (code, err) == (0, "")
-    told = json.loads(out)
-    assert (told["cases"], told["kept"], told["points"], told["seeds"], told["workers"]) == (
+    result = json.loads(out)
+    assert (
+        result["cases"],
+        result["kept"],
+        result["points"],
+        result["seeds"],
+        result["workers"],
+    ) == (
         24,
         0,
         4,
         6,
         4,
     )
-    at_work = 24 * told["seconds_a_case"] / min(4, execution.cores())
-    assert at_work < told["seconds"] < at_work + 120.0  # workers have to start before
+    at_work = 24 * result["seconds_a_case"] / min(4, execution.cores())
+    assert at_work < result["seconds"] < at_work + 120.0  # includes the start of the workers
 
 
 @pytest.mark.parametrize(
@@ -223,7 +231,9 @@ def test_a_dry_run_tells_what_it_would_cost(asp):
         (["--report", "page.pdf"], "--report must be a file that ends in .html, got page.pdf"),
     ],
 )
-def test_bad_input_is_one_sentence_and_writes_no_table(asp, monkeypatch, words, sentence):
+def test_bad_input_is_refused_in_one_sentence_and_writes_no_table(
+    asp, monkeypatch, words, sentence
+):
     monkeypatch.setattr("asperity.study.dask_workers.DASK_WAIT_S", 1.0)
     code, out, err = asp("study", str(CASE), "--out", "out", *WORDS, *words)
     assert (code, out) == (2, "")
@@ -232,7 +242,7 @@ def test_bad_input_is_one_sentence_and_writes_no_table(asp, monkeypatch, words, 
     assert not Path("out/table.parquet").exists()
 
 
-def test_a_study_needs_a_folder_that_is_one(asp):
+def test_a_study_needs_a_study_folder(asp):
     Path("file").write_text("")
     refused = asp("study", str(CASE), "--out", "file")
     assert refused == (2, "", "error: cannot write into file: it is a file; name a folder\n")

@@ -1,4 +1,4 @@
-"""`asperity surface` and `solve --surface` as a user types them, on files of several kinds."""
+"""`asperity surface` and `solve --surface` on files of several formats."""
 
 import json
 import re
@@ -25,7 +25,7 @@ def asp(asp):
     return asp
 
 
-def test_surface_names_what_it_did_and_found(asp):
+def test_surface_reports_its_processing_and_parameters(asp):
     code, out, err = asp(
         "surface", "ground.x3p", "--form", "quadratic", "--l-filter", "0.2 mm", "--out", "map.png"
     )
@@ -75,7 +75,7 @@ def test_a_profile_has_profile_parameters_and_a_figure(asp):
     assert found["profile"]["letter"] == "P"
 
 
-def test_a_profile_is_called_r_where_a_filter_has_removed_its_waviness(asp):
+def test_filtered_profiles_have_roughness_parameters(asp):
     given = ("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--l-filter", "8 um")
     code, out, _ = asp(*given)
     assert code == 0
@@ -85,15 +85,15 @@ def test_a_profile_is_called_r_where_a_filter_has_removed_its_waviness(asp):
     shorter = ("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--s-filter", "1 um")
     assert (
         "arithmetic mean height, Pa " in asp(*shorter)[1]
-    )  # which a primary profile may have been through
+    )  # a primary profile may have passed this filter
 
 
-def test_a_profiles_figure_says_what_its_text_says(asp, monkeypatch):
+def test_a_profile_figure_agrees_with_the_text(asp, monkeypatch):
     written = []
     monkeypatch.setattr("matplotlib.axes.Axes.text", lambda *given, **_: written.append(given[3]))
     steps = (
         np.cumsum(np.random.default_rng(3).standard_normal(901)) * 1e-2
-    )  # not a sine: its flattest secant is one
+    )  # not a sine: its flattest secant is unique
     Path("rough.csv").write_text(
         "\n".join(f"{0.1e-3 * k:.6f},{z:.6f}" for k, z in enumerate(steps))
     )
@@ -120,13 +120,16 @@ def test_good_surfaces_are_shown_beside_a_bad_one(asp):
     assert "--unit um --lateral-unit mm" in err  # line.csv
     assert err.count("\n") == 1
     code, out, err = asp("surface", "ground.x3p", "missing.x3p", "--json")
-    said = json.loads(out)
-    assert [one["file"] for one in said["files"] + said["refused"]] == ["ground.x3p", "missing.x3p"]
-    assert said["refused"][0]["reason"] in err
+    result = json.loads(out)
+    assert [row["file"] for row in result["files"] + result["refused"]] == [
+        "ground.x3p",
+        "missing.x3p",
+    ]
+    assert result["refused"][0]["reason"] in err
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (("surface", "ground.x3p", "--form", "sphere"), "form must be one of"),
         (("surface", "ground.x3p", "--l-filter", "3"), "--l-filter must be a length"),
@@ -134,17 +137,15 @@ def test_good_surfaces_are_shown_beside_a_bad_one(asp):
         (("surface", "line.csv"), "give unit"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_in_a_sentence(asp, arguments, said):
+def test_invalid_arguments_are_refused_in_one_sentence(asp, arguments, message):
     code, out, err = asp(*arguments)
     assert (code, out) == (2, "")
-    assert said in err
+    assert message in err
     assert err.count("\n") == 1
 
 
 def test_a_ground_surface_is_solved_with_its_lay_across_and_along(asp):
-    """Across rolling the ridges carry oil in and lift the contact; along it the oil runs off
-    between them.
-    """
+    """Ridges across rolling carry oil in and lift the contact; along it the oil escapes."""
     clr = {}
     for lay, turn in (("across", "false"), ("along", "true")):
         code, out, _ = asp(

@@ -1,4 +1,4 @@
-"""`asperity vibrate` as a user types it."""
+"""`asperity vibrate` from the command line."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ from asperity import load_case
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
 
 
-def test_table_1_has_the_contracts_rows(asp):
+def test_table_1_has_the_documented_rows(asp):
     code, out, _ = asp(
         "vibrate", "case.toml", "--preset", "paper", "--table1", "--records", "20", "--json"
     )
@@ -35,7 +35,7 @@ def test_table_1_has_the_contracts_rows(asp):
     assert all(row["crfa_low"] < row["crfa"] < row["crfa_high"] for row in rows)
 
 
-def test_table_1_needs_no_case_and_draws_itself(asp):
+def test_table_1_needs_no_case_and_is_drawn(asp):
     code, out, _ = asp("vibrate", "--table1", "--records", "20", "--figures", "drawn")
     assert code == 0
     assert out.startswith("Table 1, preset paper: CRF within 0.")
@@ -45,14 +45,14 @@ def test_table_1_needs_no_case_and_draws_itself(asp):
 def test_a_case_vibrates_dry_with_all_load_on_asperities(asp):
     code, out, err = asp("vibrate", "case.toml", "--json")
     assert (code, err) == (0, "")
-    heard = json.loads(out)
-    assert heard["clr"] == heard["car"] == 1.0
-    assert heard["natural_frequency_hz"] == pytest.approx(
+    result = json.loads(out)
+    assert result["clr"] == result["car"] == 1.0
+    assert result["natural_frequency_hz"] == pytest.approx(
         3834.6, abs=0.1
     )  # physics.md: 3834 Hz at 500 N, E 200 GPa
-    assert heard["crf_hz"] == pytest.approx(3834.6, abs=3 * heard["crf_std_hz"])
-    assert asp("vibrate", "case.toml")[1].splitlines()[0] == heard["verdict"]
-    assert asp("vibrate", "case.toml", "--quiet")[1] == heard["verdict"] + "\n"
+    assert result["crf_hz"] == pytest.approx(3834.6, abs=3 * result["crf_std_hz"])
+    assert asp("vibrate", "case.toml")[1].splitlines()[0] == result["verdict"]
+    assert asp("vibrate", "case.toml", "--quiet")[1] == result["verdict"] + "\n"
 
 
 def test_the_papers_preset_replaces_the_cases_choices_and_draws_figs_3_and_4(asp):
@@ -62,29 +62,29 @@ def test_the_papers_preset_replaces_the_cases_choices_and_draws_figs_3_and_4(asp
     assert {path.name for path in Path("drawn").iterdir()} == {"excitation.png", "response.png"}
 
 
-def test_a_stiffness_that_needs_the_solved_contact_solves_it(asp):
-    wanted = (
+def test_a_stiffness_of_the_solved_contact_solves_it(asp):
+    overrides = (
         "vibration.stiffness_law=tangent",
         "vibration.rate=200 kHz",
         "surface.correlation_length=30 um",
     )
     code, out, _ = asp(
-        "vibrate", "case.toml", "--json", *(word for key in wanted for word in ("--set", key))
+        "vibrate", "case.toml", "--json", *(word for key in overrides for word in ("--set", key))
     )
     assert code == 0
-    heard = json.loads(out)
-    assert "solved contact" in heard["verdict"]
-    assert 0.1 < heard["clr"] < 1.0
-    assert 5000.0 < heard["crf_hz"] < heard["full_load_crf_hz"] < 10e3
+    result = json.loads(out)
+    assert "solved contact" in result["verdict"]
+    assert 0.1 < result["clr"] < 1.0
+    assert 5000.0 < result["crf_hz"] < result["full_load_crf_hz"] < 10e3
 
 
-def test_a_contact_that_cannot_be_solved_is_kept_without_its_tangent_stiffness(asp):
-    wanted = (
+def test_an_unsolved_contact_is_stored_without_its_tangent_stiffness(asp):
+    overrides = (
         "vibration.stiffness_law=tangent",
         "vibration.rate=200 kHz",
         "solver.max_iterations=1",
     )
-    sets = [word for key in wanted for word in ("--set", key)]
+    sets = [word for key in overrides for word in ("--set", key)]
     code, out, _ = asp("solve", "case.toml", "--out", "run.nc", *sets)
     assert code == 1
     assert out.startswith("NOT CONVERGED")
@@ -121,7 +121,7 @@ def test_a_dynamic_load_beyond_a_linear_spring_is_stated(asp):
         (("absent.toml", "--table1"), ("absent.toml",)),
     ],
 )
-def test_what_cannot_be_used_is_named(asp, arguments, names):
+def test_unusable_input_is_named(asp, arguments, names):
     code, out, err = asp("vibrate", *arguments)
     assert (code, out) == (2, "")
     assert err.startswith("error: ")

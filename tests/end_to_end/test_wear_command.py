@@ -1,4 +1,4 @@
-"""`asperity wear` as a user types it."""
+"""`asperity wear` from the command line."""
 
 import json
 from pathlib import Path
@@ -50,7 +50,7 @@ def worn_case(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_json_holds_the_contract(asp, worn_case):
+def test_json_has_the_documented_keys(asp, worn_case):
     code, out, err = asp(
         "wear",
         "wear.toml",
@@ -64,33 +64,33 @@ def test_json_holds_the_contract(asp, worn_case):
         *COARSE,
     )
     assert (code, err) == (0, "")
-    said = json.loads(out)
-    assert sorted(said) == sorted(KEYS)
-    assert said["hours"] == 1.0
-    assert said["overrollings"] == pytest.approx([56.25 * 3600.0, 5.0 * 3600.0])
-    assert said["volume_error"] < 1e-9
-    table = pandas.read_parquet(said["table"])
-    assert len(table) == said["jumps"] + 1
+    result = json.loads(out)
+    assert sorted(result) == sorted(KEYS)
+    assert result["hours"] == 1.0
+    assert result["overrollings"] == pytest.approx([56.25 * 3600.0, 5.0 * 3600.0])
+    assert result["volume_error"] < 1e-9
+    table = pandas.read_parquet(result["table"])
+    assert len(table) == result["jumps"] + 1
     for key in ("sq_m", "clr", "crf_hz"):
-        assert said[key] == [table[key].iloc[0], table[key].iloc[-1]]
-    assert [Path(name).is_file() for name in said["surfaces"]] == [True] * 4
+        assert result[key] == [table[key].iloc[0], table[key].iloc[-1]]
+    assert [Path(name).is_file() for name in result["surfaces"]] == [True] * 4
     page = (worn_case / "w.html").read_text("utf-8")
     assert "Wear of a contact" in page
     shown = json.loads(page.split('id="data">')[1].split("</script>")[0])
     assert (
-        len(shown["frames"]) == len(shown["captions"]) == said["jumps"] + 1
-    )  # fewer than are thinned out
+        len(shown["frames"]) == len(shown["captions"]) == result["jumps"] + 1
+    )  # few enough that no frame is left out
     assert shown["captions"][-1].startswith("after 1 h, at ")
     again = json.loads(
         asp("wear", "wear.toml", "--hours", "1", "--out", "worn", "--json", *COARSE)[1]
     )
     assert again["computed"] == 0
     assert {key: again[key] for key in ("sq_m", "clr", "crf_hz")} == {
-        key: said[key] for key in ("sq_m", "clr", "crf_hz")
+        key: result[key] for key in ("sq_m", "clr", "crf_hz")
     }
     code, out, _ = asp("report", "worn", "--json")
     assert code == 0
-    assert json.loads(out)["wear"]["sq_m"] == said["sq_m"]
+    assert json.loads(out)["wear"]["sq_m"] == result["sq_m"]
     assert (worn_case / "worn" / "report.html").is_file()
 
 
@@ -124,7 +124,7 @@ def test_the_verdict_comes_first_and_tables_follow(asp, worn_case):  # noqa: ARG
         (("--hours", "1", "--report", "w.txt"), "--report must be a file that ends in .html"),
     ],
 )
-def test_what_cannot_be_meant_is_one_sentence(asp, worn_case, arguments, words):
+def test_invalid_arguments_are_refused_in_one_sentence(asp, worn_case, arguments, words):
     code, out, err = asp("wear", "wear.toml", *arguments, "--out", "worn")
     assert (code, out) == (2, "")
     assert words in err

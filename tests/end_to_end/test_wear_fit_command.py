@@ -1,4 +1,6 @@
-"""`asperity wear --fit`: one k from a friction record and a profile across the track."""
+"""`asperity wear --fit`: the wear coefficient from a friction record and a profile across the
+track.
+"""
 
 import json
 
@@ -8,7 +10,7 @@ import pytest
 
 @pytest.fixture
 def recorded(tmp_path):
-    """A groove 200 um wide and 1 um deep with noise, after 4000 laps on 4 mm under 5 N."""
+    """Write a groove 200 um wide and 1 um deep with noise, after 4000 laps of 4 mm under 5 N."""
     rows = [f"{i};{0.1 * i:.3f};{4.0 * i:.3f};0.1;0.5" for i in range(1, 1001)]
     trace = tmp_path / "trace.csv"
     trace.write_text("Time;Distance;Laps;mu;FrictionForce\n" + "\n".join(rows))
@@ -42,17 +44,17 @@ KEYS = [
 ]
 
 
-def test_k_and_what_a_second_test_loses(asp, recorded):
+def test_the_coefficient_and_the_predicted_volume_of_a_second_test(asp, recorded):
     trace, scar = recorded
     units = ("--unit", "um", "--lateral-unit", "mm")
     code, out, _ = asp("wear", "--fit", trace, "--scar", scar, *units, "--json")
     assert code == 0
-    said = json.loads(out)
-    assert sorted(said) == sorted(KEYS)
+    result = json.loads(out)
+    assert sorted(result) == sorted(KEYS)
     k = 2.0 / 3.0 * 200e-12 / (5.0 * 4000.0)
-    assert said["wear_coefficient"]["median"] == pytest.approx(k, rel=0.05, abs=0.0)
-    assert said["wear_coefficient"]["low"] < k < said["wear_coefficient"]["high"]
-    assert said["load_n"] == pytest.approx(5.0)
+    assert result["wear_coefficient"]["median"] == pytest.approx(k, rel=0.05, abs=0.0)
+    assert result["wear_coefficient"]["low"] < k < result["wear_coefficient"]["high"]
+    assert result["load_n"] == pytest.approx(5.0)
     halved = json.loads(
         asp(
             "wear",
@@ -69,20 +71,20 @@ def test_k_and_what_a_second_test_loses(asp, recorded):
         )[1]
     )
     assert halved["wear_coefficient"]["median"] == pytest.approx(
-        said["wear_coefficient"]["median"] / 2.0, rel=1e-9
+        result["wear_coefficient"]["median"] / 2.0, rel=1e-9
     )
     assert halved["second_volume_m3"]["high"] == pytest.approx(
-        said["second_volume_m3"]["high"] / 2.0, rel=1e-9
+        result["second_volume_m3"]["high"] / 2.0, rel=1e-9
     )
     code, out, _ = asp("wear", "--fit", trace, "--scar", scar, *units)
     assert code == 0
-    assert out.splitlines()[0] == said["verdict"]
+    assert out.splitlines()[0] == result["verdict"]
     assert "wear coefficient of the disc" in out
 
 
-def test_half_a_fit_is_refused(asp, recorded):
+def test_an_incomplete_fit_is_refused(asp, recorded):
     trace, scar = recorded
-    for given, said in (
+    for given, message in (
         (("--fit", trace), "--fit TRACE and --scar PROFILE go together"),
         (("--scar", scar), "--fit TRACE and --scar PROFILE go together"),
         (
@@ -97,5 +99,5 @@ def test_half_a_fit_is_refused(asp, recorded):
     ):
         code, out, error = asp("wear", *given)
         assert (code, out) == (2, ""), given
-        assert said in error
+        assert message in error
         assert len(error.strip().splitlines()) == 1

@@ -1,3 +1,3 @@
-"""What tests share: slow, plain solutions that use none of the package, recordings of all formats,
+"""Shared test code: slow reference solutions independent of the package, recordings of all formats,
 golden numbers.
 """

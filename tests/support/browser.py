@@ -1,5 +1,5 @@
-"""A live page's server and a browser that lets no request leave the machine; both tell what went
-wrong in them.
+"""A live page's server and a browser that blocks all requests to other hosts; both report
+errors.
 """
 
 import os
@@ -13,17 +13,17 @@ from urllib.parse import urlsplit
 
 import pytest
 
-PATIENCE_MS = 60_000
-REQUIRED = (  # where it is set, as in CI, a browser that is not there fails the tests
+TIMEOUT_MS = 60_000
+REQUIRED = (  # if this variable is set, as in CI, a missing browser fails the tests
     "ASPERITY_CHROMIUM"
 )
 
 
-def missing(what: str) -> None:
-    """Skip, or fail where the browser's tests have to run."""
+def missing(reason: str) -> None:
+    """Skip the test, or fail where the browser tests are required."""
     if os.environ.get(REQUIRED):
-        pytest.fail(f"{what}, and {REQUIRED} asks for these tests")
-    pytest.skip(f"{what}: pip install 'asperity[page]' playwright, apt-get install chromium")
+        pytest.fail(f"{reason}, and {REQUIRED} requires these tests")
+    pytest.skip(f"{reason}: pip install 'asperity[page]' playwright, apt-get install chromium")
 
 
 class Server:
@@ -40,12 +40,12 @@ class Server:
                 cwd=folder,
                 env={**os.environ, **environment},
             )
-        said = self.process.stdout.readline()
-        found = re.search(r"http://\S+/", said)
+        first_line = self.process.stdout.readline()
+        found = re.search(r"http://\S+/", first_line)
         if not found:
             self.process.kill()
             self.process.communicate()
-        assert found, f"{said}{self.log.read_text('utf-8')}"
+        assert found, f"{first_line}{self.log.read_text('utf-8')}"
         self.url = found[0]
 
     @property
@@ -53,7 +53,7 @@ class Server:
         return urlsplit(self.url).netloc.replace("0.0.0.0", "127.0.0.1")
 
     def stop(self) -> str:
-        """End it as Ctrl-C does; what it complained of."""
+        """Stop the server with SIGINT, as Ctrl-C does; return its log."""
         self.process.send_signal(2)
         try:
             self.process.wait(30)
@@ -65,14 +65,14 @@ class Server:
 
 @contextmanager
 def serving(folder: Path, *arguments: str, **environment: str):
-    """A server, which must not have met an exception when it ends."""
+    """Run a server; assert at the end that it logged no exception."""
     server = Server(folder, *arguments, **environment)
     try:
         yield server
     finally:
-        complained = server.stop()
-    assert "Traceback" not in complained, complained
-    assert "Exception" not in complained, complained
+        log = server.stop()
+    assert "Traceback" not in log, log
+    assert "Exception" not in log, log
 
 
 @contextmanager
@@ -92,35 +92,35 @@ def chromium():
 
 
 def expect(locator):
-    """Playwright's expectation, which waits as long as a visit does: what is shown comes part by
-    part.
+    """Return Playwright's expectation with the timeout of a visit, because the page appears in
+    parts.
     """
     from playwright.sync_api import expect as expected
 
-    expected.set_options(timeout=PATIENCE_MS)
+    expected.set_options(timeout=TIMEOUT_MS)
     return expected(locator)
 
 
 class Visit:
-    """A page in the browser, what it asked others for, and what went wrong in it."""
+    """A page in the browser, its requests to other hosts, and its errors."""
 
     def __init__(self, browser, server: Server, **settings) -> None:
         self.server, self.foreign, self.errors = server, [], []
         self.context = browser.new_context(
             **{"viewport": {"width": 1280, "height": 1000}, **settings}
         )
-        self.context.route(re.compile(".*"), self._let_through)
+        self.context.route(re.compile(".*"), self._filter_request)
         self.page = self.context.new_page()
-        self.page.set_default_timeout(PATIENCE_MS)
+        self.page.set_default_timeout(TIMEOUT_MS)
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.on("console", self._heard)
+        self.page.on("console", self._log_error)
         self.page.on("websocket", self._socket)
         self.page.on(
             "dialog",
             lambda dialog: (self.errors.append(f"dialog {dialog.message}"), dialog.dismiss()),
         )
 
-    def _let_through(self, route):
+    def _filter_request(self, route):
         if urlsplit(route.request.url).netloc == self.server.host:
             route.continue_()
         else:
@@ -131,7 +131,7 @@ class Visit:
         if urlsplit(socket.url).netloc != self.server.host:
             self.foreign.append(socket.url)
 
-    def _heard(self, message):
+    def _log_error(self, message):
         if message.type == "error":
             self.errors.append(message.text)
 
@@ -177,7 +177,9 @@ FOCUSED = """() => {
 
 
 def accessible(page):
-    """Controls and pictures as a screen reader has them, and the roles of those without a name."""
+    """Return controls and pictures as a screen reader finds them, and the roles of those without a
+    name.
+    """
     tree = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
     roles = {node["nodeId"]: node["role"]["value"] for node in tree if "role" in node}
     controls = [node for node in tree if not node["ignored"] and roles[node["nodeId"]] in CONTROLS]
@@ -187,7 +189,7 @@ def accessible(page):
         if roles[node["nodeId"]] == "image"
         and not node["ignored"]
         and roles.get(node.get("parentId")) != "button"
-    ]  # an icon says what its button says
+    ]  # the button's name covers its icon
     nameless = [
         node for node in (*controls, *pictures) if not node.get("name", {}).get("value", "").strip()
     ]
@@ -195,24 +197,24 @@ def accessible(page):
 
 
 def require_operable(page) -> None:
-    """Every control and every picture has a name for a screen reader, and the Tab key comes to all
-    controls.
+    """Assert that all controls and pictures have a name, and that the Tab key reaches every
+    control.
     """
-    for _ in range(20):  # a drop's own picture of how far it is goes away by itself
+    for _ in range(20):  # the progress picture of a drop disappears by itself
         controls, pictures, nameless = accessible(page)
         if not nameless:
             break
         page.wait_for_timeout(500)
     assert nameless == []
     assert pictures
-    there = len(controls)
+    count = len(controls)
     page.evaluate("() => { document.activeElement.blur(); scrollTo(0, 0) }")
-    for _ in range(2 * there):
+    for _ in range(2 * count):
         page.keyboard.press("Tab")
         reached = page.evaluate(FOCUSED) + 1
-        if reached >= there:
+        if reached >= count:
             return
-    raise AssertionError(f"of {there} controls the Tab key comes to {reached}")
+    raise AssertionError(f"the Tab key reaches {reached} of {count} controls")
 
 
 MARK = """([label, number]) => {
@@ -228,10 +230,10 @@ MARK = """([label, number]) => {
 
 
 def click_mark(page, label, number):
-    """Click one of the marks in the figure that screen readers call so."""
+    """Click a mark in the figure with this accessible name."""
     page.get_by_role("img", name=label).scroll_into_view_if_needed()
     before, place = None, page.evaluate(MARK, [label, number])
-    while place != before:  # until what comes above it has come
+    while place != before:  # until everything above the figure has been loaded
         page.wait_for_timeout(300)
         before, place = place, page.evaluate(MARK, [label, number])
     page.mouse.click(*place)

@@ -1,4 +1,6 @@
-"""An emulator whose contact is a formula: what it says is known, and it takes no solving."""
+"""An emulator of a formula instead of a contact: its predictions are known, and nothing
+is solved.
+"""
 
 from pathlib import Path
 
@@ -31,14 +33,14 @@ SMALL = {  # a few small contacts
 
 
 def formula_setting(**overrides: object) -> Setting:
-    """The example's setting."""
+    """Return the example's setting."""
     case = load_case(CASE)
     return inference_setting(case.with_overrides(overrides) if overrides else case)
 
 
 def formula(x: np.ndarray, sq: np.ndarray) -> dict[str, np.ndarray]:
-    """Shares, film, friction, stiffness and damping of a contact whose film ratio goes as
-    exp(4 x).
+    """Return shares, film, friction, stiffness and damping of a contact with film ratio 1.6 exp(4
+    x).
     """
     film = 1.6 * np.exp(4.0 * x)
     share = 1.0 / (1.0 + film**2.5)
@@ -53,7 +55,7 @@ def formula(x: np.ndarray, sq: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def formula_emulator(setting: Setting) -> Emulator:
-    """Processes through the formula, on a Sobol sequence, without noise."""
+    """Return Gaussian processes through the formula on a Sobol sequence, without noise."""
     shares = qmc.Sobol(len(setting.ranges), rng=np.random.default_rng(1)).random(POINTS)
     features = emulator_features(setting)
     x = features(shares)

@@ -1,8 +1,8 @@
-"""Numbers that a change of the house must not move: what `--json` says of small cases, and the
-tables behind it.
+"""Reference numbers that refactoring must not change: `--json` output of small cases and their
+tables.
 
-`python -m support.golden_numbers` (from `tests`) writes them anew into `reference/golden`: only
-when a change of numbers is meant, and the changelog says which.
+`python -m support.golden_numbers` (from `tests`) rewrites them in `reference/golden`. Do so only
+when a change of numbers is intended and named in the changelog.
 """
 
 import json
@@ -21,13 +21,13 @@ import numpy as np
 TESTS = Path(__file__).parents[1]
 REFERENCE = TESTS / "reference" / "golden"
 EXAMPLES = TESTS.parent / "examples"
-ROUNDING = 1e-11  # of what would be nothing
-TIMES = ("seconds", "solve_seconds")  # what no two runs share
-LEFT = (
+ROUNDING = 1e-11  # absolute tolerance for numbers that are zero apart from rounding
+TIMES = ("seconds", "solve_seconds")  # differ from run to run
+RESIDUALS = (
     "reynolds_residual",
     "load_error",
-)  # of equations that are solved: any two processors leave something else
-SOLVED = 1e-4  # the solver's tolerance, which it has to be below
+)  # residuals of solved equations, which depend on the processor
+SOLVER_TOLERANCE = 1e-4  # the solver's tolerance, which bounds these residuals
 SMALL = ("grid.cells=[64, 48]", "vibration.duration=0.2 s")
 ROLLING = ("grid.cells=[48, 32]", "surface.correlation_length=40 um")
 GROUND = """
@@ -40,8 +40,8 @@ seed = 1
 """
 
 
-def say(*arguments: str) -> dict[str, Any]:
-    """What a command prints as JSON."""
+def run_json(*arguments: str) -> dict[str, Any]:
+    """Return the JSON output of a command."""
     from asperity.cli import main
 
     printed = StringIO()
@@ -49,13 +49,13 @@ def say(*arguments: str) -> dict[str, Any]:
         with redirect_stdout(printed):
             main([*arguments, "--json"])
     except SystemExit as end:
-        if end.code not in (0, None, 3, 4):  # an alarm, or no way to tell
+        if end.code not in (0, None, 3, 4):  # an alarm or an undetermined state
             raise
     return json.loads(printed.getvalue())
 
 
 def solved(*overrides: str, case: str = "paper.toml") -> dict[str, Any]:
-    return say("solve", str(EXAMPLES / case), "--surfaces", "1", *_set(overrides))
+    return run_json("solve", str(EXAMPLES / case), "--surfaces", "1", *_set(overrides))
 
 
 def elliptic() -> dict[str, Any]:
@@ -67,7 +67,7 @@ def elliptic() -> dict[str, Any]:
     Path("case.toml").write_text(
         f"{start}[surface]{GROUND}\n[grid]{rest.split('[grid]')[1]}", "utf-8"
     )
-    return say(
+    return run_json(
         "solve",
         "case.toml",
         "--surfaces",
@@ -78,7 +78,7 @@ def elliptic() -> dict[str, Any]:
 
 def study() -> dict[str, Any]:
     swept = ('study.sq=["0.5 um", "1.5 um", "3 um", "4 um"]', "study.seeds=2")
-    said = say(
+    output = run_json(
         "study",
         str(EXAMPLES / "paper.toml"),
         "--out",
@@ -87,12 +87,12 @@ def study() -> dict[str, Any]:
         "1",
         *_set((*SMALL, *swept)),
     )
-    return {**said, "rows": _rows(Path("study/table.parquet"))}
+    return {**output, "rows": _rows(Path("study/table.parquet"))}
 
 
 def history(*overrides: str, steps: int, listen: bool = False) -> dict[str, Any]:
     words = ("--listen",) if listen else ()
-    said = say(
+    output = run_json(
         "run",
         str(EXAMPLES / "paper.toml"),
         "--steps",
@@ -103,19 +103,19 @@ def history(*overrides: str, steps: int, listen: bool = False) -> dict[str, Any]
         *_set(overrides),
     )
     table, *_ = Path("h").glob("*.parquet")
-    return {**said, "rows": _rows(table)}
+    return {**output, "rows": _rows(table)}
 
 
 def tracked() -> dict[str, Any]:
-    made = say("rig", "--out", "rig", "--samples", "6", "--repeats", "2", "--duration", "2 s")
+    rig = run_json("rig", "--out", "rig", "--samples", "6", "--repeats", "2", "--duration", "2 s")
     table = ("--table", "rig/table.csv", "--case", "rig/rig.toml", "--workers", "1")
-    checked = say(
+    checked = run_json(
         "check",
         "rig/recordings" if Path("rig/recordings").is_dir() else "rig",
         "--case",
         "rig/rig.toml",
     )
-    return {"rig": made, "check": checked, "track": say("track", "rig", *table)}
+    return {"rig": rig, "check": checked, "track": run_json("track", "rig", *table)}
 
 
 def measured() -> dict[str, Any]:
@@ -130,8 +130,8 @@ def measured() -> dict[str, Any]:
     words = ("--unit", "um", "--pixel", "2 um")
     filtered = ("--form", "cylinder", "--s-filter", "8 um", "--outliers", "remove")
     return {
-        "plain": say("surface", "map.txt", *words),
-        "filtered": say("surface", "map.txt", *words, *filtered),
+        "plain": run_json("surface", "map.txt", *words),
+        "filtered": run_json("surface", "map.txt", *words, *filtered),
     }
 
 
@@ -139,8 +139,8 @@ def curves() -> dict[str, Any]:
     case, small = str(EXAMPLES / "paper.toml"), _set(("grid.cells=[48, 32]",))
     speeds = ("--speed", "0.2", "--speed", "2", "--sq", "0.5 um")
     return {
-        "stribeck": say("stribeck", case, *speeds, *small),
-        "traction": say("traction", case, "--slip", "0.05", "--slip", "0.3", *small),
+        "stribeck": run_json("stribeck", case, *speeds, *small),
+        "traction": run_json("traction", case, "--slip", "0.05", "--slip", "0.3", *small),
     }
 
 
@@ -183,12 +183,12 @@ CASES: dict[str, Callable[[], dict[str, Any]]] = {
         *ROLLING, "model=conserving", "surface.sq=0.6 um", steps=2
     ),
     "vibrate": lambda: {
-        "sound": say("vibrate", str(EXAMPLES / "paper.toml")),
-        "paper": say("vibrate", str(EXAMPLES / "paper-as-printed.toml"), "--preset", "paper"),
-        "nonlinear": say(
+        "sound": run_json("vibrate", str(EXAMPLES / "paper.toml")),
+        "paper": run_json("vibrate", str(EXAMPLES / "paper-as-printed.toml"), "--preset", "paper"),
+        "nonlinear": run_json(
             "vibrate", str(EXAMPLES / "paper.toml"), *_set(("vibration.response=nonlinear",))
         ),
-        "table1": say("vibrate", "--table1", "--records", "20"),
+        "table1": run_json("vibrate", "--table1", "--records", "20"),
     },
     "track": tracked,
     "surface": measured,
@@ -197,46 +197,46 @@ CASES: dict[str, Callable[[], dict[str, Any]]] = {
 
 
 def numbers(name: str) -> dict[str, Any]:
-    """The numbers of a case, worked out in a folder of its own."""
+    """Compute the numbers of a case in a temporary folder."""
     with TemporaryDirectory() as folder, chdir(folder):
-        return _lasting(CASES[name]())
+        return _reproducible(CASES[name]())
 
 
 def differences(then: Any, now: Any, tolerance: float, where: str = "") -> list[str]:
-    """Where two trees of numbers differ, a line each; numbers by more than `tolerance` of the
-    larger one.
+    """List the differences between two trees, one per line, for numbers with a relative
+    `tolerance`.
     """
     if isinstance(then, dict) and isinstance(now, dict):
-        gone = [f"{where}.{key} is gone" for key in then.keys() - now.keys()]
-        each = [
+        missing = [f"{where}.{key} is missing" for key in then.keys() - now.keys()]
+        nested = [
             differences(then[key], now[key], tolerance, f"{where}.{key}")
             for key in then
             if key in now
         ]
-        return [*gone, *(line for lines in each for line in lines)]
+        return [*missing, *(line for lines in nested for line in lines)]
     if isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
-        each = [
+        nested = [
             differences(*pair, tolerance, f"{where}[{n}]")
             for n, pair in enumerate(zip(then, now, strict=True))
         ]
-        return [line for lines in each for line in lines]
-    if where.endswith(LEFT) and type(now) is float:
-        same = abs(now) < SOLVED
+        return [line for lines in nested for line in lines]
+    if where.endswith(RESIDUALS) and type(now) is float:
+        same = abs(now) < SOLVER_TOLERANCE
     elif type(then) is type(now) is float:
         same = then == now or abs(then - now) <= max(tolerance * max(abs(then), abs(now)), ROUNDING)
     elif isinstance(then, str) and isinstance(now, str) and tolerance > 0.0:
-        same = True  # digits in a sentence follow the numbers beside it
+        same = True  # digits in a sentence follow the numbers in other fields
     else:
         same = type(then) is type(now) and then == now
     return [] if same else [f"{where}: {then!r} is now {now!r}"]
 
 
-def _lasting(tree: Any) -> Any:
+def _reproducible(tree: Any) -> Any:
     if isinstance(tree, dict):
-        return {key: _lasting(value) for key, value in tree.items() if key not in TIMES}
+        return {key: _reproducible(value) for key, value in tree.items() if key not in TIMES}
     if isinstance(tree, str):
         return re.sub(r"\b\d+(\.\d+)? s\b", "some s", tree)
-    return [_lasting(value) for value in tree] if isinstance(tree, list) else tree
+    return [_reproducible(value) for value in tree] if isinstance(tree, list) else tree
 
 
 def _rows(table: Path) -> list[dict[str, Any]]:

@@ -1,6 +1,4 @@
-"""How a uniformly loaded rectangle dents a half-space that repeats in y, by summing its images one
-by one.
-"""
+"""Deflection of a half-space by a uniformly loaded rectangle, periodic in y, as a sum of images."""
 
 import numpy as np
 
@@ -17,7 +15,7 @@ def love(x, y, half_x, half_y):
         (-1, x - half_x, y + half_y),
     ):
         r = np.hypot(edge_x, edge_y)
-        # asinh(y/|x|) = ln((y + r)/|x|) keeps its digits where y + r cancels
+        # asinh(y/|x|) = ln((y + r)/|x|), without the cancellation of y + r
         total = total + sign * (
             edge_x * np.arcsinh(edge_y / np.abs(edge_x))
             + edge_y * np.arcsinh(edge_x / np.abs(edge_y))
@@ -29,9 +27,9 @@ def love(x, y, half_x, half_y):
 def periodic_compliance(x, y, spacing, period, images=3000):
     """Displacement at distances (x, y) from a unit pressure on one cell, all images in y included.
 
-    In the solver's units: 1/(2 pi) times the integral of 1/r. The sum of images grows like their
-    logarithm; what is left once the same length of a line is taken out is the potential -ln|x|/pi
-    per unit load and length.
+    In the solver's units: 1/(2 pi) times the integral of 1/r. The sum grows with the logarithm of
+    the number of images; without the same length of a line load, the potential -ln|x|/pi per unit
+    load and length remains.
     """
     dx, dy = spacing
     image = np.arange(-images, images + 1) * period

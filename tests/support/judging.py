@@ -1,7 +1,7 @@
-"""The documentation held against what exists.
+"""Check the documentation against the code, the command line and the files.
 
-A span of code is judged by its shape: a path, a command, an option, a piece of a case file, an
-expression, a name. What is none of these must stand in the package's code as a string.
+The shape of a code span decides the check: a path, a command, an option, part of a case file, an
+expression or a name. Any other span must occur as a string in the package's code.
 """
 
 import ast
@@ -38,12 +38,12 @@ FREE = {
     "asp",
     "Path",
     "Annotated",
-}  # names that need no definition of ours
-OTHER_TOOLS = ("--nthreads", "-n")  # of dask's worker and of pytest
+}  # names without a definition in the package
+OTHER_TOOLS = ("--nthreads", "-n")  # options of dask workers and of pytest
 
 
-def judged(text: str, page: Path, headings: tuple[str, ...] = ()) -> str | None:
-    """What is wrong with a span of code; None if nothing is."""
+def span_error(text: str, page: Path, headings: tuple[str, ...] = ()) -> str | None:
+    """Return the error in a code span, or None."""
     word = text.split(maxsplit=1)[0] if text.strip() else ""
     if word in ("asperity", ".venv/bin/asperity"):
         return wrong_command(text)
@@ -57,10 +57,10 @@ def judged(text: str, page: Path, headings: tuple[str, ...] = ()) -> str | None:
         return (
             None
             if is_file(text, page) or vocabulary().is_written(text)
-            else "no such file, and nothing writes one"
+            else "no such file, and the code writes none"
         )
     if re.fullmatch(r"\w+", text):
-        return None if is_word(text) else "nothing has this name"
+        return None if is_word(text) else "unknown name"
     if (table := toml(text.strip("'"))) is not None:
         return wrong_table(table)
     if re.fullmatch(r"'?[\w.[\]]+=.+\.\..+'?", text):
@@ -71,7 +71,7 @@ def judged(text: str, page: Path, headings: tuple[str, ...] = ()) -> str | None:
             (
                 f"{part}: {wrong}"
                 for part in text.split(",")
-                if (wrong := judged(part.strip(), page))
+                if (wrong := span_error(part.strip(), page))
             ),
             None,
         )
@@ -82,14 +82,14 @@ def judged(text: str, page: Path, headings: tuple[str, ...] = ()) -> str | None:
         return (
             None
             if any(re.fullmatch(pattern, key) for key in vocabulary().stated | vocabulary().defined)
-            else "no key is like this"
+            else "no key matches"
         )
     return wrong_expression(text)
 
 
 def is_word(text: str) -> bool:
     if text.startswith("_") and any(key.endswith(text) for key in vocabulary().keys):
-        return True  # "and their _std"
+        return True  # as in "and their _std"
     is_value = toml(f"value = {text}") is not None
     return (
         is_value
@@ -101,14 +101,14 @@ def is_word(text: str) -> bool:
 
 
 def is_file(text: str, page: Path) -> bool:
-    """Is it there, from the root, the package, the page's folder; or as a bare name anywhere in the
-    repository?
+    """Return True for a path below the root, the package or the page's folder, or a file name
+    anywhere.
     """
     if text.startswith("."):
         hidden = (ROOT / text).exists() or text in ROOT.joinpath(".gitignore").read_text("utf-8")
         return (
             hidden or is_suffix(text) or vocabulary().is_name(text[1:])
-        )  # .gain, of what was named before
+        )  # .gain, an attribute of the preceding name
     bare = re.sub(r"^DIR/|/$", "", text)
     pattern = re.sub(PLACEHOLDERS, "*", bare)
     if any(
@@ -128,7 +128,7 @@ def is_suffix(text: str) -> bool:
 
 
 def is_output(name: str) -> bool:
-    """Does the code write a file or a folder of this name?"""
+    """Return True if the code writes a file or a folder of this name."""
     stem, dot, suffix = name.partition(".")
     return (
         "*" in name.replace("*.", "")
@@ -142,8 +142,8 @@ def is_output(name: str) -> bool:
 
 
 def wrong_command(text: str) -> str | None:
-    """A command, its options and how many values each takes: of a usage line in brackets, or of one
-    to be typed.
+    """Check a command, its options and their number of values, in a usage line or a typed
+    command.
     """
     typed = re.sub(r"\.\.\.|[\[\]]", " ", text) if " [" in text else text
     words = shlex.split(re.sub(r"(\\\||\|) ?-", "-", typed), comments=True)[1:]
@@ -184,7 +184,7 @@ def wrong_command(text: str) -> str | None:
 def wrong_override(text: str) -> str | None:
     key, equals, value = text.partition("=")
     if not equals:
-        return f"{text} sets nothing"
+        return f"{text} has no value"
     if key == "KEY" or is_case_key(key):
         return wrong_table(toml(value) or {})
     return f"{key} is not a key of a case"
@@ -222,9 +222,7 @@ def wrong_shell(text: str) -> str | None:
 
 
 def wrong_options(text: str, headings: tuple[str, ...]) -> str | None:
-    """An option of the command that the section is about, or of any command where it is about
-    none.
-    """
+    """Check options against the commands in the section's heading, or against all commands."""
     about = [
         name for heading in headings for name in re.split(r",? ", heading) if name in commands()
     ]
@@ -241,7 +239,7 @@ def wrong_options(text: str, headings: tuple[str, ...]) -> str | None:
 
 
 def wrong_table(table: object, parents: tuple[str, ...] = ()) -> str | None:
-    """A key that a case does not have, or a name that is no choice anywhere."""
+    """Check a table for unknown keys and unknown choices."""
     if isinstance(table, dict):
         for key, value in table.items():
             bare = key == "value" and not parents
@@ -254,12 +252,12 @@ def wrong_table(table: object, parents: tuple[str, ...] = ()) -> str | None:
     if isinstance(table, list):
         return next((wrong for entry in table if (wrong := wrong_table(entry, parents))), None)
     if isinstance(table, str) and table and not is_choice(table):
-        return f'"{table}" is no choice of anything'
+        return f'"{table}" is not a choice of any key'
     return None
 
 
 def is_choice(text: str) -> bool:
-    """Is this an amount, a choice that the code knows, or a file?"""
+    """Return True for an amount, a choice in the code, or a file."""
     shaped = AMOUNT.fullmatch(text) or A_FILE.fullmatch(text) or text.isdigit()
     return (
         bool(shaped)
@@ -271,7 +269,7 @@ def is_choice(text: str) -> bool:
 
 
 def wrong_expression(text: str) -> str | None:
-    """An expression of Python: what is called, looked up and given by name must be there."""
+    """Check an expression of Python: calls, attributes and keyword arguments must exist."""
     source = re.sub(r"\.\.\.(?=[,)\]])", "_", re.sub(r"=\.\.\.", "=_", text)).lstrip(".")
     source = re.sub(r", _\)", ")", source)
     for attempt in (
@@ -294,13 +292,13 @@ def wrong_node(node: ast.AST) -> str | None:
     known = vocabulary()
     if isinstance(node, ast.FunctionDef | ast.arg):
         name = node.name if isinstance(node, ast.FunctionDef) else node.arg
-        return None if is_word(name) else f"nothing is called {name}"
+        return None if is_word(name) else f"unknown name {name}"
     if isinstance(node, ast.Name) and not (
         is_word(node.id) or node.id in FREE or len(node.id) <= 2
     ):
-        return f"nothing is called {node.id}"
+        return f"unknown name {node.id}"
     if isinstance(node, ast.Attribute) and not is_path(ast.unparse(node)):
-        return f"{ast.unparse(node)} leads nowhere"
+        return f"{ast.unparse(node)} does not resolve"
     if isinstance(node, ast.Call):
         name = ast.unparse(node.func).rpartition(".")[2]
         given = {word.arg for word in node.keywords if word.arg}
@@ -312,23 +310,23 @@ def wrong_node(node: ast.AST) -> str | None:
 
 
 def is_path(dotted: str) -> bool:
-    """Names with dots between: a key of a case, or what the code has."""
+    """Return True for a dotted name that is a key of a case or exists in the code."""
     plain = re.sub(r"\[[^]]*\]|\([^()]*\)", "", dotted).lstrip("(")
     return vocabulary().resolves(plain) or is_case_key(plain)
 
 
 def problems(page: Page) -> Iterator[str]:
     for span in page.spans():
-        if wrong := judged(span.text, page.path, span.line.headings):
-            yield f"{place(page, span.line)}: `{span.text}`: {wrong}"
+        if wrong := span_error(span.text, page.path, span.line.headings):
+            yield f"{location(page, span.line)}: `{span.text}`: {wrong}"
 
 
-def place(page: Page, line: Line) -> str:
+def location(page: Page, line: Line) -> str:
     path = page.path.relative_to(ROOT) if page.path.is_relative_to(ROOT) else page.path
     return f"{path}:{line.number}"
 
 
-def leads(page: Page, target: str) -> bool:
+def link_resolves(page: Page, target: str) -> bool:
     if re.match(r"https?://", target):
         return True
     path, _, anchor = target.partition("#")
@@ -339,9 +337,7 @@ def leads(page: Page, target: str) -> bool:
 
 
 def block_problems(page: Page) -> Iterator[tuple[Line, str]]:
-    """Commands that the command line would refuse, keys that a case would, names that Python would
-    not find.
-    """
+    """Yield commands, case keys and Python names in fenced blocks that the package would refuse."""
     for block in page.blocks:
         if block.language == "sh":
             typed = (
@@ -349,7 +345,9 @@ def block_problems(page: Page) -> Iterator[tuple[Line, str]]:
                 for line in block.text.splitlines()
                 if line.startswith(("asperity", "make", "python"))
             )
-            yield from ((block.line, wrong) for line in typed if (wrong := judged(line, page.path)))
+            yield from (
+                (block.line, wrong) for line in typed if (wrong := span_error(line, page.path))
+            )
         elif block.language == "toml":
             table = toml(block.text)
             wrong = (
@@ -386,7 +384,7 @@ def wrong_in_block(node: ast.AST, bound: set[str]) -> str | None:
         ]
         private = node.module.startswith("asperity.") and node.module.count(".") > 1
         return (
-            f"{node.module} is no face"
+            f"{node.module} is not public"
             if private
             else f"{node.module} has no {missing[0]}"
             if missing
@@ -395,6 +393,6 @@ def wrong_in_block(node: ast.AST, bound: set[str]) -> str | None:
     if isinstance(node, ast.Attribute):
         head = ast.unparse(node).partition(".")[0]
         if (head in bound and head not in FREE) or not head.isidentifier():
-            return None if vocabulary().is_name(node.attr) else f"nothing has {node.attr}"
+            return None if vocabulary().is_name(node.attr) else f"no object has {node.attr}"
     named = isinstance(node, ast.Constant) or (isinstance(node, ast.Name) and node.id in bound)
     return None if named else wrong_node(node)

@@ -1,9 +1,9 @@
 """Smooth lubricated line contact in one dimension, by dense Newton on nodes.
 
 Dimensionless as in the literature: lengths in a, pressures in p_h, gaps in a^2/R. Unlike the
-package it keeps pressures at nodes (zero at both ends), lets them vary linearly between, solves
-Reynolds' equation before a fixed rupture point, and moves that point until P >= 0 before it and R
->= 0 behind it.
+package it keeps pressures at nodes (zero at both ends) with linear variation between them, solves
+Reynolds' equation upstream of a fixed rupture point, and moves that point until P >= 0 upstream and
+R >= 0 downstream.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ class Film(NamedTuple):
 
 
 def compliance(x):
-    """Displacement of each node under a unit hat of pressure on each node, plane strain: -ln|x|/pi
+    """Return the displacement of each node under a unit hat of pressure on each node: -ln|x|/pi,
     integrated.
     """
     spacing = x[1] - x[0]
@@ -56,7 +56,7 @@ def compliance(x):
 
 
 def upwind(values):
-    """Second-order upwind values at the midpoints between nodes, the first one first order."""
+    """Second-order upwind values at the midpoints between nodes; the first is of first order."""
     return np.concatenate([values[:1], 1.5 * values[1:-1] - 0.5 * values[:-2]])
 
 
@@ -66,8 +66,8 @@ def line_contact(lower, upper, nodes, speed, oil):
     matrix = compliance(x)
     pressure = np.sqrt(np.maximum(1.0 - x**2, 0.0))
     approach = 1.1 - np.min(x**2 / 2.0 + matrix @ pressure)
-    rupture = int(np.searchsorted(x, 1.05))  # nodes from here on carry no pressure
-    for stiffening in (0.4, 0.7, 0.85, 1.0):  # oil that thickens little first
+    rupture = int(np.searchsorted(x, 1.05))  # no pressure at these nodes
+    for stiffening in (0.4, 0.7, 0.85, 1.0):  # continuation in the viscosity exponent
         tried = set()
         while rupture not in tried:
             tried.add(rupture)
@@ -84,11 +84,11 @@ def line_contact(lower, upper, nodes, speed, oil):
 
 
 def _full_film(x, matrix, pressure, approach, speed, oil, stiffening, rupture):
-    """Newton for R = 0 at the inner nodes before `rupture`, and the load; R of all inner nodes
-    comes back too.
+    """Solve R = 0 upstream of `rupture`, and the load balance, by Newton's method; return R of all
+    inner nodes, too.
     """
     spacing = x[1] - x[0]
-    wet = slice(0, rupture - 1)  # of the inner nodes
+    wet = slice(0, rupture - 1)  # indices of inner nodes
     pressure = pressure.copy()
     pressure[rupture:] = 0.0
     for _ in range(100):
@@ -110,7 +110,7 @@ def _full_film(x, matrix, pressure, approach, speed, oil, stiffening, rupture):
 
 
 def _fluxes(x, matrix, pressure, gap, speed, oil, stiffening):
-    """Flux at the midpoints, and its slopes in all pressures and the approach."""
+    """Flux at the midpoints, and its derivatives by all pressures and by the approach."""
     spacing, face = x[1] - x[0], np.arange(x.size - 1)
     density, slope = oil.density(pressure), oil.density_slope(pressure)
     mobility = density * gap**3 / speed * np.exp(-stiffening * oil.log_viscosity(pressure))
@@ -129,11 +129,10 @@ def _fluxes(x, matrix, pressure, gap, speed, oil, stiffening):
     return flux, by_p, by_approach
 
 
-def shaken(film, speed, oil, frequency):
-    """Complex change of the load (sum of P dX) as the bodies come closer by 1, at the angular
-    frequency ω a/u.
+def load_response(film, speed, oil, frequency):
+    """Complex change of the load (sum of P dX) per unit of approach at the angular frequency ω a/u.
 
-    Dense: every node stores what its film gains, and the rupture point stays.
+    Dense: every node stores the change of its film; the rupture point is fixed.
     """
     x, pressure, gap, rupture = film
     matrix, inner = compliance(x), slice(1, rupture)
@@ -142,5 +141,5 @@ def shaken(film, speed, oil, frequency):
     stored = 1j * frequency * spacing
     content_by_p = density[:, None] * matrix + np.diag(oil.density_slope(pressure) * gap)
     rows = np.diff(by_p, axis=0)[: rupture - 1, inner] + stored * content_by_p[inner, inner]
-    wanted = np.diff(by_approach)[: rupture - 1] + stored * density[inner]
-    return np.linalg.solve(rows, wanted).sum() * spacing
+    rhs = np.diff(by_approach)[: rupture - 1] + stored * density[inner]
+    return np.linalg.solve(rows, rhs).sum() * spacing

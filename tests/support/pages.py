@@ -1,5 +1,5 @@
-"""The documentation read as markdown: code spans, fenced blocks, headings, tables, links, each with
-its place.
+"""The documentation read as markdown: code spans, fenced blocks, headings, tables and links with
+their positions.
 """
 
 import re
@@ -17,19 +17,19 @@ LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 
 class Line(NamedTuple):
     number: int
-    headings: tuple[str, ...]  # above it, the outermost first
+    headings: tuple[str, ...]  # headings above the line, the outermost first
     text: str
 
 
 class Span(NamedTuple):
-    """A piece of text between backticks."""
+    """A code span between backticks."""
 
     line: Line
     text: str
 
 
 class Block(NamedTuple):
-    """What stands between fences."""
+    """A fenced block."""
 
     line: Line
     language: str
@@ -78,13 +78,13 @@ class Page:
             yield from ((line, target) for target in LINK.findall(SPAN.sub("", line.text)))
 
     def rows(self) -> Iterator[tuple[Line, list[str]]]:
-        """The cells of every row of a table."""
+        """Yield the cells of every table row."""
         for line in self.prose:
             if line.text.startswith("|") and not line.text.startswith("|---"):
                 yield line, [cell.strip() for cell in re.split(r"(?<!\\)\|", line.text)[1:-1]]
 
     def anchors(self) -> set[str]:
-        """What a link can lead to on this page: each heading in lower case, hyphens for spaces."""
+        """Return the link targets of this page: headings in lower case with hyphens for spaces."""
         headings = (mark[1] for line in self.prose if (mark := re.match(r"#+ (.*)", line.text)))
         return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
@@ -94,7 +94,9 @@ def read(path: Path) -> Page:
 
 
 def pages() -> list[Page]:
-    """What a user or a contributor reads; the changelog is history and names what is gone."""
+    """Return the pages for users and contributors, without the changelog, which names removed
+    items.
+    """
     return [
         read(path)
         for path in (

@@ -1,4 +1,4 @@
-"""The paper's contact, built by hand: what most of the tests press together."""
+"""The paper's contact, defined by hand, for most of the tests."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ RADIUS, ETA0 = 5.4e-3, 0.096
 
 @dataclass(frozen=True)
 class FirstPrinted:
-    """Dowson and Higginson (1966) before rounding."""
+    """Density law of Dowson and Higginson (1966) with unrounded coefficients."""
 
     rho0: float = 880.0
 
@@ -44,7 +44,7 @@ def barus(alpha=18.2e-9):
 
 
 def grid(cells, x=(-4.5, 1.9), y=(-1.6, 1.6)):
-    """`x` and `y` in Hertz half-widths."""
+    """Return a grid; `x` and `y` are in Hertz half-widths."""
     a = contact().hertz.half_widths[0]
     return Grid(cells, (x[0] * a, y[0] * a), (x[1] * a, y[1] * a))
 

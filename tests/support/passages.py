@@ -1,4 +1,4 @@
-"""Jumps made up for the mechanisms of wear: a track, the contact on it at some positions, a
+"""Synthetic jumps for the mechanisms of wear: a track, the contact at some positions on it, and a
 body.
 """
 
@@ -17,8 +17,8 @@ def track(cells=(64, 32), size=(400e-6, 200e-6)):
 
 
 def hertz_patches(grid, half_width, p_max, count, *, friction=0.0, asperities=0.0, film=0.5e-6):
-    """A line contact's pressure at places that lie evenly along the track; `asperities` is their
-    share of it.
+    """Return a line contact's pressure at equidistant positions along the track; `asperities` is
+    their share of it.
     """
     patches = []
     length = grid.extent[0]

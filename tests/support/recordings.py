@@ -1,5 +1,5 @@
-"""Small recordings in every format that asperity reads, written by the formats' own libraries; and
-damage to them.
+"""Small recordings in every format that asperity reads, written by the formats' own libraries, and
+damaged files.
 """
 
 import json
@@ -13,7 +13,7 @@ SHARED = Path(__file__).parents[2].parent / "shared" / "data"
 
 
 def vibration(samples=4000, seed=3):
-    """Something like acceleration [g]: noise, and a resonance at 900 Hz."""
+    """Return a signal like an acceleration [g]: noise with a resonance at 900 Hz."""
     rng = np.random.default_rng(seed)
     noise = rng.standard_normal(samples)
     time = np.arange(samples) / RATE
@@ -25,9 +25,7 @@ def vibration(samples=4000, seed=3):
 
 
 def write_all(folder, values):
-    """Write `values` [g] in every format; return {name: what must be said beside the file to read
-    it}.
-    """
+    """Write `values` [g] in every format; return {name: settings needed to read the file}."""
     import h5py
     import nptdms
     import pyarrow
@@ -36,11 +34,11 @@ def write_all(folder, values):
     from scipy.io import savemat
 
     time = np.arange(values.size) / RATE
-    said = {}
+    settings = {}
 
-    def put(name, text, **beside):
+    def write(name, text, **given):
         (folder / name).write_text(text, "utf-8")
-        said[name] = beside
+        settings[name] = given
 
     def lines(separator, comma, times=time, quote=""):
         rows = (
@@ -49,49 +47,49 @@ def write_all(folder, values):
         )
         return "\n".join(row.replace(".", ",") if comma else row for row in rows) + "\n"
 
-    put("comma.csv", "time_s,acc_g\n" + lines(",", comma=False))
-    put(
+    write("comma.csv", "time_s,acc_g\n" + lines(",", comma=False))
+    write(
         "german.csv",
         "Messung 1\nKanal: Lager 2\n\nZeit [s];Beschleunigung [g]\n" + lines(";", comma=True),
     )
-    put(
+    write(
         "quoted.csv",
         '"time (ms)","acc (g)"\n' + lines(",", comma=False, times=1e3 * time, quote='"'),
     )
-    put("units.txt", "time\tacc\ns\tg\n" + lines("\t", comma=False))
-    put(
+    write("units.txt", "time\tacc\ns\tg\n" + lines("\t", comma=False))
+    write(
         "declared.txt",
         "# sampling rate: 5 kHz\n# unit = g\n" + "".join(f"{v:.6f}\n" for v in values),
     )
-    put("2024.01.31.12.00.00", "".join(f"{v:.6f}\n" for v in values), rate_hz=RATE, unit="g")
+    write("2024.01.31.12.00.00", "".join(f"{v:.6f}\n" for v in values), rate_hz=RATE, unit="g")
     (folder / "wide.txt").write_bytes(("time_s,acc_g\n" + lines(",", comma=False)).encode("utf-16"))
-    said["wide.txt"] = {}
+    settings["wide.txt"] = {}
     np.save(folder / "bare.npy", values)
-    said["bare.npy"] = {"rate_hz": RATE, "unit": "g"}
+    settings["bare.npy"] = {"rate_hz": RATE, "unit": "g"}
     np.savez_compressed(folder / "facts.npz", acc=values, fs=RATE, unit="g")
-    said["facts.npz"] = {}
+    settings["facts.npz"] = {}
     savemat(folder / "plain.mat", {"acc": values, "fs": RATE, "unit": "g"}, do_compression=True)
     savemat(folder / "struct.mat", {"bearing": {"sr": RATE, "rate": 25.0, "gs": values}})
-    said |= {"plain.mat": {}, "struct.mat": {"unit": "g"}}
+    settings |= {"plain.mat": {}, "struct.mat": {"unit": "g"}}
     with h5py.File(
         folder / "v73.mat", "w", userblock_size=512
-    ) as file:  # as MATLAB -v7.3 lays it out
+    ) as file:  # the layout of MATLAB -v7.3
         file["s/acc"] = values[None, :]
         file["s/fs"] = np.array([[RATE]])
         file["s/unit"] = np.array([[ord("g")]], np.uint16)
         file["s/unit"].attrs["MATLAB_class"] = np.bytes_("char")
     with (folder / "v73.mat").open("r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
-    said["v73.mat"] = {}
+    settings["v73.mat"] = {}
     with h5py.File(folder / "attrs.h5", "w") as file:
         file["rig/acc"] = values.astype(np.float32)
         file["rig/acc"].attrs["units"] = "g"
         file["rig"].attrs["sampling_rate"] = RATE
-    said["attrs.h5"] = {}
+    settings["attrs.h5"] = {}
     soundfile.write(folder / "float.wav", values.astype(np.float32), int(RATE), subtype="FLOAT")
     soundfile.write(folder / "short.wav", values / 16.0, int(RATE), subtype="PCM_16")
     soundfile.write(folder / "long.wav", values / 16.0, int(RATE), subtype="PCM_32")
-    said |= {
+    settings |= {
         "float.wav": {"unit": "g"},
         "short.wav": {"unit": "g", "scale": 16.0},
         "long.wav": {"unit": "g", "scale": 16.0},
@@ -99,33 +97,33 @@ def write_all(folder, values):
     with nptdms.TdmsWriter(folder / "group.tdms") as file:
         facts = {"wf_increment": 1.0 / RATE, "unit_string": "g"}
         file.write_segment([nptdms.ChannelObject("rig", "acc", values, properties=facts)])
-    said["group.tdms"] = {}
+    settings["group.tdms"] = {}
     for name, binary in (("binary.uff", 1), ("ascii.uff", 0)):
         write_uff(folder / name, uff_set(values * 9.80665, binary=binary))
-        said[name] = {}
+        settings[name] = {}
     facts = {"fs_hz": str(RATE), "unit": "g"}
     table = pyarrow.table({"acc": values}).replace_schema_metadata(facts)
     pyarrow.parquet.write_table(table, folder / "meta.parquet")
-    said["meta.parquet"] = {}
+    settings["meta.parquet"] = {}
     (folder / "beside.dat").write_text("".join(f"{v:.6f}\n" for v in values))
     (folder / "beside.dat.json").write_text(
         json.dumps({"rate_hz": RATE, "unit": "g", "started": "2024-01-31 12:00:00"})
     )
-    said["beside.dat"] = {}
-    return said
+    settings["beside.dat"] = {}
+    return settings
 
 
-def write_uff(path, one):
-    """Write a data set; pyuff leaves the file open."""
+def write_uff(path, data_set):
+    """Write a data set; suppress the warning about the file that pyuff leaves open."""
     import pyuff
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ResourceWarning)
-        pyuff.UFF(str(path)).write_sets(one, "add")
+        pyuff.UFF(str(path)).write_sets(data_set, "add")
 
 
 def uff_set(values, *, binary=1, func_type=1):
-    """A data set 58 as pyuff takes it, in m/s2."""
+    """Return a data set 58 for pyuff, in m/s2."""
     return {
         "type": 58,
         "binary": binary,
@@ -154,8 +152,8 @@ def uff_set(values, *, binary=1, func_type=1):
 
 
 def damaged(content, rng):
-    """A file's bytes cut, flipped, zeroed, lengthened, with huge counts, with NaN or text in its
-    numbers, or none.
+    """Return a file's bytes cut, flipped, zeroed, extended, or with huge counts, NaN or text in
+    numbers.
     """
     data = bytearray(content)
     size = len(data)

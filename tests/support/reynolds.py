@@ -1,5 +1,5 @@
-"""The finite-volume Reynolds equation face by face in plain NumPy, once without and once with
-units.
+"""The finite-volume Reynolds equation face by face in plain NumPy, dimensionless and in
+SI units.
 """
 
 import numpy as np
@@ -8,7 +8,7 @@ SECOND_ORDER = (0.0, 0.5)
 
 
 def mean(own, following, logarithmic):
-    """Of two mobilities."""
+    """Return the arithmetic or logarithmic mean of two mobilities."""
     return (own - following) / np.log(own / following) if logarithmic else (own + following) / 2.0
 
 
@@ -23,11 +23,11 @@ def faces(
     wedge=SECOND_ORDER,
     logarithmic=False,
 ):
-    """Fluxes through all x faces, shape (nx + 1, ny), and through the north face of each cell;
-    complex welcome.
+    """Return the fluxes through all x faces, shape (nx + 1, ny), and through the north face of each
+    cell.
 
-    `ambient` is the mobility that the first and the last cells would have at the ambient pressure
-    of the outer faces, `wedge` the weights of the next and of the upstream cell.
+    Complex arguments are allowed. `ambient` is the mobility of the first and the last cells at the
+    ambient pressure of the outer faces, `wedge` the weights of the next and of the upstream cell.
     """
     nx = pressure.shape[0]
     couette = np.empty((nx + 1, pressure.shape[1]), dtype=pressure.dtype)
@@ -54,8 +54,8 @@ def net_outflow(*arguments, **scheme):
 
 
 def mass_outflow(solution):
-    """Net mass outflow of each cell [kg/m^2/s] of a solved contact, from its pressure and gap and
-    the oil's laws.
+    """Net mass outflow of each cell [kg/m^2/s] of a solved contact, from its pressure, gap and oil
+    laws.
     """
     conditions, oil, grid = solution.conditions, solution.lubricant, solution.grid
     dx, dy = grid.spacing
@@ -71,18 +71,18 @@ def mass_outflow(solution):
         return net_outflow(p, u * density * h, mobility, at_rest, entering, dx, dy)
     contact_film = (
         solution.options.contact_film
-    )  # ambient oil in it moves as easily as any in a film as thin does
+    )  # lower bound: the mobility of ambient oil in the contact film
     mobility = np.maximum(
         mobility, oil.density.rho0 * contact_film**6 / h**3 / (12.0 * oil.viscosity.eta0)
     )
     return net_outflow(
         p, u * density * h, mobility, at_rest, entering, dx, dy, wedge=(0.0, 0.0)
-    ) + leaning(solution, dx)
+    ) + limited_wedge(solution, dx)
 
 
-def leaning(solution, dx):
-    """What the mixed model's wedge adds to the first-order one: less where the film jumps, none
-    beside closed cells.
+def limited_wedge(solution, dx):
+    """Return the mixed model's second-order part of the wedge, limited at film steps and zero at
+    closed cells.
     """
     film = (
         solution.conditions.entrainment_speed
@@ -93,5 +93,6 @@ def leaning(solution, dx):
     before, here = film[:-1], film[1:]
     share = opened[1:] * opened[:-1] * before * here / (before**2 + here**2)
     added = np.zeros_like(film)
-    added[1:-1] = (share * (here - before))[:-1]  # the outlet's face leans back in full already
+    # the outlet face already has the full second-order part
+    added[1:-1] = (share * (here - before))[:-1]
     return np.diff(added, axis=0, prepend=0.0 * added[:1]) / dx

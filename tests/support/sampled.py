@@ -1,5 +1,5 @@
-"""A contact that nobody solved: any pressure and gap, as a solution, to test what is worked out
-from solutions.
+"""A contact solution with prescribed pressure and gap, for tests of quantities derived from
+solutions.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ from asperity.surface import flat_surface
 
 
 def sampled(conditions, lubricant, grid, pressure, gap, in_contact=None):
-    """Numbers are spread over the grid."""
+    """Return a solution; scalar values are broadcast over the grid."""
     return ContactSolution(
         conditions=conditions,
         lubricant=lubricant,

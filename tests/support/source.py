@@ -1,4 +1,6 @@
-"""The package read as source: its files, functions and imports, and what its faces export."""
+"""The package read as source: its files, functions and imports, and the exports of its public
+modules.
+"""
 
 import ast
 import importlib
@@ -17,7 +19,7 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def files() -> Iterator[Path]:
-    """What the package is made of."""
+    """Yield the files of the package."""
     return (
         path
         for path in sorted(PACKAGE.rglob("*"))
@@ -31,7 +33,7 @@ def parsed(path: Path) -> ast.Module:
 
 
 def modules(folder: Path = PACKAGE) -> Iterator[tuple[str, ast.Module]]:
-    """Name below `folder` and syntax tree of every module there."""
+    """Yield the name below `folder` and the syntax tree of every module there."""
     for path in sorted(folder.rglob("*.py")):
         yield path.relative_to(folder).as_posix(), parsed(path)
 
@@ -50,8 +52,8 @@ def imports_inside_functions(tree: ast.Module) -> list[ast.stmt]:
 
 
 def faces() -> dict[str, types.ModuleType]:
-    """The modules that outside code imports from: every room's face, and the modules of rooms
-    without one.
+    """Return the modules that outside code imports from: the face of each room, or the modules of a
+    room without one.
     """
     names = [path.parent.name for path in PACKAGE.glob("*/__init__.pyi")]
     names += [
@@ -64,8 +66,8 @@ def faces() -> dict[str, types.ModuleType]:
 
 
 def exported(face: types.ModuleType) -> dict[str, Any]:
-    """What a face hands out: the names of its stub, or the public names that a module defines
-    itself.
+    """Return the exports of a face: the names of its stub, or the public names that a module
+    defines.
     """
     if hasattr(face, "__path__"):
         return {name: getattr(face, name) for name in face.__all__}
@@ -77,24 +79,28 @@ def exported(face: types.ModuleType) -> dict[str, Any]:
     return {name: value for name, value in own.items() if not name.startswith("_")}
 
 
-def own_types(thing: Any) -> set[type]:
-    """The classes of the package that a function takes or returns, or that a class holds or its
-    methods return.
+def own_types(item: Any) -> set[type]:
+    """Return the package's classes among a function's parameters and results, or a class's fields
+    and methods.
     """
-    if inspect.isclass(thing):
-        public = {name: member for name, member in vars(thing).items() if not name.startswith("_")}
+    if inspect.isclass(item):
+        public = {name: member for name, member in vars(item).items() if not name.startswith("_")}
         members = [_function(member) for member in public.values()]
-        holds = {name: hint for name, hint in _hints(thing).items() if not name.startswith("_")}
+        holds = {name: hint for name, hint in _hints(item).items() if not name.startswith("_")}
         hints = [holds, *(_hints(member) for member in members if member)]
     else:
-        hints = [_hints(thing)] if inspect.isfunction(thing) else []
+        hints = [_hints(item)] if inspect.isfunction(item) else []
     return {
-        leaf for each in hints for hint in each.values() for leaf in _leaves(hint) if _is_own(leaf)
+        leaf
+        for group in hints
+        for hint in group.values()
+        for leaf in _leaves(hint)
+        if _is_own(leaf)
     }
 
 
 def _function(member: Any) -> Any:
-    """The function behind a method, a property, a cached property or a class method."""
+    """Return the function of a method, a property, a cached property or a class method."""
     inner = (
         getattr(member, "fget", None)
         or getattr(member, "func", None)
@@ -103,22 +109,22 @@ def _function(member: Any) -> Any:
     return inner if inspect.isfunction(inner) else None
 
 
-def _hints(thing: Any) -> dict[str, Any]:
-    thing = inspect.unwrap(thing)
-    module = sys.modules[thing.__module__]
+def _hints(item: Any) -> dict[str, Any]:
+    item = inspect.unwrap(item)
+    module = sys.modules[item.__module__]
     known = vars(typing) | vars(module) | _names_for_type_checkers(module.__name__)
     hints = {}
-    for name, hint in inspect.get_annotations(thing).items():
+    for name, hint in inspect.get_annotations(item).items():
         try:
             hints |= get_type_hints(types.SimpleNamespace(__annotations__={name: hint}), known)
-        except TypeError:  # pandas' own are generic for type checkers only
+        except TypeError:  # pandas types are generic for type checkers only
             assert "pandas." in hint
     return hints
 
 
 @cache
 def _names_for_type_checkers(module: str) -> dict[str, Any]:
-    """What a module imports below `if TYPE_CHECKING`."""
+    """Return the names that a module imports below `if TYPE_CHECKING`."""
     names: dict[str, Any] = {}
     source = sys.modules[module].__file__
     for node in parsed(Path(source)).body if source else []:

@@ -1,5 +1,5 @@
-"""Everything that the documentation may name: what is defined in the source, case keys, commands,
-JSON keys, files.
+"""Names that the documentation may use: definitions in the source, case keys, commands, JSON keys
+and files.
 """
 
 import ast
@@ -23,9 +23,10 @@ ELSEWHERE = (
     "concurrent",
     "itertools",
     "pathlib",
-)  # other people's modules that the docs name
-TIMES = {"seconds", "solve_seconds"}  # left out of golden numbers, as no two runs share them
-GOLDEN = {  # command: where its JSON lies in the golden numbers
+)  # third-party modules that the docs name
+# not in the golden numbers, because they differ from run to run
+TIMES = {"seconds", "solve_seconds"}
+GOLDEN = {  # command: location of its JSON in the golden numbers
     "solve": [
         (name,)
         for name in (
@@ -53,9 +54,7 @@ GOLDEN = {  # command: where its JSON lies in the golden numbers
 
 
 class Vocabulary:
-    """Names by what they are; `members` has the attributes of each class, those of its bases among
-    them.
-    """
+    """Names by kind; `members` returns the attributes of a class, including those of its bases."""
 
     def __init__(self) -> None:
         self.defined: set[str] = (
@@ -68,10 +67,10 @@ class Vocabulary:
         )  # attribute or function: classes named in its annotation
         self.parameters: dict[str, set[str]] = defaultdict(
             set
-        )  # of functions, and of classes that are called
-        self.contents: dict[str, set[str]] = defaultdict(set)  # module, dotted: what it defines
-        self.constants: set[str] = set()  # strings in the package's code, docstrings left out
-        self.patterns: set[str] = set()  # strings that are put together, as regular expressions
+        )  # parameters of functions, and of classes that are called
+        self.contents: dict[str, set[str]] = defaultdict(set)  # dotted module: its definitions
+        self.constants: set[str] = set()  # strings in the package's code, without docstrings
+        self.patterns: set[str] = set()  # f-strings as regular expressions
         for folder in FOLDERS:
             for name, tree in modules(folder):
                 self._read(
@@ -157,30 +156,30 @@ class Vocabulary:
 
     @cached_property
     def keys(self) -> set[str]:
-        """Keys of JSON, of the catalogue of quantities and of columns."""
+        """Keys of JSON, of the catalogue of quantities and of table columns."""
         from asperity.core.quantities import catalogue
 
         return TIMES | set(catalogue()) | {key for command in GOLDEN for key in json_keys(command)}
 
     @cached_property
     def stated(self) -> set[str]:
-        """Strings that stand in the code, as they are."""
+        """String constants in the code and keys."""
         return self.constants | self.keys
 
     def is_written(self, text: str) -> bool:
-        """Does the code hold this string, or put it together?"""
+        """Return True if the code contains this string or can format it."""
         if text in self.stated:
             return True
         if " " in text and any(text in constant for constant in self.constants):
             return True
-        return self._put_together.fullmatch(text) is not None
+        return self._formatted.fullmatch(text) is not None
 
     @cached_property
-    def _put_together(self) -> re.Pattern[str]:
+    def _formatted(self) -> re.Pattern[str]:
         return re.compile("|".join(sorted(self.patterns)))
 
     def is_name(self, text: str) -> bool:
-        """Is this a name without dots that something has?"""
+        """Return True for a defined name without dots."""
         return text in self.defined or text in self.stated or text in self.module_names
 
     @cached_property
@@ -188,12 +187,10 @@ class Vocabulary:
         return {part for module in self.contents for part in module.split(".")}
 
     def resolves(self, dotted: str) -> bool:
-        """Does a.b.c lead from a module, a class or an attribute of known type to something that it
-        has?
-        """
+        """Return True if a.b.c resolves from a module, a class or an attribute of known type."""
         head, *rest = dotted.split(".")
         if head in ELSEWHERE:
-            return _leads_elsewhere(dotted)
+            return _resolves_externally(dotted)
         if head in ("asp", "asperity"):
             return self._in_module("asperity", rest)
         homes = [home for home in self.contents if home == head or home.endswith(f".{head}")]
@@ -202,7 +199,7 @@ class Vocabulary:
         return head in self.defined and self._in_class(self._classes(head), rest)
 
     def _classes(self, name: str) -> set[str]:
-        """The classes that a name stands for: itself, or those that its annotation names."""
+        """Return the classes that a name denotes: itself, or those in its annotation."""
         return (
             {name}
             if name in self.own_members
@@ -224,7 +221,7 @@ class Vocabulary:
 
 
 def _bound(node: ast.stmt) -> set[str]:
-    """The names that a statement in a module or a class gives to something."""
+    """Return the names that a statement in a module or a class defines."""
     if isinstance(node, Function | ast.ClassDef):
         return {node.name}
     if isinstance(node, ast.Assign):
@@ -240,7 +237,7 @@ def _bound(node: ast.stmt) -> set[str]:
 
 
 def _words(annotation: ast.expr) -> set[str]:
-    """Names in an annotation, quoted ones too."""
+    """Return the names in an annotation, including quoted ones."""
     nodes = list(ast.walk(annotation))
     quoted = " ".join(
         node.value
@@ -264,16 +261,16 @@ def _has_docstring(node: ast.AST) -> bool:
     )
 
 
-def _leads_elsewhere(dotted: str) -> bool:
+def _resolves_externally(dotted: str) -> bool:
     parts = re.sub(r"^np\.", "numpy.", dotted).split(".")
     for split in range(len(parts), 0, -1):
         try:
-            thing: Any = importlib.import_module(".".join(parts[:split]))
+            found: Any = importlib.import_module(".".join(parts[:split]))
         except ImportError:
             continue
         for name in parts[split:]:
-            thing = getattr(thing, name, None)
-        return thing is not None
+            found = getattr(found, name, None)
+        return found is not None
     return False
 
 
@@ -284,9 +281,7 @@ def vocabulary() -> Vocabulary:
 
 @cache
 def golden(command: str) -> tuple[Any, ...]:
-    """What a command's JSON was when the golden numbers were taken; nothing for commands that have
-    none.
-    """
+    """Return a command's JSON in the golden numbers; empty for commands without it."""
     trees = []
     for name, *inside in GOLDEN.get(command, ()):
         tree = json.loads(
@@ -319,7 +314,7 @@ def _tree_words(tree: Any) -> Iterator[tuple[str, bool]]:
 
 @cache
 def commands() -> dict[str, Any]:
-    """The commands, each with its parameters."""
+    """Return the commands with their parameters."""
     import typer
 
     from asperity.cli import app
@@ -329,7 +324,7 @@ def commands() -> dict[str, Any]:
 
 
 def options(command: str) -> dict[str, Any]:
-    """What may follow a command: each option by each of its names."""
+    """Return the options of a command under each of their names."""
     own = {
         name: option
         for option in commands()[command].params
@@ -340,7 +335,7 @@ def options(command: str) -> dict[str, Any]:
 
 
 def metavars() -> set[str]:
-    """What usage lines call a value."""
+    """Return the names of values in usage lines."""
     return {
         p.metavar or p.name.upper()
         for command in commands().values()
@@ -351,7 +346,7 @@ def metavars() -> set[str]:
 
 @cache
 def bases_for_keys() -> tuple[Any, ...]:
-    """Cases that between them have every kind of table."""
+    """Return cases that together contain every kind of table."""
     from asperity.case import load_case
 
     paper = load_case(ROOT / "examples" / "paper.toml")
@@ -384,16 +379,16 @@ _SURFACE_TABLES = (
 
 @cache
 def is_case_key(dotted: str) -> bool:
-    """Does a case have this key? A case refuses keys that it does not know, and says so."""
+    """Return True for a key of a case; a case refuses unknown keys."""
     from asperity.core.errors import BadInput
 
     if dotted.startswith(
         "study."
-    ):  # a study's table has, beside its own keys, those of what it sweeps
+    ):  # the table of a study has its own keys and those of the swept values
         key = dotted.removeprefix("study.")
         return key in case_sections()["[study]"].model_fields or is_case_key(key) or is_leaf(key)
 
-    if dotted.startswith("machine."):  # in place of the contact that the bases have
+    if dotted.startswith("machine."):  # a machine replaces the contact of the base cases
         from asperity.case.machines import MACHINES
 
         return any(
@@ -401,25 +396,25 @@ def is_case_key(dotted: str) -> bool:
             for section, _ in MACHINES.values()
         )
 
-    if dotted.startswith("rating."):  # beside a machine
+    if dotted.startswith("rating."):  # used with a machine
         return dotted.removeprefix("rating.") in case_sections()["[rating]"].model_fields
 
     if dotted.partition(".")[0] not in type(bases_for_keys()[0].contents).model_fields:
         return False
 
-    def knows(case: Any) -> bool:
+    def accepts(case: Any) -> bool:
         try:
             case.with_overrides({re.sub(r"\[\d\]$", "", dotted): object()})
         except BadInput as refusal:
             return "is not a known key" not in str(refusal)
         return True
 
-    return any(knows(case) for case in bases_for_keys())
+    return any(accepts(case) for case in bases_for_keys())
 
 
 @cache
 def is_leaf(word: str) -> bool:
-    """Is there a table of the case that has this key?"""
+    """Return True if a table of the case has this key."""
     stated = [tomllib.loads(case.text) for case in bases_for_keys()]
     tables = {
         name for case in stated for name, table in case.items() if isinstance(table, dict)
@@ -430,8 +425,8 @@ def is_leaf(word: str) -> bool:
 
 
 def case_sections() -> dict[str, Any]:
-    """The tables of a case file as docs/case-file.md calls them, each as the model that reads
-    it.
+    """Return the tables of a case file under their names in docs/case-file.md, with the model of
+    each.
     """
     base = next(
         name for name, tree in modules() if any(_is_class(node, "Section") for node in tree.body)
@@ -439,10 +434,10 @@ def case_sections() -> dict[str, Any]:
     section = importlib.import_module(
         "asperity." + base.removesuffix(".py").replace("/", ".")
     ).Section
-    importlib.import_module("asperity.case.machines")  # which no other table needs
+    importlib.import_module("asperity.case.machines")  # no other table imports it
     paper = bases_for_keys()[0]
     known: dict[str, Any] = {}
-    for model in _heirs(section):
+    for model in _subclasses(section):
         fields = model.model_fields
         if "kind" in fields and (kinds := get_args(fields["kind"].annotation)) and len(kinds) == 1:
             known[f'kind = "{kinds[0]}"'] = model
@@ -466,14 +461,14 @@ def _is_class(node: ast.stmt, name: str) -> bool:
     return isinstance(node, ast.ClassDef) and node.name == name
 
 
-def _heirs(model: Any) -> Iterator[Any]:
-    for heir in model.__subclasses__():
-        yield heir
-        yield from _heirs(heir)
+def _subclasses(model: Any) -> Iterator[Any]:
+    for subclass in model.__subclasses__():
+        yield subclass
+        yield from _subclasses(subclass)
 
 
 def toml(text: str) -> dict[str, Any] | None:
-    """A piece of a case file, "..." left out; None for what is none."""
+    """Parse part of a case file without "..."; return None if it is not TOML."""
     text = re.sub(r",? ?\.\.\.", "", re.sub(r"= \.\.\.", '= ""', text)) if "{" in text else text
     for attempt in (text, re.sub(r"^(\[[\w.]+\]) ", r"\1\n", text), f"value = {text}"):
         try:

@@ -1,6 +1,4 @@
-"""The small roller on a ring that tests of wear let wear: a case file, and the case with other
-values.
-"""
+"""A small roller on a ring for tests of wear: a case file, and the case with overrides."""
 
 from asperity import load_case
 from asperity.case import Case
@@ -44,5 +42,5 @@ DRY = {"lubricant": "none", "material.hardness": "none"}
 
 
 def worn_case(overrides: dict[str, object] | None = None, text: str = CASE) -> Case:
-    """The case with other values."""
+    """Return the case with overrides."""
     return load_case(text, name="case.toml").with_overrides(overrides or {})

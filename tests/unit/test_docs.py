@@ -15,7 +15,7 @@ from pint import Quantity
 from pydantic.fields import FieldInfo
 
 from asperity.core.quantities import catalogue
-from support.judging import AMOUNT, block_problems, judged, leads, place, problems
+from support.judging import AMOUNT, block_problems, link_resolves, location, problems, span_error
 from support.pages import Line, Page, pages, read
 from support.source import PACKAGE, ROOT, functions, modules, parsed
 from support.vocabulary import (
@@ -79,14 +79,16 @@ def test_names_on_a_page_exist(page):
 @PAGES
 def test_links_resolve(page):
     defects = [
-        f"{place(page, line)}: {target}" for line, target in page.links() if not leads(page, target)
+        f"{location(page, line)}: {target}"
+        for line, target in page.links()
+        if not link_resolves(page, target)
     ]
     assert not defects, "\n".join(defects)
 
 
 @PAGES
 def test_blocks_can_be_run(page):
-    defects = [f"{place(page, line)}: {defects}" for line, defects in block_problems(page)]
+    defects = [f"{location(page, line)}: {defects}" for line, defects in block_problems(page)]
     assert not defects, "\n".join(defects)
 
 
@@ -234,7 +236,7 @@ def test_named_tests_are_in_the_named_files(page):
         ]
         defined = {function.name for file in files for function in functions(parsed(file))}
         named = {name for name in spans if not name.endswith(".py")}
-        assert not files or named <= defined, place(page, line)
+        assert not files or named <= defined, location(page, line)
 
 
 def test_every_validation_is_documented():
@@ -363,7 +365,7 @@ MISTAKES = {
     ("kind", "text"), [(kind, text) for kind, texts in MISTAKES.items() for text in texts]
 )
 def test_a_mistake_of_each_kind_is_detected(kind, text):
-    assert judged(text, ROOT / "docs" / "a.md") is not None, kind
+    assert span_error(text, ROOT / "docs" / "a.md") is not None, kind
 
 
 def test_a_mistake_is_reported_with_its_line():
@@ -373,7 +375,10 @@ def test_a_mistake_is_reported_with_its_line():
     )
     page = Page(ROOT / "docs" / "a.md", text)
     assert [line.split(": ")[0] for line in problems(page)] == ["docs/a.md:6", "docs/a.md:8"]
-    assert [target for _, target in page.links() if not leads(page, target)] == ["gone.md", "#gone"]
+    assert [target for _, target in page.links() if not link_resolves(page, target)] == [
+        "gone.md",
+        "#gone",
+    ]
     assert unknown_keys("track", sections(page)["track"]) == ["crl"]
 
 
@@ -399,7 +404,9 @@ def test_every_exception_is_needed():
     assert sorted(EXCEPTIONS.keys() - spans.keys()) == []
     located = ((text, *spans[text]) for text in EXCEPTIONS)
     assert [
-        text for text, page, span in located if judged(text, page.path, span.line.headings) is None
+        text
+        for text, page, span in located
+        if span_error(text, page.path, span.line.headings) is None
     ] == []
     texts = {
         word: [name for name in sections() if word in names_in(json_lines(sections()[name]))]

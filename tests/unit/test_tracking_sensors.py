@@ -8,7 +8,7 @@ import pytest
 from asperity.core.errors import BadInput
 from asperity.monitoring import TrackSettings, keep_track, store_overview, track_recordings
 from asperity.recording import ReadOptions
-from support.heard import BAND, RATE, TRUTH, hears
+from support.sensor_signals import BAND, RATE, TRUTH, sensor_signals
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +19,7 @@ def both(tmp_path_factory):
     for name in ("whole", "dead", "apart"):
         (folder / name).mkdir()
     for number, f0 in enumerate(TRUTH):
-        a, b = hears(rng, f0, (1.0, 0.6))
+        a, b = sensor_signals(rng, f0, (1.0, 0.6))
         facts = {"fs": RATE, "unit": "m/s^2"}
         np.savez(folder / "whole" / f"{number}.npz", a=a, b=b, **facts)
         np.savez(folder / "dead" / f"{number}.npz", a=a, b=1e-9 * np.ones_like(b), **facts)
@@ -97,7 +97,7 @@ def test_a_dead_sensor_is_told_and_the_other_goes_on(both):
 def test_a_level_that_grows_on_the_other_sensor_is_heard(tmp_path):
     rng = np.random.default_rng(4)
     for number in range(24):
-        a, b = hears(rng, 3000.0, (0.0, 0.0))
+        a, b = sensor_signals(rng, 3000.0, (0.0, 0.0))
         louder = np.exp(0.3 * max(number - 12, 0))
         np.savez(tmp_path / f"{number:02d}.npz", a=a, b=louder * b, fs=RATE, unit="m/s^2")
     track = track_recordings([tmp_path], TrackSettings(channel="a,b", band_hz=BAND))
@@ -134,7 +134,7 @@ def test_sensors_that_are_off_together_are_no_copies(both, tmp_path):
 def test_a_copy_is_no_second_sensor(tmp_path):
     rng = np.random.default_rng(1)
     for number, f0 in enumerate(TRUTH[:6]):
-        (a,) = hears(rng, f0, (1.0,))
+        (a,) = sensor_signals(rng, f0, (1.0,))
         np.savez(tmp_path / f"{number}.npz", a=a, b=a, fs=RATE, unit="m/s^2")
     with pytest.raises(BadInput, match="sensors a and b hold the same samples in 0"):
         track_recordings([tmp_path], TrackSettings(channel="a,b", band_hz=BAND))
@@ -195,7 +195,7 @@ def test_a_sensor_that_was_moved_is_noted_with_its_place(tmp_path, monkeypatch):
     """Where: tests/unit/test_series.py; here, what a track makes of it."""
     rng = np.random.default_rng(3)
     for number, f0 in enumerate(np.linspace(2900.0, 3750.0, 14)):
-        (heard,) = hears(rng, f0, (1.0,))
+        (heard,) = sensor_signals(rng, f0, (1.0,))
         np.savez(tmp_path / f"{number:02d}.npz", acc=heard, fs=RATE, unit="m/s^2")
     assert not any(
         "mounting" in note

@@ -25,7 +25,7 @@ from asperity.monitoring import (
 from asperity.monitoring.series_state import pack_shared, unpack_shared
 from asperity.monitoring.simultaneous import TimedRecording, match_times
 from asperity.recording import ReadOptions
-from support.heard import BAND, RATE, TRUTH, hears
+from support.sensor_signals import BAND, RATE, TRUTH, sensor_signals
 
 START = datetime(2025, 3, 1, 12, tzinfo=UTC)
 
@@ -40,7 +40,7 @@ def machine(tmp_path_factory):
     for name in ("whole", "apart"):
         (folder / name).mkdir()
     for number, f0 in enumerate(np.append(TRUTH, 3800.0)):
-        heard = dict(zip("ab", hears(rng, f0, (1.0, 0.6)), strict=True))
+        heard = dict(zip("ab", sensor_signals(rng, f0, (1.0, 0.6)), strict=True))
         np.savez(folder / "whole" / f"{number}.npz", **heard, fs=RATE, unit="m/s^2")
         for late, (name, values) in enumerate(heard.items()):
             np.savez(folder / "apart" / f"{name}{number}.npz", acc=values, fs=RATE, unit="m/s^2")
@@ -223,7 +223,7 @@ def louder(folder, first, count, growth):
     rng = np.random.default_rng(4)
     folder.mkdir(exist_ok=True)
     for number in range(first, first + count):
-        a, b = hears(rng, 3000.0, (0.0, 0.0))
+        a, b = sensor_signals(rng, 3000.0, (0.0, 0.0))
         np.savez(
             folder / f"{number:02d}.npz",
             a=a,

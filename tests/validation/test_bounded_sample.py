@@ -1,6 +1,5 @@
-"""Some of the benchmark's ellipses and rollers, rough and lubricated: solved, carrying their load,
-and none tilted the
-wrong way. `python -m benchmarks bounded` has all three hundred.
+"""Some of the benchmark's rough, lubricated ellipses and rollers: all are solved and carry their
+load, and none tilts in the wrong direction. `python -m benchmarks bounded` runs all three hundred.
 """
 
 from itertools import islice

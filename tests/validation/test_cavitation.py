@@ -1,9 +1,9 @@
-"""Oil that ruptures and forms again between rigid walls, against closed forms and quadratures of
-the same problem.
+"""Rupture and reformation of the oil film between rigid walls, against closed forms and quadratures
+of the same problem.
 
-Two published-style cases (B1, a parabolic slider; B3, a slider with a pocket) and three of our
-own: a journal bearing by Sommerfeld's substitution, a wavy slider and a starved one by quadrature.
-p = 0 is the cavitation pressure.
+Two published cases (B1, a parabolic slider; B3, a slider with a pocket) and three further ones: a
+journal bearing by Sommerfeld's substitution, a wavy slider and a starved slider by quadrature. p =
+0 is the cavitation pressure.
 """
 
 import numpy as np
@@ -15,19 +15,17 @@ from asperity.ehl import FilmBoundary, solve_film
 from asperity.lubricant import Barus, DowsonHigginson
 
 VISCOSITY, SPEED = 0.039, 4.57 / 2.0
-LENGTH, LEAST = 76.2e-3, 25.4e-6
+LENGTH, MIN_GAP = 76.2e-3, 25.4e-6
 GAUSS = np.polynomial.legendre.leggauss(200)
 
 
 def parabola(x):
-    return LEAST * (1.0 + (2.0 * x / LENGTH - 1.0) ** 2)
+    return MIN_GAP * (1.0 + (2.0 * x / LENGTH - 1.0) ** 2)
 
 
 def wave(x):
-    """Three waves between walls that part a little, so that every one has a cavity and none is like
-    another.
-    """
-    return LEAST * (1.2 + 0.4 * np.cos(6.0 * np.pi * x / LENGTH) + 0.1 * x / LENGTH)
+    """Three waves between slightly diverging walls, so that each wave has a different cavity."""
+    return MIN_GAP * (1.2 + 0.4 * np.cos(6.0 * np.pi * x / LENGTH) + 0.1 * x / LENGTH)
 
 
 def film_between(gap, *, ends=(0.0, 0.0), sides=None, inflow_content=1.0, **more):
@@ -42,14 +40,14 @@ def slider(gap, cells, *, ends=(0.0, 0.0), **more):
 
 
 def rise(gap, flux, start, end):
-    """Pressure gained from start to end under a flow: the integral of 12 eta (u h - q)/h^3."""
+    """Pressure rise from start to end at this flow: the integral of 12 eta (u h - q)/h^3."""
     points, weights = GAUSS
     h = gap(start + (points + 1.0) / 2.0 * (end - start))
     return (end - start) / 2.0 * weights @ (12.0 * VISCOSITY * (SPEED * h - flux) / h**3)
 
 
 def peak(gap, flux, start, end, first=0.0):
-    """Pressure where the gap passes q/u between start and end."""
+    """Pressure at the position between start and end where the gap is q/u."""
     top = brentq(lambda x: SPEED * gap(x) - flux, start, end)
     return first + rise(gap, flux, start, top)
 
@@ -87,7 +85,9 @@ def test_slider_with_a_pocket_b3(cells):
     assert film.content[film.cavitated].min() == pytest.approx(0.500208, rel=1e-5)
     assert film.load == pytest.approx(2458.170, rel=4e-3)
     assert rupture == pytest.approx(4e-3)
-    assert formed == pytest.approx(9.953314e-3, abs=0.2 * length / cells)  # a cell of two gaps
+    assert formed == pytest.approx(
+        9.953314e-3, abs=0.2 * length / cells
+    )  # the cell at the step of the gap
 
 
 @pytest.mark.parametrize("eccentricity", [0.3, 0.8])
@@ -133,7 +133,7 @@ def test_long_journal_bearing_with_a_groove_at_the_widest_gap(eccentricity):
 
 
 def wavy_film(outlet):
-    """Flow, peaks, ruptures and where the film forms again in the wavy slider, by quadrature."""
+    """Flow, peaks, and positions of rupture and reformation in the wavy slider, by quadrature."""
     x = np.linspace(0.0, LENGTH, 20001)
     slope = np.diff(wave(x))
     narrow = x[1:-1][(slope[:-1] < 0.0) & (slope[1:] >= 0.0)]
@@ -145,18 +145,18 @@ def wavy_film(outlet):
     least = SPEED * wave(narrow[0])
     flux = brentq(lambda q: rise(wave, q, 0.0, rupture(q, 0)), 1.001 * least, 1.3 * least)
     ruptures = [rupture(flux, k) for k in range(3)]
-    formed = [
+    reformed = [
         brentq(lambda x, k=k: rise(wave, flux, x, ruptures[k]), wide[k], narrow[k] - 0.001 * LENGTH)
         for k in (1, 2)
     ]
-    formed.append(brentq(lambda x: rise(wave, flux, x, LENGTH) - outlet, ruptures[2], LENGTH))
-    peaks = [peak(wave, flux, start, narrow[k]) for k, start in enumerate([0.0, *formed[:2]])]
-    return flux, peaks, ruptures, formed
+    reformed.append(brentq(lambda x: rise(wave, flux, x, LENGTH) - outlet, ruptures[2], LENGTH))
+    peaks = [peak(wave, flux, start, narrow[k]) for k, start in enumerate([0.0, *reformed[:2]])]
+    return flux, peaks, ruptures, reformed
 
 
-def test_wavy_slider_ruptures_and_forms_again_three_times():
+def test_a_wavy_slider_ruptures_and_reforms_three_times():
     outlet = 2e6
-    flux, peaks, ruptures, formed = wavy_film(outlet)
+    flux, peaks, ruptures, reformed = wavy_film(outlet)
     errors = []
     for cells in (400, 800, 1600):
         film = slider(wave, cells, ends=(0.0, outlet))
@@ -166,57 +166,57 @@ def test_wavy_slider_ruptures_and_forms_again_three_times():
         assert np.ptp(film.flux) < 1e-10 * flux
         assert film.flux.mean() == pytest.approx(flux, rel=1e-3)
         np.testing.assert_allclose(film.fronts[0], ruptures, atol=1.5 * LENGTH / cells)
-        np.testing.assert_allclose(film.fronts[1], formed, atol=0.05 * LENGTH / cells)
+        np.testing.assert_allclose(film.fronts[1], reformed, atol=0.05 * LENGTH / cells)
     assert errors[0] < 0.02
     assert errors[1] < errors[0] / 1.7
     assert errors[2] < errors[1] / 1.7
 
 
-def test_a_starved_slider_fills_where_its_oil_suffices():
+def test_a_starved_slider_fills_where_the_gap_matches_its_flow():
     content, cells = 0.53, 800
     flux = content * SPEED * parabola(LENGTH / cells / 2.0)
     film = slider(parabola, cells, inflow_content=content)
-    meets = [
+    filled = [
         brentq(lambda x: SPEED * parabola(x) - flux, *side)
         for side in ((0.0, LENGTH / 2), (LENGTH / 2, LENGTH))
     ]
-    formed = brentq(lambda x: rise(parabola, flux, x, meets[1]), 0.0, meets[0] - 1e-4 * LENGTH)
-    assert film.fronts[1] == pytest.approx([formed], abs=0.1 * LENGTH / cells)
-    assert film.fronts[0] == pytest.approx([meets[1]], abs=1.5 * LENGTH / cells)
-    assert film.pressure.max() == pytest.approx(rise(parabola, flux, formed, meets[0]), rel=0.02)
+    reformed = brentq(lambda x: rise(parabola, flux, x, filled[1]), 0.0, filled[0] - 1e-4 * LENGTH)
+    assert film.fronts[1] == pytest.approx([reformed], abs=0.1 * LENGTH / cells)
+    assert film.fronts[0] == pytest.approx([filled[1]], abs=1.5 * LENGTH / cells)
+    assert film.pressure.max() == pytest.approx(rise(parabola, flux, reformed, filled[0]), rel=0.02)
     assert np.ptp(film.flux) < 1e-10 * flux
 
 
-def test_oil_that_is_offered_and_does_not_pass_flows_back():
-    flooded, offered = slider(parabola, 200), slider(parabola, 200, inflow_content=0.9)
+def test_excess_oil_at_the_inlet_flows_back():
+    flooded, nearly_flooded = slider(parabola, 200), slider(parabola, 200, inflow_content=0.9)
     assert flooded.flux.mean() < 0.9 * SPEED * flooded.gap[0]
-    assert offered.flux.mean() == pytest.approx(flooded.flux.mean(), rel=0.01)
+    assert nearly_flooded.flux.mean() == pytest.approx(flooded.flux.mean(), rel=0.01)
 
 
-def test_barus_oil_is_a_transformed_plain_one():
-    """With eta0 exp(alpha p) the reduced pressure (1 - exp(-alpha p))/alpha obeys the equation of a
-    plain oil.
+def test_barus_oil_is_an_isoviscous_oil_in_reduced_pressure():
+    """With eta0 exp(alpha p) the reduced pressure (1 - exp(-alpha p))/alpha satisfies the equation
+    of an isoviscous oil.
     """
     alpha = 0.9 / slider(parabola, 400, viscosity=VISCOSITY).pressure.max()
     errors = []
     for cells in (400, 800):
-        plain = slider(parabola, cells)
+        isoviscous = slider(parabola, cells)
         film = slider(parabola, cells, viscosity=Barus(VISCOSITY, alpha))
         errors.append(
             np.max(
                 np.abs(
-                    (1.0 - np.exp(-alpha * film.pressure)) / alpha / plain.pressure.max()
-                    - plain.pressure / plain.pressure.max()
+                    (1.0 - np.exp(-alpha * film.pressure)) / alpha / isoviscous.pressure.max()
+                    - isoviscous.pressure / isoviscous.pressure.max()
                 )
             )
         )
-        assert film.pressure.max() > 2.0 * plain.pressure.max()
+        assert film.pressure.max() > 2.0 * isoviscous.pressure.max()
         assert np.ptp(film.flux) < 1e-10 * film.flux.mean()
     assert errors[0] < 1e-3
     assert errors[1] < errors[0] / 2.0
 
 
-def test_a_field_that_does_not_vary_across_is_a_line():
+def test_a_field_uniform_across_equals_a_line():
     line, gap = slider(wave, 200, ends=(0.0, 2e6)), wave((np.arange(200) + 0.5) * LENGTH / 200)
     field = film_between(
         np.repeat(gap[:, None], 5, axis=1),
@@ -234,8 +234,8 @@ def test_a_field_that_does_not_vary_across_is_a_line():
     assert field.load == pytest.approx(line.load * 5e-3)
 
 
-def test_short_journal_bearing_is_ocvirks():
-    """p = -6 eta u (b^2/4 - y^2) h'/h^3 where the gap narrows, and rupture where it is least.
+def test_a_short_journal_bearing_has_ocvirks_pressure():
+    """p = -6 eta u (b^2/4 - y^2) h'/h^3 in the converging gap, and rupture at the minimum gap.
     Source: Ocvirk (1952).
     """
     e, r, c, width, cells = 0.6, 25e-3, 30e-6, 2e-3, (200, 24)
@@ -283,7 +283,7 @@ def test_no_oil_is_lost_between_rough_walls(oil):
     assert film.content.min() > 0.0
 
 
-def test_a_film_that_is_not_solved_says_so():
+def test_an_unsolved_film_raises_not_converged():
     stiff = {"spacing": (40e-6, 40e-6), "entrainment_speed": 1.0, "viscosity": Barus(0.1, 20e-9)}
     with pytest.raises(NotConverged, match="imbalance") as failed:
         film_between(0.5 * rough_gap(24, 0.7), **stiff)
@@ -292,7 +292,7 @@ def test_a_film_that_is_not_solved_says_so():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "says"),
+    ("wrong", "message"),
     [
         ({"gap": np.zeros(20)}, "gap must be positive"),
         ({"gap": np.ones((2, 2, 2))}, "gap must have shape"),
@@ -306,7 +306,7 @@ def test_a_film_that_is_not_solved_says_so():
         ({"viscosity": 0.0}, "viscosity eta0 must be positive"),
     ],
 )
-def test_what_cannot_be_is_refused(wrong, says):
-    right = {"gap": np.full(20, 1e-6), "spacing": 1e-5, "entrainment_speed": 1.0, "viscosity": 0.1}
-    with pytest.raises(BadInput, match=says):
-        film_between(**{**right, **wrong})
+def test_invalid_input_is_refused(wrong, message):
+    valid = {"gap": np.full(20, 1e-6), "spacing": 1e-5, "entrainment_speed": 1.0, "viscosity": 0.1}
+    with pytest.raises(BadInput, match=message):
+        film_between(**{**valid, **wrong})

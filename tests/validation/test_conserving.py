@@ -1,6 +1,4 @@
-"""The contact that loses no oil: what must hold whatever the surface, checked from the solution's
-fields alone.
-"""
+"""The mass-conserving model: properties of every solution, checked from its fields alone."""
 
 from dataclasses import replace
 from itertools import islice, pairwise
@@ -31,13 +29,13 @@ def solved(surface, *, hardness=CAP, options=OPTIONS, **more):
     return solve_contact(contact(hardness=hardness), barus(), surface, options=options, **more)
 
 
-# a full film, a mixed contact, and one of asperities that the cap flattens
+# a full film, a mixed contact, and one with asperities flattened at the pressure cap
 @pytest.fixture(
     scope="module",
     params=[(0.5e-6, 60e-6, CAP), (1e-6, 40e-6, 0.7e9), (2.5e-6, 40e-6, CAP)],
     ids=["film", "0.7", "2"],
 )
-def some(request):
+def film_case(request):
     sq, length, hardness = request.param
     return solved(rough(ON, sq, correlation_length=length), hardness=hardness)
 
@@ -48,13 +46,13 @@ def flattened():
 
 
 def mobility_of(rho, h, p):
-    """rho h^3/(12 eta), but no less than ambient oil's in the contact film times (film/gap)^3."""
+    """rho h^3/(12 eta), at least that of ambient oil in the contact film times (film/gap)^3."""
     return np.maximum(rho * h**3 / np.exp(18.2e-9 * p), FLOOR**6 / h**3) / (12.0 * ETA0)
 
 
 def flows(solution, speed=1.91):
-    """Oil through each section along x [m^2/s per width, at ambient density], from pressure,
-    content and gap alone.
+    """Return the flow of oil through each section along x [m^2/s per width, at ambient density] and
+    the loss in each cell, from pressure, content and gap alone.
     """
     oil, h, u = solution.oil, solution.gap, speed
     dx, dy = solution.grid.spacing
@@ -68,16 +66,16 @@ def flows(solution, speed=1.91):
     return along.mean(axis=1), lost
 
 
-def test_no_oil_is_lost_on_the_way(some):
-    along, lost = flows(some)
+def test_no_oil_is_lost_along_the_contact(film_case):
+    along, lost = flows(film_case)
     assert np.ptp(along) < 1e-6 * along.mean()
     assert np.abs(lost).mean() * (ON.upper[0] - ON.lower[0]) < 2e-6 * along.mean()
-    assert contact_state(some).mass_flux_imbalance < 1e-4
+    assert contact_state(film_case).mass_flux_imbalance < 1e-4
 
 
 @pytest.mark.parametrize("kind", ["point", "elliptic"])
-def test_no_oil_is_lost_in_bounded_contacts_standing_or_moving(kind):
-    """Of every cell inside, from the fields alone; the lines at both sides are at ambient
+def test_no_oil_is_lost_in_stationary_or_moving_bounded_contacts(kind):
+    """In all inner cells, from the fields alone; the outermost rows on both sides are at ambient
     pressure.
     """
     radius = 12.5e-3 if kind == "point" else (8e-3, 20e-3)
@@ -95,24 +93,23 @@ def test_no_oil_is_lost_in_bounded_contacts_standing_or_moving(kind):
     along, lost = flows(solution, speed=0.1)
     assert np.abs(lost[:, 1:-1]).sum() * on.spacing[0] < 3e-6 * along.mean() * on.cells[1]
     surfaces = MovingSurfaces.one_rough(surface, conditions.surface_speeds)
-    for one in islice(moving_contact(conditions, barus(), surfaces, options=OPTIONS), 4):
-        assert one.solution.convergence.converged
-        assert (
-            one.state.mass_flux_imbalance < 1e-4
-        )  # of what the zone carries, which is less than what enters
+    for snapshot in islice(moving_contact(conditions, barus(), surfaces, options=OPTIONS), 4):
+        assert snapshot.solution.convergence.converged
+        # relative to the flow through the Hertz zone, which is less than the inflow
+        assert snapshot.state.mass_flux_imbalance < 1e-4
 
 
-def test_the_unified_model_loses_some(flattened):
+def test_the_unified_model_loses_oil(flattened):
     unified = solved(flattened.surface, options=replace(OPTIONS, model="unified"))
     assert contact_state(unified).mass_flux_imbalance > 0.3
     assert contact_state(flattened).mass_flux_imbalance < 1e-4
 
 
-def test_every_alternative_is_decided(some):
-    """Full or ruptured, apart or touching, below the cap or at it; the cap bounds oil and contact
-    together.
+def test_every_complementarity_condition_holds(film_case):
+    """Full or ruptured, separated or touching, below the cap or at it; the cap bounds the pressure
+    of oil and contact together.
     """
-    p, oil, cap = some.pressure, some.oil, some.p_cap
+    p, oil, cap = film_case.pressure, film_case.oil, film_case.p_cap
     assert p.min() >= 0.0
     assert p.max() <= cap * (1.0 + 1e-12)
     assert oil.pressure.min() >= 0.0
@@ -121,23 +118,31 @@ def test_every_alternative_is_decided(some):
     assert not oil.pressure[oil.content < 1.0].any()
     assert (oil.growth >= 0.0).all()
     assert (oil.pressure[oil.growth > 0.0] > cap * (1.0 - 1e-6)).all()
-    np.testing.assert_allclose(p[~some.in_contact], oil.pressure[~some.in_contact], atol=1e-4 * P_H)
-    assert some.gap.min() >= FLOOR * (1.0 - 1e-9)
-    assert p.mean() * some.grid.extent[0] == pytest.approx(50e3, rel=1e-4)
+    np.testing.assert_allclose(
+        p[~film_case.in_contact], oil.pressure[~film_case.in_contact], atol=1e-4 * P_H
+    )
+    assert film_case.gap.min() >= FLOOR * (1.0 - 1e-9)
+    assert p.mean() * film_case.grid.extent[0] == pytest.approx(50e3, rel=1e-4)
 
 
-def test_the_gap_is_the_surface_bent_by_the_pressure(some):
-    """h = h0 + x^2/(2R) + deflection - roughness, plus growth, where bodies do not touch."""
-    problem = contact_problem(some.conditions, some.lubricant, some.surface, some.options)
-    bent = problem.deflection(some.pressure / P_H) * A**2 / RADIUS
-    x = some.grid.x[:, None]
-    expected = some.rigid_approach + x**2 / (2.0 * RADIUS) + bent - some.surface.heights
-    apart = ~some.in_contact
-    np.testing.assert_allclose((some.gap - some.oil.growth)[apart], expected[apart], atol=1e-12)
-    assert (expected[some.in_contact] < 1.02 * FLOOR).all()
+def test_the_gap_is_the_surface_deflected_by_the_pressure(film_case):
+    """h = h0 + x^2/(2R) + deflection - roughness, plus growth, where the bodies do not touch."""
+    problem = contact_problem(
+        film_case.conditions, film_case.lubricant, film_case.surface, film_case.options
+    )
+    deflection = problem.deflection(film_case.pressure / P_H) * A**2 / RADIUS
+    x = film_case.grid.x[:, None]
+    expected = (
+        film_case.rigid_approach + x**2 / (2.0 * RADIUS) + deflection - film_case.surface.heights
+    )
+    separated = ~film_case.in_contact
+    np.testing.assert_allclose(
+        (film_case.gap - film_case.oil.growth)[separated], expected[separated], atol=1e-12
+    )
+    assert (expected[film_case.in_contact] < 1.02 * FLOOR).all()
 
 
-def test_a_smooth_film_is_the_unified_one_to_first_order():
+def test_a_smooth_film_equals_that_of_the_unified_model_to_first_order():
     """The unified model's film is accurate to 0.1 % at 256 cells."""
     fine = grid((256, 8))
     reference = solved(flat_surface(fine), options=replace(OPTIONS, model="unified"))
@@ -153,7 +158,7 @@ def test_a_smooth_film_is_the_unified_one_to_first_order():
     assert abs(errors[2]) < abs(errors[1]) / 1.6
 
 
-def posed(solution):
+def problem_of(solution):
     return contact_problem(
         solution.conditions, solution.lubricant, solution.surface, solution.options
     )
@@ -161,11 +166,13 @@ def posed(solution):
 
 def unknowns_of(solution):
     return pressures_of(
-        solution, posed(solution), Scales.from_conditions(solution.conditions, solution.lubricant)
+        solution,
+        problem_of(solution),
+        Scales.from_conditions(solution.conditions, solution.lubricant),
     )
 
 
-def pasts(problem):
+def transient_terms(problem):
     content, dx = np.ones(problem.cells), problem.spacing[0]
     return (
         None,
@@ -174,58 +181,67 @@ def pasts(problem):
     )
 
 
-def test_the_linearisation_is_exact_but_at_borders(flattened):
-    """Against central differences of the balance itself, of every kind of cell at once."""
-    at, standing = unknowns_of(flattened), posed(flattened)
-    for edge in (0, -1):  # a plateau, pressure and a cavity at both ends too
-        at.oil[edge, :24], at.oil[edge, 24:40] = 1.2 * standing.p_cap, 0.5
+def test_the_linearisation_is_exact_away_from_state_boundaries(flattened):
+    """Against central differences of the balance, for all kinds of cells together."""
+    point, steady = unknowns_of(flattened), problem_of(flattened)
+    for edge in (0, -1):  # both ends have a plateau, pressure and a cavity, too
+        point.oil[edge, :24], point.oil[edge, 24:40] = 1.2 * steady.p_cap, 0.5
     rng = np.random.default_rng(3)
-    way = Pressures(
-        rng.standard_normal(standing.cells), 0.1 * rng.standard_normal(standing.cells), 0.03
+    direction = Pressures(
+        rng.standard_normal(steady.cells), 0.1 * rng.standard_normal(steady.cells), 0.03
     )
     step = 1e-7
-    for past in pasts(standing):
-        problem = replace(standing, past=past)
-        here = evaluate(problem, at, second_order=False)
+    for past in transient_terms(steady):
+        problem = replace(steady, past=past)
+        here = evaluate(problem, point, second_order=False)
         before, after = (
             evaluate(
                 problem,
-                Pressures(*(a + s * step * w for a, w in zip(here.unknowns, way, strict=True))),
+                Pressures(
+                    *(a + s * step * w for a, w in zip(here.unknowns, direction, strict=True))
+                ),
                 second_order=False,
             )
             for s in (-1.0, 1.0)
         )
         expected = (after.outflow - before.outflow) * here.rows.fluid_scale / (2.0 * step)
-        found = MixedLinear(here, np.float64).product(way.oil, way.total, way.approach)[0]
+        found = MixedLinear(here, np.float64).product(
+            direction.oil, direction.total, direction.approach
+        )[0]
         same = (before.rows.state == after.rows.state) & (before.solid == after.solid)
-        opens = (
-            here.gap > problem.contact_gap
-        ) == ~here.sealed  # not so within 1 % of the contact film, and lifted
+        # differs within 1 % of the contact film, and where oil at the cap separates the bodies
+        opens = (here.gap > problem.contact_gap) == ~here.sealed
         same &= (here.solid == after.solid) & (opens | (here.unknowns.oil > problem.p_cap))
         same &= (before.gap > problem.contact_gap) == (after.gap > problem.contact_gap)
         for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
             same &= np.roll(same, shift, axis)
-        same[[0, 1]] &= past is None  # what first rows draw in by the wedge is left out
+        same[[0, 1]] &= past is None  # the wedge's inflow into the first rows is omitted
         assert {0, 2} <= set(here.rows.state[same].tolist())
         np.testing.assert_allclose(found[same], expected[same], rtol=1e-3, atol=1e-3)
         assert same.mean() > 0.7
 
 
-def test_the_approximate_inverse_is_near(flattened, monkeypatch):
-    """GMRES needs a handful of steps to a tenth with it, and more than twice as many without."""
-    at = unknowns_of(flattened)
-    pressed = Pressures(np.where(at.oil > 0.0, 1.2 * at.oil, at.oil), at.total, at.approach - 0.3)
-    away = evaluate(posed(flattened), pressed, second_order=False)
-    taken = []
+def test_the_approximate_inverse_is_accurate(flattened, monkeypatch):
+    """GMRES reduces the residual to a tenth in a few iterations with it, and needs more than twice
+    as many without.
+    """
+    point = unknowns_of(flattened)
+    perturbed = Pressures(
+        np.where(point.oil > 0.0, 1.2 * point.oil, point.oil), point.total, point.approach - 0.3
+    )
+    balance = evaluate(problem_of(flattened), perturbed, second_order=False)
+    products = []
     exact = MixedLinear.product
-    monkeypatch.setattr(MixedLinear, "product", lambda *given: taken.append(1) or exact(*given))
-    newton_step(away)
-    with_it = len(taken)
-    assert with_it < 25
+    monkeypatch.setattr(
+        MixedLinear, "product", lambda *arguments: products.append(1) or exact(*arguments)
+    )
+    newton_step(balance)
+    preconditioned = len(products)
+    assert preconditioned < 25
     monkeypatch.setattr(MixedLinear, "answer", lambda _, oil: oil)
-    taken.clear()
-    newton_step(away)
-    assert len(taken) > 2 * with_it, with_it
+    products.clear()
+    newton_step(balance)
+    assert len(products) > 2 * preconditioned, preconditioned
 
 
 def test_elastic_bodies_have_no_plateau():
@@ -235,35 +251,38 @@ def test_elastic_bodies_have_no_plateau():
     assert np.ptp(along) < 1e-6 * along.mean()
 
 
-def test_what_is_invariant_hardly_depends_on_the_start(flattened):
-    """The plateau makes heavily loaded cells ambiguous: invariants to 3 %, not digits."""
+def test_invariants_hardly_depend_on_the_start(flattened):
+    """The plateau makes heavily loaded cells ambiguous: invariants agree within 3 %."""
     neighbour = solved(replace(flattened.surface, heights=0.95 * flattened.surface.heights))
-    again = solved(flattened.surface, start=neighbour)
+    restarted = solved(flattened.surface, start=neighbour)
     unified = solved(flattened.surface, options=replace(OPTIONS, model="unified"))
     from_unified = solved(flattened.surface, start=unified)
-    one = sharing_by_film(flattened)
-    for other in map(sharing_by_film, (again, from_unified)):
-        assert other.clr_solid == pytest.approx(one.clr_solid, abs=0.03)
-        assert other.oil == pytest.approx(one.oil, rel=0.03)
-        assert other.cavitated == pytest.approx(one.cavitated, abs=0.03)
+    expected = sharing_by_film(flattened)
+    for other in map(sharing_by_film, (restarted, from_unified)):
+        assert other.clr_solid == pytest.approx(expected.clr_solid, abs=0.03)
+        assert other.oil == pytest.approx(expected.oil, rel=0.03)
+        assert other.cavitated == pytest.approx(expected.cavitated, abs=0.03)
 
 
-def test_the_usual_tolerance_is_close_to_a_much_tighter_one(some):
+def test_the_default_tolerance_gives_results_close_to_a_much_tighter_one(film_case):
     tight = solved(
-        some.surface, hardness=some.p_cap, options=replace(OPTIONS, tolerance=1e-7), start=some
+        film_case.surface,
+        hardness=film_case.p_cap,
+        options=replace(OPTIONS, tolerance=1e-7),
+        start=film_case,
     )
-    here, there = sharing_by_film(some), sharing_by_film(tight)
+    here, there = sharing_by_film(film_case), sharing_by_film(tight)
     np.testing.assert_allclose(here.below, there.below, atol=5e-3)
     assert here.clr_solid == pytest.approx(there.clr_solid, abs=5e-3)
-    assert contact_state(some).h_mean == pytest.approx(contact_state(tight).h_mean, rel=1e-3)
+    assert contact_state(film_case).h_mean == pytest.approx(contact_state(tight).h_mean, rel=1e-3)
 
 
-def test_load_shares_name_their_film(flattened):
+def test_load_shares_state_their_film(flattened):
     shares = sharing_by_film(flattened)
     assert shares.films == (FLOOR, 20e-9, 50e-9, 100e-9, 200e-9)
     assert (np.diff([0.0, *shares.below, 1.0]) >= 0.0).all()
     assert shares.clr_solid == pytest.approx(contact_state(flattened).clr)
-    assert shares.clr_floor < shares.clr_solid  # oil at the cap lies between bodies that touch
+    assert shares.clr_floor < shares.clr_solid  # oil at the cap lies between touching bodies
     assert clr_below(flattened, 1.0) == pytest.approx(1.0)
     assert 0.1 < shares.cavitated < 0.9
     with pytest.raises(BadInput, match="film must be positive"):
@@ -273,32 +292,32 @@ def test_load_shares_name_their_film(flattened):
     assert unified.oil > shares.oil
 
 
-def test_a_solution_comes_back_from_disk(flattened, tmp_path):
-    back = load_solution(flattened.save(tmp_path / "run.nc"))
-    assert back.options.model == "conserving"
+def test_a_solution_reloads_unchanged(flattened, tmp_path):
+    reloaded = load_solution(flattened.save(tmp_path / "run.nc"))
+    assert reloaded.options.model == "conserving"
     for part in ("content", "pressure", "growth"):
-        np.testing.assert_array_equal(getattr(back.oil, part), getattr(flattened.oil, part))
-    assert contact_state(back) == contact_state(flattened)
+        np.testing.assert_array_equal(getattr(reloaded.oil, part), getattr(flattened.oil, part))
+    assert contact_state(reloaded) == contact_state(flattened)
 
 
-def test_a_start_at_the_solution_stays_there(flattened):
+def test_a_start_at_the_solution_remains_there(flattened):
     again = solved(flattened.surface, start=flattened)
     assert again.convergence.iterations <= 3
     np.testing.assert_allclose(again.pressure, flattened.pressure, atol=1e-3 * P_H)
 
 
-def test_what_does_not_converge_is_loud(flattened):
-    few, seen = replace(OPTIONS, max_iterations=2), []
+def test_a_failure_to_converge_is_raised(flattened):
+    few, steps = replace(OPTIONS, max_iterations=2), []
     with pytest.raises(NotConverged, match="not solved") as failed:
-        solved(flattened.surface, options=few, progress=seen.append)
+        solved(flattened.surface, options=few, progress=steps.append)
     unfinished = failed.value.solution
     assert unfinished.convergence.status is SolveStatus.OUT_OF_ITERATIONS
     assert unfinished.oil.content.shape == ON.cells
-    assert tuple(seen) == unfinished.convergence.history
+    assert tuple(steps) == unfinished.convergence.history
     assert not solved(flattened.surface, options=few, strict=False).convergence.converged
 
 
-def test_what_it_does_not_cover_is_refused():
+def test_unsupported_options_are_refused():
     with pytest.raises(BadInput, match="model must be one of unified, paper, mixed, conserving"):
         Options(model="lossy")
     with pytest.raises(BadInput, match="solve without start"):
@@ -316,7 +335,9 @@ def moving(surface, *, speeds=PURE_ROLLING, hardness=CAP, **more):
 
 
 def oil_carried(solution):
-    """rho theta h [m], and what pressure drives through both ends and along [m^2/s]."""
+    """Return rho theta h [m], and the pressure-driven flow along the contact and out of both ends
+    [m^2/s].
+    """
     oil, h, (dx, _) = solution.oil, solution.gap, solution.grid.spacing
     p = oil.pressure
     rho = 1.0 + 0.6e-9 * p / (1.0 + 1.7e-9 * p)
@@ -326,7 +347,7 @@ def oil_carried(solution):
 
 
 def test_every_step_balances_its_oil():
-    """What the domain holds more than before came in with the surfaces, less what left at both
+    """The oil gained in the domain equals the inflow with the surfaces less the outflow at both
     ends.
     """
     x0, (dx, _) = ON.lower[0] + ON.spacing[0] / 2.0, ON.spacing
@@ -343,26 +364,26 @@ def test_every_step_balances_its_oil():
         before = held
 
 
-def test_oil_behind_the_contact_is_carried_as_it_is():
-    """Where nothing presses, m_i^n = m_(i-1)^(n-1) whatever the roughness does."""
+def test_oil_behind_the_contact_is_convected_unchanged():
+    """At ambient pressure m_i^n = m_(i-1)^(n-1), whatever the roughness."""
     snapshots = list(
         islice(moving(rough(ON, 1e-6, correlation_length=60e-6), speeds=(2.3, 1.52)), 5)
     )
     for before, after in pairwise(snapshots):
-        held, now = (oil_carried(one.solution)[0] for one in (before, after))
+        held, now = (oil_carried(snapshot.solution)[0] for snapshot in (before, after))
         free = after.solution.oil.pressure == 0.0
-        alone = (
+        unloaded = (
             free[1:-1]
             & free[2:]
             & free[:-2]
             & np.roll(free, 1, 1)[1:-1]
             & np.roll(free, -1, 1)[1:-1]
         )
-        assert alone.sum() > 300
-        np.testing.assert_allclose(now[1:-1][alone], held[:-2][alone], rtol=1e-4)
+        assert unloaded.sum() > 300
+        np.testing.assert_allclose(now[1:-1][unloaded], held[:-2][unloaded], rtol=1e-4)
 
 
-def test_a_snapshot_stays_where_nothing_moves():
+def test_a_lay_along_rolling_gives_a_steady_solution():
     surface = Surface(
         np.tile(1e-7 * np.cos(2.0 * np.pi * ON.y / ON.extent[1]), (64, 1)), ON
     )  # a lay along rolling
@@ -375,23 +396,23 @@ def test_a_snapshot_stays_where_nothing_moves():
         )
 
 
-def test_motion_goes_on_from_what_it_remembers_to_the_last_digit():
+def test_motion_resumes_from_its_memory_to_the_last_digit():
     surface = rough(ON, 1.5e-6, correlation_length=40e-6)
     whole = list(islice(moving(surface), 4))
-    rest = list(islice(moving(surface, resume=whole[1].memory), 2))
-    for one, other in zip(whole[2:], rest, strict=True):
-        assert one.number == other.number
-        np.testing.assert_array_equal(one.solution.pressure, other.solution.pressure)
-        np.testing.assert_array_equal(one.solution.oil.content, other.solution.oil.content)
+    remainder = list(islice(moving(surface, resume=whole[1].memory), 2))
+    for expected, resumed in zip(whole[2:], remainder, strict=True):
+        assert expected.number == resumed.number
+        np.testing.assert_array_equal(expected.solution.pressure, resumed.solution.pressure)
+        np.testing.assert_array_equal(expected.solution.oil.content, resumed.solution.oil.content)
 
 
-def test_motion_from_rest_draws_oil_in_step_by_step():
+def test_motion_from_rest_fills_the_contact_step_by_step():
     snapshots = list(
         islice(moving(rough(ON, 0.5e-6, correlation_length=60e-6), start="stationary"), 6)
     )
     assert (snapshots[0].solution.oil.content == 1.0).all()
-    assert all(one.solution.convergence.converged for one in snapshots)
-    clr = [one.state.clr for one in snapshots]
+    assert all(snapshot.solution.convergence.converged for snapshot in snapshots)
+    clr = [snapshot.state.clr for snapshot in snapshots]
     assert clr[0] > 0.99
     assert (np.diff(clr) < -0.02).all()
 
@@ -401,9 +422,9 @@ def test_motion_from_rest_draws_oil_in_step_by_step():
     [((1.91, 1.91), True), ((3.82, 0.0), True), ((3.82, 0.0), False)],
     ids=["one", "two", "none"],
 )
-def test_a_step_begins_where_roughness_has_carried_its_contacts(speeds, first):
-    """Cells a step: from the cell before, or of a body that slides from another one, it takes twice
-    as many steps.
+def test_a_step_starts_from_contacts_convected_with_the_roughness(speeds, first):
+    """The initial guess moves each body's contacts with that body. A guess shifted by another
+    number of cells needs twice as many iterations.
     """
     rolling = contact(hardness=CAP, surface_speeds=speeds)
     surfaces = MovingSurfaces.one_rough(
@@ -413,7 +434,7 @@ def test_a_step_begins_where_roughness_has_carried_its_contacts(speeds, first):
     assert max(snapshot.solution.convergence.iterations for snapshot in taken) <= 14
 
 
-def test_a_bad_step_is_marked():
+def test_an_unsolved_step_is_marked():
     few = replace(OPTIONS, max_iterations=3)
     surface = rough(ON, 1.5e-6, correlation_length=40e-6)
     good = next(moving(surface))
@@ -424,24 +445,24 @@ def test_a_bad_step_is_marked():
     assert bad.solution.convergence.iterations <= 100
 
 
-@pytest.mark.parametrize("how", [{"time_step": 0.5}, {"time_step": 2.0}, {"flattening": True}])
-def test_steps_of_any_length_converge_and_may_flatten(how):
+@pytest.mark.parametrize("options", [{"time_step": 0.5}, {"time_step": 2.0}, {"flattening": True}])
+def test_steps_of_any_length_converge_and_may_flatten(options):
     surface = rough(ON, 1.5e-6, correlation_length=40e-6)
-    snapshots = list(islice(moving(surface, hardness=0.7e9, **how), 4))
-    assert all(one.solution.convergence.converged for one in snapshots)
-    assert (snapshots[-1].flattened > 0.0) == ("flattening" in how)
+    snapshots = list(islice(moving(surface, hardness=0.7e9, **options), 4))
+    assert all(snapshot.solution.convergence.converged for snapshot in snapshots)
+    assert (snapshots[-1].flattened > 0.0) == ("flattening" in options)
 
 
-def test_a_start_that_is_none_is_refused():
+def test_an_invalid_start_is_refused():
     with pytest.raises(BadInput, match="steady or stationary"):
         next(moving(flat_surface(ON), start="flying"))
 
 
-def test_waviness_in_motion_is_the_unified_models_in_a_full_film():
-    """Pure rolling, a film that no cavity parts: both must press the wave down alike, each on its
+def test_moving_waviness_is_that_of_the_unified_model_in_a_full_film():
+    """Pure rolling, a film without cavities: both models flatten the wave equally, each with its
     own scheme.
 
-    Elastic bodies under 6 kN, waves half as long as the Hertz zone; the unified step is second
+    Elastic bodies under 6 kN, waves half as long as the Hertz zone; the unified scheme is of second
     order in time.
     """
     heavy = contact(load=6000.0, surface_speeds=PURE_ROLLING)
@@ -452,13 +473,14 @@ def test_waviness_in_motion_is_the_unified_models_in_a_full_film():
         on,
     )
     surfaces, period = MovingSurfaces.one_rough(wave, PURE_ROLLING), cells // waves
-    left = []
+    amplitudes = []
     for model in ("paper", "conserving"):
         options = replace(OPTIONS, model=model)
         steps = islice(moving_contact(heavy, barus(), surfaces, options=options), 84)
-        centre = np.array([one.solution.gap[np.argmin(np.abs(on.x)), 0] for one in steps])[-period:]
-        left.append(2.0 * abs(np.fft.rfft(centre)[1]) / period / 0.05e-6)
-    assert 0.1 < left[0] < 0.8
-    assert left[1] == pytest.approx(
-        left[0], rel=0.05
-    )  # 4 % above it here, 2 % on twice as many cells
+        centre = np.array([step.solution.gap[np.argmin(np.abs(on.x)), 0] for step in steps])[
+            -period:
+        ]
+        amplitudes.append(2.0 * abs(np.fft.rfft(centre)[1]) / period / 0.05e-6)
+    assert 0.1 < amplitudes[0] < 0.8
+    # 4 % larger here, 2 % on twice as many cells
+    assert amplitudes[1] == pytest.approx(amplitudes[0], rel=0.05)

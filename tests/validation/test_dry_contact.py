@@ -1,8 +1,8 @@
-"""Rough, dry contact against tamaas, with and without a cap of the pressure, and waves against
+"""Rough, dry contact against tamaas, with and without a pressure cap, and waves against
 Westergaard.
 
-tamaas repeats along x as well. Its domain is eight times as wide, and the parabola is flattened by
-what the images of the line load, a spacing L apart, bend it back: -(1/pi) ln|2 sin(pi X/L)| =
+tamaas repeats along x as well. Its domain is eight times as wide, and the parabola is corrected for
+the deflection by the images of the line load, a distance L apart: -(1/pi) ln|2 sin(pi X/L)| =
 -(1/pi) ln|X| + const + pi X^2/(6 L^2), so that a load of pi/2 adds (pi^2/6) (a/L)^2 of the
 parabola.
 """
@@ -24,15 +24,15 @@ WIDER = 8
 
 
 def tamaas_pressure(surface, cap=None):
-    """Pressure [Pa] on the surface's own cells, and the largest one anywhere else."""
+    """Return the pressure [Pa] on the surface's own cells, and the largest pressure elsewhere."""
     tamaas.set_log_level(tamaas.LogLevel.error)
     modulus = contact().pair.reduced_modulus
     (nx, ny), (width, depth) = surface.grid.cells, surface.grid.extent
     before = (WIDER - 1) * nx // 2
     here = slice(before, before + nx)
     x = surface.grid.lower[0] + (np.arange(WIDER * nx) - before + 0.5) * surface.grid.spacing[0]
-    bent = 1.0 - np.pi**2 / 6.0 * (A / (WIDER * width)) ** 2
-    heights = np.repeat((-(x**2) / (2.0 * RADIUS) * bent)[:, None], ny, axis=1)
+    curvature = 1.0 - np.pi**2 / 6.0 * (A / (WIDER * width)) ** 2
+    heights = np.repeat((-(x**2) / (2.0 * RADIUS) * curvature)[:, None], ny, axis=1)
     heights[here] += surface.heights
     model = tamaas.ModelFactory.createModel(
         tamaas.model_type.basic_2d, [WIDER * width / A, depth / A], [WIDER * nx, ny]
@@ -48,7 +48,7 @@ def tamaas_pressure(surface, cap=None):
     return pressure[here], max(pressure[:before].max(), pressure[before + nx :].max())
 
 
-def test_the_twin_finds_hertz():
+def test_the_tamaas_model_gives_hertz_pressure():
     pressure, elsewhere = tamaas_pressure(flat_surface(ON))
     assert elsewhere == 0.0
     assert pressure.max() == pytest.approx(P_H, rel=1e-3)
@@ -64,7 +64,7 @@ def test_the_twin_finds_hertz():
         (0.5e-6, 16 * CELL, 0.7e9),
     ],
 )
-def test_area_and_pressure_are_those_of_tamaas(sq, correlation_length, cap):
+def test_area_and_pressure_agree_with_tamaas(sq, correlation_length, cap):
     surface = rough(ON, sq, seed=3, correlation_length=correlation_length)
     found = solve_contact(contact(hardness=cap), None, surface, options=Options(tolerance=1e-5))
     expected, elsewhere = tamaas_pressure(surface, cap)
@@ -77,7 +77,7 @@ def test_area_and_pressure_are_those_of_tamaas(sq, correlation_length, cap):
     assert state.clr == pytest.approx(1.0, abs=1e-12)
 
 
-def test_signorini_holds_in_every_cell():
+def test_signorini_conditions_hold_in_every_cell():
     """p >= 0, h >= 0, p h = 0 and the load, in a rough contact without a cap."""
     found = solve_contact(contact(), None, rough(ON, 1e-6), options=Options(tolerance=1e-6))
     largest = found.pressure.max()
@@ -88,8 +88,8 @@ def test_signorini_holds_in_every_cell():
     assert found.pressure.mean() * ON.extent[0] == pytest.approx(50e3, rel=1e-6)
 
 
-def test_a_wave_pressed_flat_adds_its_own_pressure():
-    """A cosine of height d and wavenumber q under full contact takes the pressure E* q d/2: Johnson
+def test_a_flattened_wave_adds_its_own_pressure():
+    """A cosine of height d and wavenumber q in full contact adds the pressure E* q d/2: Johnson
     (1985) eq 13.7.
     """
     q = 2.0 * np.pi * 4 / ON.extent[1]
@@ -111,13 +111,13 @@ def test_a_wave_pressed_flat_adds_its_own_pressure():
 
 
 @pytest.mark.parametrize("full", [0.8, 1.5, 3.0])
-def test_short_waves_are_westergaards(full):
-    """Waves along y much shorter than the contact is wide feel its mean pressure as if it went on
-    for ever.
+def test_short_waves_agree_with_westergaard(full):
+    """Waves along y much shorter than the contact width behave as an infinite wavy surface under
+    the local mean pressure.
 
-    `full` is the pressure p* = π E* Δ/λ that presses them flat, over Hertz's. Contact on the share
-    (2/π) asin √s of a wave and the mean gap Δ (1 - s + s ln s) at s = p/p*: Westergaard (1939),
-    Johnson (1985) eqs 13.8-13.10.
+    `full` is the pressure p* = π E* Δ/λ that flattens them, over Hertz's. The contact covers the
+    share (2/π) asin √s of a wave and the mean gap is Δ (1 - s + s ln s) at s = p/p*: Westergaard
+    (1939), Johnson (1985) eqs 13.8-13.10.
     """
     conditions, cells = contact(), 128
     a, p_max = conditions.hertz.half_widths[0], conditions.hertz.p_max
@@ -137,9 +137,9 @@ def test_short_waves_are_westergaards(full):
 
 
 @pytest.mark.parametrize(("sq", "seed"), [(0.1e-6, 1), (0.3e-6, 2)])
-def test_a_rough_ball_is_tamaas_without_images(sq, seed):
-    """Neither repeats anywhere: the same cells, the same Love kernel, another solver (Polonsky and
-    Keer).
+def test_a_rough_ball_agrees_with_non_periodic_tamaas(sq, seed):
+    """Both are non-periodic, with the same cells and the same Love kernel, but another solver
+    (Polonsky and Keer).
     """
     ball = contact(geometry="point", radius=10e-3, length=None, load=20.0)
     a, cells = ball.hertz.half_widths[0], 96
@@ -159,9 +159,9 @@ def test_a_rough_ball_is_tamaas_without_images(sq, seed):
     model.E, model.nu = 1.0, 0.0  # stresses in units of E*
     tamaas.ModelFactory.registerNonPeriodic(model, "dcfft")
     bowl = -(on.x[:, None] ** 2 + on.y**2) / (2.0 * ball.radius)
-    twin = tamaas.PolonskyKeerRey(model, (bowl + heights) / a, 1e-12)
-    twin.setIntegralOperator("dcfft")
-    twin.solve(ball.load / on.extent[0] ** 2 / modulus)
+    solver = tamaas.PolonskyKeerRey(model, (bowl + heights) / a, 1e-12)
+    solver.setIntegralOperator("dcfft")
+    solver.solve(ball.load / on.extent[0] ** 2 / modulus)
     expected = model.traction * modulus
     np.testing.assert_array_equal(solution.in_contact, expected > 0.0)
     assert np.linalg.norm(solution.pressure - expected) < 1e-6 * np.linalg.norm(expected)

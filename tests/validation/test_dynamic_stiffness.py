@@ -1,5 +1,5 @@
-"""Stiffness and damping of solved contacts: another program's table, dense twins, closed forms,
-conserved power.
+"""Stiffness and damping of solved contacts, against another program's table, dense reference
+solutions, closed forms and energy conservation.
 """
 
 from dataclasses import replace
@@ -29,15 +29,15 @@ from asperity.solution import (
 )
 from asperity.solution.state import balance_of
 from asperity.surface import flat_surface, gaussian_surface
-from support.line import Oil, line_contact, shaken
+from support.line import Oil, line_contact, load_response
+from support.oscillating import load_response_of_cells
 from support.paper import barus, contact, grid
-from support.shaken import shaken_cells
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
-MICRO = 1e6  # N/m in a N/um
-# Independent program (linearised Reynolds, deflection, squeeze; dense), paper's contact at 96 x 48,
-# seed 7, unified: Sq um: CLR, k in N/um at 0, 3 and 10 kHz, ζ at 1, 3, 5 kHz; capped cells flowing,
-# then elastic. None: not printed.
+MICRO = 1e6  # N/m per N/um
+# Independent program (linearised Reynolds, deflection, squeeze; dense) on the paper's contact: 96 x
+# 48 cells, seed 7, unified. (Sq in um, capped cells flowing or elastic): CLR, k in N/um at 0, 3 and
+# 10 kHz, ζ at 1, 3 and 5 kHz; None: not printed.
 TABLE = {
     (0.0, "flowing"): (0.0, 330.0, 347.0, 357.0, 0.014, 0.025, 0.017),
     (0.5, "flowing"): (0.10, 291.0, 299.0, 334.0, 0.015, 0.039, 0.052),
@@ -52,7 +52,7 @@ TABLE = {
 
 
 @cache
-def papers(sq_um, model="unified", cells=(96, 48)):
+def paper_contact(sq_um, model="unified", cells=(96, 48)):
     case = load_case(PAPER).with_overrides({"grid.cells": list(cells), "model": model})
     surface = (
         case.with_overrides({"surface.sq": f"{sq_um} um"}).surface()
@@ -65,27 +65,25 @@ def papers(sq_um, model="unified", cells=(96, 48)):
 
 
 @pytest.mark.parametrize(("sq_um", "yielded"), list(TABLE))
-def test_another_programs_table_comes_out(sq_um, yielded):
-    """Within its printed digits and 1 %."""
+def test_stiffness_and_damping_match_an_independent_program(sq_um, yielded):
+    """Within the printed digits and 1 %."""
     clr, *stiffness, at_1, at_3, at_5 = TABLE[sq_um, yielded]
-    solution = papers(sq_um)
+    solution = paper_contact(sq_um)
     assert contact_state(solution).clr == pytest.approx(clr, abs=0.006)
-    shaken_contact = OscillatingContact(solution, yielded=yielded)
+    oscillating = OscillatingContact(solution, yielded=yielded)
     for frequency, expected in zip((0.0, 3e3, 10e3), stiffness, strict=True):
         if expected is not None:
-            assert shaken_contact.evaluate(frequency).stiffness / MICRO == pytest.approx(
+            assert oscillating.evaluate(frequency).stiffness / MICRO == pytest.approx(
                 expected, rel=0.01
             )
     for frequency, expected in zip((1e3, 3e3, 5e3), (at_1, at_3, at_5), strict=True):
-        assert shaken_contact.evaluate(frequency).damping_ratio == pytest.approx(
-            expected, abs=0.001
-        )
+        assert oscillating.evaluate(frequency).damping_ratio == pytest.approx(expected, abs=0.001)
 
 
 @cache
-def own_line(nodes):
-    """The smooth contact of paper.toml by the one-dimensional reference, and its speed number and
-    oil.
+def reference_line(nodes):
+    """Return the smooth contact of paper.toml from the one-dimensional reference, its speed number
+    and its oil.
     """
     conditions, alpha = contact(), 18.2e-9
     a, p_h = conditions.hertz.half_widths[0], conditions.hertz.p_max
@@ -101,16 +99,16 @@ def own_line(nodes):
 
 
 @pytest.mark.parametrize("frequency_hz", [0.0, 1e3, 3e3, 10e3, 20e3])
-def test_a_smooth_line_has_the_stiffness_of_a_solver_that_shares_no_code(frequency_hz):
+def test_a_smooth_line_has_the_stiffness_of_an_independent_solver(frequency_hz):
     conditions = contact()
     a, scales = conditions.hertz.half_widths[0], Scales.from_conditions(conditions, barus())
     solution = solve_contact(
         conditions, barus(), flat_surface(grid((256, 8))), options=Options(tolerance=1e-6)
     )
     found = dynamic_stiffness(solution, frequency_hz, reference_depth=20.0 * a)
-    film, speed, oil = own_line(801)
+    film, speed, oil = reference_line(801)
     with threadpool_limits(limits=1):
-        load = shaken(
+        load = load_response(
             film, speed, oil, 2.0 * np.pi * frequency_hz * a / conditions.entrainment_speed
         )
     response = load * scales.pressure * scales.length / scales.gap * conditions.length
@@ -136,9 +134,9 @@ def ball():
 @pytest.mark.parametrize("model", ["unified", "mixed"])
 @pytest.mark.parametrize("kind", ["line", "ball"])
 @pytest.mark.parametrize("yielded", ["flowing", "elastic"])
-def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
-    """Slopes by complex steps of Reynolds' equation as the tests write it, all cells in one dense
-    system.
+def test_gmres_agrees_with_a_dense_solution(kind, model, yielded):
+    """The dense system of all cells takes its derivatives by complex steps from the tests' own
+    Reynolds equation.
     """
     if kind == "ball":
         conditions, surface = ball()
@@ -159,17 +157,17 @@ def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
     hertz = (0.0, 4e3, 100e3)
     crossing = 2.0 * np.pi * ready.scales.length / conditions.entrainment_speed
     with threadpool_limits(limits=1):
-        expected = shaken_cells(balance, [crossing * frequency for frequency in hertz])
+        expected = load_response_of_cells(balance, [crossing * frequency for frequency in hertz])
     found = [
-        complex(ready.oscillating.answer(crossing * one, tolerance=1e-9).total.sum())
-        for one in hertz
+        complex(ready.oscillating.answer(crossing * frequency, tolerance=1e-9).total.sum())
+        for frequency in hertz
     ]
     assert found == pytest.approx(expected, rel=2e-4)
 
 
 @pytest.mark.parametrize("hardness", [None, "2 GPa"])
-def test_without_yielding_both_limits_coincide(hardness):
-    """Solved for themselves they agree; where cells are at the cap they do not."""
+def test_both_limits_coincide_without_yielding(hardness):
+    """The limits are solved separately. They agree without capped cells and differ with them."""
     case = load_case(PAPER).with_overrides(
         {"grid.cells": [48, 24], "surface.sq": "1 um", "contact.load": "500 N"}
     )
@@ -186,11 +184,11 @@ def test_without_yielding_both_limits_coincide(hardness):
     assert (own.virgin.stiffness < 0.95 * own.elastic.stiffness) == (hardness is not None)
 
 
-def test_a_sweep_that_cannot_move_begins_anew(monkeypatch):
-    """Where corrections of one frequency tell nothing new at the next, the resonance is the
+def test_a_sweep_restarts_after_dependent_corrections(monkeypatch):
+    """If the corrections of one frequency are linearly dependent at the next, the resonance is the
     same.
     """
-    solution = papers(1.0, "mixed")
+    solution = paper_contact(1.0, "mixed")
     expected = OscillatingContact(solution).resonance(0.1)
 
     def refused(_, frequency):
@@ -203,37 +201,39 @@ def test_a_sweep_that_cannot_move_begins_anew(monkeypatch):
 
 
 def stencil_times(lines, change):
-    even, odd, left = *np.empty((2, change.shape[0], change.shape[1] // 2)), np.zeros_like(change)
+    even, odd, residual = (
+        *np.empty((2, change.shape[0], change.shape[1] // 2)),
+        np.zeros_like(change),
+    )
     relax.split_residual(lines.stencil, lines.far, np.zeros_like(change), change, even, odd)
-    relax.add_lines(even, odd, left)
-    return -left
+    relax.add_lines(even, odd, residual)
+    return -residual
 
 
-def test_the_lines_follow_how_the_wedge_leans():
-    """Their stencil is the linearisation of a contact in which a cell gives way to its own pressure
-    alone.
+def test_the_line_stencil_includes_the_slope_limiter():
+    """Their stencil is the linearisation of a contact in which each cell deflects under its own
+    pressure only.
     """
-    balance = elastic(balance_of(papers(2.5, "mixed")))
+    balance = elastic(balance_of(paper_contact(2.5, "mixed")))
     linear = MixedLinear(balance, float, with_limiter=True)
     _, lines = linear.inverse
     change = np.random.default_rng(2).standard_normal(linear.cells) * linear.lubricated
     compliance = 1.0 / linear.rows.contact_scale
     expected, _ = linear.of_gap(change, np.where(linear.free, compliance * change, 0.0))
     found = stencil_times(lines, change)
-    inner = (
-        linear.lubricated & (np.arange(linear.cells[0]) % (linear.cells[0] - 1) > 0)[:, None]
-    )  # no ambient oil
+    # excludes the first and the last row, with ambient oil beyond
+    inner = linear.lubricated & (np.arange(linear.cells[0]) % (linear.cells[0] - 1) > 0)[:, None]
     assert (inner & linear.touching).sum() > 100
     np.testing.assert_allclose(
         found[inner], expected[inner], atol=1e-9 * np.abs(expected[inner]).max()
     )
-    _, upright = MixedLinear(balance, float).inverse
-    assert np.abs(stencil_times(upright, change) - expected)[inner].max() > 0.1
+    _, without_limiter = MixedLinear(balance, float).inverse
+    assert np.abs(stencil_times(without_limiter, change) - expected)[inner].max() > 0.1
 
 
-def test_an_oscillating_contact_with_asperities_takes_few_steps():
-    """With stiff oil apart from what touches it takes 30."""
-    ready = OscillatingContact(papers(0.5, "mixed", cells=(128, 128)))
+def test_an_oscillating_contact_with_asperities_needs_few_iterations():
+    """30 iterations if stiff oil and touching cells are preconditioned separately."""
+    ready = OscillatingContact(paper_contact(0.5, "mixed", cells=(128, 128)))
     answer = ready.oscillating.answer(ready.dimensionless_frequency(9e3), tolerance=3e-5)
     assert answer.left <= 3e-5
     assert answer.steps <= 24
@@ -243,25 +243,25 @@ def test_an_oscillating_contact_with_asperities_takes_few_steps():
     ("model", "sq_um"),
     [("mixed", 0.5), ("mixed", 1.0), ("mixed", 4.0), ("unified", 1.0), ("unified", 0.0)],
 )
-def test_the_resonance_is_that_of_equations_met_to_the_end(model, sq_um):
-    """Its damping ratio to 1 %, however small: 0.0003 at Sq 4 um; and the mass does resonate there,
-    to 0.5 %.
+def test_the_resonance_is_that_of_tightly_converged_equations(model, sq_um):
+    """The damping ratio within 1 %, down to 0.0003 at Sq 4 um, and the natural frequency of the
+    mass within 0.5 %.
     """
-    solution, mass = papers(sq_um, model), 0.1
+    solution, mass = paper_contact(sq_um, model), 0.1
     own = own_resonance(solution, mass)
     for found in (own.elastic, own.virgin):
         ready = OscillatingContact(solution, yielded=found.yielded)
-        to_the_end = ready.evaluate(found.frequency_hz, tolerance=1e-8)
-        assert found.stiffness == pytest.approx(to_the_end.stiffness, rel=2e-3)
-        assert found.damping_ratio == pytest.approx(to_the_end.damping_ratio, rel=0.01)
-    resonates = np.sqrt(own.elastic.stiffness / mass) / (2.0 * np.pi)
-    assert own.elastic.frequency_hz == pytest.approx(resonates, rel=0.005)
+        exact = ready.evaluate(found.frequency_hz, tolerance=1e-8)
+        assert found.stiffness == pytest.approx(exact.stiffness, rel=2e-3)
+        assert found.damping_ratio == pytest.approx(exact.damping_ratio, rel=0.01)
+    natural_hz = np.sqrt(own.elastic.stiffness / mass) / (2.0 * np.pi)
+    assert own.elastic.frequency_hz == pytest.approx(natural_hz, rel=0.005)
 
 
 @pytest.mark.parametrize(("model", "sq_um"), [("unified", 0.0), ("unified", 2.5), ("mixed", 0.5)])
-def test_a_slow_change_meets_the_tangent_of_contacts_solved_anew(model, sq_um):
-    """Load steps of 0.1 %: larger ones let cells change hands."""
-    solution = papers(sq_um, model)
+def test_the_static_limit_is_the_tangent_between_solved_contacts(model, sq_um):
+    """Load steps of 0.1 %; larger ones change the state of cells."""
+    solution = paper_contact(sq_um, model)
     solved = tangent_stiffness(solution, step=0.002)
     assert dynamic_stiffness(solution, 0.0, yielded="flowing").stiffness == pytest.approx(
         solved.total, rel=0.004
@@ -269,32 +269,34 @@ def test_a_slow_change_meets_the_tangent_of_contacts_solved_anew(model, sq_um):
 
 
 @pytest.mark.parametrize(("sq_um", "printed"), [(1.0, 324.0), (2.5, 335.0), (4.0, 337.0)])
-def test_a_contact_that_bore_its_load_before_is_level_in_roughness(sq_um, printed):
-    """The plastic overlap off the heights, the cap raised, solved and differentiated: physics of
-    issue 14.
+def test_stiffness_after_run_in_hardly_depends_on_roughness(sq_um, printed):
+    """Solved with heights reduced by the plastic overlap and a raised cap, then differentiated;
+    physics of issue 14.
 
-    The linear answer is 2 % stiffer at Sq 1 um: oil at the cap, which a raised cap lets flow
-    again, is elastic in it.
+    The linear solution is 2 % stiffer at Sq 1 um: it treats oil at the cap as elastic, which a
+    raised cap lets flow again.
     """
-    solution = papers(sq_um, cells=(128, 128))
-    again = tangent_stiffness(solution, yielded="elastic")
-    assert again.yielded == "elastic"
-    assert again.total / MICRO == pytest.approx(printed, rel=0.005)
-    assert dynamic_stiffness(solution, 0.0).stiffness == pytest.approx(again.total, rel=0.025)
-    assert tangent_stiffness(solution).total < 0.9 * again.total
+    solution = paper_contact(sq_um, cells=(128, 128))
+    reloaded = tangent_stiffness(solution, yielded="elastic")
+    assert reloaded.yielded == "elastic"
+    assert reloaded.total / MICRO == pytest.approx(printed, rel=0.005)
+    assert dynamic_stiffness(solution, 0.0).stiffness == pytest.approx(reloaded.total, rel=0.025)
+    assert tangent_stiffness(solution).total < 0.9 * reloaded.total
 
 
-def test_oil_that_has_no_time_is_shut_in():
-    """As the frequency grows no cell gains or loses oil: ρ V(p) + ρ' h p = ρ δ, solved densely."""
-    solution = papers(0.0, cells=(96, 48))
+def test_oil_is_trapped_at_high_frequency():
+    """At high frequency no cell gains or loses oil: ρ V(p) + ρ' h p = ρ δ, solved densely."""
+    solution = paper_contact(0.0, cells=(96, 48))
     ready = OscillatingContact(solution)
     balance = ready.balance
     wet = (balance.rows.state == 2).ravel()
-    bend = np.stack(
+    deflection = np.stack(
         [balance.problem.deflection(unit).ravel() for unit in np.eye(96)[:, :, None]], axis=1
     )
     film = balance.film
-    matrix = film.content_by_gap.ravel()[:, None] * bend + np.diag(film.content_by_pressure.ravel())
+    matrix = film.content_by_gap.ravel()[:, None] * deflection + np.diag(
+        film.content_by_pressure.ravel()
+    )
     locked = np.linalg.solve(matrix[np.ix_(wet, wet)], film.content_by_gap.ravel()[wet]).sum()
     fast = ready.oscillating.answer(1e8, tolerance=1e-6).total.sum()
     assert abs(fast.imag) < 0.01 * fast.real
@@ -303,10 +305,10 @@ def test_oil_that_has_no_time_is_shut_in():
 
 @pytest.mark.parametrize("frequency_hz", [100.0, 1e4])
 def test_damping_equals_the_dissipation_of_the_squeezed_oil(frequency_hz):
-    """Bodies that hardly bend, oil of one viscosity: with h³p'/12η = C - x the flow of oil squeezed
-    out at 1 m/s,
+    """Almost rigid bodies and isoviscous oil. At a squeeze speed of 1 m/s the flow is h³p'/12η = C
+    - x.
 
-    dissipation is 12 η ∫ (x - C)²/h³ dx, least for the C that leaves no pressure at both ends: c
+    The dissipation 12 η ∫ (x - C)²/h³ dx is least for the C that gives zero pressure at both ends;
     by quadrature.
     """
     eta0 = 3e-3
@@ -327,8 +329,8 @@ def test_damping_equals_the_dissipation_of_the_squeezed_oil(frequency_hz):
     assert found.damping == pytest.approx(expected, rel=0.03)
 
 
-def test_a_mass_resonates_where_its_own_stiffness_is():
-    ready = OscillatingContact(papers(1.0))
+def test_the_stiffness_at_resonance_is_consistent_with_the_mass():
+    ready = OscillatingContact(paper_contact(1.0))
     for mass in (0.1, 1.0):
         found = ready.resonance(mass)
         exact = ready.evaluate(found.frequency_hz, tolerance=1e-8)
@@ -349,8 +351,8 @@ def test_a_dry_contact_has_no_damping():
     assert found.stiffness == pytest.approx(tangent_stiffness(solution).total, rel=5e-3)
 
 
-def test_bad_input_is_named():
-    solution = papers(1.0)
+def test_invalid_input_is_named():
+    solution = paper_contact(1.0)
     with pytest.raises(BadInput, match="yielded must be one of flowing, elastic, got 'melting'"):
         dynamic_stiffness(solution, 1e3, yielded="melting")
     with pytest.raises(BadInput, match="yielded must be one of flowing, elastic, got 'melting'"):

@@ -1,5 +1,5 @@
-"""Flash temperature against the closed forms of moving heat sources, heat balances and a dense
-twin.
+"""Flash temperature against closed forms of moving heat sources, heat balances and a dense
+reference solution.
 """
 
 from dataclasses import replace
@@ -21,42 +21,40 @@ from support.sampled import sampled
 STEEL = Solid()
 K, KAPPA = STEEL.conductivity, STEEL.diffusivity
 B = 50e-6  # half-width of the sources [m]
-ENDLESS = 1e3  # m
+INFINITE_LENGTH = 1e3  # m
 
 
 def speed_at(peclet):
-    """u = 2 κ Pe/b."""
+    """Sliding speed u = 2 κ Pe/b."""
     return 2.0 * KAPPA * peclet / B
 
 
 def band_rise(peclet, across=32, cells=128):
-    """Rise along x under a band of `across` cells in the grid's middle, and the cells' distance
-    from its middle.
-    """
+    """Return the positions along x and the rise under a central band of `across` cells."""
     dx = 2.0 * B / across
-    body = moving_source((cells, 8), (dx, dx), speed_at(peclet), STEEL, length=ENDLESS)
+    body = moving_source((cells, 8), (dx, dx), speed_at(peclet), STEEL, length=INFINITE_LENGTH)
     x = (np.arange(cells) + 0.5 - cells / 2) * dx
     heat = np.where(np.abs(x) < B, 1.0, 0.0)[:, None] * np.ones(8)
     return x, body(heat)[:, 3]
 
 
 @pytest.mark.parametrize("peclet", [0.01, 0.3, -0.3, 5.0, -5.0, 100.0])
-def test_a_band_source_is_jaegers(peclet):
+def test_a_band_source_agrees_with_jaeger(peclet):
     x, rise = band_rise(peclet)
     for cell in (30, 48, 55, 64, 79, 90):
         exact = band(x[cell], B, speed_at(peclet), K, KAPPA)
         assert rise[cell] == pytest.approx(exact, rel=1e-6, abs=1e-6 * rise.max())
 
 
-def test_a_fast_band_is_bloks():
-    """T = 1.128 q sqrt(l/(k ρ c u)) at the trailing edge, the square root of the way before it;
-    nothing ahead.
+def test_a_fast_band_agrees_with_blok():
+    """T = 1.128 q sqrt(l/(k ρ c u)) at the trailing edge, the square root of the distance from the
+    leading edge before it, zero ahead.
     """
     x, rise = band_rise(1e4)
     inside = np.abs(x) < B
-    passed = 2.0 / K * np.sqrt(KAPPA * (x[inside] + B) / (np.pi * speed_at(1e4)))
-    np.testing.assert_allclose(rise[inside][4:], passed[4:], rtol=0.02)
-    np.testing.assert_allclose(rise[inside][0], passed[0], rtol=0.02)
+    expected = 2.0 / K * np.sqrt(KAPPA * (x[inside] + B) / (np.pi * speed_at(1e4)))
+    np.testing.assert_allclose(rise[inside][4:], expected[4:], rtol=0.02)
+    np.testing.assert_allclose(rise[inside][0], expected[0], rtol=0.02)
     assert rise[inside][-1] == pytest.approx(
         1.128 * np.sqrt(2 * B / (K * STEEL.density * STEEL.heat_capacity * speed_at(1e4))), rel=0.02
     )
@@ -69,25 +67,25 @@ def square_rise(peclet, across=32):
     return body(np.ones((across, across)))
 
 
-def test_a_square_at_rest_is_the_closed_form():
-    rise = square_rise(0.0, 33)  # the middle cell's middle is the square's
+def test_a_square_at_rest_agrees_with_the_closed_form():
+    rise = square_rise(0.0, 33)  # the central cell lies at the square's centre
     assert rise[16, 16] == pytest.approx(rectangle_at_rest(B, B, K), rel=1e-4)
     assert rise[16, 16] == pytest.approx(1.122 * B / K, rel=1e-3)
     np.testing.assert_allclose(rise, rise.T, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("peclet", "within"), [(0.01, 0.02), (0.1, 0.02), (1.0, 0.06), (10.0, 0.06), (300.0, 0.02)]
+    ("peclet", "tolerance"), [(0.01, 0.02), (0.1, 0.02), (1.0, 0.06), (10.0, 0.06), (300.0, 0.02)]
 )
-def test_a_square_source_meets_tian_and_kennedy(peclet, within):
-    """2 % at both ends, and the error of their own fit between."""
+def test_a_square_source_agrees_with_tian_and_kennedy(peclet, tolerance):
+    """Within 2 % at both limits, and within the error of their fit between."""
     assert square_rise(peclet, 64).max() == pytest.approx(
-        tian_kennedy_square(B, peclet, K), rel=within
+        tian_kennedy_square(B, peclet, K), rel=tolerance
     )
 
 
 @pytest.mark.parametrize("peclet", [0.05, 1.0, 10.0, -10.0, 300.0])
-def test_a_square_source_is_its_quadrature(peclet):
+def test_a_square_source_agrees_with_quadrature(peclet):
     rise, middle = square_rise(peclet), (np.arange(32) + 0.5) * B / 16 - B
     for i, j in ((0, 0), (8, 3), (15, 15), (31, 16), (31, 0)):
         exact = rectangle(middle[i], middle[j], B, B, speed_at(peclet), K, KAPPA)
@@ -95,18 +93,18 @@ def test_a_square_source_is_its_quadrature(peclet):
 
 
 @pytest.mark.parametrize("speed", [1e-3, 0.1, 1.9, -2.1, 50.0, 1e3])
-def test_few_panels_are_as_good_as_many(speed, monkeypatch):
-    """The kernel in panels of half a cell throughout, with nodes enough."""
-    place = (96, 16), (2e-6, 1e-6), speed, STEEL
-    found = moving_source(*place, length=0.01).spectrum[0]
+def test_few_panels_are_as_accurate_as_many(speed, monkeypatch):
+    """Against the kernel in panels of half a cell throughout with many nodes."""
+    source = (96, 16), (2e-6, 1e-6), speed, STEEL
+    found = moving_source(*source, length=0.01).spectrum[0]
     monkeypatch.setattr("asperity.solution.flash.MAX_DRIFT", 0.0)
     monkeypatch.setattr("asperity.solution.flash.NODES", 16)
-    expected = moving_source.__wrapped__(*place, length=0.01).spectrum[0]
+    expected = moving_source.__wrapped__(*source, length=0.01).spectrum[0]
     assert np.abs(found - expected).max() < 5e-5 * np.abs(expected).max()
 
 
-def test_a_line_at_rest_is_as_long_as_it_is():
-    """Without its length it would warm up for ever."""
+def test_a_line_at_rest_uses_its_length():
+    """An infinitely long line has no steady temperature."""
     dx = 2.0 * B / 33
     body = moving_source((33, 8), (dx, dx), 0.0, STEEL, length=0.01)
     assert body(np.ones((33, 8)))[16, 2] == pytest.approx(rectangle_at_rest(B, 0.005, K), rel=1e-4)
@@ -115,12 +113,12 @@ def test_a_line_at_rest_is_as_long_as_it_is():
 def test_periodicity_in_y_equals_many_copies():
     rng, n, dx = np.random.default_rng(2), 8, 5e-6
     heat = rng.random((16, n))
-    repeating = moving_source((16, n), (dx, dx), 1.0, STEEL, length=ENDLESS)(heat)
+    periodic = moving_source((16, n), (dx, dx), 1.0, STEEL, length=INFINITE_LENGTH)(heat)
     copies = 25
     many = moving_source((16, n * copies), (dx, dx), 1.0, STEEL, length=None)(np.tile(heat, copies))
     middle = many[:, n * (copies // 2) : n * (copies // 2 + 1)]
     np.testing.assert_allclose(
-        repeating - repeating.mean(), middle - middle.mean(), atol=2e-3 * np.ptp(repeating)
+        periodic - periodic.mean(), middle - middle.mean(), atol=2e-3 * np.ptp(periodic)
     )
 
 
@@ -137,10 +135,8 @@ SPEEDS = [(2.101, 1.719), (1.719, 2.101), (3.8, 0.02), (5.0, -1.2), (4.0, 0.0)]
 
 
 @pytest.mark.parametrize("speeds", SPEEDS)
-def test_the_bodies_take_up_all_frictional_heat(speeds):
-    """Heat that flows through planes far from the contact in both bodies, from their own
-    temperatures in depth.
-    """
+def test_the_bodies_absorb_all_frictional_heat(speeds):
+    """Heat flow through distant planes in both bodies, from their temperatures at depth."""
     solution = warm_contact(speeds)
     rubbing = friction(solution)
     heat = flash_temperature(solution, rubbing)
@@ -152,7 +148,7 @@ def test_the_bodies_take_up_all_frictional_heat(speeds):
         speeds, inputs, (heat.surface_1, heat.surface_2), strict=True
     ):
         if abs(speed) < 0.1:
-            carried += heat_in.sum() * dx  # at rest: it spreads through no plane in particular
+            carried += heat_in.sum() * dx  # at rest heat spreads in all directions
             continue
         plane = np.sign(speed) * 20.0 * abs(x[0])
 
@@ -179,21 +175,21 @@ def test_the_bodies_take_up_all_frictional_heat(speeds):
 
 
 @pytest.mark.parametrize("speeds", SPEEDS[:4])
-def test_sharing_is_the_two_coupled_equations(speeds):
-    """q_1 = q/2 + k_f (T_2 - T_1)/h, q_2 = q/2 - k_f (T_2 - T_1)/h, both temperatures from their
-    own heat.
+def test_heat_partition_satisfies_the_coupled_equations(speeds):
+    """q_1 = q/2 + k_f (T_2 - T_1)/h, q_2 = q/2 - k_f (T_2 - T_1)/h, with each temperature from its
+    own body's heat.
     """
     solution = warm_contact(speeds)
     thermal = Thermal(bulk=(313.15, 330.0), solids=(STEEL, Solid(conductivity=9.0)))
     heat = flash_temperature(solution, thermal=thermal)
-    crossing = thermal.oil_conductivity / solution.gap * (heat.surface_2 - heat.surface_1)
+    transferred = thermal.oil_conductivity / solution.gap * (heat.surface_2 - heat.surface_1)
     size = np.abs(heat.heat).max()
-    np.testing.assert_allclose(heat.into_1, heat.heat / 2.0 + crossing, atol=1e-4 * size)
+    np.testing.assert_allclose(heat.into_1, heat.heat / 2.0 + transferred, atol=1e-4 * size)
     rise = moving_source(
         solution.grid.cells, solution.grid.spacing, speeds[1], thermal.solids[1], length=0.01
     )
     np.testing.assert_allclose(heat.surface_2, 16.85 + rise(heat.heat - heat.into_1), rtol=1e-9)
-    across = (np.arange(100) + 0.5) / 100  # of the film: k_f T'' = -q/h between the two surfaces
+    across = (np.arange(100) + 0.5) / 100  # across the film: k_f T'' = -q/h
     bulge = (
         np.mean(across * (1.0 - across) / 2.0) * heat.heat * solution.gap / thermal.oil_conductivity
     )
@@ -202,25 +198,25 @@ def test_sharing_is_the_two_coupled_equations(speeds):
     )
 
 
-def test_sharing_agrees_with_a_dense_solution():
-    """All cells of one line at once, by numpy.linalg.solve; contact and film side by side."""
+def test_heat_partition_agrees_with_a_dense_solution():
+    """All cells of one line together, by numpy.linalg.solve; with touching cells and a film."""
     solution = warm_contact((3.0, 0.8), cells=(48, 8))
     touching = np.abs(solution.grid.x - 1e-5)[:, None] < 1.5e-5 * np.ones(8)
     gap = np.where(touching, 5e-9, solution.gap)
     solution = replace(solution, gap=gap, in_contact=touching)
     heat = flash_temperature(solution)
-    answers = []
+    responses = []
     for speed in (3.0, 0.8):
         body = moving_source((48, 8), solution.grid.spacing, speed, STEEL, length=0.01)
-        answers.append(np.array([body(row[:, None] * np.ones(8))[:, 0] for row in np.eye(48)]).T)
+        responses.append(np.array([body(row[:, None] * np.ones(8))[:, 0] for row in np.eye(48)]).T)
     q, resistance = heat.heat[:, 0], gap[:, 0] / 0.14
     passed = np.linalg.solve(
-        np.diag(resistance) + sum(answers), (answers[1] - answers[0]) @ q / 2.0
+        np.diag(resistance) + sum(responses), (responses[1] - responses[0]) @ q / 2.0
     )
     np.testing.assert_allclose(heat.into_1[:, 0], q / 2.0 + passed, atol=1e-4 * q.max())
 
 
-def test_opposed_speeds_are_mirror_images():
+def test_opposed_speeds_give_mirror_images():
     heat = flash_temperature(warm_contact((2.000001, -2.0)))
     np.testing.assert_allclose(
         heat.surface_1, heat.surface_2[::-1], rtol=1e-4, atol=1e-4 * heat.max_k
@@ -228,7 +224,7 @@ def test_opposed_speeds_are_mirror_images():
     assert heat.surface_1.argmax() > heat.surface_2.argmax()
 
 
-def test_a_thick_film_halves_the_heat_and_a_thin_one_evens_the_temperatures():
+def test_a_thick_film_halves_the_heat_and_a_thin_one_equalises_the_temperatures():
     thick = flash_temperature(warm_contact((3.8, 0.02), gap=1e-3))
     np.testing.assert_allclose(thick.into_1, thick.heat / 2.0, atol=5e-3 * thick.heat.max())
     solution = warm_contact((3.8, 0.02), gap=1e-12)
@@ -238,12 +234,12 @@ def test_a_thick_film_halves_the_heat_and_a_thin_one_evens_the_temperatures():
     assert thin.heat_1_w > 1.5 * thin.heat_2_w  # the faster body takes more
 
 
-def test_pure_rolling_is_cold():
+def test_pure_rolling_generates_no_heat():
     heat = flash_temperature(warm_contact((1.9, 1.9)))
     assert (heat.max_k, heat.film_max_k, heat.heat_1_w, heat.heat_2_w) == (0.0, 0.0, 0.0, 0.0)
 
 
-def test_a_dry_rough_point_contact_is_as_hot_on_either_side():
+def test_a_dry_rough_point_contact_has_equal_surface_temperatures():
     conditions = contact(
         geometry="point", length=None, load=5.0, hardness=2e9, surface_speeds=(2.0, -0.5)
     )

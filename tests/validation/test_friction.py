@@ -1,6 +1,4 @@
-"""Friction of whole contacts against closed forms, quadrature, and what must come out when all is
-dry.
-"""
+"""Friction of whole contacts against closed forms, quadrature and the dry limit."""
 
 from dataclasses import replace
 
@@ -18,13 +16,13 @@ from support.paper import ETA0, barus, contact, grid, rough
 from support.sampled import sampled
 
 A, P_H = contact().hertz.half_widths[0], contact().hertz.p_max
-ALPHA, GAP, FAR = 18.2e-9, 0.7e-6, 1.0  # m; so wide that nothing is sheared
+ALPHA, GAP, WIDE = 18.2e-9, 0.7e-6, 1.0  # m; WIDE is so large that the shear stress vanishes
 FINE = grid((2048, 8), x=(-1.6, 1.6))
 SLIDING = contact().sliding_speed
 
 
 def hertz_film(law, conditions=None):
-    """Hertz's pressure over a film of one thickness, as far as the pressure reaches."""
+    """Return Hertz's pressure on a film of uniform thickness inside the contact."""
     pressure = line_pressure(FINE.x, A, P_H)[:, None]
     oil = replace(barus(ALPHA), friction=law)
     return sampled(
@@ -32,7 +30,7 @@ def hertz_film(law, conditions=None):
         oil,
         FINE,
         pressure,
-        np.where(np.abs(FINE.x) < A, GAP, FAR)[:, None],
+        np.where(np.abs(FINE.x) < A, GAP, WIDE)[:, None],
     )
 
 
@@ -44,15 +42,14 @@ def test_newtonian_traction_of_a_line_contact():
     force = ETA0 * SLIDING / GAP * A * np.pi * (iv(1, beta) + modstruve(-1, beta))
     found = friction(hertz_film(NewtonianShear()))
     assert found.coefficient == pytest.approx(force / contact().line_load, rel=1e-3)
-    assert found.shear_force == pytest.approx(
-        -found.coefficient * 500.0
-    )  # body 1, the faster, is held back
+    # friction slows body 1, the faster one
+    assert found.shear_force == pytest.approx(-found.coefficient * 500.0)
     assert found.power == pytest.approx(-found.shear_force * SLIDING)
 
 
 def test_eyring_traction_of_a_line_contact():
-    """Far above τ0 the stress is τ0 (ln(2 η0 Δu/(τ0 h)) + α p): its mean needs Hertz's mean
-    pressure alone.
+    """Far above τ0 the stress is τ0 (ln(2 η0 Δu/(τ0 h)) + α p), so its mean depends only on Hertz's
+    mean pressure.
     """
     tau0 = 2e3
     mean = tau0 * (np.log(2.0 * ETA0 * SLIDING / (tau0 * GAP)) + ALPHA * np.pi / 4.0 * P_H)
@@ -60,7 +57,7 @@ def test_eyring_traction_of_a_line_contact():
     assert found.coefficient == pytest.approx(mean * 2.0 * A / contact().line_load, rel=1e-3)
 
 
-def test_bair_winer_traction_without_elasticity_is_a_quadrature():
+def test_bair_winer_traction_without_elasticity_agrees_with_quadrature():
     law = LinearBairWiner(2e6, 0.05, ratio=1e-9)
 
     def stress(x):
@@ -74,8 +71,8 @@ def test_bair_winer_traction_without_elasticity_is_a_quadrature():
     )
 
 
-def test_bair_winer_traction_with_elasticity_is_the_equation_integrated():
-    """The paper's Eq 14 with dτ/dt of oil that crosses at the mean speed, by an ODE solver on the
+def test_bair_winer_traction_with_elasticity_agrees_with_an_ode_solver():
+    """The paper's Eq 14, with dτ/dt of oil that moves at the mean speed, by an ODE solver on the
     continuous fields.
     """
     law, slow = BairWiner(), contact(surface_speeds=(1.915, 1.905))
@@ -91,17 +88,17 @@ def test_bair_winer_traction_with_elasticity_is_the_equation_integrated():
     found = friction(hertz_film(law, slow)).coefficient
     assert found == pytest.approx(np.trapezoid(stress, x) / contact().line_load, rel=2e-3)
     rigid = LinearBairWiner(2e6, 0.05, ratio=1e-9)
-    assert friction(hertz_film(rigid, slow)).coefficient > 1.1 * found  # no time to build up
+    assert friction(hertz_film(rigid, slow)).coefficient > 1.1 * found  # no build-up time
 
 
-def test_faster_sliding_meets_the_limit():
+def test_traction_at_fast_sliding_is_the_limiting_stress():
     law = LinearBairWiner(2e6, 0.05)
     fast = contact(surface_speeds=(101.0, -99.0))
     mean_limit = 2e6 * 2.0 * A / contact().line_load + 0.05
     assert friction(hertz_film(law, fast)).coefficient == pytest.approx(mean_limit, rel=2e-3)
 
 
-def test_a_dry_contact_has_the_boundary_friction():
+def test_a_dry_contact_has_boundary_friction():
     dry = solve_contact(
         contact(hardness=2e9), None, rough(grid((64, 64)), 1e-6, correlation_length=30e-6)
     )
@@ -111,9 +108,9 @@ def test_a_dry_contact_has_the_boundary_friction():
     assert found.oil_part == 0.0
 
 
-def test_down_the_stribeck_curve_the_asperities_friction_is_left():
-    """The oil's part fades with the speed; what stays is f_b times the load share (the model's
-    valleys keep theirs).
+def test_only_asperity_friction_remains_at_low_speed():
+    """The oil's part vanishes with the speed; the remainder is f_b times the load share (the
+    model's valleys carry the rest).
     """
     surface = rough(grid((64, 64)), 1e-6, correlation_length=30e-6)
     solved = [
@@ -159,6 +156,6 @@ def test_warm_oil_is_easier_to_shear():
 @pytest.mark.parametrize(
     "wrong", [{"boundary_friction": -0.1}, {"film_temperature": np.ones((3, 3))}]
 )
-def test_nonsense_is_refused(wrong):
+def test_invalid_input_is_refused(wrong):
     with pytest.raises(BadInput):
         friction(hertz_film(BairWiner()), **wrong)

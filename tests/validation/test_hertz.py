@@ -1,4 +1,4 @@
-"""The dry, smooth contact as the solver finds it, against Hertz."""
+"""The solved dry, smooth contact against Hertz."""
 
 import numpy as np
 import pytest
@@ -28,13 +28,13 @@ def fine():
 
 
 def half_width(solution):
-    """Where the straight line through p^2 over x^2 meets zero; all but the edge cells count."""
+    """Zero of the straight line fitted to p^2 over x^2, without the cells at the edge."""
     x2, p2 = (solution.grid.x / A) ** 2, (solution.pressure[:, 0] / P_H) ** 2
     slope, height = np.polyfit(x2[x2 < 0.9], p2[x2 < 0.9], 1)
     return np.sqrt(-height / slope)
 
 
-def test_pressure_and_half_width_are_hertzs_within_half_a_percent_at_256_cells(fine):
+def test_pressure_and_half_width_agree_with_hertz_within_half_a_percent_at_256_cells(fine):
     assert fine.pressure.max() == pytest.approx(P_H, rel=2e-4)
     assert half_width(fine) == pytest.approx(1.0, rel=1e-4)
     touching = np.abs(fine.grid.x[fine.in_contact[:, 0]])
@@ -43,21 +43,21 @@ def test_pressure_and_half_width_are_hertzs_within_half_a_percent_at_256_cells(f
     assert np.linalg.norm(fine.pressure[:, 0] - hertz) < 0.0025 * np.linalg.norm(hertz)
 
 
-def test_the_gap_outside_is_hertzs(fine):
+def test_the_gap_outside_agrees_with_hertz(fine):
     outside = np.abs(fine.grid.x) > 1.1 * A
     expected = line_gap(fine.grid.x, A, RADIUS)[outside]
     np.testing.assert_allclose(fine.gap[outside, 0], expected, atol=1e-4 * expected.max())
     np.testing.assert_allclose(fine.gap[fine.in_contact], 0.0, atol=1e-5 * A**2 / RADIUS)
 
 
-def test_a_smooth_contact_is_the_same_on_every_line(fine):
+def test_a_smooth_contact_is_uniform_and_symmetric(fine):
     np.testing.assert_allclose(
         fine.pressure, fine.pressure[:, :1] @ np.ones((1, 8)), atol=1e-6 * P_H
     )
     np.testing.assert_allclose(fine.pressure, fine.pressure[::-1], atol=1e-4 * P_H)
 
 
-def test_the_largest_pressure_closes_in_at_second_order():
+def test_the_largest_pressure_converges_at_second_order():
     errors = [abs(solved(cells).pressure.max() / P_H - 1.0) for cells in (64, 128, 256)]
     assert errors[1] < errors[0] / 3.0
     assert errors[2] < errors[1] / 3.0
@@ -74,7 +74,7 @@ def test_a_dry_smooth_contact_carries_all_load_on_all_of_its_area(fine):
 
 
 def test_a_cap_spreads_the_load():
-    """p <= p_cap; the plateau and the load hold while the contact widens."""
+    """p <= p_cap; with the cap reached, the load is met by a wider contact."""
     capped = solved(256, hardness=0.8 * P_H)
     assert capped.pressure.max() == pytest.approx(0.8 * P_H, rel=1e-12)
     assert capped.pressure.mean() * capped.grid.extent[0] == pytest.approx(50e3, rel=1e-6)

@@ -1,7 +1,7 @@
 """Point and elliptic contacts, dry and smooth-lubricated, against closed forms and a second-order
 reference.
 
-Reference films: Richardson-extrapolated from 257 and 513 points a side, X -4.5..1.5, Y -3..3, in
+Reference films: Richardson extrapolation from 257 and 513 points per side, X -4.5..1.5, Y -3..3, in
 Moes units H = (h/R)(2U)^-1/2, M = W (2U)^-3/4, L = G (2U)^1/4 with the mean speed in U.
 """
 
@@ -21,7 +21,7 @@ RADIUS, ETA0, ALPHA = 12.5e-3, 0.04, 22e-9
 
 
 def moes_contact(m: float, l: float) -> tuple[ContactConditions, float]:  # noqa: E741
-    """A ball on a flat with these Moes numbers, and the film [m] that one unit of H stands for."""
+    """Return a ball on a flat with these Moes numbers, and the film [m] of one unit of H."""
     modulus = PAIR.effective_modulus
     twice_u = (l / (ALPHA * modulus)) ** 4
     speed = twice_u * modulus * RADIUS / (2.0 * ETA0)
@@ -33,7 +33,7 @@ def moes_contact(m: float, l: float) -> tuple[ContactConditions, float]:  # noqa
 
 
 def films(conditions: ContactConditions, oil: Lubricant, cells: int) -> tuple[float, float]:
-    """Film at the centre and least film [m]."""
+    """Return the film at the centre and the minimum film [m]."""
     a = conditions.hertz.half_widths[0]
     grid = Grid((cells, cells), (-4.5 * a, -3.0 * a), (1.5 * a, 3.0 * a), periodic=(False, False))
     solution = solve_contact(conditions, oil, flat_surface(grid), options=Options(tolerance=1e-6))
@@ -57,7 +57,7 @@ ROELANDS = Lubricant(
     ],
 )
 def test_films_of_a_ball_on_a_flat(m, l, oil, h_central, h_min):  # noqa: E741
-    """Extrapolated from 96 and 192 cells a side; each grid alone closes in at second order."""
+    """Extrapolated from 96 and 192 cells per side; the scheme is of second order."""
     conditions, unit = moes_contact(m, l)
     (coarse_c, coarse_m), (fine_c, fine_m) = (films(conditions, oil, cells) for cells in (96, 192))
     extrapolated_c, extrapolated_m = (
@@ -69,9 +69,9 @@ def test_films_of_a_ball_on_a_flat(m, l, oil, h_central, h_min):  # noqa: E741
     assert abs(fine_c / unit - h_central) < abs(coarse_c / unit - h_central) / 2.0
 
 
-def test_oil_that_hardly_thickens_parts_a_ball_in_few_steps():
-    """From the hard fit's film, half of the soft one's, the bodies touched, and 270 steps hardly
-    got them apart.
+def test_a_ball_in_isoviscous_oil_is_separated_in_few_iterations():
+    """From the hard fit's film, half of the soft one's, the bodies touched, and 270 iterations
+    hardly separated them.
     """
     conditions, _ = moes_contact(20, 0.5)
     a = conditions.hertz.half_widths[0]
@@ -84,7 +84,7 @@ def test_oil_that_hardly_thickens_parts_a_ball_in_few_steps():
 
 
 @pytest.mark.parametrize("radius", [5e-3, (5e-3, 10e-3), (12e-3, 4e-3)])
-def test_a_dry_contact_is_hertz(radius):
+def test_a_dry_contact_agrees_with_hertz(radius):
     conditions = ContactConditions(
         pair=PAIR,
         geometry="elliptic" if isinstance(radius, tuple) else "point",
@@ -104,7 +104,7 @@ def test_a_dry_contact_is_hertz(radius):
     assert across == pytest.approx(2.0 * b, abs=2.0 * grid.spacing[1])
 
 
-def test_shear_thinning_is_newtonian_without_sliding_and_thins_the_film_with_it():
+def test_shear_thinning_reduces_the_film_only_with_sliding():
     thin = Lubricant(
         viscosity=Barus(ETA0, ALPHA), density=Incompressible(870.0), rheology=ReeEyring(1e5)
     )

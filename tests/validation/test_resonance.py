@@ -1,4 +1,4 @@
-"""The chain roughness -> record -> fit, against the oscillator that made the record."""
+"""The chain from roughness to record to fit, against the oscillator that generated the record."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def touching(clr: float, car: float, sq: float = 2e-6) -> ContactState:
 
 
 @pytest.mark.parametrize(("clr", "car"), [(1.0, 1.0), (0.9, 0.6), (0.4, 0.3), (0.15, 0.06)])
-def test_fitted_crf_of_a_record_is_the_oscillators_within_three_deviations(clr, car):
+def test_fitted_crf_of_a_record_is_within_three_deviations_of_the_oscillator(clr, car):
     for seed in (1, 2, 3):
         model = VibrationModel(mass=0.1, damping_ratio=0.02, seed=seed)
         seen = contact_vibration(touching(clr, car), CONDITIONS, model)
@@ -62,10 +62,8 @@ def test_fitted_crf_of_a_record_is_the_oscillators_within_three_deviations(clr, 
     ("filtered", "rate_hz"), [("bilinear", 10e3), ("continuous", 10e3), ("bilinear", 20e3)]
 )
 def test_a_coarsely_sampled_record_is_fitted_within_its_deviations(filtered, rate_hz):
-    """At 10 kHz behind the bilinear filter a continuous oscillator's line lay 11 deviations too
-    low.
-    """
-    off = []
+    """Without correction the fit at 10 kHz with the bilinear filter was 11 deviations too low."""
+    deviations = []
     for seed in range(24):
         model = VibrationModel.preset(
             "paper",
@@ -78,23 +76,21 @@ def test_a_coarsely_sampled_record_is_fitted_within_its_deviations(filtered, rat
             rate_hz=rate_hz,
             filter=filtered,
         )
-        heard = contact_vibration(touching(1.0, 1.0), CONDITIONS, model)
-        found, spring = heard.resonance, heard.oscillator
-        off.append(
+        vibration = contact_vibration(touching(1.0, 1.0), CONDITIONS, model)
+        found, spring = vibration.resonance, vibration.oscillator
+        deviations.append(
             (
                 (found.crf_hz - spring.natural_frequency_hz) / found.crf_std,
                 (found.damping_ratio - spring.damping_ratio) / found.damping_ratio_std,
             )
         )
-    assert np.abs(np.mean(off, axis=0)).max() < 1.2  # 24 records: ± 0.2 by chance
-    assert np.all(np.std(off, axis=0) < 1.5)
+    assert np.abs(np.mean(deviations, axis=0)).max() < 1.2  # 24 records: standard error 0.2
+    assert np.all(np.std(deviations, axis=0) < 1.5)
 
 
 @pytest.mark.parametrize("filtered", ["bilinear", "continuous"])
-def test_the_line_as_sampling_leaves_it_is_the_records_own_spectrum(filtered):
-    """The closed form of the sampled record, line and factor apart; and means of 300 pieces of a
-    record about it.
-    """
+def test_the_sampled_line_is_the_spectrum_of_the_record(filtered):
+    """The closed form of the sampled line against the mean spectrum of 300 pieces of a record."""
     model = VibrationModel.preset(
         "paper",
         mass=0.1,
@@ -105,24 +101,24 @@ def test_the_line_as_sampling_leaves_it_is_the_records_own_spectrum(filtered):
         duration_s=300 * 0.2,
         samples_per_period=2.0,
     )
-    heard = contact_vibration(touching(1.0, 1.0), CONDITIONS, model)
+    vibration = contact_vibration(touching(1.0, 1.0), CONDITIONS, model)
     line = SampledLine(excitation(touching(1.0, 1.0), CONDITIONS, model), model.rate_hz)
-    f0, zeta = heard.oscillator.natural_frequency_hz, heard.oscillator.damping_ratio
-    averaged = power_spectrum(heard.response, segment=2000)
-    near = (averaged.frequency_hz > 2500.0) & (averaged.frequency_hz < 4500.0)
-    f, measured = averaged.frequency_hz[near], averaged.density[near]
+    f0, zeta = vibration.oscillator.natural_frequency_hz, vibration.oscillator.damping_ratio
+    averaged = power_spectrum(vibration.response, segment=2000)
+    around_line = (averaged.frequency_hz > 2500.0) & (averaged.frequency_hz < 4500.0)
+    f, measured = averaged.frequency_hz[around_line], averaged.density[around_line]
     shape = line_shape(f, f0, zeta) * line(f, f0, zeta)
     level = measured.sum() / shape.sum()
     assert np.mean(measured / (level * shape)) == pytest.approx(1.0, abs=0.03)
     for third in np.array_split(measured / (level * shape), 3):
         assert np.mean(third) == pytest.approx(1.0, abs=0.03)
     assert line(np.array([f0]), f0, zeta) == pytest.approx(1.0)
-    assert np.abs(line(f, f0, zeta) - 1.0).max() > 0.3  # it is needed
+    assert np.abs(line(f, f0, zeta) - 1.0).max() > 0.3  # the correction is necessary
 
 
 @pytest.mark.parametrize(("window", "segment"), [("boxcar", None), ("hann", 4000)])
-def test_over_200_records_the_stated_deviation_is_the_scatter_within_a_fifth(window, segment):
-    """Item 6 of issue 2: 200 records of 0.8 s, the pieces of one long one, fitted in the contact
+def test_the_stated_deviation_is_the_scatter_of_200_records_within_a_fifth(window, segment):
+    """Item 6 of issue 2: 200 records of 0.8 s, pieces of one long record, fitted in the contact
     model's band.
     """
     records, samples, rate = 200, 40_000, 50e3
@@ -149,7 +145,7 @@ def test_over_200_records_the_stated_deviation_is_the_scatter_within_a_fifth(win
     assert np.std(errors) == pytest.approx(stated, rel=0.2)
     assert abs(np.mean(errors)) < 0.35 * stated
 
-    # CRFA in the continuum, by hand: height^2 2 sqrt(2)/(pi fc) (fc/f0)^4 (2 pi f0)^4 (1 + 4
+    # CRFA in continuous time, by hand: height^2 2 sqrt(2)/(pi fc) (fc/f0)^4 (2 pi f0)^4 (1 + 4
     # zeta^2)/(4 zeta^2)
     fc, zeta = model.excitation.cutoff_hz(state.car), 0.02
     truth = (

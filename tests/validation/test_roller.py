@@ -1,9 +1,9 @@
-"""Rollers that end: dry against reference solutions, the moment against the energy, the middle
-against a line contact,
-a strong crown against a point contact, and the ends of the range.
+"""Finite rollers: dry against reference solutions, the moment against the energy, the middle
+against a line contact, a strong crown against a point contact, and extreme operating conditions.
 
-Reference pressures: an own half-space solver and tamaas, not periodic, which agree to 2e-8 of
-Hertz's pressure; 48 x 1024 cells over 3.2 half-widths and the length, values at cell centres.
+Reference pressures: an independent half-space solver and tamaas, not periodic, which agree within
+2e-8 of Hertz's pressure; 48 x 1024 cells over 3.2 half-widths and the length, values at cell
+centres.
 """
 
 from dataclasses import replace
@@ -44,7 +44,7 @@ def roller(shape: RollerShape | None = None, load: float = LOAD, **given) -> asp
 
 
 def solved(conditions, oil=None, *, cells, reach=1.6, past=1, **options):
-    """On cells of which `past` lines lie past each end."""
+    """Solve with `past` lines of cells beyond each end."""
     nx, ny = cells
     a, end = conditions.hertz.half_widths[0], 0.5 * conditions.length * (1.0 + 2.0 * past / ny)
     x = (-reach * a, reach * a) if oil is None else (-4.5 * a, 1.5 * a)
@@ -55,7 +55,7 @@ def solved(conditions, oil=None, *, cells, reach=1.6, past=1, **options):
 
 
 @pytest.mark.parametrize(
-    ("shape", "load", "largest", "at", "middle", "line_load"),
+    ("shape", "load", "largest", "position", "middle", "line_load"),
     [
         (lundberg(LOAD), LOAD, 1.131, 0.4985, 0.9994, 1.022),
         (lundberg(LOAD), 1000.0, 1.0371, 0.0, 1.0371, None),
@@ -67,24 +67,26 @@ def solved(conditions, oil=None, *, cells, reach=1.6, past=1, **options):
         (ISO, 4000.0, 1.0771, 0.0, 1.0771, None),
     ],
 )
-def test_a_dry_roller_has_the_reference_pressure(shape, load, largest, at, middle, line_load):
+def test_a_dry_roller_has_the_reference_pressure(shape, load, largest, position, middle, line_load):
     conditions = roller(shape, load)
     solution = solved(conditions, cells=(48, 1024))
     pressure, y = solution.pressure / conditions.hertz.p_max, solution.grid.y
     assert pressure.max() == pytest.approx(largest, rel=5e-4)
     place = y[np.argmax(pressure.max(axis=0))] / LENGTH
-    assert (abs(place) if at >= 0.0 else place) == pytest.approx(at, abs=2e-3)
+    assert (abs(place) if position >= 0.0 else place) == pytest.approx(position, abs=2e-3)
     assert np.interp(0.0, y, pressure.max(axis=0)) == pytest.approx(middle, rel=1e-3)
     if line_load is not None:
         along = axial_distribution(solution)
         assert along.largest_line_load * LENGTH / load == pytest.approx(line_load, rel=5e-4)
 
 
-def test_lundbergs_shape_is_even_but_for_the_ends_and_loaded_throughout():
+def test_lundbergs_profile_is_loaded_throughout_and_uniform_except_at_the_ends():
     solution = solved(roller(lundberg(LOAD)), cells=(48, 1024))
     along = axial_distribution(solution)
-    at = np.interp(0.45 * LENGTH, along.y, along.pressure) / solution.conditions.hertz.p_max
-    assert at == pytest.approx(1.0029, abs=1e-3)
+    relative_pressure = (
+        np.interp(0.45 * LENGTH, along.y, along.pressure) / solution.conditions.hertz.p_max
+    )
+    assert relative_pressure == pytest.approx(1.0029, abs=1e-3)
     assert along.loaded_share == pytest.approx(1.0)
     assert along.edge_pressure.on_grid == pytest.approx(
         1.131 * solution.conditions.hertz.p_max, rel=5e-4
@@ -94,8 +96,10 @@ def test_lundbergs_shape_is_even_but_for_the_ends_and_loaded_throughout():
 
 
 @pytest.mark.parametrize("oil", [None, OIL])
-def test_what_lies_past_the_ends_changes_nothing(oil):
-    """Three more lines of cells past each end: no pressure there, and the same on the roller."""
+def test_cells_beyond_the_ends_do_not_change_the_solution(oil):
+    """Three more lines of cells beyond each end: no pressure there, and the same pressure on the
+    roller.
+    """
     conditions = roller(lundberg(1.2 * LOAD))
     narrow = solved(conditions, oil, cells=(64, 64))
     (x0, y0), (x1, y1), (_, dy) = narrow.grid.lower, narrow.grid.upper, narrow.grid.spacing
@@ -105,7 +109,7 @@ def test_what_lies_past_the_ends_changes_nothing(oil):
     assert wide.pressure[:, 4:-4] == pytest.approx(
         narrow.pressure[:, 1:-1], abs=2e-3 * narrow.pressure.max()
     )
-    films = [axial_distribution(each).end_film.on_grid for each in (wide, narrow)]
+    films = [axial_distribution(solution).end_film.on_grid for solution in (wide, narrow)]
     assert films[0] == pytest.approx(films[1], rel=2e-3, abs=1e-12)
 
 
@@ -120,19 +124,19 @@ def test_an_untilted_roller_is_symmetric_to_rounding():
     assert np.abs(here.pressure - there.pressure[:, ::-1]).max() < 1e-8 * pressure.max()
 
 
-def test_the_moment_is_what_the_energy_asks_for():
-    """Of p V/2 + p (x²/2R + drop + tilt y), in sum the least there is at a load, the tilt's slope
-    is the moment.
+def test_the_moment_is_the_derivative_of_the_energy_by_tilt():
+    """The moment is the derivative by tilt of the integral of p V/2 + p (x²/2R + drop + tilt y),
+    the minimum at given load.
     """
 
     def energy(tilt: float) -> float:
         solution = solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-7)
         problem = contact_problem(solution.conditions, None, solution.surface, solution.options)
         a, p_max = solution.conditions.hertz.half_widths[0], solution.conditions.hertz.p_max
-        apart = np.where(problem.rim, 0.0, problem.form.gap(problem.x, problem.y))
+        rigid_gap = np.where(problem.rim, 0.0, problem.form.gap(problem.x, problem.y))
         work = (
             solution.pressure
-            * (0.5 * problem.deflection(solution.pressure / p_max) + apart)
+            * (0.5 * problem.deflection(solution.pressure / p_max) + rigid_gap)
             * a**2
             / RADIUS
         )
@@ -144,11 +148,11 @@ def test_the_moment_is_what_the_energy_asks_for():
     assert along.moment == pytest.approx(
         (energy(tilt + step) - energy(tilt - step)) / (2.0 * step), rel=1e-3
     )
-    assert along.moment < -1.0  # away from where the gap opens
+    assert along.moment < -1.0  # opposite to the side where the gap opens
     assert along.load == pytest.approx(LOAD, rel=1e-6)
 
 
-def test_the_flattest_pressure_is_near_lundbergs_drop():
+def test_the_most_uniform_pressure_is_close_to_lundbergs_profile():
     def largest(share: float, tilt: float = 0.0) -> float:
         solution = solved(roller(lundberg(share * LOAD).tilted(tilt)), cells=(48, 256))
         return float(solution.pressure.max() / solution.conditions.hertz.p_max)
@@ -158,7 +162,7 @@ def test_the_flattest_pressure_is_near_lundbergs_drop():
     assert level[0.5] > 1.5
     assert level[4.0] > 1.08
     tilted = {share: largest(share, 0.5e-3) for share in (1.2, 3.0, 8.0)}
-    assert min(tilted, key=tilted.get) == 3.0  # a tilt asks for more
+    assert min(tilted, key=tilted.get) == 3.0  # a tilted roller needs more relief
 
 
 @pytest.mark.parametrize("oil", [None, OIL])
@@ -171,43 +175,47 @@ def test_the_middle_of_a_long_roller_is_a_line_contact(oil):
     assert carried == pytest.approx(LOAD / LENGTH, rel=0.02)
     line = replace(conditions, geometry="line", shape=None, load=carried * LENGTH)
     lower, upper = (grid.lower[0], -1e-4), (grid.upper[0], 1e-4)
-    even = asp.solve_contact(line, oil, asp.flat_surface(asp.Grid((nx, 8), lower, upper)))
-    within = np.abs(grid.x) < 0.7 * conditions.hertz.half_widths[0]  # before the spike
+    infinite = asp.solve_contact(line, oil, asp.flat_surface(asp.Grid((nx, 8), lower, upper)))
+    inner = np.abs(grid.x) < 0.7 * conditions.hertz.half_widths[0]  # upstream of the spike
     pressure, gap = (
-        solution.pressure[within, middle].mean(axis=1),
-        solution.gap[within, middle].mean(axis=1),
+        solution.pressure[inner, middle].mean(axis=1),
+        solution.gap[inner, middle].mean(axis=1),
     )
-    assert np.abs(pressure - even.pressure[within, 0]).max() < 5e-3 * even.pressure[within].max()
+    assert (
+        np.abs(pressure - infinite.pressure[inner, 0]).max() < 5e-3 * infinite.pressure[inner].max()
+    )
     if oil is not None:
-        assert gap == pytest.approx(even.gap[within, 0], rel=5e-3)
-        assert solution.gap[:, middle].min() == pytest.approx(even.gap.min(), rel=5e-3)
+        assert gap == pytest.approx(infinite.gap[inner, 0], rel=5e-3)
+        assert solution.gap[:, middle].min() == pytest.approx(infinite.gap.min(), rel=5e-3)
 
 
-def test_a_straight_rollers_middle_is_the_line_contact_of_its_own_load():
+def test_the_middle_of_a_straight_roller_is_the_line_contact_of_its_own_load():
     solution = solved(roller(), cells=(64, 256))
     along = axial_distribution(solution)
     middle = along.y.size // 2
     line = replace(roller(), geometry="line", load=along.line_load[middle] * LENGTH)
     assert along.pressure[middle] == pytest.approx(line.hertz.p_max, rel=5e-3)
     finer = axial_distribution(solved(roller(), cells=(64, 512)))
-    assert finer.edge_pressure.on_grid > 1.2 * along.edge_pressure.on_grid  # singular
+    assert (
+        finer.edge_pressure.on_grid > 1.2 * along.edge_pressure.on_grid
+    )  # the pressure at the edge is singular
     assert along.middle_pressure == pytest.approx(along.pressure[middle], rel=1e-6)
-    for each in (along, finer):
-        assert each.edge_pressure.value is each.edge_pressure.bar is None
-        assert each.undetermined[0].startswith(
+    for distribution in (along, finer):
+        assert distribution.edge_pressure.value is distribution.edge_pressure.bar is None
+        assert distribution.undetermined[0].startswith(
             "The edge pressure is not determined: the profile relieves the ends too"
         )
 
 
-def edges(shape, oil, *grids):
-    """What is said of the edge pressure on each grid, over Hertz's, and how far it may be off."""
+def edge_pressures(shape, oil, *grids):
+    """Return the edge pressure on each grid and its error bar, relative to Hertz's pressure."""
     conditions = roller(shape)
     found = [
         axial_distribution(solved(conditions, oil, cells=(nx, ny - 8), past=4)).edge_pressure
         for nx, ny in grids
     ]
     return [
-        tuple(x and x / conditions.hertz.p_max for x in (each.value, each.bar)) for each in found
+        tuple(x and x / conditions.hertz.p_max for x in (edge.value, edge.bar)) for edge in found
     ]
 
 
@@ -215,34 +223,38 @@ def edges(shape, oil, *grids):
     "shape", [lundberg(LOAD), lundberg(1.2 * LOAD), lundberg(1.5 * LOAD), ISO, ISO.tilted(1e-3)]
 )
 def test_the_dry_edge_pressure_of_finer_grids_lies_within_the_bar(shape):
-    *coarser, (finest, _) = edges(shape, None, (48, 256), (48, 512), (48, 1024))
+    *coarser, (finest, _) = edge_pressures(shape, None, (48, 256), (48, 512), (48, 1024))
     for value, bar in coarser:
         assert abs(value - finest) < bar < 0.2
 
 
-def test_the_bar_holds_the_reference_edge_pressure():
-    ((value, bar),) = edges(lundberg(LOAD), None, (48, 512))
+def test_the_bar_covers_the_reference_edge_pressure():
+    ((value, bar),) = edge_pressures(lundberg(LOAD), None, (48, 512))
     assert abs(value - 1.131) < bar < 0.1
 
 
 @pytest.mark.parametrize("shape", [lundberg(1.5 * LOAD), ISO.tilted(1e-3)])
-def test_the_lubricated_edge_pressure_is_that_of_every_grid_and_its_spike_no_part_of_it(shape):
-    """The spike grows by a quarter from 96 to 384 cells along x, what lies before it by nothing."""
-    (coarse, bar), (across, _), (along, _) = edges(shape, OIL, (96, 256), (384, 256), (96, 512))
+def test_the_lubricated_edge_pressure_does_not_depend_on_the_grid_or_the_spike(shape):
+    """The spike grows by a quarter from 96 to 384 cells along x, but the pressure upstream of it
+    does not change.
+    """
+    (coarse, bar), (across, _), (along, _) = edge_pressures(
+        shape, OIL, (96, 256), (384, 256), (96, 512)
+    )
     assert across == pytest.approx(coarse, rel=1e-3)
     assert along == pytest.approx(coarse, rel=3e-3)
     assert max(abs(across - coarse), abs(along - coarse)) < bar
-    ((dry, _),) = edges(shape, None, (48, 512))
+    ((dry, _),) = edge_pressures(shape, None, (48, 512))
     assert coarse == pytest.approx(dry, rel=0.02)
 
 
-def test_a_pressure_that_still_grows_is_no_edge_pressure():
-    """A circle that falls back by 5 um ends at 0.5 of the mean load per length: 1.1 to 2.4 GPa from
-    128 to 1024.
+def test_an_unconverged_edge_pressure_is_not_determined():
+    """A circular profile with a drop of 5 um at the ends has 0.5 of the mean load per length there,
+    and 1.1 to 2.4 GPa on 128 to 1024 cells.
     """
     circle = RollerShape(crown_radius=LENGTH**2 / 8.0 / 5e-6)
     for oil in (None, OIL):
-        assert edges(circle, oil, (48 if oil is None else 96, 256)) == [(None, None)]
+        assert edge_pressures(circle, oil, (48 if oil is None else 96, 256)) == [(None, None)]
     along = axial_distribution(solved(roller(circle), cells=(48, 120), past=4))
     assert (
         "are 0.92 half-widths apart, but loaded ends require 0.5; use 237 cells"
@@ -250,7 +262,7 @@ def test_a_pressure_that_still_grows_is_no_edge_pressure():
     )
 
 
-def test_an_end_at_the_pressure_cap_has_that_edge_pressure():
+def test_the_edge_pressure_at_a_capped_end_is_the_cap():
     along = axial_distribution(solved(roller(hardness=2e9), cells=(48, 248), past=4))
     assert along.edge_pressure.value == pytest.approx(2e9)
     assert (
@@ -261,15 +273,16 @@ def test_an_end_at_the_pressure_cap_has_that_edge_pressure():
     )
 
 
-def test_the_film_at_loaded_ends_asks_for_close_lines():
+def test_the_film_at_loaded_ends_needs_closely_spaced_cells():
     few, many, finest = (
         axial_distribution(solved(roller(lundberg(1.5 * LOAD)), OIL, cells=(128, ny - 8), past=4))
         for ny in (256, 1024, 1536)
     )
     assert few.end_film.value is None
     assert any(
-        "minimum film thickness at the ends is not determined: the lines of cells are 0.45" in said
-        for said in few.undetermined
+        "minimum film thickness at the ends is not determined: the lines of cells are 0.45"
+        in message
+        for message in few.undetermined
     )
     assert (
         abs(many.end_film.value - finest.end_film.value)
@@ -287,11 +300,15 @@ def test_a_roller_with_a_strong_crown_is_a_point_contact(oil):
     a = ball.hertz.half_widths[0]
     grid = asp.Grid((96, 96), (-4.5 * a, -2.5 * a), (1.5 * a, 2.5 * a), (False, False))
     crowned = roller(RollerShape(crown_radius=RADIUS), 20.0, length=2e-3, surface_speeds=speeds)
-    one, other = (asp.solve_contact(each, oil, asp.flat_surface(grid)) for each in (crowned, ball))
-    assert one.pressure == pytest.approx(other.pressure, abs=1e-3 * other.pressure.max())
-    assert one.gap.min() == pytest.approx(other.gap.min(), rel=1e-3, abs=1e-12)
+    crowned_solution, ball_solution = (
+        asp.solve_contact(conditions, oil, asp.flat_surface(grid)) for conditions in (crowned, ball)
+    )
+    assert crowned_solution.pressure == pytest.approx(
+        ball_solution.pressure, abs=1e-3 * ball_solution.pressure.max()
+    )
+    assert crowned_solution.gap.min() == pytest.approx(ball_solution.gap.min(), rel=1e-3, abs=1e-12)
     if oil is None:
-        assert one.pressure.max() == pytest.approx(ball.hertz.p_max, rel=0.01)
+        assert crowned_solution.pressure.max() == pytest.approx(ball.hertz.p_max, rel=0.01)
 
 
 def test_oil_leaves_at_the_ends_and_the_film_there_is_thin():
@@ -303,8 +320,8 @@ def test_oil_leaves_at_the_ends_and_the_film_there_is_thin():
     assert abs(along.load_centre) < 1e-4 * LENGTH
 
 
-def test_a_film_ends_alike_between_smooth_bodies_and_all_but_smooth_ones():
-    """Which have another wedge and other means of mobilities, but across the ends the same."""
+def test_the_end_film_of_smooth_bodies_equals_that_of_almost_smooth_bodies():
+    """Rough bodies have another wedge and other means of the mobility, but not across the ends."""
     smooth = solved(roller(lundberg(LOAD)), OIL, cells=(96, 96))
     heights = 1e-11 * np.random.default_rng(2).standard_normal(smooth.grid.cells)
     rough = asp.solve_contact(
@@ -315,8 +332,8 @@ def test_a_film_ends_alike_between_smooth_bodies_and_all_but_smooth_ones():
 
 
 def test_a_roller_is_as_stiff_as_a_strip_of_its_length():
-    """π E* L/(2 ln(2L/a)): the middle of a strip on a half-space; the shaken contact without haste
-    is the tangent.
+    """π E* L/(2 ln(2L/a)), at the middle of a strip on a half-space; the dynamic stiffness at zero
+    frequency is the tangent stiffness.
     """
     conditions = roller(lundberg(1.2 * LOAD))
     solution = solved(conditions, OIL, cells=(64, 64))
@@ -327,9 +344,9 @@ def test_a_roller_is_as_stiff_as_a_strip_of_its_length():
     assert dynamic_stiffness(solution, 0.0).stiffness == pytest.approx(tangent, rel=0.01)
 
 
-def test_models_agree_where_the_film_is_full():
-    """One pressure or two; where no oil may be lost the wedge is of first order, and films some per
-    cent thicker.
+def test_models_agree_in_a_full_film():
+    """The paper's and the mixed model agree. The mass-conserving model has a wedge of first order
+    and films some per cent thicker.
     """
     conditions = roller(ISO.tilted(0.3e-3))
     mixed, paper, conserving = (
@@ -352,7 +369,7 @@ def test_models_agree_where_the_film_is_full():
         ({"length": 50e-3}, 5000.0),
     ],
 )
-def test_the_ends_of_the_range_are_solved(given, load):
+def test_extreme_conditions_are_solved(given, load):
     conditions = roller(None, load, **given)
     shape = RollerShape.johns_gohar(
         1.3 * load, conditions.length, RADIUS, conditions.pair.reduced_modulus
@@ -366,29 +383,31 @@ def test_the_ends_of_the_range_are_solved(given, load):
 
 
 @pytest.mark.parametrize("shape", [ISO, RollerShape()])
-def test_a_smooth_roller_that_hardly_moves_is_the_dry_one(shape):
-    """Thinner than a few molecules there is no film; from the dry contact that is a dozen steps."""
+def test_a_smooth_roller_at_very_low_speed_is_dry(shape):
+    """The oil film would be thinner than a few molecules. A start from the dry contact needs about
+    twelve iterations.
+    """
     conditions = roller(shape, surface_speeds=(1e-3, 1e-3))
     slow, dry = (solved(conditions, oil, cells=(96, 120), past=4) for oil in (OIL, None))
     assert slow.convergence.iterations < 40
     assert asp.contact_state(slow).clr > 0.99
     middle = slice(10, -10)
-    reach = np.interp(slow.grid.x, dry.grid.x, dry.pressure[:, 64])
-    assert np.abs(slow.pressure[:, 64] - reach).max() < 0.05 * dry.pressure[:, middle].max()
+    expected = np.interp(slow.grid.x, dry.grid.x, dry.pressure[:, 64])
+    assert np.abs(slow.pressure[:, 64] - expected).max() < 0.05 * dry.pressure[:, middle].max()
 
 
-def test_a_straight_roller_is_led_on_from_the_dry_one():
-    """Its sharp ends touch; the film between them is that of the line contact of its own load."""
+def test_a_straight_roller_starts_from_its_dry_contact():
+    """The sharp ends touch; the film in the middle is that of the line contact of its own load."""
     solution = solved(roller(), OIL, cells=(128, 120), past=4)
-    assert solution.convergence.attempt == "coarse to fine"  # on by the accurate wedge
+    assert solution.convergence.attempt == "coarse to fine"  # continued with the second-order wedge
     assert solution.convergence.iterations < 200
     along = axial_distribution(solution)
     middle = along.y.size // 2
     line = replace(roller(), geometry="line", load=float(along.line_load[middle]) * LENGTH)
     lower, upper = (solution.grid.lower[0], -1e-4), (solution.grid.upper[0], 1e-4)
-    even = asp.solve_contact(line, OIL, asp.flat_surface(asp.Grid((128, 8), lower, upper)))
+    infinite = asp.solve_contact(line, OIL, asp.flat_surface(asp.Grid((128, 8), lower, upper)))
     assert asp.contact_state(solution).h_central == pytest.approx(
-        asp.contact_state(even).h_central, rel=5e-3
+        asp.contact_state(infinite).h_central, rel=5e-3
     )
 
 

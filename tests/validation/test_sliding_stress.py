@@ -1,6 +1,4 @@
-"""Stresses below known pressures against closed forms; Hertz's pressure is sampled on the grid,
-nothing is solved.
-"""
+"""Stresses below known pressures against closed forms; Hertz's pressure is sampled on the grid."""
 
 import numpy as np
 import pytest
@@ -37,7 +35,7 @@ def von_mises(xx, yy, zz, xy, yz, xz):
     return np.sqrt(apart / 2.0 + 3.0 * (xy**2 + yz**2 + xz**2))
 
 
-def test_the_largest_stresses_below_a_line_contact_are_the_textbook_ones():
+def test_the_largest_stresses_below_a_line_contact_agree_with_textbooks():
     """0.300 p_h in shear at 0.786 a, von Mises 0.558 p_h at 0.704 a (Johnson, section 4.2; plane
     strain, nu = 0.3).
     """
@@ -48,8 +46,10 @@ def test_the_largest_stresses_below_a_line_contact_are_the_textbook_ones():
     assert stress.peak.depth == pytest.approx(0.704, rel=0.01)
 
 
-def test_the_largest_stress_below_a_point_contact_is_the_textbook_one():
-    """0.62 p_h at 0.48 a, in von Mises; half of it in shear, on the axis (Johnson, section 4.2)."""
+def test_the_largest_stress_below_a_point_contact_agrees_with_textbooks():
+    """Von Mises 0.62 p_h at 0.48 a, on the axis; the shear stress is half of it (Johnson, section
+    4.2).
+    """
     stress = below_point(0.0)
     assert stress.peak.value == pytest.approx(0.62, rel=0.002)
     assert stress.peak.depth == pytest.approx(0.48, rel=0.01)
@@ -57,8 +57,8 @@ def test_the_largest_stress_below_a_point_contact_is_the_textbook_one():
 
 
 def mcewen_peak(friction: float) -> tuple[float, float]:
-    """The largest von Mises stress below a sliding line contact, and its depth, from the closed
-    form.
+    """Return the largest von Mises stress below a sliding line contact and its depth, from the
+    closed form.
     """
 
     def negative(place):
@@ -74,8 +74,8 @@ def mcewen_peak(friction: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.2, 0.3, 0.4])
-def test_the_peak_below_a_sliding_line_contact_is_smith_and_lius(friction):
-    """It climbs from 0.67 a towards the surface, which it reaches between f = 0.25 and 0.3."""
+def test_the_peak_below_a_sliding_line_contact_agrees_with_smith_and_liu(friction):
+    """Its depth decreases from 0.67 a; it reaches the surface between f = 0.25 and 0.3."""
     value, depth = mcewen_peak(friction)
     peak = below_line(friction).peak
     assert peak.value == pytest.approx(value, rel=0.003)
@@ -88,9 +88,8 @@ def test_the_whole_tensor_below_a_sliding_line_contact(friction):
     for depth in (0.06, 0.3, 0.786, 2.0):
         found = stress.tensor_at(depth)
         xx, yy, zz, xz = sliding.line(stress.grid.x, depth, friction, NU)
-        tolerance = (
-            0.005 if depth < 0.1 else 0.0012
-        )  # of p_h; the root at the pressure's edge sets it
+        # in p_h; limited by the square root at the edge of the pressure
+        tolerance = 0.005 if depth < 0.1 else 0.0012
         for name, expected in (("xx", xx), ("yy", yy), ("zz", zz), ("xz", xz)):
             np.testing.assert_allclose(
                 getattr(found, name)[:, 3], expected, atol=tolerance, err_msg=name
@@ -100,7 +99,7 @@ def test_the_whole_tensor_below_a_sliding_line_contact(friction):
 
 @pytest.mark.parametrize("friction", [0.0, 0.25])
 def test_the_whole_tensor_below_a_sliding_ball(friction):
-    """Hamilton's case: point loads summed over the disc."""
+    """Hamilton's case, against point loads summed over the disc."""
     stress = below_point(friction)
     i, j = np.arange(5, 128, 9), np.arange(3, 128, 10)
     x, y = np.meshgrid(stress.grid.x[i], stress.grid.y[j], indexing="ij")
@@ -114,7 +113,7 @@ def test_the_whole_tensor_below_a_sliding_ball(friction):
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.2])
-def test_the_peak_below_a_sliding_ball_is_hamiltons(friction):
+def test_the_peak_below_a_sliding_ball_agrees_with_hamilton(friction):
     x, z = np.meshgrid(np.linspace(0.0, 0.4, 41), np.linspace(0.4, 0.52, 25), indexing="ij")
     stresses = von_mises(*sliding.point(x, 0.0 * x, z, friction, NU, radial=30, around=40))
     peak = below_point(friction).peak
@@ -122,9 +121,9 @@ def test_the_peak_below_a_sliding_ball_is_hamiltons(friction):
     assert peak.depth == pytest.approx(z.flat[stresses.argmax()], rel=0.02)
 
 
-def test_the_summed_point_loads_meet_the_closed_form_on_the_axis():
-    """Shear below the middle of a sliding ball, sigma_xz/q = -1 + 3/2 z atan(1/z) - z^2/(2 (1 +
-    z^2)).
+def test_the_summed_point_loads_agree_with_the_closed_form_on_the_axis():
+    """Shear on the axis of a sliding ball: sigma_xz/q = -1 + 3/2 z atan(1/z) - z^2/(2 (1 + z^2)),
+    by point loads.
     """
     z = np.array([0.1, 0.5, 1.0])
     on_axis = (
@@ -135,7 +134,7 @@ def test_the_summed_point_loads_meet_the_closed_form_on_the_axis():
     np.testing.assert_allclose(on_axis, expected, rtol=1e-6)
 
 
-def test_traction_alone_stretches_the_surface_of_a_ball_as_hamilton_and_goodman_found():
+def test_surface_stresses_under_traction_agree_with_hamilton_and_goodman():
     """sigma_xx = -(4 + nu) pi q x/8, sigma_yy = -3 nu pi q x/8 inside the contact (J. Appl. Mech.
     33 (1966) 371).
     """

@@ -1,9 +1,9 @@
-"""The smooth lubricated line contact against a table and a solver that shares no code with ours.
+"""The smooth lubricated line contact against a table and an independent solver.
 
-The table is `../reference/smooth_line_contact.csv`: micrometres, or units of R sqrt(2 eta0 u/(E'
-R)) (Moes). Its Roelands rows come out with Dowson and Higginson's density as first printed, (5.9e8
-+ 1.34 p)/(5.9e8 + p); with the rounded coefficients of the package, 0.6 and 1.7 1/GPa, central
-films are 0.5 % thinner.
+The table is `../reference/smooth_line_contact.csv`, in micrometres or in units of R sqrt(2 eta0
+u/(E' R)) (Moes). Its Roelands rows use Dowson and Higginson's density as first printed, (5.9e8 +
+1.34 p)/(5.9e8 + p); with the rounded coefficients of the package, 0.6 and 1.7 1/GPa, central films
+are 0.5 % thinner.
 """
 
 import csv
@@ -51,7 +51,7 @@ def printed(row):
 
 @cache
 def film(index, cells=256):
-    """(h_min, h at x = 0, state) by the package."""
+    """Return (h_min, h at x = 0, state) of the package."""
     row = ROWS[index]
     on = grid((cells, 8), (float(row["inlet"]), float(row["outlet"])))
     conditions = contact(speed=float(row["speed_m_per_s"]))
@@ -64,7 +64,9 @@ def film(index, cells=256):
 
 @cache
 def reference(index, nodes=501):
-    """(h_min, h at x = 0) by the reference solver; the laws are written out anew."""
+    """Return (h_min, h at x = 0) of the reference solver, with independent implementations of the
+    laws.
+    """
     row = ROWS[index]
     alpha, speed = float(row["alpha_1_per_gpa"]) * 1e-9, float(row["speed_m_per_s"])
     if row["law"] == "barus":
@@ -82,7 +84,7 @@ def reference(index, nodes=501):
         *thickening, lambda p: 1.0 + c1 * p / (1.0 + c2 * p), lambda p: c1 / (1.0 + c2 * p) ** 2
     )
     number = 12.0 * ETA0 * speed * RADIUS**2 / (A**3 * P_H)
-    with threadpool_limits(1):  # threads only wait for one another in matrices this small
+    with threadpool_limits(1):  # threads slow down such small matrices
         solved = line_contact(float(row["inlet"]), float(row["outlet"]), nodes, number, oil)
     return solved.smallest * GAP, solved.central * GAP
 
@@ -102,29 +104,29 @@ def test_films_of_an_independent_solver(index):
 
 
 @pytest.mark.parametrize("index", [0, 2, 3, 6], ids=lambda index: name(ROWS[index]))
-def test_the_reference_solver_itself_meets_the_table(index):
-    """Else agreement of the two would prove little."""
+def test_the_reference_solver_agrees_with_the_table(index):
+    """This makes the agreement between the two solvers meaningful."""
     h_min, h_central = printed(ROWS[index])
     assert reference(index)[0] == pytest.approx(h_min, rel=0.0025)
     assert reference(index)[1] == pytest.approx(h_central, rel=0.0025)
 
 
 @pytest.mark.parametrize("index", [3, 6], ids=lambda index: name(ROWS[index]))
-def test_the_central_film_closes_in_at_second_order(index):
-    """Changes from grid to grid fall fourfold: a first-order wedge would only halve them."""
+def test_the_central_film_converges_at_second_order(index):
+    """Differences between grids decrease fourfold; with a first-order wedge they would halve."""
     coarse, middle, fine = (film(index, cells)[1] for cells in (64, 128, 256))
     assert abs(fine - middle) < abs(middle - coarse) / 2.8
 
 
-def test_a_smooth_contact_with_a_film_touches_nowhere():
+def test_a_smooth_contact_with_a_film_has_no_touching_cells():
     state = film(3)[2]
     assert state.clr == state.car == 0.0
     assert state.lambda_ratio is None
     assert abs(state.load_error) < 1e-6
 
 
-def test_the_film_is_dowson_and_higginsons_within_ten_percent():
-    """h_min/R = 2.65 G^0.54 U^0.7 W^-0.13 (1966), which is a fit; the table lies 5 % below it."""
+def test_the_film_agrees_with_dowson_and_higginson_within_ten_percent():
+    """h_min/R = 2.65 G^0.54 U^0.7 W^-0.13 (1966) is a fit; the table is 5 % below it."""
     conditions = contact()
     modulus = conditions.pair.effective_modulus
     u, w = ETA0 * 1.91 / (modulus * RADIUS), 50e3 / (modulus * RADIUS)

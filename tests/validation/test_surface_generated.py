@@ -1,5 +1,5 @@
-"""Generated surfaces hold what was asked for, over 20 seeds; and the same seed is the same surface
-anywhere.
+"""Generated surfaces have the requested properties over 20 seeds; a seed gives the same surface on
+every machine.
 """
 
 import numpy as np
@@ -31,41 +31,41 @@ def moments(heights):
 
 
 @pytest.mark.parametrize("direction", [0.0, 0.6])
-def test_gaussian_surfaces_have_their_sq_and_correlation_lengths(direction):
-    asked = (20e-6, 10e-6)
-    made = [
+def test_gaussian_surfaces_have_the_requested_sq_and_correlation_lengths(direction):
+    requested = (20e-6, 10e-6)
+    surfaces = [
         gaussian_surface(
             grid(),
             sq=1e-6,
-            correlation_length=asked,
+            correlation_length=requested,
             direction=direction,
             rng=np.random.default_rng(seed),
         )
         for seed in SEEDS
     ]
-    assert [surface.sq for surface in made] == pytest.approx([1e-6] * 20, rel=1e-12)
-    found = np.mean([correlation_lengths(surface, direction) for surface in made], axis=0)
-    assert found == pytest.approx(asked, rel=0.05)
+    assert [surface.sq for surface in surfaces] == pytest.approx([1e-6] * 20, rel=1e-12)
+    found = np.mean([correlation_lengths(surface, direction) for surface in surfaces], axis=0)
+    assert found == pytest.approx(requested, rel=0.05)
 
 
 @pytest.mark.parametrize(
     ("skewness", "kurtosis"), [(-1.0, 5.0), (0.5, 3.2), (0.0, 2.0), (-2.0, 9.0), (0.0, 3.0)]
 )
-def test_non_gaussian_surfaces_have_their_moments_in_every_sample(skewness, kurtosis):
-    asked, found = (20e-6, 10e-6), []
+def test_non_gaussian_surfaces_have_the_requested_moments_in_every_sample(skewness, kurtosis):
+    requested, found = (20e-6, 10e-6), []
     for seed in SEEDS:
         surface = non_gaussian_surface(
             grid(),
             sq=0.5e-6,
             skewness=skewness,
             kurtosis=kurtosis,
-            correlation_length=asked,
+            correlation_length=requested,
             rng=np.random.default_rng(seed),
         )
         assert surface.sq == pytest.approx(0.5e-6, rel=1e-12)
         assert moments(surface.heights) == pytest.approx((skewness, kurtosis), rel=0.01, abs=0.01)
         found.append(correlation_lengths(surface))
-    assert np.mean(found, axis=0) == pytest.approx(asked, rel=0.05)
+    assert np.mean(found, axis=0) == pytest.approx(requested, rel=0.05)
 
 
 @pytest.mark.parametrize("hurst", [0.3, 0.8])
@@ -87,7 +87,7 @@ def test_self_affine_surfaces_have_the_slope_of_their_hurst_exponent(hurst):
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6])
-def test_a_run_in_surface_has_its_plateau(share):
+def test_a_run_in_surface_has_the_requested_plateau(share):
     surface = run_in_surface(
         grid(),
         sq=1e-6,
@@ -113,7 +113,7 @@ def test_a_run_in_surface_has_its_plateau(share):
 
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 135.0])
-def test_the_lay_of_a_ground_surface_runs_where_it_was_asked_to(degrees):
+def test_a_ground_surface_has_the_requested_lay(degrees):
     lay = np.radians(degrees)
     found = []
     for seed in range(4):
@@ -126,33 +126,32 @@ def test_the_lay_of_a_ground_surface_runs_where_it_was_asked_to(degrees):
             rng=np.random.default_rng(seed),
         )
         spectrum = surface_spectrum(surface)
-        # the mean direction of a lay, which is the same backwards, is that of twice the angle
+        # directions of a lay are equal modulo 180 degrees: average at twice the angle
         found.append(0.5 * np.angle(np.sum(spectrum.share * np.exp(2j * spectrum.lay))))
         along, across = correlation_lengths(surface, lay)
         assert along > 4.0 * across
         assert surface.sq == pytest.approx(1e-6, rel=1e-12)
         assert surface_parameters(surface).ssk < -0.3  # deep grooves, no high peaks
-    off = np.degrees(np.angle(np.mean(np.exp(2j * (np.array(found) - lay)))) / 2.0)
-    assert abs(off) < 3.0
+    deviation = np.degrees(np.angle(np.mean(np.exp(2j * (np.array(found) - lay)))) / 2.0)
+    assert abs(deviation) < 3.0
 
 
-def test_a_sandblasted_surface_has_no_lay_and_pits_as_wide_as_its_craters():
-    made = [
+def test_a_sandblasted_surface_has_no_lay_and_pits_of_the_crater_radius():
+    surfaces = [
         sandblasted_surface(grid(), sq=1e-6, crater_radius=12e-6, rng=np.random.default_rng(seed))
         for seed in SEEDS
     ]
-    assert [surface.sq for surface in made] == pytest.approx([1e-6] * 20, rel=1e-12)
-    lengths = np.mean([correlation_lengths(surface) for surface in made], axis=0)
+    assert [surface.sq for surface in surfaces] == pytest.approx([1e-6] * 20, rel=1e-12)
+    lengths = np.mean([correlation_lengths(surface) for surface in surfaces], axis=0)
     assert lengths[0] == pytest.approx(lengths[1], rel=0.03)
-    # a crater z = -R (1 - u)^2 (1 - 4 u) correlates with itself like this, by brute force over
-    # radii that scatter
+    # autocorrelation of craters z = -R (1 - u)^2 (1 - 4 u), summed over random radii
     x = np.linspace(-4.0, 4.0, 401)
     u = np.minimum((x[:, None] ** 2 + x[None, :] ** 2) / 4.0, 1.0)
     power = np.abs(np.fft.fft2((1.0 - u) ** 2 * (1.0 - 4.0 * u), (1024, 1024))) ** 2
-    own, lags = np.fft.ifft2(power).real[:500, 0], np.arange(500) * 0.02
+    autocorrelation, lags = np.fft.ifft2(power).real[:500, 0], np.arange(500) * 0.02
     radii = np.clip(1.0 + 0.25 * np.random.default_rng(0).standard_normal(2000), 0.25, 1.75)
-    together = np.sum([r**4 * np.interp(lags / r, lags, own) for r in radii], axis=0)
-    distance = np.interp(-np.exp(-1.0), -together / together[0], lags)
+    correlation = np.sum([r**4 * np.interp(lags / r, lags, autocorrelation) for r in radii], axis=0)
+    distance = np.interp(-np.exp(-1.0), -correlation / correlation[0], lags)
     assert lengths[0] == pytest.approx(12e-6 * distance, rel=0.03)
 
 
@@ -170,8 +169,8 @@ def test_a_sandblasted_surface_has_no_lay_and_pits_as_wide_as_its_craters():
 )
 def test_a_finer_grid_shows_the_same_physical_surface(make):
     coarse, fine = (make(grid(cells), np.random.default_rng(5)).heights for cells in (64, 192))
-    # the middle one of three fine cells has the coarse cell's centre; only the sample's mean and Sq
-    # differ
+    # the middle of three fine cells has the centre of the coarse cell; only mean and Sq of the
+    # sample differ
     slope, offset = np.polyfit(fine[1::3, 1::3].ravel(), coarse.ravel(), 1)
     assert slope == pytest.approx(1.0, abs=0.03)
     assert abs(offset) < 0.03e-6
@@ -196,7 +195,7 @@ REFERENCE = {
         g, sq=1e-6, correlation_length=40e-6, plateau_share=0.4, rng=r
     ),
 }
-# heights [nm] of cells (0, 0), (9, 20) and (31, 5) of 32 x 32, seed 11, as first made
+# heights [nm] of cells (0, 0), (9, 20) and (31, 5) of 32 x 32, seed 11, from the first version
 RECORDED = {
     "gaussian": (1509.002, 1498.335, -557.237),
     "ground": (-88.253, -1098.159, 1369.805),
@@ -208,8 +207,8 @@ RECORDED = {
 
 
 @pytest.mark.parametrize("kind", REFERENCE)
-def test_a_seed_is_the_same_surface_on_any_machine(kind):
+def test_a_seed_gives_the_same_surface_on_any_machine(kind):
     heights = REFERENCE[kind](grid(32), np.random.default_rng(11)).heights
-    assert [1e9 * heights[at] for at in ((0, 0), (9, 20), (31, 5))] == pytest.approx(
+    assert [1e9 * heights[cell] for cell in ((0, 0), (9, 20), (31, 5))] == pytest.approx(
         RECORDED[kind], rel=1e-4, abs=0.01
     )

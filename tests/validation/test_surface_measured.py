@@ -1,4 +1,4 @@
-"""The developers' measured files, where they are at hand, against their README and one another."""
+"""The developers' measured files, if available, against their README and one another."""
 
 import json
 from pathlib import Path
@@ -32,7 +32,7 @@ def paper_grid(cells=256):
         ("ground_lay.plu", (768, 576), 1.66e-6, 0.018e-6, 0.0),
     ],
 )
-def test_a_file_reads_as_its_readme_says(name, cells, pixel, sq, missing):
+def test_a_file_agrees_with_its_readme(name, cells, pixel, sq, missing):
     found = describe_surface(FILES / name).scalars()
     assert tuple(found["cells"]) == cells
     assert found["pixel_m"][0] == pytest.approx(pixel, rel=1e-3)
@@ -41,19 +41,19 @@ def test_a_file_reads_as_its_readme_says(name, cells, pixel, sq, missing):
     assert json.loads(json.dumps(found, allow_nan=False)) == found
 
 
-def test_four_formats_of_one_surface_hold_the_same_heights():
+def test_four_formats_of_one_surface_contain_the_same_heights():
     heights = read_surface(FILES / "isotropic.al3d").heights
     for name in ("isotropic_iso5436.x3p", "isotropic_iso25178.x3p", "isotropic_iso1.sdf"):
         np.testing.assert_allclose(read_surface(FILES / name).heights, heights, atol=1e-12)
 
 
-def test_a_point_list_reads_once_its_units_are_given():
+def test_a_point_list_is_read_with_given_units():
     found = describe_surface(FILES / "nanovea_test1.txt", unit="um", lateral_unit="mm").scalars()
     assert found["sq_m"] == pytest.approx(4.47e-6, rel=0.01)
     assert found["pixel_m"] == pytest.approx([5e-6, 5e-6])
 
 
-def test_profiles_read_as_their_readme_says():
+def test_profiles_agree_with_their_readme():
     stylus = describe_surface(FILES / "stylus_4p8mm.hfm").scalars()
     assert stylus["cells"][0] == 9600
     assert stylus["pixel_m"][0] == pytest.approx(0.5e-6, rel=1e-3)
@@ -61,12 +61,11 @@ def test_profiles_read_as_their_readme_says():
     track = describe_surface(FILES / "wear_track_C1.csv", unit="um", lateral_unit="mm").scalars()
     assert track["cells"][0] == 4800
     assert track["size_m"][0] == pytest.approx(2.4e-3, rel=1e-3)
-    assert track["profile"]["rt_m"] == pytest.approx(
-        1.2e-6, rel=0.02
-    )  # the file's extremes, -0.45 and 0.75, less form
+    # the extremes of the file, -0.45 and 0.75, without form
+    assert track["profile"]["rt_m"] == pytest.approx(1.2e-6, rel=0.02)
 
 
-def test_an_archive_that_strays_from_the_standard_reads_as_its_readme_says():
+def test_an_archive_that_violates_the_standard_agrees_with_its_readme():
     found = describe_surface(
         FILES / "bullet_land.x3p", conditioning=SurfaceConditioning(form="cylinder")
     ).scalars()
@@ -77,7 +76,7 @@ def test_an_archive_that_strays_from_the_standard_reads_as_its_readme_says():
 
 
 @pytest.mark.parametrize("name", ["nanovea_test1.txt", "wear_track_C1.csv"])
-def test_what_cannot_be_read_as_it_stands_is_refused_in_a_sentence(name, capfd):
+def test_a_file_without_units_is_refused_in_one_sentence(name, capfd):
     with pytest.raises(BadInput, match=name):
         read_surface(FILES / name)
     assert capfd.readouterr() == ("", "")
@@ -87,21 +86,21 @@ def test_what_cannot_be_read_as_it_stands_is_refused_in_a_sentence(name, capfd):
     ("name", "share"),
     [("milled_1.opd", 0.9), ("isotropic.al3d", 0.4), ("isotropic_iso1.sdf", 0.99)],
 )
-def test_a_file_cut_short_is_refused(tmp_path, name, share):
+def test_a_truncated_file_is_refused(tmp_path, name, share):
     content = (FILES / name).read_bytes()
     (tmp_path / name).write_bytes(content[: int(share * len(content))])
     with pytest.raises(UnreadableFile, match=name):
         read_surface(tmp_path / name)
 
 
-def test_another_formats_name_is_told(tmp_path):
+def test_a_wrong_extension_is_reported(tmp_path):
     disguised = tmp_path / "disguised.opd"
     disguised.write_bytes((FILES / "isotropic.al3d").read_bytes())
     with pytest.raises(UnreadableFile, match=r"looks like al3d; rename it to \.al3d"):
         read_surface(disguised)
 
 
-def test_the_milled_surface_covers_the_papers_contact():
+def test_the_milled_surface_covers_the_paper_contact():
     prepared = prepare_surface(read_surface(FILES / "milled_1.opd"), paper_grid())
     heights = prepared.surface.heights
     assert np.std(heights[:, 0] - heights[:, -1]) < 2.0 * np.std(np.diff(heights, axis=1))
@@ -123,10 +122,10 @@ def test_the_prepared_surface_does_not_depend_on_the_cells():
     measured = read_surface(FILES / "milled_1.opd")
     coarse, fine = (prepare_surface(measured, paper_grid(n)).surface for n in (128, 384))
     difference = fine.heights[1::3, 1::3] - coarse.heights
-    assert np.std(difference) < 0.05 * fine.sq  # the coarse one lacks waves below 2.8 um
+    assert np.std(difference) < 0.05 * fine.sq  # the coarse surface lacks waves below 2.8 um
 
 
-def test_the_small_surface_is_refused_and_tiles_when_asked():
+def test_a_small_surface_is_refused_or_tiled_on_request():
     small = read_surface(FILES / "isotropic.al3d")
     with pytest.raises(
         BadInput, match=r"87\.61 x 129\.7 um, smaller than the contact's 357\.8 x 178\.9 um"

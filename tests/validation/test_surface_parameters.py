@@ -44,7 +44,7 @@ def test_a_sinusoid():
     assert found.sku == pytest.approx(1.5, rel=1e-9)
     assert found.sdq == pytest.approx(found.sq * 2.0 * np.pi / wavelength, rel=1e-3)
     assert found.sal == pytest.approx(np.arccos(0.2) / (2.0 * np.pi) * wavelength, rel=1e-3)
-    assert found.str_bounded  # along the grooves nothing decays
+    assert found.str_bounded  # the autocorrelation does not decay along the grooves
     assert found.str_ <= found.sal / 16e-6
 
 
@@ -64,7 +64,7 @@ def test_gaussian_surfaces_have_the_slope_and_lengths_of_their_autocorrelation(l
     mean = np.mean(
         [np.fft.fftshift(correlation(gaussian(seed, length, on))) for seed in range(12)], axis=0
     )
-    # Sal and Str of one sample scatter; those of the autocorrelation averaged over samples do not
+    # Sal and Str of single samples scatter, so the autocorrelation is averaged over samples
     assert np.interp(length[0], on.x - on.x[256], mean[:, 128]) == pytest.approx(
         np.exp(-1.0), abs=0.02
     )
@@ -81,7 +81,7 @@ def test_gaussian_surfaces_have_the_slope_and_lengths_of_their_autocorrelation(l
 
 
 @pytest.mark.parametrize("hurst", [0.3, 0.8])
-def test_self_affine_surfaces_have_the_power_law_asked_for(hurst):
+def test_self_affine_surfaces_have_the_requested_power_law(hurst):
     g = grid((256, 256), (256e-6, 256e-6))
     spectrum = np.mean(
         [
@@ -118,7 +118,7 @@ def test_the_slope_agrees_with_surfacetopography(periodic):
     assert found.sdq == pytest.approx(twin.rms_gradient(), rel=0.01)
 
 
-def test_missing_cells_hardly_move_the_parameters():
+def test_missing_cells_hardly_change_the_parameters():
     heights = gaussian(6).heights
     g = grid(periodic=NEITHER)
     holed = np.where(np.random.default_rng(1).random(heights.shape) < 0.2, np.nan, heights)
@@ -137,12 +137,12 @@ def test_missing_cells_hardly_move_the_parameters():
         assert getattr(found, name) == pytest.approx(getattr(whole, name), rel=tolerance), name
 
 
-def test_turning_the_map_turns_nothing_but_its_axes():
+def test_transposing_the_map_does_not_change_its_parameters():
     surface = gaussian(7, (6e-6, 12e-6))
     turned = Surface(np.ascontiguousarray(surface.heights.T), surface.grid)
-    one, two = parameters(surface), parameters(turned)
-    assert one.sal == pytest.approx(two.sal, rel=1e-9)
-    assert one.str_ == pytest.approx(two.str_, rel=1e-9)
+    original, transposed = parameters(surface), parameters(turned)
+    assert original.sal == pytest.approx(transposed.sal, rel=1e-9)
+    assert original.str_ == pytest.approx(transposed.str_, rel=1e-9)
 
 
 def test_a_flat_surface_has_no_texture():

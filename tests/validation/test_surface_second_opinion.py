@@ -1,5 +1,5 @@
-"""Parameters of maps and profiles against surfalize, an implementation by others, and closed forms
-on sinusoids.
+"""Parameters of maps and profiles against surfalize, an independent implementation, and closed
+forms for sinusoids.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ from asperity.surface import (
     surface_parameters,
 )
 
-AREAL = {  # name -> surfalize's unit (it works in um and %) over ours
+AREAL = {  # name: surfalize's unit (um and %) in SI
     **dict.fromkeys(("sa", "sq", "sp", "sv", "sz", "sal", "sk", "spk", "svk"), 1e-6),
     **dict.fromkeys(("ssk", "sku", "sdq", "str_"), 1.0),
     **dict.fromkeys(("sdr", "smr1", "smr2"), 1e-2),
@@ -35,7 +35,7 @@ def grid(cells=(240, 180), size=(240e-6, 220e-6)):
     return Grid(cells, (0.0, 0.0), size, (False, False))
 
 
-def made(kind, seed=4):
+def sample_surface(kind, seed=4):
     rng = np.random.default_rng(seed)
     if kind == "gaussian":
         return gaussian_surface(grid(), sq=0.8e-6, correlation_length=(9e-6, 6e-6), rng=rng)
@@ -44,12 +44,11 @@ def made(kind, seed=4):
     )
 
 
-@pytest.mark.filterwarnings(
-    "ignore:The surface has different pixel size"
-)  # ours are meant to differ
+# the test surface intentionally has different pixel sizes
+@pytest.mark.filterwarnings("ignore:The surface has different pixel size")
 @pytest.mark.parametrize("kind", ["gaussian", "pitted"])
 def test_areal_parameters_agree_with_surfalize(kind):
-    surface = made(kind)
+    surface = sample_surface(kind)
     ours = surface_parameters(surface)
     dx, dy = surface.grid.spacing
     theirs = surfalize.Surface(surface.heights.T * 1e6, dx * 1e6, dy * 1e6)
@@ -65,7 +64,7 @@ def test_areal_parameters_agree_with_surfalize(kind):
 
 @pytest.mark.parametrize("kind", ["gaussian", "pitted"])
 def test_profile_parameters_agree_with_surfalize(kind):
-    profile = np.concatenate(made(kind).heights.T[::20])  # rows end to end: any heights will do
+    profile = np.concatenate(sample_surface(kind).heights.T[::20])  # concatenated rows
     profile -= profile.mean()
     ours, theirs = profile_parameters(profile, 0.5e-6), Profile(profile * 1e6, 0.5)
     for name, unit in LINEAR.items():
@@ -75,7 +74,7 @@ def test_profile_parameters_agree_with_surfalize(kind):
 
 
 def test_the_bearing_curve_of_a_sinusoid():
-    """Heights follow the arcsine law, flattest at its ends: the core line fits the outer 40 %, on
+    """Heights follow the arcsine law. The core line is the secant over the flattest 40 %, fitted on
     either side.
     """
     on = Grid((4000, 16), (0.0, 0.0), (100e-6, 0.4e-6), (True, True))
@@ -112,13 +111,13 @@ def test_the_profile_of_a_sinusoid():
     assert found.rku == pytest.approx(1.5, rel=1e-4)
 
 
-def test_ripples_lower_than_a_tenth_of_rz_are_no_elements():
+def test_ripples_below_a_tenth_of_rz_are_not_counted():
     x = np.arange(5000) * 0.1e-6
     ripple = np.sin(2.0 * np.pi * x / 20e-6) + 0.15 * np.sin(2.0 * np.pi * x / 1e-6)
     assert profile_parameters(1e-6 * ripple, 0.1e-6).rsm == pytest.approx(20e-6, rel=0.01)
 
 
-def test_missing_points_of_a_profile_are_left_out():
+def test_missing_points_of_a_profile_are_ignored():
     z = np.sin(np.arange(4000) / 30.0) * 1e-6
     holed = z.copy()
     holed[1000:1040] = np.nan
@@ -127,7 +126,7 @@ def test_missing_points_of_a_profile_are_left_out():
     assert found.rdq == pytest.approx(whole.rdq, rel=0.01)
 
 
-def test_correlation_lengths_of_a_turned_lay():
+def test_correlation_lengths_of_a_rotated_lay():
     on = Grid((512, 512), (0.0, 0.0), (1024e-6, 1024e-6), (True, True))
     surface = gaussian_surface(
         on, sq=1e-6, correlation_length=(24e-6, 10e-6), direction=0.6, rng=np.random.default_rng(1)

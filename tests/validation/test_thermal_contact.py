@@ -1,6 +1,4 @@
-"""Heat that acts back on the film: what is fed back, that it settles, and which way it moves
-things.
-"""
+"""Thermal feedback on the film: its convergence and its effects."""
 
 from dataclasses import replace
 
@@ -31,22 +29,22 @@ def oil(law):
 
 @pytest.fixture(scope="module", params=["smooth", "rough"])
 def pair(request):
-    """The same contact without and with the way back."""
+    """Return the solutions of a contact without and with thermal feedback."""
     surface = SMOOTH if request.param == "smooth" else ROUGH
     given = (contact(hardness=2e9, surface_speeds=(2.9, 0.9)), oil(EyringShear(5e6)), surface)
     return solve_contact(*given), solve_thermal_contact(*given, thermal=WARM)
 
 
-def test_friction_and_heat_agree_with_each_other(pair):
+def test_friction_and_heat_are_consistent(pair):
     rubbing, heat = friction_and_heat(pair[1], thermal=WARM)
-    again = friction(pair[1], thermal=WARM, film_temperature=313.15 + heat.film)
-    assert again.coefficient == pytest.approx(rubbing.coefficient, rel=1e-3)
-    assert flash_temperature(pair[1], again, thermal=WARM).film_max_k == pytest.approx(
+    recomputed = friction(pair[1], thermal=WARM, film_temperature=313.15 + heat.film)
+    assert recomputed.coefficient == pytest.approx(rubbing.coefficient, rel=1e-3)
+    assert flash_temperature(pair[1], recomputed, thermal=WARM).film_max_k == pytest.approx(
         heat.film_max_k, rel=2e-3
     )
 
 
-def test_the_film_is_as_viscous_as_its_temperature_leaves_it(pair):
+def test_the_viscosity_of_the_film_is_that_of_its_temperature(pair):
     cold, warm = pair
     heat = friction_and_heat(warm, thermal=WARM)[1]
     assert cold.viscosity_factor is None
@@ -56,12 +54,14 @@ def test_the_film_is_as_viscous_as_its_temperature_leaves_it(pair):
     assert warm.viscosity_factor.min() < 0.8
     assert contact_state(warm).reynolds_residual < 1e-4
     assert warm.convergence.converged
-    assert len(warm.convergence.history) > len(cold.convergence.history)  # all rounds are told
+    assert len(warm.convergence.history) > len(
+        cold.convergence.history
+    )  # iterations of all rounds are recorded
     assert warm.convergence.iteration_error is not None
     assert warm.convergence.discretisation_error == cold.convergence.discretisation_error
 
 
-def test_warm_oil_shears_more_easily_and_parts_the_bodies_less(pair):
+def test_warm_oil_reduces_friction_and_film_thickness(pair):
     cold, warm = (contact_state(solution) for solution in pair)
     assert warm.h_mean < cold.h_mean
     assert warm.clr >= cold.clr
@@ -72,7 +72,7 @@ def test_warm_oil_shears_more_easily_and_parts_the_bodies_less(pair):
     assert fed_back.oil_part < 0.97 * isothermal.oil_part
 
 
-def test_without_feedback_heat_is_only_a_result():
+def test_without_feedback_heat_does_not_change_the_film():
     given = (contact(surface_speeds=(2.9, 0.9)), barus(), SMOOTH)
     plain, thermal = solve_contact(*given), solve_thermal_contact(*given, thermal=Thermal())
     np.testing.assert_array_equal(plain.pressure, thermal.pressure)
@@ -82,9 +82,9 @@ def test_without_feedback_heat_is_only_a_result():
     assert rolling.viscosity_factor is None
 
 
-def test_a_runaway_law_is_tamed(monkeypatch):
-    """Newtonian oil at full Barus viscosity makes thousands of kelvins isothermally; its own heat
-    thins it.
+def test_feedback_limits_the_heat_of_a_newtonian_oil(monkeypatch):
+    """Isothermal Newtonian oil at full Barus viscosity rises by thousands of kelvins; with feedback
+    the heat reduces its viscosity.
     """
     cold = solve_contact(contact(), barus(), SMOOTH)
     unlimited = replace(cold, lubricant=oil(NewtonianShear()))
@@ -92,14 +92,16 @@ def test_a_runaway_law_is_tamed(monkeypatch):
     assert isothermal[1].film_max_k > 1000.0
     assert 10.0 < fed_back[1].film_max_k < 300.0
     assert fed_back[0].coefficient < 0.5 * isothermal[0].coefficient
-    touchy = replace(WARM, warmth=ExponentialWarmth(50.0))
-    assert 0.0 < friction_and_heat(unlimited, thermal=touchy)[1].film_max_k < fed_back[1].film_max_k
+    sensitive = replace(WARM, warmth=ExponentialWarmth(50.0))
+    assert (
+        0.0 < friction_and_heat(unlimited, thermal=sensitive)[1].film_max_k < fed_back[1].film_max_k
+    )
     monkeypatch.setattr("asperity.solution.thermal.MAX_ROUNDS", 2)
     with pytest.raises(AsperityError, match="did not converge"):
         friction_and_heat(unlimited, thermal=WARM)
 
 
-def test_an_unfinished_contact_is_told():
+def test_an_unsolved_thermal_contact_is_reported():
     from asperity.ehl import Options
 
     given = (contact(hardness=2e9), barus(), ROUGH)
@@ -111,9 +113,9 @@ def test_an_unfinished_contact_is_told():
     ).convergence.converged
 
 
-def test_a_film_that_would_thin_too_much_at_once_is_warmed_in_steps():
-    """At 19 m/s and 238 K the oil loses all but a ten-thousandth of its viscosity: Newton loses its
-    way in one go.
+def test_a_film_that_would_lose_its_viscosity_is_warmed_in_steps():
+    """At 19 m/s and a rise of 238 K the viscosity decreases to a ten-thousandth; Newton's method
+    diverges in a single step.
     """
     given = (
         contact(speed=19.1, hardness=2e9),

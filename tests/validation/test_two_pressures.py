@@ -1,5 +1,5 @@
-"""The mixed contact with a pressure each for oil and asperities: its limits, and one answer
-whatever the start.
+"""The mixed model with separate pressures of oil and asperities: its limits and its independence of
+the start.
 """
 
 from dataclasses import replace
@@ -67,15 +67,15 @@ def test_a_ball_without_speed_is_dry(hardness):
     assert clr(solve_contact(slow, barus(), surface, options=MIXED)) > 0.999
 
 
-def test_the_papers_contact_has_the_trials_load_share():
-    """An independent program of the same equations found 0.750 on this grid."""
+def test_the_load_share_of_the_paper_contact_agrees_with_an_independent_program():
+    """The independent program of the same equations gives 0.750 on this grid."""
     case = load_case(PAPER).with_overrides({"grid.cells": "[64, 64]", "model": "mixed"})
     solution = solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
     assert clr(solution) == pytest.approx(0.7499, abs=0.005)
 
 
-def test_one_answer_from_two_starts():
-    """All load on the asperities, and all of it in the oil."""
+def test_two_starts_give_the_same_solution():
+    """All load on the asperities, or all in the oil."""
     conditions, oil, surface = contact(hardness=2e9), barus(), rough(COARSE, 1e-6, seed=7)
     problem, scales = (
         contact_problem(conditions, oil, surface, MIXED),
@@ -92,8 +92,8 @@ def test_one_answer_from_two_starts():
     assert dry.figures[-1].clr == pytest.approx(hertz.figures[-1].clr, abs=0.002)
 
 
-def test_what_oil_changed_on_a_coarse_grid_is_granted_to_the_finer_one():
-    """The same answer in two thirds of the steps on the fine grid."""
+def test_corrections_of_the_coarse_grid_start_the_finer_one():
+    """The same solution in two thirds of the iterations on the fine grid."""
     conditions, oil, surface = (
         contact(hardness=2e9),
         barus(),
@@ -110,14 +110,14 @@ def test_what_oil_changed_on_a_coarse_grid_is_granted_to_the_finer_one():
         assert search.converged(MIXED.tolerance)
         steps[number] = sum(step.cells == (192, 192) for step in search.history)
     assert steps[len(levels)] < 0.7 * steps[1]
-    at_once, climbed = (search.figures[-1].clr for search in searches.values())
-    assert climbed == pytest.approx(at_once, abs=0.002)
+    direct, nested = (search.figures[-1].clr for search in searches.values())
+    assert nested == pytest.approx(direct, abs=0.002)
 
 
 @pytest.mark.parametrize("sq", [1e-6, 4e-6])
 def test_a_dry_start_follows_from_the_coarser_grids(sq, monkeypatch):
-    """The answer from Hertz's pressure, without its conjugate gradients, which a cap that holds
-    most cells defeats.
+    """The solution from Hertz's pressure, without conjugate gradients, which fail when most cells
+    are at the cap.
     """
     fine, coarse = grid_levels(
         contact_problem(contact(hardness=2e9), barus(), rough(grid((96, 96)), sq), MIXED)
@@ -133,16 +133,16 @@ def test_a_dry_start_follows_from_the_coarser_grids(sq, monkeypatch):
 
 
 @pytest.mark.parametrize("sq", [1e-6, 4e-6])
-def test_a_dry_start_by_sets_of_cells_is_newtons(sq, monkeypatch):
-    """From Hertz's pressure and from the coarser grid; in single precision and on its own, without
-    Newton's steps.
+def test_a_dry_start_by_active_sets_agrees_with_newton(sq, monkeypatch):
+    """From Hertz's pressure and from the coarser grid; in single precision, without Newton
+    iterations.
     """
     levels = grid_levels(
         contact_problem(contact(hardness=2e9), barus(), rough(grid((96, 96)), sq), MIXED)
     )
     monkeypatch.setattr(starts, "GUESS", replace(GUESS, dry_tolerance=1e-5))
-    with monkeypatch.context() as before:
-        before.setattr(starts, "active_set_dry", lambda _, *start: (*start[:2], False))
+    with monkeypatch.context() as newton_only:
+        newton_only.setattr(starts, "active_set_dry", lambda _, *start: (*start[:2], False))
         expected = [dry_start(level) for level in levels]
     monkeypatch.setattr(starts, "newton", None)
     monkeypatch.setattr(starts, "dry_contact", None)
@@ -155,7 +155,7 @@ def test_a_dry_start_by_sets_of_cells_is_newtons(sq, monkeypatch):
         coarser = Pressures(np.zeros_like(total), total, distance + level.contact_gap)
 
 
-def test_a_dry_start_that_sets_of_cells_do_not_find_is_found_all_the_same(monkeypatch):
+def test_a_dry_start_falls_back_on_newton_if_active_sets_fail(monkeypatch):
     problem = contact_problem(contact(hardness=2e9), barus(), rough(grid((64, 64)), 1e-6), MIXED)
     expected = dry_start(problem)
     monkeypatch.setattr(dry, "PLASTIC_DRY", replace(PLASTIC_DRY, max_active_sets=1))
@@ -164,9 +164,9 @@ def test_a_dry_start_that_sets_of_cells_do_not_find_is_found_all_the_same(monkey
     assert found[1] == pytest.approx(expected[1], abs=0.01)
 
 
-def test_a_hard_dry_start_needs_no_steps_that_bear_the_cap(monkeypatch):
-    """Newton's from the coarser grid's pressures stood still at a hundredth of p_h on this ellipse,
-    for seconds.
+def test_a_hard_dry_start_does_not_stagnate_at_the_cap(monkeypatch):
+    """Newton's method from the coarser grid's pressures stagnated at a hundredth of p_h on this
+    ellipse for seconds.
     """
     hard = contact(
         geometry="elliptic",
@@ -185,33 +185,33 @@ def test_a_hard_dry_start_needs_no_steps_that_bear_the_cap(monkeypatch):
     total, approach = dry_start(coarse)
     monkeypatch.setattr(starts, "dry_contact", None)
     start = dry_start(fine, Pressures(np.zeros_like(total), total, approach + coarse.contact_gap))
-    left = replace(fine, lubricant=None, contact_gap=0.0).evaluate(*start)
-    assert left.residual_rms < 1e-3
-    assert abs(left.load_error) < 1e-3
+    residual = replace(fine, lubricant=None, contact_gap=0.0).evaluate(*start)
+    assert residual.residual_rms < 1e-3
+    assert abs(residual.load_error) < 1e-3
 
 
-def test_a_step_that_leads_away_from_a_solution_is_cut_short():
-    """A sixteenth of it at least is taken, and all of it from afar."""
+def test_a_step_away_from_a_solution_is_shortened():
+    """At least a sixteenth of the step is taken, and the full step far from a solution."""
     case = load_case(PAPER).with_overrides({"grid.cells": "[64, 64]", "model": "mixed"})
     surface = case.surface()
     solved = balance_of(
         solve_contact(case.conditions, case.lubricant, surface, options=case.options)
     )
-    still = np.zeros_like(solved.unknowns.total)
+    zero = np.zeros_like(solved.unknowns.total)
     for balance, share in (
         (solved, 0.0625),
         (replace(solved, oil_residual=solved.oil_residual + 1.0), 1.0),
     ):
-        led = mixed_iterate._line_search(
-            mixed_iterate._StepProposal(balance, Pressures(still, still, -0.2), 1.0),
+        result = mixed_iterate._line_search(
+            mixed_iterate._StepProposal(balance, Pressures(zero, zero, -0.2), 1.0),
             second_order=True,
         )
-        assert solved.unknowns.approach - led.unknowns.approach == pytest.approx(0.2 * share)
+        assert solved.unknowns.approach - result.unknowns.approach == pytest.approx(0.2 * share)
 
 
-def test_a_cell_in_deep_overlap_is_not_freed_again_and_again():
-    """One cell of this surface went round between the cap and the oil, for seventy steps on the
-    finest grid.
+def test_a_cell_in_deep_overlap_does_not_cycle():
+    """One cell of this surface cycled between cap and oil for seventy iterations on the finest
+    grid.
     """
     surface = gaussian_surface(
         grid((256, 256)), sq=0.5e-6, correlation_length=20e-6, rng=np.random.default_rng(1)
@@ -222,7 +222,9 @@ def test_a_cell_in_deep_overlap_is_not_freed_again_and_again():
 
 
 def hard_ball():
-    """A ball of through-hardened steel at a film ratio of 0.2, its problem and the dry start."""
+    """Return a problem of a ball of through-hardened steel at a film ratio of 0.2, its dry start
+    and a search.
+    """
     hard = contact(
         geometry="point", radius=9.6e-3, load=45.0, length=None, speed=0.41, hardness=6.5e9
     )
@@ -245,9 +247,9 @@ def hertz_pressure(problem):
     return np.sqrt(np.maximum(1.0 - (problem.x**2)[:, None] - across**2, 0.0))
 
 
-def test_steps_of_time_lead_where_newtons_steps_alone_do_not():
-    """Hard steel: eighty of Newton's steps from the dry contact go round, the film that builds up
-    in time arrives.
+def test_time_stepping_converges_where_newton_alone_does_not():
+    """Hard steel: eighty Newton iterations from the dry contact cycle; pseudo-time stepping
+    converges.
     """
     problem, dry, search = hard_ball()
     search.run(problem, newton(problem, dry, second_order=False), 1e-2, 80)
@@ -255,29 +257,29 @@ def test_steps_of_time_lead_where_newtons_steps_alone_do_not():
     assert len(search.history) > 80
 
     search.history.clear()
-    arrived = search.march_in_time(problem, dry, 1.0, tolerance=1e-2)
-    still = search.run(
-        problem, newton(problem, arrived.balance.unknowns, second_order=False), 1e-4, 80
+    marched = search.march_in_time(problem, dry, 1.0, tolerance=1e-2)
+    steady = search.run(
+        problem, newton(problem, marched.balance.unknowns, second_order=False), 1e-4, 80
     )
     assert search.converged(1e-4)
     assert len(search.history) < 200
-    # the last step of time was long: the oil that it still had from before is hardly to be seen
+    # the last time step was long: its transient term is negligible
     shares = [
-        carried_share(one.balance.pressure, one.balance.in_contact) for one in (arrived, still)
+        carried_share(step.balance.pressure, step.balance.in_contact) for step in (marched, steady)
     ]
     assert shares[0] == pytest.approx(shares[1], abs=0.02)
 
 
-def test_newtons_steps_know_how_the_wedge_leans():
-    """The linearised equations of an open, rough film are its outflow's slopes, second order
-    too.
+def test_the_linearisation_includes_the_slope_limiter():
+    """The linearised equations of an open, rough film are the derivatives of its outflow, including
+    the second order.
     """
     problem = contact_problem(
         contact(load=500.0), barus(), rough(COARSE, 0.2e-6, correlation_length=80e-6), MIXED
     )
     rng, start = np.random.default_rng(3), 0.01 + hertz_pressure(problem)
-    at = Pressures(start, start, 2.0)
-    balance = evaluate(problem, at, second_order=True)
+    point = Pressures(start, start, 2.0)
+    balance = evaluate(problem, point, second_order=True)
     assert balance.limiter.max() > 0.4
     assert balance.parted.all()
     change = rng.standard_normal(start.shape) * balance.solved
@@ -285,9 +287,11 @@ def test_newtons_steps_know_how_the_wedge_leans():
     tiny = 1e-6
     outflows = [
         evaluate(
-            problem, Pressures(start + way * change, start + way * change, 2.0), second_order=True
+            problem,
+            Pressures(start + signed_step * change, start + signed_step * change, 2.0),
+            second_order=True,
         ).outflow
-        for way in (tiny, -tiny)
+        for signed_step in (tiny, -tiny)
     ]
     slope = (outflows[0] - outflows[1]) / (2.0 * tiny) * balance.rows.fluid_scale
     np.testing.assert_allclose(
@@ -295,16 +299,16 @@ def test_newtons_steps_know_how_the_wedge_leans():
     )
 
 
-def test_newtons_steps_know_how_the_wedge_opens_where_the_gap_has_settled():
-    """Cells that open by half a contact film lean over: the outflow's slopes, but for what has not
-    settled.
+def test_the_linearisation_includes_the_opening_of_settled_cells():
+    """The second-order part opens over half a contact film. The derivatives agree where the state
+    of the gap has settled.
     """
     surface = rough(COARSE, 1e-6, correlation_length=20e-6)
     problem = contact_problem(contact(load=500.0), barus(), surface, Options(contact_film=0.1e-6))
-    start = 0.01 + 0.1 * hertz_pressure(problem)  # so that no mobility is the least one
+    start = 0.01 + 0.1 * hertz_pressure(problem)  # every mobility is above its lower bound
     shape = evaluate(problem, Pressures(start, start, 0.0), second_order=True).gap
-    at = Pressures(start, start, float(1.01 * problem.contact_gap - shape.min()))
-    balance = evaluate(problem, at, second_order=True)
+    point = Pressures(start, start, float(1.01 * problem.contact_gap - shape.min()))
+    balance = evaluate(problem, point, second_order=True)
     opening = balance.gap < 1.5 * problem.contact_gap
     assert balance.parted.all()
     assert opening.sum() > 2
@@ -312,22 +316,24 @@ def test_newtons_steps_know_how_the_wedge_opens_where_the_gap_has_settled():
     tiny, scale = 1e-7, balance.rows.fluid_scale
     outflows = [
         evaluate(
-            problem, Pressures(*(start + way * change,) * 2, at.approach), second_order=True
+            problem,
+            Pressures(*(start + signed_step * change,) * 2, point.approach),
+            second_order=True,
         ).outflow
-        for way in (tiny, -tiny)
+        for signed_step in (tiny, -tiny)
     ]
     slope = ((outflows[0] - outflows[1]) / (2.0 * tiny) * scale)[balance.solved]
-    fixed, told = (
+    opening_fixed, opening_included = (
         MixedLinear(balance, float, settled).product(change, change, 0.0)[0][balance.solved]
         for settled in (None, np.ones(start.shape, dtype=bool))
     )
-    np.testing.assert_allclose(told, slope, atol=1e-4)
-    assert np.abs(fixed - slope).max() > 0.05
+    np.testing.assert_allclose(opening_included, slope, atol=1e-4)
+    assert np.abs(opening_fixed - slope).max() > 0.05
 
 
-def test_oil_that_fills_a_streak_of_closed_cells_goes_on_in_one_step():
-    """Ruptured cells that the cap holds closed are solved with those that fill, downstream and no
-    farther.
+def test_oil_fills_a_streak_of_closed_cells_in_one_step():
+    """Ruptured cells closed at the cap are filled in one step with the filling cells upstream, and
+    no others.
     """
     problem = contact_problem(
         contact(speed=10.0, hardness=0.9e9), barus(), rough(COARSE, 2e-6, seed=7), MIXED
@@ -339,12 +345,12 @@ def test_oil_that_fills_a_streak_of_closed_cells_goes_on_in_one_step():
     before = evaluate(problem, Pressures(oil, total, approach), second_order=False)
     after = extend_streaks(before)
     closed = (before.solid == CAPPED) & (before.gap <= 1.01 * problem.contact_gap)
-    fills, expected = np.zeros(problem.cells[1], dtype=bool), np.zeros(problem.cells, dtype=bool)
+    filling, expected = np.zeros(problem.cells[1], dtype=bool), np.zeros(problem.cells, dtype=bool)
     for i in range(problem.cells[0]):
-        fills = closed[i] & (
-            fills | ((before.rows.state[i] == LUBRICATED) & (before.oil_residual[i] < 0.0))
+        filling = closed[i] & (
+            filling | ((before.rows.state[i] == LUBRICATED) & (before.oil_residual[i] < 0.0))
         )
-        expected[i] = fills & (before.rows.state[i] == RUPTURED)
+        expected[i] = filling & (before.rows.state[i] == RUPTURED)
     assert expected.sum() > 20
     np.testing.assert_array_equal(after.rows.state != before.rows.state, expected)
     assert (after.rows.state[expected] == LUBRICATED).all()
@@ -353,22 +359,22 @@ def test_oil_that_fills_a_streak_of_closed_cells_goes_on_in_one_step():
     np.testing.assert_array_equal(after.oil_residual[~expected], before.oil_residual[~expected])
 
 
-def test_the_asperities_bear_what_the_oil_does_not():
-    """Oil bears no tension and never more than all; asperities bear only where they touch."""
+def test_the_asperities_carry_the_remainder_of_the_pressure():
+    """The oil pressure lies between zero and the total; only touching asperities carry load."""
     solution = solve_contact(
         contact(hardness=2e9), barus(), rough(COARSE, 1e-6, seed=7), options=MIXED
     )
-    borne = solution.pressure - solution.oil.pressure
+    solid_pressure = solution.pressure - solution.oil.pressure
     assert solution.oil.pressure.min() >= 0.0
-    assert borne.min() > -1e-3 * solution.pressure.max()
+    assert solid_pressure.min() > -1e-3 * solution.pressure.max()
     np.testing.assert_allclose(
-        borne[~solution.in_contact], 0.0, atol=1e-3 * solution.pressure.max()
+        solid_pressure[~solution.in_contact], 0.0, atol=1e-3 * solution.pressure.max()
     )
 
 
-def test_a_closed_cells_equation_grows_with_its_own_pressure():
-    """Scaled by an open cell's derivative it would hardly move, and shut-in oil would count as
-    balanced.
+def test_the_residual_of_a_closed_cell_increases_with_its_pressure():
+    """Scaled by the derivative of an open cell it would hardly change, and trapped oil would count
+    as balanced.
     """
     fast = contact(speed=10.0, hardness=7e9)
     problem = contact_problem(fast, barus(), rough(COARSE, 1e-6, seed=7), MIXED)
@@ -388,7 +394,7 @@ def test_a_closed_cells_equation_grows_with_its_own_pressure():
         assert after.oil_residual[cell] - before.oil_residual[cell] > 0.9e-6
 
 
-def test_a_full_film_is_the_papers_models():
+def test_a_full_film_agrees_with_the_paper_model():
     """Smooth bodies: no cell touches, and both models solve the same equation."""
     flooded, surface = contact(speed=10.0), flat_surface(grid((128, 8)))
     mixed, paper = (
@@ -403,7 +409,7 @@ def test_a_full_film_is_the_papers_models():
 
 
 def test_a_dry_contact_is_the_same_in_every_model():
-    """Without oil there is one pressure."""
+    """Without oil there is only one pressure."""
     mixed, paper = (
         solve_contact(
             contact(hardness=2e9), None, rough(COARSE, 1e-6), options=Options(model=model)
@@ -413,9 +419,9 @@ def test_a_dry_contact_is_the_same_in_every_model():
     np.testing.assert_array_equal(mixed.pressure, paper.pressure)
 
 
-def test_the_oil_that_lubricated_cells_lose_is_counted():
-    """Slow, sharp and elastic: all that any cell of the Hertz zone is left with, of the oil that is
-    carried there.
+def test_the_imbalance_includes_lubricated_cells():
+    """Slow, sharp and elastic: the imbalance of all cells in the Hertz zone, relative to the flow
+    through it.
     """
     slow, surface = (
         contact(hardness=None, speed=0.05),
@@ -433,9 +439,9 @@ def test_the_oil_that_lubricated_cells_lose_is_counted():
     assert contact_state(solution).mass_flux_imbalance == pytest.approx(of_all / carried)
 
 
-def test_blocks_are_nested_where_bodies_touch_firmly_and_not_where_films_are_nearly_closed():
-    """Hard steel on 192 x 144 cells, nested and not: 192 and 176 steps, on another processor 261
-    and 234.
+def test_blocks_are_nested_for_firm_contacts_and_not_for_nearly_closed_films():
+    """Hard steel on 192 x 144 cells with and without nesting: 192 and 176 iterations, on another
+    processor 261 and 234.
     """
     case = load_case(PAPER).with_overrides({"grid.cells": "[128, 128]"})
     soft = solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)

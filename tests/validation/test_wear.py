@@ -1,8 +1,8 @@
-"""Wear of solved contacts against closed forms: volume, depth a passage, Hertz's profile, the decay
-of a wave.
+"""Wear of solved contacts against closed forms: volume, depth per passage, Hertz's profile and the
+decay of a wave.
 
-Equations of Archard's wear; J. F. Archard, J. Appl. Phys. 24 (1953) 981, and K. L. Johnson,
-Contact Mechanics (1985) for pressures.
+Equations of Archard's wear: J. F. Archard, J. Appl. Phys. 24 (1953) 981; pressures: K. L. Johnson,
+Contact Mechanics (1985).
 """
 
 import math
@@ -33,9 +33,9 @@ def worn(hours: float, overrides: dict[str, object] | None = None) -> WearHistor
     return run_wear(worn_case(LINE | (overrides or {})), hours=hours)
 
 
-def jump_by_jump(history: WearHistory, body: int) -> float:
-    """The sum of k times the load of touching cells times the sliding distance, from the table's
-    own columns.
+def volume_from_table(history: WearHistory, body: int) -> float:
+    """Return the sum of k times the load of touching cells times the sliding distance, from the
+    table's columns.
     """
     case, table = history.case, history.table
     load, sliding = case.conditions.load, case.conditions.sliding_speed
@@ -61,25 +61,26 @@ def test_worn_volume_is_k_times_load_times_sliding_distance(rough):
         assert lost * speed / rate * 10e-3 == pytest.approx(
             history.worn_volume[body], rel=1e-9, abs=0.0
         )
+        # the load is met within 1e-4
         assert history.worn_volume[body] == pytest.approx(
-            jump_by_jump(history, body), rel=3e-4, abs=0.0
-        )  # load is met to 1e-4
+            volume_from_table(history, body), rel=3e-4, abs=0.0
+        )
 
 
-def test_depth_a_passage_is_the_line_load_slid_over_the_speed():
+def test_depth_per_passage_is_k_times_line_load_times_sliding_over_surface_speed():
     history = worn(0.01)
-    assert len(history.table) == 2  # one jump, all at the pressure of the new surfaces
+    assert len(history.table) == 2  # a single jump, at the pressure of the initial surfaces
     conditions, clr = history.case.conditions, float(history.table["clr"].iloc[0])
-    assert 0.1 < clr < 0.99  # oil bears some of it
+    assert 0.1 < clr < 0.99  # the oil carries part of the load
     for body, k in ((0, 1e-17), (1, 3e-17)):
-        a_passage = k * 5e4 * clr * conditions.sliding_speed / conditions.surface_speeds[body]
+        expected = k * 5e4 * clr * conditions.sliding_speed / conditions.surface_speeds[body]
         depth = (
             float(history.table[f"worn_depth_{body + 1}_m"].iloc[-1]) / history.overrollings[body]
         )
-        assert depth == pytest.approx(a_passage, rel=3e-4, abs=0.0)
+        assert depth == pytest.approx(expected, rel=3e-4, abs=0.0)
 
 
-def test_depth_a_passage_does_not_ask_for_the_shape_of_the_pressure():
+def test_depth_per_passage_does_not_depend_on_the_pressure_profile():
     # machines.md 5.2: w' = 2e5 N/m, 2 and 1.5 m/s, k = 1e-17: 5.0e-13 and 6.667e-13 m
     smooth = {"surface": "flat", "contact.load": "2000 N", "contact.entrainment_speed": "1.75 m/s"}
     history = worn(0.001, {**DRY, **smooth, "contact.slip": 0.5 / 1.75, "wear.k": "1e-17 1/Pa"})
@@ -92,7 +93,7 @@ def test_depth_a_passage_does_not_ask_for_the_shape_of_the_pressure():
 
 @pytest.mark.parametrize("cells", [[64, 64], [128, 128]])
 def test_a_ball_wears_a_parabola_across_its_track(cells):
-    """A Hertz contact, dry and smooth: k (pi/2) p0 a (1 - y^2/a^2) |u_s|/u_i over the track, within
+    """A dry, smooth Hertz contact wears k (pi/2) p0 a (1 - y^2/a^2) |u_s|/u_i on the track, within
     1 %.
     """
     ball = {"contact.load": "20 N", "surface": "flat", "grid.cells": cells}
@@ -103,14 +104,14 @@ def test_a_ball_wears_a_parabola_across_its_track(cells):
     a, p0 = hertz.half_widths[0], hertz.p_max
     y = history.initial_surfaces.grid.y
     for body, k in ((0, 1e-17), (1, 3e-17)):
-        a_passage = (
+        largest_depth = (
             k * 0.5 * math.pi * p0 * a * conditions.sliding_speed / conditions.surface_speeds[body]
         )
         profile = history.worn.worn[body].mean(axis=0) / history.overrollings[body]
-        expected = a_passage * np.maximum(1.0 - (y / a) ** 2, 0.0)
+        expected = largest_depth * np.maximum(1.0 - (y / a) ** 2, 0.0)
         inner = np.abs(y) < 0.8 * a
         np.testing.assert_allclose(profile[inner], expected[inner], rtol=0.01)
-        assert np.max(np.abs(profile - expected)) < 0.01 * a_passage * (64 / cells[0] + 1.0)
+        assert np.max(np.abs(profile - expected)) < 0.01 * largest_depth * (64 / cells[0] + 1.0)
         area = profile.sum() * history.initial_surfaces.grid.spacing[1]
         assert area == pytest.approx(
             k * 20.0 * conditions.sliding_speed / conditions.surface_speeds[body], rel=3e-4, abs=0.0
@@ -118,7 +119,7 @@ def test_a_ball_wears_a_parabola_across_its_track(cells):
 
 
 def decay_of_ridges(half_width: float, hours: float) -> tuple[float, float]:
-    """How much ridges along rolling have decayed, ln(A0/A), by the solver and in closed form."""
+    """Return the decay of ridges along rolling, ln(A0/A), from the solver and in closed form."""
     grid = {"grid.cells": [96, 32], "grid.x": [-1.2, 1.2], "grid.y": [-half_width, half_width]}
     overrides = {**DRY, **grid, "surface": "flat", "wear.k": ["1e-15 1/Pa", "0 1/Pa"]}
     case = worn_case(LINE | overrides)
@@ -138,21 +139,21 @@ def decay_of_ridges(half_width: float, hours: float) -> tuple[float, float]:
     ), passages * 1e-15 * case.conditions.pair.reduced_modulus * wave * b * sliding / speeds[0]
 
 
-def test_ridges_in_full_contact_decay_by_the_way_that_slides_past_them():
-    """A factor exp(-k E* q b |u_s|/u_1) a passage, where the pressure is more than E* q A/2 all
-    over: within 2 %.
+def test_ridges_in_full_contact_decay_with_the_sliding_distance():
+    """A factor exp(-k E* q b |u_s|/u_1) per passage, where the pressure exceeds E* q A/2
+    everywhere; within 2 %.
 
-    The closed form is that of waves much shorter than the contact is wide, and is come nearer to
-    as they are.
+    The closed form holds for waves much shorter than the contact width, and the agreement improves
+    with shorter waves.
     """
     (wide, of_wide), (narrow, of_narrow) = decay_of_ridges(0.1, 0.006), decay_of_ridges(0.05, 0.003)
     assert of_wide == pytest.approx(of_narrow)
-    assert 0.5 < of_wide < 1.0  # they decay by a good part, and something is left
+    assert 0.5 < of_wide < 1.0  # a considerable decay that leaves measurable ridges
     assert wide == pytest.approx(of_wide, rel=0.02, abs=0.0)
     assert narrow == pytest.approx(of_narrow, rel=0.01, abs=0.0)
 
 
-def test_without_sliding_nothing_is_worn_off():
+def test_without_sliding_there_is_no_wear():
     history = worn(100.0, {"contact.slip": 0.0, "wear.k": "1e-12 1/Pa"})
     assert history.worn_volume == (0.0, 0.0)
     np.testing.assert_array_equal(
@@ -162,7 +163,7 @@ def test_without_sliding_nothing_is_worn_off():
     assert "There is no sliding, so nothing wears off." in history.notes
 
 
-def test_the_energy_law_is_archards_at_k_over_the_boundary_friction():
+def test_the_energy_law_equals_archard_with_k_over_the_boundary_friction():
     by_pressure = worn(0.2)
     by_energy = worn(
         0.2, {"wear.law": "energy", "wear.k": [f"{1e-17 / 0.15!r} 1/Pa", f"{3e-17 / 0.15!r} 1/Pa"]}
@@ -175,7 +176,7 @@ def test_the_energy_law_is_archards_at_k_over_the_boundary_friction():
     )
 
 
-def test_removal_alone_lowers_summits_and_leaves_pits():
+def test_wear_lowers_summits_and_leaves_pits():
     history = worn(1.0, {"wear.k": ["6e-17 1/Pa", "0 1/Pa"]})
     first, last = history.table.iloc[0], history.table.iloc[-1]
     assert last["sq_m"] < 0.98 * first["sq_m"]
@@ -186,7 +187,7 @@ def test_removal_alone_lowers_summits_and_leaves_pits():
     assert np.all(history.final_surfaces.first.heights <= history.initial_surfaces.first.heights)
 
 
-def test_a_harder_wear_coefficient_is_a_faster_clock():
+def test_a_larger_wear_coefficient_accelerates_wear_proportionally():
     slow, fast = worn(0.4), worn(0.1, {"wear.k": ["4e-17 1/Pa", "12e-17 1/Pa"]})
     for key in ("sq_m", "clr", "worn_depth_1_m", "worn_depth_2_m"):
         assert fast.table[key].iloc[-1] == pytest.approx(
@@ -194,7 +195,7 @@ def test_a_harder_wear_coefficient_is_a_faster_clock():
         )
 
 
-def test_halving_the_jump_moves_roughness_and_load_share_little():
+def test_halving_the_jump_hardly_changes_roughness_and_load_share():
     whole, half = (
         worn(1.0, {"wear.k": ["3e-17 1/Pa", "0 1/Pa"], "wear.step": step}) for step in (0.04, 0.02)
     )
@@ -207,8 +208,8 @@ def test_halving_the_jump_moves_roughness_and_load_share_little():
 
 @pytest.mark.skipif(not MEASURED.is_file(), reason="the measured surface is not beside the project")
 def test_a_measured_surface_runs_in(tmp_path):
-    """Its files before and after hold, opened by SurfaceTopography, the parameters that the table
-    has.
+    """SurfaceTopography reads the files before and after wear and finds the parameters of the
+    table.
     """
     surface = {"file": str(MEASURED), "fit": "tile"}
     surface_less = {key: value for key, value in LINE.items() if not key.startswith("surface")}

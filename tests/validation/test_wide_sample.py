@@ -1,4 +1,4 @@
-"""Contacts of the benchmark's wide sample that take what the solver does for the stubborn ones."""
+"""Contacts of the benchmark's wide sample that need the solver's measures for difficult cases."""
 
 import pytest
 from benchmarks.robustness import OIL, contacts, overlap, prepared
@@ -10,11 +10,11 @@ from asperity.ehl.outcome import ATTEMPTS, FROM_DRY
 @pytest.mark.parametrize(
     "number",
     [
-        342,  # two cells flip to and fro: needs another manner of stepping
-        375,  # goes round in circles: needs time steps
+        342,  # two cells alternate: needs another step method
+        375,  # iterations cycle: needs time steps
     ],
 )
-def test_stubborn_contacts_are_solved_at_the_first_attempt(number):
+def test_difficult_contacts_are_solved_at_the_first_attempt(number):
     conditions, surface = prepared(contacts()[number], 128)
     solution = solve_contact(conditions, OIL, surface, options=Options(model="paper"))
     assert solution.convergence.attempt == ATTEMPTS[0]
@@ -24,14 +24,14 @@ def test_stubborn_contacts_are_solved_at_the_first_attempt(number):
 @pytest.mark.parametrize(
     "number",
     [
-        8,  # fronts of ruptured oil ran through closed cells and never came to rest
-        24,  # cells whose wedge was switched on and off as their gap crossed the contact film
-        118,  # the same, beside cells that the oil floods
-        224,  # cells that oil at the cap had flooded, taken for lifted
-        372,  # as 8, and lifted cells asked their neighbours for the film that overlap lacks
+        8,  # fronts of ruptured oil moved through closed cells without end
+        24,  # the wedge switched on and off as the gap crossed the contact film
+        118,  # the same, next to flooded cells
+        224,  # cells flooded at the cap were treated as lifted by oil
+        372,  # as 8, and lifted cells took the missing film of the overlap from their neighbours
     ],
 )
-def test_two_pressures_solve_what_once_went_round_in_circles(number):
+def test_the_mixed_model_solves_contacts_that_used_to_cycle(number):
     conditions, surface = prepared(contacts()[number], 64)
     solution = solve_contact(conditions, OIL, surface)
     assert solution.convergence.attempt in ATTEMPTS[:1] or solution.convergence.attempt == FROM_DRY

@@ -1,8 +1,7 @@
-"""A solved contact, shaken: its equations written out face by face in NumPy and solved as one dense
-complex system.
+"""Linearised dynamic equations of a solved contact, written face by face in NumPy and solved as one
+dense complex system.
 
-Takes from the package what decides each cell and nothing else of its linearisation: slopes come by
-complex steps.
+Only the state of each cell comes from the package; derivatives come from complex steps.
 """
 
 import numpy as np
@@ -15,39 +14,39 @@ TINY = 1e-30
 
 
 def compliance(problem):
-    """Deflection of every cell by a unit of pressure in every other, (cells, cells)."""
+    """Return the deflection of every cell under unit pressure in every other, shape
+    (cells, cells).
+    """
     count = problem.roughness.size
     units = np.eye(count).reshape(count, *problem.cells)
     return np.stack([problem.deflection(unit).ravel() for unit in units], axis=1)
 
 
 def faces_of(balance):
-    """How the model takes content and mobility from cells to faces."""
+    """Return the model's interpolation of content and mobility from cells to faces."""
     accurate = balance.problem.accurate
     upwind = (0.0, 0.0) if isinstance(balance, MixedBalance) else (0.0, 0.5)
     return {"wedge": (0.375, 0.125) if accurate else upwind, "logarithmic": accurate}
 
 
-def shaken_cells(balance, frequencies):
-    """Complex changes of the sum of P as the bodies come closer by 1, at angular frequencies ω
-    a/u.
-    """
+def load_response_of_cells(balance, frequencies):
+    """Complex change of the sum of P per unit of approach, at angular frequencies ω a/u."""
     problem, count = balance.problem, balance.gap.size
-    two = isinstance(balance, MixedBalance)
-    oil_pressure = balance.unknowns.oil if two else balance.pressure
+    two_pressures = isinstance(balance, MixedBalance)
+    oil_pressure = balance.unknowns.oil if two_pressures else balance.pressure
     wet = (balance.rows.state == LUBRICATED).ravel()
-    solid = balance.solid if two else balance.rows.state
+    solid = balance.solid if two_pressures else balance.rows.state
     closed = (solid == TOUCHING).ravel()
     free = ~closed & (solid != CAPPED).ravel()
     held = (
         balance.film.content_by_gap == 0.0
-        if two
+        if two_pressures
         else (balance.gap <= problem.contact_gap) & (solid != LUBRICATED)
     )
-    bend = compliance(problem)
+    deflection = compliance(problem)
 
     def oil_rows(d_pressure, d_gap):
-        """Slope of outflow and of content along a change of the oil's pressure and of the gap."""
+        """Directional derivatives of outflow and content by the oil's pressure and the gap."""
         pressure = oil_pressure + 1j * TINY * d_pressure
         gap = np.maximum(balance.gap, problem.contact_gap) + 1j * TINY * np.where(held, 0.0, d_gap)
         outflow, content = _outflow(balance, pressure, gap)
@@ -58,17 +57,17 @@ def shaken_cells(balance, frequencies):
     for number, cell in enumerate([*oil_cells, *solid_cells]):
         unit = np.zeros(count)
         unit[cell] = 1.0
-        of_oil = number < oil_cells.size
-        total = unit if not (two and of_oil) or free[cell] else np.zeros(count)
-        own = unit if of_oil or not two else np.zeros(count)
-        d_gap = bend @ total
+        is_oil = number < oil_cells.size
+        total = unit if not (two_pressures and is_oil) or free[cell] else np.zeros(count)
+        own = unit if is_oil or not two_pressures else np.zeros(count)
+        d_gap = deflection @ total
         rows, kept = oil_rows(own.reshape(problem.cells), d_gap.reshape(problem.cells))
         totals.append(total)
         columns.append(np.concatenate([rows[oil_cells], d_gap[solid_cells]]))
         stored.append(np.concatenate([kept[oil_cells], np.zeros(solid_cells.size)]))
     by_approach = np.ones(problem.cells)
     rows, kept = oil_rows(np.zeros(problem.cells), by_approach)
-    wanted = np.concatenate([rows[oil_cells], np.ones(solid_cells.size)])
+    rhs = np.concatenate([rows[oil_cells], np.ones(solid_cells.size)])
     kept = np.concatenate([kept[oil_cells], np.zeros(solid_cells.size)])
     matrix, stores, total = (
         np.stack(columns, axis=1),
@@ -77,15 +76,14 @@ def shaken_cells(balance, frequencies):
     )
     return [
         complex(
-            total
-            @ np.linalg.solve(matrix + 1j * frequency * stores, wanted + 1j * frequency * kept)
+            total @ np.linalg.solve(matrix + 1j * frequency * stores, rhs + 1j * frequency * kept)
         )
         for frequency in frequencies
     ]
 
 
 def _outflow(balance, pressure, gap):
-    """Net outflow and oil content of every cell, complex welcome."""
+    """Net outflow and oil content of every cell; complex arguments are allowed."""
     problem = balance.problem
     oil, pascals = problem.lubricant, pressure * problem.p_scale
     density = oil.density(pascals) / oil.density.rho0
@@ -103,12 +101,12 @@ def _outflow(balance, pressure, gap):
     )
     if isinstance(
         balance, MixedBalance
-    ):  # second order, less where the film's content jumps; how open it is stays
+    ):  # second order, limited at film steps; the degree of opening is fixed
         here, before = content[1:-1], content[:-2]
         lean = here * before / (here**2 + before**2)
         added = np.zeros_like(content)
         added[1:-1] = balance.limiter[1:-1] / lean.real * lean * (here - before)
-        leaning = added.copy()
-        leaning[1:] -= added[:-1]
-        outflow = outflow + leaning / dx
+        difference = added.copy()
+        difference[1:] -= added[:-1]
+        outflow = outflow + difference / dx
     return outflow, content

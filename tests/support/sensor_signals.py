@@ -1,4 +1,4 @@
-"""What several sensors hear of one contact, as samples."""
+"""Signals of several sensors on one contact."""
 
 import numpy as np
 
@@ -8,8 +8,10 @@ RATE, SECONDS, BAND = 10_000.0, 4.0, (1800.0, 4000.0)
 TRUTH = np.linspace(2900.0, 3750.0, 8)
 
 
-def hears(rng, f0, heights):
-    """What sensors hear [m/s^2]: the contact's line, one wave for all, and noise of their own."""
+def sensor_signals(rng, f0, heights):
+    """Return acceleration [m/s^2]: the contact's resonance from one common source, and independent
+    noise.
+    """
     samples = round(RATE * SECONDS)
     frequency = np.fft.rfftfreq(samples, 1.0 / RATE)
 
