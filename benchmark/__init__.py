@@ -1,1 +1,1 @@
-"""Certified cases, and the program that makes them."""
+"""Certified cases and the program that computes them."""

@@ -1,9 +1,10 @@
-"""Writes the cases of the benchmark: each statement, and each value by two ways that share no code.
+"""Write the cases of the benchmark: each statement, and each value by two methods without common code.
 
-`python -m benchmark.certify` from the repository's root; it needs the tests' slow twins, tamaas and ContactMechanics. A
-value is that of the first way, the one nearer to exact; its uncertainty is the distance of the two, and at least what
-is left open: 1e-9 of it for closed forms; how far the first way's two coarser grids would have missed its limit; the
-whole step between the two finest grids for rough contacts, a third of it for what settles at second order.
+Run `python -m benchmark.certify` in the repository's root; it needs the tests' reference solvers,
+tamaas and ContactMechanics. The value is that of the first method, the more exact one. Its
+uncertainty is the difference of the two methods, but at least: 1e-9 of the value for closed forms;
+the error of the extrapolation from the first method's two coarser grids; the whole step between the
+two finest grids for rough contacts, a third of it for second-order convergence.
 """
 
 import csv
@@ -19,21 +20,23 @@ import tomli_w
 from benchmark import dry_cases, oiled_cases
 
 HERE = Path(__file__).parent
-MOST = 0.02  # of a value, for an uncertainty: what is known worse is not certified
+MAX_RELATIVE_UNCERTAINTY = 0.02  # values with a larger uncertainty are not certified
 
 
 def stated() -> Iterator[dry_cases.Stated]:
-    """Every case: its name, its statement, and what makes its values."""
+    """Yield every case: its name, its statement, and the function that computes its values."""
     for family in (*dry_cases.FAMILIES, *oiled_cases.FAMILIES):
         yield from family()
 
 
-def main(wanted: Collection[str]) -> None:
-    """Make the cases whose names begin so, all without any; then the table of all that there are."""
-    for name, given, made in stated():
-        if wanted and not name.startswith(tuple(wanted)):
+def main(prefixes: Collection[str]) -> None:
+    """Compute the cases whose names start with a prefix (default: all), then write the table."""
+    for name, given, compute in stated():
+        if prefixes and not name.startswith(tuple(prefixes)):
             continue
-        certified = [entry for value in made() if (entry := _certified(name, *value)) is not None]
+        certified = [
+            entry for value in compute() if (entry := _certified(name, *value)) is not None
+        ]
         text = tomli_w.dumps({**given, "certified": certified})
         (HERE / "cases" / f"{name}.toml").write_text(text, "utf-8")
     with (HERE / "certified.csv").open("w", encoding="utf-8", newline="") as file:
@@ -73,18 +76,18 @@ def _certified(
     unit: str,
     first: tuple[str, float],
     second: tuple[str, float],
-    least: float,
+    min_relative_uncertainty: float,
 ) -> dict[str, Any] | None:
-    doubt = max(abs(first[1] - second[1]), least * abs(first[1]))
-    kept = doubt <= MOST * abs(first[1])
-    sentence = "" if kept else "NOT CERTIFIED"
+    uncertainty = max(abs(first[1] - second[1]), min_relative_uncertainty * abs(first[1]))
+    certifiable = uncertainty <= MAX_RELATIVE_UNCERTAINTY * abs(first[1])
+    sentence = "" if certifiable else "NOT CERTIFIED"
     print(
-        f"{name:18s} {key:16s} {first[1]:.6e} {second[1]:.6e} {100 * doubt / abs(first[1]):.4f} % {sentence}"
+        f"{name:18s} {key:16s} {first[1]:.6e} {second[1]:.6e} {100 * uncertainty / abs(first[1]):.4f} % {sentence}"
     )
     both = [{"by": by, "value": value} for by, value in (first, second)]
     return (
-        {"quantity": key, "unit": unit, "value": first[1], "uncertainty": doubt, "ways": both}
-        if kept
+        {"quantity": key, "unit": unit, "value": first[1], "uncertainty": uncertainty, "ways": both}
+        if certifiable
         else None
     )
 

@@ -1,4 +1,4 @@
-"""Dry cases: each statement, and how each value is found by two ways."""
+"""Dry cases: each statement, and each value by two methods."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -143,7 +143,10 @@ def rough_balls() -> Iterator[Stated]:
 
 
 def _rough_ball(given: dict[str, Any]) -> list[Value]:
-    """Two other people's solvers; what they share is constant pressure on rectangles, so all of the last step is doubt."""
+    """Solve by two third-party codes.
+
+    Both assume constant pressure on rectangles, so the whole last step counts as uncertainty.
+    """
     first = ways.refined("tamaas", given, (128, 256, 512))
     value, step = ways.refined("contactmechanics", given, (96, 192, 384))
     other = (value, {key: 3.0 * first[1][key] for key in step})

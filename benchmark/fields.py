@@ -1,7 +1,7 @@
-"""Fields of the cases by their first way, as netCDF: `python -m benchmark.fields` writes `benchmark/fields/NAME.nc`.
+"""Fields of the cases as netCDF: `python -m benchmark.fields` writes `benchmark/fields/NAME.nc`.
 
-Pressure and film along x (and y) in SI, of what stands still: closed forms of smooth dry contacts and waves, the slow
-twins' nodes of oiled ones.
+Pressure and film along x (and y) in SI for the steady cases by their first method: closed forms for
+smooth dry contacts and waves, the nodes of the reference solvers for lubricated ones.
 """
 
 import sys
@@ -24,7 +24,7 @@ GRIDS = {
 
 
 def field_of(given: oiled.Given) -> xr.Dataset | None:
-    """None of a case whose first way has no field here."""
+    """Return the fields of a case, or None if its first method has none."""
     if given["kind"] in ("ehl", "mixed", "conserving"):
         return _twin(given)
     if given["kind"] == "wave":
@@ -55,22 +55,27 @@ def _twin(given: oiled.Given) -> xr.Dataset:
 def _hertz(given: oiled.Given) -> xr.Dataset:
     modulus, share = ways.modulus(given), np.linspace(-1.2, 1.2, 121)
     if given["geometry"] == "line":
-        found = hertz.line_contact(given["line_load_n_m"], 1.0, given["radius_m"], modulus)
-        x = share * found.half_widths[0]
+        hertzian = hertz.line_contact(given["line_load_n_m"], 1.0, given["radius_m"], modulus)
+        x = share * hertzian.half_widths[0]
         return _dataset(
-            {"x": x}, {"pressure": found.p_max * np.sqrt(np.maximum(1.0 - share**2, 0.0))}
+            {"x": x}, {"pressure": hertzian.p_max * np.sqrt(np.maximum(1.0 - share**2, 0.0))}
         )
     if given["geometry"] == "point":
-        found = hertz.point_contact(given["load_n"], given["radius_m"], modulus)
+        hertzian = hertz.point_contact(given["load_n"], given["radius_m"], modulus)
     else:
-        found = hertz.elliptic_contact(given["load_n"], tuple(given["radius_m"]), modulus)
-    a, b = found.half_widths
+        hertzian = hertz.elliptic_contact(given["load_n"], tuple(given["radius_m"]), modulus)
+    a, b = hertzian.half_widths
     inside = np.maximum(1.0 - share[:, None] ** 2 - share[None, :] ** 2, 0.0)
-    return _dataset({"x": share * a, "y": share * b}, {"pressure": found.p_max * np.sqrt(inside)})
+    return _dataset(
+        {"x": share * a, "y": share * b}, {"pressure": hertzian.p_max * np.sqrt(inside)}
+    )
 
 
 def _wave(given: oiled.Given) -> xr.Dataset:
-    """Westergaard (1939), Johnson (1985) eq. 13.8: zero outside |x| < b, sin(pi b/wavelength)^2 = s."""
+    """Evaluate Westergaard (1939), Johnson (1985) eq. 13.8.
+
+    Pressure is zero outside |x| < b, with sin(pi b/wavelength)^2 = s.
+    """
     length, s = given["wavelength_m"], given["pressure_over_full"]
     mean = s * np.pi * ways.modulus(given) * given["amplitude_m"] / length
     x = (np.arange(400) + 0.5) / 400 * length - length / 2.0
@@ -84,27 +89,32 @@ UNITS = {"pressure": "Pa", "oil_pressure": "Pa", "film": "m", "fill": "1"}
 
 
 def _dataset(axes: dict[str, np.ndarray], fields: dict[str, np.ndarray]) -> xr.Dataset:
-    told = {name: (tuple(axes), field, {"units": UNITS[name]}) for name, field in fields.items()}
-    return xr.Dataset(told, {name: (name, axis, {"units": "m"}) for name, axis in axes.items()})
+    variables = {
+        name: (tuple(axes), field, {"units": UNITS[name]}) for name, field in fields.items()
+    }
+    return xr.Dataset(
+        variables, {name: (name, axis, {"units": "m"}) for name, axis in axes.items()}
+    )
 
 
-def main(wanted: Collection[str]) -> None:
+def main(prefixes: Collection[str]) -> None:
     HERE.mkdir(exist_ok=True)
     for case in load_benchmark(HERE.parent / "cases"):
-        if wanted and not case.name.startswith(tuple(wanted)):
+        if prefixes and not case.name.startswith(tuple(prefixes)):
             continue
-        found = field_of(dict(case.given))
-        if found is not None:
-            found.attrs = {
+        dataset = field_of(dict(case.given))
+        if dataset is not None:
+            dataset.attrs = {
                 "title": case.name,
                 "source": f"benchmark/cases/{case.name}.toml",
                 "Conventions": "CF-1.11",
             }
             packed = {
-                name: {"dtype": "float32", "zlib": True, "complevel": 9} for name in found.data_vars
+                name: {"dtype": "float32", "zlib": True, "complevel": 9}
+                for name in dataset.data_vars
             }
-            found.to_netcdf(HERE / f"{case.name}.nc", engine="h5netcdf", encoding=packed)
-            print(case.name, *found.sizes.items())
+            dataset.to_netcdf(HERE / f"{case.name}.nc", engine="h5netcdf", encoding=packed)
+            print(case.name, *dataset.sizes.items())
 
 
 if __name__ == "__main__":

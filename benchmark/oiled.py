@@ -1,4 +1,4 @@
-"""Cases of oiled contacts as problems of the slow twins, and the quantities of what these find."""
+"""Lubricated cases as problems of the reference solvers, and the quantities of their solutions."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,7 +14,7 @@ Found = dict[str, float]
 
 
 class Stated:
-    """A case with its scales, all from the file's numbers."""
+    """A case and its scales, computed from the numbers of its file."""
 
     def __init__(self, given: Given) -> None:
         self.given = given
@@ -39,7 +39,7 @@ class Stated:
         return twin.line(low, high, nodes[0])
 
     def shape(self, mesh: twin.Mesh, shifted: float = 0.0) -> np.ndarray:
-        """Gap without approach; the waves have moved on by this many half-widths."""
+        """Return the gap without approach; the waves have moved by `shifted` half-widths."""
         x, y = mesh.x[:, None], mesh.y[None, :]
         gap = x**2 / 2.0 + (y**2 / 2.0 if mesh.kind == "ball" else 0.0 * y)
         for amplitude, along, across, phase in self.given.get("waves", []):
@@ -80,8 +80,8 @@ class Stated:
         )
 
 
-def onto(mesh: twin.Mesh, coarse: twin.Mesh, state: twin.State) -> twin.State:
-    """A state on other nodes."""
+def interpolated(mesh: twin.Mesh, coarse: twin.Mesh, state: twin.State) -> twin.State:
+    """Interpolate a state to other nodes."""
 
     def moved(field: np.ndarray) -> np.ndarray:
         values, y = field.reshape(coarse.shape), coarse.y
@@ -92,11 +92,11 @@ def onto(mesh: twin.Mesh, coarse: twin.Mesh, state: twin.State) -> twin.State:
         at = np.stack(np.meshgrid(mesh.x, mesh.y, indexing="ij"), axis=-1)
         return RegularGridInterpolator((coarse.x, y), values)(at).ravel()
 
-    return twin.State(moved(state.oil), moved(state.borne), state.approach)
+    return twin.State(moved(state.oil), moved(state.solid), state.approach)
 
 
 def solved(given: Given, grids: list[tuple[int, int]]) -> Iterator[tuple[twin.Twin, twin.State]]:
-    """On one grid after the other, each from what the last one found."""
+    """Yield the solution on each grid; the previous grid's solution is the initial guess."""
     stated, state, before = Stated(given), None, None
     for nodes in grids:
         solver = twin.Twin(stated.problem(nodes))
@@ -104,7 +104,7 @@ def solved(given: Given, grids: list[tuple[int, int]]) -> Iterator[tuple[twin.Tw
         if state is None:
             state = solver.steady(twin.hertz_start(solver, 0.5))
         else:
-            start = onto(mesh, before, state)
+            start = interpolated(mesh, before, state)
             try:
                 state = solver.settled(start, most=25)
             except twin.NotFound:
@@ -114,12 +114,12 @@ def solved(given: Given, grids: list[tuple[int, int]]) -> Iterator[tuple[twin.Tw
 
 
 def steady(given: Given, grids: list[tuple[int, int]]) -> list[Found]:
-    """Quantities on each grid."""
+    """Return the quantities on each grid."""
     return [quantities(Stated(given), *found) for found in solved(given, grids)]
 
 
 def quantities(stated: Stated, solver: twin.Twin, state: twin.State) -> Found:
-    """In SI."""
+    """Return the quantities of a solution in SI."""
     problem = solver.problem
     mesh, weights = problem.mesh, problem.mesh.weights
     film = np.maximum(solver.gap(state), problem.touch).reshape(mesh.shape)
@@ -139,30 +139,32 @@ def quantities(stated: Stated, solver: twin.Twin, state: twin.State) -> Found:
         found["load_share"] = float((weights @ (pressure * touching)) / (weights @ pressure))
     if problem.keeps_oil:
         content = solver.content(state).reshape(mesh.shape)
-        found["flux_m2_s"] = (
-            float(content[-2].mean()) * stated.height * stated.speed
-        )  # nothing drives it there but u
+        # near the outlet only the entrainment drives the flow
+        found["flux_m2_s"] = float(content[-2].mean()) * stated.height * stated.speed
     return {key: float(value) for key, value in found.items()}
 
 
 def least(film: np.ndarray) -> float:
-    """Vertex of the parabolas through the lowest node and its neighbours along x, and along y where it has both."""
+    """Return the vertex of the parabolas through the lowest node and its neighbours.
+
+    Along y only where the node has both neighbours.
+    """
     i, j = np.unravel_index(int(film.argmin()), film.shape)
 
-    def gained(before: float, here: float, behind: float) -> float:
+    def parabola_drop(before: float, here: float, behind: float) -> float:
         bend = before - 2.0 * here + behind
         return (behind - before) ** 2 / (8.0 * bend) if bend > 0.0 else 0.0
 
     lowest = film[i, j]
     if 0 < i < film.shape[0] - 1:
-        lowest -= gained(film[i - 1, j], film[i, j], film[i + 1, j])
+        lowest -= parabola_drop(film[i - 1, j], film[i, j], film[i + 1, j])
     if 0 < j < film.shape[1] - 1:
-        lowest -= gained(film[i, j - 1], film[i, j], film[i, j + 1])
+        lowest -= parabola_drop(film[i, j - 1], film[i, j], film[i, j + 1])
     return float(lowest)
 
 
 def moving(given: Given, nodes: int) -> Found:
-    """Waves that run through: the film at the middle over their last period, by steps of one node."""
+    """Solve moving waves in steps of one node; the result is the central film's last period."""
     stated = Stated(given)
     solver = twin.Twin(stated.problem((nodes, 1)))
     mesh, problem = solver.problem.mesh, solver.problem
@@ -184,7 +186,7 @@ def moving(given: Given, nodes: int) -> Found:
             "problem": replace(problem, shape=stated.shape(mesh, number * step * rough)),
         }
         guess = twin.State(
-            np.maximum(2.0 * state.oil - before.oil, 0.0), state.borne, state.approach
+            np.maximum(2.0 * state.oil - before.oil, 0.0), state.solid, state.approach
         )
         past = twin.Past(step, once, twice)
         try:
@@ -194,20 +196,23 @@ def moving(given: Given, nodes: int) -> Found:
         before, state = state, following
         once, twice = now.content(state), once
         films.append(float(now.gap(state)[centre]))
-    heard = np.array(films[-period:]) * stated.height
+    films_last_period = np.array(films[-period:]) * stated.height
     turns = np.exp(2j * np.pi * np.arange(period) / period)
     return {
-        "amplitude_ratio": float(2.0 * abs(turns @ heard) / period / amplitude),
-        "h_mean_m": float(heard.mean()),
+        "amplitude_ratio": float(2.0 * abs(turns @ films_last_period) / period / amplitude),
+        "h_mean_m": float(films_last_period.mean()),
     }
 
 
 def limit(found: list[Found], sizes: list[float]) -> tuple[Found, Found]:
-    """Of the last two grids at second order in their spacing, and how far the two before would have missed that."""
+    """Extrapolate from the last two grids at second order in their spacing.
 
-    def of(coarse: int, fine: int, key: str) -> float:
+    Also returns the difference to the extrapolation from the two grids before.
+    """
+
+    def extrapolated(coarse: int, fine: int, key: str) -> float:
         gain = sizes[fine] ** 2 / (sizes[coarse] ** 2 - sizes[fine] ** 2)
         return found[fine][key] + gain * (found[fine][key] - found[coarse][key])
 
-    last = {key: of(-2, -1, key) for key in found[-1]}
-    return last, {key: abs(last[key] - of(-3, -2, key)) for key in last}
+    last = {key: extrapolated(-2, -1, key) for key in found[-1]}
+    return last, {key: abs(last[key] - extrapolated(-3, -2, key)) for key in last}

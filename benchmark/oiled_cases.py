@@ -1,4 +1,4 @@
-"""Oiled cases: smooth lines and balls, mixed and conserving contacts with waves, waves that move, cavities."""
+"""Lubricated cases: smooth lines and balls, mixed and mass-conserving waves, moving waves, cavities."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -83,7 +83,7 @@ def _twinned(
     cells: tuple[int, ...],
     keys: tuple[str, ...],
 ) -> list[Value]:
-    """Values of what stands still: by dense Newton on these grids, and by asperity on its own."""
+    """Return the values of a steady case by dense Newton on these grids and by asperity."""
     found = oiled.limit(oiled.steady(given, grids), [1.0 / (along - 1) for along, _ in grids])
     along, across = grids[-1]
     nodes = f"{along} nodes" if across == 1 else f"{along} x {across} nodes"

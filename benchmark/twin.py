@@ -1,9 +1,10 @@
-"""Slow twins of oiled contacts: nodes, dense matrices, Newton's method on active sets. Written from the equations alone.
+"""Reference solver of lubricated contacts: nodes, dense matrices, Newton's method on active sets.
 
-Nothing here is asperity's. Lengths in the Hertz half-width a, pressures in p_h, gaps in a^2/R, times in a/u, viscosity
-and density over their ambient values; `number` is 12 eta0 u R^2/(a^3 p_h). The unknowns are the oil s at every inner
-node (its pressure, or where oil is kept and s < 0 the share of the film that is missing), the part b of the pressure
-that the bodies bear where they touch, and the approach.
+It is written from the equations alone and shares no code with asperity. Lengths are in units of the
+Hertz half-width a, pressures in p_h, gaps in a^2/R, times in a/u, viscosity and density relative to
+their ambient values; `number` is 12 eta0 u R^2/(a^3 p_h). The unknowns are the oil s at every inner
+node (its pressure; with mass conservation s < 0 is the missing share of the film), the pressure
+`solid` that the bodies carry where they touch, and the approach.
 """
 
 from collections.abc import Callable
@@ -21,7 +22,7 @@ Law = Callable[[Field], tuple[Field, Field]]  # of the pressure: value and slope
 
 @dataclass(frozen=True)
 class Mesh:
-    """Nodes of a line, of a strip that repeats along y, or of half a ball's contact (y >= 0, mirrored)."""
+    """Nodes of a line, a strip that is periodic along y, or half a ball's contact (y >= 0, mirrored)."""
 
     x: Field
     y: Field
@@ -33,14 +34,14 @@ class Mesh:
 
     @property
     def inner(self) -> Field:
-        """Nodes that have a balance of their own; the others have no pressure."""
+        """Nodes with a mass balance; the others have no pressure."""
         inside = np.zeros(self.shape, dtype=bool)
         inside[1:-1, : -1 if self.kind == "ball" else None] = True
         return inside.ravel()
 
     @property
     def weights(self) -> Field:
-        """Area that each node stands for (of a strip over its width, of a ball over both halves)."""
+        """Area of each node (of a strip over its width, of a ball over both halves)."""
         across = np.full(self.y.size, 1.0 / self.y.size)
         if self.kind == "ball":
             across = np.full(self.y.size, 2.0 * (self.y[1] - self.y[0]))
@@ -63,9 +64,9 @@ def half_ball(lower: float, upper: float, side: float, nodes: tuple[int, int]) -
 
 
 def compliance(mesh: Mesh) -> Field:
-    """Deflection at each node by the pressure at each node, dense."""
+    """Return the dense matrix of the deflection at each node by the pressure at each node."""
     if mesh.kind == "ball":
-        return _of_a_ball(mesh)
+        return _ball_compliance(mesh)
     nx, ny = mesh.shape
     dx = mesh.x[1] - mesh.x[0]
     away = np.arange(-nx, nx + 1) * dx
@@ -73,9 +74,8 @@ def compliance(mesh: Mesh) -> Field:
     hats = np.empty((ny, 2 * nx - 1))
     twice = away**2 * (np.where(away == 0.0, 0.0, np.log(far)) / 2.0 - 0.75) / -np.pi
     hats[0] = np.diff(twice, 2) / dx
-    for number in range(
-        1, ny
-    ):  # e^(iky) along y: 2 K0(k |x|) in place of 1/r, integrated twice along x
+    # e^(iky) along y: 2 K0(k |x|) replaces 1/r, integrated twice along x
+    for number in range(1, ny):
         k = 2.0 * np.pi * min(number, ny - number) / (ny * (mesh.y[1] - mesh.y[0]))
         once = iti0k0(k * far)[1] / k
         twice = far * once - (1.0 - k * far * k1(k * far)) / k**2
@@ -85,12 +85,12 @@ def compliance(mesh: Mesh) -> Field:
     return columns[(j[:, None] - j[None, :]) % ny, i[:, None] - i[None, :] + nx - 1]
 
 
-def _of_a_ball(mesh: Mesh) -> Field:
-    """Love (1929): a rectangle of pressure 1 at its own and other nodes; 2/pi^2 is 1/(pi E*) in these units."""
+def _ball_compliance(mesh: Mesh) -> Field:
+    """Evaluate Love (1929) for a rectangle of unit pressure; 1/(pi E*) is 2/pi^2 in these units."""
     dx, dy = mesh.x[1] - mesh.x[0], mesh.y[1] - mesh.y[0]
     nx, ny = mesh.shape
 
-    def at(x: Field, y: Field) -> Field:
+    def deflection(x: Field, y: Field) -> Field:
         def corner(p: Field, q: Field) -> Field:
             return p * np.arcsinh(q / np.abs(p)) + q * np.arcsinh(p / np.abs(q))
 
@@ -98,7 +98,7 @@ def _of_a_ball(mesh: Mesh) -> Field:
         return corner(right, high) - corner(left, high) - corner(right, low) + corner(left, low)
 
     offset_x, offset_y = np.arange(nx) * dx, np.arange(2 * ny) * dy
-    table = 2.0 / np.pi**2 * at(offset_x[:, None], offset_y[None, :])
+    table = 2.0 / np.pi**2 * deflection(offset_x[:, None], offset_y[None, :])
     i, j = (part.ravel() for part in np.indices(mesh.shape))
     apart = np.abs(i[:, None] - i[None, :])
     matrix = table[apart, np.abs(j[:, None] - j[None, :])]
@@ -108,7 +108,7 @@ def _of_a_ball(mesh: Mesh) -> Field:
 
 @dataclass(frozen=True)
 class Problem:
-    """What is to be solved; `shape` is the undeformed gap without approach, roughness taken off."""
+    """Problem to be solved; `shape` is the undeformed gap without approach, less the roughness."""
 
     mesh: Mesh
     shape: Field
@@ -116,24 +116,24 @@ class Problem:
     number: float
     log_viscosity: Law
     density: Law
-    touch: float = 0.0  # gap at which bodies touch; 0 where they do not
+    touch: float = 0.0  # gap at which bodies touch; 0: no solid contact
     keeps_oil: bool = False
 
 
 @dataclass(frozen=True)
 class State:
     oil: Field
-    borne: Field
+    solid: Field
     approach: float
 
     @property
     def pressure(self) -> Field:
-        return np.maximum(self.oil, 0.0) + self.borne
+        return np.maximum(self.oil, 0.0) + self.solid
 
 
 @dataclass(frozen=True)
 class Past:
-    """Contents one and two steps of time ago, and the step; by one backward difference where there is no second."""
+    """Contents one and two time steps ago, and the step; first-order difference without the second."""
 
     step: float
     once: Field
@@ -141,42 +141,44 @@ class Past:
 
 
 class NotFound(Exception):
-    """Newton's steps did not end."""
+    """Newton's method did not converge."""
 
 
 class Twin:
-    """Everything that stays as a contact's pressures change."""
+    """Solver of a problem: its matrices, which do not depend on the pressures."""
 
     def __init__(self, problem: Problem, matrix: Field | None = None) -> None:
         self.problem, mesh = problem, problem.mesh
         self.matrix = compliance(mesh) if matrix is None else matrix
         nx, ny = mesh.shape
         dx = mesh.x[1] - mesh.x[0]
-        each = sparse.identity(ny)
+        same_row = sparse.identity(ny)
         ahead, behind = sparse.eye(nx - 1, nx, 1), sparse.eye(nx - 1, nx)
-        self.mean_x = sparse.kron((ahead + behind) / 2.0, each).tocsr()
-        self.slope_x = sparse.kron((ahead - behind) / dx, each).tocsr()
+        self.mean_x = sparse.kron((ahead + behind) / 2.0, same_row).tocsr()
+        self.slope_x = sparse.kron((ahead - behind) / dx, same_row).tocsr()
         self.out_x = (
-            sparse.kron(sparse.eye(nx, nx - 1) - sparse.eye(nx, nx - 1, -1), each).tocsr() / dx
+            sparse.kron(sparse.eye(nx, nx - 1) - sparse.eye(nx, nx - 1, -1), same_row).tocsr() / dx
         )
-        self.upwind = sparse.kron(behind, each).tocsr()
+        self.upwind = sparse.kron(behind, same_row).tocsr()
         back = sparse.eye(nx - 1, nx) - sparse.eye(nx - 1, nx, -1)
         first = sparse.diags(np.r_[0.0, np.ones(nx - 2)])
-        self.back = sparse.kron(first @ back, each).tocsr()
-        self.both = sparse.kron(first @ abs(back), each).tocsr()
+        self.back = sparse.kron(first @ back, same_row).tocsr()
+        self.both = sparse.kron(first @ abs(back), same_row).tocsr()
         if ny > 1:
             dy = mesh.y[1] - mesh.y[0]
             if mesh.kind == "ball":
-                further, near = sparse.eye(ny - 1, ny, 1), sparse.eye(ny - 1, ny)
+                further, nearer = sparse.eye(ny - 1, ny, 1), sparse.eye(ny - 1, ny)
                 out = sparse.eye(ny, ny - 1) - sparse.eye(ny, ny - 1, -1)
-                out = sparse.diags(np.r_[2.0, np.ones(ny - 1)]) @ out  # the mirror's flow too
+                out = (
+                    sparse.diags(np.r_[2.0, np.ones(ny - 1)]) @ out
+                )  # the flow of the mirrored half, too
             else:
-                near = sparse.identity(ny)
+                nearer = sparse.identity(ny)
                 further = sparse.csr_matrix(np.roll(np.eye(ny), 1, 1))
-                out = near - further.T
+                out = nearer - further.T
             along = sparse.identity(nx)
-            self.mean_y = sparse.kron(along, (further + near) / 2.0).tocsr()
-            self.slope_y = sparse.kron(along, (further - near) / dy).tocsr()
+            self.mean_y = sparse.kron(along, (further + nearer) / 2.0).tocsr()
+            self.slope_y = sparse.kron(along, (further - nearer) / dy).tocsr()
             self.out_y = sparse.kron(along, out).tocsr() / dy
 
     def gap(self, state: State) -> Field:
@@ -189,7 +191,7 @@ class Twin:
         return density * np.maximum(gap, self.problem.touch) * share
 
     def balance(self, state: State, gap: Field, past: Past | None) -> tuple[Field, Any, Any]:
-        """Net outflow of each node, and its slopes in the oil (gap held) and in the gap."""
+        """Return each node's net outflow and its derivatives by oil (at fixed gap) and by gap."""
         p, oil = self.problem, np.maximum(state.oil, 0.0)
         wet = (state.oil >= 0.0).astype(float)
         share = 1.0 + np.minimum(state.oil, 0.0) if p.keeps_oil else np.ones_like(oil)
@@ -237,7 +239,10 @@ class Twin:
         return outflow, slope_oil.tocsr(), slope_gap.tocsr()
 
     def _carried(self, content: Field) -> tuple[Field, Any]:
-        """Content at the faces behind each node, second order; where oil is kept, less so at its fronts; and slopes."""
+        """Return the content at the faces behind each node, second order, and its derivatives.
+
+        With mass conservation, a limiter lowers the order at fronts.
+        """
         rise = self.back @ content
         if not self.problem.keeps_oil:
             return self.upwind @ content + rise / 2.0, self.upwind + self.back / 2.0
@@ -251,12 +256,12 @@ class Twin:
     def settled(
         self, state: State, past: Past | None = None, most: int = 60, tolerance: float = 1e-9
     ) -> State:
-        """By Newton's steps, each on the sets that the last one left.
+        """Solve by Newton's method; each step takes the active sets of the previous one.
 
         Raises
         ------
         NotFound
-            where they go round, or away.
+            if the steps cycle or diverge.
         """
         inner = self.problem.mesh.inner
         for _ in range(most):
@@ -274,9 +279,9 @@ class Twin:
         oil = np.maximum(state.oil, 0.0)
         stiff = np.maximum(by_oil.diagonal() + by_gap.diagonal() * self.matrix.diagonal(), 1e-12)
         wet = inner & ((state.oil - outflow / stiff > 0.0) | p.keeps_oil)
-        closed = inner & (state.borne > (gap - p.touch) / self.matrix.diagonal()) & (p.touch > 0.0)
+        closed = inner & (state.solid > (gap - p.touch) / self.matrix.diagonal()) & (p.touch > 0.0)
         w, t = np.flatnonzero(wet), np.flatnonzero(closed)
-        drop_oil, drop_borne = np.where(wet, 0.0, -state.oil), np.where(closed, 0.0, -state.borne)
+        drop_oil, drop_solid = np.where(wet, 0.0, -state.oil), np.where(closed, 0.0, -state.solid)
         full = (state.oil[w] >= 0.0).astype(float)
         bent = by_gap[w] @ self.matrix[:, np.r_[w, t]]
         rows = np.empty((w.size + t.size + 1,) * 2)
@@ -289,38 +294,38 @@ class Twin:
         rows[w.size : -1, -1] = 1.0
         rows[-1, :-1] = np.r_[weights[w] * full, weights[t]]
         rows[-1, -1] = 0.0
-        sunk = self.matrix @ (drop_oil * (state.oil > 0.0) + drop_borne)
-        asked = np.r_[
+        sunk = self.matrix @ (drop_oil * (state.oil > 0.0) + drop_solid)
+        residual = np.r_[
             outflow[w] + by_oil[w] @ drop_oil + by_gap[w] @ sunk,
             (gap + sunk - p.touch)[t],
-            weights @ (oil + state.borne + drop_oil * (state.oil > 0.0) + drop_borne) - p.load,
+            weights @ (oil + state.solid + drop_oil * (state.oil > 0.0) + drop_solid) - p.load,
         ]
         step = -lu_solve(
-            lu_factor(rows, overwrite_a=True, check_finite=False), asked, check_finite=False
+            lu_factor(rows, overwrite_a=True, check_finite=False), residual, check_finite=False
         )
         step = np.clip(step, -0.3, 0.3)
-        new_oil, new_borne = state.oil + drop_oil, state.borne + drop_borne
+        new_oil, new_solid = state.oil + drop_oil, state.solid + drop_solid
         new_oil[w] += step[: w.size]
-        new_borne[t] += step[w.size : -1]
+        new_solid[t] += step[w.size : -1]
         if not p.keeps_oil:
             new_oil = np.maximum(new_oil, 0.0)
         else:
-            crossed = new_oil * state.oil < 0.0  # put on the border first
+            crossed = new_oil * state.oil < 0.0  # stop at the border first
             border = np.where(new_oil < 0.0, -1e-12, 0.0)
             new_oil = np.where(crossed, border, np.maximum(new_oil, -0.999))
-        new_borne = np.maximum(new_borne, 0.0)
+        new_solid = np.maximum(new_solid, 0.0)
         change = max(
-            np.abs(new_oil - state.oil).max(), np.abs(new_borne - state.borne).max(), abs(step[-1])
+            np.abs(new_oil - state.oil).max(), np.abs(new_solid - state.solid).max(), abs(step[-1])
         )
-        return State(new_oil, new_borne, state.approach + step[-1]), float(change)
+        return State(new_oil, new_solid, state.approach + step[-1]), float(change)
 
     def steady(self, state: State) -> State:
-        """What stands still, by steps of time that grow while they are met."""
+        """Find the steady state by time steps that grow as long as they converge."""
         length, steps = 0.3, 0
         while length < 300.0:
             steps += 1
             if steps > 120:
-                raise NotFound("steps of time stay short")
+                raise NotFound("time steps remain short")
             try:
                 state = self.settled(
                     state, Past(length, self.content(state)), most=14, tolerance=1e-5
@@ -329,12 +334,12 @@ class Twin:
             except NotFound:
                 length /= 4.0
             if length < 1e-4:
-                raise NotFound("steps of time stay short")
+                raise NotFound("time steps remain short")
         return self.settled(state)
 
 
 def hertz_start(twin: Twin, film: float = 0.3) -> State:
-    """Hertz's pressure and a film over it."""
+    """Return Hertz's pressure with a film of this thickness as the initial guess."""
     mesh = twin.problem.mesh
     x, y = mesh.x[:, None], mesh.y[None, :] if mesh.kind == "ball" else 0.0 * mesh.y[None, :]
     oil = np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0)).ravel()
@@ -343,7 +348,7 @@ def hertz_start(twin: Twin, film: float = 0.3) -> State:
 
 
 def carried(twin: Twin, state: State, problem: Problem, steps: int) -> State:
-    """Another problem on the same nodes, reached in steps from the twin's own."""
+    """Solve another problem on the same nodes by steps from the twin's own problem."""
     for part in np.linspace(0.0, 1.0, steps + 1)[1:]:
         between = replace(problem, shape=(1.0 - part) * twin.problem.shape + part * problem.shape)
         state = Twin(between, twin.matrix).steady(state)

@@ -1,11 +1,10 @@
-"""What a certified value is made of: a quantity by two ways, and what their grids leave open."""
+"""Certified values: a quantity by two methods, and the uncertainty of their grids."""
 
 UNITS = {"_pa": "Pa", "_m2_s": "m^2/s", "_n_m": "N/m", "_m2": "m^2", "_m": "m", "_n": "N"}
 
 Found = dict[str, float]
-Value = tuple[
-    str, str, tuple[str, float], tuple[str, float], float
-]  # quantity, unit, two ways, least uncertainty
+# quantity, unit, two methods, smallest relative uncertainty
+Value = tuple[str, str, tuple[str, float], tuple[str, float], float]
 
 
 def unit_of(key: str) -> str:
@@ -19,7 +18,7 @@ def only(found: Found, *keys: str) -> Found:
 def paired(
     first_by: str, first: Found, second_by: str, second: Found, least: float = 1e-9
 ) -> list[Value]:
-    """Both ways of every quantity that both have."""
+    """Pair the two methods for every quantity that both compute."""
     return [
         (key, unit_of(key), (first_by, float(first[key])), (second_by, float(second[key])), least)
         for key in first
@@ -34,7 +33,10 @@ def stepped(
     second: tuple[Found, Found],
     *keys: str,
 ) -> list[Value]:
-    """Values of both ways on ever more cells, each with what its grids leave open; a third of the second's last step."""
+    """Pair two methods on refined grids.
+
+    The smallest uncertainty is the first method's estimate or a third of the second's last step.
+    """
     (value, doubt), (other, step) = first, second
     return [
         (

@@ -1,4 +1,4 @@
-"""The ways by which values of the benchmark are found: closed forms, quadratures, dense twins, and solvers."""
+"""The methods behind the values of the benchmark: closed forms, quadrature, dense solvers, solvers."""
 
 import sys
 from pathlib import Path
@@ -25,7 +25,7 @@ def modulus(given: Given) -> float:
     ).reduced_modulus
 
 
-def of(contact: hertz.HertzContact) -> Found:
+def contact_quantities(contact: hertz.HertzContact) -> Found:
     return {"p_max_pa": contact.p_max, "contact_area_m2": contact.area}
 
 
@@ -40,9 +40,12 @@ def hertz_line(given: Given) -> Found:
 
 
 def dense_line(given: Given, nodes: int = 1601) -> Found:
-    """Contact of an elastic line by a dense matrix of hats and an active set; in units of no closed form."""
+    """Solve an elastic line contact by a dense matrix of hat functions and an active set.
+
+    The units do not come from a closed form.
+    """
     e, radius, load = modulus(given), given["radius_m"], given["line_load_n_m"]
-    scale = np.sqrt(load * radius / e)  # a length that the half-width is near
+    scale = np.sqrt(load * radius / e)  # a length of the order of the half-width
     x = np.linspace(-1.6, 1.6, nodes)
     matrix = 2.0 * compliance(x)  # -(2/(pi E*)) ln|x|, pressures in E* scale/R
     shape = x**2 / 2.0
@@ -79,21 +82,24 @@ def dense_line(given: Given, nodes: int = 1601) -> Found:
 
 def hertz_point(given: Given) -> Found:
     found = hertz.point_contact(given["load_n"], given["radius_m"], modulus(given))
-    return of(found) | {"p_weighted_pa": 0.75 * found.p_max, "half_width_m": found.half_widths[0]}
+    return contact_quantities(found) | {
+        "p_weighted_pa": 0.75 * found.p_max,
+        "half_width_m": found.half_widths[0],
+    }
 
 
 def sneddon(given: Given) -> Found:
-    """Axisymmetric contact by Sneddon's integrals of the profile's slope, all by quadrature."""
+    """Solve an axisymmetric contact by quadrature of Sneddon's integrals of the profile's slope."""
     e, radius, load = modulus(given), given["radius_m"], given["load_n"]
 
     height, length = given.get("rings", (0.0, 1.0))
     number = 2.0 * np.pi / length
 
-    def rises(r: float) -> float:
+    def profile_slope(r: float) -> float:
         return r / radius + height * number * np.sin(number * r)
 
     def depth(x: float) -> float:
-        return x * quad(lambda turn: rises(x * np.sin(turn)), 0.0, np.pi / 2.0)[0]
+        return x * quad(lambda turn: profile_slope(x * np.sin(turn)), 0.0, np.pi / 2.0)[0]
 
     def force(a: float) -> float:
         return 2.0 * e * quad(lambda x: depth(a) - depth(x), 0.0, a)[0]
@@ -111,7 +117,7 @@ def sneddon(given: Given) -> Found:
 
     nodes, weights = np.polynomial.legendre.leggauss(80 if height else 24)
     r = a * np.sqrt((nodes + 1.0) / 2.0)  # even in area
-    p = np.array([pressure(one) for one in r])
+    p = np.array([pressure(distance) for distance in r])
     return {
         "p_max_pa": pressure(0.0),
         "p_weighted_pa": weights @ p**2 / (weights @ p),
@@ -120,18 +126,21 @@ def sneddon(given: Given) -> Found:
 
 
 def hertz_ellipse(given: Given) -> Found:
-    return of(hertz.elliptic_contact(given["load_n"], tuple(given["radius_m"]), modulus(given)))
+    return contact_quantities(
+        hertz.elliptic_contact(given["load_n"], tuple(given["radius_m"]), modulus(given))
+    )
 
 
 def ellipse_by_chords(given: Given) -> Found:
-    """Semi-axes whose half-ellipsoid of pressure dents by both curvatures, by quadrature over chords.
+    """Return the semi-axes whose half-ellipsoid of pressure yields both curvatures.
 
-    A pressure that dents as it should is the one solution; that it is a half-ellipsoid is no premise.
+    The deflection is integrated over chords. The contact has one solution, so the half-ellipsoid
+    need not be assumed.
     """
     e, load, (rx, ry) = modulus(given), given["load_n"], given["radius_m"]
 
     def curvatures(a: float, b: float) -> tuple[float, float]:
-        def over(axis: float, part: Any) -> float:
+        def curvature(axis: float, part: Any) -> float:
             def chord(turn: float) -> float:
                 gamma = (np.cos(turn) / a) ** 2 + (np.sin(turn) / b) ** 2
                 return 1.0 / (axis**2 * gamma**0.5) - part(turn) ** 2 / (axis**4 * gamma**1.5)
@@ -144,21 +153,21 @@ def ellipse_by_chords(given: Given) -> Found:
                 / (2.0 * e)
             )
 
-        return 2.0 * over(a, np.cos), 2.0 * over(b, np.sin)
+        return 2.0 * curvature(a, np.cos), 2.0 * curvature(b, np.sin)
 
     start = np.cbrt(load * np.array([rx, ry]) / e)
 
-    def misses(logs: np.ndarray) -> np.ndarray:
+    def residuals(logs: np.ndarray) -> np.ndarray:
         x, y = curvatures(*(start * np.exp(logs)))
         return np.array([x * rx - 1.0, y * ry - 1.0])
 
-    a, b = start * np.exp(fsolve(misses, np.zeros(2), xtol=1e-13))
+    a, b = start * np.exp(fsolve(residuals, np.zeros(2), xtol=1e-13))
     p_max = 1.5 * load / (np.pi * a * b)
     return {"p_max_pa": p_max, "contact_area_m2": np.pi * a * b}
 
 
 def westergaard(given: Given) -> Found:
-    """Westergaard (1939), Johnson (1985) eqs 13.8 to 13.10, at s = p/p*."""
+    """Evaluate Westergaard (1939), Johnson (1985) eqs 13.8 to 13.10, at s = p/p*."""
     s, amplitude = given["pressure_over_full"], given["amplitude_m"]
     mean = s * np.pi * modulus(given) * amplitude / given["wavelength_m"]
     return {
@@ -168,7 +177,7 @@ def westergaard(given: Given) -> Found:
 
 
 def dense_wave(given: Given, nodes: int = 800) -> Found:
-    """A wave of a periodic half-space by its Fourier coefficients, a dense matrix and an active set."""
+    """Solve a wave on a periodic half-space by a dense matrix of Fourier terms and an active set."""
     e, length, amplitude = modulus(given), given["wavelength_m"], given["amplitude_m"]
     mean = given["pressure_over_full"] * np.pi * e * amplitude / length
     x = (np.arange(nodes) + 0.5) / nodes
@@ -200,7 +209,7 @@ def dense_wave(given: Given, nodes: int = 800) -> Found:
 
 
 def random_waves(sq: float, side: float, seed: int) -> list[list[float]]:
-    """Twelve waves of two to seven periods over the side that add up to Sq."""
+    """Draw twelve waves of two to seven periods over the side; together they have this Sq."""
     assert side > 0.0
     rng = np.random.default_rng(seed)
     waves = [
@@ -216,21 +225,23 @@ def random_waves(sq: float, side: float, seed: int) -> list[list[float]]:
 
 
 def refined(solver: str, given: Given, cells: tuple[int, ...]) -> tuple[Found, Found]:
-    """On the last two grids extrapolated at the order that the last three show, and how far the last two lie apart."""
+    """Extrapolate from the last two grids at the order observed on the last three.
+
+    Also returns the difference between the last two grids.
+    """
     grids = [solver_named(solver).solve(given, count) for count in cells]
     value, step = {}, {}
     for key in grids[-1]:
         first, second, third = (grid[key] for grid in grids[-3:])
         ratio = (second - first) / (third - second) if third != second else 4.0
-        gain = (
-            1.0 / (ratio - 1.0) if ratio > 1.5 else 1.0
-        )  # else it does not settle, and all of the step is doubt
+        # below 1.5 the grids do not converge: the whole step is the uncertainty
+        gain = 1.0 / (ratio - 1.0) if ratio > 1.5 else 1.0
         value[key], step[key] = third + min(gain, 1.0) * (third - second), abs(third - second)
     return value, step
 
 
 def newton_on_nodes(given: Given, grids: tuple[int, int] = (401, 801)) -> Found:
-    """The tests' dense Newton, extrapolated at second order."""
+    """Solve by the tests' dense Newton method, extrapolated at second order."""
     oil, radius, speed = (
         given["oil"],
         given["radius_m"],
@@ -267,11 +278,14 @@ def newton_on_nodes(given: Given, grids: tuple[int, int] = (401, 801)) -> Found:
 def shooting(
     gap: Any, given: Given, start: float, widest_end: float, first: float, narrowest: float
 ) -> Found:
-    """Flow at which pressure and its slope end together, by quadrature of 12 eta (u h - q)/h^3."""
+    """Find the flow at which pressure and its slope vanish together.
+
+    The pressure gradient 12 eta (u h - q)/h^3 is integrated by quadrature.
+    """
     eta, u = given["viscosity_pa_s"], given["speed_m_s"]
     points, weights = np.polynomial.legendre.leggauss(400)
 
-    def gained(flux: float, end: float) -> float:
+    def pressure_gain(flux: float, end: float) -> float:
         x = start + (points + 1.0) / 2.0 * (end - start)
         return (end - start) / 2.0 * weights @ (12.0 * eta * (u * gap(x) - flux) / gap(x) ** 3)
 
@@ -280,16 +294,16 @@ def shooting(
 
     least = u * gap(narrowest)
     flux = brentq(
-        lambda q: first + gained(q, rupture(q)),
+        lambda q: first + pressure_gain(q, rupture(q)),
         1.0001 * least,
         min(1.9 * least, 0.9999 * u * gap(widest_end)),
         xtol=1e-18,
     )
     top = brentq(lambda x: u * gap(x) - flux, start, narrowest, xtol=1e-15)
     x = np.linspace(start, rupture(flux), 4001)
-    p = first + np.array([gained(flux, one) for one in x])
+    p = first + np.array([pressure_gain(flux, place) for place in x])
     return {
-        "p_max_pa": first + gained(flux, top),
+        "p_max_pa": first + pressure_gain(flux, top),
         "flux_m2_s": flux,
         "load_n_m": float(np.trapezoid(p, x)),
     }
@@ -316,7 +330,7 @@ def journal(given: Given) -> Found:
 
 
 def sommerfeld(given: Given) -> Found:
-    """By 1 + e cos(phi) = (1 - e^2)/(1 - e cos(gamma)); Pinkus and Sternlicht (1961)."""
+    """Substitute 1 + e cos(phi) = (1 - e^2)/(1 - e cos(gamma)); Pinkus and Sternlicht (1961)."""
     c, e, r = given["clearance_m"], given["eccentricity"], given["radius_m"]
     eta, u = given["viscosity_pa_s"], given["speed_m_s"]
 

@@ -1,1 +1,1 @@
-"""Every figure that the docs quote, measured: `make bench`."""
+"""Benchmarks that measure every figure quoted in the docs: `make bench`."""

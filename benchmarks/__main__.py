@@ -1,9 +1,8 @@
-"""`make bench`: every figure that the docs quote, measured part by part within a time, kept, and
-compared.
+"""Measure every figure quoted in the docs part by part, store the results and compare them: `make
+bench`.
 
-Each part runs in a process of its own, on one thread: one that fails or takes too long is named at
-the end, with what it said the last time left standing. A run that is cut off, or out of time, goes
-on where it stopped.
+Each part runs in its own process on one thread. A part that fails or exceeds its time limit is
+listed at the end; its previous results stay. An interrupted run resumes where it stopped.
 """
 
 import argparse
@@ -25,8 +24,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks import kept, unfinished
 from benchmarks.unfinished import Unfinished
 
-# whose times are their result: nothing runs beside them; those first that the others' are told
-# against
+# parts whose result is a time: nothing runs alongside; the references of other parts come first
 ALONE = (
     "prompt",
     "roughness_levels",
@@ -48,8 +46,8 @@ ALONE = (
     "monitor",
     "gallery",
 )
-# what is counted, on each processor one of these, each one part or some that need what another
-# keeps
+# parts without timings: one entry per processor; an entry is a part, or parts that depend on
+# each other
 ABREAST = (
     ("inference", "forecast", "next_points", "rings"),  # the longest first
     ("wearing",),
@@ -66,7 +64,7 @@ ABREAST = (
     ("vibration",),
 )
 PARTS = (*ALONE, *chain.from_iterable(ABREAST))
-# short enough as they are, whatever is asked
+# short enough to run at full size always
 WHOLE = (
     "certified",
     "chosen_films",
@@ -83,55 +81,59 @@ ON_ALL = (
     "first_call",
     "prompt",
     "page",
-)  # as their users have them, on all processors
-TIMES = "times"  # the part that says how long the others took
+)  # as users run them, on all processors
+TIMES = "times"  # the part that lists how long the others took
 
 
-class Asked(NamedTuple):
-    """What a run is asked for."""
+class RunRequest(NamedTuple):
+    """Parts and limits of a run."""
 
     parts: tuple[str, ...]
     whole: bool
     seconds: float
-    most: float  # seconds of one part
+    most: float  # time limit of one part
 
 
 def main() -> None:
-    """Run the parts, keep what they say as csv, write the page and say what changed."""
+    """Run the parts, store their output as csv, write the page and print the changes."""
     arguments = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     arguments.add_argument(
-        "parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all unless named"
+        "parts", nargs="*", metavar="PART", help=f"one of {', '.join(PARTS)}; default: all"
     )
     arguments.add_argument(
-        "--whole", action="store_true", help="the long parts at full size, too: hours"
+        "--whole", action="store_true", help="run the long parts at full size (hours)"
     )
     arguments.add_argument(
-        "--minutes", type=float, help="of all parts together; 40 unless given, no end if whole"
+        "--minutes", type=float, help="limit of all parts together (default 40; none with --whole)"
     )
     arguments.add_argument(
-        "--most", type=float, help="minutes of one part; 8 unless given, no end if whole"
+        "--most", type=float, help="limit of one part in minutes (default 8; none with --whole)"
     )
     arguments.add_argument(
-        "--afresh", action="store_true", help="all parts, also those of a run that was cut off"
+        "--afresh", action="store_true", help="restart an interrupted run from its first part"
     )
     arguments.add_argument("--alone", type=float, metavar="SECONDS", help=argparse.SUPPRESS)
-    wanted = arguments.parse_args()
-    if unknown := [part for part in wanted.parts if part not in PARTS]:
-        arguments.error(f"there is no part {unknown[0]}; there are {', '.join(PARTS)}")
-    if wanted.alone:
-        for line in _said(wanted.parts[0], whole=wanted.whole, seconds=wanted.alone):
+    arguments_given = arguments.parse_args()
+    if unknown := [part for part in arguments_given.parts if part not in PARTS]:
+        arguments.error(f"unknown part {unknown[0]}; choose from {', '.join(PARTS)}")
+    if arguments_given.alone:
+        for line in _printed_lines(
+            arguments_given.parts[0], whole=arguments_given.whole, seconds=arguments_given.alone
+        ):
             print(line, flush=True)
         return
     minutes, most = (
-        given or (float("inf") if wanted.whole else usual)
-        for given, usual in ((wanted.minutes, 40), (wanted.most, 8))
+        given or (float("inf") if arguments_given.whole else usual)
+        for given, usual in ((arguments_given.minutes, 40), (arguments_given.most, 8))
     )
-    asked = Asked(tuple(wanted.parts or PARTS), wanted.whole, 60.0 * minutes, 60.0 * most)
+    request = RunRequest(
+        tuple(arguments_given.parts or PARTS), arguments_given.whole, 60.0 * minutes, 60.0 * most
+    )
     run = Unfinished.of(
-        asked.parts,
-        whole=wanted.whole,
-        afresh=wanted.afresh,
-        file=None if wanted.parts else unfinished.FILE,
+        request.parts,
+        whole=arguments_given.whole,
+        afresh=arguments_given.afresh,
+        file=None if arguments_given.parts else unfinished.FILE,
     )
     if run.done:
         print(
@@ -139,29 +141,29 @@ def main() -> None:
             " anew.\n",
             flush=True,
         )
-    _measure(asked, run)
-    _conclude(run, alone=bool(wanted.parts))
-    sys.exit(any(trouble for _, trouble, _ in run.done.values()) or bool(run.left))
+    _measure(request, run)
+    _conclude(run, alone=bool(arguments_given.parts))
+    sys.exit(any(failure for _, failure, _ in run.done.values()) or bool(run.left))
 
 
-def _measure(asked: Asked, run: Unfinished) -> None:
-    """Run what is left, within the time; each part is kept as it ends."""
-    end, saying = perf_counter() + asked.seconds, threading.Lock()
+def _measure(request: RunRequest, run: Unfinished) -> None:
+    """Run the remaining parts within the time limit; store each part when it ends."""
+    end, print_lock = perf_counter() + request.seconds, threading.Lock()
 
     def measure(part: str) -> None:
         began = perf_counter()
-        seconds = min(asked.most, end - began)
+        seconds = min(request.most, end - began)
         if seconds <= 0.0:
             return
-        printed, trouble = _run(part, whole=asked.whole, seconds=seconds)
-        with saying:
-            if seconds < asked.most and trouble.startswith(
+        printed, failure = _run(part, whole=request.whole, seconds=seconds)
+        with print_lock:
+            if seconds < request.most and failure.startswith(
                 "stopped"
-            ):  # by the end of all: the next run has it first
+            ):  # stopped by the limit of the whole run: the next run starts with it
                 return
-            changed = [] if trouble else kept.keep(part, printed.splitlines())
-            run.end(part, perf_counter() - began, trouble, changed)
-            print(f"{part}: {trouble}\n" if trouble else printed, flush=True)
+            changed = [] if failure else kept.keep(part, printed.splitlines())
+            run.end(part, perf_counter() - began, failure, changed)
+            print(f"{part}: {failure}\n" if failure else printed, flush=True)
 
     def in_turn(parts: Iterable[str]) -> None:
         for part in parts:
@@ -175,12 +177,12 @@ def _measure(asked: Asked, run: Unfinished) -> None:
 
 
 def _conclude(run: Unfinished, *, alone: bool) -> None:
-    """Write the page, and say what the parts took and what changed."""
+    """Write the page; print the duration of each part and what changed."""
     times = [
-        f"| {part} | {seconds:.0f} | {trouble or 'measured'} |"
-        for part, (seconds, trouble, _) in run.done.items()
+        f"| {part} | {seconds:.0f} | {failure or 'measured'} |"
+        for part, (seconds, failure, _) in run.done.items()
     ]
-    times = ["## What the parts took", "", "| part | time [s] | outcome |", "|---|---|---|", *times]
+    times = ["## Time of each part", "", "| part | time [s] | outcome |", "|---|---|---|", *times]
     changed = [line for _, _, lines in run.done.values() for line in lines]
     if not alone and not run.left:
         kept.keep(TIMES, times)
@@ -191,26 +193,28 @@ def _conclude(run: Unfinished, *, alone: bool) -> None:
             [
                 *times,
                 "",
-                f"## What changed by more than {100 * kept.CHANGED:.0f} % against the last",
+                f"## Changes of more than {100 * kept.CHANGED:.0f} % since the last run",
                 "",
             ]
         )
     )
     print("\n".join(changed) or "Nothing.")
     if run.left:
-        print(f"\nOut of time before {', '.join(run.left)}: the same command goes on there.")
+        print(f"\nOut of time before {', '.join(run.left)}: the same command resumes there.")
 
 
-def _said(part: str, *, whole: bool, seconds: float) -> Iterator[str]:
-    """A part's lines, and whether that is all of it, unless it says how large its sample is.
+def _printed_lines(part: str, *, whole: bool, seconds: float) -> Iterator[str]:
+    """Yield a part's lines and, unless it states its sample size, whether it was measured in full.
 
-    One that asks for its `seconds` does what it has time for, and goes on the next time.
+    A part with a `seconds` parameter computes what fits into that time and resumes in the next run.
     """
-    told = importlib.import_module(f"benchmarks.{part}").lines
-    asks = {"seconds": seconds} if "seconds" in inspect.signature(told).parameters else {}
+    part_lines = importlib.import_module(f"benchmarks.{part}").lines
+    time_limit = (
+        {"seconds": seconds} if "seconds" in inspect.signature(part_lines).parameters else {}
+    )
     counted = part in WHOLE
     with nullcontext() if part in ON_ALL else threadpool_limits(1):
-        for line in told(fast=not whole and part not in WHOLE, **asks):
+        for line in part_lines(fast=not whole and part not in WHOLE, **time_limit):
             counted = counted or kept.SAMPLE.match(line) is not None
             yield line
     if not counted:
@@ -218,7 +222,7 @@ def _said(part: str, *, whole: bool, seconds: float) -> Iterator[str]:
 
 
 def _run(part: str, *, whole: bool, seconds: float) -> tuple[str, str]:
-    """What a part prints, and what kept it from doing so to the end."""
+    """Return what a part prints, and the reason if it did not finish."""
     command = [
         sys.executable,
         "-m",

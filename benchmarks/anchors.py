@@ -1,8 +1,8 @@
-"""Four studies against what the paper prints: `python -m benchmarks.anchors [CELLS]`.
+"""Compare four studies with the paper's printed values: `python -m benchmarks.anchors [CELLS]`.
 
-Default: examples/paper.toml, by its own model and by the paper's; as printed: the domain that the
-paper prints, which starves the film; calibrated: the free parameters that meet the anchors best
-(docs/theory/calibration.md); both by the paper's model.
+Default: examples/paper.toml with its own model and with the paper's. As printed: the domain in the
+paper, which starves the film. Calibrated: the free parameters that fit the anchors best
+(docs/theory/calibration.md). The last two use the paper's model.
 """
 
 import sys
@@ -64,13 +64,13 @@ def print_anchors(cells: int | None = None) -> None:
             f"| {anchor.name} | {sign}{shown(anchor.quantity, anchor.value)} |"
             f" {' | '.join(cells_shown)} |"
         )
-    for name, what in (
+    for name, reference in (
         ("ends", "two printed ends"),
         ("knee", "12 rings, bent"),
         ("smooth", "12 rings, saturating"),
     ):
         off = [f"{rig_deviation(curve)[name]:.0f} Hz" for curve in found.values()]
-        print(f"| rms deviation of CRF from the rig, {what} | - | {' | '.join(off)} |")
+        print(f"| rms deviation of CRF from the rig, {reference} | - | {' | '.join(off)} |")
     for preset in ("sound", "paper"):
         stages = [curve.stages[preset].kind for curve in found.values()]
         print(f"| stages, preset {preset} | severe | {' | '.join(stages)} |")

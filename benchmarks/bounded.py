@@ -1,10 +1,9 @@
-"""Two hundred ellipses and a hundred rollers from fixed Latin hypercubes, rough and lubricated:
-does every one solve?
+"""Solve 200 ellipses and 100 rollers from fixed Latin hypercubes, rough and lubricated.
 
 Ellipses: Rx 4-20 mm, Ry/Rx 0.3-10, 5-500 N. Rollers: R 2-20 mm, 1-20 mm long, 20-400 N/mm;
-straight, with the logarithm of half to thrice the load, or a circular crown that falls back by
-1-50 um; half of them tilted by up to 2 mrad. Both: Sq 0.05-2 um, correlation lengths 10-120 um or
-four cells, pressure cap 1, 2, 4 GPa or none, inlet at -4.5 or -1.9 half-widths, 0.01-20 m/s.
+logarithmic profile for half to three times the load, or a circular crown with a drop of 1-50 um;
+half of them tilted by up to 2 mrad. Both: Sq 0.05-2 um, correlation lengths 10-120 um or four
+cells, pressure cap 1, 2, 4 GPa or none, inlet at -4.5 or -1.9 half-widths, 0.01-20 m/s.
 """
 
 import csv
@@ -44,14 +43,16 @@ def _between(low: float, high: float, share: float) -> float:
 
 def _rough(shares: np.ndarray, number: int, grid: Grid) -> Surface:
     least, most = [4.0 * cell for cell in grid.spacing], [0.4 * side for side in grid.extent]
-    wanted = _between(10e-6, 120e-6, shares[1])
-    lengths = tuple(min(max(wanted, low), high) for low, high in zip(least, most, strict=True))
+    sampled_length = _between(10e-6, 120e-6, shares[1])
+    lengths = tuple(
+        min(max(sampled_length, low), high) for low, high in zip(least, most, strict=True)
+    )
     rng, sq = np.random.default_rng(number), _between(0.05e-6, 2e-6, shares[0])
     return gaussian_surface(grid, sq=sq, correlation_length=(lengths[0], lengths[1]), rng=rng)
 
 
 def ellipses(count: int = 200) -> Iterator[tuple[int, ContactConditions, Surface]]:
-    """The sample: numbers, contacts and roughness."""
+    """Yield number, contact and roughness of each sample."""
     for number, row in enumerate(_sample(count, 8, 20261122)):
         radius, speed = _between(4e-3, 20e-3, row[2]), _between(0.01, 20.0, row[7])
         conditions = ContactConditions(
@@ -72,7 +73,7 @@ def ellipses(count: int = 200) -> Iterator[tuple[int, ContactConditions, Surface
 
 
 def rollers(count: int = 100) -> Iterator[tuple[int, ContactConditions, Surface]]:
-    """The sample: numbers, contacts and roughness."""
+    """Yield number, contact and roughness of each sample."""
     for number, row in enumerate(_sample(count, 11, 20261123)):
         radius, length, speed = (
             _between(2e-3, 20e-3, row[2]),
@@ -105,7 +106,7 @@ def rollers(count: int = 100) -> Iterator[tuple[int, ContactConditions, Surface]
 def outcomes(
     contacts: Iterator[tuple[int, ContactConditions, Surface]],
 ) -> Iterator[dict[str, object]]:
-    """Each contact solved, a row each."""
+    """Solve each contact and return one row for each."""
     for number, conditions, surface in contacts:
         began = time.process_time()
         solution = solve_contact(conditions, OIL, surface, strict=False)
@@ -128,7 +129,7 @@ def outcomes(
 
 
 def lines(*, fast: bool, artefact: Path = Path("build/bounded.csv")) -> Iterator[str]:
-    """The summary as Markdown; every contact and what became of it goes into `artefact`."""
+    """Yield the summary as Markdown; all outcomes go into `artefact`."""
     samples = {"ellipses": ellipses(20 if fast else 200), "rollers": rollers(10 if fast else 100)}
     artefact.parent.mkdir(exist_ok=True)
     yield "## Ellipses and rollers from fixed Latin hypercubes, 128 x 128 and 128 x 256"
@@ -149,8 +150,8 @@ def lines(*, fast: bool, artefact: Path = Path("build/bounded.csv")) -> Iterator
                 [float(str(row[key])) for row in solved] for key in ("processor_s", "steps")
             )
             yield (
-                f"{name}: {len(solved)} of {len(rows)} solved, the rest said so; median"
+                f"{name}: {len(solved)} of {len(rows)} solved, the others reported failure; median"
                 f" {np.median(times):.1f} s of processor time and {np.median(steps):.0f} steps, at"
                 f" most {max(times):.0f} s."
             )
-    yield f"All of it: {artefact}."
+    yield f"All results: {artefact}."

@@ -1,4 +1,4 @@
-"""Solvers held against the benchmark's certified values: error and time by family of cases."""
+"""Compare solvers with the benchmark's certified values: error and time by family of cases."""
 
 from collections.abc import Iterator
 from statistics import median
@@ -16,8 +16,8 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield "## The benchmark's certified values"
     yield ""
     yield (
-        "Relative to the certified value; processor time of a case, all that is loaded and compiled"
-        " once apart."
+        "Errors relative to the certified value; processor time per case, excluding imports and"
+        " compilation."
     )
     yield ""
     yield (

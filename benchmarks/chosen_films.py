@@ -1,10 +1,9 @@
-"""Smooth films on the grid that is chosen for them: lines of M 5 to 500, a soft ball, light
-contacts.
+"""Smooth films on automatic grids: lines of M 5 to 500, a soft ball, light contacts.
 
-The lines' films are those of an independent one-dimensional solver on non-uniform nodes, X
--4.5..1.9, of M 5 -10..3; one least film is of the twin of it in the tests
-(`tests/validation/test_auto_grid.py` holds the same). The soft ball is compared with Hamrock and
-Dowson's fit for soft bodies (1978), light contacts with themselves on X -30..8, 1024 cells.
+Line films are compared with an independent one-dimensional solver on non-uniform nodes, X
+-4.5..1.9, for M 5 -10..3; one minimum film comes from its counterpart in the tests
+(`tests/validation/test_auto_grid.py` checks the same). The soft ball is compared with Hamrock and
+Dowson's fit for soft bodies (1978), light contacts with a fine grid, X -30..8, 1024 cells.
 """
 
 import time
@@ -53,8 +52,9 @@ kind = "flat"
 
 
 def timed(conditions: ContactConditions, oil: Lubricant) -> tuple[ContactSolution, float]:
-    """Solved on the chosen grid, and the least processor time of a few tries [s], choosing
-    included.
+    """Return the solution on the automatic grid and the least processor time of a few tries [s].
+
+    The time includes the choice of the grid.
     """
     seconds = []
     for _ in range(TRIES):
@@ -67,7 +67,7 @@ def timed(conditions: ContactConditions, oil: Lubricant) -> tuple[ContactSolutio
 
 
 def films(solution: ContactSolution) -> tuple[float, float]:
-    """At x = 0 and least [m]."""
+    """Return the film at x = 0 and the minimum film [m]."""
     middle = slice(solution.grid.cells[1] // 2 - 1, solution.grid.cells[1] // 2 + 1)
     along = solution.gap[:, middle].mean(axis=1)
     return float(np.interp(0.0, solution.grid.x, along)), float(solution.gap.min())
@@ -75,8 +75,9 @@ def films(solution: ContactSolution) -> tuple[float, float]:
 
 def heavy() -> Iterator[str]:
     yield (
-        "| M, L, law | cells | time [s] | H_c | off by [%] | own bar [%] | H_min | off by [%] | own"
-        " bar [%] | held |"
+        "| M, L, law | cells | time [s] | H_c | off by [%] | error bar [%] | H_min | off by [%] |"
+        " error"
+        " bar [%] | covered |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for load_number, oil_number, law, central, least in FILMS:
@@ -110,8 +111,8 @@ def light() -> Iterator[str]:
         )
         solution, seconds = timed(conditions, oil)
         off = [
-            f"{100.0 * (near / there - 1.0):+.2f}"
-            for near, there in zip(films(solution), far, strict=True)
+            f"{100.0 * (value / reference - 1.0):+.2f}"
+            for value, reference in zip(films(solution), far, strict=True)
         ]
         shown = " x ".join(map(str, solution.grid.cells))
         yield f"| {load_number}, {oil_number} | {shown} | {seconds:.2f} | {' | '.join(off)} |"
@@ -134,13 +135,13 @@ def soft() -> str:
 
 
 def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - short as it is
-    """The tables as Markdown."""
-    yield "## Smooth films on the grid that is chosen\n"
+    """Yield the tables as Markdown."""
+    yield "## Smooth films on automatic grids\n"
     yield (
-        f"Lines, processor time on one thread, least of {TRIES}; held: within 1 % or the solution's"
-        " own bar:\n"
+        f"Lines, processor time on one thread, least of {TRIES}; covered: error within 1 % or the"
+        " stated error bar:\n"
     )
     yield from heavy()
     yield f"\n{soft()}\n"
-    yield "Light contacts against themselves with an inlet from -30 half-widths:\n"
+    yield "Light contacts against the same contacts with an inlet from -30 half-widths:\n"
     yield from light()

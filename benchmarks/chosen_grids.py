@@ -1,9 +1,7 @@
-"""Hard-steel contacts on the grid that is chosen for them, against one finer by 1.5 in both
-directions.
+"""Hard-steel contacts on automatic grids, against grids finer by 1.5 in both directions.
 
-Fifty random ones: cap 5 to 8 GPa, Hertz's pressure 1 to 2.5 GPa, film ratio 0.1 to 2; lines, balls
-and ellipses. Asks how many are solved, how long that takes, and whether CLR is within its error
-bar of the finer grid's.
+Fifty random lines, balls and ellipses: cap 5 to 8 GPa, Hertz pressure 1 to 2.5 GPa, film ratio 0.1
+to 2. Measures how many converge, the time, and whether the error bar of CLR covers the finer grid.
 """
 
 import json
@@ -23,11 +21,11 @@ from asperity.solution import contact_state, undetermined
 from asperity.surface import gaussian_surface
 from benchmarks.unfinished import stamp
 
-COUNT, FEW = 50, range(3, 9)  # those take seconds, the third minutes on the finer grid
-MOST = 150  # Newton steps on a grid
-LEFT_S = 30.0  # of a part's time, for what is under way when it ends
+COUNT, FEW = 50, range(3, 9)  # these take seconds; the third takes minutes on the finer grid
+MOST = 150  # Newton steps per grid
+LEFT_S = 30.0  # reserve of a part's time for the solves under way at its end
 KEPT = Path("build/chosen_grids")
-ROOMS = ("ehl", "kernels", "lubricant", "surface")  # whose code decides
+ROOMS = ("ehl", "kernels", "lubricant", "surface")  # packages whose code determines the results
 FINER = 1.5
 FEWEST_CELLS = 8
 PAIR = ElasticPair((206e9, 206e9), (0.3, 0.3))
@@ -35,7 +33,7 @@ PAIR = ElasticPair((206e9, 206e9), (0.3, 0.3))
 
 @dataclass(frozen=True)
 class Sample:
-    """A contact, its oil, and its roughness: Sq, correlation lengths [m] and seed."""
+    """A contact, its oil and its roughness: Sq, correlation lengths [m] and seed."""
 
     conditions: ContactConditions
     oil: Lubricant
@@ -45,9 +43,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a solve went: whether it converged, processor time [s], CLR, its interval, whether the
-    grid can tell it.
-    """
+    """Convergence, processor time [s], CLR, its interval, and whether the grid determines CLR."""
 
     cells: tuple[int, int]
     converged: bool
@@ -57,8 +53,8 @@ class Outcome:
     determined: bool
 
     @property
-    def told(self) -> str:
-        """CLR and its interval in words."""
+    def clr_text(self) -> str:
+        """CLR and its interval as text."""
         ends = (
             "no interval"
             if self.interval is None
@@ -71,7 +67,7 @@ class Outcome:
 
 
 def samples(count: int, seed: int = 14) -> Iterator[Sample]:
-    """Random contacts; film ratios come from the speed."""
+    """Yield random contacts; the speed sets the film ratio."""
     rng = np.random.default_rng(seed)
     for number in range(count):
         geometry = ("line", "point", "elliptic")[number % 3]
@@ -107,7 +103,7 @@ def _film_over(speed: float, conditions: ContactConditions, oil: Lubricant, film
 
 
 def solved(sample: Sample, model: ContactModel, most: int, finer: float = 1.0) -> Outcome:
-    """On the chosen grid, or on one finer by a factor in both directions."""
+    """Solve on the automatic grid, refined by `finer` in both directions."""
     grid = auto_grid(sample.conditions, sample.oil, sample.texture)
     if finer != 1.0:
         nx, ny = (max(FEWEST_CELLS, 8 * round(finer * n / 8)) for n in grid.cells)
@@ -136,58 +132,62 @@ def solved(sample: Sample, model: ContactModel, most: int, finer: float = 1.0) -
 
 
 def summary(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
-    """Solved, seconds, and how many of those solved on both grids hold the finer one's CLR in their
-    bar.
+    """Return convergence, time, and coverage of the finer grid's CLR.
+
+    Coverage counts the contacts that converged on both grids.
     """
     chosen, both = (
-        [one for one, _ in pairs],
-        [(one, two) for one, two in pairs if one.converged and two.converged],
+        [coarse for coarse, _ in pairs],
+        [(coarse, fine) for coarse, fine in pairs if coarse.converged and fine.converged],
     )
-    seconds = [one.seconds for one in chosen]
-    off = [abs(one.clr - two.clr) for one, two in both]
-    told = [(one, two) for one, two in both if one.determined and one.interval is not None]
-    held = sum(
-        one.interval is not None and one.interval[0] <= two.clr <= one.interval[1]
-        for one, two in told
+    seconds = [coarse.seconds for coarse in chosen]
+    off = [abs(coarse.clr - fine.clr) for coarse, fine in both]
+    determined_pairs = [
+        (coarse, fine) for coarse, fine in both if coarse.determined and coarse.interval is not None
+    ]
+    covering = sum(
+        coarse.interval is not None and coarse.interval[0] <= fine.clr <= coarse.interval[1]
+        for coarse, fine in determined_pairs
     )
     return (
-        f"{sum(one.converged for one in chosen)} of {len(chosen)} solved on the chosen grid, median"
-        f" {np.median(seconds):.1f} s, longest {max(seconds):.1f} s; of {len(both)} solved on both,"
-        f" {len(told)} are determined, {held} of them hold the finer CLR in their interval;"
+        f"{sum(outcome.converged for outcome in chosen)} of {len(chosen)} solved on the"
+        f" chosen grid, median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s; of"
+        f" {len(both)} solved on both,"
+        f" {len(determined_pairs)} are determined, {covering} of these contain the finer CLR in"
+        " their"
+        " interval;"
         f" difference median {np.median(off) if off else np.nan:.3f}, largest"
         f" {max(off, default=np.nan):.3f}"
     )
 
 
 def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
-    """The table as Markdown: all contacts solved so far by this code, as many more as there is time
-    for.
+    """Yield the table as Markdown: all contacts solved by this code, and more while time is
+    left.
     """
     end = time.perf_counter() + seconds - LEFT_S
     every = dict(enumerate(samples(COUNT)))
     pairs = kept_pairs({number: every[number] for number in (FEW if fast else every)}, end)
-    yield (
-        "## Hard steel on the grid that is chosen for it, and on one finer by 1.5 in both"
-        " directions\n"
-    )
+    yield ("## Hard steel on the automatic grid and on one finer by 1.5 in both directions\n")
     yield f"Sample: {len(pairs)} contacts.\n"
     yield "| contact | film ratio | p_h [GPa] | cells | time [s] | CLR | finer: time [s] | CLR |"
     yield "|---|---|---|---|---|---|---|---|"
-    for number, (one, two) in pairs.items():
+    for number, (coarse, fine) in pairs.items():
         conditions, oil, sq = every[number].conditions, every[number].oil, every[number].texture.sq
-        cells = " | ".join(f"{solve.seconds:.1f} | {solve.told}" for solve in (one, two))
+        cells = " | ".join(f"{solve.seconds:.1f} | {solve.clr_text}" for solve in (coarse, fine))
         yield (
             f"| {number} {conditions.geometry} | {least_film(conditions, oil) / sq:.2f} | "
-            f"{conditions.hertz.p_max / 1e9:.2f} | {one.cells[0]} x {one.cells[1]} | {cells} |"
+            f"{conditions.hertz.p_max / 1e9:.2f} | {coarse.cells[0]} x {coarse.cells[1]} | {cells}"
+            " |"
         )
     yield f"\n{summary(list(pairs.values()))}"
 
 
-def kept_pairs(wanted: dict[int, Sample], end: float) -> dict[int, tuple[Outcome, Outcome]]:
-    """Each contact on both grids, as they are kept, and those that time allows."""
+def kept_pairs(requested: dict[int, Sample], end: float) -> dict[int, tuple[Outcome, Outcome]]:
+    """Return each stored contact on both grids, and those that the time allows to solve."""
     path = KEPT / f"{stamp(*ROOMS)}.json"
     kept = json.loads(path.read_text("utf-8")) if path.is_file() else {}
-    for number, sample in wanted.items():
+    for number, sample in requested.items():
         if str(number) not in kept and time.perf_counter() < end:
             kept[str(number)] = [
                 asdict(solved(sample, "mixed", MOST, finer)) for finer in (1.0, FINER)
@@ -195,8 +195,8 @@ def kept_pairs(wanted: dict[int, Sample], end: float) -> dict[int, tuple[Outcome
             KEPT.mkdir(parents=True, exist_ok=True)
             path.write_text(json.dumps(kept), "utf-8")
     return {
-        int(number): (Outcome(**one), Outcome(**two))
-        for number, (one, two) in sorted(kept.items(), key=_number)
+        int(number): (Outcome(**coarse), Outcome(**fine))
+        for number, (coarse, fine) in sorted(kept.items(), key=_number)
     }
 
 

@@ -1,9 +1,9 @@
-"""The contact that loses no oil: rigid films, 16 contacts on three surfaces standing still, the
-same in motion, cost.
+"""Mass-conserving cavitation: rigid films, 16 static contacts on three surfaces, the same in
+motion, cost.
 
-The rigid films are those of `tests/validation/test_cavitation.py`, where closed forms and
-quadratures stand beside them. Every steady solve starts cold; times are those of the processor.
-One pass is as many steps as the domain has cells along rolling.
+The rigid films are those of `tests/validation/test_cavitation.py`, which compares them with closed
+forms and quadratures. Every steady solve starts cold; times are processor times. One pass has as
+many steps as the domain has cells along rolling.
 """
 
 from collections import defaultdict
@@ -30,8 +30,8 @@ FILMS_NM = (5, 20, 50, 100, 200)
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """All tables as Markdown; `fast` takes one surface of three."""
-    yield "## The contact that loses no oil\n"
+    """Yield all tables as Markdown; `fast` uses one surface of three."""
+    yield "## Mass-conserving cavitation\n"
     yield from rigid_films()
     yield ""
     yield from standing(SEEDS[:1] if fast else SEEDS)
@@ -42,8 +42,8 @@ def lines(*, fast: bool) -> Iterator[str]:
 
 
 def rigid_films() -> Iterator[str]:
-    """A parabolic slider and one with a pocket (physics: p = 0 where the film ruptures), over
-    cells.
+    """Yield a parabolic slider and a pocketed slider over cells (physics: p = 0 where the film
+    ruptures).
     """
     yield "| rigid film | cells | p_max off | flow off | flow varies by | Newton steps |"
     yield "|---|---|---|---|---|---|"
@@ -89,7 +89,7 @@ class Contact(NamedTuple):
     seed: int
 
     def case(self, cells: int) -> Case:
-        """The paper's contact with this surface and cap."""
+        """Return the paper's contact with this surface and cap."""
         return paper_case(self.sq_um, self.seed, cells).with_overrides(
             {
                 "surface.correlation_length": [f"{self.length_um} um"] * 2,
@@ -100,26 +100,26 @@ class Contact(NamedTuple):
 
 
 def contacts(seeds: tuple[int, ...]) -> Iterator[Contact]:
-    """All levels of all surfaces."""
+    """Yield all roughness levels of all surfaces."""
     yield from (
         Contact(*level, seed) for seed in seeds for level in product(SQ_UM, LENGTHS_UM, CAPS_GPA)
     )
 
 
 def lost(solution: ContactSolution) -> float:
-    """Oil that all cells together lose, over the throughflow."""
+    """Return the sum of oil lost by cells, over the throughflow."""
     balance = balance_of(solution)
     dx, dy = balance.problem.spacing
     return abs(float(balance.outflow.sum()) * dx * dy / balance.throughflow)
 
 
 def standing(seeds: tuple[int, ...]) -> Iterator[str]:
-    """Snapshots at 128 x 128 of all models."""
+    """Yield snapshots of all models at 128 x 128."""
     solved: dict[int, int] = defaultdict(int)
     ratios, seconds, worst = [], [], 0.0
     shares: dict[tuple[str, float], list[LoadSharing]] = defaultdict(list)
-    for one in contacts(seeds):
-        case = one.case(128)
+    for contact in contacts(seeds):
+        case = contact.case(128)
         surface, options = case.surface(), case.options
         spent = {}
         for model in (PAPER, MIXED, CONSERVING):
@@ -133,15 +133,15 @@ def standing(seeds: tuple[int, ...]) -> Iterator[str]:
             )
             spent[model] = process_time() - began
             if solution.convergence.converged:
-                shares[model, one.sq_um].append(sharing_by_film(solution))
+                shares[model, contact.sq_um].append(sharing_by_film(solution))
         if solution.convergence.converged:
-            solved[one.seed] += 1
+            solved[contact.seed] += 1
             worst = max(worst, lost(solution))
         ratios.append(spent[CONSERVING] / spent[MIXED])
         seconds.append(spent[CONSERVING])
-    each = ", ".join(f"{solved[seed]} of 16 on surface {seed}" for seed in seeds)
+    solved_counts = ", ".join(f"{solved[seed]} of 16 on surface {seed}" for seed in seeds)
     yield (
-        f"Standing still, 128 x 128: solved {each}. Oil lost by all cells together at most"
+        f"Static, 128 x 128: solved {solved_counts}. Net oil loss at most"
         f" {worst:.1e} of the throughflow. Cold in {median(seconds):.2f} s in the median (longest"
         f" {max(seconds):.1f} s), {median(ratios):.1f} times the default model (longest"
         f" {max(ratios):.0f} times).\n"
@@ -159,34 +159,35 @@ def _shares(shares: dict[tuple[str, float], list[LoadSharing]]) -> Iterator[str]
             return f"{scale * mean(values):.2f} ± {scale * float(np.std(values)):.2f}"
 
         below = " | ".join(
-            spread([one.below[index] for one in found]) for index in range(len(FILMS_NM))
+            spread([sharing.below[index] for sharing in found]) for index in range(len(FILMS_NM))
         )
         yield (
-            f"| {sq:g} | {model} | {spread([one.clr_solid for one in found])} |"
-            f" {spread([one.car_solid for one in found])} | {below} |"
-            f" {spread([one.cavitated for one in found])} |"
-            f" {spread([one.oil for one in found], 1e6)} | {len(found)} |"
+            f"| {sq:g} | {model} | {spread([sharing.clr_solid for sharing in found])} |"
+            f" {spread([sharing.car_solid for sharing in found])} | {below} |"
+            f" {spread([sharing.cavitated for sharing in found])} |"
+            f" {spread([sharing.oil for sharing in found], 1e6)} | {len(found)} |"
         )
 
 
 def moving(seeds: tuple[int, ...]) -> Iterator[str]:
-    """One pass at 64 x 64 of every contact."""
+    """Yield one pass of every contact at 64 x 64."""
     taken = accepted = 0
     first_bad, worst = [], 0.0
     shares: dict[tuple[str, float], list[LoadSharing]] = defaultdict(list)
-    for one in contacts(seeds):
-        for snapshot in islice(_steps(one.case(64)), 1, 65):
+    for contact in contacts(seeds):
+        for snapshot in islice(_steps(contact.case(64)), 1, 65):
             good, taken = snapshot.solution.convergence.converged, taken + 1
             accepted += good
             if not good:
-                first_bad.append((one, snapshot.number))
+                first_bad.append((contact, snapshot.number))
             else:
                 worst = max(worst, snapshot.state.mass_flux_imbalance)
-        shares["moving", one.sq_um].append(sharing_by_film(snapshot.solution))
+        shares["moving", contact.sq_um].append(sharing_by_film(snapshot.solution))
     yield (
         f"Moving, 64 x 64, one pass: {accepted} of {taken} steps accepted"
-        f" ({100 * accepted / taken:.1f} %); in any accepted step all that cells of the Hertz zone"
-        f" lose and gain is at most {worst:.1e} of the oil carried there."
+        f" ({100 * accepted / taken:.1f} %); in accepted steps the oil lost and gained by cells of"
+        " the Hertz zone"
+        f" is at most {worst:.1e} of the oil carried there."
     )
     yield f"First steps not accepted: {first_bad[:5]}\n" if first_bad else ""
     yield from _shares(shares)
@@ -198,8 +199,8 @@ def _steps(case: Case) -> Iterator[Snapshot]:
 
 
 def cost() -> Iterator[str]:
-    """Seconds a step in motion on three grids, Sq 1 and 2.5 um."""
-    yield "| cells | seconds a step, Sq 1 um | Sq 2.5 um | Newton steps |"
+    """Yield seconds per step in motion on three grids, Sq 1 and 2.5 um."""
+    yield "| cells | seconds per step, Sq 1 um | Sq 2.5 um | Newton steps |"
     yield "|---|---|---|---|"
     for cells in (64, 128, 256):
         spent, newton = [], []

@@ -1,7 +1,8 @@
-"""Studies that are killed: `python -m benchmarks.crashes [MOMENTS]` kills a worker or the parent at
-random moments, goes on each time, and compares with the study that nothing interrupted, number by
-number; exit code 1
-if one differs."""
+"""Interrupted studies: kill a worker or the parent at random times, resume, and compare the results
+with an uninterrupted study.
+
+`python -m benchmarks.crashes [MOMENTS]`; the exit code is 1 if any number differs.
+"""
 
 import os
 import random
@@ -23,7 +24,7 @@ SETTINGS = [
     'study.sq={from="0.5 um", to="4 um", step="0.7 um"}',
     "study.seeds=3",
 ]
-TIMES = "seconds"  # the one column that cannot be the same twice
+TIMES = "seconds"  # the only column that differs between identical runs
 
 
 def command(out: Path) -> list[str]:
@@ -44,7 +45,7 @@ def command(out: Path) -> list[str]:
 
 
 def children(pid: int) -> list[int]:
-    """Worker processes of a study: its children but for multiprocessing's resource tracker."""
+    """Return worker processes of a study, without multiprocessing's resource tracker."""
     found = subprocess.run(
         ["pgrep", "-P", str(pid), "-f", "spawn_main"], capture_output=True, text=True, check=False
     )
@@ -52,9 +53,7 @@ def children(pid: int) -> list[int]:
 
 
 def killed(out: Path, after: float, target: str) -> str:
-    """Start or resume the study and kill the target after so many seconds; what became of the
-    process.
-    """
+    """Start or resume the study, kill the target after `after` seconds, and return its fate."""
     running = subprocess.Popen(
         command(out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
@@ -88,9 +87,9 @@ def computed_twice(out: Path) -> int:
 def main(moments: int) -> None:
     folder = Path(tempfile.mkdtemp(prefix="asperity-crashes-"))
     try:
-        begun = time.perf_counter()
+        started = time.perf_counter()
         subprocess.run(command(folder / "whole"), check=True, stdout=subprocess.DEVNULL)
-        length = time.perf_counter() - begun
+        length = time.perf_counter() - started
         whole = pandas.read_parquet(folder / "whole" / "table.parquet").drop(columns=TIMES)
         rng = random.Random(1)
         same = twice = behind = 0
@@ -109,12 +108,12 @@ def main(moments: int) -> None:
             left = len(list(out.rglob("*.part")))
             behind += left
             print(
-                f"  after {after:5.1f} s: {fate}; same to the last bit: {again.equals(whole)}; left"
+                f"  after {after:5.1f} s: {fate}; bit-identical: {again.equals(whole)}; files left"
                 f" over: {left}"
             )
             shutil.rmtree(out)
         print(
-            f"{same} of {moments} the same to the last bit; {twice} cases computed twice, {behind}"
+            f"{same} of {moments} bit-identical; {twice} cases computed twice, {behind}"
             " files left over"
         )
         sys.exit(same < moments or twice > 0 or behind > 0)

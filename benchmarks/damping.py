@@ -1,7 +1,7 @@
-"""Damping as an indicator of load sharing: over roughness, and read from 60 simulated series.
+"""Damping as an indicator of load sharing: over roughness, and from 60 simulated series.
 
-`python -m benchmarks.damping` runs this part alone. Contacts are solved once (96 x 48, model
-mixed) and kept in build/damping.csv; `--seeds 0 1 2` solves fewer surfaces.
+`python -m benchmarks.damping` runs this part alone. Contacts are solved once (96 x 48, model mixed)
+and stored in build/damping.csv; `--seeds 0 1 2` solves fewer surfaces.
 """
 
 import argparse
@@ -33,22 +33,23 @@ from benchmarks.roughness_levels import paper_case
 KEPT = Path(__file__).parents[1] / "build" / "damping.csv"
 SQ_UM = (0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 SEEDS = tuple(range(12))
-LIGHT, HEAVY = 0.1, 1.0  # kg on the contact: resonances near 9 and 2.9 kHz
+LIGHT, HEAVY = 0.1, 1.0  # masses on the contact [kg]: resonances near 9 and 2.9 kHz
 RATE_HZ, DURATION_S, SEGMENT = 20e3, 60.0, 40_000
 BAND_HZ = (2.0e3, 4.1e3)
 REST, REST_SCATTER = (
     0.01,
     0.1,
-)  # damping ratio of all but the contact, and how it varies from mounting to mounting
-MOUNTING = 0.005  # relative deviation of a frequency from mounting to mounting
+)  # structural damping ratio and its standard deviation between mountings
+MOUNTING = 0.005  # relative standard deviation of a frequency between mountings
 TESTS, TRAINING, SERIES = 3, 20, 60
 SEVERE_UM = 1.8  # between the paper's stages
 
 
 @dataclass(frozen=True)
 class Point:
-    """A solved contact and what two masses on it meet; stiffness [N/m], yielded cells elastic
-    unless virgin.
+    """A solved contact and its response with two masses; stiffness [N/m].
+
+    Yielded cells are elastic, except in a virgin contact.
     """
 
     sq_um: float
@@ -63,7 +64,7 @@ class Point:
 
 
 def points(seeds: Sequence[int]) -> list[Point]:
-    """Solved now, or kept from before."""
+    """Return stored or newly solved points."""
     kept = {}
     if KEPT.exists():
         with KEPT.open() as file:
@@ -102,7 +103,7 @@ def solved(sq_um: float, seed: int) -> Point:
 
 
 def lines(seeds: Sequence[int] = SEEDS, *, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time; `fast` leaves out the series, which take ten minutes."""
+    """Yield Markdown lines; `fast` omits the series, which take ten minutes."""
     library = points(seeds)
     yield (
         "## Stiffness and damping over roughness (96 x 48, model mixed): mean ± deviation over"
@@ -146,7 +147,7 @@ def moments(values: Sequence[float]) -> tuple[float, float]:
 
 
 class Ring(NamedTuple):
-    """What is true of a ring, and the recordings of its tests."""
+    """True state of a ring and the recordings of its tests."""
 
     sq_um: float
     clr: float
@@ -154,9 +155,7 @@ class Ring(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """What a series says of a ring: logarithms of frequency and damping ratio, means over the tests
-    that have one.
-    """
+    """Logarithms of frequency and damping ratio of a ring, averaged over tests with a resonance."""
 
     sq_um: float
     clr: float
@@ -166,7 +165,8 @@ class Reading(NamedTuple):
 
 def series_lines(library: Sequence[Point]) -> Iterator[str]:
     yield (
-        "| frequency by | else in the band | rings with a resonance | read from | CLR off, rms"
+        "| frequency by | other lines in the band | rings with a resonance | read from | CLR off,"
+        " rms"
         " [points] | rings in the right stage | series with 11 of 12 right |"
     )
     yield "|---|---|---|---|---|---|---|"
@@ -181,13 +181,14 @@ def series_lines(library: Sequence[Point]) -> Iterator[str]:
             found = sum(len(rings) for rings in judged)
             other = "noise" if modes == 0 else f"{modes} modes"
             for name in ("frequency", "damping", "both"):
-                yield f"| {law} | {other} | {100 * found / total:.0f} % | {name} | " + told(
-                    training, judged, name
+                yield (
+                    f"| {law} | {other} | {100 * found / total:.0f} % | {name} | "
+                    + regression_cells(training, judged, name)
                 )
 
 
 def series(library: Sequence[Point], number: int, law: str, modes: int) -> list[Ring]:
-    """One rig: its background drawn once, every ring a surface of its own."""
+    """Return one rig: one background, and a new surface for each ring."""
     rng = np.random.default_rng([7, number])
     frequency = np.arange(0.0, RATE_HZ / 2.0 + GRID_HZ, GRID_HZ)
     disturbance = Disturbance(snr_db=10.0, modes=modes)
@@ -200,7 +201,7 @@ def series(library: Sequence[Point], number: int, law: str, modes: int) -> list[
         )
         if (
             law != "the contact itself"
-        ):  # the printed curve: full load at 3834 Hz, a line for 0.1 kg
+        ):  # the printed curve: full load at 3834 Hz; a line for 0.1 kg
             stiffness = HEAVY * (2.0 * np.pi * 3834.0 * max(clr, 0.02) ** (1.0 / 6.0)) ** 2
         recordings = []
         for test in range(TESTS):
@@ -217,7 +218,7 @@ def series(library: Sequence[Point], number: int, law: str, modes: int) -> list[
 
 
 def between(library: Sequence[Point], sq_um: float, seed: int) -> tuple[float, float, float]:
-    """CLR, stiffness and damping ratio of one surface at any height."""
+    """Return CLR, stiffness and damping ratio of one surface at any height."""
     own = [point for point in library if point.seed == seed]
     at = [point.sq_um for point in own]
     clr, stiffness, damping = (
@@ -243,44 +244,53 @@ def line_of(spring: ContactOscillator, sq_um: float, clr: float, frequency: Fiel
 
 
 def readings(rings: Sequence[Ring], modes: int) -> list[Reading]:
-    """Fitted line by line where nothing else resonates, jointly where something does."""
+    """Return fits of single lines, or joint fits if the structure resonates too."""
     clean = [
-        remove_lines(one.spectrum(SEGMENT), shaft_hz=(60.0,))
+        remove_lines(recording.spectrum(SEGMENT), shaft_hz=(60.0,))
         for ring in rings
-        for one in ring.recordings
+        for recording in ring.recordings
     ]
     if modes:
         found = series_resonances(
-            [one.spectrum for one in clean], band_hz=BAND_HZ, kept=[one.kept for one in clean]
+            [cleaned.spectrum for cleaned in clean],
+            band_hz=BAND_HZ,
+            kept=[cleaned.kept for cleaned in clean],
         )
     else:
-        found = tuple(contact_resonance(one.spectrum, band_hz=BAND_HZ) for one in clean)
+        found = tuple(contact_resonance(cleaned.spectrum, band_hz=BAND_HZ) for cleaned in clean)
     read = []
     for number, ring in enumerate(rings):
-        seen = [one for one in found[number * TESTS : (number + 1) * TESTS] if one.found]
-        if seen:
+        resonances = [
+            resonance
+            for resonance in found[number * TESTS : (number + 1) * TESTS]
+            if resonance.found
+        ]
+        if resonances:
             logs = [
-                float(np.mean(np.log([getattr(one, name) for one in seen])))
+                float(np.mean(np.log([getattr(resonance, name) for resonance in resonances])))
                 for name in ("crf_hz", "damping_ratio")
             ]
             read.append(Reading(ring.sq_um, ring.clr, *logs))
     return read
 
 
-def told(
+def regression_cells(
     training: Sequence[Sequence[Reading]], judged: Sequence[Sequence[Reading]], name: str
 ) -> str:
-    """Regressions of the odds of CLR, and of the stage, on quadratics of what is read; learnt on
-    other series.
+    """Return regressions of the odds of CLR and of the stage on quadratics of the readings.
+
+    They are trained on other series.
     """
     learnt = [reading for rings in training for reading in rings]
     centre, width = (
-        moment(np.array([(one.frequency, one.damping) for one in learnt]), axis=0)
+        moment(np.array([(reading.frequency, reading.damping) for reading in learnt]), axis=0)
         for moment in (np.mean, np.std)
     )
 
     def columns(rings: Sequence[Reading]) -> Field:
-        scaled = (np.array([(one.frequency, one.damping) for one in rings]) - centre) / width
+        scaled = (
+            np.array([(reading.frequency, reading.damping) for reading in rings]) - centre
+        ) / width
         parts = scaled if name == "both" else scaled[:, [0 if name == "frequency" else 1]]
         squares = [
             parts[:, i] * parts[:, j]
@@ -289,19 +299,19 @@ def told(
         ]
         return np.column_stack([np.ones(len(rings)), parts, *squares])
 
-    odds = np.array([np.log((one.clr + 0.01) / (1.01 - one.clr)) for one in learnt])
-    side = np.array([1.0 if one.sq_um > SEVERE_UM else -1.0 for one in learnt])
+    odds = np.array([np.log((ring.clr + 0.01) / (1.01 - ring.clr)) for ring in learnt])
+    side = np.array([1.0 if ring.sq_um > SEVERE_UM else -1.0 for ring in learnt])
     of_clr, of_stage = (
-        np.linalg.lstsq(columns(learnt), wanted, rcond=None)[0] for wanted in (odds, side)
+        np.linalg.lstsq(columns(learnt), target, rcond=None)[0] for target in (odds, side)
     )
     off, right, whole = [], [], 0
     for rings in judged:
         if not rings:
             continue
         guessed = columns(rings) @ of_clr
-        off += list(1.02 / (1.0 + np.exp(-guessed)) - 0.01 - np.array([one.clr for one in rings]))
+        off += list(1.02 / (1.0 + np.exp(-guessed)) - 0.01 - np.array([ring.clr for ring in rings]))
         same = (columns(rings) @ of_stage > 0.0) == np.array(
-            [one.sq_um > SEVERE_UM for one in rings]
+            [ring.sq_um > SEVERE_UM for ring in rings]
         )
         right += list(same)
         whole += int(np.count_nonzero(same) >= len(SAMPLES_SQ_UM) - 1)

@@ -1,11 +1,11 @@
-"""How often stages are right that are read from CRF, from the line's damping, or from both with one
+"""Accuracy of wear stages determined from CRF, from the line's damping, or from both with one
 break.
 
-`python -m benchmarks.damping_stages` runs this part alone. Indicators are drawn about known
-courses: the paper's twelve rings, five tests each, CRF off by 15 Hz and damping by 10 % from test
-to test. Of the solved contact (benchmarks.damping has its library) every ring is a surface of its
-own, and all else damps with 0.01. Then how well the joint separation knows the damping of lines
-that move, or hardly do.
+`python -m benchmarks.damping_stages` runs this part alone. Indicators scatter about known courses:
+the paper's twelve rings, five tests each, standard deviation 15 Hz in CRF and 10 % in damping. In
+the solved contact (library of benchmarks.damping) every ring has its own surface and other parts
+damp with 0.01. A second table gives the damping from the joint separation of lines that move, or
+hardly move.
 """
 
 import argparse
@@ -47,7 +47,7 @@ Course = Callable[[Field], Field]
 
 
 class Truth(NamedTuple):
-    """CRF [Hz] and damping ratio over Sq [um], and where each breaks, if it does."""
+    """CRF [Hz] and damping ratio over Sq [um], and the break of each, if any."""
 
     name: str
     crf: Course
@@ -89,12 +89,12 @@ TRUTHS = (
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time."""
-    yield f"## Stages from CRF, damping and both, {TRIALS} trials a row\n"
+    """Yield Markdown lines."""
+    yield f"## Stages from CRF, damping and both, {TRIALS} trials per row\n"
     heads = [
         "truth",
         "read from",
-        *(f"said: {kind}" for kind in KINDS),
+        *(f"classed: {kind}" for kind in KINDS),
         "break, mean ± sd [um]",
         "90 % interval covers",
     ]
@@ -114,18 +114,18 @@ def lines(*, fast: bool = False) -> Iterator[str]:
 
 
 def draws(truth: Truth, rng: np.random.Generator) -> tuple[Field, Field]:
-    """CRF and damping of every test."""
+    """Return CRF and damping of every test."""
     sq = np.repeat(SAMPLES_SQ_UM, TESTS)
     return scattered(truth.crf(sq), truth.damping(sq), rng)
 
 
 def solved(library: Sequence[Point], law: str, rng: np.random.Generator) -> tuple[Field, Field]:
-    """The same of rings that are surfaces of the library each."""
+    """Return CRF and damping of rings with surfaces from the library."""
     seeds = sorted({point.seed for point in library})
     rings = np.array([between(library, sq, int(rng.choice(seeds))) for sq in SAMPLES_SQ_UM])
     clr, stiffness, damping = np.repeat(rings, TESTS, axis=0).T
     crf = FULL_LOAD * np.maximum(clr, 0.02) ** (1.0 / 6.0)
-    if law.startswith("by the contact"):  # of 1 kg, in hertz
+    if law.startswith("by the contact"):  # mass 1 kg, in hertz
         crf = np.sqrt(stiffness) / (2.0 * np.pi)
     return scattered(crf, REST + damping, rng)
 
@@ -149,9 +149,9 @@ def rows(name: str, knee: float | None, drawn: Sequence[tuple[Field, Field]]) ->
             )
             for crf, damping in drawn
         ]
-        share = [100.0 * np.mean([one.kind == kind for one in found]) for kind in KINDS]
-        broken = [one for one in found if one.found]
-        splits = np.array([one.split for one in broken])
+        share = [100.0 * np.mean([result.kind == kind for result in found]) for kind in KINDS]
+        broken = [result for result in found if result.found]
+        splits = np.array([result.split for result in broken])
         place = (
             f"{splits.mean():.2f} ± {splits.std():.2f}" if len(broken) > 0.1 * len(found) else "-"
         )
@@ -170,17 +170,17 @@ STIFFNESS = 3.32e8  # N/m: 2900 Hz
 
 
 def width_lines(*, fast: bool = False) -> Iterator[str]:
-    """What the joint separation makes of the damping of lines that move, or hardly do."""
+    """Yield errors of damping from the joint separation, for lines that move or hardly move."""
     count = WIDTH_SERIES // 3 if fast else WIDTH_SERIES
     yield (
         f"\n## Damping by the joint separation, {count} series of {len(SAMPLES_SQ_UM) * REPEATS}"
-        " recordings a row\n"
+        " recordings per row\n"
     )
     heads = [
         "damping",
         "frequency scatters by",
         "found",
-        "of them standing",
+        "of these, stationary",
         "error, mean and rms",
         "stated",
         "covered",
@@ -189,25 +189,25 @@ def width_lines(*, fast: bool = False) -> Iterator[str]:
     yield "|---" * len(heads) + "|"
     for name, law in (("falls from 0.04 to 0.012", width(1.8)), ("level at 0.02", level(0.02))):
         for scatter in (0.0, 0.002, 0.005, 0.02):
-            told = [row for number in range(count) for row in judged(law, scatter, number)]
-            seen = [one for one in told if one is not None]
-            off, stated, stands = (np.array(part) for part in zip(*seen, strict=True))
+            rows_of_series = [
+                row for number in range(count) for row in judged(law, scatter, number)
+            ]
+            damping_rows = [row for row in rows_of_series if row is not None]
+            off, stated, stationary = (np.array(part) for part in zip(*damping_rows, strict=True))
             covered = np.mean(np.abs(off) < 1.645 * stated)
             cells = [
                 f"{100 * part:.1f} %"
                 for part in (np.mean(off), np.sqrt(np.mean(off**2)), np.median(stated))
             ]
-            found = f"{100 * len(seen) / len(told):.0f} %"
+            found = f"{100 * len(damping_rows) / len(rows_of_series):.0f} %"
             yield (
-                f"| {name} | {100 * scatter:g} % | {found} | {100 * np.mean(stands):.0f} % |"
+                f"| {name} | {100 * scatter:g} % | {found} | {100 * np.mean(stationary):.0f} % |"
                 f" {cells[0]}, {cells[1]} | {cells[2]} | {100 * covered:.0f} % |"
             )
 
 
 def judged(law: Course, scatter: float, number: int) -> Iterator[tuple[float, float, bool] | None]:
-    """Of each recording of a series: logarithm of found over true damping, its deviation, whether
-    the line stands.
-    """
+    """Yield log of found over true damping, its deviation, and True for a stationary line."""
     rng = np.random.default_rng([11, number])
     frequency = np.arange(0.0, RATE_HZ / 2.0 + GRID_HZ, GRID_HZ)
     disturbance = Disturbance(snr_db=10.0, modes=4)
@@ -227,14 +227,16 @@ def judged(law: Course, scatter: float, number: int) -> Iterator[tuple[float, fl
             truth.append(ratio)
             clean.append(remove_lines(recording.spectrum(SEGMENT), shaft_hz=(60.0,)))
     found = series_resonances(
-        [one.spectrum for one in clean], band_hz=BAND_HZ, kept=[one.kept for one in clean]
+        [cleaned.spectrum for cleaned in clean],
+        band_hz=BAND_HZ,
+        kept=[cleaned.kept for cleaned in clean],
     )
-    for ratio, resonance, one in zip(truth, found, clean, strict=True):
-        known = damping_objection(resonance, one.spectrum.resolution_hz) is None
+    for ratio, resonance, cleaned in zip(truth, found, clean, strict=True):
+        known = damping_objection(resonance, cleaned.spectrum.resolution_hz) is None
         own = resonance.damping_ratio
-        stands = "keeps its frequency" in resonance.reason
+        stationary = "keeps its frequency" in resonance.reason
         yield (
-            (float(np.log(own / ratio)), resonance.damping_ratio_std / own, stands)
+            (float(np.log(own / ratio)), resonance.damping_ratio_std / own, stationary)
             if known
             else None
         )
@@ -245,7 +247,7 @@ def main() -> None:
     arguments = argparse.ArgumentParser(
         prog="python -m benchmarks.damping_stages", description=__doc__
     )
-    arguments.add_argument("--fast", action="store_true", help="a fifth of the trials")
+    arguments.add_argument("--fast", action="store_true", help="use a fifth of the trials")
     with threadpool_limits(1):
         for line in lines(fast=arguments.parse_args().fast):
             print(line, flush=True)

@@ -1,9 +1,9 @@
-"""Bearings that run to failure, simulated: an outer race, an inner race, a ball; short snapshots as
-loggers keep them.
+"""Simulated bearings run to failure: outer race, inner race and ball faults; short logger
+snapshots.
 
-A fault's impulses ring modes of the housing and grow, rms to 15 to 25 times by the end; there is
-no contact resonance. Judged after every snapshot. `python -m benchmarks.failures` runs this part
-alone; `--fast` a tenth.
+A fault's impulses excite modes of the housing and grow until rms has risen 15 to 25 times; there is
+no contact resonance. The alarm is judged after every snapshot. `python -m benchmarks.failures` runs
+this part alone; `--fast` uses a tenth of the machines.
 """
 
 import argparse
@@ -21,22 +21,26 @@ MACHINES, FEW, SNAPSHOTS = (
     40,
     8,
     40,
-)  # a fault and length; where a spectrum is worked out; of each machine
-LENGTHS = ((0.1, 20_000.0), (0.1, 25_600.0), (1.0, 20_000.0))  # of a snapshot [s], sampled at [Hz]
-PER_TURN = {"outer race": 3.585, "inner race": 5.415, "ball": 4.713}  # of a 6205
+)  # per fault and length; snapshots with a spectrum; snapshots per machine
+LENGTHS = (
+    (0.1, 20_000.0),
+    (0.1, 25_600.0),
+    (1.0, 20_000.0),
+)  # snapshot length [s], sampling rate [Hz]
+PER_TURN = {"outer race": 3.585, "inner race": 5.415, "ball": 4.713}  # impulses per turn of a 6205
 CAGE_PER_TURN = 0.398
 SHAFT_HZ = 30.0
 GROWTH = (15.0, 25.0)
 GAIN, MEMORY = (
     0.05,
     0.7,
-)  # scatter of ln rms from snapshot to snapshot, and what each keeps of the one before
-SLIP = 0.01  # of the time between two impulses
-HALL = 0.3  # share of white noise in what a healthy machine says
+)  # standard deviation of ln rms between snapshots, and its autocorrelation
+SLIP = 0.01  # relative standard deviation of the time between impulses
+HALL = 0.3  # share of white noise in the signal of a healthy machine
 
 
 class Machine(NamedTuple):
-    """Snapshots [m/s^2] and the number of the first behind which the fault grows."""
+    """Snapshots [m/s^2] and the number of the last healthy one."""
 
     snapshots: list[np.ndarray]
     rate_hz: float
@@ -44,7 +48,7 @@ class Machine(NamedTuple):
 
 
 def machine(fault: str, seed: int, *, seconds: float = 0.1, rate_hz: float = 20_000.0) -> Machine:
-    """A bearing from healthy to its end; `fault` is one of `PER_TURN`."""
+    """Return a bearing from healthy to failure; `fault` is a key of `PER_TURN`."""
     rng = np.random.default_rng([17, seed, list(PER_TURN).index(fault)])
     modes = np.column_stack(
         [rng.uniform(900.0, 0.4 * rate_hz, 4), rng.uniform(0.01, 0.05, 4), rng.uniform(0.3, 1.0, 4)]
@@ -65,7 +69,7 @@ def machine(fault: str, seed: int, *, seconds: float = 0.1, rate_hz: float = 20_
         fault_alone = _unit(_rung(_impulses(fault, samples, rate_hz, rng), modes, rate_hz))
         rough = _unit(
             _rung(rng.standard_normal(samples), modes, rate_hz)
-        )  # debris and wear make all of it louder, too
+        )  # debris and wear raise the whole signal
         more = np.sqrt(louder**2 - 1.0)
         whole = _unit(healthy + turning) + more * (0.8 * fault_alone + 0.6 * rough)
         snapshots.append(0.5 * np.exp(gain) * whole)
@@ -73,7 +77,7 @@ def machine(fault: str, seed: int, *, seconds: float = 0.1, rate_hz: float = 20_
 
 
 def _impulses(fault: str, samples: int, rate_hz: float, rng: np.random.Generator) -> np.ndarray:
-    """An impulse each time a fault is passed, with slip; as loud as the load there."""
+    """Return one impulse per passage of the fault, with slip, modulated by the local load."""
     train = np.zeros(samples)
     period = rate_hz / (PER_TURN[fault] * SHAFT_HZ)
     at = rng.uniform(0.0, period)
@@ -90,32 +94,32 @@ def _impulses(fault: str, samples: int, rate_hz: float, rng: np.random.Generator
 
 
 def _rung(force: np.ndarray, modes: np.ndarray, rate_hz: float) -> np.ndarray:
-    """What modes of frequency, damping ratio and weight make of a force."""
-    heard = np.zeros(force.size)
+    """Return the response of modes (frequency, damping ratio, weight) to a force."""
+    response = np.zeros(force.size)
     for f0, damping, weight in modes:
         pole = np.exp((-damping + 1j * np.sqrt(1.0 - damping**2)) * 2.0 * np.pi * f0 / rate_hz)
-        heard += weight * scipy.signal.lfilter(
+        response += weight * scipy.signal.lfilter(
             [1.0, -1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], force
         )
-    return heard
+    return response
 
 
 def _unit(values: np.ndarray) -> np.ndarray:
     return np.asarray(values / np.sqrt(np.mean(values**2)))
 
 
-def tracked(one: Machine, folder: Path) -> Track:
-    """As `asperity track` says of the files of a machine."""
+def tracked(simulated: Machine, folder: Path) -> Track:
+    """Return the result of `asperity track` for the files of a machine."""
     names = []
-    for number, values in enumerate(one.snapshots):
+    for number, values in enumerate(simulated.snapshots):
         names.append(folder / f"{number:03d}.npz")
-        np.savez(names[-1], acc=values, fs=one.rate_hz, unit="m/s^2")
+        np.savez(names[-1], acc=values, fs=simulated.rate_hz, unit="m/s^2")
     return track_recordings(names)
 
 
 class Outcome(NamedTuple):
-    """Of a machine: snapshots from the fault's begin to the alarm, and from there to the end;
-    claims of a resonance.
+    """Snapshots from the start of the fault to the alarm and from there to the end; claimed
+    resonances.
     """
 
     delay: float
@@ -125,39 +129,42 @@ class Outcome(NamedTuple):
 
 
 def outcome(fault: str, seed: int, seconds: float, rate_hz: float) -> Outcome:
-    """A machine run to failure, judged."""
-    one = machine(fault, seed, seconds=seconds, rate_hz=rate_hz)
+    """Run a machine to failure and judge it."""
+    simulated = machine(fault, seed, seconds=seconds, rate_hz=rate_hz)
     with TemporaryDirectory() as folder:
-        track = tracked(one, Path(folder))
+        track = tracked(simulated, Path(folder))
     states = track.alarm.states
     at = states.index("alarm") if "alarm" in states else np.inf
-    return Outcome(at - one.begins, SNAPSHOTS - 1 - at, at <= one.begins, track.resonance_count)
+    return Outcome(
+        at - simulated.begins, SNAPSHOTS - 1 - at, at <= simulated.begins, track.resonance_count
+    )
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time; `fast` takes a tenth of the machines."""
+    """Yield Markdown lines; `fast` uses a tenth of the machines."""
     share = 10 if fast else 1
     yield f"## Bearings run to failure: {SNAPSHOTS} snapshots each\n"
     yield (
         "| snapshots | fault | machines | alarm before the end | alarm while healthy | snapshots"
-        " from the fault's begin, median | left to the end, least | a contact resonance claimed |"
+        " from fault onset to alarm, median | snapshots left before failure, minimum | contact"
+        " resonance claimed |"
     )
     yield "|---|---|---|---|---|---|---|---|"
     for seconds, rate_hz in LENGTHS:
         machines = max((MACHINES if seconds < 1.0 else FEW) // share, 1)
         for fault in PER_TURN:
             every = [outcome(fault, seed, seconds, rate_hz) for seed in range(machines)]
-            delays, left = [one.delay for one in every], [one.left for one in every]
+            delays, left = [result.delay for result in every], [result.left for result in every]
             yield (
                 f"| {seconds:g} s at {rate_hz / 1e3:g} kHz | {fault} | {machines} |"
-                f" {sum(value > 0.0 for value in left)} | {sum(one.early for one in every)} |"
+                f" {sum(value > 0.0 for value in left)} | {sum(result.early for result in every)} |"
                 f" {np.median(delays):.0f} | {min(left):.0f} |"
-                f" {sum(one.claims > 0 for one in every)} |"
+                f" {sum(result.claims > 0 for result in every)} |"
             )
 
 
 if __name__ == "__main__":
     arguments = argparse.ArgumentParser(prog="python -m benchmarks.failures", description=__doc__)
-    arguments.add_argument("--fast", action="store_true", help="a tenth of the machines")
+    arguments.add_argument("--fast", action="store_true", help="use a tenth of the machines")
     for line in lines(fast=arguments.parse_args().fast):
         print(line, flush=True)

@@ -1,9 +1,9 @@
-"""Smooth films against published ones: a line contact in Moes' numbers, balls on flats and barrels.
+"""Smooth films against published values: line contacts in Moes numbers, balls on flats and barrels.
 
-Line contacts are compared with an independent one-dimensional solver of the tests on 3201 nodes,
-itself held to a published-style table; balls with Richardson-extrapolated references; balls and
-barrels with the fit of Nijenbanning, Venner and Moes, Wear 176 (1994) 217 (central film,
-Roelands), whose authors claim 10 %, and with Hamrock and Dowson's.
+Line contacts are compared with the tests' independent one-dimensional solver on 3201 nodes, which
+is validated with a published table; balls with Richardson-extrapolated references; balls and
+barrels with the fit of Nijenbanning, Venner and Moes, Wear 176 (1994) 217 (central film, Roelands,
+stated accuracy 10 %), and with Hamrock and Dowson's.
 """
 
 from collections.abc import Callable, Iterator
@@ -29,12 +29,12 @@ from asperity.surface import flat_surface
 
 PAIR = ElasticPair((200e9, 200e9), (0.3, 0.3))
 RADIUS, ETA0, ALPHA = 12.5e-3, 0.04, 22e-9
-NO_FLOOR = 1e-13  # [m]: low speeds make films of less than the usual contact film
+NO_FLOOR = 1e-13  # [m]: low speeds give films thinner than the default contact film
 ROELANDS = Lubricant(
     viscosity=Roelands(ETA0, ALPHA), density=DowsonHigginson(870.0), rheology=Newtonian()
 )
 BARUS = Lubricant(viscosity=Barus(ETA0, ALPHA), density=Incompressible(870.0), rheology=Newtonian())
-# M, L, oil: central and least film, Richardson from 257 and 513 points, X -4.5..1.5, Y -3..3
+# M, L, oil: central and minimum film, Richardson from 257 and 513 points, X -4.5..1.5, Y -3..3
 REFERENCE = {
     (20, 10, "Barus"): (4.803, 2.961),
     (100, 5, "Barus"): (3.102, 1.439),
@@ -46,8 +46,8 @@ REFERENCE = {
 def ball(
     load_number: float, oil_number: float, ratio: float = 1.0
 ) -> tuple[ContactConditions, float]:
-    """A ball or barrel (`ratio` = Rx/Ry) on a flat with these Moes numbers, and the film [m] that H
-    = 1 stands for.
+    """Return a ball or barrel (`ratio` = Rx/Ry) on a flat for Moes numbers, and the film [m] of
+    H = 1.
     """
     modulus = PAIR.effective_modulus
     twice_u = (oil_number / (ALPHA * modulus)) ** 4
@@ -68,8 +68,9 @@ TRIES = 5
 
 @dataclass(frozen=True)
 class Films:
-    """Central and least film in units of H, on the finest grid and extrapolated from it and one
-    half as fine.
+    """Central and minimum film in units of H, on the finest grid and extrapolated.
+
+    The extrapolation uses the next coarser grid.
     """
 
     central: float
@@ -88,7 +89,7 @@ def ball_films(
     ratio: float = 1.0,
     reach: float = 4.5,
 ) -> Films:
-    """Solved on X -reach..1.5, Y -3..3 half-widths, wider for a longer reach."""
+    """Solve on X -reach..1.5, Y -3..3 half-widths, wider for a longer reach."""
     conditions, unit = ball(load_number, oil_number, ratio)
     a, b = conditions.hertz.half_widths
     wide = max(3.0, reach / 1.5)
@@ -123,7 +124,7 @@ def ball_films(
 
 
 def nijenbanning(load_number: float, oil_number: float, ratio: float = 1.0) -> float:
-    """Central film H of Nijenbanning, Venner and Moes (1994)."""
+    """Return the central film H of Nijenbanning, Venner and Moes (1994)."""
     shape = 1.0 + 0.006 * np.log(ratio) + 0.63 * ratio ** (4.0 / 7.0)
     rigid = (
         145.0 * (1.0 + 0.796 * ratio ** (14.0 / 15.0)) ** (-15.0 / 7.0) / ratio * load_number**-2.0
@@ -146,7 +147,7 @@ def nijenbanning(load_number: float, oil_number: float, ratio: float = 1.0) -> f
 def line_case(
     load_number: float, oil_number: float, law: str
 ) -> tuple[ContactConditions, Lubricant, float]:
-    """A line contact with these Moes numbers, its oil, and the film [m] that H = 1 stands for."""
+    """Return a line contact for Moes numbers, its oil, and the film [m] of H = 1."""
     modulus, radius = PAIR.effective_modulus, 5.4e-3
     twice_u = (oil_number / (ALPHA * modulus)) ** 4
     speed = twice_u * modulus * radius / (2.0 * ETA0)
@@ -164,12 +165,14 @@ def line_case(
 
 
 def line_films(load_number: float, oil_number: float, law: str, cells: int) -> tuple[float, float]:
-    """Film at x = 0 and least film, in units of H; the inlet is longer for light loads."""
+    """Return the film at x = 0 and the minimum film in units of H; light loads get a longer
+    inlet.
+    """
     conditions, oil, unit = line_case(load_number, oil_number, law)
     a = conditions.hertz.half_widths[0]
     reach = (
         10.0 if load_number <= 10.0 else 4.5 if load_number <= 20.0 else 2.5
-    )  # thin films need a short inlet only
+    )  # thin films need only a short inlet
     grid = Grid((cells, 8), (-reach * a, -a), (max(1.4, 0.3 * reach) * a, a))
     solution = solve_contact(
         conditions, oil, flat_surface(grid), options=Options(tolerance=1e-7, contact_film=NO_FLOOR)
@@ -180,13 +183,13 @@ def line_films(load_number: float, oil_number: float, law: str, cells: int) -> t
 
 
 def fft_pair() -> Callable[[], object]:
-    """One real FFT of 512 x 512 and back, in double precision: what times are told against."""
+    """Return a real FFT pair of 512 x 512 in double precision, the unit of the times."""
     field = np.random.default_rng(0).random((512, 512))
     return lambda: scipy.fft.irfft2(scipy.fft.rfft2(field), s=field.shape)
 
 
 def spent(work: Callable[[], object], tries: int) -> float:
-    """Processor time [s] of the quickest try."""
+    """Return the least processor time [s] of several tries."""
     times = []
     for _ in range(tries):
         began = process_time()
@@ -196,16 +199,16 @@ def spent(work: Callable[[], object], tries: int) -> float:
 
 
 def _timed(load_number: float, oil_number: float, oil: Lubricant) -> str:
-    """What a ball costs, the FFT pair measured in between."""
+    """Return the cost of a ball; the FFT pair is measured in between."""
     conditions, unit = ball(load_number, oil_number)
     a, n, pair = conditions.hertz.half_widths[0], 257, fft_pair()
     surface = flat_surface(
         Grid((n, n), (-4.5 * a, -3.0 * a), (1.5 * a, 3.0 * a), periodic=(False, False))
     )
     options = Options(contact_film=NO_FLOOR)
-    seconds, beside = [], []
+    seconds, fft_seconds = [], []
     for _ in range(TRIES):
-        beside.append(spent(pair, TRIES))
+        fft_seconds.append(spent(pair, TRIES))
         seconds.append(spent(lambda: solve_contact(conditions, oil, surface, options=options), 1))
     solution = solve_contact(conditions, oil, surface, options=options)
     steps = [
@@ -224,7 +227,7 @@ def _timed(load_number: float, oil_number: float, oil: Lubricant) -> str:
         ]
     return (
         f"| {load_number}, {oil_number}, {law} | {', '.join(map(str, steps))} | {min(seconds):.2f}"
-        f" | {min(seconds) / min(beside):.0f} | {' | '.join(off)} |"
+        f" | {min(seconds) / min(fft_seconds):.0f} | {' | '.join(off)} |"
     )
 
 
@@ -232,7 +235,7 @@ LINE_CASES = ((5, 5), (10, 10), (20, 2), (20, 10), (50, 15), (100, 5), (200, 10)
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """The tables as Markdown."""
+    """Yield the tables as Markdown."""
     yield "## Smooth films"
     yield ""
     yield (

@@ -1,5 +1,5 @@
-"""The first solve after installation, compilation included: in a fresh process with an empty
-compiler cache.
+"""First solve after installation, with compilation: a fresh process with an empty compiler
+cache.
 """
 
 import os
@@ -14,9 +14,7 @@ CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
 
 
 def first_call() -> tuple[float, bool]:
-    """Seconds of `asperity solve` with nothing compiled, and whether it said what the wait was
-    for.
-    """
+    """Return seconds of `asperity solve` without a cache, and whether it explained the wait."""
     with tempfile.TemporaryDirectory() as empty:
         began = perf_counter()
         done = subprocess.run(
@@ -29,11 +27,11 @@ def first_call() -> tuple[float, bool]:
         return perf_counter() - began, "compiles" in done.stderr
 
 
-def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - there is but one first call
-    """The figure as Markdown."""
+def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - there is only one first call
+    """Yield the result as Markdown."""
     yield "## The first call\n"
-    seconds, said = first_call()
+    seconds, explained = first_call()
     yield (
         f"First `asperity solve` after installation, compilation included: {seconds:.1f} s; "
-        f"{'says what the wait is for' if said else 'SAYS NOTHING about the wait'}."
+        f"{'explains the wait' if explained else 'DOES NOT EXPLAIN the wait'}."
     )

@@ -1,12 +1,12 @@
-"""When a limit is crossed: simulated wear histories, and machines that stay as they are.
+"""Forecast when a limit is crossed: simulated wear histories, and machines without wear.
 
-Contacts have unknowns from the case's priors, and are off the emulator by its deviation, which
-stays along the course. Of one class courses are straight, steepening, slackening and wandering,
-and scatter is white and of the size stated: what the filter takes for granted too. The other class
-has what it does not: a course that jumps, one that runs in and then roughens, and CRF that
-scatters by twice the size stated and remembers the visit before by 0.7. Those count whose load
-share crosses 50 % between the last recording and two series' lengths after it. Rows are kept in
-docs/benchmarks/forecast-courses.csv and gone on from.
+Unknowns come from the case's priors. Each contact deviates from the emulator by a draw of its
+standard deviation, constant along the course. One class meets the filter's assumptions: straight,
+steepening, slackening and wandering courses with white scatter of the stated size. The other
+violates them: a course with a jump, one that runs in and then roughens, and CRF with twice the
+stated scatter and autocorrelation 0.7. Only series count whose load share crosses 50 % between the
+last recording and two series' lengths later. Rows are stored in
+docs/benchmarks/forecast-courses.csv and extended by later runs.
 """
 
 import argparse
@@ -41,18 +41,18 @@ VISITS, LIMIT, SEED = 30, 0.5, 4
 CRF_STD, DAMPING_STD, HEIGHT_STD = 2e-3, 0.05, 0.08
 ROWS = FOLDER / "forecast-courses.csv"
 SHAPES = ("straight", "steepening", "slackening", "wandering")
-OTHERS = ("jumping", "run in, then roughening", "straight, scatter remembers")
+OTHERS = ("jumping", "run in, then roughening", "straight, autocorrelated scatter")
 CLASSES = {
     "wearing": SHAPES,
     "otherwise": OTHERS,
     "steady": ("steady",),
-    "slow": ("steady, scatter remembers",),
+    "slow": ("steady, autocorrelated scatter",),
 }
 REMEMBERED, SCATTER = (
     0.7,
     2.0,
-)  # of scatter that remembers: from visit to visit, and over the deviation stated
-RATE = 0.3  # of a range over the series, standard deviation
+)  # autocorrelated scatter: autocorrelation between visits; ratio to the stated deviation
+RATE = 0.3  # standard deviation, as a share of a range over the series
 AHEAD = 2.0  # series' lengths after the last recording
 PLACE = (500.0, 1.91)
 COLUMNS = (
@@ -77,20 +77,20 @@ COLUMNS = (
 
 
 def main() -> None:
-    """Draw, listen, forecast, and say how often intervals hold."""
+    """Simulate recordings, forecast, and print the coverage of the intervals."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--histories", type=int, default=HISTORIES)
     arguments.add_argument("--steady", type=int, default=STEADY)
-    arguments.add_argument("--kept", type=Path, default=KEPT, help="folder that keeps everything")
-    wanted = arguments.parse_args()
+    arguments.add_argument("--kept", type=Path, default=KEPT, help="folder of stored results")
+    parsed = arguments.parse_args()
     with threadpool_limits(1):
-        judge_all(wanted.histories, wanted.steady, wanted.kept)
+        judge_all(parsed.histories, parsed.steady, parsed.kept)
     print("\n".join(tables()))
 
 
 def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
-    """What `python -m benchmarks forecast` prints: all series judged so far, as many more as there
-    is time for.
+    """Yield the output of `python -m benchmarks forecast`: all stored series, and more while
+    time is left.
     """
     end = perf_counter() + seconds - LEFT_S
     judge_all(FEW if fast else HISTORIES, FEW if fast else STEADY, KEPT, end=end)
@@ -98,7 +98,7 @@ def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
 
 
 def judge_all(histories: int, steady: int, kept: Path, *, end: float = float("inf")) -> None:
-    """A row for each series, as it is done."""
+    """Judge the series; write each row when it is done."""
     setting = inference_setting(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     rows = Rows(ROWS, ("kind", "number"))
@@ -112,7 +112,7 @@ def judge_all(histories: int, steady: int, kept: Path, *, end: float = float("in
 
 
 def judged(setting: Setting, emulator: Emulator, kind: str, number: int) -> dict[str, Any]:
-    """One series: what is foretold of it, and what comes."""
+    """Return the forecast of one series and the true course."""
     rng = np.random.default_rng([SEED, number, list(CLASSES).index(kind)])
     forward = ForwardModel(setting, emulator, (ObservationPoint(*PLACE),))
     crossing = np.nan
@@ -124,7 +124,7 @@ def judged(setting: Setting, emulator: Emulator, kind: str, number: int) -> dict
             continue
         sounds, clr = _shown(forward, z, course, rng)
         if clr[: _at(1.0) + 1].min() < 0.02:
-            continue  # nothing resonates
+            continue  # no resonance
         if "steady" in shape:
             break
         past = np.flatnonzero((clr - LIMIT) * (clr[_at(1.0)] - LIMIT) <= 0.0)
@@ -135,9 +135,9 @@ def judged(setting: Setting, emulator: Emulator, kind: str, number: int) -> dict
     began = process_time()
     try:
         found = forecast_observations(
-            setting, emulator, _heard(sounds, rng, shape), limit=(CLR, LIMIT), seed=number
+            setting, emulator, _observations(sounds, rng, shape), limit=(CLR, LIMIT), seed=number
         )
-    except AsperityError:  # counts as not held
+    except AsperityError:  # counts as not covered
         return dict.fromkeys(COLUMNS, np.nan) | {
             "kind": kind,
             "number": number,
@@ -177,7 +177,7 @@ def _at(time: float) -> int:
 
 
 def _course(shape: str, begin: float, rng: np.random.Generator) -> Field:
-    """Shares of the range of Sq over time, 1 the last recording."""
+    """Return Sq over time as shares of its range; 1 is the last recording."""
     if shape.startswith("steady"):
         return np.full(TIME.size, begin)
     rate = RATE * rng.standard_normal()
@@ -203,8 +203,9 @@ def _course(shape: str, begin: float, rng: np.random.Generator) -> Field:
 def _shown(
     forward: ForwardModel, z: Field, course: Field, rng: np.random.Generator
 ) -> tuple[dict[str, Field], Field]:
-    """Logarithms that the true contact shows, and its load share: the emulator's, off by a draw of
-    its deviation.
+    """Return the logarithms of the true contact's indicators, and its load share.
+
+    The contact is the emulator's, shifted by a draw of its deviation.
     """
     unknown, grid = forward.setting.unknowns[0], np.linspace(0.0, 1.0, 4 * KNOTS)
     along = along_range(z, 0, unknown.at_share(grid))
@@ -222,19 +223,21 @@ def _shown(
     return tables, clr
 
 
-def _heard(sounds: dict[str, Field], rng: np.random.Generator, shape: str) -> list[Observation]:
-    heard, slow = [], 0.0
+def _observations(
+    sounds: dict[str, Field], rng: np.random.Generator, shape: str
+) -> list[Observation]:
+    observations, slow = [], 0.0
     for at in np.linspace(0.0, 1.0, VISITS):
         place = _at(at)
         crf, damping, crfa = (
             float(np.exp(sounds[key][place] + std * rng.standard_normal()))
             for key, std in (("crf", CRF_STD), ("damping", DAMPING_STD), ("crfa", HEIGHT_STD))
         )
-        if "remembers" in shape:
-            fresh = rng.standard_normal() * (np.sqrt(1.0 - REMEMBERED**2) if heard else 1.0)
+        if "autocorrelated" in shape:
+            fresh = rng.standard_normal() * (np.sqrt(1.0 - REMEMBERED**2) if observations else 1.0)
             slow = REMEMBERED * slow + fresh
             crf = float(np.exp(sounds["crf"][place] + SCATTER * CRF_STD * slow))
-        heard.append(
+        observations.append(
             Observation(
                 load_n=PLACE[0],
                 entrainment_m_s=PLACE[1],
@@ -247,49 +250,45 @@ def _heard(sounds: dict[str, Field], rng: np.random.Generator, shape: str) -> li
                 x=100.0 * at,
             )
         )
-    return heard
+    return observations
 
 
 def tables() -> Iterator[str]:
-    """Shares of intervals that hold and of alarms, as Markdown: of all rows that are kept."""
+    """Yield coverage and alarm rates of all stored rows as Markdown."""
     kept = Rows(ROWS, ("kind", "number"))
     rows = list(kept)
-    yield "## The time to CLR 50 %: intervals of 90 % over simulated wear histories"
+    yield "## Time to CLR 50 %: coverage of 90 % intervals on simulated wear histories"
     yield f"Sample: {len(rows)} series."
     if not rows:
         return
     yield (
-        "| course | series | held | upper end over lower (median) | CLR at the last recording held"
-        " | change told |"
+        "| course | series | covered | upper over lower end (median) | CLR at the last recording"
+        " covered"
+        " | change detected |"
     )
     yield "|---|---|---|---|---|---|"
     for kind, whole in (
-        ("wearing", "all of these, as the filter assumes"),
-        ("otherwise", "all that it does not assume"),
+        ("wearing", "all that meet the filter's assumptions"),
+        ("otherwise", "all that violate them"),
     ):
         own = [row for row in rows if row["kind"] == kind]
         for shape in (*CLASSES[kind], whole):
             if some := [row for row in own if shape in (row["shape"], whole)]:
                 yield _line(shape, some)
-    for kind, what in (
-        ("steady", "that stay as they are"),
-        ("slow", "that do, and scatter that remembers"),
+    for kind, kind_text in (
+        ("steady", "without wear"),
+        ("slow", "without wear, with autocorrelated scatter"),
     ):
         if own := [row for row in rows if row["kind"] == kind]:
-            alarms, told = (
-                int(sum(flags))
-                for flags in (
-                    [row["alarm"] == "1" for row in own],
-                    [float(row["log_odds"]) >= np.log(100.0) for row in own],
-                )
-            )
+            alarms = sum(row["alarm"] == "1" for row in own)
+            changes = sum(float(row["log_odds"]) >= np.log(100.0) for row in own)
             yield (
-                f"Of {len(own)} machines {what}, {told} are told to change and {alarms} are"
-                " alarmed of."
+                f"Of {len(own)} machines {kind_text}, {changes} were classed as changing and"
+                f" {alarms} raised an alarm."
             )
     took = np.median([float(row["seconds"]) for row in rows])
     yield (
-        f"A forecast took {took:.1f} s of a processor (median). Rows by the code that found them:"
+        f"A forecast took {took:.1f} s of processor time (median). Rows per code version:"
         f" {kept.codes()}."
     )
 
@@ -299,12 +298,16 @@ def _line(shape: str, rows: list[dict[str, str]]) -> str:
     now = [
         float(row["clr_low"]) <= float(row["clr_true"]) <= float(row["clr_high"]) for row in rows
     ]
-    told = [float(row["log_odds"]) >= np.log(100.0) for row in rows]
-    held = share([_held(row) for row in rows])
-    return f"| {shape} | {len(rows)} | {held} | {width:.1f} | {share(now)} | {share(told)} |"
+    change_detected = [float(row["log_odds"]) >= np.log(100.0) for row in rows]
+    covered = share([_covered(row) for row in rows])
+    return (
+        f"| {shape} | {len(rows)} | {covered} | {width:.1f} | {share(now)} |"
+        f" {share(change_detected)}"
+        " |"
+    )
 
 
-def _held(row: dict[str, str]) -> bool:
+def _covered(row: dict[str, str]) -> bool:
     low, high, true = (float(row[key]) for key in ("low", "high", "crossing"))
     return row["rises"] == row["rising"] and low <= 100.0 * true <= high
 

@@ -1,5 +1,5 @@
-"""Friction, flash temperature and the thermal loop: errors against closed forms, the paper's case
-over Sq, the cost.
+"""Friction, flash temperature and thermal feedback: errors against closed forms, the paper's
+case over Sq, cost.
 """
 
 import statistics
@@ -55,7 +55,7 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield from cost_lines()
     if not fast:
         yield (
-            "\n## The paper's case over Sq, heat as a result and heat fed back, 256 x 256, mean of"
+            "\n## The paper's case over Sq, without and with thermal feedback, 256 x 256, mean of"
             " three surfaces\n"
         )
         yield from roughness_lines()
@@ -83,7 +83,7 @@ def limit_lines() -> Iterator[str]:
             NewtonianShear(),
             eta0 * rate * a * np.pi * (iv(1, beta) + modstruve(-1, beta)),
         ),
-        "Eyring far above its stress": (
+        "Eyring far above its characteristic stress": (
             EyringShear(tau0),
             2.0 * a * tau0 * (np.log(2.0 * eta0 * rate / tau0) + alpha * np.pi / 4.0 * p_h),
         ),
@@ -100,10 +100,10 @@ def limit_lines() -> Iterator[str]:
     for name, (law, force) in exact.items():
         for cells in (64, 256, 1024):
             found = friction(_hertz_film(case, law, cells, gap)).coefficient
-            wanted = force / conditions.line_load
+            reference = force / conditions.line_load
             yield (
-                f"| {name} | {cells} | {found:.5f} | {wanted:.5f} |"
-                f" {100 * (found / wanted - 1):+.3f} % |"
+                f"| {name} | {cells} | {found:.5f} | {reference:.5f} |"
+                f" {100 * (found / reference - 1):+.3f} % |"
             )
     dry = solve_contact(conditions, None, case.surface())
     found = friction(dry).coefficient
@@ -117,15 +117,15 @@ def _hertz_film(case: Case, law: FrictionLaw, cells: int, gap: float) -> Contact
     a, p_h = case.conditions.hertz.half_widths[0], case.conditions.hertz.p_max
     grid = Grid((2 * cells, 8), (-2.0 * a, -a), (2.0 * a, a))
     inside = np.abs(grid.x) < a
-    ones = np.ones(8)
+    line_ones = np.line_ones(8)
     assert case.lubricant is not None
     return ContactSolution(
         conditions=case.conditions,
         lubricant=replace(case.lubricant, friction=law),
         surface=flat_surface(grid),
         options=Options(),
-        pressure=line_pressure(grid.x, a, p_h)[:, None] * ones,
-        gap=np.where(inside, gap, 1.0)[:, None] * ones,
+        pressure=line_pressure(grid.x, a, p_h)[:, None] * line_ones,
+        gap=np.where(inside, gap, 1.0)[:, None] * line_ones,
         in_contact=np.zeros(grid.cells, bool),
         rigid_approach=0.0,
         convergence=Convergence(
@@ -150,7 +150,7 @@ def source_lines() -> Iterator[str]:
     for peclet in (0.01, 0.1, 1.0, 10.0, 100.0, 1e4):
         body = moving_source((128, 8), (dx, dx), speed_at(peclet), STEEL, length=1e3)
         x = (np.arange(128) - 63.5) * dx
-        rise = body(np.where(np.abs(x) < HALF, 1.0, 0.0)[:, None] * np.ones(8))[:, 0]
+        rise = body(np.where(np.abs(x) < HALF, 1.0, 0.0)[:, None] * np.line_ones(8))[:, 0]
         where = float(x[rise.argmax()])
         v = speed_at(peclet) / (2.0 * kappa)
 
@@ -175,7 +175,7 @@ def source_lines() -> Iterator[str]:
                 "band, Blok's 1.128 at the trailing edge", peclet, float(rise.max()), blok
             )
     square = moving_source((65, 65), (2.0 * HALF / 65, 2.0 * HALF / 65), 0.0, STEEL, length=None)
-    at_rest = float(square(np.ones((65, 65))).max())
+    at_rest = float(square(np.line_ones((65, 65))).max())
     yield _compared(
         "square at rest, 4 ln(1 + √2)/π",
         0.0,
@@ -186,7 +186,10 @@ def source_lines() -> Iterator[str]:
         body = moving_source((64, 64), (dx, dx), speed_at(peclet), STEEL, length=None)
         fitted = 2.0 * HALF / (k * np.sqrt(np.pi * (1.011 + peclet)))
         yield _compared(
-            "square, Tian and Kennedy's fit", peclet, float(body(np.ones((64, 64))).max()), fitted
+            "square, Tian and Kennedy's fit",
+            peclet,
+            float(body(np.line_ones((64, 64))).max()),
+            fitted,
         )
 
 
@@ -262,15 +265,17 @@ def _median(run: Callable[[], object]) -> float:
 def roughness_lines() -> Iterator[str]:
     yield (
         "| Sq [um] | CLR [%] | friction (range) | asperities | oil | surface [K] | film [K] | mean"
-        " film [um] | fed back: CLR [%] | friction | oil | film [K] | mean film [um] |"
+        " film [um] | with feedback: CLR [%] | friction | oil | film [K] | mean film [um] |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|---|---|---|"
     warm = Thermal(feedback=True)
     for sq in (0.0, *SQ_UM):
         rows = []
         for seed in SEEDS if sq else SEEDS[:1]:
-            wanted = {"surface.sq": f"{sq} um", "surface.seed": seed} if sq else {"surface": "flat"}
-            case = load_case(CASE).with_overrides(wanted)
+            overrides = (
+                {"surface.sq": f"{sq} um", "surface.seed": seed} if sq else {"surface": "flat"}
+            )
+            case = load_case(CASE).with_overrides(overrides)
             given = (case.conditions, case.lubricant, case.surface())
             cold = solve_contact(*given)
             fed = solve_thermal_contact(*given, thermal=warm)
@@ -308,7 +313,7 @@ def stribeck_lines() -> Iterator[str]:
             )
             curves.append(stribeck_curve(case))
     names = [
-        f"Sq {1e6 * curve.sq:g} um{', fed back' if curve.feedback else ''}" for curve in curves
+        f"Sq {1e6 * curve.sq:g} um{', with feedback' if curve.feedback else ''}" for curve in curves
     ]
     yield f"| u [m/s] | {' | '.join(names)} |"
     yield "|---|" + "---|" * len(curves)

@@ -1,4 +1,4 @@
-"""What each script of the gallery takes, in a process of its own, on one thread."""
+"""Processor time of each script of the gallery, in its own process on one thread."""
 
 import os
 import resource
@@ -9,15 +9,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 SCRIPTS = Path(__file__).parents[1] / "docs" / "scripts"
-MOST = 60  # seconds of a processor
+MOST = 60  # limit of processor time [s]
 
 
-def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - short as it is
-    """A row a script."""
+def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - short already
+    """Yield one row per script."""
     scripts = sorted(SCRIPTS.glob("[0-9]*.py"))
     yield "## The gallery's scripts"
     yield ""
-    yield f"Processor time of the whole script, imports too; {MOST} s are allowed."
+    yield f"Processor time of the whole script, with imports; limit {MOST} s."
     yield ""
     yield "| script | time [s] |"
     yield "|---|---|"
@@ -26,7 +26,7 @@ def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - short as it is
 
 
 def _taken(script: Path) -> float:
-    """Processor time of a script, its processes' included [s]."""
+    """Return the processor time of a script and its subprocesses [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with tempfile.TemporaryDirectory() as folder:
         limited = {"MPLBACKEND": "agg", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}

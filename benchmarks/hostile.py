@@ -1,9 +1,9 @@
-"""`asperity watch` on a folder as loggers leave it, killed ten times beside one that is not.
+"""`asperity watch` on an untidy logger folder: one watch runs undisturbed, one is killed ten times.
 
-Files come late, in parts, twice, from a clock that is ahead, and from other programs. At the end
-every file has to be accounted for, on each of the sensors, and both stores have to hold the same.
-`python -m benchmarks.hostile --minutes 60 [--kills 10] [--sensors 2]` runs this part alone and
-prints what was found; processor time is small, the clock's is not.
+Files arrive late, in parts, twice, from a clock that is ahead, and from other programs. At the end
+every file must have an outcome on each sensor, and both stores must be equal. `python -m
+benchmarks.hostile --minutes 60 [--kills 10] [--sensors 2]` runs this part alone. It needs little
+processor time but the full elapsed time.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from asperity.monitoring.files import may_be_recording
 
 RATE, SECONDS = 20e3, 0.1
 AHEAD_S = 30 * 86_400.0
-PARTS_S = 3.0  # between the two halves of a file that is still being written
+PARTS_S = 3.0  # between the two halves of a file in progress
 KINDS = ("plain",) * 6 + (
     "late",
     "in parts",
@@ -45,18 +45,18 @@ def recorded(number: int, sensor: int) -> np.ndarray:
 
 
 def channels(sensors: int) -> list[str]:
-    """Names of what the sensors heard, in each file."""
+    """Return channel names, which are the same in each file."""
     return [f"acc{sensor}" for sensor in range(1, sensors + 1)]
 
 
 def write(path: Path, number: int, sensors: int) -> None:
-    heard = {name: recorded(number, sensor) for sensor, name in enumerate(channels(sensors))}
+    signals = {name: recorded(number, sensor) for sensor, name in enumerate(channels(sensors))}
     with path.open("wb") as file:
-        np.savez(file, **heard, fs=RATE, unit="m/s^2")
+        np.savez(file, **signals, fs=RATE, unit="m/s^2")
 
 
 def arrive(folder: Path, number: int, kind: str, sensors: int) -> None:
-    """One arrival; what is written in parts takes `PARTS_S` twice."""
+    """Let one file arrive; files written in parts take `PARTS_S` twice."""
     path = folder / f"r-{number:04}.npz"
     if kind == "late":
         path = folder / f"r-{max(number - 7, 0):04}-late.npz"
@@ -110,43 +110,41 @@ def watch(
 
 
 def latest(store: Path) -> dict[str, list[tuple[object, ...]]]:
-    """Of each file what was read of the last version, and that it was judged; a row for each
-    sensor.
-    """
-    told: dict[str, dict[str, tuple[object, ...]]] = {}
+    """Return the readings and states of each file's last version, one row per sensor."""
+    latest_rows: dict[str, dict[str, tuple[object, ...]]] = {}
     with closing(sqlite3.connect(store)) as connection:
         rows = connection.execute(
             "SELECT file, sensor.name, version, refused, reading, state FROM recording "
             "JOIN sensor ON sensor.id = recording.sensor ORDER BY recording.id"
         ).fetchall()
     for file, sensor, version, refused, reading, state in rows:
-        of_file = told.setdefault(Path(file).name, {})
+        of_file = latest_rows.setdefault(Path(file).name, {})
         if any(version != other for other, *_ in of_file.values()):
             of_file.clear()
         of_file[sensor] = (version, sensor, refused, reading, state)
-    return {file: [row[1:] for _, row in sorted(of_file.items())] for file, of_file in told.items()}
+    return {
+        file: [row[1:] for _, row in sorted(of_file.items())]
+        for file, of_file in latest_rows.items()
+    }
 
 
 def accounted(folder: Path, store: Path, sensors: int) -> tuple[Counter[str], list[str]]:
-    """What became of every file of the folder, and those of which not every sensor says
-    anything.
-    """
-    held, counts, silent = latest(store), Counter[str](), []
+    """Count the outcomes of all files, and list files without an outcome on every sensor."""
+    held, counts, unreported = latest(store), Counter[str](), []
     for path in folder.iterdir():
         rows = held.get(path.name, [])
         if len(rows) == sensors:
-            counts[
-                "refused with a reason" if any(row[1] for row in rows) else "heard and judged"
-            ] += 1
+            refused = any(row[1] for row in rows)
+            counts["refused" if refused else "judged"] += 1
         elif not path.name.isprintable() or b"\xff" in os.fsencode(path.name):
-            counts["left out, its name said"] += 1
+            counts["skipped, name reported"] += 1
         elif not may_be_recording(path):
-            counts["no recording by its name"] += 1
+            counts["not a recording by name"] += 1
         elif path.stat().st_size == 0:
-            counts["empty, waited for"] += 1
+            counts["empty, pending"] += 1
         else:
-            silent.append(path.name)
-    return counts, silent
+            unreported.append(path.name)
+    return counts, unreported
 
 
 def run(
@@ -157,13 +155,13 @@ def run(
     settle: float = 5.0,
     say: Callable[[str], None] = print,
 ) -> Iterator[str]:
-    """Lines of a table."""
+    """Yield the lines of a table."""
     with TemporaryDirectory() as name:
         folder = Path(name) / "in"
         folder.mkdir()
         rng, began = np.random.default_rng(1), monotonic()
         end = began + 60.0 * minutes
-        outs = {"left alone": Path(name) / "alone", f"killed {kills} times": Path(name) / "killed"}
+        outs = {"undisturbed": Path(name) / "alone", f"killed {kills} times": Path(name) / "killed"}
         pace = {"every": every, "settle": settle}
         commands = [watch(folder, out, sensors=sensors, **pace) for out in outs.values()]
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -192,28 +190,29 @@ def run(
                 watch(folder, out, "--once", sensors=sensors, **pace), check=False, **quiet
             )
         stores = [out / "asperity.db" for out in outs.values()]
-        counts, silent = accounted(folder, stores[1], sensors)
+        counts, unreported = accounted(folder, stores[1], sensors)
         first, second = (latest(store) for store in stores)
         differ = sorted(
             file for file in first.keys() | second.keys() if first.get(file) != second.get(file)
         )
         yield f"Sample: {minutes:.0f} minutes."
-        yield "| a folder as loggers leave it | |"
+        yield "| untidy logger folder | |"
         yield "|---|---|"
         took = (monotonic() - began) / 60.0
         yield f"| minutes, arrivals, kills, sensors | {took:.1f}, {number}, {kills}, {sensors} |"
-        yield from (f"| {what} | {many} |" for what, many in sorted(counts.items()))
-        yield f"| nobody says what became of | {len(silent)} {' '.join(silent[:3])} |"
+        yield from (f"| {outcome} | {many} |" for outcome, many in sorted(counts.items()))
+        yield f"| files without an outcome | {len(unreported)} {' '.join(unreported[:3])} |"
         same = len(first.keys() | second.keys()) - len(differ)
         yield (
-            f"| files of which both stores hold the same, and not | {same}, {len(differ)}"
+            f"| files equal in both stores, files that differ | {same}, {len(differ)}"
             f" {' '.join(differ[:3])} |"
         )
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time; `fast` takes a minute of it. The hour is run by itself, with
-    `--minutes 60`.
+    """Yield Markdown lines; `fast` lasts one minute.
+
+    `--minutes 60` runs the full hour.
     """
     yield from run(1.0 if fast else 5.0, 3 if fast else 10)
 

@@ -1,7 +1,6 @@
-"""Indicators measured on the simulated rig: failures and errors over SNR, intervals, stages of
-wear.
+"""Indicators measured on the simulated rig: failures and errors over SNR, intervals, wear stages.
 
-`python -m benchmarks.indicators` runs this part alone; `--fast` a twentieth of it.
+`python -m benchmarks.indicators` runs this part alone; `--fast` uses a twentieth of the series.
 """
 
 import argparse
@@ -35,22 +34,22 @@ SNRS = (20.0, 10.0, 6.0, 3.0, 0.0)
 SERIES = 60
 DURATION = 300.0
 SEGMENT = 80_000
-FAR = 100.0  # Hz: a failure
+FAR = 100.0  # Hz; a larger error is a failure
 NINETY = 1.6449
 TRIALS = 400
-FEW, FEWER = 12, 3  # series, where fewer will do
+FEW, FEWER = 12, 3  # series, where fewer suffice
 CRF_STD = 15.0
 KNEE, RANGE = 1.8, (1.68, 1.92)
-HEARD_THROUGH = (
+STRUCTURE_SIZES = (
     0.3,
     1.0,
-)  # height of the highest mode of a structure's transfer over the direct way
+)  # height of the highest mode of a structure's transfer function over the direct path
 
-Reading = Callable[["Heard"], Sequence[Resonance]]
+Reading = Callable[["RigSpectra"], Sequence[Resonance]]
 
 
-class Heard(NamedTuple):
-    """A rig, its spectra, and those without tones."""
+class RigSpectra(NamedTuple):
+    """A rig, its spectra, and its spectra without tones."""
 
     rig: Rig
     spectra: list[Spectrum]
@@ -58,7 +57,7 @@ class Heard(NamedTuple):
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time; `fast` takes a twentieth of the series and trials."""
+    """Yield Markdown lines; `fast` uses a twentieth of the series and trials."""
     share = 20 if fast else 1
     yield (
         f"## Indicators: 12 samples x 5 repeats of {DURATION:g} s at 20 kHz, {SERIES // share}"
@@ -66,16 +65,16 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     )
     yield from table_lines(SERIES // share)
     few, fewer = max(FEW // share, 1), max(FEWER // share, 1)
-    yield f"\n## Indicators: each spectrum by itself, {fewer} series a row\n"
+    yield f"\n## Indicators: each spectrum alone, {fewer} series a row\n"
     yield from table_lines(fewer, (20.0, 6.0, 0.0), BY_ITSELF)
     yield f"\n## Indicators: short recordings of 10 s, {few} series a row\n"
     yield from table_lines(few, (10.0, 0.0), METHODS, duration_s=10.0)
     yield (
-        "\n## Indicators: a machine that repeats itself badly (modes' levels 0.3 dB, frequencies"
+        "\n## Indicators: poor repeatability of the machine (modes' levels 0.3 dB, frequencies"
         f" 0.05 %), {few} series a row\n"
     )
     yield from table_lines(few, (6.0, 0.0), METHODS, mode_gain_db=0.3, mode_drift=5e-4)
-    yield f"\n## Indicators: the line heard through a structure, {few} series a row\n"
+    yield f"\n## Indicators: line transmitted by a structure, {few} series a row\n"
     yield from through_lines(few)
     yield f"\n## Stages: {TRIALS // share} trials a row, CRF standard deviation {CRF_STD:g} Hz\n"
     yield from stage_lines(TRIALS // share)
@@ -91,8 +90,11 @@ def drawn(snr_db: float, seed: int, *, duration_s: float = DURATION, **choices: 
 
 
 def transferred(rig: Rig, size: float, seed: int) -> Rig:
-    """The rig with its contact heard through a structure: |1 + 2 to 6 modes|^2, in the band, damped
-    by 0.4 to 3 %.
+    """Return the rig with its contact line passed through a structure.
+
+    The transfer function is
+    1 + 2 to 6 modes
+    ^2 in the band, with damping ratios of 0.4 to 3 %.
     """
     rng = np.random.default_rng([5, seed])
     frequency = rig.recordings[0].frequency_hz
@@ -104,26 +106,26 @@ def transferred(rig: Rig, size: float, seed: int) -> Rig:
             height * 2j * damping / (1.0 - (frequency / f0) ** 2 + 2j * damping * frequency / f0)
         )
     power = np.abs(passed) ** 2
-    heard = [
+    recordings = [
         replace(
-            one,
-            contact_density=one.contact_density * power,
-            crfa=one.crfa * float(np.interp(one.crf_hz, frequency, power)),
+            recording,
+            contact_density=recording.contact_density * power,
+            crfa=recording.crfa * float(np.interp(recording.crf_hz, frequency, power)),
         )
-        for one in rig.recordings
+        for recording in rig.recordings
     ]
-    return replace(rig, recordings=tuple(heard))
+    return replace(rig, recordings=tuple(recordings))
 
 
 def moved(rig: Rig, size: float, seed: int) -> Rig:
-    """The same, the sensor moved to another place of the structure halfway."""
+    """Return the same rig with the sensor moved to another place of the structure halfway."""
     first, second = transferred(rig, size, seed), transferred(rig, size, 1000 + seed)
     half = len(rig.recordings) // 2
     return replace(rig, recordings=(*first.recordings[:half], *second.recordings[half:]))
 
 
 def through_lines(series: int) -> Iterator[str]:
-    """The joint separation where a structure passes on what it hears of the contact."""
+    """Yield the errors of the joint separation with a structure between contact and sensor."""
     yield (
         "| recordings | modes up to | failures | > 100 Hz off | not found | CRF rms error [Hz] |"
         " stated [Hz] | CRFA rms error | CRFA median error | 90 % intervals cover CRF and CRFA | s"
@@ -135,51 +137,59 @@ def through_lines(series: int) -> Iterator[str]:
         (DURATION, f"{DURATION:g} s", transferred),
         (10.0, "10 s, sensor moved halfway", moved),
     ):
-        for size in HEARD_THROUGH:
+        for size in STRUCTURE_SIZES:
             tally = Tally()
             for number in range(series):
                 rig = way(drawn(6.0, 3000 + number, duration_s=duration_s), size, number)
                 began = perf_counter()
-                found = joint(heard(rig))
+                found = joint(spectra_of(rig))
                 tally.seconds += (perf_counter() - began) / series
                 tally.add(rig, found)
             yield f"| {name} | {size:g} | {tally.row()} |"
 
 
-def heard(rig: Rig) -> Heard:
-    one = rig.recordings[0]
-    length = min(SEGMENT, round(one.duration_s * one.rate_hz))
-    spectra = [one.spectrum(length) for one in rig.recordings]
-    clean = [remove_lines(one, shaft_hz=rig.shaft_hz, band_hz=rig.band_hz) for one in spectra]
-    return Heard(rig, spectra, clean)
+def spectra_of(rig: Rig) -> RigSpectra:
+    first = rig.recordings[0]
+    length = min(SEGMENT, round(first.duration_s * first.rate_hz))
+    spectra = [recording.spectrum(length) for recording in rig.recordings]
+    clean = [
+        remove_lines(recording, shaft_hz=rig.shaft_hz, band_hz=rig.band_hz) for recording in spectra
+    ]
+    return RigSpectra(rig, spectra, clean)
 
 
-def papers(heard: Heard) -> Sequence[Resonance]:
-    """Five-point cubic smoothing three times, highest point of the band."""
+def papers(spectra: RigSpectra) -> Sequence[Resonance]:
+    """Return the highest point of the band after smoothing cubically over five points three
+    times.
+    """
     return [
-        contact_resonance(one, band_hz=heard.rig.band_hz, method="peak") for one in heard.spectra
+        contact_resonance(spectrum, band_hz=spectra.rig.band_hz, method="peak")
+        for spectrum in spectra.spectra
     ]
 
 
-def alone(heard: Heard) -> Sequence[Resonance]:
-    """One oscillator line over a floor, each recording by itself, tones taken out."""
-    return [contact_resonance(one.spectrum, band_hz=heard.rig.band_hz) for one in heard.clean]
-
-
-def modes(heard: Heard) -> Sequence[Resonance]:
-    """As many lines as each spectrum needs, the strongest; tones taken out."""
+def alone(spectra: RigSpectra) -> Sequence[Resonance]:
+    """Fit one oscillator line over a floor to each recording, tones removed."""
     return [
-        contact_resonance(one.spectrum, band_hz=heard.rig.band_hz, method="modes")
-        for one in heard.clean
+        contact_resonance(cleaned.spectrum, band_hz=spectra.rig.band_hz)
+        for cleaned in spectra.clean
     ]
 
 
-def joint(heard: Heard) -> Sequence[Resonance]:
-    """What stays told from what moves, tones taken out."""
+def modes(spectra: RigSpectra) -> Sequence[Resonance]:
+    """Fit as many lines as each spectrum needs and return the strongest; tones removed."""
+    return [
+        contact_resonance(cleaned.spectrum, band_hz=spectra.rig.band_hz, method="modes")
+        for cleaned in spectra.clean
+    ]
+
+
+def joint(spectra: RigSpectra) -> Sequence[Resonance]:
+    """Separate fixed from moving lines in all recordings; tones removed."""
     return series_resonances(
-        [one.spectrum for one in heard.clean],
-        band_hz=heard.rig.band_hz,
-        kept=[one.kept for one in heard.clean],
+        [cleaned.spectrum for cleaned in spectra.clean],
+        band_hz=spectra.rig.band_hz,
+        kept=[cleaned.kept for cleaned in spectra.clean],
     )
 
 
@@ -195,24 +205,24 @@ class Tally:
         self.seconds = 0.0
 
     def add(self, rig: Rig, found: Sequence[Resonance]) -> None:
-        for true, one in zip(rig.recordings, found, strict=True):
+        for true, resonance in zip(rig.recordings, found, strict=True):
             self.all += 1
-            if not one.found:
+            if not resonance.found:
                 self.lost += 1
                 continue
-            error = one.crf_hz - true.crf_hz
+            error = resonance.crf_hz - true.crf_hz
             if abs(error) > FAR:
                 self.wrong += 1
                 continue
-            relative = one.crfa / true.crfa - 1.0
+            relative = resonance.crfa / true.crfa - 1.0
             self.crf.append(error)
             self.crfa.append(relative)
-            if np.isfinite(one.crf_std):
-                self.crf_std.append(one.crf_std)
+            if np.isfinite(resonance.crf_std):
+                self.crf_std.append(resonance.crf_std)
                 self.covered.append(
                     (
-                        abs(error) < NINETY * one.crf_std,
-                        abs(one.crfa - true.crfa) < NINETY * one.crfa_std,
+                        abs(error) < NINETY * resonance.crf_std,
+                        abs(resonance.crfa - true.crfa) < NINETY * resonance.crfa_std,
                     )
                 )
 
@@ -254,19 +264,19 @@ def table_lines(
     for snr_db in snrs:
         tallies = {name: Tally() for name in methods}
         for number in range(series):
-            series_heard = heard(drawn(snr_db, 1000 + number, **choices))
+            rig_spectra = spectra_of(drawn(snr_db, 1000 + number, **choices))
             for name, method in methods.items():
                 began = perf_counter()
-                found = method(series_heard)
+                found = method(rig_spectra)
                 tallies[name].seconds += (perf_counter() - began) / series
-                tallies[name].add(series_heard.rig, found)
+                tallies[name].add(rig_spectra.rig, found)
         for name, tally in tallies.items():
             yield f"| {snr_db:g} | {name} | {tally.row()} |"
 
 
 def stage_lines(trials: int) -> Iterator[str]:
     yield (
-        "| truth | Sq | tests a sample | said: severe | running-in | no distinct stage | no change"
+        "| truth | Sq | tests per sample | severe | running-in | no distinct stage | no change"
         " | break in 1.68 to 1.92 um | 90 % interval covers | sd of the break [um] |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
@@ -321,12 +331,12 @@ def stage_row(
             splits.append(found.split)
             covered += found.interval[0] <= KNEE <= found.interval[1]
     order = ("severe", "running-in", "no distinct stage", "no change")
-    said = " | ".join(f"{100 * kinds.get(kind, 0) / trials:.1f} %" for kind in order)
+    shares = " | ".join(f"{100 * kinds.get(kind, 0) / trials:.1f} %" for kind in order)
     if truth is not TRENDS["knee"]:
-        return f"{said} | - | - | -"
+        return f"{shares} | - | - | -"
     inside = sum(RANGE[0] <= split <= RANGE[1] for split in splits)
     return (
-        f"{said} | {100 * inside / trials:.1f} % | {100 * covered / max(len(splits), 1):.0f} % |"
+        f"{shares} | {100 * inside / trials:.1f} % | {100 * covered / max(len(splits), 1):.0f} % |"
         f" {np.std(splits):.3f}"
     )
 

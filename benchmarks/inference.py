@@ -1,16 +1,15 @@
-"""Contact spectroscopy on simulated machines: do intervals hold the truth, at one operating point
-and at six.
+"""Contact spectroscopy on simulated machines: coverage of intervals with one and six operating
+points.
 
-Truths are contacts solved anew (never the emulator's), means over many surfaces, with unknowns
-drawn from the case's priors; their recordings are the rig's, with structural modes, noise and
-tones, and go through the joint separation. The emulator is the product's; only where a truth is
-solved on the emulator's own grid is what a finer one changes no part of it. Truths are kept in
-docs/benchmarks/inference-truths.csv, a line an operating point: when the inference has changed,
-they are judged anew without a solve. Emulator and contacts under way are kept in build/inference,
-intervals in docs/benchmarks/inference-machines.csv, of which the tables are made. `python -m
-benchmarks.inference` runs this part alone, `--machines 60` with fewer of them, `--finer 10` with
-as many whose truth is solved on twice the cells, `--known` with those alone that were solved
-before.
+True states are new contact solutions (not the emulator's), averaged over many surfaces, with
+unknowns drawn from the case's priors. The rig simulates their recordings with structural modes,
+noise and tones; the joint separation evaluates them. The emulator is the product's; it omits the
+grid correction where the truth uses its own grid. True states are stored in
+docs/benchmarks/inference-truths.csv, one line per operating point, so that a changed inference
+needs no new solves. The emulator and unfinished contacts are stored in build/inference, intervals
+in docs/benchmarks/inference-machines.csv, the source of the tables. `python -m
+benchmarks.inference` runs this part alone, `--machines 60` with fewer machines, `--finer 10` with
+as many whose truth uses twice the cells, `--known` with those already solved.
 """
 
 import argparse
@@ -49,40 +48,42 @@ CASE = Path(__file__).parents[1] / "examples" / "infer.toml"
 KEPT = Path(__file__).parents[1] / "build" / "inference"
 ROWS, TRUTHS = FOLDER / "inference-machines.csv", FOLDER / "inference-truths.csv"
 MACHINES, FEW, SEED = 200, 6, 21
-SURFACES = 12  # of a truth: their mean scatters by 2 points of CLR, and the emulator is off by 5
-ALSO_OUTSIDE = 50  # so many machines are heard by each law that is neither of both, too
+SURFACES = 12  # per true state: the mean scatters by 2 points of CLR; the emulator is off by 5
+ALSO_OUTSIDE = (
+    50  # number of machines simulated also with the laws that the inference does not contain
+)
 KEYS = ("clr", "car", "h_mean_m")
 PLACES = tuple((load, speed) for load in (300.0, 500.0, 900.0) for speed in (0.8, 2.5))
-ONE = PLACES[2]  # the operating point of those inferred from one: 500 N, 0.8 m/s
-TESTS = 2  # recordings at each operating point
+SINGLE_POINT = PLACES[2]  # the operating point of single-point inference: 500 N, 0.8 m/s
+TESTS = 2  # recordings per operating point
 RATE_HZ, DURATION_S, SEGMENT = 20e3, 60.0, 40_000
-LEAST_SHARE = 0.01  # CLR below which there is no line to be found
-INSIDE, FINER = "as the emulator has it", "on twice the cells"
-OUTSIDE = ("exponent 1/5", "CRF 5 % higher at 900 N")  # truths that neither law has
-LEFT_S = 60.0  # of the time given, for what is written at the end
+LEAST_SHARE = 0.01  # CLR below which no line is detectable
+INSIDE, FINER = "emulator grid", "twice the cells"
+OUTSIDE = ("exponent 1/5", "CRF 5 % higher at 900 N")  # truths that violate both laws
+LEFT_S = 60.0  # reserve of the time limit for writing the results
 
 
 def main() -> None:
-    """Solve, listen, infer, and say how often intervals hold."""
+    """Solve, simulate recordings, infer, and print the coverage of intervals."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--machines", type=int, default=MACHINES)
     arguments.add_argument(
-        "--finer", type=int, default=0, help="machines whose truth is on twice the cells"
+        "--finer", type=int, default=0, help="machines whose truth uses twice the cells"
     )
     arguments.add_argument("--fast", action="store_true", help=f"{FEW} machines")
-    arguments.add_argument("--kept", type=Path, default=KEPT, help="folder that keeps everything")
-    arguments.add_argument("--known", action="store_true", help="only machines whose truth is kept")
-    wanted = arguments.parse_args()
+    arguments.add_argument("--kept", type=Path, default=KEPT, help="folder of stored results")
+    arguments.add_argument("--known", action="store_true", help="only machines with stored truth")
+    parsed = arguments.parse_args()
     with threadpool_limits(1):
         judge_all(
-            FEW if wanted.fast else wanted.machines, wanted.finer, wanted.kept, known=wanted.known
+            FEW if parsed.fast else parsed.machines, parsed.finer, parsed.kept, known=parsed.known
         )
     print("\n".join(tables()))
 
 
 def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
-    """What `python -m benchmarks inference` prints: all machines judged so far, as many more as
-    there is time for.
+    """Yield the output of `python -m benchmarks inference`: all stored machines, and more while
+    time is left.
     """
     end = perf_counter() + seconds - LEFT_S
     judge_all(FEW if fast else MACHINES, 0, KEPT, end=end)
@@ -92,7 +93,7 @@ def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
 def judge_all(
     machines: int, finer: int, kept: Path, *, known: bool = False, end: float = float("inf")
 ) -> None:
-    """Every machine, in turn; its rows as it is done."""
+    """Judge every machine in turn; write its rows when it is done."""
     setting = inference_setting(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     print(emulator.sentence(), flush=True)
@@ -123,8 +124,8 @@ GRIDS = ("as the emulator's", "twice the cells")
 
 @dataclass(frozen=True)
 class Machine:
-    """A simulated machine: unknowns, and its contact's states at `PLACES`; None where one could not
-    be solved.
+    """A simulated machine: unknowns, and its contact states at `PLACES` (None if a solve
+    failed).
     """
 
     number: int
@@ -134,7 +135,7 @@ class Machine:
 
 
 def machines_of(setting: Setting) -> Iterator[Field]:
-    """Unknowns of one machine after the other, each a standard normal number: drawn from the case's
+    """Yield the unknowns of one machine after another: standard normal draws of the case's
     priors.
     """
     rng = np.random.default_rng(SEED)
@@ -144,8 +145,8 @@ def machines_of(setting: Setting) -> Iterator[Field]:
 
 @dataclass
 class Truths:
-    """States of machines' contacts at `PLACES`, means over surfaces: as they are kept, or solved
-    now, and kept.
+    """Contact states of machines at `PLACES`, averaged over surfaces; stored, or solved and
+    stored.
     """
 
     setting: Setting
@@ -155,7 +156,7 @@ class Truths:
         self.rows = Rows(TRUTHS, ("machine", "grid"))
 
     def __call__(self, number: int, z: Field, grid: str) -> dict[str, Field] | None:
-        """Of one machine; None where a contact could not be solved."""
+        """Return the states of one machine, or None if a contact could not be solved."""
         if (number, grid) not in self.rows:
             states, seconds = self._solved(number, z, grid)
             self.rows.write(
@@ -172,7 +173,7 @@ class Truths:
         return {key: np.array([float(row[key]) for row in own]) for key in KEYS}
 
     def _solved(self, number: int, z: Field, grid: str) -> tuple[dict[str, Field] | None, float]:
-        """The states, and how long all contacts took together."""
+        """Return the states and the time of all contacts together."""
         case = self.setting.case
         if grid != GRIDS[0]:
             case = case.with_overrides({"grid.cells": [2 * count for count in case.grid.cells]})
@@ -184,14 +185,12 @@ class Truths:
             {**base, "contact.load": f"{load:g} N", "contact.entrainment_speed": f"{speed:g} m/s"}
             for load, speed in PLACES
         ]
-        unheard = case.with_overrides(
+        without_resonance = case.with_overrides(
             {"vibration": "none"}
-        )  # no stiffness of its own, which takes as long again
-        plan = plan_points(unheard, points, seeds=SURFACES, kind="solve")
+        )  # skip the tangent stiffness, which doubles the time
+        plan = plan_points(without_resonance, points, seeds=SURFACES, kind="solve")
         there = self.kept / ("truth" if grid == GRIDS[0] else "truth-finer") / f"{number:03d}"
-        with ThreadPoolExecutor(
-            1
-        ) as executor:  # a process for each machine would take as long to start
+        with ThreadPoolExecutor(1) as executor:  # one process per machine would double the time
             table = run_study(plan, out=there, executor=executor).table
         means = table[table["status"] == "done"].groupby("point")[list(KEYS)].agg(["mean", "count"])
         if len(means) < len(PLACES) or (means[KEYS[0], "count"] < SURFACES).any():
@@ -200,7 +199,7 @@ class Truths:
 
 
 def recordings(setting: Setting, machine: Machine) -> list[Observation]:
-    """What the rig hears of a machine, by the joint separation of all its recordings."""
+    """Return a machine's observations: the joint separation of all its simulated recordings."""
     assert machine.states is not None
     values = {
         unknown.key: float(unknown.value(machine.z[i : i + 1])[0])
@@ -221,7 +220,7 @@ def recordings(setting: Setting, machine: Machine) -> list[Observation]:
     for place, (load, speed) in enumerate(PLACES):
         clr, car = (float(machine.states[key][place]) for key in ("clr", "car"))
         if clr < LEAST_SHARE or car == 0.0:
-            continue  # nothing resonates
+            continue  # no resonance
         conditions = setting.case.with_overrides({"contact.load": f"{load:g} N"}).conditions
         state = replace(dry_full_load(conditions, values["sq_m"]), clr=clr, car=car)
         line = contact_line(
@@ -244,21 +243,21 @@ def recordings(setting: Setting, machine: Machine) -> list[Observation]:
         Observation(
             load_n=load,
             entrainment_m_s=speed,
-            crf_hz=one.crf_hz,
-            crf_std_hz=one.crf_std,
-            crf_shared_std_hz=one.crf_shared_std,
-            crfa=one.crfa if one.crfa_std > 0.0 else np.nan,
-            crfa_std=one.crfa_std if one.crfa_std > 0.0 else np.nan,
-            damping_ratio=one.damping_ratio,
-            damping_std=one.damping_ratio_std,
+            crf_hz=resonance.crf_hz,
+            crf_std_hz=resonance.crf_std,
+            crf_shared_std_hz=resonance.crf_shared_std,
+            crfa=resonance.crfa if resonance.crfa_std > 0.0 else np.nan,
+            crfa_std=resonance.crfa_std if resonance.crfa_std > 0.0 else np.nan,
+            damping_ratio=resonance.damping_ratio,
+            damping_std=resonance.damping_ratio_std,
         )
-        for (load, speed), one in zip(places, found, strict=True)
-        if one.found
+        for (load, speed), resonance in zip(places, found, strict=True)
+        if resonance.found
     ]
 
 
 def wrongly(model: VibrationModel, law: str, clr: float, load: float) -> VibrationModel:
-    """The model with a mass that makes its frequency another law's."""
+    """Return the model with a mass that shifts its frequency to another law's."""
     if law == OUTSIDE[0]:  # CRF ~ (CLR F)^(1/5), the same as by 1/6 at 250 N
         factor = (clr * load / 250.0) ** (1.0 / 5.0 - 1.0 / 6.0)
     elif law == OUTSIDE[1]:
@@ -268,7 +267,7 @@ def wrongly(model: VibrationModel, law: str, clr: float, load: float) -> Vibrati
     return model.with_choices(mass=model.mass / factor**2)
 
 
-# Judged
+# Judgement
 # -------------------------------------------------------------------------------------------------
 
 ENDS = tuple(
@@ -296,25 +295,29 @@ HELD = (
 
 
 def judged(setting: Setting, emulator: Emulator, machine: Machine) -> Iterator[dict[str, Any]]:
-    """A row for the machine heard at one operating point, and one at all of them."""
-    heard = [] if machine.states is None else recordings(setting, machine)
-    at_one = [one for one in heard if one.conditions[:2] == ONE]
-    for points, observations in ((1, at_one), (len(PLACES), heard)):
+    """Yield a row for the machine inferred at one operating point, and one at all points."""
+    observations_of_all = [] if machine.states is None else recordings(setting, machine)
+    at_one = [
+        observation
+        for observation in observations_of_all
+        if observation.conditions[:2] == SINGLE_POINT
+    ]
+    for points, observations in ((1, at_one), (len(PLACES), observations_of_all)):
         row = {
             "machine": machine.number,
             "law": machine.law,
             "points": points,
-            "heard": len(observations),
+            "observations": len(observations),
         }
         if not observations:
             yield row | dict.fromkeys(HELD, "")
             continue
         found = infer_observations(setting, emulator, observations, seed=machine.number)
-        yield row | held(found, observations[0].conditions[:2], machine)
+        yield row | coverage(found, observations[0].conditions[:2], machine)
 
 
-def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[str, Any]:
-    """Truth and intervals of Sq, and of CLR and stage at one operating point that was heard."""
+def coverage(found: Inference, at: tuple[float, float], machine: Machine) -> dict[str, Any]:
+    """Return truth and intervals of Sq, and of CLR and stage at one observed operating point."""
     assert machine.states is not None
     place = next(
         number
@@ -353,35 +356,38 @@ def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[st
     }
 
 
-# Told
+# Tables
 # -------------------------------------------------------------------------------------------------
 
 
 def tables() -> Iterator[str]:
-    """Shares of intervals that hold, with 90 % of the binomial, and widths, as Markdown: of all
-    rows that are kept.
+    """Yield coverage (with 90 % binomial intervals) and widths as Markdown, from all stored
+    rows.
     """
     kept = Rows(ROWS, ("machine", "law"))
     every = list(kept)
-    yield "## Intervals of 90 % that hold the truth, of simulated machines"
+    yield "## Coverage of 90 % intervals on simulated machines"
     yield (
-        "| truth | points | machines | CLR held | CLR held, laws exact | Sq held | Sq held, laws"
-        " exact | stage held | likeliest stage right (said) |"
+        "| truth | points | machines | CLR covered | CLR covered, laws exact | Sq covered | Sq"
+        " covered, laws"
+        " exact | stage covered | likeliest stage right (stated probability) |"
     )
     yield "|---|---|---|---|---|---|---|---|---|"
     groups = {(row["law"], row["points"]): [] for row in every}
     for row in every:
         groups[row["law"], row["points"]].append(row)
-    told = {key: [row for row in rows if row["clr_true"]] for key, rows in sorted(groups.items())}
-    told = {key: rows for key, rows in told.items() if rows}
-    for (law, points), rows in told.items():
+    solved_rows = {
+        key: [row for row in rows if row["clr_true"]] for key, rows in sorted(groups.items())
+    }
+    solved_rows = {key: rows for key, rows in solved_rows.items() if rows}
+    for (law, points), rows in solved_rows.items():
         inside = [
             share([within(row, key, name) for row in rows])
             for key in ("clr", "sq")
             for name in ("", "exact_")
         ]
         right = np.mean([row["likeliest"] == row["stage_true"] for row in rows])
-        said = np.mean([float(row["likeliest_probability"]) for row in rows])
+        stated_probability = np.mean([float(row["likeliest_probability"]) for row in rows])
         stage = share([row["stage_held"] == "1" for row in rows])
         cells = (
             law,
@@ -389,17 +395,17 @@ def tables() -> Iterator[str]:
             len(rows),
             *inside,
             stage,
-            f"{100 * right:.0f} % ({100 * said:.0f} %)",
+            f"{100 * right:.0f} % ({100 * stated_probability:.0f} %)",
         )
         yield f"| {' | '.join(map(str, cells))} |"
-    yield "## What such an interval is wide, and what was learned (medians)"
+    yield "## Width of the intervals and information gain (medians)"
     yield (
         "| truth | points | CLR, points of load | laws exact | Sq, upper end over lower | laws"
         " exact | bits of CLR | bits of Sq | law's error, % of CRF | ln evidence of an error over"
         " none |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
-    for (law, points), rows in told.items():
+    for (law, points), rows in solved_rows.items():
         clr = [
             f"{100 * median(rows, f'clr_{name}high', f'clr_{name}low', np.subtract):.0f}"
             for name in ("", "exact_")
@@ -417,33 +423,33 @@ def tables() -> Iterator[str]:
         yield f"| {' | '.join((law, points, *clr, *sq, *information_gain, error, odds))} |"
     machines = {row["machine"] for row in every}
     yield f"Sample: {len(machines)} machines."
-    silent = {
+    unobserved = {
         row["machine"]
         for row in every
-        if row["law"] == INSIDE and row["points"] != "1" and row["heard"] == "0"
+        if row["law"] == INSIDE and row["points"] != "1" and row["observations"] == "0"
     }
     yield (
         f"{len(machines)} machines with {SURFACES} surfaces at each operating point; of"
-        f" {len(silent)} too few recordings show a line, and nothing is said. Rows by the code that"
-        f" found them: {kept.codes()}."
+        f" {len(unobserved)} too few recordings show a line, so no result is given. Rows per code"
+        f" version: {kept.codes()}."
     )
 
 
 def within(row: Mapping[str, str], key: str, name: str) -> bool:
-    """Whether an interval holds the truth."""
+    """Return True if an interval contains the truth."""
     low, high, true = (float(row[f"{key}_{end}"]) for end in (f"{name}low", f"{name}high", "true"))
     return low <= true <= high
 
 
 def median(rows: Sequence[Mapping[str, str]], high: str, low: str, how: np.ufunc) -> float:
-    """Of what `how` makes of two columns."""
+    """Return the median of `how` applied to two columns."""
     return float(
         np.median(how([float(row[high]) for row in rows], [float(row[low]) for row in rows]))
     )
 
 
 def share(inside: Sequence[bool]) -> str:
-    """A share with its 90 % interval (Clopper and Pearson's)."""
+    """Return a share with its 90 % interval (Clopper and Pearson)."""
     found = float(np.mean(inside))
     exact = binomtest(int(np.sum(inside)), len(inside)).proportion_ci(0.9)
     return f"{100 * found:.0f} % ({100 * exact.low:.0f} to {100 * exact.high:.0f})"

@@ -1,9 +1,9 @@
-"""Do the intervals hold what they say? Load shares on 128 and 256 cells against 512, a hundred of
-the wide sample.
+"""Coverage of load-share intervals: 128 and 256 cells against 512, a hundred contacts of the wide
+sample.
 
-A contact counts where it converged on both grids and the interval is determined. The calibration
-of `asperity.ehl.strategies.grid_continuation.grid_error`: its factors were chosen on forty of
-these contacts.
+A contact counts if it converged on both grids and its interval is determined. This calibrates
+`asperity.ehl.strategies.grid_continuation.grid_error`, whose factors were chosen on forty of these
+contacts.
 """
 
 import csv
@@ -19,14 +19,14 @@ from benchmarks.robustness import OIL, contacts, prepared
 
 MODELS: tuple[ContactModel, ...] = ("mixed",)
 COARSE, FINE = (128, 256), 512
-# difference from which on an interval is compared with it: below, the solver's tolerance is what
-# differs
+# smallest difference with which an interval is compared; smaller ones are dominated by the
+# solver's tolerance
 SHOWN = 1e-3
 
 
 @dataclass(frozen=True)
-class Held:
-    """A load share on one grid, its interval, and the finest grid's."""
+class Comparison:
+    """A load share on one grid, its interval, and the load share on the finest grid."""
 
     number: int
     model: ContactModel
@@ -42,7 +42,7 @@ class Held:
 
     @property
     def ratio(self) -> float:
-        """Half the interval over the difference."""
+        """Half-width of the interval over the difference."""
         assert self.low is not None
         assert self.high is not None
         return 0.5 * (self.high - self.low) / abs(self.true - self.clr)
@@ -51,7 +51,7 @@ class Held:
 def solved(
     number: int, model: ContactModel, cells: int
 ) -> tuple[float, float | None, float | None] | None:
-    """Load share and interval of one contact on one grid; None where it did not converge."""
+    """Return load share and interval of one contact on one grid, or None without convergence."""
     conditions, surface = prepared(contacts()[number], cells, shown=COARSE[0])
     solution = solve_contact(conditions, OIL, surface, options=Options(model=model), strict=False)
     error = contact_state(solution).error
@@ -60,33 +60,33 @@ def solved(
     return error.clr.value, error.clr.low, error.clr.high
 
 
-def held(count: int) -> Iterator[Held]:
-    """Every `600/count`-th contact."""
+def comparisons(count: int) -> Iterator[Comparison]:
+    """Yield every `600/count`-th contact."""
     for contact in contacts()[:: 600 // count]:
         for model in MODELS:
             finest = solved(contact.number, model, FINE)
             for cells in COARSE if finest is not None else ():
                 found = solved(contact.number, model, cells)
                 if found is not None and finest is not None:
-                    yield Held(contact.number, model, cells, *found, finest[0])
+                    yield Comparison(contact.number, model, cells, *found, finest[0])
 
 
 def lines(*, fast: bool, artefact: Path = Path("build/intervals.csv")) -> Iterator[str]:
-    """The table as Markdown; every contact goes into `artefact`."""
-    results = list(held(10 if fast else 100))
+    """Yield the table as Markdown; every contact goes into `artefact`."""
+    results = list(comparisons(10 if fast else 100))
     artefact.parent.mkdir(exist_ok=True)
     with artefact.open("w", newline="") as file:
-        names = list(Held.__dataclass_fields__)
+        names = list(Comparison.__dataclass_fields__)
         writer = csv.writer(file)
         writer.writerow(names)
-        writer.writerows([getattr(one, name) for name in names] for one in results)
+        writer.writerows([getattr(result, name) for name in names] for result in results)
     yield "## Intervals of the load share against a finer grid"
     yield ""
     yield from table(results)
 
 
-def table(results: list[Held]) -> Iterator[str]:
-    """How often the interval holds the finest grid, and how wide it is beside the difference."""
+def table(results: list[Comparison]) -> Iterator[str]:
+    """Yield the coverage of the finest grid and the interval's width relative to the difference."""
     yield (
         f"| model | cells | contacts | determined | {FINE} inside | half-width over difference,"
         " median |"
@@ -94,10 +94,12 @@ def table(results: list[Held]) -> Iterator[str]:
     yield "|---|---|---|---|---|---|"
     for model in MODELS:
         for cells in COARSE:
-            all_of = [one for one in results if (one.model, one.cells) == (model, cells)]
-            known = [one for one in all_of if one.low is not None]
-            wide = [one.ratio for one in known if abs(one.true - one.clr) > SHOWN]
-            inside = 100.0 * np.mean([one.inside for one in known]) if known else np.nan
+            all_of = [
+                result for result in results if (result.model, result.cells) == (model, cells)
+            ]
+            known = [result for result in all_of if result.low is not None]
+            wide = [result.ratio for result in known if abs(result.true - result.clr) > SHOWN]
+            inside = 100.0 * np.mean([result.inside for result in known]) if known else np.nan
             ratio = np.median(wide) if wide else np.nan
             yield (
                 f"| {model} | {cells} | {len(all_of)} | {len(known)} | {inside:.0f} % |"

@@ -1,9 +1,8 @@
-"""What benchmarks said, kept as csv that `docs/benchmarks.md` includes, and what became of each
-number since.
+"""Store benchmark output as csv for `docs/benchmarks.md`, and report changes of its numbers.
 
-A part's tables go to docs/benchmarks/PART.csv, PART-2.csv ... as they stand, its headings and
-sentences to PART-said.csv, where a table is named by its file. What a larger sample gave stays: a
-smaller one is compared with it.
+The tables of a part go to docs/benchmarks/PART.csv, PART-2.csv ..., its headings and sentences to
+PART-said.csv, with references to the tables. Results of a larger sample are not replaced; a smaller
+one is only compared with them.
 """
 
 import csv
@@ -13,54 +12,50 @@ from pathlib import Path
 
 DOCS = Path(__file__).parents[1] / "docs"
 FOLDER, PAGE = DOCS / "benchmarks", DOCS / "benchmarks.md"
-CHANGED = 0.1  # relative, from which a number is told: less is a shared machine's mood
+CHANGED = 0.1  # relative threshold of reported changes; smaller ones are noise of a shared machine
 IN_FULL, IN_SHORT = (
     "Measured in full.",
     "Measured in short; `python -m benchmarks --whole` takes all of it.",
 )
-SAMPLE = re.compile(r"Sample: (\d+) ")  # what a part says that goes on as long as it has time
+SAMPLE = re.compile(r"Sample: (\d+) ")  # line of a part that uses all its time
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 Table = list[list[str]]
 
 
-def taken_apart(lines: Iterable[str]) -> tuple[list[str], list[Table]]:
-    """Sentences and headings of Markdown lines, each table among them as its number in braces; and
-    the tables.
-    """
-    said: list[str] = []
+def split_lines(lines: Iterable[str]) -> tuple[list[str], list[Table]]:
+    """Split Markdown lines into sentences (a table is its number in braces) and tables."""
+    sentences: list[str] = []
     tables: list[Table] = []
-    within = False  # a table, which any other line ends, an empty one too
+    within = False  # inside a table; any other line ends it, also an empty one
     for line in (line for text in lines for line in text.splitlines() or [""]):
         if not line.startswith("|"):
-            said += [line] if line.strip() else []
+            sentences += [line] if line.strip() else []
             within = False
         elif within:
             tables[-1].append(cells(line))
         else:
             tables.append([cells(line)])
-            said.append(f"{{{len(tables)}}}")
+            sentences.append(f"{{{len(tables)}}}")
             within = True
-    return said, [
+    return sentences, [
         [row for row in table if not all(set(cell) <= set("-: ") for cell in row)]
         for table in tables
     ]
 
 
 def cells(line: str) -> list[str]:
-    """What stands between the bars of a row."""
+    """Return the cells of a row."""
     return [cell.strip() for cell in line.strip().strip("|").split("|")]
 
 
 def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
-    """Write a part's csv in place of those of no larger a sample; what changed against these, a
-    line each.
-    """
-    said, tables = taken_apart(lines)
+    """Store a part's csv unless the stored sample is larger; return one line per change."""
+    sentences, tables = split_lines(lines)
     before = {path.name: read(path) for path in _files(part, folder)}
     now = {_name(part, number): table for number, table in enumerate(tables, 1)}
     have, had = (
-        sample(said),
+        sample(sentences),
         sample([text for row in before.get(f"{part}-said.csv", []) for text in row]),
     )
     if have < had:
@@ -73,7 +68,7 @@ def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
                 for line in changes(name, before[name], now[name])
             ),
         ]
-    now[f"{part}-said.csv"] = [["said"], *([text] for text in said)]
+    now[f"{part}-said.csv"] = [["said"], *([text] for text in sentences)]
     folder.mkdir(parents=True, exist_ok=True)
     for name in before.keys() - now.keys():
         (folder / name).unlink()
@@ -83,10 +78,8 @@ def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
     return [line for name in now for line in changes(name, before.get(name), now[name])]
 
 
-def sample(said: Iterable[str]) -> float:
-    """How much a part took into account, by its own words; 0 where it took little or does not
-    say.
-    """
+def sample(sentences: Iterable[str]) -> float:
+    """Return the sample size that a part states; 0 for a short run or none stated."""
     sizes = [
         (
             float("inf")
@@ -95,7 +88,7 @@ def sample(said: Iterable[str]) -> float:
             if (found := SAMPLE.match(text))
             else 0.0
         )
-        for text in said
+        for text in sentences
     ]
     return max(sizes, default=0.0)
 
@@ -111,10 +104,9 @@ def _in_words(size: float) -> str:
 
 
 def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:
-    """Numbers that moved by more than a tenth, with the first cell of their row and the head of
-    their column.
+    """Yield numbers that changed by more than a tenth, with row and column names.
 
-    Of a table with other rows than the last, those that both have.
+    If the rows differ, only rows in both tables are compared.
     """
     if before is None:
         yield f"{name}: new"
@@ -152,7 +144,7 @@ def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:
 
 
 def _by_name(*tables: Table) -> list[dict[tuple[str, ...], list[str]]]:
-    """Rows by as few of their first cells as tell those of each table apart."""
+    """Return rows keyed by as few leading cells as identify the rows of each table."""
     widths = range(1, max((len(row) for table in tables for row in table), default=1) + 1)
     for width in widths:
         named = [{tuple(row[:width]): row for row in table} for table in tables]
@@ -166,7 +158,7 @@ def _moved(old: float, new: float) -> bool:
 
 
 def page(folder: Path = FOLDER, parts: Iterable[str] = ()) -> str:
-    """The page that includes every csv."""
+    """Return the page that includes every csv."""
     text = [
         "# Benchmarks",
         "",
@@ -190,7 +182,7 @@ def page(folder: Path = FOLDER, parts: Iterable[str] = ()) -> str:
 
 
 def read(path: Path) -> Table:
-    """The rows of a csv file."""
+    """Return the rows of a csv file."""
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.reader(file))
 

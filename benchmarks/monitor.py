@@ -1,8 +1,7 @@
-"""What a monitor costs: a store of 10 000 recordings and one more, and a watch over files that it
-knows.
+"""Cost of monitoring: a store of 10 000 recordings and one more, and a watch over known files.
 
-Processor time, least of several. `python -m benchmarks.monitor` runs this part alone; `--fast`
-with a tenth of the recordings.
+Processor time, least of several. `python -m benchmarks.monitor` runs this part alone; `--fast` uses
+a tenth of the recordings.
 """
 
 import argparse
@@ -29,13 +28,15 @@ from asperity.recording import ReadOptions
 
 RATE, SAMPLES, BAND = 12e3, 12_000, (2000.0, 4000.0)
 SPACING, MORE = 5.0, 12
-# of their frequencies, by which the modes of one sensor's structure lie beside the last one's
+# relative shift between the structural modes of adjacent sensors
 ELSEWHERE = 0.05
 LINES = ((3300.0, 0.004, 0.5), (2300.0, 0.01, 0.7))  # of the machine: frequency, damping, level
 
 
-def heard(rng: np.random.Generator, sensors: int) -> dict[str, np.ndarray]:
-    """A second of a machine with two modes and a contact line that scatters by 1 %, by channel."""
+def channel_signals(rng: np.random.Generator, sensors: int) -> dict[str, np.ndarray]:
+    """Return one second of a machine by channel: two modes and a contact line that scatters by 1
+    %.
+    """
     line_hz = 2800.0 * (1.0 + 0.01 * rng.standard_normal())
     channels = {}
     for sensor in range(sensors):
@@ -57,16 +58,16 @@ def heard(rng: np.random.Generator, sensors: int) -> dict[str, np.ndarray]:
 
 
 def write(path: Path, rng: np.random.Generator, sensors: int) -> None:
-    np.savez(path, **heard(rng, sensors), fs=RATE, unit="m/s^2")
+    np.savez(path, **channel_signals(rng, sensors), fs=RATE, unit="m/s^2")
 
 
 def channel(sensors: int) -> str:
-    """All of them, as `watch` takes them."""
+    """Return all channels as an argument of `watch`."""
     return ",".join(f"acc{sensor + 1}" for sensor in range(sensors))
 
 
 def filled(folder: Path, store: Path, many: int, sensors: int) -> None:
-    """A folder and a store of `many` recordings, of which 200 differ."""
+    """Fill a folder and a store with `many` recordings, 200 of them different."""
     rng, target, options = (
         np.random.default_rng(1),
         search_target(None, BAND),
@@ -74,11 +75,13 @@ def filled(folder: Path, store: Path, many: int, sensors: int) -> None:
     )
     sensors_in_store = open_sensors(store, folder.resolve(), (None, None, None), target, options)
     sensors_in_store.set_spacing(SPACING)
-    one = folder.parent / "one.npz"
+    prototype = folder.parent / "one.npz"
     readings = []
     for _ in range(200):
-        write(one, rng, sensors)
-        readings.append([reading for _, reading in read_channels([one], options, target, SPACING)])
+        write(prototype, rng, sensors)
+        readings.append(
+            [reading for _, reading in read_channels([prototype], options, target, SPACING)]
+        )
     for number in range(many):
         path = folder / f"r-{number:05}.npz"
         path.write_bytes(b"P")
@@ -86,12 +89,12 @@ def filled(folder: Path, store: Path, many: int, sensors: int) -> None:
         for reading in readings[number % 200]:
             sensors_in_store.add(key, replace(reading, file=key.file))
     with closing(sensors_in_store.store), sensors_in_store.store.transaction() as run:
-        run("UPDATE recording SET state = 'none'")  # as if each had been judged when it came
+        run("UPDATE recording SET state = 'none'")  # as if each had been judged on arrival
 
 
 def one_more(folder: Path, out: Path, many: int, sensors: int) -> tuple[list[float], list[float]]:
-    """Processor time [s] of judging one more recording, and of all that a look at the folder
-    takes.
+    """Return processor times [s] of judging one more recording, and of the whole scan of the
+    folder.
     """
     rng = np.random.default_rng(2)
     judged: list[float] = []
@@ -123,19 +126,21 @@ def one_more(folder: Path, out: Path, many: int, sensors: int) -> tuple[list[flo
 
 
 def _require_known(update: Update) -> None:
-    """That the watch goes on with what was filled in, and that it was heard: nothing else is worth
-    a time.
-    """
+    """Raise unless the watch knows the filled store and finds its resonances."""
     track = update.track
-    if update.new or track is None or not all(one.resonance.found for one in track.recordings):
+    if (
+        update.new
+        or track is None
+        or not all(recording.resonance.found for recording in track.recordings)
+    ):
         raise RuntimeError(
-            f"the watch reads {len(update.new)} recordings that its store should know, or hears no"
-            " line"
+            f"the watch read {len(update.new)} recordings that are already in its store, or found"
+            " no line"
         )
 
 
 def known(folder: Path, out: Path) -> float:
-    """Processor time [s] of `asperity watch --once` where nothing is new, its imports too."""
+    """Return processor time [s] of `asperity watch --once` without new files, with imports."""
     command = [
         sys.executable,
         "-m",
@@ -159,11 +164,11 @@ def known(folder: Path, out: Path) -> float:
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Lines of a markdown table."""
+    """Yield the lines of a Markdown table."""
     many = 1000 if fast else 10_000
     yield "## A monitor's store"
     yield ""
-    yield "| what | processor time |"
+    yield "| operation | processor time |"
     yield "|---|---|"
     for sensors in (1, 2):
         with TemporaryDirectory() as name:
@@ -175,7 +180,7 @@ def lines(*, fast: bool = False) -> Iterator[str]:
             yield f"| a store of {many} recordings of {of}: size | {size:.0f} MB |"
             yield f"| {of}: one more judged, median of {MORE} | {1e3 * np.median(judged):.0f} ms |"
             yield (
-                f"| {of}: one more looked for, read, judged and kept, median |"
+                f"| {of}: one more found, read, judged and stored, median |"
                 f" {1e3 * np.median(whole):.0f} ms |"
             )
             yield f"| {of}: the same, longest | {1e3 * np.max(whole):.0f} ms |"

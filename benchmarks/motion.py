@@ -1,4 +1,4 @@
-"""Motion: waviness running through a line contact against published amplitudes, orders, accepted
+"""Waviness moving through a line contact: published amplitudes, orders of convergence, accepted
 steps, cost.
 """
 
@@ -29,24 +29,22 @@ ALPHA, ETA0, EFFECTIVE, RADIUS = (
     0.04,
     2.26e11,
     12.5e-3,
-)  # Moes' numbers decide; these only have to meet them
+)  # the Moes numbers decide; these values only have to be consistent with them
 OIL = Lubricant(
     viscosity=Roelands(ETA0, ALPHA), density=DowsonHigginson(870.0), rheology=Newtonian()
 )
 DOMAIN = (-2.5, 1.5)  # half-widths
-CROSSING = (
-    1.4  # half-widths that the waves travel before the amplitude is taken, over one wavelength more
-)
+CROSSING = 1.4  # travel in half-widths before the amplitude is measured, over one wavelength more
 
 
 def master_curve(wavelength: float) -> float:
-    """The curve fitted to such results, of λ/b M^(3/4)/L^(1/2) (the same paper)."""
+    """Return the curve fitted to such results, of λ/b M^(3/4)/L^(1/2) (same paper)."""
     r = wavelength * M**0.75 / L**0.5
     return 1.0 / (1.0 + 0.125 * r + 0.04 * r**2)
 
 
 def contact(m: float = M, l: float = L) -> ContactConditions:  # noqa: E741
-    """A line contact of Moes' numbers, M = W (2U)^(-1/2) and L = G (2U)^(1/4), in pure rolling."""
+    """Return a line contact for Moes numbers, M = W (2U)^(-1/2), L = G (2U)^(1/4), pure rolling."""
     twice_u = (l / (ALPHA * EFFECTIVE)) ** 4
     speed = twice_u * EFFECTIVE * RADIUS / (2.0 * ETA0)
     young = EFFECTIVE * (1.0 - 0.3**2)
@@ -61,8 +59,8 @@ def contact(m: float = M, l: float = L) -> ContactConditions:  # noqa: E741
 
 
 class Waves(NamedTuple):
-    """What became of a wave: first harmonic of the film over time at each cell, complex, over the
-    wave's own there.
+    """Complex first harmonic over time of the film at each cell, relative to the undeformed
+    wave.
     """
 
     x: np.ndarray
@@ -80,7 +78,7 @@ class Waves(NamedTuple):
 
 @cache
 def waves(wavelength: float, cells_per_b: int, time_step: float = 1.0, share: float = 0.1) -> Waves:
-    """A wave of `share` of the smooth film runs through; lengths in half-widths."""
+    """Run a wave of `share` of the smooth film through the contact; lengths in half-widths."""
     conditions, (left, right) = contact(), DOMAIN
     b = conditions.hertz.half_widths[0]
     period = round(wavelength * cells_per_b)
@@ -116,7 +114,8 @@ def waves(wavelength: float, cells_per_b: int, time_step: float = 1.0, share: fl
 def _amplitudes(*, fast: bool) -> Iterator[str]:
     grids = (64,) if fast else (64, 128, 256)
     yield (
-        f"| wavelength/b | {' | '.join(f'{n} cells a half-width' for n in grids)} | Δ -> 0 | Venner"
+        f"| wavelength/b | {' | '.join(f'{n} cells per half-width' for n in grids)} | Δ -> 0 |"
+        " Venner"
         " | off | curve |"
     )
     yield "|---|" + "---|" * (len(grids) + 4)
@@ -124,7 +123,7 @@ def _amplitudes(*, fast: bool) -> Iterator[str]:
         found = [waves(wavelength, cells).central for cells in grids]
         limit = (
             found[-1] + (found[-1] - found[-2]) / 3.0 if len(found) > 1 else None
-        )  # one grid has none
+        )  # a single grid has no extrapolation
         off = 100.0 * ((found[-1] if limit is None else limit) / printed - 1.0)
         row = " | ".join(
             "not determined" if value is None else f"{value:.4f}" for value in (*found, limit)
@@ -140,15 +139,18 @@ def _orders(*, fast: bool) -> Iterator[str]:
         coarse, middle, fine = (waves(0.5, cells).at(0.0) for cells in grids)
         order = np.log2(abs(coarse - middle) / abs(middle - fine))
         yield (
-            f"Order in Δx = u Δt together (wavelength b/2, {grids} cells a half-width):"
+            f"Order in Δx = u Δt together (wavelength b/2, {grids} cells per half-width):"
             f" {order:.2f}."
         )
     long, half, quarter = (waves(0.5, 64, time_step).at(0.0) for time_step in (0.5, 0.25, 0.125))
     order = np.log2(abs(half - long) / abs(quarter - half))
-    yield f"Order in Δt alone (steps of 1/2, 1/4, 1/8 cell, time and wedge apart): {order:.2f}."
+    yield (
+        "Order in Δt alone (steps of 1/2, 1/4, 1/8 cell, separate time and wedge terms):"
+        f" {order:.2f}."
+    )
     for label, time_step in (
-        ("followed along its way, steps of 1 cell", 1.0),
-        ("apart, steps of 1/4 cell", 0.25),
+        ("Lagrangian, steps of 1 cell", 1.0),
+        ("Eulerian, steps of 1/4 cell", 0.25),
     ):
         amplitude = abs(waves(0.125, 64, time_step).at(0.0))
         yield f"A wave of b/8 on 8 cells, {label}: {amplitude:.3f} of its height at x = 0."
@@ -156,7 +158,8 @@ def _orders(*, fast: bool) -> Iterator[str]:
 
 def _costs(*, fast: bool) -> Iterator[str]:
     yield (
-        "| Sq [um] | cells | steps | not converged | bodies held | Newton steps | s a step | over a"
+        "| Sq [um] | cells | steps | not converged | bodies held | Newton steps | s per step |"
+        " over a"
         " cold solve |"
     )
     yield "|---|---|---|---|---|---|---|---|"
@@ -166,24 +169,27 @@ def _costs(*, fast: bool) -> Iterator[str]:
             steps = 40 if fast or cells > 128 else cells
             surfaces = MovingSurfaces.one_rough(case.surface(), case.conditions.surface_speeds)
             taken = moving_contact(case.conditions, case.lubricant, surfaces, options=case.options)
-            start, *rest = [one.solution.convergence for one in islice(taken, steps + 1)]
-            bad, held = (
-                sum(not one.converged for one in rest),
-                sum("held" in one.attempt for one in rest),
+            start, *rest = [
+                convergence.solution.convergence for convergence in islice(taken, steps + 1)
+            ]
+            bad, fixed_approach = (
+                sum(not convergence.converged for convergence in rest),
+                sum("fixed approach" in convergence.attempt for convergence in rest),
             )
             newton, seconds = (
-                median(one.iterations for one in rest),
-                median(one.seconds for one in rest),
+                median(convergence.iterations for convergence in rest),
+                median(convergence.seconds for convergence in rest),
             )
             ratio = seconds / start.seconds
             yield (
-                f"| {sq} | {cells} | {steps} | {bad} | {held} | {newton:g} | {seconds:.3f} |"
+                f"| {sq} | {cells} | {steps} | {bad} | {fixed_approach} | {newton:g} |"
+                f" {seconds:.3f} |"
                 f" {ratio:.2f} |"
             )
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """The tables as Markdown."""
+    """Yield the tables as Markdown."""
     yield "## Motion"
     yield ""
     yield "Amplitude of moving waviness at x = 0, pure rolling, M 100, L 11:"

@@ -1,11 +1,11 @@
-"""One table over roughness: load and area shares, load by film, films and resonances, of three
-models of one contact.
+"""Load and area shares, load by film, films and resonances over roughness, for three models of one
+contact.
 
 The paper's contact with a cap of 0.7 GPa and a correlation length of 40 um: snapshot and moving
-contact of the mixed model, moving contact of the conserving one. Means over one passage of the
-rough surface after oil has crossed the domain once; mean and standard deviation over seeds. What
-is computed is kept in build/motion_table.csv and not computed again: `python -m
-benchmarks.motion_table --cells 64 --seeds 0 1 2`.
+contact of the mixed model, moving contact of the conserving model. Means over one passage of the
+rough surface after oil has crossed the domain once; mean and standard deviation over seeds. Results
+are stored in build/motion_table.csv and reused: `python -m benchmarks.motion_table --cells 64
+--seeds 0 1 2`.
 """
 
 import argparse
@@ -40,15 +40,16 @@ KINDS: dict[str, type] = {
     "seed": int,
     "steps": int,
     "bad": int,
-}  # numbers else
+}  # all other columns are numbers
 LOAD_STEP = 0.02
-MOMENTS = 2  # of a passage, at which the tangent stiffness is taken
+MOMENTS = 2  # times in a passage at which the tangent stiffness is computed
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Means of one surface's passage, SI; `tangent_hz` and `shared_hz` are resonances, `bad` steps
-    not converged.
+    """Means of one surface's passage, SI; `bad` counts steps not converged.
+
+    `tangent_hz` and `shared_hz` are resonances.
     """
 
     model: str
@@ -74,7 +75,7 @@ class Outcome:
 
 
 def table_case(sq_um: float, seed: int, cells: int) -> Case:
-    """The paper's contact under the table's cap and correlation length."""
+    """Return the paper's contact with the table's cap and correlation length."""
     case = paper_case(sq_um, seed, cells)
     return case.with_overrides(
         {"material.hardness": "0.7 GPa", "surface.correlation_length": "40 um"}
@@ -82,7 +83,7 @@ def table_case(sq_um: float, seed: int, cells: int) -> Case:
 
 
 def outcomes(model: str, sq_um: float, seed: int, cells: int) -> Iterator[Outcome]:
-    """The moving contact of a model, and before it, of the mixed one, its snapshot."""
+    """Yield the moving contact of a model, preceded by its snapshot for the mixed model."""
     case = table_case(sq_um, seed, cells).with_overrides({"model": MODELS[model]})
     assert case.lubricant is not None
     surfaces = case.moving_surfaces()
@@ -119,29 +120,29 @@ def _outcome(
         return float(np.mean(list(values)))
 
     conditions, mass = case.conditions, case.vibration.mass if case.vibration else math.nan
-    sharing = [sharing_by_film(one.solution) for one in rows]
-    clr = mean(one.clr_solid for one in sharing)
+    sharing = [sharing_by_film(snapshot.solution) for snapshot in rows]
+    clr = mean(snapshot.clr_solid for snapshot in sharing)
     spring = point_stiffness(
         clr * conditions.load, conditions.radius_along_rolling, conditions.pair.reduced_modulus
     )
-    below = [mean(clr_below(one.solution, film) for one in rows) for film in FILMS]
-    stiffness = [found for one in moments if (found := _tangent(one)) is not None]
+    below = [mean(clr_below(snapshot.solution, film) for snapshot in rows) for film in FILMS]
+    stiffness = [found for snapshot in moments if (found := _tangent(snapshot)) is not None]
     return Outcome(
         model,
         case.grid.cells[0],
         sq_um,
         seed,
         clr,
-        mean(one.car_solid for one in sharing),
-        mean(one.clr_floor for one in sharing),
+        mean(shares.car_solid for shares in sharing),
+        mean(shares.clr_floor for shares in sharing),
         below[0],
         below[1],
         below[2],
         below[3],
-        h_min=mean(one.state.h_min for one in rows),
-        h_mean=mean(one.state.h_mean for one in rows),
-        cavitated=mean(one.cavitated for one in sharing),
-        approach_std=float(np.std([one.solution.rigid_approach for one in rows])),
+        h_min=mean(snapshot.state.h_min for snapshot in rows),
+        h_mean=mean(snapshot.state.h_mean for snapshot in rows),
+        cavitated=mean(shares.cavitated for shares in sharing),
+        approach_std=float(np.std([snapshot.solution.rigid_approach for snapshot in rows])),
         tangent_hz=math.sqrt(mean(stiffness) / mass) / (2.0 * math.pi) if stiffness else math.nan,
         shared_hz=math.sqrt(spring / mass) / (2.0 * math.pi) if clr > 0.0 else math.nan,
         steps=len(rows),
@@ -160,11 +161,11 @@ def _tangent(snapshot: Snapshot) -> float | None:
 def tangent_in_motion(
     sq_um: float, seed: int, cells: int, model: str = MIXED
 ) -> tuple[float, float]:
-    """Resonance [Hz] by the tangent stiffness of the moving contact, and that by the standing one's
-    at MOMENTS times.
+    """Return the resonance [Hz] from the tangent stiffness in motion, and from the snapshot's
+    stiffness.
 
-    In motion: the same passage under a load 2 % less and 2 % more, difference of loads over that
-    of mean approaches.
+    The latter is the mean at MOMENTS times. In motion: the same passage with 2 % less and 2 % more
+    load; difference of loads over difference of mean approaches.
     """
     case = table_case(sq_um, seed, cells).with_overrides({"model": MODELS[model]})
     assert case.lubricant is not None
@@ -179,7 +180,13 @@ def tangent_in_motion(
         )
         approaches.append(
             float(
-                np.mean([approach_of(one.solution, depth) for one in taken if one.number > cells])
+                np.mean(
+                    [
+                        approach_of(snapshot.solution, depth)
+                        for snapshot in taken
+                        if snapshot.number > cells
+                    ]
+                )
             )
         )
     stiffness = 2.0 * LOAD_STEP * conditions.load / (approaches[1] - approaches[0])
@@ -191,7 +198,7 @@ def tangent_in_motion(
 
 
 def kept() -> dict[tuple[str, int, float, int], Outcome]:
-    """What has been computed, by model, cells, Sq and seed."""
+    """Return stored results by model, cells, Sq and seed."""
     if not KEPT.exists():
         return {}
     with KEPT.open(newline="") as file:
@@ -199,16 +206,18 @@ def kept() -> dict[tuple[str, int, float, int], Outcome]:
     found = []
     for row in rows:
         values: dict[str, Any] = {
-            one.name: KINDS.get(one.name, float)(row[one.name]) for one in fields(Outcome)
+            field.name: KINDS.get(field.name, float)(row[field.name]) for field in fields(Outcome)
         }
         found.append(Outcome(**values))
-    return {(one.model, one.cells, one.sq_um, one.seed): one for one in found}
+    return {
+        (outcome.model, outcome.cells, outcome.sq_um, outcome.seed): outcome for outcome in found
+    }
 
 
 def compute(
     cells: int, seeds: Iterable[int], models: Iterable[str], sq_um: Iterable[float] = SQ_UM
 ) -> None:
-    """Whatever is not kept yet, kept as soon as it is there."""
+    """Compute what is not stored yet; store each result at once."""
     models, sq_um = list(models), list(sq_um)
     for seed in seeds:
         for sq in sq_um:
@@ -219,7 +228,7 @@ def compute(
                     KEPT.parent.mkdir(exist_ok=True)
                     new = not KEPT.exists()
                     with KEPT.open("a", newline="") as file:
-                        writer = csv.DictWriter(file, [one.name for one in fields(Outcome)])
+                        writer = csv.DictWriter(file, [field.name for field in fields(Outcome)])
                         if new:
                             writer.writeheader()
                         writer.writerow(asdict(outcome))
@@ -242,8 +251,8 @@ COLUMNS = (  # heading, field, scale, digits
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """The table as Markdown; `fast` takes one seed at 64 cells."""
-    KEPT.unlink(missing_ok=True)  # measured anew
+    """Yield the table as Markdown; `fast` uses one seed at 64 cells."""
+    KEPT.unlink(missing_ok=True)  # measure again
     compute(64, SEEDS[:1] if fast else SEEDS, MODELS)
     yield "## One contact, three models"
     yield ""
@@ -251,33 +260,34 @@ def lines(*, fast: bool) -> Iterator[str]:
 
 
 def table() -> Iterator[str]:
-    """What is kept; in brackets the same surfaces on the coarsest grid."""
+    """Yield the stored results; values in brackets: the same surfaces on the coarsest grid."""
     found = kept()
     yield (
         f"| Sq [um] | model | cells | surfaces | {' | '.join(name for name, *_ in COLUMNS)} | not"
         " converged |"
     )
     yield "|" + "---|" * (len(COLUMNS) + 5)
-    coarsest = min((one.cells for one in found.values()), default=0)
+    coarsest = min((outcome.cells for outcome in found.values()), default=0)
     for sq in SQ_UM:
         for model in (SNAPSHOT, *MODELS):
-            for cells in sorted({one.cells for one in found.values()}):
+            for cells in sorted({outcome.cells for outcome in found.values()}):
                 rows = [
-                    one
-                    for one in found.values()
-                    if (one.model, one.cells, one.sq_um) == (model, cells, sq)
+                    outcome
+                    for outcome in found.values()
+                    if (outcome.model, outcome.cells, outcome.sq_um) == (model, cells, sq)
                 ]
                 if not rows:
                     continue
                 same = (
-                    [found[model, coarsest, sq, one.seed] for one in rows]
+                    [found[model, coarsest, sq, outcome.seed] for outcome in rows]
                     if cells > coarsest
                     else []
                 )
                 shown = " | ".join(
                     _shown(rows, same, name, scale, digits) for _, name, scale, digits in COLUMNS
                 )
-                bad = f"{sum(one.bad for one in rows)} of {sum(one.steps + cells for one in rows)}"
+                steps = sum(outcome.steps + cells for outcome in rows)
+                bad = f"{sum(outcome.bad for outcome in rows)} of {steps}"
                 yield (
                     f"| {sq:g} | {model} | {cells} | {len(rows)} | {shown} |"
                     f" {'-' if model == SNAPSHOT else bad} |"
@@ -286,7 +296,7 @@ def table() -> Iterator[str]:
 
 def _shown(rows: list[Outcome], same: list[Outcome], name: str, scale: float, digits: int) -> str:
     values, coarse = (
-        np.array([getattr(one, name) for one in some]) * scale for some in (rows, same)
+        np.array([getattr(outcome, name) for outcome in some]) * scale for some in (rows, same)
     )
     values, coarse = values[np.isfinite(values)], coarse[np.isfinite(coarse)]
     if values.size == 0:
@@ -298,7 +308,7 @@ def _shown(rows: list[Outcome], same: list[Outcome], name: str, scale: float, di
 
 
 def main() -> None:
-    """Compute a part of the table, and print what there is of it."""
+    """Compute a part of the table and print all stored results."""
     arguments = argparse.ArgumentParser(
         prog="python -m benchmarks.motion_table", description=__doc__
     )
@@ -306,9 +316,9 @@ def main() -> None:
     arguments.add_argument("--seeds", type=int, nargs="*", default=SEEDS)
     arguments.add_argument("--sq", type=float, nargs="*", default=SQ_UM)
     arguments.add_argument("--models", nargs="*", choices=list(MODELS), default=list(MODELS))
-    wanted = arguments.parse_args()
+    parsed = arguments.parse_args()
     with threadpool_limits(1):
-        compute(wanted.cells, wanted.seeds, wanted.models, wanted.sq)
+        compute(parsed.cells, parsed.seeds, parsed.models, parsed.sq)
     print("\n".join(table()))
 
 

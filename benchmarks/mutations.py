@@ -1,5 +1,4 @@
-"""Do the tests notice broken physics? One deliberately wrong version of each term of the solver,
-and what catches it.
+"""Mutation tests: a deliberately wrong version of each term of the solver, and the test that fails.
 
 `python -m benchmarks.mutations` breaks a copy of the sources, term by term, and runs the tests
 that should fail.
@@ -25,7 +24,7 @@ DRY = "tests/validation/test_dry_contact.py"
 
 @dataclass(frozen=True)
 class Mutation:
-    """A term, where it stands, what it is turned into, and the tests that must not let it pass."""
+    """A term, its source text, the wrong replacement, and tests of which at least one must fail."""
 
     term: str
     file: str
@@ -38,16 +37,17 @@ MUTATIONS = (
     Mutation("wedge: 2 % too much oil dragged in", "ehl/scales.py", "12.0 * ", "12.24 * ", SMOOTH),
     Mutation(
         "Poiseuille flow: h cubed becomes h squared",
-        "ehl/models/single_pressure.py",
-        "content * height**2",
-        "content * height",
+        "kernels/reynolds.py",
+        "conductance * content * h * h / ",
+        "conductance * content * h / ",
         SMOOTH,
     ),
     Mutation(
         "density: held at its ambient value",
         "ehl/models/single_pressure.py",
-        "content = density * height",
-        "content = height",
+        "oil.density(pascals) / oil.density.rho0,\n"
+        "            oil.density.slope(pascals) * (self.p_scale / oil.density.rho0),",
+        "np.ones_like(pascals),\n            np.zeros_like(pascals),",
         SMOOTH,
     ),
     Mutation(
@@ -74,8 +74,8 @@ MUTATIONS = (
     Mutation(
         "load balance: 0.1 % too little carried",
         "ehl/models/single_pressure.py",
-        "/ self.problem.load - 1.0",
-        "/ self.problem.load - 0.999",
+        "dx * dy / self.load - 1.0",
+        "dx * dy / self.load - 0.999",
         MIXED,
     ),
     Mutation(
@@ -96,7 +96,7 @@ MUTATIONS = (
 
 
 def caught(mutation: Mutation) -> str | None:
-    """Name of the first test that fails on the broken sources; None when all of them pass."""
+    """Return the first test that fails on the broken sources; None when all pass."""
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(
             ROOT / "src", folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__")
@@ -105,8 +105,8 @@ def caught(mutation: Mutation) -> str | None:
         text = path.read_text("utf-8")
         if text.count(mutation.true) != 1:
             raise RuntimeError(
-                f"{mutation.file} holds {mutation.true!r} {text.count(mutation.true)} times, not"
-                " once"
+                f"{mutation.file} contains {mutation.true!r} {text.count(mutation.true)} times"
+                " instead of once"
             )
         path.write_text(text.replace(mutation.true, mutation.broken), "utf-8")
         command = [
@@ -136,8 +136,8 @@ def caught(mutation: Mutation) -> str | None:
 
 
 def lines() -> Iterator[str]:
-    """The table as Markdown."""
-    yield "| broken on purpose | caught by |"
+    """Yield the table as Markdown."""
+    yield "| mutation | failing test |"
     yield "|---|---|"
     for mutation in MUTATIONS:
         test = caught(mutation)

@@ -1,11 +1,10 @@
-"""Whether the advised next operating point teaches more than twenty drawn at random, of machines
-heard at one.
+"""Information gain of the advised next operating point against twenty random ones.
 
-Machines have unknowns from the case's priors and show what the emulator says, off by draws of its
-deviation that go together at points as the likelihood has them: those at the first point stay, the
-others are drawn anew each time. What a point teaches is how far the posterior's entropy falls by
-what is heard there: once, and in the mean over ten times. Rows are kept in
-docs/benchmarks/next-points-machines.csv and gone on from.
+Machines have unknowns from the case's priors and one recorded operating point. Their recordings
+follow the emulator with draws of its deviation, correlated between points as in the likelihood: the
+draw of the first point stays, the others are new each time. The gain of a point is the decrease of
+the posterior's entropy by its recording, once and averaged over ten recordings. Rows are stored in
+docs/benchmarks/next-points-machines.csv and extended by later runs.
 """
 
 import argparse
@@ -36,29 +35,29 @@ from benchmarks.inference import CASE, KEPT, LEAST_SHARE, LEFT_S, share
 from benchmarks.rows import FOLDER, Rows
 
 MACHINES, FEW, RANDOM, TIMES, SEED = 100, 8, 20, 10, 9
-FIRST = (500.0, 0.8)  # where each was heard
+FIRST = (500.0, 0.8)  # first operating point of all machines
 ROWS = FOLDER / "next-points-machines.csv"
 
 
 def main() -> None:
-    """Hear, advise, hear again, and say how often the advice was the better."""
+    """Simulate recordings, advise, and print how often the advised point was better."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--machines", type=int, default=MACHINES)
-    arguments.add_argument("--kept", type=Path, default=KEPT, help="folder that keeps everything")
-    wanted = arguments.parse_args()
+    arguments.add_argument("--kept", type=Path, default=KEPT, help="folder of stored results")
+    parsed = arguments.parse_args()
     with threadpool_limits(1):
-        judge_all(wanted.machines, wanted.kept)
+        judge_all(parsed.machines, parsed.kept)
     print("\n".join(tables()))
 
 
 def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
-    """What `python -m benchmarks next_points` prints: as many machines as there is time for."""
+    """Yield the output of `python -m benchmarks next_points`: as many machines as time allows."""
     judge_all(FEW if fast else MACHINES, KEPT, end=perf_counter() + seconds - LEFT_S)
     yield from tables()
 
 
 def judge_all(machines: int, kept: Path, *, end: float = float("inf")) -> None:
-    """A row for each machine, as it is done."""
+    """Judge the machines; write each row when it is done."""
     setting = inference_setting(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     rows = Rows(ROWS, ("machine",))
@@ -70,14 +69,14 @@ def judge_all(machines: int, kept: Path, *, end: float = float("inf")) -> None:
 
 
 def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
-    """Bits that the advised point teaches, and those drawn at random."""
+    """Return the information gain of the advised point and of random points in bits."""
     rng = np.random.default_rng([SEED, number])
     first = ForwardModel(setting, emulator, (ObservationPoint(*FIRST),))
     z = rng.standard_normal((1, first.dims))
     while first.states(z, ["clr"])["clr"][0, 0] < 0.05:
         z = rng.standard_normal((1, first.dims))
     own, usual = rng.standard_normal(1), [TYPICAL_STD[key] for key in ("crf", "damping")]
-    crf, damping = np.exp(_heard(first, z, own, rng)[:, 0])
+    crf, damping = np.exp(_recorded(first, z, own, rng)[:, 0])
     found = infer_observations(
         setting,
         emulator,
@@ -104,7 +103,7 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
         ForwardModel(setting, emulator, (ObservationPoint(*FIRST), *points)),
     )
     information_gain = np.array(
-        [taught(shown, _heard(every, z, own, rng)[:, 1:]) for _ in range(TIMES)]
+        [information_gains(shown, _recorded(every, z, own, rng)[:, 1:]) for _ in range(TIMES)]
     )
     shows = every.states(z, ["clr"])["clr"][0, 1:] > LEAST_SHARE
     once, mean = information_gain[0], information_gain.mean(axis=0)
@@ -122,11 +121,10 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     }
 
 
-def _heard(forward: ForwardModel, z: Field, own: Field, rng: np.random.Generator) -> Field:
-    """Logarithms of frequency and damping as the true machine shows them once, (2, points).
+def _recorded(forward: ForwardModel, z: Field, own: Field, rng: np.random.Generator) -> Field:
+    """Return logarithms of the true machine's frequency and damping in one recording, (2, points).
 
-    `own` is the chance that its emulator's error at the first point has, which is the same each
-    time.
+    `own` is the standard normal draw of the emulator's error at the first point, constant in time.
     """
     shown = forward.predict(z, "hertz-point", heights=False)
     lower = np.linalg.cholesky(
@@ -140,14 +138,14 @@ def _heard(forward: ForwardModel, z: Field, own: Field, rng: np.random.Generator
     return np.stack([shown.crf[0] + errors, shown.damping[0]]) + measured
 
 
-def taught(shown: PredictedRecordings, heard: Field) -> Field:
-    """Bits by which the entropy of what is possible falls at each point: by the weights that what
-    is heard gives.
+def information_gains(shown: PredictedRecordings, recorded: Field) -> Field:
+    """Return the decrease of the posterior's entropy at each point in bits, from importance
+    weights.
     """
     logs = np.asarray(
         sum(
             shown.channels[key].log_density(value, TYPICAL_STD[key])
-            for key, value in zip(("crf", "damping"), heard, strict=True)
+            for key, value in zip(("crf", "damping"), recorded, strict=True)
         )
     )
     weights = np.exp(logs - logs.max(axis=0))
@@ -156,16 +154,16 @@ def taught(shown: PredictedRecordings, heard: Field) -> Field:
 
 
 def tables() -> Iterator[str]:
-    """How often the advice is the better, as Markdown: of all rows that are kept."""
+    """Yield how often the advised point is better, as Markdown, from all stored rows."""
     kept = Rows(ROWS, ("machine",))
     rows = [{key: float(value) for key, value in row.items() if key != "code"} for row in kept]
-    yield f"## The advised next point against {RANDOM} drawn at random, machines heard at one"
+    yield f"## The advised next point against {RANDOM} random ones, machines recorded at one point"
     yield f"Sample: {len(rows)} machines."
     if not rows:
         return
     yield (
-        "| heard there | machines | advised teaches more than their mean | bits, advised | bits,"
-        " mean of the random |"
+        "| recordings at the point | machines | advised gains more than random on average | bits,"
+        " advised | bits, mean of random |"
     )
     yield "|---|---|---|---|---|"
     for key, name in (("once", "once"), ("mean", f"mean of {TIMES} times")):
@@ -176,8 +174,8 @@ def tables() -> Iterator[str]:
         yield f"| {name} | {len(rows)} | {better} | {information_gain[0]} | {information_gain[1]} |"
     shows = share([row["advised_shows"] == 1.0 for row in rows])
     yield (
-        f"At the advised point a line is to be heard (CLR over {100 * LEAST_SHARE:.0f} %) in"
-        f" {shows} of machines. Rows by the code that found them: {kept.codes()}."
+        f"At the advised point a line is detectable (CLR over {100 * LEAST_SHARE:.0f} %) in"
+        f" {shows} of machines. Rows per code version: {kept.codes()}."
     )
 
 

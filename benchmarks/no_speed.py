@@ -1,9 +1,9 @@
-"""Towards no speed: the load share of lines and balls, which is 1 in the limit, and a gear pair's
-Stribeck curve.
+"""Low-speed limit: the load share of lines and balls, which tends to 1, and a gear pair's Stribeck
+curve.
 
-The lines are the paper's contact, the balls 10 mm under 15 N in its oil; the gear pair is an FZG
-type C at its pitch point, load stage 7, ground across, by a grid of 256 x 128 cells. Each speed of
-the curve is solved from nothing, and from the next faster one's solution.
+The lines are the paper's contact; the balls have 10 mm radius, 15 N and the paper's oil. The gear
+pair is an FZG type C at its pitch point, load stage 7, ground across, on 256 x 128 cells. Each
+speed of the curve is solved cold, and from the solution of the next higher speed.
 """
 
 import time
@@ -25,7 +25,7 @@ from benchmarks.roughness_levels import paper_case
 SQ_UM, CAPS_GPA = (0.5, 1.0, 2.5), (0.7, 2.0, 7.0)
 SPEEDS, CELLS = (1e-2, 1e-4, 1e-6), (128, 256)
 SEED, LENGTH = 7, 20e-6
-WANTED = 0.02  # of 1
+CLR_TOLERANCE = 0.02  # of CLR about 1
 GEARS = """
 [contact]
 geometry = "line"
@@ -63,7 +63,7 @@ GEAR_SPEEDS = (1e-4, 1e-3, 0.01, 0.033, 0.067, 0.1, 0.33, 1.0, 3.29)  # m/s
 def posed(
     body: str, sq_um: float, cap_gpa: float, speed: float, cells: int
 ) -> tuple[ContactConditions, Lubricant, Surface]:
-    """One of the contacts, its oil and its roughness."""
+    """Return one of the contacts, its oil and its roughness."""
     case = paper_case(sq_um, SEED, cells)
     oil, speeds = case.lubricant, (1.1 * speed, 0.9 * speed)
     assert oil is not None
@@ -78,7 +78,7 @@ def posed(
 
 
 def limits(*, fast: bool) -> Iterator[str]:
-    """A row for each body, grid and speed: nine contacts of three roughnesses and three caps."""
+    """Yield a row per body, grid and speed: nine contacts of three roughnesses and three caps."""
     heads = (
         "contact | cells | speed [m/s] | solved | CLR, least | largest | within 0.02 of 1 | median"
         " [s] | longest"
@@ -87,7 +87,7 @@ def limits(*, fast: bool) -> Iterator[str]:
     yield "|---|---|---|---|---|---|---|---|---|"
     solve_contact(
         *posed("line", SQ_UM[0], CAPS_GPA[0], SPEEDS[0], 64), strict=False
-    )  # loads the compiled kernels
+    )  # load the compiled kernels
     for body in ("line", "ball"):
         for cells in CELLS[:1] if fast else CELLS:
             for speed in SPEEDS:
@@ -100,25 +100,20 @@ def limits(*, fast: bool) -> Iterator[str]:
                         seconds.append(time.process_time() - began)
                         solved += solution.convergence.converged
                         clr.append(contact_state(solution).clr)
-                near = sum(abs(one - 1.0) < WANTED for one in clr)
+                within_tolerance = sum(abs(value - 1.0) < CLR_TOLERANCE for value in clr)
                 yield (
                     f"| {body} | {cells} x {cells} | {speed:g} | {solved} of {len(clr)} |"
-                    f" {min(clr):.4f} | {max(clr):.4f} | {near} of {len(clr)} |"
+                    f" {min(clr):.4f} | {max(clr):.4f} | {within_tolerance} of {len(clr)} |"
                     f" {np.median(seconds):.2f} | {max(seconds):.2f} |"
                 )
 
 
 def gears(*, fast: bool) -> Iterator[str]:
-    """Friction and load share over speed, each speed from nothing and from the next faster one's
-    solution.
-    """
+    """Yield friction and load share over speed, cold and from the next higher speed."""
     case = load_case(GEARS, name="gears")
     speeds = GEAR_SPEEDS[::4] if fast else GEAR_SPEEDS
     swept = stribeck_curve(case, speeds=speeds).points
-    yield (
-        "| speed [m/s] | film ratio | CLR from nothing | swept | friction from nothing | swept |"
-        " solved |"
-    )
+    yield ("| speed [m/s] | film ratio | CLR cold | swept | friction cold | swept | solved |")
     yield "|---|---|---|---|---|---|---|"
     for after in swept:
         (alone,) = stribeck_curve(case, speeds=[after.entrainment_speed_m_s]).points
@@ -130,8 +125,8 @@ def gears(*, fast: bool) -> Iterator[str]:
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """Both tables as Markdown."""
-    yield "## Towards no speed\n"
+    """Yield both tables as Markdown."""
+    yield "## Low-speed limit\n"
     yield (
         f"The paper's contact and a ball, Sq {', '.join(f'{sq:g}' for sq in SQ_UM)} um, caps "
         f"{', '.join(f'{cap:g}' for cap in CAPS_GPA)} GPa, one surface each, model mixed:\n"

@@ -1,9 +1,8 @@
-"""The live page in headless Chromium: from a turned knob to new maps, first content, three users, a
-file, memory.
+"""Response times and memory of the live page in headless Chromium.
 
-Needs the extra `page`, Playwright and Debian's chromium. Times are by the clock: the machine's
-load stands beside them. So does the processor time of a knob's step: in the server, in what
-solves, in the browser.
+Measured are the time from a changed setting to new maps, the first content, three users at once and
+a large file. Needs the extra `page`, Playwright and Debian's chromium. Times are by the clock, so
+the machine's load is reported. Processor time of a change is split into server, solver and browser.
 """
 
 import os
@@ -21,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-STEPS, USERS, SESSIONS, GIVEN_BACK_S = 40, 3, 200, 40.0
+STEPS, USERS, SESSIONS, MEMORY_RELEASE_S = 40, 3, 200, 40.0
 RECORDING = 37_500_000  # samples of eight bytes: 300 MB
 TURN = """([key, text]) => new Promise(done => {
   const models = Bokeh.documents.flatMap(d => [...d._all_models.values()])
@@ -46,7 +45,7 @@ TURN = """([key, text]) => new Promise(done => {
 
 @contextmanager
 def _server(folder: Path) -> Iterator[tuple[str, int]]:
-    """The address of a page's server and the number of its process."""
+    """Run the page's server; yields its address and process number."""
     process = subprocess.Popen(
         [sys.executable, "-m", "asperity", "page", "--port", "0"],
         stdout=subprocess.PIPE,
@@ -64,7 +63,7 @@ def _server(folder: Path) -> Iterator[tuple[str, int]]:
 
 
 def _knob(rng: random.Random) -> tuple[str, str]:
-    """A knob and a value for it."""
+    """Draw a setting and a value for it."""
     return rng.choice(
         [
             ("Load, F", f"{rng.uniform(300, 900):.0f} N"),
@@ -91,13 +90,13 @@ def _steps(page: Any, count: int, seed: int) -> tuple[list[float], list[float]]:
 
 
 def _resident(process: int) -> float:
-    """Memory of a process [MB]."""
+    """Return the memory of a process [MB]."""
     status = Path(f"/proc/{process}/status").read_text("ascii")
     return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024.0  # type: ignore[index]
 
 
 def _spent(process: int) -> dict[str, float]:
-    """Processor time so far [s] of the page's server, of what solves for it, and of the browser."""
+    """Return the processor time so far [s] of the page's server, its solvers and the browser."""
     server, ours = _descendants(process), _descendants(os.getpid())
     return {
         "the server": _seconds([process]),
@@ -107,7 +106,7 @@ def _spent(process: int) -> dict[str, float]:
 
 
 def _descendants(process: int) -> set[int]:
-    """A process and all that it and they have started."""
+    """Return a process and all its descendants."""
     found, new = {process}, [process]
     while new:
         number = new.pop()
@@ -120,7 +119,7 @@ def _descendants(process: int) -> set[int]:
 
 
 def _seconds(processes: Iterable[int]) -> float:
-    """Processor time of processes so far [s]; nothing of one that has ended meanwhile."""
+    """Return the processor time of processes so far [s]; ended processes count as 0."""
     ticks = 0
     for number in processes:
         with suppress(OSError):
@@ -130,9 +129,7 @@ def _seconds(processes: Iterable[int]) -> float:
 
 
 def _memory(browser: Any, url: str, process: int, count: int) -> tuple[float, float]:
-    """The server's memory before and after so many visits that have gone [MB]; each until its maps
-    are there.
-    """
+    """Return the server's memory [MB] before and after visits, each until the maps appear."""
 
     def visits(number: int) -> None:
         for _ in range(number):
@@ -141,16 +138,16 @@ def _memory(browser: Any, url: str, process: int, count: int) -> tuple[float, fl
             page.locator(".block.film .bk-Figure").wait_for(timeout=120_000)
             page.close()
 
-    visits(20)  # what is loaded once
-    time.sleep(GIVEN_BACK_S)
+    visits(20)  # loads everything that stays in memory
+    time.sleep(MEMORY_RELEASE_S)
     before = _resident(process)
     visits(count)
-    time.sleep(GIVEN_BACK_S)
+    time.sleep(MEMORY_RELEASE_S)
     return before, _resident(process)
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """What was measured, as markdown."""
+    """Measure the page and yield the tables as Markdown."""
     from playwright.sync_api import sync_playwright
 
     steps, parts = 10 if fast else STEPS, dict[int, dict[str, float]]()
@@ -176,7 +173,7 @@ def lines(*, fast: bool) -> Iterator[str]:
                 _solved(visit)
                 wholes.append(time.perf_counter() - began)
                 visit.close()
-            yield _row("first content: knobs and what the page is doing", contents)
+            yield _row("first content: settings and progress", contents)
             yield _row("first contact: solved, all figures drawn", wholes)
             for cells in (128, 256):
                 page.goto(f"{url}contact?grid.cells={cells}+x+{cells}")
@@ -186,32 +183,32 @@ def lines(*, fast: bool) -> Iterator[str]:
                 parts[cells] = {
                     name: (spent - before[name]) / steps for name, spent in _spent(process).items()
                 }
-                yield _row(f"a knob to new maps, {cells} x {cells}, coarse", first)
-                yield _row(f"a knob to the full answer, {cells} x {cells}", whole)
+                yield _row(f"changed setting to new maps, {cells} x {cells}, coarse", first)
+                yield _row(f"changed setting to full solution, {cells} x {cells}", whole)
             yield _row(
-                f"a knob to the full answer, 128 x 128, {USERS} users at once",
+                f"changed setting to full solution, 128 x 128, {USERS} users at once",
                 _crowd(browser, url, steps // 4),
             )
             size = RECORDING // (10 if fast else 1)
-            name = f"a recording of {size * 8 / 1e6:.0f} MB dropped, to its verdict"
+            name = f"recording of {size * 8 / 1e6:.0f} MB uploaded to verdict"
             yield _row(name, [_drop(browser, url, Path(folder), size)])
             before, after = _memory(browser, url, process, 20 if fast else SESSIONS)
             browser.close()
         yield ""
-        yield "| processor time of a knob's step [s] | 128 x 128 | 256 x 256 |"
+        yield "| processor time per changed setting [s] | 128 x 128 | 256 x 256 |"
         yield "|---|---|---|"
         for name in parts[128]:
             yield f"| {name} | {parts[128][name]:.2f} | {parts[256][name]:.2f} |"
         yield ""
         yield (
-            f"{20 if fast else SESSIONS} visits come and gone: the server grew from {before:.0f} to"
-            f" {after:.0f} MB. Load of the machine ({os.cpu_count()} processors) at the end:"
+            f"After {20 if fast else SESSIONS} visits the server grew from {before:.0f} to"
+            f" {after:.0f} MB. Machine load ({os.cpu_count()} processors) at the end:"
             f" {os.getloadavg()[1]:.1f}."
         )
 
 
 def _crowd(browser: Any, url: str, count: int) -> list[float]:
-    """Seconds of every step, where several users turn knobs at once."""
+    """Return the seconds of every step with several users at once."""
     pages = [browser.new_context().new_page() for _ in range(USERS)]
     for page in pages:
         page.goto(f"{url}contact")
@@ -227,7 +224,7 @@ def _crowd(browser: Any, url: str, count: int) -> list[float]:
 
 
 def _drop(browser: Any, url: str, folder: Path, size: int) -> float:
-    """Seconds from dropping a large recording to what is said of it."""
+    """Return the seconds from the upload of a large recording to its verdict."""
     np.save(folder / "long.npy", np.random.default_rng(0).standard_normal(size))
     page = browser.new_page()
     page.goto(f"{url}recordings")

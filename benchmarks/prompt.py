@@ -1,6 +1,4 @@
-"""From the prompt to the answer: processor time of whole commands beside that of the solves in
-them.
-"""
+"""Processor time of whole commands, and of the solves in them."""
 
 import json
 import os
@@ -13,16 +11,14 @@ from functools import cache
 from pathlib import Path
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
-PROCESSOR = (
-    0  # the one that all run on: further surfaces are then solved in the command's own process
-)
+PROCESSOR = 0  # with one processor, further surfaces are solved in the command's own process
 INSIDE = """
 import io, json, sys
 from contextlib import redirect_stdout
 from time import process_time
-from asperity import ehl
+from importlib import import_module
 from asperity.cli import main
-from asperity.results import run
+run, solve = (import_module(f"asperity.results.{name}") for name in ("run", "solve"))
 spent = {}
 def timed(name, work):
     def within(*given, **named):
@@ -31,9 +27,9 @@ def timed(name, work):
         spent[name] = spent.get(name, 0.0) + process_time() - began
         return done
     return within
-ehl.solve_thermal_contact = timed("solve", ehl.solve_thermal_contact)
-ehl.own_resonance = timed("own resonance", ehl.own_resonance)
-ehl.subsurface_stress = timed("stress", ehl.subsurface_stress)
+solve.solve_thermal_contact = timed("solve", solve.solve_thermal_contact)
+run.own_resonance = timed("own resonance", run.own_resonance)
+run.subsurface_stress = timed("stress", run.subsurface_stress)
 run.friction_and_heat = timed("heat", run.friction_and_heat)
 def command():
     spent.clear()
@@ -56,22 +52,20 @@ def _on_one_processor() -> None:
 
 @cache
 def _bytecode() -> tempfile.TemporaryDirectory[str]:
-    """Where Python keeps what it compiled, also where it is told to keep none beside the
-    sources.
-    """
+    """Create a folder for Python's bytecode, used even with PYTHONDONTWRITEBYTECODE."""
     return tempfile.TemporaryDirectory()
 
 
 def _run(*arguments: str) -> tuple[float, str]:
-    """Processor time of a Python process on one thread [s], system's included, and what it
-    printed.
-    """
-    kept = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    """Run Python on one thread; return its user and system time [s] and its output."""
+    environment = {
+        key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"
+    }
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
         [sys.executable, *arguments],
-        env={**kept, **threads, "PYTHONPYCACHEPREFIX": _bytecode().name},
+        env={**environment, **threads, "PYTHONPYCACHEPREFIX": _bytecode().name},
         capture_output=True,
         text=True,
         check=False,
@@ -85,16 +79,12 @@ def _run(*arguments: str) -> tuple[float, str]:
 
 
 def seconds(*arguments: str, tries: int) -> float:
-    """Least processor time of `asperity` with these arguments [s]; once before, unmeasured, to
-    compile.
-    """
+    """Return the least processor time of `asperity` [s]; a first run, not counted, compiles."""
     return min([_run("-m", "asperity", *arguments)[0] for _ in range(tries + 1)][1:])
 
 
 def rows(*, fast: bool) -> Iterator[tuple[str, float]]:
-    """What is measured, and its processor time [s]: least of several, all that is compiled in its
-    cache.
-    """
+    """Yield each measured command and its least processor time [s] with warm caches."""
     tries = 2 if fast else 5
     with tempfile.TemporaryDirectory() as folder:
         recording, run = Path(folder) / "small.csv", Path(folder) / "run.nc"
@@ -102,30 +92,30 @@ def rows(*, fast: bool) -> Iterator[tuple[str, float]]:
         recording.write_text("time [s],acceleration [m/s^2]\n" + "\n".join(lines), "utf-8")
         yield "asperity --help", seconds("--help", tries=tries)
         yield "asperity check of a recording", seconds("check", str(recording), tries=tries)
-        yield "asperity check of a file that is none", seconds("check", str(CASE), tries=tries)
+        yield "asperity check of an invalid file", seconds("check", str(CASE), tries=tries)
         yield "asperity solve examples/paper.toml", seconds("solve", str(CASE), tries=tries)
         inside = [json.loads(_run("-c", INSIDE, str(CASE))[1]) for _ in range(tries)]
         for name, title in (
-            ("first", "in a process that looks inside"),
-            ("again", "once more in that process"),
+            ("first", "in a profiled process"),
+            ("again", "second solve in that process"),
         ):
-            parts = min((one[name] for one in inside), key=lambda one: one["whole"])
+            parts = min((times[name] for times in inside), key=lambda times: times["whole"])
             whole = parts.pop("whole")
             yield title, whole
             for part, spent in parts.items():
-                yield f"- of it {part}, of all surfaces", spent
-            yield "- of it the rest", whole - sum(parts.values())
+                yield f"- thereof {part}, all surfaces", spent
+            yield "- thereof the rest", whole - sum(parts.values())
         yield "the same with --out", seconds("solve", str(CASE), "--out", str(run), tries=tries)
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """The table as Markdown."""
-    yield "## From the prompt to the answer"
+    """Yield the table as Markdown."""
+    yield "## Processor time of whole commands"
     yield ""
-    yield "| what | processor time [s] |"
+    yield "| command | processor time [s] |"
     yield "|---|---|"
-    for what, spent in rows(fast=fast):
-        yield f"| {what} | {spent:.2f} |"
+    for name, spent in rows(fast=fast):
+        yield f"| {name} | {spent:.2f} |"
 
 
 if __name__ == "__main__":

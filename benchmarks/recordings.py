@@ -1,7 +1,7 @@
-"""What docs/recordings.md quotes: seconds and memory from disk to report, damaged files, false
-finds on real bearings.
+"""Time and memory to track recordings, damaged files, and false detections on real bearings.
 
-Recordings come from the rig simulator; what it costs to make them is not counted.
+The recordings come from the rig simulator; the time to simulate them is not counted.
+docs/recordings.md quotes the results.
 """
 
 import resource
@@ -30,7 +30,7 @@ ASPERITY = [sys.executable, "-m", "asperity"]
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """The tables, as Markdown."""
+    """Yield the tables as Markdown."""
     duration = 30.0 if fast else 300.0
     yield f"## Recordings: 60 of {duration:g} s at 20 kHz, from disk to report\n"
     with tempfile.TemporaryDirectory() as folder:
@@ -44,12 +44,13 @@ def lines(*, fast: bool) -> Iterator[str]:
             str(where.parent / "track.nc"),
         ]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        seconds, peak, said = measured([*ASPERITY, "track", str(where), *table, *page, "--quiet"])
+        command = [*ASPERITY, "track", str(where), *table, *page, "--quiet"]
+        seconds, peak, first_line = measured(command)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        worked = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        processor_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         yield (
-            f"- `asperity track`: {seconds:.1f} s, {worked:.1f} s of processor time, {peak:.0f} MB"
-            f" at most, all processes together. {said}"
+            f"- `asperity track`: {seconds:.1f} s, {processor_s:.1f} s of processor time, peak"
+            f" {peak:.0f} MB in all processes together. {first_line}"
         )
         yield f"- {one_file(next(iter(sorted(where.glob('*.h5')))))}"
         if not fast:
@@ -58,14 +59,15 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield from damaged_files(100 if fast else 500)
     yield "\n## Real bearings, which have no contact resonance of this kind\n"
     if MEASURED.is_dir():
-        yield from false_finds()
+        yield from false_detections()
     else:
-        yield "The measured recordings are not on this machine."
+        yield "The measured recordings are not available on this machine."
 
 
 def measured(command: list[str]) -> tuple[float, float, str]:
-    """Seconds, peak of the memory [MB] of a command and its children (proportional set size), its
-    first line.
+    """Run a command; return its seconds, peak memory [MB] with children, and first line.
+
+    Memory is the proportional set size.
     """
     began = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -85,7 +87,7 @@ def _family(pid: int) -> list[int]:
         children = [(thread / "children").read_text().split() for thread in threads]
     except OSError:
         return [pid]
-    return [pid, *(one for group in children for child in group for one in _family(int(child)))]
+    return [pid, *(pid for group in children for child in group for pid in _family(int(child)))]
 
 
 def _megabytes(pid: int) -> float:
@@ -99,7 +101,7 @@ def _megabytes(pid: int) -> float:
 
 
 def one_file(path: Path) -> str:
-    """From one file to its CRF."""
+    """Measure the time from one file to its CRF."""
     target = search_target(load_case(CASE))
     times, processor = [], []
     for _ in range(5):
@@ -110,14 +112,14 @@ def one_file(path: Path) -> str:
         times.append(time.perf_counter() - began)
         processor.append(time.process_time() - worked)
     return (
-        f"one of them from disk to CRF ({found.crf_hz:.1f} Hz): {np.median(times):.2f} s, "
+        f"one recording from disk to CRF ({found.crf_hz:.1f} Hz): {np.median(times):.2f} s, "
         f"{np.median(processor):.2f} s of processor time (medians of 5)"
     )
 
 
 def large_file(folder: Path) -> str:
-    """Files of 2 GB (npy, wav) and of 0.5 GB (csv), checked."""
-    told = []
+    """Check an npy file of 2 GB and a csv file of 0.5 GB."""
+    results = []
     rng = np.random.default_rng(0)
     block = rng.standard_normal(1 << 20).astype(np.float32)
     large = np.lib.format.open_memmap(folder / "large.npy", "w+", np.float32, (500 << 20,))
@@ -142,24 +144,25 @@ def large_file(folder: Path) -> str:
             "--quiet",
         ]
         seconds, peak, _ = measured(command)
-        told.append(f"{name.split('.')[1]} of {size:.1f} GB in {seconds:.0f} s and {peak:.0f} MB")
+        kind = name.split(".")[1]
+        results.append(f"{kind} of {size:.1f} GB in {seconds:.0f} s and {peak:.0f} MB")
         (folder / name).unlink()
-    return f"`asperity check` of {', '.join(told)}"
+    return f"`asperity check` of {', '.join(results)}"
 
 
 def damaged_files(count: int) -> Iterator[str]:
-    """Read or refused in a sentence, each in how long and how much."""
+    """Check that damaged files are read or rejected with one message; report time and memory."""
     sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
     from support.recordings import damaged, vibration, write_all
 
-    warnings.simplefilter("ignore")  # readers that fail leave files open
+    warnings.simplefilter("ignore")  # failing readers leave files open
     rng = np.random.default_rng(11)
     outcomes: Counter[str] = Counter()
     slowest = (0.0, "")
-    Path("/proc/self/clear_refs").write_text("5")  # the peak of the memory is counted from here
+    Path("/proc/self/clear_refs").write_text("5")  # resets the peak of the memory
     with tempfile.TemporaryDirectory() as folder:
-        said = write_all(Path(folder), vibration())
-        contents = [(name, Path(folder, name).read_bytes()) for name in said]
+        options = write_all(Path(folder), vibration())
+        contents = [(name, Path(folder, name).read_bytes()) for name in options]
         if MEASURED.is_dir():
             contents.append(("endaq.ide", (MEASURED / "endaq" / "ActTest_009.IDE").read_bytes()))
         for number in range(count):
@@ -168,39 +171,40 @@ def damaged_files(count: int) -> Iterator[str]:
             path.write_bytes(damaged(content, rng))
             began = time.perf_counter()
             try:
-                for one in open_channels(path, **said.get(name, {})):
-                    check_recording(one)
+                for channel in open_channels(path, **options.get(name, {})):
+                    check_recording(channel)
                 outcomes["read"] += 1
             except BadInput as refusal:
                 outcomes[
-                    "refused" if "\n" not in str(refusal) else "TRACEBACK IN THE SENTENCE"
+                    "rejected" if "\n" not in str(refusal) else "TRACEBACK IN THE MESSAGE"
                 ] += 1
-            except Exception as error:  # noqa: BLE001 - what must not happen is counted
+            except Exception as error:  # noqa: BLE001 - tracebacks are counted
                 outcomes[f"TRACEBACK {type(error).__name__}"] += 1
             slowest = max(slowest, (time.perf_counter() - began, name))
             path.unlink()
     status = Path("/proc/self/status").read_text().splitlines()
     peak = sum(int(line.split()[1]) for line in status if line.startswith("VmHWM")) / 1024
-    told = ", ".join(f"{number} {outcome}" for outcome, number in outcomes.most_common())
+    counts = ", ".join(f"{number} {outcome}" for outcome, number in outcomes.most_common())
     yield (
         f"{count} files of {len(contents)} kinds, cut, flipped, lengthened, with huge counts, NaN"
-        f" and text in numbers: {told}; slowest {slowest[0]:.2f} s ({slowest[1]}); the process"
-        f" never held more than {peak:.0f} MB."
+        f" and text in numbers: {counts}; slowest {slowest[0]:.2f} s ({slowest[1]}); peak memory"
+        f" {peak:.0f} MB."
     )
 
 
-def false_finds() -> Iterator[str]:
-    """How often a contact resonance is found on bearings that have none."""
+def false_detections() -> Iterator[str]:
+    """Count contact resonances detected on bearings that have none."""
     yield "| recordings | method | found | of |"
     yield "|---|---|---|---|"
-    alone = {"none given": None, "modes": "modes", "likelihood": "likelihood", "peak": "peak"}
+    methods = {"default": None, "modes": "modes", "likelihood": "likelihood", "peak": "peak"}
     running = []
     for path in [*sorted((MEASURED / "mfpt").iterdir()), *sorted((MEASURED / "ims").iterdir())]:
         given = {"rate_hz": 20e3} if path.parent.name == "ims" else {"unit": "g"}
         running += [
-            (path, given | {"channel": one.channel.name}) for one in open_channels(path, **given)
+            (path, given | {"channel": opened.channel.name})
+            for opened in open_channels(path, **given)
         ]
-    for name, method in alone.items():
+    for name, method in methods.items():
         tracks = [
             track_recordings([path], TrackSettings(method=method, **given))
             for path, given in running
@@ -208,7 +212,7 @@ def false_finds() -> Iterator[str]:
         usable = [track for track in tracks if track.recordings[0].reading.usable]
         found = sum(track.resonance_count for track in usable)
         yield (
-            f"| MFPT and IMS channels one by one (the machine runs) | {name} | {found} |"
+            f"| MFPT and IMS channels, each alone (machine running) | {name} | {found} |"
             f" {len(usable)} |"
         )
     with tempfile.TemporaryDirectory() as folder:
@@ -222,12 +226,11 @@ def false_finds() -> Iterator[str]:
             track = track_recordings(names)
             found, total = found + track.resonance_count, total + len(names)
         yield (
-            f"| MFPT, each record in 8 pieces as a series | none given (joint) | {found} |"
-            f" {total} |"
+            f"| MFPT, each record in 8 pieces as a series | default (joint) | {found} | {total} |"
         )
         every = sorted(Path(folder).iterdir())
         count = track_recordings(every).resonance_count
         yield (
-            f"| MFPT, all pieces of all four as one series | none given (joint) | {count} |"
+            f"| MFPT, all pieces of all records as one series | default (joint) | {count} |"
             f" {len(every)} |"
         )

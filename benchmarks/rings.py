@@ -1,5 +1,4 @@
-"""The paper's twelve rings: what Sq of a profilometer says of their load share, and what its two
-printed CRF add.
+"""CLR of the paper's twelve rings from their measured Sq, and from the two printed CRF.
 
 `python -m benchmarks.rings` runs this part alone; the emulator is that of `benchmarks.inference`.
 """
@@ -24,33 +23,33 @@ from asperity.inference import (
 from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM
 from benchmarks.inference import CASE, KEPT
 
-CRF_STD_HZ = 15.0  # the width that the paper's figure gives a point
+CRF_STD_HZ = 15.0  # size of a point in the paper's figure
 LOAD_N, SPEED_M_S = 500.0, 1.91
 
 
 def main() -> None:
     """Print the table."""
     arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("--kept", type=Path, default=KEPT, help="folder that keeps the emulator")
+    arguments.add_argument("--kept", type=Path, default=KEPT, help="folder of the stored emulator")
     print("\n".join(lines(fast=True, kept=arguments.parse_args().kept)))
 
 
-def lines(*, fast: bool, kept: Path = KEPT) -> Iterator[str]:  # noqa: ARG001 - short as it is
-    """What `python -m benchmarks rings` prints."""
+def lines(*, fast: bool, kept: Path = KEPT) -> Iterator[str]:  # noqa: ARG001 - already short
+    """Yield the output of `python -m benchmarks rings`."""
     setting = inference_setting(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     clr, kg = quantity("clr"), quantity("mass_kg")
-    yield "## The paper's rings at 500 N: what Sq says of CLR, and what a printed CRF adds"
+    yield "## The paper's rings at 500 N: CLR from Sq, and from a printed CRF"
     yield (
-        "| Sq [um] | CLR by Sq alone, 90 % | printed CRF [Hz] | CLR, 90 % | bits | effective mass,"
-        " 90 % | law own |"
+        "| Sq [um] | CLR from Sq alone, 90 % | printed CRF [Hz] | CLR from CRF, 90 % | bits |"
+        " effective mass, 90 % | P(law own) |"
     )
     yield "|---|---|---|---|---|---|---|"
     for number, (sq, std) in enumerate(zip(SAMPLES_SQ_UM, SAMPLES_STD_UM, strict=True)):
         known = Unknown("sq_m", setting.contact[0].range, sq, std)
         ring = replace(setting, contact=(known, *setting.contact[1:]))
         printed = {0: CRF_ENDS_HZ[0], len(SAMPLES_SQ_UM) - 1: CRF_ENDS_HZ[1]}.get(number)
-        heard = (
+        observations = (
             []
             if printed is None
             else [
@@ -59,20 +58,20 @@ def lines(*, fast: bool, kept: Path = KEPT) -> Iterator[str]:  # noqa: ARG001 - 
                 )
             ]
         )
-        found = infer_observations(ring, emulator, heard)
+        found = infer_observations(ring, emulator, observations)
         before = _interval(found.values(found.prior)["clr"])
         cells = [f"{sq:.2f} ± {std:.2f}", clr.interval(*before), "", "", "", "", ""]
         if printed is not None:
-            told, mass = found.posterior()["clr"], found.posterior()["mass_kg"]
+            share, mass = found.posterior()["clr"], found.posterior()["mass_kg"]
             cells[2:] = [
                 f"{printed:.0f}",
-                clr.interval(told.low, told.high),
-                f"{told.information_bits:.1f}",
+                clr.interval(share.low, share.high),
+                f"{share.information_bits:.1f}",
                 kg.interval(mass.low, mass.high),
                 f"{found.law_probability('own'):.2f}",
             ]
         yield f"| {' | '.join(cells)} |"
-    yield "Ten of the twelve CRF are drawn and not printed; of those rings Sq alone says something."
+    yield "The paper prints two of the twelve CRF; the other rings have Sq alone."
 
 
 def _interval(values: Field) -> tuple[float, float]:

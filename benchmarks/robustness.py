@@ -1,9 +1,8 @@
-"""Six hundred contacts from a fixed Latin hypercube: does every one of them solve, and is none of
-them silently wrong?
+"""Convergence and errors of six hundred contacts from a fixed Latin hypercube.
 
 Roughness 0.25-6 um, correlation length 10-120 um, Gaussian and self-affine, pressure cap 0.65, 1,
-2 GPa or none, inlet at -1.9 or -4.5 half-widths, load 50-2000 N, speed 0.01-20 m/s. Thirty of the
-solved ones are solved again 100 times tighter.
+2 GPa or none, inlet at -1.9 or -4.5 half-widths, load 50-2000 N, speed 0.01-20 m/s. Thirty
+converged contacts are solved again with a 100 times smaller tolerance.
 """
 
 import csv
@@ -46,24 +45,24 @@ class Contact:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of it."""
+    """Result of a contact."""
 
     contact: Contact
     status: str
     steps: int
     seconds: float
     clr: float
-    overlap_nm: float  # deepest, of the bodies as they deform, where no cap flattens them
+    overlap_nm: float  # deepest overlap of the deformed bodies, outside cells at the cap
     clr_error: float | None = None
 
     def row(self) -> dict[str, object]:
-        """One flat row."""
+        """Return the outcome as one flat row."""
         rest = asdict(self)
         return {**rest.pop("contact"), **rest}
 
 
 def contacts(count: int = 600) -> list[Contact]:
-    """The fixed sample; roughness, lengths, load and speed spread evenly in their logarithms."""
+    """Draw the fixed sample; roughness, lengths, load and speed are log-uniform."""
     from scipy.stats.qmc import LatinHypercube
 
     unit = LatinHypercube(d=7, rng=np.random.default_rng(20261121)).random(count)
@@ -89,10 +88,9 @@ def contacts(count: int = 600) -> list[Contact]:
 def prepared(
     contact: Contact, cells: int, *, shown: int | None = None
 ) -> tuple[ContactConditions, Surface]:
-    """Conditions and roughness; a length that the domain cannot hold is cut to 0.45 of its shorter
-    side.
+    """Return conditions and surface; the correlation length is at most 0.45 of the shorter side.
 
-    The roughness has no waves that a grid of `shown` cells cannot show, so that it is the same one
+    The roughness contains only waves that a grid of `shown` cells resolves, so that it is the same
     on finer grids.
     """
     conditions = ContactConditions(
@@ -117,10 +115,10 @@ def prepared(
 
 
 def overlap(solution: ContactSolution) -> float:
-    """How far the bent bodies reach below the contact film, worked out from the pressure alone [m].
+    """Return the depth [m] to which the deformed bodies penetrate the contact film.
 
-    The solution's own gap is no less than the contact film by construction, so it could not tell.
-    Cells that the cap decides are flattened plastically and do not count.
+    It is computed from the pressure, as the solution's gap is at least the contact film by
+    construction. Cells at the pressure cap are flattened plastically and do not count.
     """
     scales = Scales.from_conditions(solution.conditions, solution.lubricant)
     problem = contact_problem(
@@ -138,9 +136,9 @@ def outcomes(
     count: int = 600,
     cells: int = 128,
     checked: int = 30,
-    told: Callable[[Outcome], None] = lambda _: None,
+    progress: Callable[[Outcome], None] = lambda _: None,
 ) -> Iterator[Outcome]:
-    """Solve every contact, and every (count/checked)-th again 100 times tighter."""
+    """Solve every contact; every (count/checked)-th again with a 100 times smaller tolerance."""
     for contact in contacts(count):
         conditions, surface = prepared(contact, cells)
         solution = solve_contact(conditions, OIL, surface, strict=False)
@@ -164,27 +162,28 @@ def outcomes(
             1e9 * overlap(solution),
             error,
         )
-        told(outcome)
+        progress(outcome)
         yield outcome
 
 
 def lines(*, fast: bool, artefact: Path = Path("build/robustness.csv")) -> Iterator[str]:
-    """The summary as Markdown; every contact and what became of it goes into `artefact`."""
+    """Yield the summary as Markdown; write every contact and its result to `artefact`."""
     results = list(outcomes(count=60 if fast else 600, checked=3 if fast else 30))
     artefact.parent.mkdir(exist_ok=True)
     with artefact.open("w", newline="") as file:
         writer = csv.DictWriter(file, list(results[0].row()))
         writer.writeheader()
-        writer.writerows(one.row() for one in results)
-    solved = [one for one in results if one.status == "converged"]
-    errors = [one.clr_error for one in results if one.clr_error is not None]
+        writer.writerows(outcome.row() for outcome in results)
+    solved = [outcome for outcome in results if outcome.status == "converged"]
+    errors = [outcome.clr_error for outcome in results if outcome.clr_error is not None]
     yield "## Contacts from a fixed Latin hypercube, 128 x 128"
     yield ""
     yield (
-        f"{len(solved)} of {len(results)} solved, the rest refused loudly; median"
-        f" {np.median([one.seconds for one in solved]):.2f} s and"
-        f" {np.median([one.steps for one in solved]):.0f} steps. Bodies overlap nowhere by more"
-        f" than {max(one.overlap_nm for one in solved):.3f} nm. {len(errors)} solved again 100"
-        f" times tighter: {sum(np.isnan(errors))} of those did not converge, the load share of the"
-        f" others is off by {np.nanmax(errors):.1e} at most. All of it: {artefact}."
+        f"{len(solved)} of {len(results)} converged, the others reported non-convergence; median"
+        f" {np.median([outcome.seconds for outcome in solved]):.2f} s and"
+        f" {np.median([outcome.steps for outcome in solved]):.0f} iterations. Bodies overlap by at"
+        f" most {max(outcome.overlap_nm for outcome in solved):.3f} nm. {len(errors)} were solved"
+        f" again with a 100 times smaller tolerance: {sum(np.isnan(errors))} of these did not"
+        f" converge; the CLR of the others differs by at most {np.nanmax(errors):.1e}. All"
+        f" contacts: {artefact}."
     )

@@ -1,8 +1,7 @@
-"""Rollers that end: which drop of the ends is best, dry, level and tilted; and how long a
-lubricated roller takes.
+"""Finite rollers: best profile drop, dry, level and tilted; time to solve a lubricated roller.
 
-Steel on steel, R 3.629 mm, 10 mm long, 2000 N: the most loaded roller of an NU 206, about. The oil
-has 0.04 Pa s and 20 1/GPa, the surfaces roll at 3.5 m/s.
+Steel on steel, R 3.629 mm, 10 mm long, 2000 N: about the most loaded roller of an NU 206. The oil
+has 0.04 Pa s and 20 1/GPa; pure rolling at 3.5 m/s.
 """
 
 import time
@@ -27,7 +26,7 @@ TIMED = (128, 256), (256, 512)
 
 
 def conditions(shape: RollerShape) -> ContactConditions:
-    """The roller of that shape."""
+    """Return the conditions of a roller of this shape."""
     return ContactConditions(
         pair=STEEL,
         geometry="roller",
@@ -40,13 +39,14 @@ def conditions(shape: RollerShape) -> ContactConditions:
 
 
 def lundberg(share: float) -> RollerShape:
-    """Johns and Gohar's shape for a share of the load."""
+    """Return Johns and Gohar's profile for a share of the load."""
     return RollerShape.johns_gohar(share * LOAD, LENGTH, RADIUS, STEEL.reduced_modulus)
 
 
 def between(contact: ContactConditions, cells: tuple[int, int], x: tuple[float, float]) -> Grid:
-    """A grid from x to x, in half-widths, and four lines of cells past each end, so that coarser
-    ones have it too.
+    """Return a grid over `x` [half-widths] with four rows of cells past each end of the roller.
+
+    Coarser grids then have rows past the ends, too.
     """
     a, end = contact.hertz.half_widths[0], 0.5 * LENGTH * cells[1] / (cells[1] - 8)
     return Grid(cells, (x[0] * a, -end), (x[1] * a, end), periodic=(False, False))
@@ -59,10 +59,8 @@ def _largest(shape: RollerShape) -> float:
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """Tables as Markdown."""
-    yield (
-        "## Rollers: largest pressure over Hertz's, dry, by the load that the logarithm is made for"
-    )
+    """Yield the tables as Markdown."""
+    yield "## Rollers: largest dry pressure over Hertz's, by design load of the logarithmic profile"
     yield ""
     yield f"| design load over load | {' | '.join(f'{1e3 * tilt:g} mrad' for tilt in TILTS)} |"
     yield f"|---{'|---' * len(TILTS)}|"
@@ -73,7 +71,7 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield "## Rollers: smooth and lubricated, processor time on one thread"
     yield ""
     yield (
-        "| shape | cells | steps | time [s] | central film [um] | film at the ends [um] | edge"
+        "| shape | cells | iterations | time [s] | central film [um] | film at the ends [um] | edge"
         " pressure [GPa] |"
     )
     yield "|---|---|---|---|---|---|---|"

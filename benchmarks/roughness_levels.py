@@ -1,9 +1,7 @@
-"""The paper's contact at nine roughness levels on five surfaces each: how it converges, what it
-costs, what comes out.
+"""Convergence, time and results of the paper's contact at nine roughness levels, five surfaces.
 
-Every solve starts cold, with the elastic kernel built anew, on one thread, in processor time.
-Compiled kernels are cached. The tight solves (tolerance 1e-6) tell how far off the default ones
-(1e-4) are.
+Every solve is a cold start including the elastic kernel, on one thread; times are processor times
+with cached compiled kernels. Solves with tolerance 1e-6 give the error of the default (1e-4).
 """
 
 import statistics
@@ -27,7 +25,7 @@ SEEDS = range(5)
 
 @dataclass(frozen=True)
 class Outcome:
-    """One contact, solved to the default tolerance and, if asked, 100 times tighter."""
+    """One contact, solved to the default tolerance and, if requested, to a hundredth of it."""
 
     sq_um: float
     seed: int
@@ -44,14 +42,14 @@ class Outcome:
 
 
 def paper_case(sq_um: float, seed: int, cells: int) -> Case:
-    """The paper's contact with one of the surfaces."""
+    """Return the paper's contact with one of the surfaces."""
     return load_case(CASE).with_overrides(
         {"surface.sq": f"{sq_um} um", "surface.seed": seed, "grid.cells": [cells, cells]}
     )
 
 
 def solve(sq_um: float, seed: int, tolerance: float, cells: int) -> ContactSolution:
-    """One cold solve."""
+    """Solve from a cold start."""
     case = paper_case(sq_um, seed, cells)
     deflection.cache_clear()
     return solve_contact(
@@ -64,9 +62,9 @@ def solve(sq_um: float, seed: int, tolerance: float, cells: int) -> ContactSolut
 
 
 def outcomes(
-    *, tight: bool, cells: int = 256, told: Callable[[Outcome], None] = lambda _: None
+    *, tight: bool, cells: int = 256, progress: Callable[[Outcome], None] = lambda _: None
 ) -> list[Outcome]:
-    """All levels and surfaces."""
+    """Solve all levels and surfaces."""
     solve(SQ_UM[0], 0, 1e-2, 64)  # loads the compiled kernels
     results = []
     for sq_um in SQ_UM:
@@ -90,13 +88,13 @@ def outcomes(
                 checked.convergence.converged if checked else None,
                 abs(contact_state(checked).clr - state.clr) if checked else None,
             )
-            told(outcome)
+            progress(outcome)
             results.append(outcome)
     return results
 
 
 def fft_pair_seconds(cells: int = 512) -> float:
-    """Median time of one real FFT and back of cells x cells, the machine's yardstick."""
+    """Return the median time of a real FFT and its inverse of cells x cells, as a reference."""
     import scipy.fft as fft
 
     field = np.random.default_rng(0).standard_normal((cells, cells))
@@ -109,53 +107,55 @@ def fft_pair_seconds(cells: int = 512) -> float:
 
 
 def table(results: list[Outcome]) -> list[str]:
-    """A Markdown table, a row a roughness level: means over seeds, standard deviation behind ±."""
+    """Return a Markdown table, one row for each roughness level: mean ± standard deviation."""
     rows = [
         (
             "| Sq [um] | CAR [%] | CAR domain [%] | CLR [%] | load on capped oil [%] | oil"
-            " imbalance [%] | converged | steps | seconds | CLR off by |"
+            " imbalance [%] | converged | iterations | seconds | CLR error |"
         ),
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for sq_um in SQ_UM:
-        level = [one for one in results if one.sq_um == sq_um]
+        level = [outcome for outcome in results if outcome.sq_um == sq_um]
 
         def spread(name: str, level: list[Outcome] = level) -> str:
-            values = [100.0 * getattr(one, name) for one in level]
+            values = [100.0 * getattr(outcome, name) for outcome in level]
             return f"{statistics.mean(values):.1f} ± {statistics.stdev(values):.1f}"
 
-        worst = max((one.clr_error for one in level if one.clr_error is not None), default=None)
-        tight = (
-            "" if worst is None else f" ({sum(bool(one.tight_converged) for one in level)} tight)"
-        )
+        errors = [outcome.clr_error for outcome in level if outcome.clr_error is not None]
+        worst = max(errors, default=None)
+        tight_count = sum(bool(outcome.tight_converged) for outcome in level)
+        tight = "" if worst is None else f" ({tight_count} tight)"
         rows.append(
             f"| {sq_um} | {spread('car')} | {spread('car_domain')} | {spread('clr')} |"
             f" {spread('capped_oil')} | {spread('imbalance')} |"
-            f" {sum(one.converged for one in level)} of {len(level)}{tight} |"
-            f" {statistics.median(one.steps for one in level):.0f} |"
-            f" {statistics.median(one.seconds for one in level):.2f} |"
+            f" {sum(outcome.converged for outcome in level)} of {len(level)}{tight} |"
+            f" {statistics.median(outcome.steps for outcome in level):.0f} |"
+            f" {statistics.median(outcome.seconds for outcome in level):.2f} |"
             f" {'-' if worst is None else f'{worst:.1e}'} |"
         )
     return rows
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """The table as Markdown, and what a solve takes in transforms."""
+    """Yield the table as Markdown and the cost of a solve in FFTs."""
 
-    def told(one: Outcome) -> None:
+    def progress(outcome: Outcome) -> None:
         print(
-            f"  Sq {one.sq_um} um, seed {one.seed}: {one.seconds:.2f} s, CLR {one.clr:.4f}",
+            f"  Sq {outcome.sq_um} um, seed {outcome.seed}: {outcome.seconds:.2f} s,"
+            f" CLR {outcome.clr:.4f}",
             file=sys.stderr,
         )
 
     yield "## Roughness levels of the paper's contact, 256 x 256\n"
     before = fft_pair_seconds()
-    results = outcomes(tight=not fast, told=told)
+    results = outcomes(tight=not fast, progress=progress)
     pair = statistics.mean([before, fft_pair_seconds()])
     yield from table(results)
-    median = statistics.median(one.seconds for one in results)
+    seconds = [outcome.seconds for outcome in results]
+    median = statistics.median(seconds)
     yield (
-        f"\nMedian cold solve {median:.2f} s (slowest {max(one.seconds for one in results):.2f} s)"
-        f" = {median / pair:.0f} times one real 512 x 512 FFT and back ({1e3 * pair:.2f} ms in the"
-        " same run)."
+        f"\nMedian cold solve {median:.2f} s (slowest {max(seconds):.2f} s)"
+        f" = {median / pair:.0f} times a real 512 x 512 FFT and its inverse ({1e3 * pair:.2f} ms in"
+        " the same run)."
     )

@@ -1,8 +1,7 @@
-"""Rows of long benchmarks, kept in the repository, so that runs of many sessions add up and tables
-are made of them.
+"""Rows of long benchmarks, stored in the repository; runs of many sessions add rows to the tables.
 
-Each row says by which code it was found: the commit, with a + where the code or its examples were
-changed since.
+Each row names the commit of the code that computed it, with a + if code or examples had uncommitted
+changes.
 """
 
 import csv
@@ -17,19 +16,19 @@ DIGITS = 4  # significant
 
 
 def code() -> str:
-    """The commit that is run."""
+    """Return the current commit, with a + for uncommitted changes."""
     changed = _git("status", "--porcelain", "--", "src", "benchmarks", "examples")
     return _git("rev-parse", "--short=8", "HEAD") + "+" * bool(changed)
 
 
-def _git(*asked: str) -> str:
+def _git(*arguments: str) -> str:
     return subprocess.run(
-        ["git", *asked], cwd=HERE.parent, capture_output=True, text=True, check=True
+        ["git", *arguments], cwd=HERE.parent, capture_output=True, text=True, check=True
     ).stdout.strip()
 
 
 class Rows:
-    """A csv of rows, of which some columns say which they are."""
+    """Rows of a csv file; some columns are the keys."""
 
     def __init__(self, path: Path, keys: Sequence[str]) -> None:
         self.path, self.keys, self.code = path, keys, code()
@@ -44,7 +43,7 @@ class Rows:
         return tuple(map(str, key)) in self.done
 
     def write(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Put rows behind those that are there, numbers to four digits."""
+        """Append rows to the file, numbers to four digits."""
         with self.path.open("a", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, ["code", *rows[0]], lineterminator="\n")
             if file.tell() == 0:
@@ -56,9 +55,9 @@ class Rows:
         self.done |= {tuple(str(row[key]) for key in self.keys) for row in rows}
 
     def codes(self) -> str:
-        """Which code how many rows are of."""
+        """Return the commits of the rows, each with its number of rows."""
         found = [row["code"] for row in self]
-        return ", ".join(f"{one} ({found.count(one)})" for one in dict.fromkeys(found))
+        return ", ".join(f"{commit} ({found.count(commit)})" for commit in dict.fromkeys(found))
 
 
 def _short(value: Any) -> Any:

@@ -1,8 +1,7 @@
-"""One machine on two sensors, each through its own structure: how often the line is found, held,
-and wrongly claimed.
+"""One machine on two sensors, each with its own structure: detections, false claims and coverage.
 
-The contact's line is one random wave for both; what else a sensor hears is its own, or in part the
-other's too. `python -m benchmarks.sensors` runs this part alone; `--fast` a tenth of it.
+The contact's line is the same random process on both sensors; the background of each is its own or
+partly common. `python -m benchmarks.sensors` runs this part alone; `--fast` a tenth of it.
 """
 
 import argparse
@@ -20,30 +19,30 @@ BAND = (1800.0, 4000.0)
 FREQUENCY = np.arange(0.0, 4400.0, 2.0)
 TRUTH = np.linspace(2900.0, 3750.0, 12)
 NINETY = 1.6449
-FAR = 100.0  # Hz: another line
-DAMPING, SHARPER = 0.02, 0.012  # of the contact's line, and of a structure's that moves
+FAR = 100.0  # Hz: a line at this distance is another one
+DAMPING, SHARPER = 0.02, 0.012  # of the contact's line, and of a moving structural mode
 
 ROWS: dict[str, dict[str, Any]] = {
-    "a line on both": {},
-    "most of the rest is heard by both": {"alike": 0.7},
+    "line on both": {},
+    "70 % of the background common to both": {"alike": 0.7},
     "through structures, modes up to 0.5": {"size": 0.5},
     "through structures, modes up to 1": {"size": 1.0},
-    "weak on both, 3 % of the rest": {"heights": (0.03, 0.03)},
-    "weaker than either finds alone": {"heights": (0.012, 0.012)},
-    "loud on one, weak on the other": {"heights": (0.7, 0.03)},
-    "a mode that moves, on one only": {"heights": (0.0, 0.0), "moving": True},
-    "the line on one, a mode that moves on the other": {"heights": (0.0, 0.7), "moving": True},
-    "the line on both, a mode that moves on one": {"heights": (0.7, 0.7), "moving": True},
+    "weak on both, 3 % of the background": {"heights": (0.03, 0.03)},
+    "below the detection limit of either sensor alone": {"heights": (0.012, 0.012)},
+    "strong on one, weak on the other": {"heights": (0.7, 0.03)},
+    "no line, a moving mode on one": {"heights": (0.0, 0.0), "moving": True},
+    "line on one, a moving mode on the other": {"heights": (0.0, 0.7), "moving": True},
+    "line on both, a moving mode on one": {"heights": (0.7, 0.7), "moving": True},
 }
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time; `fast` takes a tenth of the series."""
+    """Yield the table as Markdown; `fast` takes a tenth of the series."""
     series = SERIES // (10 if fast else 1)
     yield f"## One line on two sensors: {series} series of {TRUTH.size} recordings a row\n"
     yield (
-        "| what is heard | claimed | of those wrong | sensors disagree | found by the better alone"
-        " | CRF rms error [Hz] | alone [Hz] | 90 % intervals cover | alone |"
+        "| signal | claimed | falsely claimed | sensors disagree | found by the better sensor alone"
+        " | CRF rms error [Hz] | one sensor [Hz] | coverage of 90 % intervals | one sensor |"
     )
     yield "|---|---|---|---|---|---|---|---|---|"
     for name, choices in ROWS.items():
@@ -51,37 +50,41 @@ def lines(*, fast: bool = False) -> Iterator[str]:
 
 
 def row(choices: dict[str, Any], series: int) -> str:
-    """A row of the table."""
-    together, alone, claimed, wrong, apart, by_best = [], [], 0, 0, 0, 0
+    """Return a row of the table."""
+    together, alone, claimed, wrong, disagreeing, by_best = [], [], 0, 0, 0, 0
     for seed in range(series):
-        told = resonances_of_sensors(two_sensors(seed, **choices), band_hz=BAND)
-        apart += sum(one.reason.startswith(SENSORS_DISAGREE) for one in told.resonances)
-        by_best += max(
-            sum(one is not None and one.found for one in every) for every in told.alone.values()
+        result = resonances_of_sensors(two_sensors(seed, **choices), band_hz=BAND)
+        disagreeing += sum(
+            resonance.reason.startswith(SENSORS_DISAGREE) for resonance in result.resonances
         )
-        for number, (one, true) in enumerate(zip(told.resonances, TRUTH, strict=True)):
-            claimed += one.found
-            far = one.found and (
-                choices.get("heights") == (0.0, 0.0) or abs(one.crf_hz - true) > FAR
+        by_best += max(
+            sum(resonance is not None and resonance.found for resonance in resonances)
+            for resonances in result.alone.values()
+        )
+        for number, (joint, true) in enumerate(zip(result.resonances, TRUTH, strict=True)):
+            claimed += joint.found
+            far = joint.found and (
+                choices.get("heights") == (0.0, 0.0) or abs(joint.crf_hz - true) > FAR
             )
             wrong += far
-            heard = [every[number] for every in told.alone.values()]
-            best = [other for other in heard if other is not None and other.found]
-            if one.found and not far:
-                together.append((one.crf_hz - true, one.crf_std))
-                if best:
-                    least = min(best, key=lambda other: other.crf_std)
-                    alone.append((least.crf_hz - true, least.crf_std))
+            single = [resonances[number] for resonances in result.alone.values()]
+            detected = [
+                resonance for resonance in single if resonance is not None and resonance.found
+            ]
+            if joint.found and not far:
+                together.append((joint.crf_hz - true, joint.crf_std))
+                if detected:
+                    best = min(detected, key=lambda resonance: resonance.crf_std)
+                    alone.append((best.crf_hz - true, best.crf_std))
     total = series * TRUTH.size
-    shares = [f"{100.0 * count / total:.1f} %" for count in (claimed, wrong, apart, by_best)]
+    shares = [f"{100.0 * count / total:.1f} %" for count in (claimed, wrong, disagreeing, by_best)]
     if not together:
         return f"{' | '.join(shares)} | - | - | - | -"
     both = [np.array(part).T for part in (together, alone) if part]
     errors = [f"{np.sqrt(np.mean(off**2)):.2f}" for off, _ in both]
-    held = [f"{100.0 * np.mean(np.abs(off) < NINETY * std):.0f} %" for off, std in both]
-    return (
-        f"{' | '.join(shares)} | {' | '.join([*errors, '-'][:2])} | {' | '.join([*held, '-'][:2])}"
-    )
+    covered = [f"{100.0 * np.mean(np.abs(off) < NINETY * std):.0f} %" for off, std in both]
+    pairs = (" | ".join([*cells, "-"][:2]) for cells in (errors, covered))
+    return " | ".join([*shares, *pairs])
 
 
 def two_sensors(
@@ -93,14 +96,20 @@ def two_sensors(
     alike: float = 0.0,
     moving: bool = False,
 ) -> dict[str, list[Spectrum]]:
-    """Spectra by sensor, a and b.
+    """Simulate the spectra of sensors a and b.
 
-    `heights` of the line over the loudest mode on each; `size` of the structures' modes over the
-    direct way; `alike` the share of the rest that both hear; `moving` whether a hears a mode that
-    moves by 100 to 400 Hz.
+    Parameters
+    ----------
+    heights : height of the line over the highest mode on each sensor
+    size : height of the structures' modes over the direct path
+    alike : common share of the background
+    moving : True: sensor a measures a mode that moves by 100 to 400 Hz
     """
     rng = np.random.default_rng([3, seed])
-    rests, ways = [machine(rng), machine(rng)], [passed_on(rng, size), passed_on(rng, size)]
+    backgrounds, paths = (
+        [machine(rng), machine(rng)],
+        [path_transfer(rng, size), path_transfer(rng, size)],
+    )
     moved = rng.uniform(1900.0, 2400.0) + rng.uniform(100.0, 400.0) * np.linspace(
         0.0, 1.0, TRUTH.size
     )
@@ -108,32 +117,30 @@ def two_sensors(
     for number, f0 in enumerate(TRUTH):
         line, both = _waves(rng, averages), _waves(rng, averages)
         for sensor, name in enumerate(found):
-            rest = np.exp(0.2 * rng.standard_normal()) * rests[sensor]
+            background = np.exp(0.2 * rng.standard_normal()) * backgrounds[sensor]
             if moving and sensor == 0:
-                rest = rest + line_shape(FREQUENCY, moved[number], SHARPER)
+                background = background + line_shape(FREQUENCY, moved[number], SHARPER)
             own = np.sqrt(alike) * both + np.sqrt(1.0 - alike) * _waves(rng, averages)
-            height = heights[sensor] * ways[sensor] * line_shape(FREQUENCY, f0, DAMPING)
-            density = np.mean(np.abs(np.sqrt(height) * line + np.sqrt(rest) * own) ** 2, axis=0)
+            height = heights[sensor] * paths[sensor] * line_shape(FREQUENCY, f0, DAMPING)
+            density = np.mean(
+                np.abs(np.sqrt(height) * line + np.sqrt(background) * own) ** 2, axis=0
+            )
             found[name].append(_spectrum(density, averages))
     return found
 
 
 def machine(rng: np.random.Generator) -> Field:
-    """What stays of what a sensor hears: noise that falls with frequency, and three modes in the
-    band.
-    """
-    heard = 0.1 * (np.maximum(FREQUENCY, 1.0) / 2000.0) ** -0.7
+    """Draw a constant background: noise that falls with frequency and three modes in the band."""
+    background = 0.1 * (np.maximum(FREQUENCY, 1.0) / 2000.0) ** -0.7
     for f0 in rng.uniform(*BAND, 3):
-        heard = heard + rng.uniform(0.2, 1.0) * line_shape(
+        background = background + rng.uniform(0.2, 1.0) * line_shape(
             FREQUENCY, f0, np.exp(rng.uniform(np.log(5e-3), np.log(2e-2)))
         )
-    return np.asarray(heard)
+    return np.asarray(background)
 
 
-def passed_on(rng: np.random.Generator, size: float) -> Field:
-    """|1 + two modes|^2: what a structure between contact and sensor makes of the contact's
-    line.
-    """
+def path_transfer(rng: np.random.Generator, size: float) -> Field:
+    """Draw |1 + two modes|^2, the power transfer of the structure between contact and sensor."""
     factor = np.ones(FREQUENCY.size, dtype=complex)
     for _ in range(2):
         f0, damping = rng.uniform(*BAND), rng.uniform(0.008, 0.03)

@@ -1,6 +1,4 @@
-"""What a solve costs: on finer grids, smooth, dry, beside other codes, and on two processors at
-once.
-"""
+"""Time and memory of solves: finer grids, smooth, dry, other codes, two processors at once."""
 
 import os
 import subprocess
@@ -25,13 +23,13 @@ from benchmarks.films import BARUS, REFERENCE, ball
 from benchmarks.roughness_levels import SEEDS, SQ_UM, paper_case
 
 TRIES = 3
-TURNS = 5  # of two codes beside each other
+TURNS = 5  # alternating runs of two codes
 
 
 def cold(
     conditions: ContactConditions, oil: Lubricant | None, surface: Surface, tolerance: float
 ) -> ContactSolution:
-    """From the Hertz pressure, the elastic kernel built anew."""
+    """Solve from the Hertz pressure without a cached elastic kernel."""
     deflection.cache_clear()
     return solve_contact(
         conditions, oil, surface, options=Options(tolerance=tolerance), strict=False
@@ -39,7 +37,7 @@ def cold(
 
 
 def best_of(work: Callable[[], object], tries: int = TRIES) -> float:
-    """Least time of several [s]; once before, unmeasured, for the compiled kernels."""
+    """Return the least time of several runs [s]; a first run, not counted, compiles the kernels."""
     work()
     times = []
     for _ in range(tries):
@@ -50,7 +48,7 @@ def best_of(work: Callable[[], object], tries: int = TRIES) -> float:
 
 
 def _grids(*, fast: bool) -> Iterator[str]:
-    yield "| cells | median of solves [s] | over 256 x 256 | peak memory [GiB] |"
+    yield "| cells | median solve [s] | over 256 x 256 | peak memory [GiB] |"
     yield "|---|---|---|---|"
     levels = [(sq, seed) for sq in SQ_UM for seed in SEEDS] if not fast else [(1.0, 0), (3.0, 1)]
     base = None
@@ -66,8 +64,8 @@ def _grids(*, fast: bool) -> Iterator[str]:
         yield f"| {cells} x {cells} ({len(times)} solves) | {found} |"
 
 
-def _beside_papers_model() -> Iterator[str]:
-    """Rough contacts by the default model and by the paper's, in turns on the same surfaces."""
+def _against_papers_model() -> Iterator[str]:
+    """Solve the same rough contacts alternately by the default model and by the paper's."""
     spent: dict[str, list[float]] = {"paper": [], "mixed": []}
     for sq_um in (SQ_UM[0], 1.0, 2.5, SQ_UM[-1]):
         for seed in SEEDS[:3]:
@@ -85,21 +83,21 @@ def _beside_papers_model() -> Iterator[str]:
                 times.append(process_time() - began)
     paper, mixed = (median(times) for times in spent.values())
     yield (
-        f"Rough, 256 x 256, median of {len(spent['mixed'])} surfaces in turns: {mixed:.2f} s by the"
-        f" default model, {paper:.2f} s by the paper's: {mixed / paper:.2f}."
+        f"Rough, 256 x 256, median of {len(spent['mixed'])} surfaces, alternating: {mixed:.2f} s by"
+        f" the default model, {paper:.2f} s by the paper's; ratio {mixed / paper:.2f}."
     )
 
 
 def peak_gib(cells: int) -> float:
-    """Of a process that solves the paper's contact once."""
+    """Return the peak memory [GiB] of a process that solves the paper's contact once."""
     code = (
         "import resource; from benchmarks.speed import cold; from benchmarks.roughness_levels"
         f" import paper_case; case = paper_case(1.0, 0, {cells}); cold(case.conditions,"
         " case.lubricant, case.surface(), 1e-4);"
         " print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
     )
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return int(said.stdout) / 1024.0**2
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return int(done.stdout) / 1024.0**2
 
 
 def _smooth() -> Iterator[str]:
@@ -114,25 +112,26 @@ def _smooth() -> Iterator[str]:
         seconds = best_of(lambda c=conditions, g=grid: cold(c, BARUS, flat_surface(g), 1e-4))  # type: ignore[misc]
         middle = float(np.interp(0.0, grid.x, solution.gap[:, 128])) / unit
         off = [
-            100.0 * (film / wanted - 1.0)
-            for film, wanted in ((middle, central), (solution.gap.min() / unit, least))
+            100.0 * (film / reference - 1.0)
+            for film, reference in ((middle, central), (solution.gap.min() / unit, least))
         ]
         yield (
             f"Smooth ball, M {load_number}, L {oil_number}, {name}, 257 x 257: {seconds:.2f} s; "
-            f"central film {off[0]:+.2f} %, least film {off[1]:+.2f} % off the reference."
+            f"deviation from the reference: central film {off[0]:+.2f} %, least film"
+            f" {off[1]:+.2f} %."
         )
 
 
 def _dry() -> Iterator[str]:
     yield ""
     yield (
-        "| dry, rough, elastic, to 1e-8 | ours [s] | kernel at hand [s] | tamaas [s] | ours over"
-        " tamaas |"
+        "| dry, rough, elastic, to 1e-8 | asperity [s] | kernel cached [s] | tamaas [s] | asperity"
+        " over tamaas |"
     )
     yield "|---|---|---|---|---|"
     for cells in (256, 512):
         for sq_um, seed in ((0.5, 2), (1.0, 0), (3.0, 1)):
-            yield f"| {cells} x {cells}, Sq {sq_um} um | {_beside_tamaas(sq_um, seed, cells)} |"
+            yield f"| {cells} x {cells}, Sq {sq_um} um | {_against_tamaas(sq_um, seed, cells)} |"
     yield ""
     conditions, surface = elastic_case(1.0, 0, 256)
     try:
@@ -143,27 +142,27 @@ def _dry() -> Iterator[str]:
     except ImportError:
         yield "ContactMechanics is not installed here."
     yield (
-        "SlipPy 0.5.2, the one open code for the rough point contact, asks for NumPy below 1.21 and"
-        " so for Python 3.9 or older: it cannot be installed beside asperity."
+        "SlipPy 0.5.2, the only open code for the rough point contact, requires NumPy below 1.21"
+        " and thus Python 3.9 or older: it cannot be installed with asperity."
     )
 
 
 def elastic_case(sq_um: float, seed: int, cells: int) -> tuple[ContactConditions, Surface]:
-    """The paper's contact without a cap."""
+    """Return the paper's contact without a pressure cap."""
     case = paper_case(sq_um, seed, cells)
     return replace(case.conditions, hardness=None), case.surface()
 
 
-def _beside_tamaas(sq_um: float, seed: int, cells: int) -> str:
-    """Least processor times of both, taken in turns, and their ratio."""
+def _against_tamaas(sq_um: float, seed: int, cells: int) -> str:
+    """Return the least processor times of alternating runs of both codes, and their ratio."""
     conditions, surface = elastic_case(sq_um, seed, cells)
     options = Options(tolerance=1e-8)
     works = {
         "cold": lambda: cold(conditions, None, surface, 1e-8),
-        "kept": lambda: solve_contact(conditions, None, surface, options=options),
+        "cached": lambda: solve_contact(conditions, None, surface, options=options),
     }
     with suppress(ImportError):
-        works["tamaas"] = _by_tamaas(surface, conditions)
+        works["tamaas"] = _tamaas_solver(surface, conditions)
     spent: dict[str, list[float]] = {name: [] for name in works}
     for _ in range(1 + TURNS):
         for name, work in works.items():
@@ -174,20 +173,20 @@ def _beside_tamaas(sq_um: float, seed: int, cells: int) -> str:
     twin = (
         f"{least['tamaas']:.3f} | {least['cold'] / least['tamaas']:.2f}"
         if "tamaas" in least
-        else "not here | -"
+        else "not installed | -"
     )
-    return f"{least['cold']:.3f} | {least['kept']:.3f} | {twin}"
+    return f"{least['cold']:.3f} | {least['cached']:.3f} | {twin}"
 
 
-def _by_tamaas(surface: Surface, conditions: ContactConditions) -> Callable[[], object]:
-    """A solve of the same heights, periodic both ways."""
+def _tamaas_solver(surface: Surface, conditions: ContactConditions) -> Callable[[], object]:
+    """Return a function that solves the same heights by tamaas, periodic in both directions."""
     import tamaas as tm
 
     grid = surface.grid
     form = -(grid.x[:, None] ** 2) / (2.0 * conditions.radius_along_rolling) * np.ones(grid.cells)
     pressure = conditions.line_load / grid.extent[0]
 
-    def solve() -> None:  # a model each, or it starts from what it found before
+    def solve() -> None:  # a new model each time: a used one starts from its last solution
         model = tm.Model(tm.model_type.basic_2d, list(grid.extent), list(grid.cells))
         model.E, model.nu = conditions.pair.reduced_modulus, 0.0
         solver = tm.PolonskyKeerRey(model, surface.heights + form, 1e-8)
@@ -233,7 +232,7 @@ def _one_solve(seed: int) -> float:
 
 def _two_processors() -> Iterator[str]:
     if (os.cpu_count() or 1) < 2:
-        yield "One processor only: nothing to compare."
+        yield "Only one processor: no comparison."
         return
     alone = sum(_one_solve(seed) for seed in (0, 1))
     with ProcessPoolExecutor(2) as pool:
@@ -245,37 +244,38 @@ def _two_processors() -> Iterator[str]:
 
 
 def _error_bars(*, fast: bool) -> Iterator[str]:
-    """How often the stated error holds the difference to a grid twice as fine."""
-    held, cases, factors = {"car": 0, "clr": 0, "h_central": 0}, 0, []
+    """Count how often the stated error covers the difference to a grid twice as fine."""
+    covered, cases, factors = {"car": 0, "clr": 0, "h_central": 0}, 0, []
     for sq in SQ_UM[:: 4 if fast else 1]:
         for seed in (0, 1) if fast else SEEDS:
             coarse, fine = (paper_case(sq, seed, cells) for cells in (256, 512))
             here, finer = (
-                cold(one.conditions, one.lubricant, one.surface(), 1e-4) for one in (coarse, fine)
+                cold(case.conditions, case.lubricant, case.surface(), 1e-4)
+                for case in (coarse, fine)
             )
             error, state, truth = here.convergence.error, contact_state(here), contact_state(finer)
             assert error is not None
             cases += 1
-            for name in held:
+            for name in covered:
                 off = abs(getattr(state, name) - getattr(truth, name))
-                held[name] += bool(off <= getattr(error, name))
+                covered[name] += bool(off <= getattr(error, name))
                 if off > 0.0:
                     factors.append(getattr(error, name) / off)
-    counts = ", ".join(f"{name} in {count}" for name, count in held.items())
+    counts = ", ".join(f"{name} in {count}" for name, count in covered.items())
     yield (
-        f"Of {cases} contacts at 256 x 256 the stated error holds the difference to 512 x 512 for"
+        f"Of {cases} contacts at 256 x 256 the stated error covers the difference to 512 x 512 for"
         f" {counts}; it is {median(factors):.1f} times that difference (median)."
     )
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """The figures as Markdown."""
-    yield "## What a solve costs"
+    """Yield the figures as Markdown."""
+    yield "## Time and memory of a solve"
     yield ""
     yield from _grids(fast=fast)
     yield ""
     for part in (
-        _beside_papers_model(),
+        _against_papers_model(),
         _smooth(),
         _dry(),
         _two_processors(),

@@ -1,5 +1,6 @@
-"""What docs/theory/stress.md quotes: peaks below sliding Hertz contacts on several grids, and what
-stress costs.
+"""Stress peaks below sliding Hertz contacts on several grids, and the time to compute stress.
+
+docs/theory/stress.md quotes the results.
 """
 
 from collections.abc import Iterator
@@ -22,7 +23,7 @@ NU = 0.3
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """The tables, line by line."""
+    """Yield the tables as Markdown."""
     yield "## Stress below the surface\n"
     yield (
         "Largest von Mises stress [p_h] and its depth [a] below sliding Hertz contacts, nu = 0.3:\n"
@@ -42,19 +43,17 @@ def lines(*, fast: bool) -> Iterator[str]:
             ("point", _point(0.0, 256).shear_peak),
         )
     )
-    yield "\nSeconds of one processor, with kernels made anew and with kernels kept:\n"
+    yield "\nSeconds of one processor, with new and with cached kernels:\n"
     yield (
-        "| case | cells | solve | friction and heat, anew | stress, anew | friction and heat, kept"
-        " | stress, kept |"
+        "| case | cells | solve | friction and heat, new | stress, new | friction and heat, cached"
+        " | stress, cached |"
     )
     yield "|---|---|---|---|---|---|---|"
     for file, count in (("paper.toml", 256), ("ball-on-disc.toml", 256)):
         case = load_case(EXAMPLES / file).with_overrides(
             {"grid.cells": [count, count], "vibration": "none"}
         )
-        solution = solve_case(
-            case, strict=False
-        ).solution  # whatever has to be compiled is, after this
+        solution = solve_case(case, strict=False).solution  # compiles the kernels
         friction_and_heat(solution)
         started = process_time()
         solution = solve_case(case, strict=False).solution

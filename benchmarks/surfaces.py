@@ -1,5 +1,6 @@
-"""What docs/theory/surfaces.md quotes: generated statistics over 20 seeds, their cost, second
-opinions, the lay.
+"""Generated surfaces: statistics over 20 seeds, time, comparison with surfalize, effect of the lay.
+
+docs/theory/surfaces.md quotes the results.
 """
 
 import statistics
@@ -34,28 +35,28 @@ CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
 MEASURED = Path(__file__).parents[2] / "shared" / "data" / "surfaces"
 SEEDS = range(20)
 SIDE = 512e-6
-ASKED = (20e-6, 10e-6)
+LENGTHS = (20e-6, 10e-6)
 Maker = Callable[[Grid, np.random.Generator], Surface]
 
 KINDS: dict[str, Maker] = {
-    "gaussian": lambda g, r: gaussian_surface(g, sq=1e-6, correlation_length=ASKED, rng=r),
+    "gaussian": lambda g, r: gaussian_surface(g, sq=1e-6, correlation_length=LENGTHS, rng=r),
     "gaussian, lay at 30°": lambda g, r: gaussian_surface(
-        g, sq=1e-6, correlation_length=ASKED, direction=np.pi / 6.0, rng=r
+        g, sq=1e-6, correlation_length=LENGTHS, direction=np.pi / 6.0, rng=r
     ),
     "non-gaussian, Ssk -1, Sku 5": lambda g, r: non_gaussian_surface(
-        g, sq=1e-6, skewness=-1.0, kurtosis=5.0, correlation_length=ASKED, rng=r
+        g, sq=1e-6, skewness=-1.0, kurtosis=5.0, correlation_length=LENGTHS, rng=r
     ),
     "non-gaussian, Ssk 0, Sku 2": lambda g, r: non_gaussian_surface(
-        g, sq=1e-6, skewness=0.0, kurtosis=2.0, correlation_length=ASKED, rng=r
+        g, sq=1e-6, skewness=0.0, kurtosis=2.0, correlation_length=LENGTHS, rng=r
     ),
     "non-gaussian, Ssk -2, Sku 9": lambda g, r: non_gaussian_surface(
-        g, sq=1e-6, skewness=-2.0, kurtosis=9.0, correlation_length=ASKED, rng=r
+        g, sq=1e-6, skewness=-2.0, kurtosis=9.0, correlation_length=LENGTHS, rng=r
     ),
     "self-affine, H 0.8": lambda g, r: self_affine_surface(
         g, sq=1e-6, hurst=0.8, cutoffs=(8e-6, 200e-6), rng=r
     ),
     "run-in, plateau 0.4": lambda g, r: run_in_surface(
-        g, sq=1e-6, correlation_length=ASKED, plateau_share=0.4, rng=r
+        g, sq=1e-6, correlation_length=LENGTHS, plateau_share=0.4, rng=r
     ),
     "ground, lay at 30°": lambda g, r: ground_surface(
         g, sq=1e-6, groove_width=12e-6, groove_length=150e-6, direction=np.pi / 6.0, rng=r
@@ -65,25 +66,27 @@ KINDS: dict[str, Maker] = {
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    """The tables, as Markdown."""
+    """Yield the tables as Markdown."""
     yield (
         "## Generated surfaces, 256 x 256 cells of 2 um, means over 20 seeds (standard deviation)\n"
     )
     yield (
-        "| kind | Sq off by | 1/e length along, across [um] | Ssk | Sku | seconds at 1024 x 1024 |"
+        "| kind | Sq error | 1/e length along, across [um] | Ssk | Sku | seconds at 1024 x 1024 |"
     )
     yield "|---|---|---|---|---|---|"
     for kind, make in KINDS.items():
         yield _row(kind, make)
     yield (
-        f"\nSlope of the self-affine spectrum, asked -3.6: {_slope(0.8):.3f}; asked -2.6:"
+        f"\nSlope of the self-affine spectrum, nominal -3.6: {_slope(0.8):.3f}; nominal -2.6:"
         f" {_slope(0.3):.3f}."
     )
     if not MEASURED.is_dir():
-        yield "\nThe measured surfaces are not on this machine: no second opinion on them, no lay."
+        yield (
+            "\nThe measured surfaces are not available here: no comparison with surfalize, no lay."
+        )
         return
     yield "\n## Parameters against surfalize: largest difference\n"
-    yield from _second_opinion()
+    yield from _surfalize_comparison()
     if not fast:
         yield "\n## Lay across and along rolling: measured surfaces in the paper's contact\n"
         yield from _lay()
@@ -126,7 +129,7 @@ def _slope(hurst: float) -> float:
     return float(np.polyfit(np.log(q[inside]), np.log(density[inside]), 1)[0])
 
 
-def _second_opinion() -> Iterator[str]:
+def _surfalize_comparison() -> Iterator[str]:
     import surfalize
     from surfalize.profile import Profile
 
@@ -173,8 +176,8 @@ def _second_opinion() -> Iterator[str]:
             expected = getattr(theirs, name.rstrip("_").capitalize())() * scales.get(name, 1e-6)
             off[name] = abs(getattr(ours, name) / expected - 1.0)
         name = max((name for name in off if off[name] == off[name]), key=off.__getitem__)
-        unsaid = [name for name in off if off[name] != off[name]]
-        without = f"; surfalize gives no {unsaid[0].rstrip('_').capitalize()}" if unsaid else ""
+        missing = [name for name in off if off[name] != off[name]]
+        without = f"; surfalize gives no {missing[0].rstrip('_').capitalize()}" if missing else ""
         return f"{100.0 * off[name]:.2f} % ({name.rstrip('_').capitalize()}){without}"
 
     for name in ("isotropic.al3d", "ground_lay.plu"):

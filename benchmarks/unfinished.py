@@ -1,6 +1,4 @@
-"""A run of the benchmarks that may be cut off: which parts have ended, kept beside what it
-builds.
-"""
+"""State of a benchmark run that can be resumed: the parts that have ended."""
 
 import hashlib
 import json
@@ -12,26 +10,24 @@ from pathlib import Path
 FILE = Path("build/benchmarks.json")
 PACKAGE = Path(__file__).parents[1] / "src" / "asperity"
 
-Ended = tuple[
-    float, str, list[str]
-]  # seconds, what kept the part from its end, what changed against the last
+Ended = tuple[float, str, list[str]]  # seconds, failure, changes from the last run
 
 
 @dataclass
 class Unfinished:
-    """The parts of a run, and what became of those that have ended."""
+    """A run's parts and the results of those that have ended."""
 
     parts: tuple[str, ...]
     whole: bool
     began: str
-    file: Path | None  # where it is kept; None where it is not
+    file: Path | None  # file of the state; None: not stored
     done: dict[str, Ended] = field(default_factory=dict)
 
     @classmethod
     def of(
         cls, parts: Sequence[str], *, whole: bool, afresh: bool, file: Path | None
     ) -> "Unfinished":
-        """The run that was cut off, of these parts in this size; or a new one."""
+        """Return the interrupted run with these parts and this size, or a new one."""
         new = cls(tuple(parts), whole, f"{datetime.now():%Y-%m-%d %H:%M}", file)
         if afresh or file is None or not file.is_file():
             return new
@@ -43,7 +39,7 @@ class Unfinished:
             whole,
             last["began"],
             file,
-            {part: tuple(how) for part, how in last["done"].items()},
+            {part: tuple(ended) for part, ended in last["done"].items()},
         )
 
     @property
@@ -52,7 +48,7 @@ class Unfinished:
         return [part for part in self.parts if part not in self.done]
 
     def end(self, part: str, seconds: float, trouble: str, changed: list[str]) -> None:
-        """Remember how a part has ended."""
+        """Store the result of a part."""
         self.done[part] = seconds, trouble, changed
         if self.file is None:
             return
@@ -61,15 +57,13 @@ class Unfinished:
         self.file.write_text(json.dumps(kept), "utf-8")
 
     def forget(self) -> None:
-        """What has come to its end is no more gone on with."""
+        """Delete the state of a finished run."""
         if self.file is not None:
             self.file.unlink(missing_ok=True)
 
 
 def stamp(*names: str) -> str:
-    """The code of rooms and modules of the package as a digest: what other code has done is not
-    gone on with.
-    """
+    """Return a digest of packages and modules; results of other code are not reused."""
     digest = hashlib.sha256()
     for name in names:
         for path in sorted((PACKAGE / name).rglob("*.py")) or [PACKAGE / f"{name}.py"]:

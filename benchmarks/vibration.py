@@ -1,5 +1,4 @@
-"""The vibration model measured: Table 1, trends, speed, loss of contact, and the stiffness of
-solved contacts.
+"""The vibration model: Table 1, trends, speed, loss of contact, stiffness of solved contacts.
 
 `python -m benchmarks.vibration` runs this part alone.
 """
@@ -38,14 +37,14 @@ SEEDS = (0, 1, 2)
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time; `fast` leaves out the solved contacts."""
+    """Yield the tables as Markdown; `fast` omits the solved contacts."""
     yield "## Vibration: the paper's Table 1, preset paper, 200 records a row\n"
     yield from table_lines()
-    yield "\n## Vibration: what load does to CRFA (exponent over 100 to 400 N, closed form)\n"
+    yield "\n## Vibration: exponent of CRFA over load (100 to 400 N, closed form)\n"
     yield from trend_lines()
     yield "\n## Vibration: speed\n"
     yield from speed_lines()
-    yield "\n## Vibration: Hertz's spring against its tangent\n"
+    yield "\n## Vibration: Hertz's nonlinear spring against its tangent\n"
     yield from nonlinear_lines()
     if not fast:
         yield (
@@ -57,8 +56,8 @@ def lines(*, fast: bool = False) -> Iterator[str]:
 
 def table_lines() -> Iterator[str]:
     yield (
-        "| cut-off [Hz] | height [um] | load [N] | CRF [Hz] | printed | off | CRFA | 5 to 95 % |"
-        " printed | inside |"
+        "| cut-off [Hz] | height [um] | load [N] | CRF [Hz] | printed | deviation | CRFA |"
+        " 5 to 95 % | printed | inside |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for row in reproduce_table1():
@@ -72,8 +71,8 @@ def table_lines() -> Iterator[str]:
 
 def trend_lines() -> Iterator[str]:
     yield (
-        "| rate [kHz] | bilinear filter (paper) | continuous filter (sound) | the same, point patch"
-        " averaged |"
+        "| rate [kHz] | bilinear filter (paper) | continuous filter (sound) | continuous filter,"
+        " point patch averaged |"
     )
     yield "|---|---|---|---|"
     for rate in (10e3, 20e3, 50e3, 200e3, None):
@@ -133,7 +132,7 @@ def speed_lines() -> Iterator[str]:
         f" {median_seconds(noise_to_spectrum, 3):.2f} s"
     )
     yield (
-        "- 300 s at 20 kHz, surface's own spectrum to spectrum:"
+        "- 300 s at 20 kHz, spectrum of the surface to spectrum:"
         f" {median_seconds(surface_to_spectrum, 3):.2f} s"
     )
     few = Signal(million.values[:1000], 20e3, "m")
@@ -143,14 +142,14 @@ def speed_lines() -> Iterator[str]:
     )
     seconds, off = by_solve_ivp(few, reference, 1e-10)
     yield (
-        f"- solve_ivp (RK45, rtol 1e-10; off by {off:.0e} of the largest acceleration), a million"
+        f"- solve_ivp (RK45, rtol 1e-10; error {off:.0e} of the largest acceleration), a million"
         f" samples: {1e3 * seconds:.0f} s, {1e3 * seconds / exact:.0f} times the exact response and"
-        f" {1e3 * seconds / rk5:.0f} times Runge-Kutta with 8 sub-steps (off by {error:.0e})"
+        f" {1e3 * seconds / rk5:.0f} times Runge-Kutta with 8 sub-steps (error {error:.0e})"
     )
 
 
 def by_solve_ivp(profile: Signal, reference: np.ndarray, rtol: float) -> tuple[float, float]:
-    """Seconds for the record, and the largest error over the largest acceleration."""
+    """Return the seconds for the record and the largest error over the largest acceleration."""
     times = np.arange(profile.values.size) / profile.rate_hz
     slopes = np.diff(profile.values) * profile.rate_hz
 
@@ -180,7 +179,7 @@ def by_solve_ivp(profile: Signal, reference: np.ndarray, rtol: float) -> tuple[f
 
 
 def nonlinear_lines() -> Iterator[str]:
-    yield "| rms dynamic force, linear | peak moves by | in the air |"
+    yield "| rms dynamic force, linear | shift of the peak | out of contact |"
     yield "|---|---|---|"
     rate, samples = 50e3, 2_000_000
     kicks = np.cumsum(np.cumsum(np.random.default_rng(5).standard_normal(samples)))
@@ -200,8 +199,8 @@ def nonlinear_lines() -> Iterator[str]:
 
 def stiffness_lines() -> Iterator[str]:
     yield (
-        "| Sq [um] | CLR [%] | tangent [N/um] | asperities | film | step moves total, split | CRF"
-        " tangent [Hz] | CRF paper's law | parallel film | line |"
+        "| Sq [um] | CLR [%] | tangent [N/um] | asperities | film | step error of total, split |"
+        " CRF tangent [Hz] | CRF paper's law | parallel film | line |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for sq_um in (0.0, *SQ_UM):
@@ -215,17 +214,17 @@ def stiffness_lines() -> Iterator[str]:
 
 def stiffness_row(sq_um: float, seed: int) -> list[tuple[float, ...]]:
     case = load_case(CASE)
-    wanted = {"surface.sq": f"{sq_um} um", "surface.seed": seed} if sq_um else {"surface": "flat"}
-    case = case.with_overrides(wanted)
+    rough = {"surface.sq": f"{sq_um} um", "surface.seed": seed}
+    case = case.with_overrides(rough if sq_um else {"surface": "flat"})
     solution = solve_contact(case.conditions, case.lubricant, case.surface())
     state = contact_state(solution)
     found = tangent_stiffness(solution)
     crf = [np.sqrt(found.total / 0.1) / (2.0 * np.pi)]
     for law in ("hertz-point", "parallel-film", "hertz-line"):
         model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law=law)
-        silent = law != "parallel-film" and state.clr == 0.0
+        no_spring = law != "parallel-film" and state.clr == 0.0
         crf.append(
-            np.nan if silent else oscillator(state, case.conditions, model).natural_frequency_hz
+            np.nan if no_spring else oscillator(state, case.conditions, model).natural_frequency_hz
         )
     micro = 1e-6
     return [

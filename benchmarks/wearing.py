@@ -1,8 +1,7 @@
-"""Wear in time: what it takes, kills, what jumps, grids and positions do to it, intervals,
-plateaus, rings.
+"""Wear histories: time, kills, effect of jump, grid and positions, coverage, plateaus, rings.
 
-Histories are kept in build/wearing and go on where they were stopped, as long as the code that
-wears is the same: each call does what its time allows and says what is left.
+Histories are stored in build/wearing and resume where they were stopped as long as the wear code is
+the same: each call does as much as its time allows and reports the unfinished ones.
 """
 
 import hashlib
@@ -40,7 +39,7 @@ from benchmarks.unfinished import stamp
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "build" / "wearing"
-WEARS = (
+PACKAGES = (  # that determine a history
     "wear",
     "ehl",
     "solution",
@@ -48,14 +47,14 @@ WEARS = (
     "kernels",
     "surface",
     "lubricant",
-)  # rooms that decide a history; of their own room these:
-DECIDE = ("jump", "run", "contact", "reach", "state", "tracks")
+)
+MODULES = ("jump", "run", "contact", "reach", "state", "tracks")  # likewise, of simulation.wear
 IMAGES = ROOT / "docs" / "images"
 EXAMPLE = ROOT / "examples" / "wear.toml"
 MEASURED = ROOT.parent / "shared" / "data" / "surfaces" / "milled_1.opd"
 KILLS = 10
 COARSE = ("grid.cells=[32,32]", 'surface.correlation_length="30 um"', "wear.patches=4")
-KILLED = {  # what is killed: hours, and what its case differs in from the example
+KILLED = {  # killed histories: hours, and changes from the example
     "removal alone, 32 x 32 cells, 12 h": (12.0, COARSE),
     "pits, marks, scuffing and flattening, 32 x 32 cells, 0.5 h": (
         0.5,
@@ -68,26 +67,22 @@ KILLED = {  # what is killed: hours, and what its case differs in from the examp
         ),
     ),
 }
-ENDS = (
-    14  # positions at which the end of a history is looked at, the same for all that are compared
-)
-SHORT_S = 240.0  # of a short run
-ENOUGH_CELLS = 0.85  # of the time that a part has, that is spent on histories
-MANY = 14  # positions whose mean stands for the mean
+END_POSITIONS = 14  # positions that are evaluated at the end of each compared history
+SHORT_S = 240.0  # time of a short run
+HISTORY_TIME_SHARE = 0.85  # share of a part's time spent on histories
+MANY = 14  # positions whose mean represents the true mean
 SEEDS = 20
-RISEN = 12.0  # hours in which pits have made up for what removal smoothed
+RISE_HOURS = 12.0  # hours until pits have restored the roughness that removal smoothed
 
 Overrides = dict[str, object]
 
 
 class OutOfTime(Exception):
-    """A history that has to wait for the next call."""
+    """A history that remains unfinished in this call."""
 
 
 class Plan(NamedTuple):
-    """A history that is wanted: its folder's name, its hours, and what its case differs in from the
-    example.
-    """
+    """A planned history: name of its folder, hours, and changes from the example."""
 
     name: str
     hours: float
@@ -95,24 +90,22 @@ class Plan(NamedTuple):
 
     @property
     def folder(self) -> str:
-        """Another for every case."""
-        told = json.dumps([self.hours, self.overrides], sort_keys=True)
-        return f"{self.name}-{hashlib.sha256(told.encode()).hexdigest()[:8]}"
+        """Name of the folder, unique for each case."""
+        identity = json.dumps([self.hours, self.overrides], sort_keys=True)
+        return f"{self.name}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}"
 
 
-class Shelf:
-    """Histories as they are kept, and time to go on with them."""
+class Store:
+    """Stored histories, and the time to resume them."""
 
     def __init__(self, seconds: float) -> None:
-        self.end = time.perf_counter() + ENOUGH_CELLS * seconds
-        self.folder = KEPT / stamp(*WEARS, *(f"simulation/wear/{name}" for name in DECIDE))
+        self.end = time.perf_counter() + HISTORY_TIME_SHARE * seconds
+        self.folder = KEPT / stamp(*PACKAGES, *(f"simulation/wear/{name}" for name in MODULES))
         self.left: list[str] = []
         self.made = 0
 
     def worn(self, plan: Plan) -> tuple[WearHistory, float] | None:
-        """A history and the processor time that it took in all; None where time runs out on the
-        way.
-        """
+        """Return a history and its total processor time; None if the time runs out."""
         folder = self.folder / plan.folder
         clock, ended = (self.folder / f"{plan.folder}.{kind}" for kind in ("json", "ended"))
         if time.perf_counter() > self.end and not ended.is_file():
@@ -121,14 +114,16 @@ class Shelf:
         began = time.process_time()
         spent = float(json.loads(clock.read_text("utf-8"))) if clock.is_file() else 0.0
 
-        def told(_: WearProgress) -> None:
+        def progress(_: WearProgress) -> None:
             clock.write_text(json.dumps(spent + time.process_time() - began), "utf-8")
             if time.perf_counter() > self.end:
                 raise OutOfTime
 
         self.folder.mkdir(parents=True, exist_ok=True)
         try:
-            history = run_wear(case(plan.overrides), hours=plan.hours, out=folder, progress=told)
+            history = run_wear(
+                case(plan.overrides), hours=plan.hours, out=folder, progress=progress
+            )
         except OutOfTime:
             self.left.append(plan.name)
             return None
@@ -136,7 +131,7 @@ class Shelf:
         return history, float(json.loads(clock.read_text("utf-8")))
 
     def all(self, plans: Sequence[Plan]) -> Iterator[tuple[Plan, WearHistory, float]]:
-        """Those of them that are there, or that time allows."""
+        """Yield the histories that are stored or that the time allows."""
         for plan in plans:
             if (made := self.worn(plan)) is not None:
                 self.made += 1
@@ -148,68 +143,63 @@ def case(overrides: Overrides) -> Case:
 
 
 def coefficients(k: float) -> list[str]:
-    """Of the roller, which is over-rolled more often, and of the ring."""
+    """Return the wear coefficients of roller and ring; the roller is over-rolled more often."""
     return [f"{k / 20.0!r} 1/Pa", f"{k!r} 1/Pa"]
 
 
 def heads(*keys: str) -> str:
-    """Of some columns, as cells of a table, with the units that people read."""
+    """Return headings of columns, with display units, as cells of a table."""
     return " | ".join(quantity(key).label for key in keys)
 
 
-def told(moment: Mapping[str, float], *keys: str) -> str:
-    """Some numbers of a moment, as cells of a table."""
+def shown(moment: Mapping[str, float], *keys: str) -> str:
+    """Format quantities of one time as cells of a table."""
     return " | ".join(f"{quantity(key).factor * moment[key]:.4g}" for key in keys)
 
 
 def row(history: WearHistory, *keys: str) -> str:
-    """First and last of some columns, as cells of a table."""
+    """Format first and last values of columns as cells of a table."""
     first, last = history.table.iloc[0], history.table.iloc[-1]
-    return " | ".join(f"{told(first, key)} to {told(last, key)}" for key in keys)
+    return " | ".join(f"{shown(first, key)} to {shown(last, key)}" for key in keys)
 
 
 def solved_at(history: WearHistory, count: int, seed: int) -> list[SolvedPosition]:
-    """The contact at the history's end, at so many positions."""
+    """Solve the contact at the end of a history at `count` positions."""
     ageing: WearingContact = history.contact
     surfaces = history.final_surfaces
     cells = (surfaces.first.grid.cells[0], surfaces.second.grid.cells[0])
     places = positions(cells, ageing.surfaces.rough, count, 0, seed)
-    return [
-        one
-        for place in places
-        if isinstance(one := ageing.solver(combined_roughness(surfaces, place)), SolvedPosition)
-    ]
+    solutions = (ageing.solver(combined_roughness(surfaces, place)) for place in places)
+    return [solution for solution in solutions if isinstance(solution, SolvedPosition)]
 
 
 def end_mean(history: WearHistory) -> str:
-    """CLR of the worn surfaces over many positions, which a jump's own have not the number for, and
-    its deviation.
-    """
-    clr = 100.0 * np.array([one.state.clr for one in solved_at(history, ENDS, 99)])
+    """Return mean CLR and standard error at the end, over more positions than a jump solves."""
+    clr = 100.0 * np.array([solved.state.clr for solved in solved_at(history, END_POSITIONS, 99)])
     return f"{np.mean(clr):.2f} ± {np.std(clr, ddof=1) / np.sqrt(len(clr)):.1f}"
 
 
-def speed(shelf: Shelf) -> Iterator[str]:
+def speed(store: Store) -> Iterator[str]:
     yield "\n## 1e7 over-rollings of the roller at 128 x 128 cells\n"
     yield (
-        "| hours | jumps | positions | processor time [s] | a jump [s] | of two processes [s] | "
+        "| hours | jumps | positions | processor time [s] | per jump [s] | by two processes [s] | "
         f"{heads('sq_m', 'clr')} | volume error | jump error |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     whole = 1e7 / 56.25 / 3600.0
     fast: Overrides = {"grid.cells": [128, 128], "wear.patches": 4, "wear.step": 0.1}
-    for _, history, seconds in shelf.all([Plan("speed", whole, fast)]):
+    for _, history, seconds in store.all([Plan("speed", whole, fast)]):
         jumps, patches = len(history.table) - 1, history.contact.patches
-        abreast = -(-patches // 2) / patches  # of a jump's positions, that the busier of two solves
+        busier_share = -(-patches // 2) / patches  # of a jump's positions, for two processes
         yield (
             f"| {history.hours:.1f} | {jumps} | {patches} | {seconds:.0f} | {seconds / jumps:.2f} |"
-            f" {seconds * abreast:.0f} | {row(history, 'sq_m', 'clr')} | {history.volume_error:.1e}"
-            f" | {history.worn.error:.1e} |"
+            f" {seconds * busier_share:.0f} | {row(history, 'sq_m', 'clr')} |"
+            f" {history.volume_error:.1e} | {history.worn.error:.1e} |"
         )
 
 
 def kills() -> Iterator[str]:
-    yield "\n## Killed while they ran, at random moments\n"
+    yield "\n## Histories killed at random times\n"
     yield "| history | jumps | times killed | numbers and surfaces |"
     yield "|---|---|---|---|"
     for name, (hours, overrides) in KILLED.items():
@@ -222,14 +212,17 @@ def kills() -> Iterator[str]:
             )
             for body in ("first", "second")
         )
-        outcome = "the same to the last bit" if same else "DIFFERENT"
+        outcome = "identical to the last bit" if same else "DIFFERENT"
         yield f"| {name} | {len(whole.table) - 1} | {times} | {outcome} |"
 
 
 def _killed(
     folder: Path, hours: float, overrides: Sequence[str]
 ) -> tuple[int, WearHistory, WearHistory]:
-    """How often a history was killed as it ran, one that was let alone, and that one at its end."""
+    """Run a history undisturbed and another that is killed and resumed.
+
+    Returns the number of kills during the run, and both histories.
+    """
     changes = [word for override in overrides for word in ("--set", override)]
     command = [
         sys.executable,
@@ -253,27 +246,27 @@ def _killed(
         process.send_signal(signal.SIGKILL)
         process.wait()
     subprocess.run([*command, str(folder / "killed")], check=True, stdout=subprocess.DEVNULL)
-    one, other = (load_wear(folder / name) for name in ("whole", "killed"))
-    return times, one, other
+    undisturbed, killed = (load_wear(folder / name) for name in ("whole", "killed"))
+    return times, undisturbed, killed
 
 
-def jumps(shelf: Shelf) -> Iterator[str]:
-    yield "\n## Half the jump, and fewer or more positions, 2 h\n"
+def jumps(store: Store) -> Iterator[str]:
+    yield "\n## Effect of jump length and number of positions, 2 h\n"
     yield (
-        f"| cells | step | positions | jumps | {heads('sq_m', 'spk_m', 'clr')} of {ENDS} positions"
-        " | seconds |"
+        f"| cells | step | positions | jumps | {heads('sq_m', 'spk_m', 'clr')} of"
+        f" {END_POSITIONS} positions | seconds |"
     )
     yield "|---|---|---|---|---|---|---|---|"
-    ways = [(64, 0.1, 7), (64, 0.05, 7), (64, 0.025, 7), (64, 0.05, 4), (64, 0.05, 14)]
+    settings = [(64, 0.1, 7), (64, 0.05, 7), (64, 0.025, 7), (64, 0.05, 4), (64, 0.05, 14)]
     plans = [
         Plan(
             f"jumps-{cells}-{step}-{count}",
             2.0,
             {"grid.cells": [cells] * 2, "wear.step": step, "wear.patches": count},
         )
-        for cells, step, count in ways
+        for cells, step, count in settings
     ]
-    for plan, history, seconds in shelf.all(plans):
+    for plan, history, seconds in store.all(plans):
         _, cells, step, count = plan.name.split("-")
         last = history.table.iloc[-1]
         yield (
@@ -282,68 +275,70 @@ def jumps(shelf: Shelf) -> Iterator[str]:
         )
 
 
-def grids(shelf: Shelf) -> Iterator[str]:
+def grids(store: Store) -> Iterator[str]:
     keys = ("clr", "sq_m", "spk_m", "worn_depth_2_m")
-    yield "\n## Grids, 1 h\n"
+    yield "\n## Effect of the grid, 1 h\n"
     yield (
-        f"| cells | {heads(*keys)} | {heads('clr')} of {ENDS} positions | jumps | processor time"
-        " [s] |"
+        f"| cells | {heads(*keys)} | {heads('clr')} of {END_POSITIONS} positions | jumps |"
+        " processor time [s] |"
     )
     yield "|---|---|---|---|---|---|---|---|"
     plans = [Plan(f"grid-{cells}", 1.0, {"grid.cells": [cells] * 2}) for cells in (64, 128, 256)]
-    for plan, history, seconds in shelf.all(plans):
+    for plan, history, seconds in store.all(plans):
         count = len(history.table) - 1
         cells = plan.name.removeprefix("grid-")
         yield f"| {cells} | {row(history, *keys)} | {end_mean(history)} | {count} | {seconds:.0f} |"
 
 
 def intervals() -> Iterator[str]:
-    """How often the interval over a jump's positions holds: new surfaces of several seeds."""
-    one_more, mean, of_mean, widths, all_others = 0, 0, 0, [], 0
+    """Measure the coverage of the interval over a jump's positions on new surfaces."""
+    covered, mean, of_mean, widths, all_others = 0, 0, 0, [], 0
     for seed in range(SEEDS):
         new = run_wear(case({"surface.seed": seed, "grid.cells": [96, 32]}), hours=1e-9)
         few, many = solved_at(new, new.contact.patches, seed), solved_at(new, MANY, 1000 + seed)
-        shares, others = ([one.state.clr for one in found] for found in (few, many))
+        shares, others = ([solved.state.clr for solved in group] for group in (few, many))
         share = load_share(few)
-        assert share.interval is not None  # these cells have coarser ones to be compared with
+        assert share.interval is not None  # a coarser grid exists for these cells
         low, high = share.interval
         widths.append(high - low)
-        one_more += sum(low <= other <= high for other in others)
+        covered += sum(low <= other <= high for other in others)
         all_others += len(others)
         mean += low <= float(np.mean(others)) <= high
         off = float(np.std(shares, ddof=1)) / np.sqrt(len(shares))
         of_mean += abs(float(np.mean(shares)) - float(np.mean(others))) <= 1.9432 * off
-    yield f"\n## The interval of CLR over a jump's positions, {SEEDS} surfaces on 96 x 32 cells\n"
-    yield "| what it should hold | how often it does [%] | asked [%] |"
+    yield (
+        f"\n## Coverage of the CLR interval over a jump's positions, {SEEDS} surfaces, 96 x 32"
+        " cells\n"
+    )
+    yield "| quantity | covered [%] | nominal [%] |"
     yield "|---|---|---|"
     yield (
-        f"| CLR at a further position (`clr_low`, `clr_high`) | {100 * one_more / all_others:.0f} |"
+        f"| CLR at a further position (`clr_low`, `clr_high`) | {100 * covered / all_others:.0f} |"
         " 90 |"
     )
-    yield f"| the mean of {MANY} positions, by the same | {100 * mean / SEEDS:.0f} | 90 or more |"
     yield (
-        f"| the mean of {MANY} positions, by `clr_mean_low`, `clr_mean_high` |"
+        f"| mean of {MANY} positions (`clr_low`, `clr_high`) | {100 * mean / SEEDS:.0f} | 90 or"
+        " more |"
+    )
+    yield (
+        f"| mean of {MANY} positions (`clr_mean_low`, `clr_mean_high`) |"
         f" {100 * of_mean / SEEDS:.0f} | 90 |"
     )
-    yield f"\nThe interval is {np.mean(widths):.3f} wide on average.\n"
+    yield f"\nMean width of the interval: {np.mean(widths):.3f}.\n"
 
 
-LASTING = {
+PLATEAU_EXTENT = {  # k of the ring times hours [h/Pa] until the plateau
     "0.5 um": 3e-15,
     "1 um": 6e-15,
     "2 um": 9e-15,
-}  # k of the ring times hours [h/Pa], to the plateau
-CLOCKS = (
-    1e-16,
-    3e-17,
-    3e-16,
-)  # k of the ring [1/Pa]; those but the first so far as tells that they are clocks
+}
+COEFFICIENTS = (1e-16, 3e-17, 3e-16)  # k of the ring [1/Pa]; all but the first run a short time
 PLATEAUS = tuple(
-    (sq, k, (lasting if k == CLOCKS[0] else min(LASTING.values()) / 3.0) / k)
-    for k in CLOCKS
-    for sq, lasting in LASTING.items()
+    (sq, k, (extent if k == COEFFICIENTS[0] else min(PLATEAU_EXTENT.values()) / 3.0) / k)
+    for k in COEFFICIENTS
+    for sq, extent in PLATEAU_EXTENT.items()
 )
-TIMES_K = (0.0, 3e-16, 1e-15, 3e-15, 6e-15, 9e-15)  # at which a plateau's curves are told
+TIMES_K = (0.0, 3e-16, 1e-15, 3e-15, 6e-15, 9e-15)  # k times hours in the table
 
 
 def plateau_plan(sq: str, k: float, hours: float) -> Plan:
@@ -357,8 +352,8 @@ def plateau_plan(sq: str, k: float, hours: float) -> Plan:
     return Plan(f"plateau-{sq.replace(' ', '')}-{k:g}", hours, overrides)
 
 
-def plateau(shelf: Shelf) -> Iterator[str]:
-    """Removal alone, as long in k times time."""
+def plateau(store: Store) -> Iterator[str]:
+    """Yield the wear by removal alone over k times time."""
     keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "h_mean_m")
     yield (
         "\n## Removal alone: three roughnesses, three coefficients (32 x 32 cells, correlation"
@@ -368,36 +363,33 @@ def plateau(shelf: Shelf) -> Iterator[str]:
     yield f"|---|---|---|---|{'---|' * len(keys)}---|"
     done = {
         plan.name: history
-        for plan, history, _ in shelf.all([plateau_plan(*one) for one in PLATEAUS])
+        for plan, history, _ in store.all([plateau_plan(*settings) for settings in PLATEAUS])
     }
     for sq, k, hours in PLATEAUS:
         if (history := done.get(plateau_plan(sq, k, hours).name)) is None:
             continue
-        for turned in TIMES_K:
-            if turned <= k * hours * (1.0 + 1e-9):
-                moment = history.values_at(min(turned / k, hours))
-                numbers = f"{turned / k:g} | {turned:g} | {told(moment, *keys)}"
+        for k_hours in TIMES_K:
+            if k_hours <= k * hours * (1.0 + 1e-9):
+                moment = history.values_at(min(k_hours / k, hours))
+                numbers = f"{k_hours / k:g} | {k_hours:g} | {shown(moment, *keys)}"
                 yield f"| {sq} | {k:g} | {numbers} | {len(history.table) - 1} |"
     if done:
         draw_plateaus(done)
 
 
-def measured(shelf: Shelf) -> Iterator[str]:
-    """A measured surface: parameters as reported, and as SurfaceTopography finds them in the
-    written files.
-    """
+def measured(store: Store) -> Iterator[str]:
+    """Compare reported parameters of a measured surface with SurfaceTopography's."""
     if not MEASURED.is_file():
-        yield f"\n{MEASURED.name} is not at hand.\n"
+        yield f"\n{MEASURED.name} is not available.\n"
         return
     keys = ("sq_m", "ssk", "spk_m", "svk_m")
     surface = {"file": os.path.relpath(MEASURED, EXAMPLE.parent), "fit": "tile"}
     yield "\n## A measured surface, 3 h at 128 x 128 cells\n"
     yield (
-        f"| {MEASURED.name} | {heads(*keys)} | Sq by SurfaceTopography [µm] | Ssk from its"
-        " heights |"
+        f"| {MEASURED.name} | {heads(*keys)} | Sq by SurfaceTopography [µm] | Ssk of its heights |"
     )
     yield f"|---|{'---|' * len(keys)}---|---|"
-    for _, history, _ in shelf.all(
+    for _, history, _ in store.all(
         [Plan("measured", 3.0, {"surface": surface, "grid.cells": [128, 128]})]
     ):
         for name, when in ((-2, "new"), (-1, "after")):
@@ -409,23 +401,21 @@ def measured(shelf: Shelf) -> Iterator[str]:
                 f"{quantity(key).factor * line[body_column(key, 1)]:.6g}" for key in keys
             )
             yield f"| {when} | {numbers} | {1e6 * sq:.6g} | {np.mean(heights**3) / sq**3:.6g} |"
-        yield f"\nIn {len(history.table) - 1} jumps.\n"
+        yield f"\nJumps: {len(history.table) - 1}.\n"
 
 
-def rings(shelf: Shelf) -> Iterator[str]:
+def rings(store: Store) -> Iterator[str]:
     keys = ("sq_m", "clr", "crf_hz", "worn_depth_2_m")
-    yield "\n## The paper's first ring for ten hours, removal alone: 0.87 um are printed then\n"
+    yield "\n## The paper's first ring after ten hours, removal alone (printed: 0.87 um)\n"
     yield f"| k of the ring [1/Pa] | {heads(*keys)} |"
     yield "|---|---|---|---|---|"
     most = 1e-15
-    for _, history, _ in shelf.all([Plan("ring", 1.0, {**PAPERS, "wear.k": coefficients(most)})]):
+    for _, history, _ in store.all([Plan("ring", 1.0, {**PAPERS, "wear.k": coefficients(most)})]):
         new = history.values_at(0.0)
-        for k in (1e-18, 1e-17, 1e-16):  # the same history, as k is its clock
-            then = history.values_at(10.0 * k / most)
-            yield (
-                f"| {k:g} |"
-                f" {' | '.join(f'{told(new, key)} to {told(then, key)}' for key in keys)} |"
-            )
+        for k in (1e-18, 1e-17, 1e-16):  # the same history, as wear depends on k times time
+            end = history.values_at(10.0 * k / most)
+            cells = (f"{shown(new, key)} to {shown(end, key)}" for key in keys)
+            yield f"| {k:g} | {' | '.join(cells)} |"
 
 
 PAPERS: Overrides = {
@@ -436,15 +426,15 @@ PAPERS: Overrides = {
 }
 
 
-def debris_rings(shelf: Shelf) -> Iterator[str]:
-    """The first ring in dirty oil, for ten hours, of three seeds: 0.87 um are printed then."""
+def debris_rings(store: Store) -> Iterator[str]:
+    """Yield the first ring after ten hours in contaminated oil, for three seeds."""
     keys = ("sq_1_m", "sq_2_m", "clr", "crf_hz")
     marks: Overrides = {"law": "debris", "concentration": "1.74e10 1/m^3", "sinking": 0.2}
     yield (
-        "\n## The paper's first ring in dirty oil (code 21), three seeds: 0.54 to 0.87 um in ten"
-        " hours are printed\n"
+        "\n## The paper's first ring in contaminated oil (code 21), ten hours, three seeds"
+        " (printed: 0.54 to 0.87 um)\n"
     )
-    yield f"| seed | {heads(*keys)} | least of the ring |"
+    yield f"| seed | {heads(*keys)} | minimum Sq of the ring |"
     yield "|---|---|---|---|---|---|"
     for seed in (7, 8, 9):
         overrides = PAPERS | {
@@ -452,12 +442,12 @@ def debris_rings(shelf: Shelf) -> Iterator[str]:
             "wear.k": ["1e-18 1/Pa", "3e-17 1/Pa"],
             "wear.ploughing": marks,
         }
-        for _, history, _ in shelf.all([Plan(f"debris-{seed}", 10.0, overrides)]):
+        for _, history, _ in store.all([Plan(f"debris-{seed}", 10.0, overrides)]):
             yield f"| {seed} | {row(history, *keys)} | {1e6 * history.table['sq_2_m'].min():.4g} |"
 
 
-def falls_and_rises(shelf: Shelf) -> Iterator[str]:
-    """Removal at once, and pits as soon as sums are full."""
+def falls_and_rises(store: Store) -> Iterator[str]:
+    """Yield Sq under removal from the start and pits once the fatigue sums are full."""
     keys = ("sq_m", "sq_1_m", "sq_2_m", "spk_m", "svk_m", "ssk", "clr", "crf_hz")
     overrides: Overrides = {
         "grid.cells": [32, 32],
@@ -471,11 +461,11 @@ def falls_and_rises(shelf: Shelf) -> Iterator[str]:
     )
     yield f"| hours | {heads(*keys)} |"
     yield f"|---|{'---|' * len(keys)}"
-    for _, history, _ in shelf.all([Plan("falls-and-rises", RISEN, overrides)]):
+    for _, history, _ in store.all([Plan("falls-and-rises", RISE_HOURS, overrides)]):
         for hours in (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0):
-            if hours <= RISEN:
+            if hours <= RISE_HOURS:
                 moment = history.values_at(hours)
-                yield f"| {hours:g} | {told(moment, *keys)} |"
+                yield f"| {hours:g} | {shown(moment, *keys)} |"
         draw_rise(history)
 
 
@@ -485,7 +475,7 @@ STROKES = {1e-16: "-", 3e-17: "--", 3e-16: ":"}
 
 @ON_PAGE.drawing()
 def draw_plateaus(histories: Mapping[str, WearHistory]) -> None:
-    """Parameters of both bodies and CLR over k times hours, a colour each Sq, a stroke each k."""
+    """Draw parameters and CLR over k times hours: one colour for each Sq, one stroke for each k."""
     figure = Figure(figsize=(ON_PAGE.double, 4.8))
     figure.subplots_adjust(left=0.075, right=0.985, top=0.97, bottom=0.18, wspace=0.32, hspace=0.32)
     keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "h_mean_m")
@@ -512,7 +502,7 @@ def draw_plateaus(histories: Mapping[str, WearHistory]) -> None:
 
 @ON_PAGE.drawing()
 def draw_rise(history: WearHistory) -> None:
-    """Sq and CRF over hours, of removal beside fatigue."""
+    """Draw Sq and CRF over hours, for removal with fatigue."""
     figure = Figure(figsize=(ON_PAGE.double, 2.9))
     figure.subplots_adjust(left=0.075, right=0.985, top=0.96, bottom=0.17, wspace=0.22)
     left, right = figure.subplots(1, 2)
@@ -535,17 +525,12 @@ def draw_rise(history: WearHistory) -> None:
 
 
 def lines(*, fast: bool, seconds: float) -> Iterator[str]:
-    """The same tables in the same order at any length: docs/theory/wear.md includes them by
-    number.
-    """
-    shelf = Shelf(min(seconds, SHORT_S) if fast else seconds)
-    checks = [*intervals(), *kills()]  # first, as they do not go on another time
+    """Yield the tables, always in the same order: docs/theory/wear.md includes them by number."""
+    store = Store(min(seconds, SHORT_S) if fast else seconds)
+    checks = [*intervals(), *kills()]  # first, as these cannot be resumed
     for part in (speed, plateau, falls_and_rises, debris_rings, rings, jumps, grids, measured):
-        yield from part(shelf)
+        yield from part(store)
     yield from checks
-    yield f"Sample: {shelf.made} histories."
-    if shelf.left:
-        yield (
-            "\nNot at their end for want of time; the same command goes on with them:"
-            f" {', '.join(shelf.left)}.\n"
-        )
+    yield f"Sample: {store.made} histories."
+    if store.left:
+        yield f"\nUnfinished; the same command resumes them: {', '.join(store.left)}.\n"

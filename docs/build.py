@@ -1,8 +1,8 @@
-"""Builds the site into build/site: `make docs`.
+"""Build the site into build/site: `make docs`.
 
-The pages are staged first, in one tree with the README, the changelog and the reference of
-`make_reference.py`, so that nothing that is made ever stands among what is written. Warnings are
-errors; nothing is fetched.
+The pages are first staged in one tree with the README, the changelog and the reference of
+`make_reference.py`, so that generated files stay apart from sources. Warnings are errors; nothing
+is fetched.
 """
 
 import os
@@ -28,15 +28,13 @@ BESIDE = {
     "SECURITY.md": "security.md",
 }
 LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
-ERRORS = (
-    STAGE / "images" / "benchmark-error.png"
-)  # drawn from the csv that the last `make bench` wrote
-MATHJAX = ("sphinx-mathjax-offline", "tex-svg.js")  # who has it, and what of it draws the equations
-REST = "<!-- the rest -->"  # where pages go that no other list of pages names
+ERRORS = STAGE / "images" / "benchmark-error.png"  # drawn from the csv of the last `make bench`
+MATHJAX = ("sphinx-mathjax-offline", "tex-svg.js")  # package, and its file that draws equations
+REST = "<!-- the rest -->"  # replaced by the pages that no other list of pages names
 
 
 def staged(path: Path) -> Path:
-    """Where a file of the repository lies in the stage: docs is its root."""
+    """Return the path of a repository file in the stage, whose root is docs."""
     name = path.relative_to(ROOT).as_posix()
     return STAGE / BESIDE.get(name, name.removeprefix("docs/"))
 
@@ -67,13 +65,13 @@ def relinked(path: Path) -> str:
 
 
 def mathjax() -> Path:
-    """MathJax in one file, as the library that brings it for Sphinx has it."""
+    """Return the path of MathJax's single file in its Sphinx package."""
     library, name = MATHJAX
     return Path(next(file for file in files_of(library) or () if file.name == name).locate())
 
 
 def listed(texts: dict[Path, str]) -> set[str]:
-    """Pages of the stage's root that some list of pages names."""
+    """Return the pages of the stage's root that a list of pages names."""
     blocks = (
         block
         for text in texts.values()
@@ -93,18 +91,18 @@ def stage() -> None:
     texts |= {STAGE / name: text for name, text in make_reference.pages().items()}
     rest = sorted(path.stem for path in texts if path.parent == STAGE and path.stem != "index")
     names = "\n".join(f"../{name}" for name in rest if name not in listed(texts))
-    wanted = {path: text.replace(REST, names).encode() for path, text in texts.items()}
-    wanted |= {staged(path): path.read_bytes() for path in sources() if path.suffix != ".md"}
-    wanted[STAGE / "_static" / "mathjax" / MATHJAX[1]] = mathjax().read_bytes()
+    contents = {path: text.replace(REST, names).encode() for path, text in texts.items()}
+    contents |= {staged(path): path.read_bytes() for path in sources() if path.suffix != ".md"}
+    contents[STAGE / "_static" / "mathjax" / MATHJAX[1]] = mathjax().read_bytes()
     made = [STAGE / name for name in ("gallery", "reference/names")]
     for path in STAGE.rglob("*"):
         if (
             path.is_file()
-            and path not in (*wanted, ERRORS)
+            and path not in (*contents, ERRORS)
             and not any(path.is_relative_to(folder) for folder in made)
         ):
             path.unlink()
-    for path, content in wanted.items():
+    for path, content in contents.items():
         if not path.exists() or path.read_bytes() != content:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
@@ -112,7 +110,7 @@ def stage() -> None:
 
 
 def main() -> int:
-    """Write the page of quantities, stage, and build; the exit code."""
+    """Write the page of quantities, stage and build the site; return the exit code."""
     make_quantities.PAGE.write_text(make_quantities.page(), "utf-8")
     stage()
     shutil.rmtree(SITE, ignore_errors=True)

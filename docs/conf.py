@@ -23,9 +23,9 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 templates_path = ["_templates"]
-exclude_patterns = ["scripts"]  # the gallery is made of them
+exclude_patterns = ["scripts"]  # sources of the gallery
 default_role = "literal"
-smartquotes_action = "q"  # two hyphens are an option's, not a dash
+smartquotes_action = "q"  # two hyphens start an option, they are no dash
 maximum_signature_line_length = 88
 
 myst_enable_extensions = ["colon_fence", "dollarmath"]
@@ -38,10 +38,8 @@ autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "inherited-members": False}
 napoleon_google_docstring = False
 
-mathjax_path = "mathjax/tex-svg.js"  # staged: equations are drawn without a network
-mathjax3_config = {
-    "options": {"enableMenu": False}
-}  # the menu is what would ask other machines for speech rules
+mathjax_path = "mathjax/tex-svg.js"  # staged: equations need no network
+mathjax3_config = {"options": {"enableMenu": False}}  # the menu loads speech rules from the network
 copybutton_prompt_text = "$ "
 
 html_theme = "pydata_sphinx_theme"
@@ -73,7 +71,7 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "download_all_examples": False,
     "min_reported_time": 0,
-    "capture_repr": (),  # what is printed is shown, not what a line happens to return
+    "capture_repr": (),  # show printed output only, not return values
     "plot_gallery": True,
     "abort_on_example_error": True,
     "remove_config_comments": True,
@@ -88,6 +86,6 @@ sphinx_gallery_conf = {
 
 def setup(app):
     """Register the conversion of Markdown in docstrings to reStructuredText."""
-    app.connect("autodoc-process-docstring", described, priority=100)  # before napoleon reads them
+    app.connect("autodoc-process-docstring", described, priority=100)  # before napoleon
     app.connect("autodoc-process-docstring", plain)
     app.connect("autodoc-process-signature", signed)

@@ -1,7 +1,7 @@
-"""Docstrings as Sphinx reads them, and the look of the gallery's figures.
+"""Adapt docstrings for Sphinx and set the style of the gallery's figures.
 
-What reStructuredText would take for markup is meant as it stands; fields are told by the comments
-behind them.
+Characters that reStructuredText would take for markup are escaped; trailing comments describe
+fields.
 """
 
 import inspect
@@ -13,14 +13,14 @@ INNER = r"\[(?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])*\]"  # brackets, three dee
 ARRAY = re.compile(rf"(~?numpy\.ndarray){INNER}")
 
 
-def plain(_app: Any, what: str, _name: str, thing: Any, _options: Any, lines: list[str]) -> None:
+def plain(_app: Any, kind: str, _name: str, owner: Any, _options: Any, lines: list[str]) -> None:
     """Escape bars, stars and trailing underscores outside code, and describe a class's fields.
 
     Words before a colon in the first line of a property are no type and are restored.
     """
-    if what == "class":
-        lines += _fields(thing)
-    taken = [line for line in lines if line.startswith(":type: ")] if what == "property" else []
+    if kind == "class":
+        lines += _fields(owner)
+    taken = [line for line in lines if line.startswith(":type: ")] if kind == "property" else []
     for line in taken:
         lines.remove(line)
         lines[0] = f"{line.removeprefix(':type: ')}: {lines[0]}"
@@ -28,7 +28,7 @@ def plain(_app: Any, what: str, _name: str, thing: Any, _options: Any, lines: li
 
 
 def described(
-    _app: Any, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]
+    _app: Any, _kind: str, _name: str, _owner: Any, _options: Any, lines: list[str]
 ) -> None:
     """Move the description of each parameter to a line of its own."""
     lines[:] = [part for line in lines for part in _entry(line)]
@@ -36,9 +36,9 @@ def described(
 
 def signed(
     _app: Any,
-    _what: str,
+    _kind: str,
     _name: str,
-    _thing: Any,
+    _owner: Any,
     _options: Any,
     signature: str | None,
     returns: str | None,
@@ -61,15 +61,15 @@ def _escaped(text: str) -> str:
 
 
 def _fields(owner: type) -> list[str]:
-    """Fields that a comment explains in the source, as a list."""
-    told = re.findall(
+    """Return a list of the fields that have a trailing comment in the source."""
+    fields = re.findall(
         r"^    (\w+): .*?  # (?!noqa|type:)(.+)$", inspect.getsource(owner), re.MULTILINE
     )
-    return ["", *(f"- ``{name}``: {comment}" for name, comment in told), ""] if told else []
+    return ["", *(f"- ``{name}``: {comment}" for name, comment in fields), ""] if fields else []
 
 
 def styled(_gallery: dict[str, Any], _script: str) -> None:
-    """Matplotlib's settings for every script of the gallery."""
+    """Set Matplotlib's style for a script of the gallery."""
     import matplotlib as mpl
 
     mpl.rcdefaults()

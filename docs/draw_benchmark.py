@@ -11,13 +11,11 @@ from asperity.report.style import ON_PAGE, write_figure
 TABLE = Path(__file__).parent / "benchmarks" / "certified.csv"
 STROKES = {"asperity": "-", "tamaas": "--", "contactmechanics": ":"}
 
-Course = tuple[
-    list[float], list[float]
-]  # time of a case [s] and error [%], medians, from coarse to fine
+Course = tuple[list[float], list[float]]  # median time of a case [s] and error [%], coarse to fine
 
 
 def courses(table: Path = TABLE) -> dict[tuple[str, str], Course]:
-    """By solver and family."""
+    """Read times and errors by solver and family."""
     found: dict[tuple[str, str], Course] = {}
     with table.open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
@@ -29,7 +27,7 @@ def courses(table: Path = TABLE) -> dict[tuple[str, str], Course]:
 
 @ON_PAGE.drawing()
 def figure(table: Path = TABLE) -> Figure:
-    """One panel, a line for each solver and family."""
+    """Draw one panel with a line for each solver and family."""
     drawn = Figure(figsize=(ON_PAGE.single, 4.6), layout="constrained")
     axes = drawn.subplots()
     looks = {name: (colour, marker) for name, colour, marker in FAMILIES}
@@ -46,6 +44,6 @@ def figure(table: Path = TABLE) -> Figure:
 
 
 def write(path: Path) -> Path:
-    """As PNG."""
+    """Write the figure as PNG."""
     path.parent.mkdir(parents=True, exist_ok=True)
     return write_figure(figure(), path)

@@ -1,8 +1,8 @@
-"""The generated pages of the reference: what Python offers, commands, keys of a case, keys of JSON.
+"""Generate the pages of the reference: Python names, commands, keys of a case, keys of JSON.
 
-Each is made of what the program itself reads: the stub of its names, typer's commands, pydantic's
-sections, the catalogue of quantities. JSON's shape is that of the golden numbers, which the tests
-hold against every command.
+Their sources are those of the program: the stub of its names, typer's commands, pydantic's sections
+and the catalogue of quantities. The structure of JSON comes from the golden numbers, which tests
+compare with every command.
 """
 
 import ast
@@ -33,12 +33,12 @@ GROUPS = {  # of names, by the module that exports them
     ),
 }
 
-JSON = """With `--json` a command prints one object, numbers in SI, `null` for what there is not. \
-A key with dots lies inside another, one with [] in each entry of a list."""
+JSON = """With `--json` a command prints one object: numbers in SI, `null` for missing values. \
+Dots separate nested keys; [] denotes each entry of a list."""
 
 
 def pages() -> dict[str, str]:
-    """Path in the site's source: text."""
+    """Return the text of each page by its path in the site's source."""
     return {
         "reference/api.rst": api_page(),
         "reference/commands.md": commands_page(),
@@ -66,7 +66,7 @@ def api_page() -> str:
         "Python",
         "======",
         "",
-        "``import asperity as asp``. SI throughout. Each is loaded when it is first used.",
+        "``import asperity as asp``. All values are in SI. Modules are loaded on first use.",
     ]
     for title, modules in groups.items():
         listed = [f"   {name}" for module in modules for name in names[module]]
@@ -87,7 +87,7 @@ def api_page() -> str:
 
 
 def commands_page() -> str:
-    """Every command as typer has it."""
+    """Return the page of commands, from typer."""
     parts = [
         "# Commands",
         "",
@@ -100,8 +100,8 @@ def commands_page() -> str:
             if entry.opts[0].startswith("-") or entry.param_type_name == "argument"
         ]
         usage = " ".join(_usage(entry) for entry in options if entry.param_type_name == "argument")
-        said = (command.help or "").strip().replace("\n", " ")
-        parts += ["", f"## asperity {name}".rstrip(), "", said, "", "```text"]
+        summary = (command.help or "").strip().replace("\n", " ")
+        parts += ["", f"## asperity {name}".rstrip(), "", summary, "", "```text"]
         parts += [" ".join(f"asperity {name} {usage} [OPTIONS]".split()), "```", ""]
         parts += _table(("", "value", "default", "meaning"), [_option(entry) for entry in options])
     return "\n".join([*parts, ""])
@@ -135,10 +135,7 @@ def case_page() -> str:
     parts = [
         "# Keys of a case file",
         "",
-        (
-            "What each means, and why its default is what it is, says [the case"
-            " file](../case-file.md)."
-        ),
+        "[The case file](../case-file.md) explains each key and its default.",
     ]
     for name, section in sorted(
         case_sections().items(), key=lambda item: (item[0] != "Top level", item[0])
@@ -175,12 +172,12 @@ def _key(name: str, field: Any) -> tuple[str, ...]:
 PLAIN = {bool: "true or false", int: "whole number", float: "number", str: "text"}
 
 
-def _parts(*things: Any) -> Iterator[Any]:
-    """Yield the types, choices and validators of an annotation."""
-    for thing in things:
-        yield from _parts(*get_args(thing))
-        yield from _parts(*getattr(thing, "__metadata__", ()))
-        yield getattr(thing, "func", None) if hasattr(thing, "json_schema_input_type") else thing
+def _parts(*annotations: Any) -> Iterator[Any]:
+    """Yield the types, choices and validators of annotations."""
+    for part in annotations:
+        yield from _parts(*get_args(part))
+        yield from _parts(*getattr(part, "__metadata__", ()))
+        yield getattr(part, "func", None) if hasattr(part, "json_schema_input_type") else part
 
 
 def _shown(default: Any) -> str:
@@ -195,7 +192,7 @@ def _shown(default: Any) -> str:
 
 
 def json_page() -> str:
-    """Keys of `--json` by command, as the golden numbers have them."""
+    """Return the page of `--json` keys by command, from the golden numbers."""
     parts = ["# Keys of JSON", "", JSON]
     for command in commands():
         if trees := golden(command):
@@ -206,7 +203,7 @@ def json_page() -> str:
 
 
 def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, str]]:
-    """Paths to what is no object, each with what it holds."""
+    """Yield the path and type of every value that is no object."""
     if isinstance(tree, dict):
         for key, inner in tree.items():
             yield from _leaves(inner, f"{path}.{key}".lstrip("."))
@@ -231,8 +228,8 @@ def _meaning(path: str) -> tuple[str, str]:
         "_std": ", standard deviation",
     }.items():
         if key.endswith(suffix) and (entry := catalogue().get(key.removesuffix(suffix))):
-            said = f"{entry.name}: {entry.meaning}" if entry.meaning else entry.name
-            return entry.unit if entry.unit != "1" else "-", _cell(said + words)
+            text = f"{entry.name}: {entry.meaning}" if entry.meaning else entry.name
+            return entry.unit if entry.unit != "1" else "-", _cell(text + words)
     return "", ""
 
 

@@ -1,3 +1,1 @@
-"""Attacks: what is thrown at asperity, and a runner that sees whether it holds. `python -m
-benchmarks.attacks`.
-"""
+"""Attacks on asperity and a runner that checks its response: `python -m benchmarks.attacks`."""

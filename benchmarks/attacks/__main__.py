@@ -1,5 +1,6 @@
-"""All attacks, and the table of docs/validation.md: `python -m benchmarks.attacks [--share 0.01]
-[KIND ...]`.
+"""Run all attacks and print the table of docs/validation.md.
+
+`python -m benchmarks.attacks [--share 0.01] [KIND ...]`.
 """
 
 import argparse
@@ -15,24 +16,22 @@ from typing import NamedTuple
 from benchmarks.attacks import endings, runner
 from benchmarks.attacks.hostile import HOSTILE
 
-LONGEST_S = runner.LONGEST_S
+MAX_SECONDS = runner.MAX_SECONDS
 ROOT = Path(__file__).parents[2]
 
 
 class Kind(NamedTuple):
-    """How many attacks of a kind there are, and what does them: yields a fault, or None, for
-    each.
-    """
+    """Kind of attack: the number of attacks and the function that yields each fault, or None."""
 
     attacks: int
     do: Callable[[str, int], Iterator[str | None]]
 
 
 def in_worker(kind: str, count: int) -> Iterator[str | None]:
-    """Attacks in a worker that is started again where one kills or stops it.
+    """Run attacks in a worker process, restarted after an attack that kills or blocks it.
 
-    What takes 20 s of a processor, or three times that by the clock, hangs: other work on the
-    machine is nobody's hang.
+    An attack hangs if it takes over 20 s of processor time or three times that by the clock, which
+    allows for other work on the machine.
     """
     at, longest = 0, (0.0, 0.0, 0)
     while at < count:
@@ -41,8 +40,8 @@ def in_worker(kind: str, count: int) -> Iterator[str | None]:
             command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=ROOT
         )
         lines: queue.Queue[str] = queue.Queue()
-        threading.Thread(target=_hand_on, args=(worker, lines), daemon=True).start()
-        patience = 600.0  # to set up
+        threading.Thread(target=_forward_lines, args=(worker, lines), daemon=True).start()
+        patience = 600.0  # for the set-up
         while True:
             try:
                 line = lines.get(timeout=patience)
@@ -56,16 +55,17 @@ def in_worker(kind: str, count: int) -> Iterator[str | None]:
                     yield f"{kind} {at}: the process dies with {worker.wait()}"
                     at += 1
                 break
-            told = json.loads(line)
-            if "done" in told:
-                fault = told["fault"]
-                longest = max(longest, (told["processor_s"], told["seconds"], told["done"]))
-                if fault is None and told["processor_s"] > LONGEST_S:
-                    fault = f"took {told['processor_s']:.0f} s of a processor"
-                yield None if fault is None else f"{kind} {told['done']}: {fault}"
-                at, patience = told["done"] + 1, 600.0
+            message = json.loads(line)
+            if "done" in message:
+                fault = message["fault"]
+                timing = message["processor_s"], message["seconds"], message["done"]
+                longest = max(longest, timing)
+                if fault is None and message["processor_s"] > MAX_SECONDS:
+                    fault = f"took {message['processor_s']:.0f} s of a processor"
+                yield None if fault is None else f"{kind} {message['done']}: {fault}"
+                at, patience = message["done"] + 1, 600.0
             else:
-                patience = 3.0 * LONGEST_S
+                patience = 3.0 * MAX_SECONDS
         worker.wait()
     processor, clock, number = longest
     print(
@@ -75,7 +75,7 @@ def in_worker(kind: str, count: int) -> Iterator[str | None]:
     )
 
 
-def _hand_on(worker: "subprocess.Popen[str]", lines: "queue.Queue[str]") -> None:
+def _forward_lines(worker: "subprocess.Popen[str]", lines: "queue.Queue[str]") -> None:
     assert worker.stdout is not None
     for line in worker.stdout:
         lines.put(line)
@@ -83,14 +83,14 @@ def _hand_on(worker: "subprocess.Popen[str]", lines: "queue.Queue[str]") -> None
 
 
 def hostile(_: str, count: int) -> Iterator[str | None]:
-    """Each in a process of its own, its memory watched."""
+    """Run each hostile file in its own process and watch its memory."""
     for name, make in list(HOSTILE.items())[:count]:
         yield endings.in_folder(
-            lambda folder, name=name, make=make: _met(name, make(folder), folder)
+            lambda folder, name=name, make=make: _attack(name, make(folder), folder)
         )
 
 
-def _met(name: str, arguments: tuple[str, ...], folder: Path) -> str | None:
+def _attack(name: str, arguments: tuple[str, ...], folder: Path) -> str | None:
     faults = runner.run(name, arguments, folder).faults
     return f"{name}: {', '.join(faults)}" if faults else None
 
@@ -108,15 +108,15 @@ KINDS = {
 
 
 def main() -> None:
-    """Attack, and print a row a kind; what did not hold goes to standard error."""
+    """Run the attacks and print a row for each kind; faults go to standard error."""
     arguments = argparse.ArgumentParser(prog="python -m benchmarks.attacks", description=__doc__)
-    arguments.add_argument("--share", type=float, default=1.0, help="of each kind's attacks")
+    arguments.add_argument("--share", type=float, default=1.0, help="share of the attacks to run")
     arguments.add_argument("kinds", nargs="*", help=", ".join(KINDS))
-    wanted = arguments.parse_args()
+    options = arguments.parse_args()
     print("| attacks | number | held |\n|---|---|---|", flush=True)
     failed = 0
-    for name in wanted.kinds or KINDS:
-        count = max(1, round(KINDS[name].attacks * wanted.share))
+    for name in options.kinds or KINDS:
+        count = max(1, round(KINDS[name].attacks * options.share))
         faults = []
         for fault in KINDS[name].do(name, count):
             if fault is not None:

@@ -1,6 +1,4 @@
-"""Damage of files: what lies on disk is flipped, cut, filled and mixed up, and has to be refused or
-read as it was.
-"""
+"""Damaged files: with flipped, cut or overwritten bytes, a file is rejected or read unchanged."""
 
 import json
 import random
@@ -19,16 +17,16 @@ if TYPE_CHECKING:
 SHARED = Path(__file__).parents[2].parent / "shared" / "data"
 RECORDINGS = ("mfpt-formats/*", "mfpt/*.mat", "endaq/*", "uff/*", "ims/*")
 SURFACES = ("surfaces/*",)
-LARGEST = 3_000_000  # bytes of an original; larger ones take too long a thousand times
+LARGEST = 3_000_000  # bytes; larger originals take too long a thousand times
 SMALL = {"grid.cells": [32, 24], "surface.correlation_length": "40 um"}
 
 
 def damaged(content: bytes, rng: random.Random) -> bytes:
-    """A content with one kind of damage that disks, cables and hands do."""
+    """Return the content with one random kind of damage, as from disks and transfers."""
     changed, size = bytearray(content), len(content)
     kind = rng.randrange(7)
     at = rng.randrange(size)
-    if kind <= 2:  # most often a bit; half of them where headers are
+    if kind <= 2:  # most often one bit; every third of these in the header
         at = at if kind else rng.randrange(min(size, 4096))
         changed[at] ^= 1 << rng.randrange(8)
     elif kind == 3:
@@ -50,7 +48,7 @@ def damaged(content: bytes, rng: random.Random) -> bytes:
 
 
 def make_results(folder: Path) -> None:
-    """A run, a history and a study, each small."""
+    """Create a small run, history and study."""
     from asperity.paper import papers_case
     from asperity.results import solve_case
     from asperity.simulation import run_history
@@ -63,8 +61,8 @@ def make_results(folder: Path) -> None:
     run_study(plan_study(swept), out=folder / "study", workers=1, fields=("pressure", "gap"))
 
 
-def numbers_of(folder: Path, which: str) -> str:
-    """All that a result gives, as text to compare."""
+def results_text(folder: Path, which: str) -> str:
+    """Return all numbers of a result as text to compare."""
     from asperity.results import load_run
     from asperity.simulation import load_history
     from asperity.study import load_study
@@ -91,10 +89,10 @@ def numbers_of(folder: Path, which: str) -> str:
 
 
 def results(folder: Path) -> Callable[[int], str | None]:
-    """An attack by number on one file of a result."""
+    """Return a function that damages one file of a result, chosen by number."""
     make_results(folder)
-    told = {which: numbers_of(folder, which) for which in ("run.nc", "history", "study")}
-    files = {which: sorted(_files(folder / which)) for which in told}
+    expected = {which: results_text(folder, which) for which in ("run.nc", "history", "study")}
+    files = {which: sorted(_files(folder / which)) for which in expected}
 
     def attack(number: int) -> str | None:
         rng = random.Random(number)
@@ -105,7 +103,7 @@ def results(folder: Path) -> Callable[[int], str | None]:
         try:
             return (
                 None
-                if numbers_of(folder, which) == told[which]
+                if results_text(folder, which) == expected[which]
                 else f"{path.name}: silently different"
             )
         except BadInput as refusal:
@@ -124,17 +122,17 @@ def _files(path: Path) -> Iterator[Path]:
 
 
 def too_long(refusal: BadInput) -> str | None:
-    """What is wrong with a refusal."""
+    """Return the fault of an error message that is too long, or None."""
     text = str(refusal)
     return f"refusal of {len(text)} characters" if len(text) > 500 or "\n" in text else None
 
 
-# What was measured
+# Measurements
 # -------------------------------------------------------------------------------------------------
 
 
 def originals(folder: Path) -> list[Path]:
-    """Measured files of every format, as far as they are at hand; else such as can be made."""
+    """Return measured files of every format if present, otherwise generated ones."""
     found = [
         path
         for pattern in (*(f"vibration/{recordings}" for recordings in RECORDINGS), *SURFACES)
@@ -169,9 +167,7 @@ def _made(folder: Path) -> list[Path]:
 
 
 def measured(folder: Path) -> Callable[[int], str | None]:
-    """An attack by number on a recording or a surface: what is wrong with it is said, or it is
-    read.
-    """
+    """Return a function that damages a recording or surface, which is then read or rejected."""
     from asperity.surface import read_surface
 
     files = originals(folder)
@@ -199,7 +195,7 @@ def measured(folder: Path) -> Callable[[int], str | None]:
 
 
 def channels(path: Path) -> "list[OpenRecording]":
-    """All channels of a recording, with a rate stated where the file states none."""
+    """Open all channels of a recording; supply a sampling rate if the file has none."""
     from asperity.recording import open_channels
 
     try:

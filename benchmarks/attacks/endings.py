@@ -1,6 +1,4 @@
-"""Ends that nobody asked for: a process that is killed, a disk that is full. What is left is whole,
-or goes on.
-"""
+"""Killed processes and full disks: saved results must be complete or resumable."""
 
 import os
 import random
@@ -25,7 +23,7 @@ QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
 
 
 def in_folder(attack: Callable[[Path], str | None]) -> str | None:
-    """Do an attack in a folder of its own."""
+    """Run an attack in a temporary folder."""
     folder = Path(tempfile.mkdtemp(prefix="asperity-attack-"))
     try:
         return attack(folder)
@@ -38,16 +36,16 @@ def _command(*arguments: str) -> list[str]:
 
 
 def kills(_: str, count: int) -> Iterator[str | None]:
-    """A history that goes on bit for bit, and a run that is the old one, the new one or none."""
+    """Kill histories, which must resume bit for bit, and runs, which must be complete or absent."""
     with tempfile.TemporaryDirectory(prefix="asperity-attack-") as place:
         home = Path(place)
         (home / "case.toml").write_text(small_text(100), "utf-8")
         run = _command(
             "run", str(home / "case.toml"), "--steps", "10", "--every", "5", "-q", "--out"
         )
-        begun = time.perf_counter()
+        start = time.perf_counter()
         subprocess.run([*run, str(home / "whole")], check=True, **QUIET)
-        length = time.perf_counter() - begun
+        length = time.perf_counter() - start
         table = load_history(home / "whole").table
         for number in range(count):
             after = random.Random(number).uniform(0.2, 1.1) * length
@@ -72,7 +70,7 @@ def _killed_history(
     _kill([*run, str(folder)], after)
     again = subprocess.run([*run, str(folder)], check=False, **QUIET)
     if again.returncode:
-        return f"history killed after {after:.1f} s does not go on: {again.stderr[:200]}"
+        return f"history killed after {after:.1f} s does not resume: {again.stderr[:200]}"
     same = load_history(folder).table.equals(table)
     return None if same else f"history killed after {after:.1f} s gives other numbers"
 
@@ -89,7 +87,7 @@ def _killed_save(case: Path, folder: Path, after: float) -> str | None:
 
 
 def full_disks(_: str, count: int) -> Iterator[str | None]:
-    """Files may grow to a few kilobytes only; the system's own limit is as good as a full disk."""
+    """Limit file sizes to a few kilobytes, which has the effect of a full disk."""
     commands = (
         ("solve", "case.toml", "-q", "--out", "new/run.nc"),
         ("run", "case.toml", "--steps", "2", "-q", "--out", "new/history"),

@@ -1,6 +1,4 @@
-"""Small files that are meant to take the machine: each is made in a folder, with the command that
-meets it.
-"""
+"""Small files that try to exhaust the machine, each with the command that reads it."""
 
 import json
 import os
@@ -14,9 +12,7 @@ from pathlib import Path
 import numpy as np
 
 GIGABYTE = 1 << 30
-Attack = Callable[
-    [Path], tuple[str, ...]
-]  # makes its files in a folder; the arguments of the command
+Attack = Callable[[Path], tuple[str, ...]]  # writes files in a folder, returns arguments
 CASE = Path(__file__).parents[2] / "examples" / "paper.toml"
 
 
@@ -50,12 +46,12 @@ def _matrix(path: Path) -> tuple[str, ...]:
     )
 
 
-# What claims to be large
+# Files that claim to be large
 # ----------------------------------------------------------------------------------------------
 
 
 def sparse(name: str, head: bytes, size: int, command: Callable[[Path], tuple[str, ...]]) -> Attack:
-    """A file that takes no room on the disk, and all of it when read."""
+    """Return an attack by a sparse file of this size."""
 
     def make(folder: Path) -> tuple[str, ...]:
         path = folder / name
@@ -70,7 +66,7 @@ def sparse(name: str, head: bytes, size: int, command: Callable[[Path], tuple[st
 def content(
     name: str, make: Callable[[], bytes], command: Callable[[Path], tuple[str, ...]]
 ) -> Attack:
-    """A file of these bytes."""
+    """Return an attack by a file of these bytes."""
 
     def made(folder: Path) -> tuple[str, ...]:
         path = folder / name
@@ -87,7 +83,7 @@ def npy_head(shape: str, kind: str = "<f8") -> bytes:
 
 
 def zeros_zip(path: Path, names: dict[str, bytes], large: str, size: int) -> None:
-    """A zip archive with one member of so many zeros."""
+    """Write a zip archive with one member of `size` zeros."""
     block = bytes(1 << 24)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, body in names.items():
@@ -140,7 +136,7 @@ def mat_head() -> bytes:
 
 
 def mat_bomb(folder: Path) -> tuple[str, ...]:
-    """One variable of 2.5 GB zeros, compressed."""
+    """Write one variable of 2.5 GB zeros, compressed."""
     count = 312_000_000
     name = struct.pack("<II", 1, 1) + b"x".ljust(8, b"\0")
     inner = struct.pack("<IIII", 6, 8, 6, 0) + struct.pack("<IIII", 5, 8, count, 1) + name
@@ -159,7 +155,7 @@ def mat4(rows: int, columns: int, tail: int = 80) -> bytes:
 
 
 def hdf5(name: str, **about: object) -> Attack:
-    """A data set that claims what no disk holds."""
+    """Return an attack by a data set that claims more data than any disk holds."""
 
     def make(folder: Path) -> tuple[str, ...]:
         import h5py
@@ -196,7 +192,7 @@ def hdf5_outside(folder: Path) -> tuple[str, ...]:
 
 
 def hdf5_text(mark: bytes, behind: int, value: int) -> Attack:
-    """Samples beside text, one byte of which is not what the library expects."""
+    """Return an attack by samples and text with one byte that the library does not expect."""
 
     def make(folder: Path) -> tuple[str, ...]:
         import h5py
@@ -223,7 +219,7 @@ def hdf5_groups(folder: Path) -> tuple[str, ...]:
 
 
 def parquet(name: str, columns: int, rows: int) -> Attack:
-    """Equal numbers in a table, which parquet says once."""
+    """Return an attack by a table of equal numbers, which parquet stores once."""
 
     def make(folder: Path) -> tuple[str, ...]:
         import pyarrow
@@ -290,9 +286,7 @@ def uff_claim() -> bytes:
 
 
 def ide_formula(folder: Path) -> tuple[str, ...]:
-    """A recorder's file whose clock is a formula, which its library evaluates: a number of 370
-    million digits.
-    """
+    """Write a recorder's file whose clock is a formula; evaluated, it has 370 million digits."""
     from ebmlite import loadSchema
 
     schema = loadSchema("mide_ide.xml")
@@ -324,7 +318,7 @@ def wrong_byte_xyz() -> bytes:
 
 
 def sidecar(text: str, suffix: str = "toml") -> Attack:
-    """An honest recording with a sidecar that is not."""
+    """Return an attack by a valid recording with a hostile sidecar file."""
 
     def make(folder: Path) -> tuple[str, ...]:
         np.save(folder / "x.npy", np.random.default_rng(1).standard_normal(20000))
@@ -334,12 +328,12 @@ def sidecar(text: str, suffix: str = "toml") -> Attack:
     return make
 
 
-# What is no file
+# Pipes, devices and links
 # -------------------------------------------------------------------------------------------------
 
 
 def fifo(name: str, command: Callable[[Path], tuple[str, ...]]) -> Attack:
-    """A pipe that nobody writes to."""
+    """Return an attack by a pipe that no process writes to."""
 
     def make(folder: Path) -> tuple[str, ...]:
         os.mkfifo(folder / name)
@@ -349,7 +343,7 @@ def fifo(name: str, command: Callable[[Path], tuple[str, ...]]) -> Attack:
 
 
 def linked(name: str, target: str, command: Callable[[Path], tuple[str, ...]]) -> Attack:
-    """A name that leads elsewhere."""
+    """Return an attack by a symbolic link."""
 
     def make(folder: Path) -> tuple[str, ...]:
         (folder / name).symlink_to(target)
@@ -359,7 +353,7 @@ def linked(name: str, target: str, command: Callable[[Path], tuple[str, ...]]) -
 
 
 def folder_file(name: str, body: bytes | None, of: str) -> Attack:
-    """A folder of results with one file that is not; None for a pipe."""
+    """Return an attack by a folder of results with one hostile file; None: a pipe."""
 
     def make(folder: Path) -> tuple[str, ...]:
         manifest = {"of": of, "format": 2}

@@ -1,6 +1,4 @@
-"""Case files and `--set` values as nobody should write them; and names that want to be more than
-names.
-"""
+"""Malformed case files and `--set` values."""
 
 import contextlib
 import io
@@ -141,7 +139,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 def small_text(iterations: int = 5) -> str:
-    """The paper's case on a grid that is solved at once."""
+    """Return the paper's case on a coarse grid that solves quickly."""
     text = CASE.read_text("utf-8")
     for old, new in FAST.items():
         text = text.replace(old, new)
@@ -150,16 +148,16 @@ def small_text(iterations: int = 5) -> str:
     )[0]
 
 
-def commanded(*arguments: str) -> str | None:
-    """Run a command in this process; what must not have come of it."""
-    out, said = io.StringIO(), io.StringIO()
+def run_command(*arguments: str) -> str | None:
+    """Run a command in this process and return its fault, or None."""
+    out, errors = io.StringIO(), io.StringIO()
     code: object = 0
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(said):
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
         try:
             main(arguments)
         except SystemExit as end:
             code = end.code or 0
-    text = said.getvalue()
+    text = errors.getvalue()
     if code not in (0, 1, 2, 3, 4, 5):
         return f"ends with {code}"
     if _CONTROL.search(text) or _CONTROL.search(out.getvalue()):
@@ -172,7 +170,7 @@ def commanded(*arguments: str) -> str | None:
 
 
 def mutated(text: str, rng: random.Random) -> str:
-    """A case file with one to three changes."""
+    """Return a case file with one to three random changes."""
     lines = text.splitlines()
     for _ in range(rng.randint(1, 3)):
         at = rng.randrange(len(lines))
@@ -204,20 +202,20 @@ def mutated(text: str, rng: random.Random) -> str:
 
 
 def cases(folder: Path) -> Callable[[int], str | None]:
-    """An attack by number: a case file."""
+    """Return a function that solves a malformed case file, chosen by number."""
     text = small_text()
 
     def attack(number: int) -> str | None:
         (folder / "case.toml").write_text(
             mutated(text, random.Random(number)), "utf-8", errors="replace"
         )
-        return commanded("solve", str(folder / "case.toml"), "-q")
+        return run_command("solve", str(folder / "case.toml"), "-q")
 
     return attack
 
 
 def settings(folder: Path) -> Callable[[int], str | None]:
-    """An attack by number: a value given on the command line."""
+    """Return a function that passes a value on the command line, chosen by number."""
     (folder / "case.toml").write_text(small_text(), "utf-8")
 
     def attack(number: int) -> str | None:
@@ -231,6 +229,8 @@ def settings(folder: Path) -> Callable[[int], str | None]:
             ("vibrate",),
         )
         command, *more = rng.choice(commands)
-        return commanded(command, str(folder / "case.toml"), "-q", *more, "--set", f"{key}={value}")
+        return run_command(
+            command, str(folder / "case.toml"), "-q", *more, "--set", f"{key}={value}"
+        )
 
     return attack

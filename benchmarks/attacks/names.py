@@ -1,6 +1,4 @@
-"""Names that want to be more than names: in pages, tables, terminals and paths they stay what they
-are.
-"""
+"""Names with markup, formulas or control codes, which must appear as text everywhere."""
 
 import re
 from collections.abc import Callable
@@ -8,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.attacks.inputs import commanded, small_text
+from benchmarks.attacks.inputs import run_command, small_text
 
 NAMES = (
     "<script>alert(1)</script>",
@@ -45,7 +43,7 @@ NAMES = (
 
 
 def injections(folder: Path) -> Callable[[int], str | None]:
-    """An attack by number: a name for a channel, a unit, a file and a case."""
+    """Return a function that uses a hostile name, by number, for channel, unit, file and case."""
     values = np.random.default_rng(1).standard_normal((3000, 2))
 
     def attack(number: int) -> str | None:
@@ -59,16 +57,16 @@ def injections(folder: Path) -> Callable[[int], str | None]:
             (place / f"{copy}{file}").write_text(
                 f'"{quoted} ({quoted})",b\n{rows}\n', "utf-8", errors="replace"
             )
-        fault = commanded("check", str(place), "--rate", "20000")
+        fault = run_command("check", str(place), "--rate", "20000")
         page, table = place / "page.html", place / "track.csv"
         about = ("--rate", "20000", "--channel", "1", "--band", "1000", "5000", "--method", "peak")
-        fault = fault or commanded(
+        fault = fault or run_command(
             "track", str(place), *about, "--report", str(page), "--out", str(table)
         )
         case = place / (re.sub(r"[/\x00]", "_", name)[:60] + ".toml")
         case.write_text(small_text(), "utf-8")
-        fault = fault or commanded("solve", str(case), "-q", "--out", str(place / "run.nc"))
-        fault = fault or commanded(
+        fault = fault or run_command("solve", str(case), "-q", "--out", str(place / "run.nc"))
+        fault = fault or run_command(
             "report", str(place / "run.nc"), "--out", str(place / "run.html")
         )
         return fault or _in_page(page) or _in_page(place / "run.html") or _in_table(table)

@@ -1,4 +1,4 @@
-"""Attacks of one kind in a process that may die: a line of JSON before and after each."""
+"""Run attacks of one kind in a disposable process; print a line of JSON before and after each."""
 
 import json
 import os
@@ -21,28 +21,28 @@ KINDS = {
 
 
 def main(kind: str, first: int, last: int) -> None:
-    """Do the attacks of a kind from one number to another; what they print is not ours."""
+    """Run the attacks of a kind from one number to another; discard their output."""
     channel = os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
-    def tell(**about: object) -> None:
+    def send(**about: object) -> None:
         print(json.dumps(about), file=channel, flush=True)
 
     with tempfile.TemporaryDirectory(prefix="asperity-attack-") as folder:
         attack = KINDS[kind](Path(folder))
         for number in range(first, last):
-            tell(begun=number)
-            begun, spent = time.perf_counter(), runner.processor_s(os.getpid())
+            send(start=number)
+            start, processor_before = time.perf_counter(), runner.processor_s(os.getpid())
             try:
                 fault = attack(number)
             except BadInput as refusal:
-                fault = f"refusal that no command caught: {refusal}"[:200]
-            except Exception as error:  # noqa: BLE001 - a traceback is what is looked for
+                fault = f"uncaught refusal: {refusal}"[:200]
+            except Exception as error:  # noqa: BLE001 - tracebacks are faults
                 fault = f"traceback: {type(error).__name__}: {error}"[:200]
             megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-            processor = runner.processor_s(os.getpid()) - spent
-            seconds = time.perf_counter() - begun
-            tell(
+            processor = runner.processor_s(os.getpid()) - processor_before
+            seconds = time.perf_counter() - start
+            send(
                 done=number,
                 fault=fault,
                 seconds=seconds,

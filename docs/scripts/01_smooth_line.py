@@ -2,9 +2,9 @@
 Pressure and film of a smooth line contact
 ==========================================
 
-Oil that thickens under pressure carries the load nearly as the dry bodies would, Hertz's half
-ellipse, but for three things: pressure begins ahead of the contact, the film narrows at the
-outlet, and a spike of pressure stands before it.
+Oil that thickens under pressure carries the load almost with the pressure of the dry bodies,
+Hertz's semi-ellipse. Three features differ: pressure builds up in the inlet, the film narrows at
+the outlet, and a pressure spike precedes this constriction.
 """
 
 import matplotlib.pyplot as plt
@@ -29,14 +29,14 @@ oil = asp.Lubricant(
 )
 
 # %%
-# Eight cells across are enough where nothing varies across.
+# Eight cells across are enough, as nothing varies in this direction.
 a = contact.hertz.half_widths[0]
 grid = asp.Grid((512, 8), lower=(-4 * a, -0.04 * a), upper=(1.6 * a, 0.04 * a))
 solution = asp.solve_contact(contact, oil, asp.flat_surface(grid))
 state = asp.contact_state(solution)
 
 # %%
-# In half-widths and in Hertz's largest pressure the picture is that of every line contact.
+# Position is given in half-widths of the Hertz contact.
 figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(7, 5))
 x = grid.x / a
 above.plot(x, solution.pressure[:, 0] / 1e9, label="oil")

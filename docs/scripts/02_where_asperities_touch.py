@@ -1,9 +1,9 @@
 """
-Where asperities touch
-======================
+Asperity contacts in the film
+=============================
 
-The paper's contact at a roughness of 1 µm: film, pressure, and the cells in which the bodies
-touch. Their share of the load is CLR, their share of the Hertz zone CAR.
+The paper's contact at a roughness of 1 µm: film, pressure, and the cells in solid contact. Their
+share of the load is CLR, their share of the Hertz zone is CAR.
 """
 
 import matplotlib.pyplot as plt
@@ -17,7 +17,7 @@ run = solve_case(case)
 solution, state = run.solution, run.state
 
 # %%
-# Rolling is to the right. Film in the inlet is cut off at 3 µm, to see what happens in the contact.
+# Rolling is to the right. The film is cut off at 3 µm to resolve the contact.
 figure, axes = plt.subplots(3, 1, sharex=True, figsize=(6.5, 9), layout="constrained")
 a = case.conditions.hertz.half_widths[0]
 grid = solution.grid

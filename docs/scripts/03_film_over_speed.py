@@ -1,10 +1,10 @@
 """
-Film over speed, beside the usual fit
-=====================================
+Film over speed, with the usual fit
+===================================
 
-A smooth ball on a disc. Hamrock and Dowson's fit of 1977 was made of coarse solutions for thick
-films. Where the film is thick it holds; where it is thin, the least film, at the sides of the
-ball, comes down to half of what the fit says.
+A smooth ball on a disc. Hamrock and Dowson fitted their formula of 1977 to coarse solutions for
+thick films. It holds for thick films; for thin films, the solved minimum film at the sides of the
+ball is down to half of the fit.
 """
 
 import matplotlib.pyplot as plt
@@ -32,7 +32,7 @@ def ball(speed: float) -> asp.ContactConditions:
 
 
 # %%
-# Each speed has the grid that its film needs: ``auto_grid`` reaches as far ahead as the oil does.
+# Each speed has its own grid: ``auto_grid`` chooses the inlet length and resolution for the film.
 speeds = np.geomspace(0.02, 2.0, 7)
 solved, fitted = [], []
 for speed in speeds:
@@ -48,14 +48,15 @@ figure, axis = plt.subplots(figsize=(7, 4.5))
 for place, marker, ours, fit in zip(
     ("central", "least"), "os", zip(*solved, strict=True), zip(*fitted, strict=True), strict=True
 ):
-    (line,) = axis.loglog(speeds, np.array(fit) * 1e9, label=f"{place}, Hamrock and Dowson")
+    name = {"central": "central", "least": "minimum"}[place]
+    (line,) = axis.loglog(speeds, np.array(fit) * 1e9, label=f"{name}, Hamrock and Dowson")
     axis.loglog(
-        speeds, np.array(ours) * 1e9, marker, color=line.get_color(), label=f"{place}, solved"
+        speeds, np.array(ours) * 1e9, marker, color=line.get_color(), label=f"{name}, solved"
     )
 axis.set(xlabel="rolling speed [m/s]", ylabel="film [nm]")
 axis.legend()
 for speed, ours, fit in zip(speeds, solved, fitted, strict=True):
     print(
-        f"{speed:5.2f} m/s: solved over fit {ours[0] / fit[0]:.2f} in the middle,"
-        f" {ours[1] / fit[1]:.2f} at the least"
+        f"{speed:5.2f} m/s: solved over fit {ours[0] / fit[0]:.2f} for the central film,"
+        f" {ours[1] / fit[1]:.2f} for the minimum film"
     )

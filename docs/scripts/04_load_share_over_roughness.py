@@ -2,8 +2,8 @@
 Load share over roughness
 =========================
 
-As the roughness grows, asperities take the load from the oil. Three surfaces a level: the bars are
-their range, which is what one surface of a kind says of another.
+With increasing roughness, asperities carry more of the load. Each level has three surfaces; the
+bars show their range, the scatter between nominally identical surfaces.
 """
 
 import matplotlib.pyplot as plt

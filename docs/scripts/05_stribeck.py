@@ -2,8 +2,9 @@
 Friction over speed: a Stribeck curve
 =====================================
 
-At low speed asperities rub, at high speed only oil is sheared. The parts are stacked: what
-asperities and oil each contribute to one coefficient, with the load on asperities beside them.
+At low speed asperities rub, at high speed only oil is sheared. The stacked areas are the
+contributions of asperities and oil to the friction coefficient; the dashed line is the load on
+asperities.
 """
 
 import matplotlib.pyplot as plt

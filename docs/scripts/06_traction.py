@@ -2,8 +2,9 @@
 Friction over slip: three oils
 ==============================
 
-A Newtonian oil under high pressure would bear shear stresses that no oil bears. A law of friction
-ends that: Eyring's stress, or a limit in proportion to pressure (Bair and Winer).
+A Newtonian oil under high pressure would carry shear stresses beyond those of any real oil.
+A friction law limits the stress: Eyring's law, or a limiting stress proportional to pressure (Bair
+and Winer).
 """
 
 import matplotlib.pyplot as plt

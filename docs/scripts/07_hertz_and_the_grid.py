@@ -1,9 +1,9 @@
 """
-How fast the solver closes in on Hertz
-======================================
+Convergence to Hertz's solution
+===============================
 
-A dry, smooth ball has a closed form. The solver's largest pressure and contact area come nearer to
-it with every finer grid: that is how its numerical error is known.
+A dry, smooth ball has a closed form. The error of the solver's pressures decreases with each finer
+grid, which gives the order of convergence.
 """
 
 import matplotlib.pyplot as plt
@@ -22,7 +22,7 @@ a = contact.hertz.half_widths[0]
 
 
 def error_on(cells: int) -> tuple[float, float]:
-    """Relative error of the largest pressure, and of the pressure everywhere in the mean."""
+    """Return the relative error of the largest pressure and the mean error over the contact."""
     grid = asp.Grid(
         (cells, cells), (-1.5 * a, -1.5 * a), (1.5 * a, 1.5 * a), periodic=(False, False)
     )
@@ -39,9 +39,7 @@ largest, mean = np.array([error_on(n) for n in cells]).T
 # %%
 figure, axis = plt.subplots(figsize=(7, 4))
 axis.loglog(cells, 100 * largest, "o-", label="largest pressure")
-axis.loglog(cells, 100 * mean, "s-", label="pressure everywhere, mean")
-axis.loglog(
-    cells, 100 * mean[0] * (cells[0] / cells) ** 1.5, ":", color="0.4", label="cells to the -1.5"
-)
-axis.set(xlabel="cells each way", ylabel="error [%]")
+axis.loglog(cells, 100 * mean, "s-", label="pressure, mean over the contact")
+axis.loglog(cells, 100 * mean[0] * (cells[0] / cells) ** 1.5, ":", color="0.4", label="order 1.5")
+axis.set(xlabel="cells per direction", ylabel="error [%]")
 axis.legend()

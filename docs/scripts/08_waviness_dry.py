@@ -1,9 +1,9 @@
 """
-Waviness pressed flat
-=====================
+Flattening of a wavy surface
+============================
 
-A dry wave is pressed flat by the pressure p* = π E* A/λ (Westergaard, Johnson). Below it only
-crests touch, over a share of the wavelength that has a closed form: (2/π) arcsin of the root of
+The mean pressure p* = π E* A/λ flattens a dry wave completely (Westergaard, Johnson). Below it only
+the crests touch, over a share of the wavelength with a closed form: (2/π) arcsin of the root of
 p/p*.
 """
 
@@ -15,8 +15,9 @@ import asperity as asp
 pair = asp.ElasticPair((210e9, 210e9), (0.3, 0.3))
 wavelength = 0.1e-3
 
-# %% A line contact is nearly flat over one wave in its middle; the pressure there is Hertz's.
-# Half-width 1 mm, 20 waves.
+# %%
+# In the middle of a line contact the mean pressure is nearly constant over one wave and equals
+# Hertz's. The half-width is 1 mm, which holds 20 waves.
 amplitude, half_width = 0.2e-6, 1e-3
 full = np.pi * pair.reduced_modulus * amplitude / wavelength
 shares = np.array([0.1, 0.2, 0.35, 0.5, 0.7, 0.9])
@@ -27,12 +28,8 @@ for share in shares:
         geometry="line",
         radius=half_width * pair.reduced_modulus / (2.0 * share * full),
         length=10e-3,
-        load=0.5
-        * np.pi
-        * half_width
-        * share
-        * full
-        * 10e-3,  # then Hertz's largest pressure is that share of p*
+        # Hertz's largest pressure is then this share of p*
+        load=0.5 * np.pi * half_width * share * full * 10e-3,
         surface_speeds=(1.0, 1.0),
     )
     grid = asp.Grid((2048, 8), (-1.5e-3, -4e-6), (1.5e-3, 4e-6))
@@ -45,6 +42,6 @@ for share in shares:
 figure, axis = plt.subplots(figsize=(7, 4))
 fine = np.linspace(0, 1, 200)
 axis.plot(fine, 2 / np.pi * np.arcsin(np.sqrt(fine)), label="closed form")
-axis.plot(shares, found, "o", label="solved, two waves amid the contact")
-axis.set(xlabel="mean pressure / p*", ylabel="share that touches", xlim=(0, 1), ylim=(0, 1))
+axis.plot(shares, found, "o", label="solved, two waves in the middle of the contact")
+axis.set(xlabel="mean pressure / p*", ylabel="share in contact", xlim=(0, 1), ylim=(0, 1))
 axis.legend()

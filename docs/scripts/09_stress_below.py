@@ -2,9 +2,9 @@
 Stress below the surface
 ========================
 
-Under a smooth line contact the largest shear stress, 0.300 of Hertz's pressure, lies at 0.786
-half-widths. Roughness adds a second place: shallow, under single asperities, and often the larger
-of the two.
+Under a smooth line contact the largest shear stress, 0.300 of Hertz's pressure, lies at a depth of
+0.786 half-widths. Roughness adds a second, often larger maximum at shallow depth under single
+asperities.
 """
 
 import matplotlib.pyplot as plt
@@ -20,8 +20,9 @@ runs = {
 }
 hertz = case.conditions.hertz
 
-# %% Von Mises' stress in the plane of rolling, at the row with the largest, and the largest at each
-# depth.
+# %%
+# The maps show the von Mises stress in the rolling plane through its maximum; the curves show the
+# largest value at each depth.
 figure, axes = plt.subplots(1, 3, figsize=(9, 3.6), width_ratios=(1, 1, 0.8))
 a, p0 = hertz.half_widths[0], hertz.p_max
 for axis, (name, run) in zip(axes, runs.items(), strict=False):

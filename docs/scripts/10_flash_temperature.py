@@ -2,8 +2,8 @@
 Flash temperature
 =================
 
-Heat of friction leaves through both surfaces, which pass in tens of microseconds. Where asperities
-rub, the surface is hot for as long as the contact lasts: the temperature of scuffing.
+Friction heat flows into both surfaces, which pass the contact in tens of microseconds. Rubbing
+asperities are hot only for this time; this flash temperature governs scuffing.
 """
 
 import matplotlib.pyplot as plt
@@ -26,7 +26,7 @@ for axis, (label, field) in zip(axes, fields, strict=True):
     figure.colorbar(image, ax=axis, label=label)
     axis.set(ylabel="y / a", xlim=(-2, 1.9))
 axes[0].set_title(
-    f"friction {run.friction.coefficient:.3f}, {run.friction.power:.0f} W, at most"
+    f"friction {run.friction.coefficient:.3f}, {run.friction.power:.0f} W, maximum"
     f" {run.heat.max_k:.0f} K"
 )
 axes[1].set(xlabel="x / a, rolling to the right")

@@ -2,9 +2,9 @@
 A roller's ends
 ===============
 
-A straight roller presses hardest at its ends. A logarithmic profile evens it out, up to the load
-it was made for; a tilt spends that reserve. Dry, and thus quick: what presses on the ends is a
-matter of the bodies.
+A straight roller has its largest pressure at the ends. A logarithmic profile evens out the pressure
+up to its design load; tilt reduces this margin. The contact is solved dry, which is fast: the end
+pressure depends on the bodies, hardly on the oil.
 """
 
 import matplotlib.pyplot as plt

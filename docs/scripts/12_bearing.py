@@ -1,10 +1,10 @@
 """
-What each roller of a bearing bears
-===================================
+Load on each roller of a bearing
+================================
 
-A cylindrical roller bearing under a radial load: only half of its rollers bear, fewer the larger
-the clearance. Each is a contact of its own; the most loaded one is what ratings and films are
-about.
+In a cylindrical roller bearing under a radial load, at most half of the rollers carry load, and
+fewer with larger clearance. Each roller is a separate contact; the most loaded one determines
+ratings and film thickness.
 """
 
 import matplotlib.pyplot as plt
@@ -34,7 +34,7 @@ for clearance in (0.0, 20e-6, 50e-6):
     )
 
 # %%
-# Stribeck's estimate for a bearing without clearance: the most loaded roller bears 4 F/Z.
+# Stribeck's estimate for a bearing without clearance: the most loaded roller carries 4 F/Z.
 axis.axhline(4 * 4000 / 13, ls=":", color="0.4", label="4 F / Z")
-axis.set(xlabel="place from the load's direction [deg]", ylabel="load on the roller [N]")
+axis.set(xlabel="angle from the load's direction [deg]", ylabel="load on the roller [N]")
 axis.legend()

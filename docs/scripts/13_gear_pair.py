@@ -1,9 +1,10 @@
 """
-Along the path of contact of a gear pair
-========================================
+Contacts along the path of contact of a gear pair
+=================================================
 
-The radius grows and falls, the load is shared by two pairs of teeth and borne by one in between,
-sliding changes its sign at the pitch point. Each place is a contact with a film of its own.
+Along the path of contact the radius rises and falls, and sliding changes sign at the pitch point.
+Two pairs of teeth share the load, except in the middle, where one pair carries it. Each position is
+a separate contact with its own film.
 """
 
 import matplotlib.pyplot as plt

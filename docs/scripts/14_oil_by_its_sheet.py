@@ -1,10 +1,10 @@
 """
-An oil by its data sheet
-========================
+Oil from its data sheet
+=======================
 
-A grade gives the viscosity over temperature; the pressure-viscosity coefficient alpha is seldom
-printed and has to be estimated. The band is what published estimates differ by, for one and the
-same oil.
+A grade gives the viscosity over temperature. Data sheets seldom state the pressure-viscosity
+coefficient alpha, so it has to be estimated. The curves show how much published estimates differ
+for the same oil.
 """
 
 import matplotlib.pyplot as plt

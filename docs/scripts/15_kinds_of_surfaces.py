@@ -2,8 +2,8 @@
 Kinds of surfaces
 =================
 
-Six surfaces with the same Sq of 1 µm. What they do in a contact differs by far more than Sq tells:
-plateaus bear, peaks touch, grooves lead oil.
+Six surfaces with the same Sq of 1 µm. They behave differently in a contact, which Sq does not show:
+plateaus carry load, peaks touch first, grooves conduct oil.
 """
 
 import matplotlib.pyplot as plt

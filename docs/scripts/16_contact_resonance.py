@@ -2,8 +2,9 @@
 The contact's resonance in a spectrum
 =====================================
 
-A contact under noise rings at its natural frequency. The likelihood of the whole line, background
-and all, gives the frequency with a standard deviation, and says "not found" where there is none.
+A contact excited by noise vibrates at its natural frequency. A maximum-likelihood fit of the whole
+line and its background gives the frequency with a standard deviation, or reports that there is no
+resonance.
 """
 
 import matplotlib.pyplot as plt
@@ -17,14 +18,14 @@ run = solve_case(papers_case().with_overrides({"grid.cells": [96, 64], "surface.
 vibration = run.vibration
 
 # %%
-# What a sensor hears besides: tones of a shaft, and noise of its own.
-ringing = vibration.response
-time = np.arange(ringing.values.size) / ringing.rate_hz
-loud = ringing.values.std()
-tones = sum(0.5 * loud * np.sin(2 * np.pi * 600.0 * k * time) for k in (1, 2, 3))
-hiss = loud * np.random.default_rng(2).standard_normal(time.size)
+# Add disturbances: tones of a shaft and sensor noise.
+response = vibration.response
+time = np.arange(response.values.size) / response.rate_hz
+rms = response.values.std()
+tones = sum(0.5 * rms * np.sin(2 * np.pi * 600.0 * k * time) for k in (1, 2, 3))
+noise = rms * np.random.default_rng(2).standard_normal(time.size)
 spectrum = asp.power_spectrum(
-    asp.Signal(ringing.values + tones + hiss, ringing.rate_hz, ringing.unit), segment=16_384
+    asp.Signal(response.values + tones + noise, response.rate_hz, response.unit), segment=16_384
 )
 found = asp.contact_resonance(spectrum, band_hz=vibration.band_hz)
 
@@ -40,5 +41,5 @@ axis.axvline(
     label="natural frequency of the contact",
 )
 axis.set(xlabel="frequency [Hz]", ylabel="density of acceleration [m²/s⁴/Hz]", xlim=(0, 6000))
-axis.set_title(f"found {found.crf_hz:.0f} ± {found.crf_std_hz:.0f} Hz")
+axis.set_title(f"resonance {found.crf_hz:.0f} ± {found.crf_std_hz:.0f} Hz")
 axis.legend()

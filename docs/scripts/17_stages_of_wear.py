@@ -1,9 +1,9 @@
 """
-Stages of wear from recordings
-==============================
+Wear stages from recordings
+===========================
 
-Sixty recordings of the paper's wear test, simulated with noise. The resonance of each, and where
-its trend breaks, with the probability of severe wear at each recording.
+Sixty recordings of the paper's wear test, simulated with noise: the resonance of each, the break in
+its trend, and the probability of severe wear at each recording.
 """
 
 import matplotlib.pyplot as plt
@@ -16,16 +16,19 @@ rig = paper.simulate_rig(
     paper.RigSettings(repeats=2, duration_s=5.0), disturbance=paper.Disturbance(snr_db=6.0)
 )
 clean = [
-    resonance.remove_lines(one.spectrum(20_000), shaft_hz=rig.shaft_hz) for one in rig.recordings
+    resonance.remove_lines(recording.spectrum(20_000), shaft_hz=rig.shaft_hz)
+    for recording in rig.recordings
 ]
-found = resonance.series_resonances(
-    [one.spectrum for one in clean], band_hz=rig.band_hz, kept=[one.kept for one in clean]
+resonances = resonance.series_resonances(
+    [cleaned.spectrum for cleaned in clean],
+    band_hz=rig.band_hz,
+    kept=[cleaned.kept for cleaned in clean],
 )
 
 # %%
-sq = [1e6 * one.sq_m for one in rig.recordings]
-sq_std = [1e6 * one.sq_std_m for one in rig.recordings]
-crf = [one.crf_hz for one in found]
+sq = [1e6 * recording.sq_m for recording in rig.recordings]
+sq_std = [1e6 * recording.sq_std_m for recording in rig.recordings]
+crf = [fitted.crf_hz for fitted in resonances]
 stages = asp.split_stages(sq, crf, errors=StageErrors(x=sq_std), unit="um")
 
 figure, axis = plt.subplots(figsize=(7, 4))

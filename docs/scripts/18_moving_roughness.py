@@ -1,9 +1,9 @@
 """
-Roughness that moves
-====================
+Moving roughness
+================
 
-A snapshot lets the roughness stand still. Here it runs through the contact, and the oil is
-squeezed: load share and film change from step to step as other summits come in.
+A snapshot assumes stationary roughness. Here the roughness moves through the contact and squeezes
+the oil: load share and film change from step to step as new summits enter.
 """
 
 import matplotlib.pyplot as plt

@@ -1,9 +1,9 @@
 """
-Wear, minute by minute
-======================
+Wear over minutes
+=================
 
-Asperities that rub lose what Archard's law says: peaks go, Sq falls, and the load goes back to the
-oil. On a coarse grid, to be quick.
+Rubbing asperities wear by Archard's law: peaks are removed, Sq falls, and the oil carries more of
+the load. The coarse grid keeps the example fast.
 """
 
 import matplotlib.pyplot as plt

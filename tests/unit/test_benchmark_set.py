@@ -212,7 +212,7 @@ def test_the_reference_solver_conserves_mass_and_load():
     dx = solver.problem.mesh.x[1] - solver.problem.mesh.x[0]
     assert np.abs(np.cumsum(outflow[1:-1])).max() * dx < 1e-7 * through
     assert solver.problem.mesh.weights @ state.pressure == pytest.approx(np.pi / 2.0, rel=1e-9)
-    assert ((state.oil > -1.0) & (state.borne >= 0.0)).all()
+    assert ((state.oil > -1.0) & (state.solid >= 0.0)).all()
 
 
 def test_reference_solutions_are_converged():

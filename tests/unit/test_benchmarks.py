@@ -145,8 +145,8 @@ def test_a_part_ends_with_its_sample_size(monkeypatch, output, whole, last):
     monkeypatch.setattr(
         importlib, "import_module", lambda _: SimpleNamespace(lines=lambda **_: iter(output))
     )
-    assert list(bench_main._said("intervals", whole=whole, seconds=1.0))[-1] == last
-    assert kept.sample(bench_main._said("certified", whole=whole, seconds=1.0)) == (
+    assert list(bench_main._printed_lines("intervals", whole=whole, seconds=1.0))[-1] == last
+    assert kept.sample(bench_main._printed_lines("certified", whole=whole, seconds=1.0)) == (
         7.0 if len(output) > 1 else 0.0
     )
 
@@ -301,10 +301,10 @@ def test_stored_rows_produce_the_tables():
     assert lines[-1].startswith(
         f"{len({row['machine'] for row in rows})} machines with 12 surfaces"
     )
-    table_rows = [line for line in lines if line.startswith("| as the emulator has it | 6 |")]
+    table_rows = [line for line in lines if line.startswith("| emulator grid | 6 |")]
     complete_rows = [
         row
         for row in rows
-        if (row["law"], row["points"]) == ("as the emulator has it", "6") and row["clr_true"]
+        if (row["law"], row["points"]) == ("emulator grid", "6") and row["clr_true"]
     ]
     assert f"| {len(complete_rows)} |" in table_rows[0]

@@ -6,12 +6,12 @@ import scipy.linalg
 from benchmarks.alarms import AFTER, RISE_HZ
 from benchmarks.soonest import (
     Nearest,
-    beside,
     courses,
     distance,
     in_season,
     independent,
     nearest,
+    nearest_residual,
     power,
     power_unknown,
 )
@@ -55,7 +55,7 @@ def test_in_scatter_of_its_own_a_course_is_told_by_what_dense_covariances_say():
 
 @pytest.mark.parametrize("memory", [0.0, 0.7])
 def test_where_scatter_is_known_the_drawn_power_is_the_derived_one(memory):
-    left = beside(course_of(18, 5) / 30.0, memory, courses)
+    left = nearest_residual(course_of(18, 5) / 30.0, memory, courses)
     same = Nearest(float(left @ left) / 2.0, left, memory, 1.0)
     (derived,) = power(np.array([np.linalg.norm(left)]), np.array([5]), 0.02)
     assert power_unknown(same, memory, 0.02) == pytest.approx(derived, abs=0.03)

@@ -5,7 +5,7 @@ it alone makes.
 import numpy as np
 import pytest
 from benchmarks import failures
-from benchmarks.indicators import NINETY, drawn, heard, joint, transferred
+from benchmarks.indicators import NINETY, drawn, joint, spectra_of, transferred
 from benchmarks.sensors import BAND, FREQUENCY, _spectrum, machine
 
 from asperity.resonance import line_shape, series_resonances
@@ -13,7 +13,7 @@ from asperity.resonance import residuals as misfit
 
 
 def held(rig):
-    found = joint(heard(rig))
+    found = joint(spectra_of(rig))
     off = [
         abs(one.crf_hz - true.crf_hz) < NINETY * one.crf_std
         for one, true in zip(found, rig.recordings, strict=True)
