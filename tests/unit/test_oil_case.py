@@ -1,6 +1,4 @@
-"""[lubricant] by a data sheet in the case file, and what the case, a run, a study and a page make
-of it.
-"""
+"""[lubricant] given by a data sheet: case, run, study and page."""
 
 import json
 import pickle
@@ -20,13 +18,13 @@ PAPER = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
 BARE = {"lubricant": {"grade": "VG 100", "temperature": "70 degC"}}
 
 
-def test_a_sheet_arrives_in_si_and_comes_back():
+def test_a_data_sheet_is_converted_to_si_and_restated():
     sheet = OilSheet(grade="VG 100", viscosity_100=11.2e-6, density_15=885.0)
     assert EXAMPLE.lubricant == sheet.lubricant(343.15)
     assert load_case(EXAMPLE.text) == EXAMPLE
-    assert "ambient" not in EXAMPLE.text  # the default would be another temperature than the oil's
+    assert "ambient" not in EXAMPLE.text  # the default temperature would differ from the oil's
     assert pickle.loads(pickle.dumps(EXAMPLE)) == EXAMPLE
-    whole = {
+    overrides = {
         "viscosity_40": "98 cSt",
         "viscosity_100": "1.12e-5 m^2/s",
         "viscosity_index": 100,
@@ -38,7 +36,7 @@ def test_a_sheet_arrives_in_si_and_comes_back():
         "rheology": {"law": "ree-eyring", "tau0": "5 MPa"},
         "friction": "newtonian",
     }
-    case = PAPER.with_overrides({"lubricant": whole})
+    case = PAPER.with_overrides({"lubricant": overrides})
     assert case.lubricant.viscosity.eta0 == pytest.approx(
         OilSheet(viscosity_40=98e-6, viscosity_100=11.2e-6, density_15=880.0).viscosity(343.15),
         rel=1e-12,
@@ -52,7 +50,7 @@ def test_a_sheet_arrives_in_si_and_comes_back():
     )
 
 
-def test_single_values_are_set_and_left_out():
+def test_single_values_can_be_overridden_and_removed():
     case = EXAMPLE.with_overrides(
         {"lubricant.grade": "none", "lubricant.viscosity_40": "150 mm^2/s"}
     )
@@ -68,7 +66,7 @@ def test_single_values_are_set_and_left_out():
 
 @pytest.mark.parametrize("celsius", [50, 90])
 def test_heat_takes_temperature_and_slope_from_the_sheet(celsius):
-    """From a case whose [thermal] was restated with every default, too."""
+    """Also for a case whose [thermal] was restated with every default."""
     case = PAPER.with_overrides(BARE).with_overrides({"lubricant.temperature": f"{celsius} degC"})
     kelvin = celsius + 273.15
     assert case.thermal.ambient == pytest.approx(kelvin)
@@ -82,19 +80,19 @@ def test_heat_takes_temperature_and_slope_from_the_sheet(celsius):
     assert case.with_overrides({"thermal.ambient": f"{kelvin} K"}).thermal.ambient == pytest.approx(
         kelvin
     )
-    stated = case.with_overrides({"thermal.warmth": {"law": "roelands", "s0": 1.1}})
-    assert stated.thermal.warmth == RoelandsWarmth(1.1)
-    assert load_case(stated.text) == stated
+    restated = case.with_overrides({"thermal.warmth": {"law": "roelands", "s0": 1.1}})
+    assert restated.thermal.warmth == RoelandsWarmth(1.1)
+    assert load_case(restated.text) == restated
 
 
-def test_laws_are_taken_as_they_were():
+def test_viscosity_laws_without_a_data_sheet_are_unchanged():
     assert PAPER.thermal.ambient == pytest.approx(313.15)
     assert PAPER.oil_facts == ()
     assert "[thermal]\nambient" in PAPER.text
     assert not any("Oil" in note for note in PAPER.notes)
 
 
-def test_a_measured_oil_by_name():
+def test_a_measured_oil_is_selected_by_name():
     case = PAPER.with_overrides({"lubricant": {"oil": "spindle low-VI", "temperature": "60 degC"}})
     assert case.lubricant.viscosity.eta0 == pytest.approx(8.6e-3, rel=1e-9)
     assert case.lubricant.viscosity.alpha == pytest.approx(20.3e-9, rel=1e-9)
@@ -106,7 +104,7 @@ def test_a_measured_oil_by_name():
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("change", "message"),
     [
         (
             {"lubricant.viscosity": "barus"},
@@ -154,36 +152,36 @@ def test_a_measured_oil_by_name():
         ({"lubricant": "nun"}, "lubricant must be a table"),
     ],
 )
-def test_a_mistake_is_one_sentence(change, says):
-    with pytest.raises(BadInput, match=says) as refused:
+def test_a_mistake_is_reported_in_one_sentence(change, message):
+    with pytest.raises(BadInput, match=message) as caught:
         EXAMPLE.with_overrides(change)
-    assert "\n" not in str(refused.value)
+    assert "\n" not in str(caught.value)
 
 
-def test_a_sheet_beside_laws_is_refused():
+def test_a_data_sheet_together_with_laws_is_refused():
     with pytest.raises(
         BadInput, match=r"has both viscosity \(a law\) and grade \(of a data sheet\)"
     ):
         PAPER.with_overrides({"lubricant.grade": "VG 100"})
 
 
-def test_a_run_and_its_page_say_what_was_estimated(tmp_path):
+def test_a_run_and_its_page_report_estimated_oil_properties(tmp_path):
     small = {"grid.cells": [48, 16], "surface": "flat", "vibration": "none"}
     run = solve_case(PAPER.with_overrides(BARE | small))
-    kept = load_run(run.save(tmp_path / "run.nc"))
-    assert kept.case == run.case
-    assert kept.solution.lubricant == run.case.lubricant
-    said = json.loads(json.dumps(kept.summary()))
-    assert said["oil"]["oil_viscosity_pa_s"] == pytest.approx(
+    loaded = load_run(run.save(tmp_path / "run.nc"))
+    assert loaded.case == run.case
+    assert loaded.solution.lubricant == run.case.lubricant
+    summary = json.loads(json.dumps(loaded.summary()))
+    assert summary["oil"]["oil_viscosity_pa_s"] == pytest.approx(
         OilSheet(grade="VG 100").viscosity(343.15)
     )
-    assert said["oil"]["origins"]["oil_alpha_1_pa"].startswith(
+    assert summary["oil"]["origins"]["oil_alpha_1_pa"].startswith(
         "estimated: Roelands with Z 0.65, ± 20 %"
     )
-    assert said["oil"]["origins"].keys() == said["oil"].keys() - {"origins"}
-    assert said["notes"][0].startswith("Oil by its data sheet, given: ")
-    assert said["notes"][1].startswith("Oil by its data sheet, estimated: viscosity index 95")
-    page = write_report([kept], tmp_path / "page.html").read_text("utf-8")
+    assert summary["oil"]["origins"].keys() == summary["oil"].keys() - {"origins"}
+    assert summary["notes"][0].startswith("Oil by its data sheet, given: ")
+    assert summary["notes"][1].startswith("Oil by its data sheet, estimated: viscosity index 95")
+    page = write_report([loaded], tmp_path / "page.html").read_text("utf-8")
     assert "Oil, estimated" in page
     assert "(mid-point of VG 100)" in page
     assert "oil" not in solve_case(PAPER.with_overrides(small)).summary()
@@ -191,9 +189,9 @@ def test_a_run_and_its_page_say_what_was_estimated(tmp_path):
 
 def test_a_study_varies_the_temperature_of_an_oil():
     plan = plan_study(EXAMPLE.with_overrides({"study": {"temperature": ["40 degC", "90 degC"]}}))
-    cold, hot = (EXAMPLE.with_overrides(point) for point in plan.points)
-    assert cold.lubricant.viscosity.eta0 == pytest.approx(
+    cool, warm = (EXAMPLE.with_overrides(point) for point in plan.points)
+    assert cool.lubricant.viscosity.eta0 == pytest.approx(
         OilSheet(grade="VG 100", density_15=885.0).viscosity(313.15)
     )
-    assert hot.lubricant.viscosity.eta0 < 0.2 * cold.lubricant.viscosity.eta0
-    assert hot.thermal.ambient == pytest.approx(363.15)
+    assert warm.lubricant.viscosity.eta0 < 0.2 * cool.lubricant.viscosity.eta0
+    assert warm.thermal.ambient == pytest.approx(363.15)

@@ -1,6 +1,4 @@
-"""An oil by its data sheet: numbers against the standards' examples, other programs' and a table of
-measurements.
-"""
+"""Oils by data sheet, against the standards' examples, other programs and measured data."""
 
 import re
 from pathlib import Path
@@ -40,7 +38,7 @@ def test_walther_through_a_vg_220():
 
 @pytest.mark.parametrize("celsius", [-20.0, 40.0, 90.0, 150.0])
 @pytest.mark.parametrize("thin", [False, True])
-def test_thinning_is_the_slope_of_the_logarithm(celsius, thin):
+def test_thinning_equals_the_slope_of_log_viscosity(celsius, thin):
     line = (
         OilSheet(viscosity_40=3 * MM2, viscosity_100=1.2 * MM2).walther if thin else VG_220.walther
     )
@@ -49,8 +47,8 @@ def test_thinning_is_the_slope_of_the_logarithm(celsius, thin):
     assert line.thinning(kelvin) == pytest.approx(slope, rel=1e-6)
 
 
-def test_a_thin_oil_meets_both_of_its_viscosities():
-    """Where D341's exponential is a tenth of Z."""
+def test_a_thin_oil_reproduces_both_given_viscosities():
+    """The exponential correction of ASTM D341 is a tenth of Z."""
     line = Walther.through((313.15, 0.9 * MM2), (373.15, 0.45 * MM2))
     assert [line(313.15), line(373.15)] == pytest.approx([0.9 * MM2, 0.45 * MM2], rel=1e-9)
 
@@ -58,9 +56,14 @@ def test_a_thin_oil_meets_both_of_its_viscosities():
 @pytest.mark.parametrize(
     ("warm", "hot", "index", "tolerance"),
     [
-        (73.30, 8.86, 92.43, 0.05),  # with digits: D2270's table as another program interpolates it
+        (
+            73.30,
+            8.86,
+            92.43,
+            0.05,
+        ),  # with decimals: table of ASTM D2270 as interpolated by another program
         (22.83, 5.05, 156.42, 0.08),
-        (30.0, 4.24, -25.0, 1.0),  # whole ones: other programs', one of which rounds down
+        (30.0, 4.24, -25.0, 1.0),  # integers: results of other programs, one of which rounds down
         (70.0, 11.1, 150.0, 1.0),
         (120.0, 20.9, 200.0, 1.0),
     ],
@@ -69,7 +72,7 @@ def test_viscosity_index_of_known_oils(warm, hot, index, tolerance):
     assert viscosity_index(warm * MM2, hot * MM2) == pytest.approx(index, abs=tolerance)
 
 
-def test_viscosity_index_above_70_is_the_standards_equation():
+def test_viscosity_index_above_70_follows_the_standards_equation():
     high = 0.1684 * 100.0**2 + 11.85 * 100.0 - 97.0
     low = 0.8353 * 100.0**2 + 14.67 * 100.0 - 216.0
     assert viscosity_index(5000 * MM2, 100 * MM2) == pytest.approx(
@@ -79,11 +82,11 @@ def test_viscosity_index_above_70_is_the_standards_equation():
 
 @pytest.mark.parametrize("index", [-20.0, 60.0, 95.0, 100.0, 150.0, 230.0])
 @pytest.mark.parametrize("warm", [32.0, 100.0, 460.0])
-def test_an_index_is_inverted(index, warm):
+def test_the_viscosity_index_is_inverted(index, warm):
     hot = viscosity_100_of(warm * MM2, index)
     assert viscosity_index(warm * MM2, hot) == pytest.approx(
         index, abs=0.06
-    )  # L and H have steps of 0.05
+    )  # L and H are tabulated in steps of 0.05
 
 
 # viscosity at 100 °C, density at 15 °C, viscosities [mPa s] at 20, 40 ... 120 °C: index 95
@@ -105,10 +108,10 @@ def test_mineral_oils_by_grade(grade):
     oil = OilSheet(grade=f"VG {grade}")
     assert oil.at_100 / MM2 == pytest.approx(hot, rel=5e-4)
     assert oil.density(15 + ZERO) == pytest.approx(dense, abs=0.06)
-    found = [1e3 * oil.viscosity(celsius + ZERO) for celsius in range(20, 121, 20)]
-    # the table counts density from 289 K, 0.08 %; its last digit; the table of the index against
-    # the fit to it
-    assert found == pytest.approx(viscosities, rel=2.5e-3)
+    viscosities_mpas = [1e3 * oil.viscosity(celsius + ZERO) for celsius in range(20, 121, 20)]
+    # the table refers density to 289 K (0.08 %), has a rounded last digit, and its index is
+    # tabulated rather than fitted
+    assert viscosities_mpas == pytest.approx(viscosities, rel=2.5e-3)
 
 
 def test_grades_are_those_of_iso_3448():
@@ -117,8 +120,8 @@ def test_grades_are_those_of_iso_3448():
     assert OilSheet(grade="VG 46", viscosity_40=42 * MM2).at_40 == 42 * MM2
 
 
-class Stated:
-    """An oil of which an estimator's numbers are stated themselves."""
+class StatedOil:
+    """Oil with the estimators' input values stated directly."""
 
     base = "mineral"
 
@@ -133,14 +136,14 @@ class Stated:
         return self.walther(temperature) * self.rho
 
 
-def test_so_and_klaus_own_oil():
-    """Measured: 15.8 1/GPa."""
-    assert ESTIMATORS["so-klaus"](Stated(11.011, 826.4, 3.57677), 300.0) == pytest.approx(
+def test_so_and_klaus_reproduce_their_own_oil():
+    """Measured value: 15.8 1/GPa."""
+    assert ESTIMATORS["so-klaus"](StatedOil(11.011, 826.4, 3.57677), 300.0) == pytest.approx(
         16.991e-9, rel=1e-4
     )
 
 
-def test_iso_and_gold_and_roelands_and_wooster_as_printed():
+def test_iso_gold_and_roelands_wooster_estimates_as_printed():
     at_38 = [
         ESTIMATORS["iso"](OilSheet(grade=f"VG {grade}"), 311.15) * 1e9 for grade in (32, 100, 460)
     ]
@@ -148,18 +151,18 @@ def test_iso_and_gold_and_roelands_and_wooster_as_printed():
     assert ESTIMATORS["gold"](OilSheet(grade="VG 32"), 60 + ZERO) == pytest.approx(
         14.4e-9, rel=5e-3
     )
-    kept = OilSheet(
+    pao = OilSheet(
         viscosity_40=100 * MM2, viscosity_100=14 * MM2, density_15=850.0, base="pao", alpha=1e-8
     )
-    assert ESTIMATORS["gold"](kept, 313.15) == pytest.approx(7.382e-9 * 100**0.1335, rel=1e-9)
-    oil = Stated(100.0, 1000.0, 3.5)  # 0.1 Pa s
+    assert ESTIMATORS["gold"](pao, 313.15) == pytest.approx(7.382e-9 * 100**0.1335, rel=1e-9)
+    oil = StatedOil(100.0, 1000.0, 3.5)  # 0.1 Pa s
     assert ESTIMATORS["roelands"](oil, 300.0) == pytest.approx(
         0.65 * (np.log(0.1) + 9.67) / 0.196e9, rel=1e-6
     )
     assert ESTIMATORS["wooster"](oil, 300.0) == pytest.approx((6.0 + 9.65 * 2.0) * 1e-9, rel=1e-6)
 
 
-def test_iso_falls_as_the_standard_has_it():
+def test_the_iso_estimate_decreases_as_in_the_standard():
     oil = OilSheet(grade="VG 100")
     ratio = ESTIMATORS["iso"](oil, 100 + ZERO) / ESTIMATORS["iso"](oil, 38 + ZERO)
     assert ratio == pytest.approx(1.0 + 516.0 * (1.0 / 373.0 - 1.0 / 311.0), rel=1e-12)
@@ -168,38 +171,38 @@ def test_iso_falls_as_the_standard_has_it():
 def deviations(name, celsius, kinds):
     oils = [oil for oil in measured_oils().values() if oil.index in kinds]
     alphas = [(oil, oil.alphas[(30, 60, 100).index(celsius)]) for oil in oils]
-    as_it_was = whole if name == "iso" else lambda oil: exact(oil, celsius)
-    found = [
-        (ESTIMATORS[name](as_it_was(oil), celsius + ZERO) / alpha - 1.0) * 100
+    stated_oil = through_30_and_100 if name == "iso" else lambda oil: exact(oil, celsius)
+    errors_percent = [
+        (ESTIMATORS[name](stated_oil(oil), celsius + ZERO) / alpha - 1.0) * 100
         for oil, alpha in alphas
         if alpha
     ]
-    return np.array(found)
+    return np.array(errors_percent)
 
 
 def exact(oil, celsius):
-    """With its own viscosity at that temperature, and the slope between 30 and 100 °C."""
-    line, kelvin = whole(oil), celsius + ZERO
+    """Oil with its measured viscosity at this temperature and its slope between 30 and 100 °C."""
+    line, kelvin = through_30_and_100(oil), celsius + ZERO
     rho = line.density(kelvin)
     nu = oil.viscosities[(30, 60, 100).index(celsius)] / rho / MM2
-    return Stated(nu, rho, line.walther.b, kelvin)
+    return StatedOil(nu, rho, line.walther.b, kelvin)
 
 
-def whole(oil):
-    """Through its viscosities at 30 and 100 °C."""
-    dense = OilSheet(grade="VG 100")
+def through_30_and_100(oil):
+    """Oil whose viscosity law passes through the measured values at 30 and 100 °C."""
+    sheet = OilSheet(grade="VG 100")
     for _ in range(8):
         points = [
-            (t + ZERO, oil.viscosities[i] / dense.density(t + ZERO)) for i, t in ((0, 30), (2, 100))
+            (t + ZERO, oil.viscosities[i] / sheet.density(t + ZERO)) for i, t in ((0, 30), (2, 100))
         ]
         line = Walther.through(*points)
-        dense = OilSheet(viscosity_40=line(313.15), viscosity_100=line(373.15))
-    return dense
+        sheet = OilSheet(viscosity_40=line(313.15), viscosity_100=line(373.15))
+    return sheet
 
 
 @pytest.mark.parametrize(
     ("name", "bias", "rms", "high"),
-    [  # [%] at 30, 60, 100 °C; made independently, with So and Klaus' by another density
+    [  # [%] at 30, 60, 100 °C, computed independently; So and Klaus with another density
         ("wooster", (-6, -11, -17), (14, 13, 19), (13, 7, 6)),
         ("so-klaus", (20, 9, 1), (23, 13, 6), (25, 11, 6)),
         ("roelands", (-10, -9, -8), (15, 11, 12), (9, 6, 7)),
@@ -208,27 +211,27 @@ def whole(oil):
     ],
 )
 def test_estimates_against_measured_oils(name, bias, rms, high):
-    everything = [deviations(name, celsius, ("high", "medium", "low")) for celsius in (30, 60, 100)]
-    best = [deviations(name, celsius, ("high",)) for celsius in (30, 60, 100)]
-    loose = 4.1 if name == "so-klaus" else 1.1
-    assert [values.mean() for values in everything] == pytest.approx(bias, abs=loose)
-    assert [np.sqrt(np.mean(values**2)) for values in everything] == pytest.approx(rms, abs=loose)
-    spread = [np.sqrt(np.mean(values**2)) for values in best]
-    assert spread == pytest.approx(high, abs=loose)
-    # what is stated beside an estimate is twice the worst of them
+    all_oils = [deviations(name, celsius, ("high", "medium", "low")) for celsius in (30, 60, 100)]
+    high_index = [deviations(name, celsius, ("high",)) for celsius in (30, 60, 100)]
+    tolerance = 4.1 if name == "so-klaus" else 1.1
+    assert [values.mean() for values in all_oils] == pytest.approx(bias, abs=tolerance)
+    assert [np.sqrt(np.mean(values**2)) for values in all_oils] == pytest.approx(rms, abs=tolerance)
+    spread = [np.sqrt(np.mean(values**2)) for values in high_index]
+    assert spread == pytest.approx(high, abs=tolerance)
+    # the quoted uncertainty of an estimate is twice the worst deviation
     assert 100.0 * ESTIMATORS[name].spread == pytest.approx(2.0 * max(spread), abs=5.0)
 
 
-def test_the_page_has_the_measured_oils():
+def test_the_docs_page_lists_the_measured_oils():
     rows = re.findall(
         r"^\| ([a-z ]+ (?:high|medium|low)-VI) \| (.*) \| (.*) \|$",
         PAGE.read_text("utf-8"),
         re.MULTILINE,
     )
-    told = {name: (nu.split(", "), alpha.split(", ")) for name, nu, alpha in rows}
-    assert list(told) == list(measured_oils())
+    listed = {name: (nu.split(", "), alpha.split(", ")) for name, nu, alpha in rows}
+    assert list(listed) == list(measured_oils())
     for name, oil in measured_oils().items():
-        nu, alphas = told[name]
+        nu, alphas = listed[name]
         assert [float(text) for text in nu] == pytest.approx(
             [1e3 * value for value in oil.viscosities]
         )
@@ -239,38 +242,40 @@ def test_the_page_has_the_measured_oils():
 
 @pytest.mark.parametrize("celsius", [60, 100])
 @pytest.mark.parametrize("name", measured_oils())
-def test_a_measured_oil_is_as_measured_where_it_was(name, celsius):
-    oil, at = measured_oils()[name], (30, 60, 100).index(celsius)
+def test_a_measured_oil_returns_its_data_at_measured_temperatures(name, celsius):
+    oil, position = measured_oils()[name], (30, 60, 100).index(celsius)
     sheet = oil.sheet(celsius + ZERO)
-    assert sheet.viscosity(celsius + ZERO) == pytest.approx(oil.viscosities[at], rel=1e-9)
-    assert sheet.pressure_viscosity(celsius + ZERO) == pytest.approx(oil.alphas[at], rel=1e-12)
+    assert sheet.viscosity(celsius + ZERO) == pytest.approx(oil.viscosities[position], rel=1e-9)
+    assert sheet.pressure_viscosity(celsius + ZERO) == pytest.approx(
+        oil.alphas[position], rel=1e-12
+    )
 
 
-def test_a_measured_oil_between_and_beyond():
+def test_a_measured_oil_is_interpolated_and_not_extrapolated():
     oil = measured_oils()["heavy machine high-VI"]
     assert oil.sheet(45 + ZERO).alpha == pytest.approx(22.1e-9, rel=1e-9)
     assert [
         fact.origin for fact in oil_facts(oil.sheet(318.15), 318.15) if "alpha" in fact.key
     ] == ["measured"]
-    for name, celsius, least in (
+    for name, celsius, limit in (
         ("heavy machine high-VI", 101, 30),
         ("light machine high-VI", 45, 60),
     ):
         with pytest.raises(
-            BadInput, match=f"must lie between {least} and 100 degC, .* got {celsius} degC"
+            BadInput, match=f"must lie between {limit} and 100 degC, .* got {celsius} degC"
         ):
             measured_oils()[name].sheet(celsius + ZERO)
 
 
-def test_a_sheet_becomes_laws_at_a_temperature():
+def test_a_data_sheet_gives_laws_at_a_temperature():
     oil, kelvin = OilSheet(grade="VG 100"), 343.15
-    made = oil.lubricant(kelvin)
-    assert made.viscosity == Roelands(oil.viscosity(kelvin), oil.pressure_viscosity(kelvin))
-    assert made.viscosity.exponent == pytest.approx(
+    laws = oil.lubricant(kelvin)
+    assert laws.viscosity == Roelands(oil.viscosity(kelvin), oil.pressure_viscosity(kelvin))
+    assert laws.viscosity.exponent == pytest.approx(
         0.65, rel=1e-12
-    )  # alpha and law are one estimate
-    assert made.density == DowsonHigginson(oil.density(kelvin))
-    assert made.rheology == Newtonian()
+    )  # alpha and law come from one estimate
+    assert laws.density == DowsonHigginson(oil.density(kelvin))
+    assert laws.rheology == Newtonian()
     given = OilSheet(grade="VG 100", alpha=21e-9).lubricant(
         kelvin, thickening="barus", rheology=ReeEyring(5e6)
     )
@@ -278,16 +283,18 @@ def test_a_sheet_becomes_laws_at_a_temperature():
     assert given.rheology == ReeEyring(5e6)
 
 
-def test_what_is_given_and_what_is_estimated_is_said():
-    bare = {fact.key: fact.origin for fact in oil_facts(OilSheet(grade="VG 100"), 343.15)}
-    assert [key for key, origin in bare.items() if origin == "estimated"] == [
+def test_given_and_estimated_properties_are_listed():
+    origins = {fact.key: fact.origin for fact in oil_facts(OilSheet(grade="VG 100"), 343.15)}
+    assert [key for key, origin in origins.items() if origin == "estimated"] == [
         "oil_viscosity_index",
         "oil_density_15_kg_m3",
         "oil_alpha_1_pa",
     ]
-    full = OilSheet(viscosity_40=100 * MM2, viscosity_100=11 * MM2, density_15=885.0, alpha=2e-8)
-    assert not any(fact.origin == "estimated" for fact in oil_facts(full, 343.15))
-    assert len(oil_notes(full, 343.15)) == 1
+    complete = OilSheet(
+        viscosity_40=100 * MM2, viscosity_100=11 * MM2, density_15=885.0, alpha=2e-8
+    )
+    assert not any(fact.origin == "estimated" for fact in oil_facts(complete, 343.15))
+    assert len(oil_notes(complete, 343.15)) == 1
     given, estimated = oil_notes(OilSheet(grade="VG 100", viscosity_index=110.0), 343.15)
     assert given.startswith("Oil by its data sheet, given: ")
     assert "viscosity index 110" in given
@@ -296,7 +303,7 @@ def test_what_is_given_and_what_is_estimated_is_said():
 
 
 @pytest.mark.parametrize(
-    ("oil", "celsius", "says"),
+    ("oil", "celsius", "note"),
     [
         (
             OilSheet(
@@ -317,12 +324,12 @@ def test_what_is_given_and_what_is_estimated_is_said():
         ),
     ],
 )
-def test_what_is_doubtful_is_noted(oil, celsius, says):
-    assert re.search(says, oil_notes(oil, celsius + ZERO)[-1])
+def test_doubtful_properties_are_noted(oil, celsius, note):
+    assert re.search(note, oil_notes(oil, celsius + ZERO)[-1])
 
 
 @pytest.mark.parametrize(
-    ("given", "says"),
+    ("given", "message"),
     [
         ({"grade": "SAE 30"}, 'such as "VG 100", of 2, 3, .* got "SAE 30"; give viscosity_40'),
         ({"grade": "VG 99"}, 'got "VG 99"'),
@@ -370,13 +377,13 @@ def test_what_is_doubtful_is_noted(oil, celsius, says):
         ),
     ],
 )
-def test_a_sheet_that_cannot_be_is_refused(given, says):
-    with pytest.raises(BadInput, match=says):
+def test_an_impossible_data_sheet_is_refused(given, message):
+    with pytest.raises(BadInput, match=message):
         OilSheet(**given)
 
 
 @pytest.mark.parametrize(
-    ("oil", "celsius", "says"),
+    ("oil", "celsius", "message"),
     [
         (
             OilSheet(grade="VG 100"),
@@ -410,30 +417,30 @@ def test_a_sheet_that_cannot_be_is_refused(given, says):
         ),
     ],
 )
-def test_an_oil_out_of_range_is_refused(oil, celsius, says):
-    with pytest.raises(BadInput, match=says):
+def test_an_oil_out_of_range_is_refused(oil, celsius, message):
+    with pytest.raises(BadInput, match=message):
         oil.lubricant(celsius + ZERO)
 
 
 @pytest.mark.parametrize("name", sorted(ESTIMATORS))
 @pytest.mark.parametrize("grade", [32, 320, 1000])
-def test_alpha_rises_as_oil_cools_or_none_is_given(name, grade):
-    """So and Klaus' turns down in thick oil and ends below 0."""
-    oil, last, refused = OilSheet(grade=f"VG {grade}", alpha_estimate=name), 0.0, []
+def test_alpha_rises_on_cooling_or_is_not_determined(name, grade):
+    """The correlation of So and Klaus falls in thick oil and becomes negative."""
+    oil, previous, invalid = OilSheet(grade=f"VG {grade}", alpha_estimate=name), 0.0, []
     for celsius in range(100, -20, -5):
         try:
             alpha = oil.pressure_viscosity(celsius + ZERO)
         except BadInput as refusal:
-            refused.append((celsius, str(refusal)))
+            invalid.append((celsius, str(refusal)))
             continue
-        assert alpha > last
-        assert not refused  # once it falls it stays refused
-        last = alpha
-    assert bool(refused) == (name == "so-klaus" and grade > 32)
-    assert all("So and Klaus (1980) is invalid at" in said for _, said in refused)
+        assert alpha > previous
+        assert not invalid  # once it decreases, it stays invalid
+        previous = alpha
+    assert bool(invalid) == (name == "so-klaus" and grade > 32)
+    assert all("So and Klaus (1980) is invalid at" in message for _, message in invalid)
 
 
-def test_a_thin_grade_says_what_is_missing():
+def test_a_thin_grade_without_alpha_names_the_missing_value():
     with pytest.raises(
         BadInput,
         match=(
@@ -444,5 +451,5 @@ def test_a_thin_grade_says_what_is_missing():
         OilSheet(grade="VG 2")
 
 
-def test_a_given_alpha_serves_a_thin_oil():
+def test_a_given_alpha_suffices_for_a_thin_oil():
     assert OilSheet(grade="VG 10", alpha=1.1e-8).lubricant(145 + ZERO).viscosity.alpha == 1.1e-8

@@ -1,4 +1,4 @@
-"""Orders of a shaft that does not turn evenly, lines at rates and bands: against closed forms."""
+"""Orders of a shaft with varying speed and lines at rates and bands, against closed forms."""
 
 import numpy as np
 import pytest
@@ -14,79 +14,81 @@ from asperity.vibration import (
 
 RATE, SECONDS = 20e3, 4.0
 TIME = np.arange(round(RATE * SECONDS)) / RATE
-ANGLE = 20.0 * TIME + 0.5 * 4.0 * TIME**2  # turns, from 20 to 36 Hz
+ANGLE = 20.0 * TIME + 0.5 * 4.0 * TIME**2  # shaft angle [turns]; speed from 20 to 36 Hz
 SPEED = 20.0 + 4.0 * TIME
 MEAN = 28.0
 
 
 def spectrum(values, rate):
-    """One-sided power spectral density of a record, Hann."""
+    """One-sided power spectral density of a record, Hann window."""
     weights = np.hanning(values.size)
     density = 2.0 * np.abs(np.fft.rfft(values * weights)) ** 2 / (rate * np.sum(weights**2))
     return np.fft.rfftfreq(values.size, 1.0 / rate), density
 
 
 @pytest.mark.parametrize("per_turn", [1, 4])
-def test_the_angle_by_pulses_is_the_shafts(per_turn):
+def test_the_angle_from_pulses_equals_the_shaft_angle(per_turn):
     noise = 0.01 * np.random.default_rng(1).standard_normal(TIME.size)
     pulses = np.exp(-200.0 * (((ANGLE * per_turn) % 1.0) - 0.5) ** 2) + noise
-    found = turning_by_pulses(pulses, RATE, per_turn)
-    known = np.isfinite(found.turns)
-    off = found.turns[known] - ANGLE[known]
-    assert known.mean() > 0.95
-    assert np.ptp(off) < 5e-3  # turns: from where on they are counted is open
-    assert found.speed_hz == pytest.approx(MEAN, rel=0.01)
+    turning = turning_by_pulses(pulses, RATE, per_turn)
+    valid = np.isfinite(turning.turns)
+    error = turning.turns[valid] - ANGLE[valid]
+    assert valid.mean() > 0.95
+    assert np.ptp(error) < 5e-3  # turns; the zero of the count is arbitrary
+    assert turning.speed_hz == pytest.approx(MEAN, rel=0.01)
 
 
-def test_the_noise_of_a_tacho_makes_no_pulses():
+def test_tacho_noise_produces_no_pulses():
     noise = 0.1 * np.random.default_rng(1).standard_normal(TIME.size)
     assert turning_by_pulses(np.sin(2.0 * np.pi * ANGLE) + noise, RATE).speed_hz == pytest.approx(
         MEAN, rel=0.01
     )
 
 
-def test_pulses_of_two_samples_a_turn_are_pulses():
+def test_pulses_at_two_samples_per_turn_are_detected():
     pulses = 0.001 * np.random.default_rng(0).standard_normal(51_200)
     pulses[2559::2560] += 5.0
     pulses[2560::2560] += 5.0
     assert turning_by_pulses(pulses, 25_600.0).speed_hz == pytest.approx(10.0, rel=1e-3)
 
 
-def test_edges_that_come_as_no_shaft_turns_are_refused():
+def test_edges_inconsistent_with_a_shaft_are_refused():
     with pytest.raises(BadInput, match="which no shaft produces; use another channel"):
         turning_by_pulses(np.random.default_rng(0).standard_normal(5_000), 25_600.0)
 
 
-def test_the_angle_by_a_speed_channel_is_its_integral():
-    found = turning_by_speed(SPEED, RATE)
-    assert found.turns == pytest.approx(ANGLE, abs=1e-9)
-    assert found.speed_hz == pytest.approx(MEAN, rel=1e-4)
+def test_the_angle_from_a_speed_channel_is_its_integral():
+    turning = turning_by_speed(SPEED, RATE)
+    assert turning.turns == pytest.approx(ANGLE, abs=1e-9)
+    assert turning.speed_hz == pytest.approx(MEAN, rel=1e-4)
 
 
-@pytest.mark.parametrize("order", [3.58, 80.0, 200.0])  # up to 7200 Hz, a third of the rate
-def test_an_order_is_one_line_again(order):
+@pytest.mark.parametrize(
+    "order", [3.58, 80.0, 200.0]
+)  # up to 7200 Hz, a third of the sampling rate
+def test_order_tracking_restores_a_single_line(order):
     values = np.sin(2.0 * np.pi * order * ANGLE)
-    even, rate = resample_to_constant_speed(values, turning_by_speed(SPEED, RATE), RATE)
-    found = lines(*spectrum(even, rate), {"it": order * MEAN})["it"]
-    assert found == pytest.approx(np.sqrt(0.5), rel=0.01)
-    frequency, density = spectrum(even, rate)
+    resampled, rate = resample_to_constant_speed(values, turning_by_speed(SPEED, RATE), RATE)
+    amplitude = lines(*spectrum(resampled, rate), {"it": order * MEAN})["it"]
+    assert amplitude == pytest.approx(np.sqrt(0.5), rel=0.01)
+    frequency, density = spectrum(resampled, rate)
     assert frequency[np.argmax(density)] == pytest.approx(order * MEAN, rel=2e-3)
     assert (
-        lines(*spectrum(values, RATE), {"it": order * MEAN})["it"] < 0.5 * found
-    )  # as it was recorded
+        lines(*spectrum(values, RATE), {"it": order * MEAN})["it"] < 0.5 * amplitude
+    )  # not resampled
 
 
-def test_a_shaft_that_turns_evenly_leaves_a_vibration_as_it_is():
+def test_constant_speed_leaves_a_vibration_unchanged():
     values = np.random.default_rng(2).standard_normal(4000)
     smooth = np.convolve(values, np.ones(8) / 8.0, mode="same")
-    even, rate = resample_to_constant_speed(
+    resampled, rate = resample_to_constant_speed(
         smooth, turning_by_speed(np.full(4000, 25.0), RATE), RATE
     )
     assert rate == pytest.approx(RATE)
-    assert even[100:3900] == pytest.approx(smooth[100:3900], abs=0.02)
+    assert resampled[100:3900] == pytest.approx(smooth[100:3900], abs=0.02)
 
 
-def test_what_turns_no_shaft_is_refused():
+def test_signals_without_rotation_are_refused():
     with pytest.raises(BadInput, match="has 0 pulses, but 4 are required"):
         turning_by_pulses(np.zeros(1000), RATE)
     with pytest.raises(BadInput, match="stops or reverses"):
@@ -100,22 +102,22 @@ def test_what_turns_no_shaft_is_refused():
     assert isinstance(turning_by_speed(np.ones(10), RATE), Turning)
 
 
-def test_a_line_is_the_root_of_its_harmonics_squares():
-    parts = [(1.0, 1), (0.5, 2), (0.25, 3), (3.0, 5)]  # the fifth is no part of it
+def test_a_line_is_the_root_sum_square_of_its_harmonics():
+    parts = [(1.0, 1), (0.5, 2), (0.25, 3), (3.0, 5)]  # the fifth harmonic is excluded
     values = sum(size * np.sin(2.0 * np.pi * 100.0 * number * TIME) for size, number in parts)
-    found = lines(*spectrum(values, RATE), {"mesh": 100.0, "slow": 0.5, "fast": 11e3})
-    assert found["mesh"] == pytest.approx(np.sqrt(0.5 * (1.0 + 0.25 + 0.0625)), rel=1e-3)
-    assert np.isnan([found["slow"], found["fast"]]).all()
+    amplitudes = lines(*spectrum(values, RATE), {"mesh": 100.0, "slow": 0.5, "fast": 11e3})
+    assert amplitudes["mesh"] == pytest.approx(np.sqrt(0.5 * (1.0 + 0.25 + 0.0625)), rel=1e-3)
+    assert np.isnan([amplitudes["slow"], amplitudes["fast"]]).all()
 
 
-def test_bands_share_out_what_is_heard():
-    class Opened:
+def test_bands_partition_the_signals_power():
+    class OpenedRecording:
         facts = {}  # noqa: RUF012
         rate_hz = RATE
 
     frequency = np.arange(0.0, 10_001.0, 5.0)
-    found = bands(Opened, frequency, np.full(frequency.size, 2.0))
-    wide = {"10 to 1000 Hz": 990.0, "1 to 5 kHz": 4000.0, "above 5 kHz": 3000.0}
-    assert {name: value**2 for name, value in found.items()} == pytest.approx(
-        {name: 2.0 * width for name, width in wide.items()}, rel=1e-9
+    band_powers = bands(OpenedRecording, frequency, np.full(frequency.size, 2.0))
+    expected = {"10 to 1000 Hz": 990.0, "1 to 5 kHz": 4000.0, "above 5 kHz": 3000.0}
+    assert {name: value**2 for name, value in band_powers.items()} == pytest.approx(
+        {name: 2.0 * width for name, width in expected.items()}, rel=1e-9
     )

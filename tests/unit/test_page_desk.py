@@ -1,6 +1,4 @@
-"""A contact without its widgets: answered twice, marked while it is old, compared, tried again,
-taken away.
-"""
+"""Page state without widgets: coarse and full answers, stale marks, comparison, undo, export."""
 
 import json
 import shutil
@@ -36,34 +34,34 @@ from asperity.results import solve_case
 from asperity.solution import contact_state
 from asperity.surface import Surface
 
-NOBODY = Ticket(-1, 0)
+NO_SESSION = Ticket(-1, 0)
 CELLS = {"grid.cells": [96, 64], "surface.correlation_length": "30 um", "vibration.duration": "1 s"}
 MUTE = {**CELLS, "vibration": "none"}
 
 
-class AtOnce:
-    """Stands in for a queue: does the work when it is asked to, or keeps it."""
+class ImmediateQueue:
+    """Queue stub: runs work immediately or holds it."""
 
     def __init__(self):
-        self.kept, self.held, self.going = [], False, False
+        self.pending, self.held, self.running = [], False, False
 
     @property
     def busy(self):
-        return bool(self.kept)
+        return bool(self.pending)
 
-    def submit(self, wish, arrived):
-        self.kept.append((wish, arrived))
-        while self.kept and not self.held and not self.going:
-            self.go()
+    def submit(self, job, callback):
+        self.pending.append((job, callback))
+        while self.pending and not self.held and not self.running:
+            self.run_next()
 
-    def go(self):
-        (function, arguments), arrived = self.kept.pop(0)
-        self.going = True
-        arrived(run_job(function, NOBODY, *arguments))
-        self.going = False
+    def run_next(self):
+        (function, arguments), callback = self.pending.pop(0)
+        self.running = True
+        callback(run_job(function, NO_SESSION, *arguments))
+        self.running = False
 
     def close(self):
-        self.kept.clear()
+        self.pending.clear()
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +76,7 @@ def result(run):
 
 def session_of(overrides=MUTE):
     drawn = []
-    queue = AtOnce()
+    queue = ImmediateQueue()
     session = ContactSession(
         Settings(papers_case().with_overrides(overrides)),
         queue,
@@ -87,7 +85,7 @@ def session_of(overrides=MUTE):
     return session, queue, drawn
 
 
-def test_an_answer_is_what_the_run_says(run, result):
+def test_an_answer_equals_the_run(run, result):
     summary = run.summary()
     assert {key: result.row[key] for key in TILES} == {key: summary[key] for key in TILES}
     np.testing.assert_allclose(result.pressure, run.solution.pressure, rtol=1e-6)
@@ -97,12 +95,12 @@ def test_an_answer_is_what_the_run_says(run, result):
     assert set(run.notes) <= set(result.notes)
 
 
-def test_tiles_have_the_intervals_that_the_verdict_has(run, result):
+def test_tiles_show_the_intervals_of_the_verdict(run, result):
     uncertainties = {tile.key: tile.uncertainty for tile in result.tiles}
     assert uncertainties["clr"] in run.verdict()
     assert uncertainties["crf_hz"] in run.verdict()
     assert uncertainties["car"].startswith("± ")
-    assert uncertainties["lambda_ratio"] == ""  # by a formula
+    assert uncertainties["lambda_ratio"] == ""  # closed-form film
     assert (
         uncertainties["friction_coefficient"]
         == uncertainties["flash_temperature_max_k"]
@@ -110,38 +108,40 @@ def test_tiles_have_the_intervals_that_the_verdict_has(run, result):
     )
 
 
-def test_a_grid_that_cannot_tell_says_so_in_the_tiles(result):
+def test_an_undetermined_resonance_is_stated_in_the_tiles(result):
     assert {tile.key: tile.uncertainty for tile in replace(result, determined=False).tiles}[
         "clr"
     ] == NOT_DETERMINED
     unknown = replace(result, row={**result.row, "clr_low": None})
     assert {tile.key: tile.uncertainty for tile in unknown.tiles}["clr"] == NOT_DETERMINED
-    wide = replace(result, row={**result.row, "car": 0.002, "car_error": 0.069})
-    assert {tile.key: tile.uncertainty for tile in wide.tiles}[
+    wide_interval = replace(result, row={**result.row, "car": 0.002, "car_error": 0.069})
+    assert {tile.key: tile.uncertainty for tile in wide_interval.tiles}[
         "car"
-    ] == "0.0 to 7.1 %"  # and nothing below
-    silent = replace(result, row={**result.row, "crf_hz": None})
-    assert {tile.key: (tile.value, tile.uncertainty) for tile in silent.tiles}["crf_hz"] == (
+    ] == "0.0 to 7.1 %"  # and no interval
+    without_resonance = replace(result, row={**result.row, "crf_hz": None})
+    assert {tile.key: (tile.value, tile.uncertainty) for tile in without_resonance.tiles}[
+        "crf_hz"
+    ] == (
         "–",
         "",
     )
 
 
-def test_the_spectrum_is_the_runs_near_its_band(run, result):
-    spectrum, full = result.spectrum, run.vibration.spectrum
+def test_the_spectrum_is_that_of_the_run_around_its_band(run, result):
+    spectrum, full_spectrum = result.spectrum, run.vibration.spectrum
     assert spectrum.crf_hz == run.vibration.resonance.crf_hz
     assert spectrum.frequency.size <= 500
-    near = (full.frequency_hz >= spectrum.frequency[0]) & (
-        full.frequency_hz <= spectrum.frequency[-1]
+    in_band = (full_spectrum.frequency_hz >= spectrum.frequency[0]) & (
+        full_spectrum.frequency_hz <= spectrum.frequency[-1]
     )
-    assert spectrum.density.mean() == pytest.approx(full.density[near].mean(), rel=0.02)
+    assert spectrum.density.mean() == pytest.approx(full_spectrum.density[in_band].mean(), rel=0.02)
     peak = spectrum.frequency[np.argmax(spectrum.curve)]
     assert peak == pytest.approx(
         spectrum.crf_hz, abs=2.0 * float(np.diff(spectrum.frequency[:2])[0])
     )
 
 
-def test_titles_that_follow_what_is_tried_have_room_on_a_phone(result):
+def test_titles_of_the_settings_fit_on_a_phone(result):
     pytest.importorskip("panel")
     from asperity.app.contact_page import _spectrum_title
     from asperity.app.figures import TrialFigures
@@ -153,10 +153,10 @@ def test_titles_that_follow_what_is_tried_have_room_on_a_phone(result):
     assert max(map(len, titles)) <= 36  # of 390 pixels
 
 
-def test_hertzs_pressure_carries_the_load():
+def test_the_hertz_pressure_carries_the_load():
     x = np.linspace(-1.2, 1.2, 1201)
     y = np.linspace(-2.4, 2.4, 1201)
-    pressure = np.array([ellipse_pressure(x, float(at), (1.0, 2.0), 3.0) for at in y])
+    pressure = np.array([ellipse_pressure(x, float(y_value), (1.0, 2.0), 3.0) for y_value in y])
     assert pressure.sum() * (x[1] - x[0]) * (y[1] - y[0]) == pytest.approx(
         2.0 / 3.0 * np.pi * 2.0 * 3.0, rel=1e-4
     )
@@ -166,7 +166,7 @@ def test_hertzs_pressure_carries_the_load():
     assert not ellipse_pressure(x, 2.0, (1.0, 2.0), 3.0).any()
 
 
-def test_a_line_contacts_profile_is_one_all_along(result):
+def test_a_line_contacts_profile_is_uniform_along_y(result):
     conditions = papers_case().conditions
     np.testing.assert_allclose(
         result.hertz(0),
@@ -174,71 +174,75 @@ def test_a_line_contacts_profile_is_one_all_along(result):
     )
 
 
-def test_a_coarse_answer_comes_first_and_the_full_one_after_it():
+def test_the_coarse_answer_precedes_the_full_answer():
     session, _, drawn = session_of()
     session.solve()
-    shown = list({id(result): result for result in drawn if result is not None}.values())
-    assert [result.coarse for result in shown] == [True, False]
-    coarse, full = shown
+    results = list({id(result): result for result in drawn if result is not None}.values())
+    assert [result.coarse for result in results] == [True, False]
+    coarse, full = results
     assert coarse.gap.shape == (48, 32)
     assert full.gap.shape == (96, 64)
     assert coarse.row["clr"] == pytest.approx(full.row["clr"], abs=0.15)
     assert all(tile.uncertainty in ("coarse solution", "") for tile in coarse.tiles)
 
 
-def test_a_coarse_answer_goes_on_from_the_one_before():
+def test_a_coarse_answer_starts_from_the_previous_one():
     case = papers_case().with_overrides(MUTE)
-    first = work.solve_coarsely(NOBODY, case, None)
-    turned = case.with_overrides({"contact.load": "520 N"})
-    cold = work.solve_coarsely(NOBODY, turned, None)
-    warm = work.solve_coarsely(NOBODY, turned, first.solution)
+    first = work.solve_coarsely(NO_SESSION, case, None)
+    changed = case.with_overrides({"contact.load": "520 N"})
+    cold = work.solve_coarsely(NO_SESSION, changed, None)
+    warm = work.solve_coarsely(NO_SESSION, changed, first.solution)
     assert warm.solution.convergence.iterations < cold.solution.convergence.iterations / 2
     assert warm.result.row["clr"] == pytest.approx(cold.result.row["clr"], abs=0.02)
     other = case.with_overrides({"surface.seed": 99})
-    assert work.solve_coarsely(NOBODY, other, first.solution).solution.convergence.iterations == (
-        work.solve_coarsely(NOBODY, other, None).solution.convergence.iterations
+    assert work.solve_coarsely(
+        NO_SESSION, other, first.solution
+    ).solution.convergence.iterations == (
+        work.solve_coarsely(NO_SESSION, other, None).solution.convergence.iterations
     )
 
 
-def test_a_coarse_answer_is_the_averaged_surfaces():
+def test_a_coarse_answer_uses_the_averaged_surface():
     case = papers_case().with_overrides(MUTE)
-    coarse = work.solve_coarsely(NOBODY, case, None)
+    coarse = work.solve_coarsely(NO_SESSION, case, None)
     fine = case.surface()
-    along = (fine.heights[::2] + fine.heights[1::2]) / 2
-    heights = (along[:, ::2] + along[:, 1::2]) / 2
+    averaged = (fine.heights[::2] + fine.heights[1::2]) / 2
+    heights = (averaged[:, ::2] + averaged[:, 1::2]) / 2
     np.testing.assert_allclose(coarse.solution.surface.heights, heights)
-    alone = Surface(heights, coarse.solution.grid)
-    solved = solve_contact(case.conditions, case.lubricant, alone, options=Options())
+    surface = Surface(heights, coarse.solution.grid)
+    solved = solve_contact(case.conditions, case.lubricant, surface, options=Options())
     assert coarse.result.row["clr"] == pytest.approx(contact_state(solved).clr, abs=2e-3)
 
 
-def test_a_coarse_answer_that_takes_too_many_steps_is_sought_on_fewer_cells(monkeypatch):
+def test_a_coarse_answer_with_too_many_iterations_uses_fewer_cells(monkeypatch):
     case = papers_case().with_overrides({**MUTE, "grid.cells": [128, 128]})
     monkeypatch.setattr(work, "COLD_STEPS", 200)
-    assert work.solve_coarsely(NOBODY, case, None).solution.grid.cells == (64, 64)
+    assert work.solve_coarsely(NO_SESSION, case, None).solution.grid.cells == (64, 64)
     monkeypatch.setattr(work, "COLD_STEPS", 2)
     monkeypatch.setattr(work, "COARSEST_CELLS", 48 * 48)
     monkeypatch.setattr(work, "COARSE_CELLS", 80 * 80)
-    assert work.solve_coarsely(NOBODY, case, None).solution.grid.cells == (32, 32)
+    assert work.solve_coarsely(NO_SESSION, case, None).solution.grid.cells == (32, 32)
     monkeypatch.setattr(work, "COARSEST_STEPS", 2)
-    assert work.solve_coarsely(NOBODY, case, None) == work.CoarseResult(None, None)
+    assert work.solve_coarsely(NO_SESSION, case, None) == work.CoarseResult(None, None)
 
 
-def test_cells_that_are_too_few_only_for_a_coarse_answer_refuse_nothing():
+def test_cells_too_few_for_a_coarse_answer_only_are_accepted():
     session, _, _ = session_of({**MUTE, "grid.x": [-9.0, 3.0], "grid.cells": [96, 64]})
     session.solve()
-    assert work.solve_coarsely(NOBODY, session.settings.case, None) == work.CoarseResult(None, None)
+    assert work.solve_coarsely(NO_SESSION, session.settings.case, None) == work.CoarseResult(
+        None, None
+    )
     assert session.status.startswith("Solved on 96 × 64 cells")
 
 
 def test_a_contact_on_few_cells_has_no_coarse_answer():
     coarse = work.solve_coarsely(
-        NOBODY, papers_case().with_overrides({**MUTE, "grid.cells": [64, 64]}), None
+        NO_SESSION, papers_case().with_overrides({**MUTE, "grid.cells": [64, 64]}), None
     )
     assert coarse == work.CoarseResult(None, None)
 
 
-def test_what_is_shown_is_old_until_its_answer_has_come():
+def test_results_are_stale_until_the_answer_arrives():
     session, queue, _ = session_of()
     session.solve()
     assert not session.stale
@@ -246,69 +250,69 @@ def test_what_is_shown_is_old_until_its_answer_has_come():
     session.change("contact.load", "600 N")
     assert session.stale
     assert session.status == "Solving ..."
-    queue.go()
+    queue.run_next()
     assert session.status == "Coarse solution, refining ..."
     assert session.stale
-    queue.go()
+    queue.run_next()
     assert not session.stale
     assert session.status.startswith("Solved on 96 × 64 cells")
 
 
 @pytest.mark.parametrize("first", ["coarse", "full"])
-def test_where_there_is_room_the_full_answer_does_not_wait_for_the_coarse_one(first):
-    coarsely, fully = AtOnce(), AtOnce()
-    coarsely.held = fully.held = fully.has_room = True
+def test_with_a_free_worker_the_full_answer_does_not_wait(first):
+    coarse_queue, full_queue = ImmediateQueue(), ImmediateQueue()
+    coarse_queue.held = full_queue.held = full_queue.has_room = True
     session = ContactSession(
-        Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully
+        Settings(papers_case().with_overrides(MUTE)), coarse_queue, lambda: None, full_queue
     )
     session.solve()
-    assert (len(coarsely.kept), len(fully.kept)) == (1, 1)
+    assert (len(coarse_queue.pending), len(full_queue.pending)) == (1, 1)
     if first == "coarse":
-        coarsely.go()
-        assert (session.result.coarse, session.pending, len(fully.kept)) == (True, True, 1)
-        fully.go()
+        coarse_queue.run_next()
+        assert (session.result.coarse, session.pending, len(full_queue.pending)) == (True, True, 1)
+        full_queue.run_next()
     else:
-        fully.go()
+        full_queue.run_next()
         assert not session.pending
-        coarsely.go()
+        coarse_queue.run_next()
     assert (session.result.coarse, session.pending, len(session.trials)) == (False, False, 1)
-    assert (coarsely.kept, fully.kept) == ([], [])
+    assert (coarse_queue.pending, full_queue.pending) == ([], [])
 
 
-def test_an_answer_to_what_was_set_before_is_none_to_what_is_set_now():
-    coarsely, fully = AtOnce(), AtOnce()
-    coarsely.held = fully.held = fully.has_room = True
+def test_an_answer_to_earlier_settings_is_discarded():
+    coarse_queue, full_queue = ImmediateQueue(), ImmediateQueue()
+    coarse_queue.held = full_queue.held = full_queue.has_room = True
     session = ContactSession(
-        Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully
+        Settings(papers_case().with_overrides(MUTE)), coarse_queue, lambda: None, full_queue
     )
     session.solve()
-    coarsely.go()
-    fully.has_room = False  # busy with what was set before
+    coarse_queue.run_next()
+    full_queue.has_room = False  # busy with the earlier settings
     session.change("contact.load", "600 N")
-    fully.go()
+    full_queue.run_next()
     assert (session.pending, session.trials) == (True, [])
-    coarsely.go()
-    fully.go()
+    coarse_queue.run_next()
+    full_queue.run_next()
     assert (session.pending, session.result.text) == (False, session.settings.case.text)
     assert "600 N" in session.result.text
 
 
-def test_without_room_the_full_answer_is_asked_for_after_the_coarse_one():
-    coarsely, fully = AtOnce(), AtOnce()
-    coarsely.held = fully.held = True
-    fully.has_room = False
+def test_without_a_free_worker_the_full_answer_follows_the_coarse_one():
+    coarse_queue, full_queue = ImmediateQueue(), ImmediateQueue()
+    coarse_queue.held = full_queue.held = True
+    full_queue.has_room = False
     session = ContactSession(
-        Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully
+        Settings(papers_case().with_overrides(MUTE)), coarse_queue, lambda: None, full_queue
     )
     session.solve()
-    assert fully.kept == []
-    coarsely.go()
-    assert len(fully.kept) == 1
-    fully.go()
+    assert full_queue.pending == []
+    coarse_queue.run_next()
+    assert len(full_queue.pending) == 1
+    full_queue.run_next()
     assert not session.result.coarse
 
 
-def test_a_wrong_value_keeps_its_sentence_and_marks_the_picture_until_it_is_mended():
+def test_an_invalid_value_keeps_its_message_and_marks_the_figures_until_corrected():
     session, _, _ = session_of()
     session.solve()
     before = session.result
@@ -316,12 +320,12 @@ def test_a_wrong_value_keeps_its_sentence_and_marks_the_picture_until_it_is_mend
     assert "bare number 600" in session.rejected["contact.load"].message
     assert session.result is before
     assert session.stale
-    session.change("contact.load", "500 N")  # as it was
+    session.change("contact.load", "500 N")  # unchanged
     assert not session.rejected
     assert not session.stale
 
 
-def test_a_contact_that_is_not_solved_says_so(monkeypatch):
+def test_an_unsolved_contact_is_reported(monkeypatch):
     session, _, _ = session_of({**MUTE, "solver.max_iterations": 1})
     session.solve()
     assert session.status.startswith("NOT CONVERGED, do not use: out of iterations")
@@ -332,45 +336,45 @@ def test_a_contact_that_is_not_solved_says_so(monkeypatch):
     assert session.stale
 
 
-def test_values_beyond_all_reckoning_are_a_sentence():
+def test_a_numerical_overflow_is_reported_in_one_sentence():
     def divided(ticket):  # noqa: ARG001
         return 1 / 0
 
-    refused = run_job(divided, NOBODY)
-    assert isinstance(refused, JobFailure)
-    assert refused.message.startswith(
+    failure = run_job(divided, NO_SESSION)
+    assert isinstance(failure, JobFailure)
+    assert failure.message.startswith(
         "These values cannot be solved (division by zero). Undo the last change."
     )
 
 
-def test_a_contact_that_its_grid_cannot_carry_says_so():
+def test_a_grid_too_small_for_the_load_is_reported():
     session, _, _ = session_of()
     session.change("surface.correlation_length.0", "3 um")
     assert session.status.startswith("Not solved: paper.toml: surface: ")
     assert session.result is None
 
 
-def test_what_is_pinned_stays_to_compare_with():
+def test_a_pinned_result_stays_for_comparison():
     session, queue, _ = session_of()
     session.solve()
-    pinned = session.result
+    pinned_result = session.result
     session.pin()
     session.change("contact.load", "900 N")
-    assert session.pinned is pinned
-    change = session.result.row["clr"] - pinned.row["clr"]
-    assert difference("clr", session.result.row["clr"], pinned.row["clr"]).startswith(
+    assert session.pinned is pinned_result
+    change = session.result.row["clr"] - pinned_result.row["clr"]
+    assert difference("clr", session.result.row["clr"], pinned_result.row["clr"]).startswith(
         "+" if change >= 0 else "−"
     )
     assert difference("crf_hz", None, 3.0) == "–"
     queue.held = True
     session.change("contact.load", "800 N")
-    session.pin()  # not what is old
-    assert session.pinned is pinned
+    session.pin()  # not the stale result
+    assert session.pinned is pinned_result
     session.unpin()
     assert session.pinned is None
 
 
-def test_what_was_tried_lies_in_the_trail_once_and_comes_back():
+def test_earlier_settings_are_in_the_history_once_and_can_be_restored():
     session, _, _ = session_of()
     session.solve()
     session.change("surface.sq", "2 um")
@@ -383,14 +387,14 @@ def test_what_was_tried_lies_in_the_trail_once_and_comes_back():
     assert len(session.trials) == 2
 
 
-def test_an_address_is_gone_to():
+def test_an_address_sets_the_case():
     session, _, _ = session_of()
-    turned = session.settings.with_value("contact.load", "700 N")
-    assert session.go_to(turned.address) == []
-    assert session.result.text == turned.case.text
+    changed = session.settings.with_value("contact.load", "700 N")
+    assert session.go_to(changed.address) == []
+    assert session.result.text == changed.case.text
 
 
-def test_a_desk_that_closes_holds_nothing():
+def test_a_closed_desk_holds_no_resources():
     session, _, _ = session_of()
     session.solve()
     session.pin()
@@ -398,15 +402,15 @@ def test_a_desk_that_closes_holds_nothing():
     assert (session.result, session.pinned, session.trials) == (None, None, [])
 
 
-def test_a_dropped_surface_takes_the_place_of_the_cases_own(tmp_path):
+def test_a_dropped_surface_replaces_the_cases_own(tmp_path):
     heights = np.random.default_rng(5).standard_normal((400, 400)) * 1e-6
     x3pio.write(str(tmp_path / "ring.x3p"), heights, x_scale=2e-6, y_scale=2e-6)
-    case, held, steps = work.open_surface(
-        NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p"
+    case, key, steps = work.open_surface(
+        NO_SESSION, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p"
     )
     assert case.contents.surface.name == "ring.x3p"
     assert steps[0] == "Measured surface ring.x3p:"
-    assert surface_key(f"held={held}") == held
+    assert surface_key(f"held={key}") == key
     assert len(steps) > 3
     text = take.case_text(case)
     assert "# Needs ring.x3p in the same folder." in text
@@ -414,7 +418,7 @@ def test_a_dropped_surface_takes_the_place_of_the_cases_own(tmp_path):
     assert load_case(text, folder=tmp_path).surface().sq == case.surface().sq
 
 
-def test_a_dropped_surface_is_held_for_links_and_the_oldest_goes(tmp_path, monkeypatch):
+def test_dropped_surfaces_are_held_for_links_and_the_oldest_is_removed(tmp_path, monkeypatch):
     rng = np.random.default_rng(5)
     session, other, surfaces = tmp_path / "one", tmp_path / "other", SurfaceStore()
     session.mkdir(), other.mkdir()
@@ -429,56 +433,59 @@ def test_a_dropped_surface_is_held_for_links_and_the_oldest_goes(tmp_path, monke
             y_scale=2e-6,
         )
         case, key, _ = work.open_surface(
-            NOBODY, papers_case().with_overrides(MUTE), folder / "ring.x3p"
+            NO_SESSION, papers_case().with_overrides(MUTE), folder / "ring.x3p"
         )
         keys.append(key)
         monkeypatch.setattr("asperity.app.surface_store.MAX_SURFACES", 2)
         surfaces.add(key, case)
     assert len(set(keys)) == 3
     assert surfaces.load(keys[0], other) is None
-    shutil.rmtree(session)  # the session that dropped it has gone
-    lent = surfaces.load(keys[2], other)
-    assert lent.text == case.text
-    assert lent.folder.parent == other
+    shutil.rmtree(session)  # the session that dropped it has ended
+    loaded = surfaces.load(keys[2], other)
+    assert loaded.text == case.text
+    assert loaded.folder.parent == other
     surfaces.close()
-    assert lent.surface().sq > 0.0  # whose session goes on
+    assert loaded.surface().sq > 0.0  # whose session is still active
     assert surfaces.load(keys[2], other) is None
 
 
 @pytest.mark.parametrize(
     "content", [b"", b"PK\x03\x04 cut short", b"<script>", bytes(range(256)) * 20]
 )
-def test_a_damaged_surface_is_a_sentence(tmp_path, content):
+def test_a_damaged_surface_is_reported_in_one_sentence(tmp_path, content):
     (tmp_path / "ring.x3p").write_bytes(content)
-    refused = run_job(
-        work.open_surface, NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p"
+    failure = run_job(
+        work.open_surface, NO_SESSION, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p"
     )
-    assert isinstance(refused, JobFailure)
-    assert "ring.x3p" in refused.message
+    assert isinstance(failure, JobFailure)
+    assert "ring.x3p" in failure.message
 
 
-def test_what_is_taken_away_solves_to_the_same_numbers(tmp_path):
+def test_the_exported_case_gives_the_same_numbers(tmp_path):
     case = papers_case().with_overrides(MUTE)
     (tmp_path / take.CASE_FILE).write_text(take.case_text(case), "utf-8")
     (tmp_path / take.SCRIPT).write_text(take.python_script(), "utf-8")
-    said = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, take.SCRIPT], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     state = solve_case(case).state
-    assert f"CLR {state.clr:.4f}, CAR {state.car:.4f}, film {state.h_central:.4g} m" in said.stdout
+    assert (
+        f"CLR {state.clr:.4f}, CAR {state.car:.4f}, film {state.h_central:.4g} m"
+        in completed.stdout
+    )
 
 
-def test_the_report_is_our_own_page():
-    text = work.make_report(NOBODY, papers_case().with_overrides(MUTE), write_report)
+def test_the_report_is_the_report_page():
+    text = work.make_report(NO_SESSION, papers_case().with_overrides(MUTE), write_report)
     assert text.startswith("<!doctype html>")
     assert "Content-Security-Policy" in text
 
 
-def test_a_kept_run_is_opened_as_it_was_solved(tmp_path, run, result):
+def test_a_stored_run_opens_as_solved(tmp_path, run, result):
     run.save(tmp_path / "run.nc")
     opened = open_page(tmp_path / "run.nc")
     assert opened.kind == "contact"
     assert json.dumps(opened.result.row) == json.dumps(result.row)
     assert opened.case.stored is not None
-    turned = Settings(opened.case).with_value("contact.slip", "0.4")
-    np.testing.assert_array_equal(turned.case.surface().heights, run.solution.surface.heights)
+    changed = Settings(opened.case).with_value("contact.slip", "0.4")
+    np.testing.assert_array_equal(changed.case.surface().heights, run.solution.surface.heights)

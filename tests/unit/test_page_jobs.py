@@ -1,6 +1,4 @@
-"""One piece of work in flight a session, the newest wins; what is refused or fails comes back as a
-sentence.
-"""
+"""One job per session, the newest wins; refusals and failures return as one sentence."""
 
 import os
 import queue
@@ -19,11 +17,11 @@ from asperity.paper import papers_case
 SMALL = {"grid.cells": [48, 32], "surface.correlation_length": "40 um", "vibration": "none"}
 
 
-class Bench:
-    """Stands in for a workshop: work waits until it is told to be done."""
+class ManualWorkshop:
+    """Workshop stub: jobs wait until the test runs them."""
 
     def __init__(self, slots=8):
-        self.newest, self._free, self.begun = [0] * slots, list(range(slots)), []
+        self.newest, self._free, self.submitted = [0] * slots, list(range(slots)), []
 
     def acquire_slot(self):
         return self._free.pop() if self._free else -1
@@ -34,16 +32,16 @@ class Bench:
             self._free.append(slot)
 
     def submit(self, function, *arguments):
-        self.begun.append((function, arguments, Future()))
-        return self.begun[-1][2]
+        self.submitted.append((function, arguments, Future()))
+        return self.submitted[-1][2]
 
 
 @pytest.mark.parametrize("running", [0, 1, 2])
-def test_a_workshop_has_room_while_a_worker_has_nothing_to_do(monkeypatch, running):
+def test_a_workshop_accepts_work_while_a_worker_is_idle(monkeypatch, running):
     worker_pool, futures = WorkerPool(workers=2), [Future() for _ in range(running)]
-    waiting = iter(futures)
+    next_future = iter(futures)
     monkeypatch.setattr(
-        worker_pool, "_pool", SimpleNamespace(submit=lambda *_arguments: next(waiting))
+        worker_pool, "_pool", SimpleNamespace(submit=lambda *_arguments: next(next_future))
     )
     for _ in futures:
         worker_pool.submit(str)
@@ -53,84 +51,85 @@ def test_a_workshop_has_room_while_a_worker_has_nothing_to_do(monkeypatch, runni
     assert worker_pool.has_room
 
 
-def at_once(function):
+def run_immediately(function):
     function()
 
 
-def test_one_piece_of_work_at_a_time_and_the_newest_wins():
-    bench, came = Bench(), []
-    line = JobQueue(bench, at_once)
-    for wish in "abcd":
-        line.submit((str, (wish,)), came.append)
-    assert [arguments[1] for _, arguments, _ in bench.begun] == ["a"]
-    bench.begun[0][2].set_result("a done")
-    assert [arguments[1] for _, arguments, _ in bench.begun] == ["a", "d"]
-    assert came == []  # nobody waits for it any more
-    bench.begun[1][2].set_result("d done")
-    assert came == ["d done"]
-    assert not line.busy
+def test_one_job_at_a_time_and_the_newest_wins():
+    workshop, results = ManualWorkshop(), []
+    job_queue = JobQueue(workshop, run_immediately)
+    for name in "abcd":
+        job_queue.submit((str, (name,)), results.append)
+    assert [arguments[1] for _, arguments, _ in workshop.submitted] == ["a"]
+    workshop.submitted[0][2].set_result("a done")
+    assert [arguments[1] for _, arguments, _ in workshop.submitted] == ["a", "d"]
+    assert results == []  # the session no longer waits for it
+    workshop.submitted[1][2].set_result("d done")
+    assert results == ["d done"]
+    assert not job_queue.busy
 
 
-def test_a_worker_is_told_what_is_wanted_no_more():
-    bench = Bench()
-    line = JobQueue(bench, at_once)
+def test_a_worker_is_notified_of_cancelled_jobs():
+    workshop = ManualWorkshop()
+    line = JobQueue(workshop, run_immediately)
     line.submit((str, ()), print)
-    ticket = bench.begun[0][1][0]
-    assert bench.newest[ticket.slot] == ticket.number
+    ticket = workshop.submitted[0][1][0]
+    assert workshop.newest[ticket.slot] == ticket.number
     line.submit((str, ()), print)
-    assert bench.newest[ticket.slot] > ticket.number
+    assert workshop.newest[ticket.slot] > ticket.number
 
 
-def test_a_session_that_closes_gives_its_place_back_and_hears_nothing_more():
-    bench, came = Bench(slots=1), []
-    line = JobQueue(bench, at_once)
-    line.submit((str, ()), came.append)
-    ticket = bench.begun[0][1][0]
+def test_a_closed_session_frees_its_slot_and_receives_nothing_more():
+    workshop, results = ManualWorkshop(slots=1), []
+    line = JobQueue(workshop, run_immediately)
+    line.submit((str, ()), results.append)
+    ticket = workshop.submitted[0][1][0]
     line.close()
-    assert bench.newest[ticket.slot] > ticket.number
-    bench.begun[0][2].set_result("late")
-    line.submit((str, ()), came.append)
-    assert came == []
-    assert len(bench.begun) == 1
-    assert JobQueue(bench, at_once)._slot == 0
+    assert workshop.newest[ticket.slot] > ticket.number
+    workshop.submitted[0][2].set_result("late")
+    line.submit((str, ()), results.append)
+    assert results == []
+    assert len(workshop.submitted) == 1
+    assert JobQueue(workshop, run_immediately)._slot == 0
 
 
-def test_without_a_free_place_work_is_done_all_the_same():
-    bench = Bench(slots=0)
-    JobQueue(bench, at_once).submit((str, ()), print)
-    assert bench.begun[0][1][0].slot == -1
+def test_without_a_free_slot_jobs_still_run():
+    workshop = ManualWorkshop(slots=0)
+    JobQueue(workshop, run_immediately).submit((str, ()), print)
+    assert workshop.submitted[0][1][0].slot == -1
 
 
-def test_what_arrives_may_ask_for_more():
-    bench, came = Bench(), []
-    line = JobQueue(bench, at_once)
+def test_a_result_may_request_another_job():
+    workshop, results = ManualWorkshop(), []
+    line = JobQueue(workshop, run_immediately)
     line.submit(
-        (str, ("a",)), lambda result: (came.append(result), line.submit((str, ("b",)), came.append))
+        (str, ("a",)),
+        lambda result: (results.append(result), line.submit((str, ("b",)), results.append)),
     )
-    bench.begun[0][2].set_result(1)
-    bench.begun[1][2].set_result(2)
-    assert came == [1, 2]
+    workshop.submitted[0][2].set_result(1)
+    workshop.submitted[1][2].set_result(2)
+    assert results == [1, 2]
 
 
-def test_what_fails_is_a_sentence(caplog):
+def test_a_failure_is_reported_in_one_sentence(caplog):
     failed: Future = Future()
     failed.set_exception(ZeroDivisionError("inside"))
     assert "Internal error" in job_outcome(failed).message
     assert "inside" in caplog.text
-    died: Future = Future()
-    died.set_exception(BrokenProcessPool())
-    assert "A worker process died" in job_outcome(died).message
+    failing: Future = Future()
+    failing.set_exception(BrokenProcessPool())
+    assert "A worker process died" in job_outcome(failing).message
 
 
 def refuse():
     raise BadInput("contact.load must be a force")
 
 
-def test_what_is_refused_travels_as_a_sentence():
+def test_a_refusal_returns_as_one_sentence():
     assert run_job(refuse) == JobFailure("contact.load must be a force.")
 
 
-def test_a_solve_stops_where_nobody_waits(monkeypatch):
+def test_a_solve_without_a_waiting_session_stops(monkeypatch):
     monkeypatch.setattr(work, "_newest", [5])
     case = papers_case().with_overrides(SMALL)
     assert isinstance(run_job(work.solve_fully, Ticket(0, 4), case), Superseded)
@@ -138,13 +137,13 @@ def test_a_solve_stops_where_nobody_waits(monkeypatch):
     assert run_job(work.solve_fully, Ticket(-1, 4), case).converged
 
 
-def test_a_solve_is_given_up_after_its_time(monkeypatch):
+def test_a_solve_stops_at_its_time_limit(monkeypatch):
     monkeypatch.setattr(work, "TIME_LIMIT_S", -1.0)
     case = papers_case().with_overrides(SMALL)
     assert "No solution within" in run_job(work.solve_fully, Ticket(-1, 0), case).message
 
 
-def test_more_cells_than_the_page_solves_are_refused_where_the_case_chooses_them(monkeypatch):
+def test_chosen_grids_beyond_the_pages_limit_are_refused(monkeypatch):
     monkeypatch.setattr("asperity.app.settings.MAX_CELLS", 100)
     case = papers_case().with_overrides({**SMALL, "grid.cells": "auto"})
     assert "at most 100 in all" in run_job(work.solve_fully, Ticket(-1, 0), case).message
@@ -160,11 +159,11 @@ def worker_pool():
 
 def test_processes_warm_up_and_solve(worker_pool):
     assert wait_until_warm(worker_pool, 120.0)
-    came: queue.Queue = queue.Queue()
-    line = JobQueue(worker_pool, came.put)
+    results: queue.Queue = queue.Queue()
+    line = JobQueue(worker_pool, results.put)
     answers = []
     line.submit((work.solve_fully, (papers_case().with_overrides(SMALL),)), answers.append)
-    came.get(timeout=60)()
+    results.get(timeout=60)()
     assert answers[0].converged
     assert answers[0].gap.shape == (48, 32)
     line.close()

@@ -1,6 +1,4 @@
-"""Visits that have gone: sent away soon after their connection was lost, swept after, and no
-others.
-"""
+"""Disconnected sessions, and only those, expire soon after connection loss and are cleaned up."""
 
 import gc
 import weakref
@@ -13,42 +11,50 @@ from asperity.app.session_cleanup import DISCONNECT_MS, SessionSweeper
 
 
 class Session:
-    """Stands in for Bokeh's."""
+    """Stub of Bokeh's session."""
 
     def __init__(self, name, connections=1):
         self.id, self.connection_count = name, connections
-        self.milliseconds_since_last_unsubscribe, self.sent_away = 1e6, False
+        self.milliseconds_since_last_unsubscribe, self.expired = 1e6, False
 
     def request_expiration(self):
-        self.sent_away = True
+        self.expired = True
 
 
-def test_who_has_gone_is_sent_away_and_who_is_there_or_on_the_way_is_not():
-    there, gone, coming = Session("there"), Session("gone"), Session("coming", connections=0)
-    sweeper = SessionSweeper(lambda: [there, gone, coming])
+def test_only_disconnected_sessions_are_expired():
+    connected, disconnected, connecting = (
+        Session("connected"),
+        Session("disconnected"),
+        Session("connecting", connections=0),
+    )
+    sweeper = SessionSweeper(lambda: [connected, disconnected, connecting])
     sweeper.sweep()
-    gone.connection_count = 0
-    gone.milliseconds_since_last_unsubscribe = DISCONNECT_MS - 1.0
+    disconnected.connection_count = 0
+    disconnected.milliseconds_since_last_unsubscribe = DISCONNECT_MS - 1.0
     sweeper.sweep()
-    assert not gone.sent_away  # a browser tries anew after a second
-    gone.milliseconds_since_last_unsubscribe = DISCONNECT_MS + 1.0
+    assert not disconnected.expired  # a browser reconnects after a second
+    disconnected.milliseconds_since_last_unsubscribe = DISCONNECT_MS + 1.0
     sweeper.sweep()
-    assert (there.sent_away, gone.sent_away, coming.sent_away) == (False, True, False)
+    assert (connected.expired, disconnected.expired, connecting.expired) == (
+        False,
+        True,
+        False,
+    )
 
 
-def test_what_a_session_leaves_is_swept_when_it_has_left():
+def test_resources_of_a_closed_session_are_freed_after_it():
     sessions = [Session("one"), Session("two")]
     sweeper = SessionSweeper(lambda: sessions)
-    left = Session("what is left")
-    left.itself = left  # which only a sweep frees
-    watched = weakref.ref(left)
-    del left
+    remainder = Session("remainder")
+    remainder.cycle = remainder  # a reference cycle that only garbage collection frees
+    reference = weakref.ref(remainder)
+    del remainder
     gc.disable()
     try:
         sweeper.sweep()
-        assert watched() is not None  # nobody has left
+        assert reference() is not None  # no session has ended
         sessions[1] = Session("three")
         sweeper.sweep()
-        assert watched() is None
+        assert reference() is None
     finally:
         gc.enable()

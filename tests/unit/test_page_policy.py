@@ -1,6 +1,4 @@
-"""A page loads nothing and runs nothing but its own script, whatever stands in the names that it
-shows.
-"""
+"""A page loads nothing and runs only its own script, whatever names it displays."""
 
 import re
 from base64 import b64encode

@@ -1,6 +1,4 @@
-"""Who is let in, what is dropped where, what the page is opened with; and widgets that escape what
-they show.
-"""
+"""Access, file upload and start-up of the page; widgets escape what they show."""
 
 import socket
 import subprocess
@@ -32,7 +30,7 @@ NAMES = {
 }
 
 
-def test_on_this_machine_alone_nobody_needs_a_password(monkeypatch):
+def test_local_access_needs_no_password(monkeypatch):
     monkeypatch.delenv(PASSWORD, raising=False)
     for address in ("127.0.0.1", "::1", "localhost"):
         assert password_for(address) is None
@@ -41,7 +39,7 @@ def test_on_this_machine_alone_nobody_needs_a_password(monkeypatch):
 
 @pytest.mark.parametrize("address", ["0.0.0.0", "::", "192.0.2.7", "example.org"])
 @pytest.mark.parametrize("password", [None, "", "short"])
-def test_others_are_let_in_with_a_password_only(monkeypatch, address, password):
+def test_remote_access_needs_a_password(monkeypatch, address, password):
     monkeypatch.delenv(PASSWORD, raising=False)
     if password is not None:
         monkeypatch.setenv(PASSWORD, password)
@@ -53,19 +51,19 @@ def test_others_are_let_in_with_a_password_only(monkeypatch, address, password):
     assert password_for(address) == "long enough"
 
 
-def test_a_pages_own_names_may_talk_to_it_and_no_others():
+def test_only_the_pages_own_host_names_may_connect():
     assert origins("192.0.2.7", 80) == ["192.0.2.7:80"]
     assert origins("2001:db8::1", 80) == ["[2001:db8::1]:80"]
-    everywhere = origins("0.0.0.0", 80)
-    assert {"127.0.0.1:80", "localhost:80", f"{socket.gethostname()}:80"} <= set(everywhere)
-    assert "*" not in "".join(everywhere)
+    all_interfaces = origins("0.0.0.0", 80)
+    assert {"127.0.0.1:80", "localhost:80", f"{socket.gethostname()}:80"} <= set(all_interfaces)
+    assert "*" not in "".join(all_interfaces)
 
 
-def test_a_port_that_is_taken_is_named():
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
+def test_an_occupied_port_is_named():
+    with socket.socket() as occupied:
+        occupied.bind(("127.0.0.1", 0))
+        occupied.listen()
+        port = occupied.getsockname()[1]
         with pytest.raises(
             BadInput, match=f"cannot listen on 127.0.0.1, port {port}: address already in use"
         ):
@@ -76,16 +74,16 @@ def test_a_port_that_is_taken_is_named():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_dropped_files_name_is_only_a_name(name):
+def test_an_uploaded_files_name_has_no_path(name):
     assert safe_name(name) == NAMES[name]
 
 
 def drop_of(limit):
-    paths, said = [], []
+    paths, errors = [], []
     return (
-        FileDrop(limit=limit, on_file=paths.append, on_error=said.append, several=True),
+        FileDrop(limit=limit, on_file=paths.append, on_error=errors.append, several=True),
         paths,
-        said,
+        errors,
     )
 
 
@@ -94,49 +92,49 @@ def piece(number, total, data, name="a.csv"):
     return SimpleNamespace(event_name="upload_event", data=about)
 
 
-def test_a_dropped_file_goes_to_disk_piece_by_piece_and_with_the_session():
-    drop, paths, said = drop_of(1_000_000)
+def test_an_upload_is_written_in_chunks_and_removed_with_its_session():
+    drop, paths, errors = drop_of(1_000_000)
     for number, data in enumerate((b"one,", b"two,", b"three"), 1):
         assert paths == []
         drop._process_event(piece(number, 3, data))
     assert paths[0].name == "a.csv"
     assert paths[0].read_bytes() == b"one,two,three"
-    assert drop.value == {}  # nothing of it in memory
+    assert drop.value == {}  # nothing stays in memory
     drop._process_event(piece(1, 1, b"again"))
     assert [path.read_bytes() for path in paths] == [b"one,two,three", b"again"]
     drop.close()
     assert not paths[0].exists()
-    assert said == []
+    assert errors == []
 
 
 @pytest.mark.parametrize(
     "pieces",
     [
-        [(1, 2, b"x" * 600), (2, 2, b"x" * 600)],  # too much
-        [(1, 3, b"x"), (3, 3, b"x")],  # one is missing
+        [(1, 2, b"x" * 600), (2, 2, b"x" * 600)],  # over the limit
+        [(1, 3, b"x"), (3, 3, b"x")],  # one chunk is missing
         [(1, "many", b"x")],
         [(1, 1, None)],
     ],
 )
-def test_what_is_too_large_or_damaged_is_not_taken(pieces):
-    drop, paths, said = drop_of(1000)
+def test_too_large_or_damaged_uploads_are_refused(pieces):
+    drop, paths, errors = drop_of(1000)
     for arguments in pieces:
         drop._process_event(piece(*arguments))
     drop._process_event(piece(2, 2, b"late"))
     assert paths == []
-    assert len(said) == 1
+    assert len(errors) == 1
     drop.close()
 
 
-def test_what_is_shown_is_escaped():
+def test_displayed_text_is_escaped():
     assert sentences(["<script>"], '"') == '<p class="&#34;">&lt;script&gt;</p>'
-    shown = SimpleNamespace(key="clr", name="<b>", value="<i>", uncertainty="<u>")
+    tile = SimpleNamespace(key="clr", name="<b>", value="<i>", uncertainty="<u>")
     result = SimpleNamespace(converged=True, row={})
-    assert "<b>" not in tiles([shown], result, None, stale=False)
-    assert "<dt>&lt;b&gt;</dt>" in tiles([shown], result, None, stale=False)
+    assert "<b>" not in tiles([tile], result, None, stale=False)
+    assert "<dt>&lt;b&gt;</dt>" in tiles([tile], result, None, stale=False)
 
 
-def test_the_page_is_opened_with_what_is_named(tmp_path):
+def test_the_page_opens_with_the_named_files(tmp_path):
     assert (open_page(None).kind, open_page(None).case.grid.cells) == ("contact", (192, 128))
     (tmp_path / "manifest.json").write_text("{}", "utf-8")
     with pytest.raises(UnreadableFile, match="has no digest"):
@@ -150,7 +148,7 @@ def test_the_page_is_opened_with_what_is_named(tmp_path):
         open_page(tmp_path / "case.toml")
 
 
-def test_without_panel_the_extra_is_named():
+def test_a_missing_panel_names_the_extra():
     without = (
         "import sys; sys.modules['panel'] = None; from asperity.cli import main; main(['page',"
         " '--port', '0'])"

@@ -1,6 +1,4 @@
-"""Knobs of cases and the settings they make: in the case file's words, back from an address,
-nothing let through.
-"""
+"""Controls of cases and their settings: case-file values, links, and rejection of invalid input."""
 
 import tomllib
 from functools import reduce
@@ -17,7 +15,7 @@ from asperity.paper import papers_case
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CONTACTS = ("paper", "ball-on-disc", "data-sheet-oil", "roller")
-HOSTILE = [  # addresses: none of this may be turned, run, or shown as anything but text
+HOSTILE = [  # values in links that must neither be set, run, nor shown as anything but text
     "surface.file=/etc/passwd",
     "surface=%7Bfile%3D%22/etc/passwd%22%7D",
     "contact.load=%7Bfile%3D%22/etc/passwd%22%7D",
@@ -36,14 +34,12 @@ def settings():
     return Settings(papers_case())
 
 
-def test_every_knob_is_in_the_catalogue():
-    assert {turned.quantity for turned in INPUT_SPECS.values() if not turned.title} <= set(
-        catalogue()
-    )
+def test_every_control_is_in_the_catalogue():
+    assert {spec.quantity for spec in INPUT_SPECS.values() if not spec.title} <= set(catalogue())
 
 
 @pytest.mark.parametrize("name", CONTACTS)
-def test_a_case_has_the_knobs_that_its_own_tables_have(name):
+def test_a_case_has_the_controls_of_its_own_tables(name):
     case = load_case(EXAMPLES / f"{name}.toml")
     inputs = case_inputs(case)
     assert {"contact.load", "contact.entrainment_speed", "contact.slip", "grid.cells"} <= set(
@@ -55,7 +51,7 @@ def test_a_case_has_the_knobs_that_its_own_tables_have(name):
 
 
 @pytest.mark.parametrize("name", CONTACTS)
-def test_every_position_of_every_slider_is_a_value_of_its_knob(name):
+def test_every_slider_position_is_a_valid_value(name):
     case = load_case(EXAMPLES / f"{name}.toml")
     for key, case_input in case_inputs(case).items():
         if case_input.choices:
@@ -63,13 +59,13 @@ def test_every_position_of_every_slider_is_a_value_of_its_knob(name):
         first, last = case_input.positions
         for position in range(first, last + 1):
             assert case_input.position(case_input.value_text(position)) == position, (key, position)
-        turned = case.with_overrides(
+        changed = case.with_overrides(
             overrides(case, {key: case_input.value_text(case_input.position(case_input.text))})
         )
-        assert turned.conditions == case.conditions, key
+        assert changed.conditions == case.conditions, key
 
 
-def test_a_slider_goes_a_decade_up_and_down_from_the_cases_own_value(settings):
+def test_a_slider_spans_a_decade_either_side_of_the_cases_value(settings):
     load = settings.inputs["contact.load"]
     assert [load.value_text(place) for place in (load.positions[0], 0, load.positions[1])] == [
         "50 N",
@@ -82,18 +78,18 @@ def test_a_slider_goes_a_decade_up_and_down_from_the_cases_own_value(settings):
     assert load.position("many") is None
 
 
-def test_one_entry_of_a_pair_is_turned_and_the_other_stays(settings):
-    turned = settings.with_value("surface.correlation_length.1", "40 um")
-    assert turned.case.contents.surface.correlation_length == (20e-6, 40e-6)
+def test_changing_one_entry_of_a_pair_keeps_the_other(settings):
+    changed = settings.with_value("surface.correlation_length.1", "40 um")
+    assert changed.case.contents.surface.correlation_length == (20e-6, 40e-6)
 
 
-def test_cells_are_typed_as_people_write_them(settings):
+def test_cells_are_accepted_in_usual_notations(settings):
     assert settings.with_value("grid.cells", "96 x 64").case.grid.cells == (96, 64)
     assert settings.with_value("grid.cells", "96 × 64").case.grid.cells == (96, 64)
 
 
 @pytest.mark.parametrize(
-    ("key", "text", "says"),
+    ("key", "text", "message"),
     [
         (
             "contact.load",
@@ -112,42 +108,42 @@ def test_cells_are_typed_as_people_write_them(settings):
         ("contact.load", "1" * 300, "value of 300 characters"),
     ],
 )
-def test_a_wrong_value_is_refused_in_the_case_files_own_sentence(settings, key, text, says):
+def test_an_invalid_value_is_refused_with_the_case_files_message(settings, key, text, message):
     refusal = settings.with_value(key, text)
     assert isinstance(refusal, RejectedValue)
     assert refusal.key == key
-    assert says in refusal.message
+    assert message in refusal.message
 
 
-def test_an_address_brings_the_settings_back(settings):
-    turned = settings
+def test_a_link_restores_the_settings(settings):
+    changed = settings
     for key, text in {
         "contact.load": "0.8 kN",
         "surface.correlation_length.0": "30 um",
         "contact.slip": "-0.5",
         "surface.seed": "3",
     }.items():
-        turned = turned.with_value(key, text)
-    back, notes = settings.from_address(turned.address)
+        changed = changed.with_value(key, text)
+    restored, notes = settings.from_address(changed.address)
     assert notes == []
-    assert back.changes == turned.changes
-    assert back.case.text == turned.case.text
+    assert restored.changes == changed.changes
+    assert restored.case.text == changed.case.text
 
 
-def test_a_knob_that_is_turned_back_leaves_the_address(settings):
-    turned = settings.with_value("contact.load", "800 N").with_value("contact.load", "500 N")
-    assert turned.address == ""
-    assert turned.case is settings.opened
+def test_a_control_set_back_leaves_the_link(settings):
+    changed = settings.with_value("contact.load", "800 N").with_value("contact.load", "500 N")
+    assert changed.address == ""
+    assert changed.case is settings.opened
 
 
-def test_a_link_of_another_case_says_so(settings):
+def test_a_link_of_another_case_is_reported(settings):
     other = Settings(load_case(EXAMPLES / "ball-on-disc.toml")).with_value("contact.load", "20 N")
-    back, notes = settings.from_address(other.address)
-    assert back.case.conditions.load == 20.0
+    restored, notes = settings.from_address(other.address)
+    assert restored.case.conditions.load == 20.0
     assert notes == ["The link was made with another case; its changes are applied here."]
 
 
-def test_a_link_of_a_dropped_surface_is_of_one_that_is_held(settings):
+def test_a_link_with_a_dropped_surface_needs_that_surface(settings):
     dropped = Settings(settings.opened, dropped="ring.x3p", held="0" * 32)
     _, notes = settings.from_address(dropped.address)
     assert notes == [
@@ -157,9 +153,9 @@ def test_a_link_of_a_dropped_surface_is_of_one_that_is_held(settings):
     assert notes == [
         "The link uses the dropped surface x, which is no longer stored; drop it again."
     ]
-    back, notes = dropped.from_address(dropped.with_value("contact.load", "700 N").address)
+    restored, notes = dropped.from_address(dropped.with_value("contact.load", "700 N").address)
     assert notes == []
-    assert (back.dropped, back.held, back.changes) == (
+    assert (restored.dropped, restored.held, restored.changes) == (
         "ring.x3p",
         "0" * 32,
         {"contact.load": "700 N"},
@@ -169,24 +165,24 @@ def test_a_link_of_a_dropped_surface_is_of_one_that_is_held(settings):
 
 
 @pytest.mark.parametrize("name", CONTACTS)
-def test_every_law_that_is_offered_can_be_had_and_taken_back(name):
+def test_every_offered_law_can_be_selected_and_undone(name):
     settings = Settings(load_case(EXAMPLES / f"{name}.toml"))
     chosen = {key: case_input for key, case_input in settings.inputs.items() if case_input.names}
     assert chosen["model"].names == ("mixed", "conserving", "paper")
     for key, case_input in chosen.items():
         assert case_input.text in case_input.choices
         for law in case_input.names:
-            turned = settings.with_value(key, law)
-            assert isinstance(turned, Settings), (key, law)
-            assert reduce(dict.get, key.split("."), tomllib.loads(turned.case.text)) == law
-            assert turned.with_value(key, case_input.text).address == ""
+            changed = settings.with_value(key, law)
+            assert isinstance(changed, Settings), (key, law)
+            assert reduce(dict.get, key.split("."), tomllib.loads(changed.case.text)) == law
+            assert changed.with_value(key, case_input.text).address == ""
 
 
-def test_a_law_takes_the_parameters_along_that_it_knows(settings):
-    turned = settings.with_value("lubricant.viscosity.law", "roelands").with_value(
+def test_a_law_keeps_the_parameters_it_shares(settings):
+    changed = settings.with_value("lubricant.viscosity.law", "roelands").with_value(
         "lubricant.viscosity.eta0", "0.2 Pa s"
     )
-    assert turned.case.lubricant.viscosity == Roelands(eta0=0.2, alpha=18.2e-9)
+    assert changed.case.lubricant.viscosity == Roelands(eta0=0.2, alpha=18.2e-9)
     newtonian = settings.with_value("lubricant.friction.law", "newtonian")
     assert (
         "floor"
@@ -194,10 +190,10 @@ def test_a_law_takes_the_parameters_along_that_it_knows(settings):
     )
     assert (
         "lubricant.rheology.law" not in settings.inputs
-    )  # Ree and Eyring's needs a stress that this case has not
+    )  # the Ree-Eyring law needs a stress that this case lacks
 
 
-def test_both_rough_bodies_have_knobs():
+def test_both_rough_bodies_have_controls():
     second = {
         "kind": "gaussian",
         "sq": "0.4 um",
@@ -205,28 +201,28 @@ def test_both_rough_bodies_have_knobs():
         "seed": 4,
     }
     settings = Settings(papers_case().with_overrides({"surface.second": second}))
-    turned = settings.with_value("surface.second.sq", "0.6 um").with_value(
+    changed = settings.with_value("surface.second.sq", "0.6 um").with_value(
         "surface.second.correlation_length.1", "20 um"
     )
-    assert turned.case.contents.surface.second.sq == 0.6e-6
-    assert turned.case.contents.surface.second.correlation_length == (30e-6, 20e-6)
-    assert turned.case.contents.surface.sq == settings.case.contents.surface.sq
+    assert changed.case.contents.surface.second.sq == 0.6e-6
+    assert changed.case.contents.surface.second.correlation_length == (30e-6, 20e-6)
+    assert changed.case.contents.surface.sq == settings.case.contents.surface.sq
     assert settings.inputs["surface.second.sq"].title == "Second body: composite roughness, Sq"
     titles = [case_input.title for case_input in settings.inputs.values()]
     assert len(set(titles)) == len(titles)
 
 
 @pytest.mark.parametrize("query", HOSTILE)
-def test_nothing_but_values_of_knobs_comes_in_by_an_address(settings, query):
-    back, notes = settings.from_address(query)
-    assert back.case is settings.opened
+def test_links_set_only_valid_values_of_controls(settings, query):
+    restored, notes = settings.from_address(query)
+    assert restored.case is settings.opened
     assert len(notes) == 1
     assert len(notes[0]) < 400
 
 
-def test_an_address_may_be_as_long_as_anybody_likes(settings):
-    back, notes = settings.from_address(
+def test_a_link_of_any_length_is_read(settings):
+    restored, notes = settings.from_address(
         "&".join(f"contact.load={load} N" for load in range(1, 5000))
     )
     assert notes == []
-    assert back.case.conditions.load == 100.0
+    assert restored.case.conditions.load == 100.0

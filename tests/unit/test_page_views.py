@@ -1,6 +1,4 @@
-"""Recordings, studies and histories as the page shows them: what the command line says of the same
-files.
-"""
+"""Recordings, studies and histories on the page agree with the command line on the same files."""
 
 import os
 
@@ -20,7 +18,7 @@ from asperity.study import load_study, plan_study, run_study
 from asperity.vibration import ContactOscillator, acceleration, white_noise
 from support.wearing import FEW, worn_case
 
-NOBODY = Ticket(-1, 0)
+NO_SESSION = Ticket(-1, 0)
 SMALL = {"grid.cells": [32, 24], "surface.correlation_length": "40 um", "vibration": "none"}
 
 
@@ -30,7 +28,7 @@ def rig(tmp_path_factory):
 
 
 def recordings(folder):
-    """A series whose resonance rises, as npy files at 20 kHz."""
+    """A series with rising resonance, as npy files at 20 kHz."""
     for number, crf in enumerate((2600.0, 2800.0, 3000.0, 3200.0, 3400.0, 3600.0, 3700.0)):
         spring = ContactOscillator(
             mass=0.1, stiffness=0.1 * (2 * np.pi * crf) ** 2, damping_ratio=0.02, load=500.0
@@ -44,9 +42,9 @@ def recordings(folder):
     return folder
 
 
-def test_dropped_recordings_are_heard_as_track_hears_them(rig):
+def test_uploaded_recordings_give_the_same_results_as_track(rig):
     paths = sorted(rig.glob("*.npy"))
-    series = track_files(NOBODY, paths, RecordingInputs(rate_hz=2e4, unit="m/s^2"), None)
+    series = track_files(NO_SESSION, paths, RecordingInputs(rate_hz=2e4, unit="m/s^2"), None)
     track = track_recordings(paths, TrackSettings(rate_hz=2e4, unit="m/s^2"))
     assert series.verdict == track.verdict()
     assert [row["crf_hz"] for row in series.rows] == [
@@ -54,29 +52,31 @@ def test_dropped_recordings_are_heard_as_track_hears_them(rig):
     ]
     assert [row["file"] for row in series.rows] == [path.name for path in paths]
     assert series.levels.shape == (7, series.frequency.size)
-    loudest = series.frequency[
+    peak_frequency = series.frequency[
         np.argmax(np.where(series.frequency > 2e3, series.levels, -np.inf), axis=1)
     ]
-    np.testing.assert_allclose(loudest, [row["crf_hz"] for row in series.rows], atol=60.0)
+    np.testing.assert_allclose(peak_frequency, [row["crf_hz"] for row in series.rows], atol=60.0)
 
 
-def test_a_recording_that_does_not_say_its_rate_is_refused_in_the_pages_words(rig):
-    refused = run_job(track_files, NOBODY, sorted(rig.glob("*.npy"))[:1], RecordingInputs(), None)
-    assert isinstance(refused, JobFailure)
-    assert "give the sampling rate" in refused.message
-    assert "give rate_hz" not in refused.message
+def test_a_recording_without_a_sampling_rate_is_refused_in_the_pages_words(rig):
+    failure = run_job(
+        track_files, NO_SESSION, sorted(rig.glob("*.npy"))[:1], RecordingInputs(), None
+    )
+    assert isinstance(failure, JobFailure)
+    assert "give the sampling rate" in failure.message
+    assert "give rate_hz" not in failure.message
 
 
-def test_a_folder_is_read_once_and_grows(rig, tmp_path):
+def test_a_folder_is_read_incrementally(rig, tmp_path):
     folder = tmp_path / "arriving"
     folder.mkdir()
-    stated = RecordingInputs(rate_hz=2e4, unit="m/s^2", band_hz=(2e3, 4e3))
-    assert track_folder(NOBODY, folder, tmp_path / "memory", stated, None) is None
+    inputs = RecordingInputs(rate_hz=2e4, unit="m/s^2", band_hz=(2e3, 4e3))
+    assert track_folder(NO_SESSION, folder, tmp_path / "memory", inputs, None) is None
     for number, path in enumerate(sorted(rig.glob("*.npy"))[:3], 1):
-        arrived = folder / path.name
-        arrived.write_bytes(path.read_bytes())
-        os.utime(arrived, (1e9 + number, 1e9 + number))
-        series = track_folder(NOBODY, folder, tmp_path / "memory", stated, None)
+        new_file = folder / path.name
+        new_file.write_bytes(path.read_bytes())
+        os.utime(new_file, (1e9 + number, 1e9 + number))
+        series = track_folder(NO_SESSION, folder, tmp_path / "memory", inputs, None)
         assert len(series.rows) == number
     assert series.band_hz == (2e3, 4e3)
 
@@ -91,8 +91,8 @@ def study(tmp_path_factory):
     return folder
 
 
-def test_a_study_is_shown_by_its_rows_and_means(study):
-    data = open_study(NOBODY, study)
+def test_a_study_is_shown_as_rows_and_means(study):
+    data = open_study(NO_SESSION, study)
     table = load_study(study).table
     assert [axis.key for axis in data.axes] == ["surface.sq"]
     assert data.axes[0].unit == "um"
@@ -105,41 +105,41 @@ def test_a_study_is_shown_by_its_rows_and_means(study):
     assert open_page(study).case.contents.surface.sq == 1e-6
 
 
-def test_a_point_of_a_study_becomes_its_contact(study):
-    data = open_study(NOBODY, study)
+def test_a_point_of_a_study_opens_as_its_contact(study):
+    data = open_study(NO_SESSION, study)
     for row, number in enumerate(data.numbers):
-        result = solve_row(NOBODY, study, number)
+        result = solve_row(NO_SESSION, study, number)
         assert result.row["clr"] == pytest.approx(data.outputs["clr"][row], abs=1e-12)
 
 
-def test_a_history_is_shown_by_its_steps_and_maps(tmp_path):
-    kept = run_history(papers_case().with_overrides(SMALL), out=tmp_path / "moving", steps=6)
-    history = open_history(NOBODY, tmp_path / "moving")
-    assert history.verdict == kept.verdict()
-    np.testing.assert_array_equal(history.curves["clr"], kept.table["clr"])
-    assert history.names == tuple(f"Step {frame.number}" for frame in kept.frames)
+def test_a_history_is_shown_by_steps_and_maps(tmp_path):
+    stored = run_history(papers_case().with_overrides(SMALL), out=tmp_path / "moving", steps=6)
+    history = open_history(NO_SESSION, tmp_path / "moving")
+    assert history.verdict == stored.verdict()
+    np.testing.assert_array_equal(history.curves["clr"], stored.table["clr"])
+    assert history.names == tuple(f"Step {frame.number}" for frame in stored.frames)
     assert history.clock == "time_s"
-    for contact_maps, frame in zip(history.maps, kept.frames, strict=True):
+    for contact_maps, frame in zip(history.maps, stored.frames, strict=True):
         np.testing.assert_array_equal(contact_maps.cells == TOUCHING, frame.in_contact)
         assert not (contact_maps.pressure[contact_maps.cells == CAVITATED] > 0.0).any()
     assert open_page(tmp_path / "moving").kind == "history"
 
 
-def test_a_contact_that_wears_is_shown_by_its_hours_and_maps(tmp_path):
-    kept = run_wear(worn_case(FEW), hours=0.2, out=tmp_path / "worn")
-    history = open_history(NOBODY, tmp_path / "worn")
-    assert (history.verdict, history.clock) == (kept.verdict(), "hours")
-    np.testing.assert_array_equal(history.curves["sq_m"], kept.table["sq_m"])
-    np.testing.assert_array_equal(history.time, kept.table["hours"])
-    assert history.times == tuple(frame.hours for frame in kept.frames)
-    for contact_maps, frame in zip(history.maps, kept.frames, strict=True):
+def test_a_wear_history_is_shown_by_hours_and_maps(tmp_path):
+    stored = run_wear(worn_case(FEW), hours=0.2, out=tmp_path / "worn")
+    history = open_history(NO_SESSION, tmp_path / "worn")
+    assert (history.verdict, history.clock) == (stored.verdict(), "hours")
+    np.testing.assert_array_equal(history.curves["sq_m"], stored.table["sq_m"])
+    np.testing.assert_array_equal(history.time, stored.table["hours"])
+    assert history.times == tuple(frame.hours for frame in stored.frames)
+    for contact_maps, frame in zip(history.maps, stored.frames, strict=True):
         np.testing.assert_array_equal(contact_maps.cells == TOUCHING, frame.in_contact)
     assert open_page(tmp_path / "worn").kind == "history"
 
 
-def test_a_folder_that_is_damaged_is_a_sentence(study, tmp_path):
+def test_a_damaged_folder_is_reported_in_one_sentence(study, tmp_path):
     (tmp_path / "manifest.json").write_text(
         (study / "manifest.json").read_text("utf-8")[:200], "utf-8"
     )
-    assert isinstance(run_job(open_study, NOBODY, tmp_path), JobFailure)
-    assert isinstance(run_job(open_history, NOBODY, tmp_path), JobFailure)
+    assert isinstance(run_job(open_study, NO_SESSION, tmp_path), JobFailure)
+    assert isinstance(run_job(open_history, NO_SESSION, tmp_path), JobFailure)

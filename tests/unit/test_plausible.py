@@ -1,4 +1,4 @@
-"""What is implausible is noted: each note where its cause is, and not where it is not."""
+"""Notes on implausible input and results: present with their cause, absent otherwise."""
 
 from dataclasses import replace
 
@@ -74,8 +74,10 @@ def test_short_inlets_are_noted_as_starved_and_long_inlets_as_longer_than_necess
     )
     assert inlet_notes(contact(), barus(), grid((256, 8), (-12.0, 3.0))) == ()
     heavy = contact(load=50000.0, speed=0.5)
-    wide = heavy.hertz.half_widths[0]
-    long, ample = (Grid((256, 8), (inlet * wide, -a), (1.9 * wide, a)) for inlet in (-4.5, -1.6))
+    half_width = heavy.hertz.half_widths[0]
+    long, ample = (
+        Grid((256, 8), (inlet * half_width, -a), (1.9 * half_width, a)) for inlet in (-4.5, -1.6)
+    )
     (note_text,) = inlet_notes(heavy, roelands(0.04, 22e-9), long)
     assert "is longer than necessary (m* = 1.1): starting grid.x at -1.6" in note_text
     assert inlet_notes(heavy, roelands(0.04, 22e-9), ample) == ()
@@ -89,9 +91,9 @@ def test_contact_at_a_grid_edge_is_noted():
         "reaches the outlet edge of" in note
         for note in solution_notes(solve_contact(soft, None, small))
     )
-    wide = gaussian_surface(grid((128, 32), (-5.0, 5.0)), **rough)
+    wide_domain = gaussian_surface(grid((128, 32), (-5.0, 5.0)), **rough)
     assert not any(
-        "reaches the" in note for note in solution_notes(solve_contact(soft, None, wide))
+        "reaches the" in note for note in solution_notes(solve_contact(soft, None, wide_domain))
     )
 
 
@@ -107,7 +109,7 @@ def test_excessive_pressures_and_unresolved_heights_are_noted():
     assert "cells along the correlation length in x, where 4 are needed" in note_text
 
 
-def test_a_film_far_from_its_fits_is_noted_with_the_reason():
+def test_a_film_outside_the_range_of_its_fits_is_noted_with_the_reason():
     smooth = Surface(np.zeros((64, 8)), grid((64, 8), (-1.3, 1.9)))
     oil = Lubricant(
         viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian()
@@ -121,26 +123,22 @@ def test_a_film_far_from_its_fits_is_noted_with_the_reason():
 
 
 def test_unloaded_asperities_at_a_small_film_ratio_are_noted():
-    """The paper's contact at Sq 2.5 um has a film ratio of 0.25, and asperities bear nine tenths:
-    no note.
-    """
+    """The paper's contact at Sq 2.5 um: film ratio 0.25, nine tenths on asperities; no note."""
     solved = solve_contact(contact(hardness=2e9), barus(), rough(grid((48, 32)), 2.5e-6))
     assert not any("film ratio" in note for note in solution_notes(solved))
-    untouched = replace(solved, in_contact=np.zeros_like(solved.in_contact))
+    unloaded = replace(solved, in_contact=np.zeros_like(solved.in_contact))
     assert any(
-        "film ratio of 0.2" in note and "asperity run" in note for note in solution_notes(untouched)
+        "film ratio of 0.2" in note and "asperity run" in note for note in solution_notes(unloaded)
     )
-    smooth = replace(untouched, surface=flat_surface(solved.grid))
+    smooth = replace(unloaded, surface=flat_surface(solved.grid))
     assert not any("film ratio" in note for note in solution_notes(smooth))
 
 
 def test_sharp_ridges_are_noted():
-    """Grooves that cut one another leave edges; a Gaussian surface's crests have a radius on any
-    grid.
-    """
-    conditions, on = contact(speed=0.1), grid((96, 64))
+    """Crossing grooves form edges; crests of a Gaussian surface have a radius on any grid."""
+    conditions, domain = contact(speed=0.1), grid((96, 64))
     ground = ground_surface(
-        on,
+        domain,
         sq=0.5e-6,
         groove_width=40e-6,
         groove_length=80e-6,
@@ -148,14 +146,14 @@ def test_sharp_ridges_are_noted():
         rng=np.random.default_rng(1),
     )
     gaussian = gaussian_surface(
-        on, sq=0.5e-6, correlation_length=20e-6, rng=np.random.default_rng(1)
+        domain, sq=0.5e-6, correlation_length=20e-6, rng=np.random.default_rng(1)
     )
-    of_ground, of_gaussian = (
+    on_ground, on_gaussian = (
         solve_contact(conditions, barus(), surface) for surface in (ground, gaussian)
     )
-    (note_text,) = (note for note in solution_notes(of_ground) if "are sharp edges" in note)
+    (note_text,) = (note for note in solution_notes(on_ground) if "are sharp edges" in note)
     assert "on cells twice as wide" in note_text
-    assert not any("are sharp edges" in note for note in solution_notes(of_gaussian))
+    assert not any("are sharp edges" in note for note in solution_notes(on_gaussian))
     dry = solve_contact(conditions, None, ground)
     assert not any("are sharp edges" in note for note in solution_notes(dry))
 
@@ -163,16 +161,14 @@ def test_sharp_ridges_are_noted():
 @pytest.mark.parametrize(
     ("shape", "ratio"), [(lambda t: t**2, 1.0), (lambda t: np.abs(t) * 1e-5, 2.0)]
 )
-def test_the_radius_of_ridges_is_that_of_a_parabola_and_an_edge_has_none(shape, ratio):
-    """Ten crests of radius 1/2 m along x, in units of the lengths; of edges twice as much on cells
-    twice as wide.
-    """
-    on = grid((240, 16))
-    past_crest = (np.arange(240) % 24 - 12) * on.spacing[0]
-    surface = Surface(np.repeat(-shape(past_crest)[:, None], 16, axis=1), on)
-    pressed = replace(solve_contact(contact(), None, flat_surface(on)), surface=surface)
-    touching = replace(pressed, in_contact=np.ones(on.cells, dtype=bool))
-    near, far = ridge_radii(touching)
-    assert far / near == pytest.approx(ratio)
-    assert near == pytest.approx(0.5 if ratio == 1.0 else on.spacing[0] / 2e-5)
-    assert ridge_radii(replace(touching, in_contact=np.zeros(on.cells, dtype=bool))) is None
+def test_ridge_radii_of_a_parabola_and_of_an_edge(shape, ratio):
+    """Ten crests of radius 1/2 m along x; for edges the radius doubles with the cell width."""
+    domain = grid((240, 16))
+    from_crest = (np.arange(240) % 24 - 12) * domain.spacing[0]
+    surface = Surface(np.repeat(-shape(from_crest)[:, None], 16, axis=1), domain)
+    loaded = replace(solve_contact(contact(), None, flat_surface(domain)), surface=surface)
+    all_touching = replace(loaded, in_contact=np.ones(domain.cells, dtype=bool))
+    fine, coarse = ridge_radii(all_touching)
+    assert coarse / fine == pytest.approx(ratio)
+    assert fine == pytest.approx(0.5 if ratio == 1.0 else domain.spacing[0] / 2e-5)
+    assert ridge_radii(replace(all_touching, in_contact=np.zeros(domain.cells, dtype=bool))) is None

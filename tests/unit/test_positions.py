@@ -1,6 +1,4 @@
-"""A position of the tracks, solved loosely first; and a grid that shows too little of the
-roughness.
-"""
+"""Contact solutions at track positions, solved coarsely first; grids too coarse for roughness."""
 
 from dataclasses import replace
 
@@ -30,84 +28,87 @@ def solver_of(case: Case) -> PositionSolver:
 
 
 def solved(case: Case) -> SolvedPosition:
-    found = solver_of(case)(case.surface())
-    assert isinstance(found, SolvedPosition)
-    return found
+    position = solver_of(case)(case.surface())
+    assert isinstance(position, SolvedPosition)
+    return position
 
 
-def test_a_position_is_the_contact_itself_with_its_interval():
+def test_a_position_equals_the_contact_with_its_interval():
     case = worn_case(ROUGH)
-    alone = solution.contact_state(
+    reference = solution.contact_state(
         ehl.solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
     )
-    here = solved(case).state
-    assert 0.1 < alone.clr < 0.95
-    assert here.clr == pytest.approx(alone.clr, rel=0.0, abs=2e-3)
-    assert here.reynolds_residual < case.options.tolerance
-    assert here.error is not None
-    assert alone.error is not None
-    assert here.error.clr.grid == pytest.approx(
-        alone.error.clr.grid, rel=0.1
-    )  # what the coarser grid told is kept
+    state = solved(case).state
+    assert 0.1 < reference.clr < 0.95
+    assert state.clr == pytest.approx(reference.clr, rel=0.0, abs=2e-3)
+    assert state.reynolds_residual < case.options.tolerance
+    assert state.error is not None
+    assert reference.error is not None
+    assert state.error.clr.grid == pytest.approx(
+        reference.error.clr.grid, rel=0.1
+    )  # the coarse grid's estimate is stored
 
 
-def test_what_leads_nowhere_at_once_is_solved_from_afar(monkeypatch):
-    case, asked = worn_case(ROUGH), []
-    alone = ehl.solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
+def test_a_failed_warm_start_is_retried_from_scratch(monkeypatch):
+    case, attempts = worn_case(ROUGH), []
+    reference = ehl.solve_contact(
+        case.conditions, case.lubricant, case.surface(), options=case.options
+    )
     monkeypatch.setattr(contact, "START_ITERATIONS", 1)
     thermal = solution.solve_thermal_contact
 
-    def counted(*arguments, **how):
-        asked.append((how["options"], how["start"] is None))
-        return thermal(*arguments, **how)
+    def count_attempts(*arguments, **options):
+        attempts.append((options["options"], options["start"] is None))
+        return thermal(*arguments, **options)
 
-    monkeypatch.setattr(contact, "solve_thermal_contact", counted)
-    np.testing.assert_array_equal(solved(case).pressure, alone.pressure)
+    monkeypatch.setattr(contact, "solve_thermal_contact", count_attempts)
+    np.testing.assert_array_equal(solved(case).pressure, reference.pressure)
     few = replace(case.options, max_iterations=1)
-    assert asked == [(few, False), (few, False), (case.options, True)]
+    assert attempts == [(few, False), (few, False), (case.options, True)]
 
 
-def test_what_wears_is_the_load_of_touching_cells():
-    """CLR's, as the film's own part in a touching cell has no meaning by itself; nothing
-    elsewhere.
-    """
-    found = solved(worn_case(ROUGH))
-    borne = found.asperity_pressure.sum() / found.pressure.sum()
-    assert borne == pytest.approx(found.state.clr, rel=1e-12)
-    parted = found.asperity_pressure == 0.0
-    assert 0.1 < parted.mean() < 0.99
-    np.testing.assert_array_equal(found.asperity_pressure[~parted], found.pressure[~parted])
+def test_wear_acts_on_the_load_of_touching_cells():
+    """CLR counts the whole load of touching cells, as their film share alone is meaningless."""
+    position = solved(worn_case(ROUGH))
+    share = position.asperity_pressure.sum() / position.pressure.sum()
+    assert share == pytest.approx(position.state.clr, rel=1e-12)
+    separated = position.asperity_pressure == 0.0
+    assert 0.1 < separated.mean() < 0.99
+    np.testing.assert_array_equal(
+        position.asperity_pressure[~separated], position.pressure[~separated]
+    )
 
 
-def of(overrides: dict[str, object]) -> WearingContact:
+def wear_model(overrides: dict[str, object]) -> WearingContact:
     case = worn_case(overrides)
     assert case.wear is not None
     return WearingContact(case, case.wear, case.moving_surfaces())
 
 
-@pytest.mark.parametrize(("cells", "told"), [([64, 64], True), ([160, 64], False)])
-def test_too_few_cells_of_the_roughness_are_said_with_as_many_as_do(cells, told):
+@pytest.mark.parametrize(("cells", "noted"), [([64, 64], True), ([160, 64], False)])
+def test_too_few_cells_for_the_roughness_are_noted_with_a_sufficient_number(cells, noted):
     fine = {"surface.correlation_length": "20 um", "grid.y": [-1.0, 1.0]}
-    model = of({**fine, "grid.cells": cells})
+    model = wear_model({**fine, "grid.cells": cells})
     composite = combined_roughness(model.surfaces, TrackPosition(0, 0))
     lengths, grid = correlation_lengths(composite), composite.grid
-    along = [length / step for length, step in zip(lengths, grid.spacing, strict=True)]
-    said = cells_note(model)
-    assert (said is not None) is told is (min(along) < ENOUGH_CELLS * RECOMMENDED_CELLS)
-    if said is not None:
-        assert said.startswith(
-            f"The roughness has {along[0]:.2g} by {along[1]:.2g} cells along its correlation"
+    lengths_in_cells = [length / step for length, step in zip(lengths, grid.spacing, strict=True)]
+    note = cells_note(model)
+    assert (note is not None) is noted is (min(lengths_in_cells) < ENOUGH_CELLS * RECOMMENDED_CELLS)
+    if note is not None:
+        assert note.startswith(
+            f"The roughness has {lengths_in_cells[0]:.2g} by {lengths_in_cells[1]:.2g} cells along"
+            " its correlation"
         )
-        wanted = [
-            int(number) for number in said.split("grid.cells = [")[1].split("]")[0].split(", ")
+        recommended = [
+            int(number) for number in note.split("grid.cells = [")[1].split("]")[0].split(", ")
         ]
-        assert wanted[0] > cells[0]
-        assert cells_note(of({**fine, "grid.cells": wanted})) is None
+        assert recommended[0] > cells[0]
+        assert cells_note(wear_model({**fine, "grid.cells": recommended})) is None
 
 
-def test_smooth_bodies_want_no_cells():
-    assert cells_note(of({"surface": "flat"})) is None
+def test_smooth_bodies_require_no_cells():
+    assert cells_note(wear_model({"surface": "flat"})) is None
 
 
-def test_cells_that_are_wanted_are_those_of_a_chosen_grid():
+def test_recommended_cells_are_those_of_a_chosen_grid():
     assert RECOMMENDED_CELLS == gridding.CELLS_IN_CORRELATION

@@ -1,6 +1,4 @@
-"""Progress: on a terminal only, beside the output; the wait for the compiler is announced, a solver
-at work is not.
-"""
+"""Progress output: shown on terminals only; announces compilation until the solver iterates."""
 
 import os
 import subprocess
@@ -14,7 +12,9 @@ from asperity.ehl import Iteration
 
 
 @pytest.mark.parametrize(("number", "announced"), [(0, True), (1, False)])
-def test_the_first_step_ends_the_wait_not_the_start(monkeypatch, capsys, number, announced):
+def test_the_compilation_message_ends_with_the_first_iteration(
+    monkeypatch, capsys, number, announced
+):
     monkeypatch.setattr(output, "NOTICE_DELAY_S", 0.05)
     with output.solver_progress("case", quiet=False) as step:
         step(Iteration((8, 8), number, 1.0, 1.0, float("inf")))
@@ -22,39 +22,43 @@ def test_the_first_step_ends_the_wait_not_the_start(monkeypatch, capsys, number,
     assert ("compiles the solver" in capsys.readouterr().err) is announced
 
 
-def test_a_file_gets_the_output_while_a_terminal_shows_progress():
+def test_progress_is_shown_on_the_terminal_while_output_is_redirected():
     program = (
         "from asperity.cli.output import progress\n"
         "with progress('in [brackets/]', quiet=False) as display:\n"
         "    display('2 read', 2, 4)\n"
         "    print('{}')\n"
     )
-    terminal, end = os.openpty()
-    done = subprocess.run(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=end, text=True, check=True
+    terminal, terminal_end = os.openpty()
+    process = subprocess.run(
+        [sys.executable, "-c", program],
+        stdout=subprocess.PIPE,
+        stderr=terminal_end,
+        text=True,
+        check=True,
     )
-    os.close(end)
-    shown = os.read(terminal, 100_000).decode()
+    os.close(terminal_end)
+    output_text = os.read(terminal, 100_000).decode()
     os.close(terminal)
-    assert done.stdout == "{}\n"
-    assert "in [brackets/]" in shown
-    assert "2 read" in shown
+    assert process.stdout == "{}\n"
+    assert "in [brackets/]" in output_text
+    assert "2 read" in output_text
 
 
-def test_quiet_shows_nothing(capsys):
+def test_quiet_shows_no_progress(capsys):
     with output.progress("case", quiet=True, compiles=True) as display:
         display("step 1")
     assert capsys.readouterr() == ("", "")
 
 
-def test_surfaces_that_are_done_are_counted_beside_the_steps():
-    shown = []
-    steps = output.SolverSteps(lambda *told: shown.append(told))
+def test_finished_surfaces_are_counted_with_the_iterations():
+    messages = []
+    steps = output.SolverSteps(lambda *counts: messages.append(counts))
     steps.step(Iteration((8, 8), 0, 1.0, 1.0, float("inf")))
     steps.step(Iteration((8, 8), 1, 1e-2, 1.0, 1.0))
     steps.surface(2, 5)
     steps.step(Iteration((16, 8), 3, 1e-4, 1.0, 1.0))
-    assert shown == [
+    assert messages == [
         ("8 x 8 cells, step 1, residual 1.0e-02", None, None),
         ("2 of 5 surfaces", 2, 5),
         ("16 x 8 cells, step 3, residual 1.0e-04", 2, 5),

@@ -1,6 +1,4 @@
-"""One idea a sentence: no sentence of the pages is long. What is told is counted in words, not in
-names or formulas.
-"""
+"""Sentence length on the documentation pages, counted without names and formulas."""
 
 import re
 from collections.abc import Iterator
@@ -10,28 +8,30 @@ import pytest
 from support.pages import SPAN, Page, pages
 from support.source import ROOT
 
-MOST = 40  # words
-KEYS = "`--json`"  # a list of keys is no sentence
-APART = re.compile(r"#|\||:::|<|\$\$|\([^)]*\)=$")  # headings, tables, directives: no prose
+MAX_WORDS = 40  # words
+KEYS = "`--json`"  # a list of keys is not a sentence
+NOT_PROSE = re.compile(
+    r"#|\||:::|<|\$\$|\([^)]*\)=$"
+)  # headings, tables and directives are not prose
 ITEM = re.compile(r"^(?:[-*]|\d+\.)\s+")
 END = re.compile(r"(?<=[.!?])[\"')*\]]*\s+(?=[^a-z])|(?<=[.!?][*\")])\s+")
 
 
 def paragraphs(page: Page) -> Iterator[tuple[int, str]]:
-    """Each with the number of its first line."""
-    number, parts, last = 0, [], 0
+    """Paragraphs with the number of their first line."""
+    number, parts, previous = 0, [], 0
     for line in page.prose:
         text = line.text.strip()
-        apart = not text or APART.match(text)
-        if parts and (apart or ITEM.match(text) or line.number != last + 1):
+        excluded = not text or NOT_PROSE.match(text)
+        if parts and (excluded or ITEM.match(text) or line.number != previous + 1):
             yield number, " ".join(parts)
             parts = []
-        if not apart:
+        if not excluded:
             number, parts = (
                 (number if parts else line.number),
                 [*parts, ITEM.sub("", text, count=1)],
             )
-        last = line.number
+        previous = line.number
     if parts:
         yield number, " ".join(parts)
 
@@ -47,12 +47,12 @@ def words(sentence: str) -> int:
     return sum(bool(re.search(r"[^\W\d_]", word)) for word in sentence.split())
 
 
-def long_ones(page: Page) -> list[str]:
+def long_sentences(page: Page) -> list[str]:
     return [
         f"{number}: {words(sentence)} words: {sentence}"
         for number, text in paragraphs(page)
         for sentence in sentences(text)
-        if KEYS not in sentence and words(sentence) > MOST
+        if KEYS not in sentence and words(sentence) > MAX_WORDS
     ]
 
 
@@ -63,7 +63,7 @@ PAGES = pytest.mark.parametrize(
 
 @PAGES
 def test_no_sentence_is_long(page):
-    wrong = long_ones(page)
+    wrong = long_sentences(page)
     assert not wrong, f"{page.path.relative_to(ROOT).as_posix()}: " + "\n".join(wrong)
 
 
@@ -81,5 +81,5 @@ def test_no_sentence_is_long(page):
         (f"{'word ' * 30}\n```sh\nls\n```\n{'word ' * 30}", 0),
     ],
 )
-def test_what_counts(text, count):
-    assert len(long_ones(Page(ROOT / "page.md", text))) == count
+def test_only_words_of_sentences_are_counted(text, count):
+    assert len(long_sentences(Page(ROOT / "page.md", text))) == count

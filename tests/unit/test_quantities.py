@@ -31,10 +31,10 @@ SCALED = (
     "Pa s",
     "Pa-1",
     "rad",
-)  # units shown in others
+)  # quantities displayed in other units
 
 
-def test_a_key_stands_in_one_line():
+def test_a_key_is_defined_once():
     keys = [
         line.split(",")[0]
         for line in files("asperity.core")
@@ -45,7 +45,7 @@ def test_a_key_stands_in_one_line():
     assert len(keys) == len(set(keys))
 
 
-def test_every_line_is_whole():
+def test_every_line_is_complete():
     for key, entry in catalogue().items():
         assert entry.name
         assert entry.unit, key
@@ -69,7 +69,7 @@ def test_every_line_is_whole():
         (12.0, float("nan"), ".4g", "12"),
     ],
 )
-def test_a_value_ends_where_its_deviation_does(value, deviation, form, text):
+def test_a_value_is_rounded_to_its_deviation(value, deviation, form, text):
     assert with_deviation(value, deviation, form) == text
 
 
@@ -82,7 +82,7 @@ def test_a_stored_number_is_shown_in_its_display_unit():
     assert quantity("iterations").text(31) == "31"
 
 
-def test_no_deviation_leads_beyond_what_a_share_or_film_can_be():
+def test_intervals_stay_within_physical_bounds():
     assert quantity("car").text_in({"car": 0.002, "car_error": 0.069}) == "0.2 (0.0 to 7.1) %"
     assert quantity("car").text_in({"car": 0.97, "car_error": 0.05}) == "97.0 (92.0 to 100.0) %"
     assert quantity("car").text_in({"car": 0.2, "car_error": 0.069}) == "20.0 ± 6.9 %"
@@ -90,25 +90,25 @@ def test_no_deviation_leads_beyond_what_a_share_or_film_can_be():
     assert film == "0.010 (0.000 to 0.050) µm"
     assert (
         quantity("car_domain").clipped_interval(1.2, 0.05) is None
-    )  # over the Hertz area, beyond which bodies may touch
-    assert quantity("crfa").number(1.0, 2.0) == "1.0 ± 2.0"  # what only scatters, and is no share
+    )  # relative to the Hertz area; real contact may extend beyond it
+    assert quantity("crfa").number(1.0, 2.0) == "1.0 ± 2.0"  # scatter only, not a share
 
 
-def test_a_presets_resonance_is_the_plain_one_by_another_name():
+def test_a_presets_resonance_is_an_alias_of_the_plain_key():
     assert quantity("crf_sound_hz").label == "CRF, sound [Hz]"
     assert quantity("crf_sound_hz").deviation == "crf_std_sound_hz"
     with pytest.raises(KeyError, match="catalogue of quantities"):
         quantity("clrr")
 
 
-def test_short_tables_leave_out_details_and_deviations():
+def test_short_tables_omit_details_and_deviations():
     keys = [entry.key for entry in select("load")]
     assert {"clr", "car", "car_domain"} <= set(keys)
     assert "clr_error" not in keys
     assert "load_at_floor" in [entry.key for entry in select("sharing", detail=True)]
 
 
-def test_a_law_says_unit_and_symbol_beside_its_parameters():
+def test_a_laws_parameters_state_unit_and_symbol():
     @dataclass
     class Law:
         eta0: Annotated[float, Parameter("Pa s", "η₀")]
@@ -119,7 +119,9 @@ def test_a_law_says_unit_and_symbol_beside_its_parameters():
 
 def test_every_parameter_of_a_surface_is_in_the_catalogue():
     for kind, group in ((SurfaceParameters, "surface"), (ProfileParameters, "profile")):
-        names = {entry.name.rstrip("_") for entry in fields(kind)} - {"sq"}  # the contact's Sq too
+        names = {entry.name.rstrip("_") for entry in fields(kind)} - {
+            "sq"
+        }  # including the Sq of the contact
         keys = {entry.key.removesuffix("_m") for entry in select(group, detail=True)} - {
             "pixel",
             "size",

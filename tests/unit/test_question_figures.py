@@ -1,4 +1,4 @@
-"""Measured figures on the question pages: each listed with the test or the csv that holds it."""
+"""Figures quoted on the question pages: each is listed with its test or csv file."""
 
 import ast
 import csv
@@ -23,13 +23,13 @@ def test_every_figure_of_a_page_is_listed(page):
     text = PLAIN.sub("", (FOLDER / f"{page}.md").read_text("utf-8"))
     listed = [row["figure"] for row in FIGURES if row["page"] == page]
     for figure in MEASURED.findall(text):
-        assert any(figure in one for one in listed), (
+        assert any(figure in entry for entry in listed), (
             f"{page}.md says {figure!r}; name in figures.csv what holds it"
         )
 
 
 @pytest.mark.parametrize("row", FIGURES, ids=lambda row: f"{row['page']}: {row['figure']}")
-def test_every_listed_figure_stands_on_its_page_and_is_held(row):
+def test_every_listed_figure_is_on_its_page_and_in_its_source(row):
     assert row["figure"] in (FOLDER / f"{row['page']}.md").read_text("utf-8")
     file, _, name = row["held by"].partition("::")
     assert (ROOT / file).is_file()
@@ -37,14 +37,14 @@ def test_every_listed_figure_stands_on_its_page_and_is_held(row):
         assert name in {function.name for function in functions(parsed(ROOT / file))}
 
 
-def test_the_profiles_named_are_those_of_the_lowest_peaks():
+def test_the_named_profiles_have_the_lowest_peaks():
     head, *rows = read(ROOT / "docs" / "benchmarks" / "rollers.csv")
     level, tilted = head.index("0 mrad"), head.index("0.5 mrad")
     assert min(rows, key=lambda row: float(row[level]))[0] == "1.2"
     assert min(rows, key=lambda row: float(row[tilted]))[0] == "3"
 
 
-def test_thirty_seven_lines_are_thirty_seven():
+def test_the_quoted_number_of_solved_films_is_37():
     tree = parsed(ROOT / "tests" / "validation" / "test_auto_grid.py")
     (films,) = (
         node.value

@@ -1,6 +1,4 @@
-"""Ratings: constants as public readings of the standards have them, published lives, closed forms,
-limits.
-"""
+"""Ratings against published constants, published lives, closed forms and limits."""
 
 import math
 from dataclasses import fields
@@ -50,13 +48,13 @@ KAPPAS = (0.2, 0.5, 1.0, 2.0, 4.0)
     ("turning", "diameter", "printed"),
     [(500, 380, 13.279), (3000, 46.5, 12.048), (3000, 72.5, 9.649), (200, 250, 35.026)],
 )
-def test_the_reference_viscosity(turning, diameter, printed):
+def test_the_reference_viscosity_equals_published_values(turning, diameter, printed):
     assert 1e6 * reference_viscosity(turning * RPM, 1e-3 * diameter) == pytest.approx(
         printed, rel=1e-4
     )
 
 
-def test_the_reference_viscositys_branches_differ_as_printed():
+def test_branches_of_the_reference_viscosity_differ_as_printed():
     below, above = (
         1e6 * reference_viscosity(turning * RPM, 0.1) for turning in (999.999999, 1000.000001)
     )
@@ -64,7 +62,7 @@ def test_the_reference_viscositys_branches_differ_as_printed():
 
 
 @pytest.mark.parametrize(
-    ("element", "table"),  # a row an e_C C_u/P, a column a kappa; two public codes agree
+    ("element", "table"),  # rows: e_C C_u/P; columns: kappa; two public codes agree
     [
         (
             "ball",
@@ -88,14 +86,14 @@ def test_the_reference_viscositys_branches_differ_as_printed():
         ),
     ],
 )
-def test_the_life_factor_as_iso_281_has_it(element, table):
-    found = [[life_factor(element, kappa, share) for kappa in KAPPAS] for share in SHARES]
-    assert np.array(found) == pytest.approx(np.array(table), rel=1e-3)
+def test_the_life_factor_agrees_with_iso_281(element, table):
+    factors = [[life_factor(element, kappa, share) for kappa in KAPPAS] for share in SHARES]
+    assert np.array(factors) == pytest.approx(np.array(table), rel=1e-3)
 
 
 @pytest.mark.parametrize("element", ["ball", "roller"])
-def test_the_life_factor_is_whole_at_its_borders(element):
-    """A constant misprinted in two public codes breaks this."""
+def test_the_life_factor_is_continuous_at_its_limits(element):
+    """A misprinted constant in two public codes would fail here."""
     for border in (0.4, 1.0):
         for share in SHARES[:3]:
             below, above = (
@@ -124,7 +122,7 @@ def test_the_life_factor_is_whole_at_its_borders(element):
     ],
 )
 def test_lives_of_a_ball_bearing_by_a_commercial_program(radial, axial, clearance, millions):
-    """As quoted in minzhun/ISO16281: Z 7, D 11.5 mm, d_m 43.5 mm, C 23.4 kN."""
+    """Quoted in minzhun/ISO16281: Z 7, D 11.5 mm, d_m 43.5 mm, C 23.4 kN."""
     pair = ElasticPair((210e9, 210e9), (0.3, 0.3))
     bearing = BallBearing(
         balls=7,
@@ -143,16 +141,14 @@ def test_lives_of_a_ball_bearing_by_a_commercial_program(radial, axial, clearanc
 
 
 def zone(count, power, eps=0.5):
-    """Loads of so many rolling elements in Sjövall's zone."""
+    """Loads of `count` rolling elements in Sjövall's load zone."""
     angles = 2.0 * np.pi * np.arange(count) / count
     return np.maximum(1.0 - (1.0 - np.cos(angles)) / (2.0 * eps), 0.0) ** power, angles
 
 
-def test_a_roller_bearing_lives_as_its_rating_promises():
-    """C is made for half a load zone: a million turns under C, but for λν, which slices account for
-    themselves.
-
-    The slices' life goes with the fourth power of the load, so that only there both agree.
+def test_a_roller_bearing_reaches_its_rated_life():
+    """C assumes half a load zone: one million turns under C, apart from λν, which slices include.
+    Slice life scales with load^4, so both agree at this load only.
     """
     loads, angles = zone(400, 10.0 / 9.0)
     force = float(loads @ np.cos(angles))
@@ -169,22 +165,22 @@ def test_a_roller_bearing_lives_as_its_rating_promises():
 
 @pytest.mark.parametrize("ratio", [0.05, 0.2, 0.35])
 def test_both_rings_of_a_roller_bearing_by_lundberg_and_palmgren(ratio):
-    """A ring's capacity goes with (1 - γ)^(29/27)/(1 + γ)^(1/4), of the outer ring with γ negative;
-    here by hand.
-    """
+    """Ring capacity ~ (1 - γ)^(29/27)/(1 + γ)^(1/4), γ negative for the outer ring; by hand."""
     inner, outer = (
         (1.0 - side) ** (29.0 / 27.0) / (1.0 + side) ** 0.25 for side in (ratio, -ratio)
     )
-    both = (1.038 * inner / outer) ** 4.5
-    alike = np.full((14, 30), 5.0)  # N on every slice of every roller: 150 N each
+    ratio_of_rings = (1.038 * inner / outer) ** 4.5
+    slices = np.full((14, 30), 5.0)  # [N] on every slice; 150 N per roller
     capacity = 20e3 / 0.83 / 14
-    worn = (150.0 / capacity) ** 4.5 * (0.378**4.5 / (1.0 + both) + 0.364**4.5 / (1.0 + 1.0 / both))
-    assert roller_life(alike, 20e3, ratio, straight=False) == pytest.approx(
-        1e6 * worn ** (-8.0 / 9.0), rel=1e-9
+    damage = (150.0 / capacity) ** 4.5 * (
+        0.378**4.5 / (1.0 + ratio_of_rings) + 0.364**4.5 / (1.0 + 1.0 / ratio_of_rings)
+    )
+    assert roller_life(slices, 20e3, ratio, straight=False) == pytest.approx(
+        1e6 * damage ** (-8.0 / 9.0), rel=1e-9
     )
 
 
-def test_a_ball_bearing_lives_as_its_rating_promises():
+def test_a_ball_bearing_reaches_its_rated_life():
     loads, angles = zone(400, 1.5)
     force = float(loads @ np.cos(angles))
     life = ball_life(loads * 1e3, 10.0 * force * 1e3, BallRaceway(0.2, (0.52, 0.53), 0.0))
@@ -217,7 +213,7 @@ VG_220 = OilSheet(grade="VG 220", viscosity_100=18.75e-6)
 
 
 def gear_oil(sheet=VG_220):
-    """Beyond 150 degC too, where a flash of microseconds takes it."""
+    """Extrapolates above 150 degC, which a flash of microseconds reaches."""
     return GearOil(
         lambda kelvin: sheet.walther(kelvin) * sheet.density(kelvin),
         lambda kelvin: ESTIMATORS["iso"](sheet, kelvin),
@@ -228,7 +224,7 @@ def gear_oil(sheet=VG_220):
 def test_the_specific_film_along_the_fzg_c_path():
     oil, bulk = gear_oil(), 373.15
     mesh = Mesh(0.5e-6, STEEL.effective_modulus, (12427.0, 12427.0))
-    found = {}
+    results = {}
     for contact in C_GEAR.contacts(STEEL):
         hertz = contact.hertz(STEEL)
         point = MeshPoint(
@@ -238,46 +234,46 @@ def test_the_specific_film_along_the_fzg_c_path():
             hertz.half_widths[0],
             contact.surface_speeds,
         )
-        found[contact.name] = specific_film(point, mesh, oil, 0.05, bulk)
-    films = [film for film, _ in found.values()]
+        results[contact.name] = specific_film(point, mesh, oil, 0.05, bulk)
+    films = [film for film, _ in results.values()]
     assert films == pytest.approx(
         [0.2081, 0.2573, 0.2765, 0.4125, 0.3238, 0.3525, 0.3566], rel=2e-3
     )
-    rises = [rise for _, rise in found.values()]
+    rises = [rise for _, rise in results.values()]
     assert rises == pytest.approx([71.8, 57.8, 49.6, 0.0, 46.5, 49.1, 53.3], rel=2e-3, abs=0.01)
     assert oil.alpha(bulk) * STEEL.effective_modulus == pytest.approx(3554.1, rel=1e-3)
     assert 1e9 * oil.alpha(311.15) == pytest.approx(21.68, rel=1e-3)
     assert 1e3 * oil.viscosity(bulk) == pytest.approx(
         15.91, rel=2e-3
-    )  # there of a density counted from 289 K
+    )  # the source refers density to 289 K
 
 
-def test_the_ratings_film_is_dowsons_least_one():
-    """Without heat within 2.5 % of 2.65 G^0.54 U^0.7 W^-0.13, for G from 3000 to 5000."""
+def test_the_ratings_film_is_dowsons_minimum_film():
+    """Isothermal; within 2.5 % of 2.65 G^0.54 U^0.7 W^-0.13 for G from 3000 to 5000."""
     modulus, radius = STEEL.effective_modulus, 8e-3
     for alpha in (3000.0 / modulus, 5000.0 / modulus):
         oil = GearOil(lambda _: 0.02, lambda _, alpha=alpha: alpha, "mineral")
         pressure = 1.2e9
         load = 2.0 * math.pi * pressure**2 / modulus * radius
         point = MeshPoint(radius, pressure, load, 1e-4, (3.0, 3.0))
-        found, rise = specific_film(point, Mesh(1e-6, modulus, (1e4, 1e4)), oil, 0.05, 373.15)
-        speed, carried = 0.02 * 3.0 / (modulus * radius), load / (modulus * radius)
-        dowson = 2.65 * (alpha * modulus) ** 0.54 * speed**0.7 * carried**-0.13 * radius
-        assert 1e-6 * found == pytest.approx(dowson, rel=0.025)
+        film, rise = specific_film(point, Mesh(1e-6, modulus, (1e4, 1e4)), oil, 0.05, 373.15)
+        speed_number, load_number = 0.02 * 3.0 / (modulus * radius), load / (modulus * radius)
+        dowson = 2.65 * (alpha * modulus) ** 0.54 * speed_number**0.7 * load_number**-0.13 * radius
+        assert 1e-6 * film == pytest.approx(dowson, rel=0.025)
         assert rise == 0.0
 
 
 def test_the_loss_factor_of_the_fzg_c_gears():
-    def of(gears):
+    def gear_loss(gears):
         path, pitch = gears.path, gears.base_pitch
         parts = (path["E"] - path["C"]) / pitch, (path["C"] - path["A"]) / pitch
         return loss_factor(parts, gears.contact_ratio, gears.teeth)
 
-    assert of(C_GEAR) == pytest.approx(0.1950, rel=1e-3)
+    assert gear_loss(C_GEAR) == pytest.approx(0.1950, rel=1e-3)
     given = {entry.name: getattr(C_GEAR, entry.name) for entry in fields(C_GEAR)}
-    assert of(SpurGear(**(given | {"tip_diameters": None}))) == pytest.approx(
+    assert gear_loss(SpurGear(**(given | {"tip_diameters": None}))) == pytest.approx(
         0.1986, rel=1e-3
-    )  # GEARpie's report
+    )  # report of GEARpie
 
 
 def test_friction_and_bulk_temperature_in_the_standards_units():
@@ -300,34 +296,34 @@ def test_friction_and_bulk_temperature_in_the_standards_units():
 # -------------------------------------------------------------------------------------------------
 
 
-def heated(shape):
-    """Largest rise of a half-space under a fast band of heat of mean 1, unit speed, effusivity and
-    half-width 1.
+def largest_rise(shape):
+    """Largest temperature rise under a fast heat band and its position; mean flux, speed,
+    effusivity and half-width are 1.
     """
     mean = scipy.integrate.quad(shape, -1.0, 1.0)[0] / 2.0
 
-    def rise(x):
-        # the heat that has passed over the point at x since -1: T = 1/(B sqrt(π u)) ∫ q(s)/sqrt(x -
-        # s) ds
+    def relative_rise(x):
+        # heat received at x after entering the band at -1:
+        # T = 1/(B sqrt(π u)) ∫ q(s)/sqrt(x - s) ds
         root = math.sqrt(x + 1.0)
         inner = scipy.integrate.quad(
             lambda z: 2.0 * shape(x - z * z), 0.0, root, limit=200, epsabs=1e-12
         )[0]
         return inner / math.sqrt(math.pi) / mean
 
-    best = scipy.optimize.minimize_scalar(lambda x: -rise(x), bounds=(0.0, 1.0), method="bounded")
+    best = scipy.optimize.minimize_scalar(
+        lambda x: -relative_rise(x), bounds=(0.0, 1.0), method="bounded"
+    )
     return -best.fun, best.x
 
 
-def test_bloks_constants():
-    """A twin: the moving source integrated. Each body takes the heat that lets both be equally
-    hot.
-    """
-    hertz, where = heated(lambda x: math.sqrt(max(1.0 - x * x, 0.0)))
-    even, _ = heated(lambda _: 1.0)
+def test_bloks_constants_agree_with_an_integrated_moving_source():
+    """Reference: integrated moving source; heat is partitioned for equal surface temperatures."""
+    hertz, position = largest_rise(lambda x: math.sqrt(max(1.0 - x * x, 0.0)))
+    uniform, _ = largest_rise(lambda _: 1.0)
     assert hertz / math.sqrt(2.0) == pytest.approx(1.1115, rel=1e-4)
-    assert where == pytest.approx(0.652, abs=2e-3)
-    assert even / math.sqrt(2.0) == pytest.approx(2.0 / math.sqrt(math.pi), rel=1e-4)
+    assert position == pytest.approx(0.652, abs=2e-3)
+    assert uniform / math.sqrt(2.0) == pytest.approx(2.0 / math.sqrt(math.pi), rel=1e-4)
 
 
 def half_width(line_load, radius):
@@ -349,20 +345,20 @@ def half_width(line_load, radius):
         (0.1, 2e5, 3.629e-3, (2.0, 1.5), 25.21),
     ],
 )
-def test_flash_temperatures(friction, line_load, radius, speeds, printed):
+def test_flash_temperatures_equal_published_values(friction, line_load, radius, speeds, printed):
     width = half_width(line_load, radius)
     bodies = (12427.0, 12427.0)
     assert flash_rise(friction, line_load, width, speeds, bodies) == pytest.approx(
         printed, rel=1e-3
     )
-    swapped = flash_rise(friction, line_load, width, speeds[::-1], bodies)
-    assert swapped == pytest.approx(printed, rel=1e-3)
-    even = flash_rise(friction, line_load, width, speeds, bodies, shape=2.0 / math.sqrt(math.pi))
-    assert even == pytest.approx(printed * 1.1284 / 1.1115, rel=1e-3)
+    exchanged = flash_rise(friction, line_load, width, speeds[::-1], bodies)
+    assert exchanged == pytest.approx(printed, rel=1e-3)
+    uniform = flash_rise(friction, line_load, width, speeds, bodies, shape=2.0 / math.sqrt(math.pi))
+    assert uniform == pytest.approx(printed * 1.1284 / 1.1115, rel=1e-3)
 
 
 def test_flash_temperature_in_the_standards_form():
-    """0.62 μ w'^0.75 (E'/R)^0.25 |sqrt u1 - sqrt u2|/B, and X_M = 50.0 of equal steels."""
+    """0.62 μ w'^0.75 (E'/R)^0.25 |sqrt u1 - sqrt u2|/B, with X_M = 50.0 for equal steels."""
     width, line_load, radius = half_width(3e5, 8e-3), 3e5, 8e-3
     modulus = STEEL.effective_modulus
     printed = (
@@ -396,7 +392,7 @@ def path(xx=NOTHING, yy=NOTHING, zz=NOTHING, xy=NOTHING):
 
 
 @pytest.mark.parametrize(
-    ("stresses", "closed"),
+    ("stresses", "expected"),
     [
         (path(xy=SINE), 1.0),
         (path(xx=SINE), 0.5 + A / 3.0),
@@ -407,50 +403,55 @@ def path(xx=NOTHING, yy=NOTHING, zz=NOTHING, xy=NOTHING):
         (path(xx=SINE, xy=0.5 * SINE), math.sqrt(0.5) + A / 3.0),
     ],
 )
-def test_dang_van_of_closed_cases(stresses, closed):
-    assert dang_van(stresses, A) == pytest.approx(closed, rel=1e-6)
+def test_dang_van_in_closed_form(stresses, expected):
+    assert dang_van(stresses, A) == pytest.approx(expected, rel=1e-6)
 
 
-def test_dang_van_knows_no_axes():
+def test_dang_van_is_invariant_to_rotation():
     rng = np.random.default_rng(3)
     stresses = rng.normal(size=(6, 1, 40))
     xx, yy, zz, xy, yz, xz = stresses[:, 0]
     tensors = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
-    turned = scipy.spatial.transform.Rotation.random(rng=rng).as_matrix()
-    seen = turned @ tensors @ turned.T
-    again = np.stack(
-        [seen[:, 0, 0], seen[:, 1, 1], seen[:, 2, 2], seen[:, 0, 1], seen[:, 1, 2], seen[:, 0, 2]]
+    rotation = scipy.spatial.transform.Rotation.random(rng=rng).as_matrix()
+    rotated = rotation @ tensors @ rotation.T
+    paths = np.stack(
+        [
+            rotated[:, 0, 0],
+            rotated[:, 1, 1],
+            rotated[:, 2, 2],
+            rotated[:, 0, 1],
+            rotated[:, 1, 2],
+            rotated[:, 0, 2],
+        ]
     )
-    assert dang_van(again[:, None, :], A) == pytest.approx(dang_van(stresses, A), rel=1e-10)
+    assert dang_van(paths[:, None, :], A) == pytest.approx(dang_van(stresses, A), rel=1e-10)
 
 
-def test_the_largest_path_is_found_without_all_being_worked_out():
+def test_the_largest_path_is_found_without_evaluating_all():
     rng = np.random.default_rng(5)
     stresses = rng.normal(size=(6, 30, 25)) * rng.uniform(0.5, 1.5, size=(1, 30, 1))
-    each = [dang_van(stresses[:, [path]], A) for path in range(30)]
-    assert dang_van(stresses, A) == max(each)
+    values = [dang_van(stresses[:, [path]], A) for path in range(30)]
+    assert dang_van(stresses, A) == max(values)
 
 
-def test_the_smallest_sphere_is_one():
-    """What makes one: its centre lies among the points that it touches."""
+def test_the_smallest_enclosing_sphere_is_minimal():
+    """Its centre lies in the convex hull of the points on it."""
     rng = np.random.default_rng(1)
     for count in (1, 2, 3, 7, 60):
         points = rng.normal(size=(count, 5))
         centre, radius = smallest_sphere(points)
-        apart = np.linalg.norm(points - centre, axis=1)
-        assert apart.max() == pytest.approx(radius)
-        touching = points[apart >= radius * (1.0 - 1e-8)]
-        rows = np.vstack([touching.T, np.ones(len(touching))])
+        distances = np.linalg.norm(points - centre, axis=1)
+        assert distances.max() == pytest.approx(radius)
+        on_sphere = points[distances >= radius * (1.0 - 1e-8)]
+        rows = np.vstack([on_sphere.T, np.ones(len(on_sphere))])
         within = scipy.optimize.lsq_linear(rows, np.append(centre, 1.0), (0.0, np.inf), tol=1e-14)
         assert within.cost < 1e-10
-    points = np.repeat(points[:4], 3, axis=0)  # doubled
+    points = np.repeat(points[:4], 3, axis=0)  # each point three times
     assert smallest_sphere(points)[1] == pytest.approx(smallest_sphere(points[::3])[1], rel=1e-12)
 
 
-def rolled_by(width, p_max, depth):
-    """Stresses at a depth as Hertz' line contact passes, from 5 half-widths before it to 5
-    behind.
-    """
+def rolling_stresses(width, p_max, depth):
+    """Stresses at one depth as a Hertzian line contact passes, within 5 half-widths either side."""
     grid = Grid((480, 24), (-5.0 * width, -width), (5.0 * width, width), (False, True))
     pressure = p_max * np.sqrt(np.maximum(1.0 - (grid.x[:, None] / width) ** 2, 0.0)) + np.zeros(
         grid.cells
@@ -460,26 +461,26 @@ def rolled_by(width, p_max, depth):
 
 
 def test_dang_van_below_a_rolling_line_contact():
-    """p_h/4 at half a half-width where hydrostatic stress does not count; own values with it,
-    1 %.
-    """
+    """p_h/4 at half a half-width without hydrostatic stress; own values with it, 1 %."""
     conditions = ContactConditions(
         pair=STEEL, geometry="line", radius=0.01, length=0.01, load=5e3, surface_speeds=(1.0, 1.0)
     )
     (width, _), p_max = conditions.hertz.half_widths, conditions.hertz.p_max
-    for slope, deep, least in (
+    for slope, expected_depth, expected in (
         (0.0, 0.5, 0.25),
         (0.2, 0.55, 0.1935),
         (0.3, 0.65, 0.1702),
         (0.5, 0.7, 0.1341),
     ):
         depths = width * np.arange(0.4, 0.85, 0.05)
-        measured = [dang_van(rolled_by(width, p_max, float(depth)), slope) for depth in depths]
-        assert max(measured) / p_max == pytest.approx(least, rel=0.01)
-        assert depths[int(np.argmax(measured))] / width == pytest.approx(deep, abs=0.051)
+        measured = [
+            dang_van(rolling_stresses(width, p_max, float(depth)), slope) for depth in depths
+        ]
+        assert max(measured) / p_max == pytest.approx(expected, rel=0.01)
+        assert depths[int(np.argmax(measured))] / width == pytest.approx(expected_depth, abs=0.051)
 
 
-def test_the_slope_of_fatigue_limits():
+def test_the_dang_van_slope_follows_from_fatigue_limits():
     assert dang_van_slope(300e6, 500e6) == pytest.approx(0.3)
     with pytest.raises(BadInput, match=r"between 0\.5 and 1, got 500 and 300 MPa"):
         dang_van_slope(500e6, 300e6)

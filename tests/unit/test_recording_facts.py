@@ -1,6 +1,4 @@
-"""What files state beside their numbers, and what a table states of them: nothing of it may be lost
-in silence.
-"""
+"""Metadata in files and tables are applied or refused, never ignored."""
 
 from datetime import datetime
 
@@ -29,7 +27,7 @@ def test_packed_values_are_unpacked(tmp_path, packed):
     )
 
 
-def test_a_packing_that_is_no_number_is_refused(tmp_path):
+def test_an_invalid_packing_is_refused(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         data = file.create_dataset("acc", data=np.ones(4000, np.int16))
         data.attrs.update({"fs_hz": 20e3, "unit": "m/s^2", "scale_factor": "one"})
@@ -37,7 +35,7 @@ def test_a_packing_that_is_no_number_is_refused(tmp_path):
         read_recording(tmp_path / "a.h5")
 
 
-def test_hours_across_a_change_of_clocks_are_hours():
+def test_hours_across_a_clock_change_are_elapsed_hours():
     before, after = parse_time("2026-10-25T02:30:00+02:00"), parse_time("2026-10-25T02:30:00+01:00")
     assert (after - before).total_seconds() == 3600.0
     assert parse_time("2026-10-25T02:30:00") == datetime(2026, 10, 25, 2, 30)
@@ -53,11 +51,11 @@ def folders(tmp_path, rows):
     return files, read_table(tmp_path / "table.csv")
 
 
-def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path):
+def test_files_of_one_name_are_distinguished_by_folder(tmp_path):
     files, table = folders(tmp_path, "one/a.npz,1\ntwo\\a.npz,7\n")
     assert [table.place(file).x for file in files] == [1.0, 7.0]
     track = track_recordings(files, TrackSettings(band_hz=(2e3, 4e3)), table=tmp_path / "table.csv")
-    assert [one.x for one in track.recordings] == [1.0, 7.0]
+    assert [recording.x for recording in track.recordings] == [1.0, 7.0]
 
 
 def test_one_row_for_two_files_is_refused(tmp_path):
@@ -72,7 +70,7 @@ def test_a_file_with_two_rows_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("column", "value", "least"),
+    ("column", "value", "bound"),
     [
         ("load_n", -5, "0"),
         ("speed_hz", 0, "0"),
@@ -80,16 +78,16 @@ def test_a_file_with_two_rows_is_refused(tmp_path):
         ("temperature_degc", -400, "-273.15"),
     ],
 )
-def test_a_table_says_nothing_impossible(tmp_path, column, value, least):
+def test_impossible_table_values_are_refused(tmp_path, column, value, bound):
     table = tmp_path / "table.csv"
     table.write_text(f"file,x,{column}\na.npz,1,{value}\n")
     with pytest.raises(
-        BadInput, match=rf"line 2: {column} must be above {least}, got {value}; leave it empty"
+        BadInput, match=rf"line 2: {column} must be above {bound}, got {value}; leave it empty"
     ):
         read_table(table)
 
 
-def test_a_header_against_its_own_times_is_said(tmp_path):
+def test_a_header_that_contradicts_its_times_is_reported(tmp_path):
     times = np.arange(4000) / 20e3
     lines = [
         f"{t:.6f},{v:.5f}"
@@ -107,11 +105,11 @@ def test_a_header_against_its_own_times_is_said(tmp_path):
 
 
 @pytest.mark.parametrize(("moving", "usable"), [(40, False), (19_000, False), (21_000, True)])
-def test_a_sensor_that_stands_still_most_of_the_time_is_dead(tmp_path, moving, usable):
+def test_a_sensor_that_is_mostly_constant_is_dead(tmp_path, moving, usable):
     values = np.ones(40_000)
     values[:moving] = np.random.default_rng(0).standard_normal(moving)
     np.savez(tmp_path / "a.npz", acc=values, fs=20e3, unit="m/s^2")
-    found = check_recording(open_recording(tmp_path / "a.npz"))
-    assert (found.usable, found.dead) == (usable, not usable)
-    words = found.remarks if usable else found.faults
-    assert any("constant for" in sentence for sentence in words)
+    report = check_recording(open_recording(tmp_path / "a.npz"))
+    assert (report.usable, report.dead) == (usable, not usable)
+    sentences = report.remarks if usable else report.faults
+    assert any("constant for" in sentence for sentence in sentences)

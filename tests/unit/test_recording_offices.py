@@ -1,6 +1,4 @@
-"""Recordings as offices and loggers of other countries write them, and files that are no recordings
-at all.
-"""
+"""Recordings from office programs and loggers of other locales; files that are no recordings."""
 
 import zipfile
 from datetime import datetime
@@ -14,13 +12,13 @@ from asperity.monitoring.reading import read_spectrum
 from asperity.recording import ReadOptions, read_recording
 
 VALUES = np.round(300.0 * np.random.default_rng(2).standard_normal(60), 2)
-VALUES[[7, 31]] = 1234.5, -2345.25  # with a separator of thousands
+VALUES[[7, 31]] = 1234.5, -2345.25  # with a thousands separator
 GERMAN, ENGLISH = str.maketrans(",.", ".,"), {}
 
 
-def rows(stamp, separator, swap):
+def rows(format_time, separator, translation):
     return "".join(
-        f"{stamp(k)}{separator}{f'{value:,.2f}'.translate(swap)}\n"
+        f"{format_time(k)}{separator}{f'{value:,.2f}'.translate(translation)}\n"
         for k, value in enumerate(VALUES)
     )
 
@@ -63,7 +61,7 @@ def rows(stamp, separator, swap):
         ),
     ],
 )
-def test_a_text_of_another_country_is_read_in_full(tmp_path, name, text, rate, started):
+def test_text_of_another_locale_is_read_in_full(tmp_path, name, text, rate, started):
     (tmp_path / name).write_text(text, "utf-8")
     channel = {} if name[0] in "g" or name == "am-pm.csv" else {"channel": "2"}
     recording = read_recording(tmp_path / name, **channel)
@@ -73,8 +71,8 @@ def test_a_text_of_another_country_is_read_in_full(tmp_path, name, text, rate, s
     assert started is None or recording.facts["started"].value == started
 
 
-def test_archives_say_what_they_are_and_what_to_do(tmp_path):
-    for name, inside, said in (
+def test_archives_are_refused_with_advice(tmp_path):
+    for name, content, message in (
         ("rec.zip", "a.csv", "rec.zip is a zip archive of 1 files; unpack it"),
         (
             "rec.xlsx",
@@ -84,19 +82,19 @@ def test_archives_say_what_they_are_and_what_to_do(tmp_path):
         ("book.csv", "xl/workbook.xml", "book.csv is an Excel workbook"),
     ):
         with zipfile.ZipFile(tmp_path / name, "w") as packed:
-            packed.writestr(inside, "1,2\n")
-        with pytest.raises(UnreadableFile, match=said):
+            packed.writestr(content, "1,2\n")
+        with pytest.raises(UnreadableFile, match=message):
             read_recording(tmp_path / name)
     np.savez(tmp_path / "named.npz", acc=np.tile(VALUES, 40), fs=250.0, unit="m/s^2")
     (tmp_path / "named.npz").rename(tmp_path / "named.dat")
     assert np.array_equal(read_recording(tmp_path / "named.dat").values, np.tile(VALUES, 40))
 
 
-def test_what_is_no_recording_takes_no_place(tmp_path):
+def test_other_files_are_not_counted_as_recordings(tmp_path):
     for number in range(4):
-        stamp = f"2024.01.31.{number:02}.00.00"
+        time_stamp = f"2024.01.31.{number:02}.00.00"
         np.savez(
-            tmp_path / f"{stamp}.npz",
+            tmp_path / f"{time_stamp}.npz",
             acc=np.random.default_rng(number).standard_normal(4000),
             fs=4e3,
             unit="g",
@@ -113,22 +111,22 @@ def test_what_is_no_recording_takes_no_place(tmp_path):
     (tmp_path / "2024.01.31.01.30.00.npz").write_bytes(b"cut")
     track = track_recordings([tmp_path], TrackSettings(band_hz=(500.0, 1500.0)))
     assert track.x_name == "time_h"
-    placed = {row["file"][-23:]: row["x"] for row in track.scalars()["recordings"]}
-    assert sorted(x for x in placed.values() if x is not None) == [0.0, 1.0, 2.0, 3.0]
-    assert sum(x is None for x in placed.values()) == 2
+    x_by_file = {row["file"][-23:]: row["x"] for row in track.scalars()["recordings"]}
+    assert sorted(x for x in x_by_file.values() if x is not None) == [0.0, 1.0, 2.0, 3.0]
+    assert sum(x is None for x in x_by_file.values()) == 2
 
 
-def test_bursts_of_lost_samples_leave_neither_lines_nor_a_slope(tmp_path):
-    """Held for 10 ms ten times a second, 40 % of the pieces: what is left has the spectrum of what
-    was not lost.
+def test_bursts_of_lost_samples_add_neither_lines_nor_a_slope(tmp_path):
+    """Held for 10 ms ten times a second (40 % of segments): the rest gives the undisturbed
+    spectrum.
     """
     rng = np.random.default_rng(3)
-    whole = rng.standard_normal(20 * 20_000)
-    held = whole.copy()
-    for first in range(0, 2 * held.size // 5, 2_000):
-        held[first : first + 200] = held[first]
+    complete = rng.standard_normal(20 * 20_000)
+    interrupted = complete.copy()
+    for first in range(0, 2 * interrupted.size // 5, 2_000):
+        interrupted[first : first + 200] = interrupted[first]
     densities = []
-    for name, values in (("whole", whole), ("held", held)):
+    for name, values in (("whole", complete), ("held", interrupted)):
         np.savez(tmp_path / f"{name}.npz", acc=values, fs=20e3, unit="m/s^2")
         reading = read_spectrum(
             tmp_path / f"{name}.npz", ReadOptions(), search_target(None, (2e3, 4e3)), 4.0

@@ -1,4 +1,4 @@
-"""The report page: it loads nothing, says every number with its unit, and hides no failure."""
+"""Report page: loads nothing, states every number with its unit, and shows every failure."""
 
 import re
 from dataclasses import replace
@@ -83,13 +83,15 @@ HISTORY = tuple(
 
 
 def solution_like(case, surface=None, status=SolveStatus.CONVERGED):
-    """Fields a solver could have returned: Hertz's, with contact where the roughness is highest."""
+    """Fields a solver could return: Hertz pressure, with contact on the highest roughness."""
     surface = surface or case.surface()
     x = surface.grid.x[:, None]
     half_width, p_max = case.conditions.hertz.half_widths[0], case.conditions.hertz.p_max
     gap = line_gap(x, half_width, case.conditions.radius_along_rolling) + 0.7e-6 - surface.heights
-    touching = (gap <= 5e-9) & (np.abs(x) < 2.0 * half_width)
-    pressure = line_pressure(x, half_width, p_max) * np.ones(surface.grid.cells) + 0.4e9 * touching
+    in_contact = (gap <= 5e-9) & (np.abs(x) < 2.0 * half_width)
+    pressure = (
+        line_pressure(x, half_width, p_max) * np.ones(surface.grid.cells) + 0.4e9 * in_contact
+    )
     return ContactSolution(
         conditions=case.conditions,
         lubricant=case.lubricant,
@@ -97,7 +99,7 @@ def solution_like(case, surface=None, status=SolveStatus.CONVERGED):
         options=case.options,
         pressure=pressure,
         gap=np.maximum(gap, 5e-9),
-        in_contact=touching,
+        in_contact=in_contact,
         rigid_approach=0.0,
         convergence=Convergence(status, HISTORY, 1e-4, 1.234),
     )
@@ -129,23 +131,25 @@ def run_like(text=CASE, *, status=SolveStatus.CONVERGED, surface=None, notes=(),
         else contact_vibration(state, case.conditions, case.vibration)
     )
     solution = solution_like(case, case.stored, status)
-    return doubted(Run(case=case, solution=solution, state=state, vibration=vibration, notes=notes))
+    return with_uncertainty(
+        Run(case=case, solution=solution, state=state, vibration=vibration, notes=notes)
+    )
 
 
-def doubted(run, half=None, others=()):
-    """The run with an error bar of its load share, and numbers of further surfaces."""
+def with_uncertainty(run, half=None, others=()):
+    """The run with an interval of its load share and numbers of further surfaces."""
     sides = None if half is None else (half, half)
-    known = ContactError(
+    contact_error = ContactError(
         clr=Uncertainty(value=run.state.clr, iteration=sides, grid=sides, range=(0.0, 1.0))
     )
-    state = replace(run.state, error=known)
+    state = replace(run.state, error=contact_error)
     rows = (run.summary_row, *others)
     error = total_error(state, rows, run.case.conditions, run.case.vibration, run.vibration)
     return replace(run, state=replace(state, error=error), others=tuple(others))
 
 
 class Page(HTMLParser):
-    """Tags with their attributes, and the text of each table row, cell by cell."""
+    """Parsed page: tags with attributes, and table rows as text cells."""
 
     def __init__(self, html):
         super().__init__()
@@ -177,10 +181,8 @@ class Page(HTMLParser):
 
 
 @pytest.fixture
-def unprinted(monkeypatch):
-    """Figures are drawn and not printed, which is most of a page's time, where its words are what
-    is asked for.
-    """
+def without_image_files(monkeypatch):
+    """Draw figures without encoding them, which takes most of a page's time; for tests of text."""
     monkeypatch.setattr(base, "svg", lambda figure: f"<svg>{figure.get_label()}</svg>")
 
 
@@ -201,10 +203,10 @@ def several():
     return Page(page.render_page(runs))
 
 
-@pytest.mark.parametrize("which", ["single", "several"])
-def test_page_loads_nothing(which, request):
-    shown = request.getfixturevalue(which)
-    assert not {tag for tag, _ in shown.tags} & {
+@pytest.mark.parametrize("fixture", ["single", "several"])
+def test_page_loads_nothing(fixture, request):
+    parsed = request.getfixturevalue(fixture)
+    assert not {tag for tag, _ in parsed.tags} & {
         "script",
         "iframe",
         "object",
@@ -212,16 +214,16 @@ def test_page_loads_nothing(which, request):
         "video",
         "audio",
     }
-    for tag, attributes in shown.tags:
+    for tag, attributes in parsed.tags:
         for name in ("src", "href", "srcset", "data", "poster", "action"):
             target = attributes.get(name, "data:")
             linked = tag == "a" and target.startswith(
                 ("#", "https://doi.org/")
-            )  # a link loads nothing by itself
+            )  # a link alone loads nothing
             assert linked or target.startswith("data:"), (tag, name, target[:80])
-    assert "url(" not in re.sub(r'src="data:[^"]*"', "", shown.html)
-    assert "@import" not in shown.html
-    for image in shown.images():
+    assert "url(" not in re.sub(r'src="data:[^"]*"', "", parsed.html)
+    assert "@import" not in parsed.html
+    for image in parsed.images():
         drawing = unquote(image["src"])
         for target in re.findall(r'href="([^"]*)"', drawing) + re.findall(
             r"url\(([^)]*)\)", drawing
@@ -249,16 +251,16 @@ def test_page_loads_nothing(which, request):
         ("Converged", "yes", ""),
     ],
 )
-def test_every_number_is_there_with_its_unit(single, name, value, unit):
+def test_every_number_is_shown_with_its_unit(single, name, value, unit):
     (row,) = [row for row in single.rows if row[0].startswith(name)]
     assert row[1:] == [value, unit]
 
 
-@pytest.mark.usefixtures("unprinted")
-def test_a_new_quantity_of_a_shown_group_is_in_the_table(monkeypatch):
-    made_up = replace(quantity("clr"), key="made_up", symbol="", name="made-up share", deviation="")
-    known = {**catalogue(), "made_up": made_up}
-    monkeypatch.setattr("asperity.core.quantities.catalogue", lambda: known)
+@pytest.mark.usefixtures("without_image_files")
+def test_a_new_quantity_of_a_shown_group_appears_in_the_table(monkeypatch):
+    extra = replace(quantity("clr"), key="made_up", symbol="", name="made-up share", deviation="")
+    extended = {**catalogue(), "made_up": extra}
+    monkeypatch.setattr("asperity.core.quantities.catalogue", lambda: extended)
     (row,) = [
         row
         for row in Page(page.render_page([run_like()])).rows
@@ -267,16 +269,14 @@ def test_a_new_quantity_of_a_shown_group_is_in_the_table(monkeypatch):
     assert row[1:] == ["54.2", "%"]
 
 
-@pytest.mark.usefixtures("unprinted")
-def test_a_resonance_is_not_given_with_its_record_s_deviation_alone(single):
-    """The fit to one record knows its frequency to some hertz where the load share's error bar is
-    worth a hundred.
-    """
+@pytest.mark.usefixtures("without_image_files")
+def test_a_resonance_has_more_than_its_records_fit_deviation(single):
+    """The fit gives some hertz, while the error of the load share contributes a hundred."""
     resonance = run_like().vibration.resonance
     (row,) = [row for row in single.rows if row[0].startswith("Contact resonance frequency")]
     assert float(row[1]) == pytest.approx(resonance.crf_hz, abs=0.06)
-    shown = Page(page.render_page([doubted(run_like(), 0.02)]))
-    (row,) = [row for row in shown.rows if row[0].startswith("Contact resonance frequency")]
+    parsed = Page(page.render_page([with_uncertainty(run_like(), 0.02)]))
+    (row,) = [row for row in parsed.rows if row[0].startswith("Contact resonance frequency")]
     low, high = (float(end) for end in re.search(r"\((\d+) to (\d+)\)", row[1]).groups())
     assert high - low > 10.0 * resonance.crf_std
     assert row[2] == "Hz"
@@ -299,7 +299,7 @@ def test_conditions_are_those_of_the_paper(single):
     assert rows["Domain"] == "x from −4.50 a to 1.90 a, y from −1.60 a to 1.60 a, repeating in y"
 
 
-def test_only_what_differs_is_told_apart(several):
+def test_runs_are_labelled_by_their_differences_only(several):
     rows = several.html.split('<tr class="varies">')[1:]
     names = [re.search(r"<th[^>]*>([^<]*)<", row)[1] for row in rows]
     fits = [
@@ -320,7 +320,7 @@ def test_only_what_differs_is_told_apart(several):
     assert next(row for row in several.rows if row[0] == "Rheology")[1:] == ["newtonian"]
 
 
-def test_unconverged_run_is_loud(several):
+def test_an_unconverged_run_is_prominent(several):
     assert "NOT CONVERGED" in several.html
     assert "stalled after 12 steps" in several.html.lower()
     header = next(row for row in several.rows if row[0] == "Quantity")
@@ -337,43 +337,43 @@ def test_unconverged_run_is_loud(several):
     assert verdicts == ["verdict", "verdict unfinished", "verdict"]
 
 
-def test_converged_run_raises_no_alarm(single):
+def test_a_converged_run_shows_no_warning(single):
     assert "not converged" not in single.text.lower()
 
 
-def test_text_from_outside_is_escaped():
+def test_external_text_is_escaped():
     hostile = CASE.replace(
         'kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', ""
     )
     hostile = hostile.replace("[surface]", '[surface]\nfile = "<script>alert(1)</script>.opd"')
     surface = load_case(CASE).surface()
-    shown = Page(
+    parsed = Page(
         page.render_page(
             [run_like(hostile, surface=surface, notes=("<img src=x>",))], title="<b>&</b>"
         )
     )
-    assert not [tag for tag, _ in shown.tags if tag in ("script", "b")]
-    assert all(image["src"].startswith("data:") for image in shown.images())
-    assert "<script>alert(1)</script>.opd" in shown.text
-    assert "<img src=x>" in shown.text
-    assert "<b>&</b>" in shown.text
+    assert not [tag for tag, _ in parsed.tags if tag in ("script", "b")]
+    assert all(image["src"].startswith("data:") for image in parsed.images())
+    assert "<script>alert(1)</script>.opd" in parsed.text
+    assert "<img src=x>" in parsed.text
+    assert "<b>&</b>" in parsed.text
 
 
 def test_several_runs_are_drawn_against_roughness(single, several):
-    def drawn(shown, title):
+    def has_figure(shown, title):
         return sum(title in unquote(image["src"]) for image in shown.images())
 
     for title in ("Asperity load and area share", ">Contact resonance frequency<"):
-        assert drawn(single, title) == 0
-        assert drawn(several, title) == 1
-    assert drawn(several, "Film thickness") == 3
+        assert has_figure(single, title) == 0
+        assert has_figure(several, title) == 1
+    assert has_figure(several, "Film thickness") == 3
     assert "20.0 to 69.4 %" in several.text.replace(
         "\N{NO-BREAK SPACE}", " "
     )  # oil-flow imbalance over the runs
 
 
-@pytest.mark.usefixtures("unprinted")
-def test_figures_carry_their_error_where_it_shows():
+@pytest.mark.usefixtures("without_image_files")
+def test_figures_show_error_bars_where_visible():
     run = run_like()
     errors = Figures(car=0.0123, clr=0.0456, h_min=1e-12, h_central=7.1e-9)
     none = errors.scale(0.0)
@@ -405,16 +405,16 @@ def test_figures_carry_their_error_where_it_shows():
     )
 
 
-@pytest.mark.usefixtures("unprinted")
-def test_runs_of_one_roughness_are_not_drawn_against_it():
-    shown = Page(page.render_page([run_like(), run_like()]))
+@pytest.mark.usefixtures("without_image_files")
+def test_runs_of_equal_roughness_are_not_drawn_over_it():
+    parsed = Page(page.render_page([run_like(), run_like()]))
     assert not any(
-        "Asperity load and area share" in unquote(image["src"]) for image in shown.images()
+        "Asperity load and area share" in unquote(image["src"]) for image in parsed.images()
     )
-    assert "2 runs, Sq 1.25 µm" in shown.text
+    assert "2 runs, Sq 1.25 µm" in parsed.text
 
 
-def test_page_can_be_read_without_seeing_it(several):
+def test_page_is_readable_by_screen_readers(several):
     assert ("html", {"lang": "en"}) in several.tags
     assert all(len(image["alt"]) > 30 for image in several.images())
     assert all("scope" in attributes for tag, attributes in several.tags if tag == "th")
@@ -424,7 +424,7 @@ def test_page_can_be_read_without_seeing_it(several):
     assert targets <= set(identifiers)
 
 
-def test_says_what_was_done_what_is_left_out_and_whom_to_cite(single):
+def test_page_states_method_limits_and_citation(single):
     assert "Filled 0.2\N{NO-BREAK SPACE}% missing cells" in single.text
     for limit in (
         "Cavities are refilled",
@@ -439,7 +439,7 @@ def test_says_what_was_done_what_is_left_out_and_whom_to_cite(single):
     assert run_like().case.text in single.text
 
 
-@pytest.mark.usefixtures("unprinted")
+@pytest.mark.usefixtures("without_image_files")
 @pytest.mark.parametrize(
     ("model", "stated", "not_stated"),
     [
@@ -453,7 +453,7 @@ def test_says_what_was_done_what_is_left_out_and_whom_to_cite(single):
         ),
     ],
 )
-def test_limits_state_the_oil_balance_of_the_model(model, stated, not_stated):
+def test_limits_state_the_models_oil_balance(model, stated, not_stated):
     text = Page(page.render_page([run_like(f'model = "{model}"\n{CASE}')])).text
     limits = text[text.rindex("\nLimits\n") :]
     assert stated in limits
@@ -461,16 +461,16 @@ def test_limits_state_the_oil_balance_of_the_model(model, stated, not_stated):
     assert "69.4\N{NO-BREAK SPACE}% of the oil carried through the Hertz zone" in limits
 
 
-@pytest.mark.usefixtures("unprinted")
-def test_limits_of_several_models_are_stated_once_each():
+@pytest.mark.usefixtures("without_image_files")
+def test_limits_of_several_models_are_each_stated_once():
     runs = [run_like(f'model = "{model}"\n{CASE}') for model in ("mixed", "mixed", "conserving")]
     text = Page(page.render_page(runs)).text
     limits = text[text.rindex("\nLimits\n") :]
     assert limits.count("Cavities are refilled.") == limits.count("Mass-conserving") == 1
 
 
-@pytest.mark.usefixtures("unprinted")
-def test_what_is_left_out_follows_what_the_run_took():
+@pytest.mark.usefixtures("without_image_files")
+def test_limits_depend_on_what_the_run_included():
     thinning = CASE.replace('law = "newtonian"', 'law = "ree-eyring", tau0 = "5 MPa"')
     assert thinning != CASE
     assert "Newtonian." not in Page(page.render_page([run_like(thinning)])).text
@@ -480,23 +480,29 @@ def test_what_is_left_out_follows_what_the_run_took():
     assert "Stiffness of a sphere" not in Page(page.render_page([run_like(line)])).text
 
 
-def test_silent_dry_and_deaf_runs_have_a_page_too():
+def test_runs_without_contact_oil_or_spectrum_have_a_page():
     smooth = CASE.replace(
         'kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', 'kind = "flat"'
     )
-    silent = Page(page.render_page([run_like(smooth, sq=0.0, clr=0.0, car=0.0, lambda_ratio=None)]))
-    assert "No spectrum" in silent.text
-    assert next(row for row in silent.rows if row[0].startswith("Lambda ratio"))[1] == "–"
-    assert next(row for row in silent.rows if row[0].startswith("Contact resonance"))[1] == "–"
+    smooth_page = Page(
+        page.render_page([run_like(smooth, sq=0.0, clr=0.0, car=0.0, lambda_ratio=None)])
+    )
+    assert "No spectrum" in smooth_page.text
+    assert next(row for row in smooth_page.rows if row[0].startswith("Lambda ratio"))[1] == "–"
+    assert next(row for row in smooth_page.rows if row[0].startswith("Contact resonance"))[1] == "–"
 
     dry = re.sub(r"\[lubricant\].*?(?=\[surface\])", "", CASE, flags=re.DOTALL)
-    deaf = 'lubricant = "none"\n' + dry.split("[vibration]")[0]
-    shown = Page(page.render_page([run_like(deaf, lambda_ratio=None, mass_flux_imbalance=0.0)]))
-    assert "none: dry contact" in shown.text
-    limits = shown.text[shown.text.rindex("\nLimits\n") :]
+    dry_without_vibration = 'lubricant = "none"\n' + dry.split("[vibration]")[0]
+    parsed = Page(
+        page.render_page(
+            [run_like(dry_without_vibration, lambda_ratio=None, mass_flux_imbalance=0.0)]
+        )
+    )
+    assert "none: dry contact" in parsed.text
+    limits = parsed.text[parsed.text.rindex("\nLimits\n") :]
     assert "The contact is dry" in limits
     assert not any(words in limits for words in ("conserv", "refilled", "A snapshot"))
-    assert "cavitated" not in unquote(shown.images()[0]["src"])
+    assert "cavitated" not in unquote(parsed.images()[0]["src"])
 
 
 def test_every_report_has_its_template():
@@ -508,12 +514,12 @@ def test_every_report_has_its_template():
     assert [name for name in names if not (folder / name).is_file()] == []
 
 
-def test_same_run_gives_the_same_bytes(tmp_path, single):
+def test_the_same_run_gives_the_same_bytes(tmp_path, single):
     out = write_report([run_like(notes=("filled 0.2 % missing cells",))], tmp_path / "report.html")
     assert out.read_text("utf-8") == single.html
 
 
-def test_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+def test_page_is_written_completely_or_not_at_all(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise KeyboardInterrupt
 
@@ -542,17 +548,17 @@ def test_report_needs_a_run_and_a_folder(tmp_path):
         (None, None, ("–", "")),
     ],
 )
-def test_a_tile_sets_deviation_and_unit_apart(value, deviation, parts):
+def test_a_tile_separates_deviation_and_unit(value, deviation, parts):
     assert base.tile(quantity("clr"), {"clr": value, "clr_error": deviation})[1:] == parts
 
 
 def test_a_tile_repeats_the_power_of_ten():
-    shown = base.tile(quantity("crfa"), {"crfa": 0.0003172, "crfa_std": 0.00002114})
-    assert shown[1:] == ("3.17×10⁻⁴", "± 0.21×10⁻⁴ (m/s²)²/Hz")
+    tile = base.tile(quantity("crfa"), {"crfa": 0.0003172, "crfa_std": 0.00002114})
+    assert tile[1:] == ("3.17×10⁻⁴", "± 0.21×10⁻⁴ (m/s²)²/Hz")
 
 
 @pytest.mark.parametrize(
-    ("written", "shown"),
+    ("written", "expected"),
     [
         ("residual 6.2e-03; tolerance 1e-04", "residual 6.2×10⁻³; tolerance 1×10⁻⁴"),
         ("54.2 % of it at 3461.2 ± 2.3 Hz", "54.2~% of it at 3461.2~±~2.3~Hz"),
@@ -560,14 +566,14 @@ def test_a_tile_repeats_the_power_of_ten():
         ("Sq 1.25 um after 3 us, sq_um", "Sq 1.25~µm after 3 µs, sq_um"),
     ],
 )
-def test_prose_is_set_as_in_print(written, shown):
-    assert base.in_print(written) == shown.replace("~", "\N{NO-BREAK SPACE}")
+def test_prose_is_typeset_as_in_print(written, expected):
+    assert base.in_print(written) == expected.replace("~", "\N{NO-BREAK SPACE}")
 
 
-@pytest.mark.usefixtures("unprinted")
-def test_load_on_capped_oil_is_not_hidden():
-    shown = page.render_page([run_like(capped_oil_load_ratio=0.5)])
-    assert "without contact carry 50.0\N{NO-BREAK SPACE}% of the load" in shown
+@pytest.mark.usefixtures("without_image_files")
+def test_load_on_capped_oil_is_shown():
+    html = page.render_page([run_like(capped_oil_load_ratio=0.5)])
+    assert "without contact carry 50.0\N{NO-BREAK SPACE}% of the load" in html
 
 
 # Figures
@@ -579,7 +585,7 @@ ROUGH = "composite roughness, Sq [µm]"
 
 
 def labels_of(exhibit):
-    """Every label of its axes."""
+    """All axis labels of an exhibit."""
     return [
         label
         for axes in exhibit.figure().axes
@@ -614,16 +620,16 @@ def test_every_axis_of_friction_and_heat_has_a_label_with_its_unit():
     run = run_like()
     shear = labels_of(friction_maps.traction_map(run, run.friction))
     assert shear == [*MAP, "surface traction [MPa]"]
-    hotter = labels_of(friction_maps.temperature_map(run, run.friction, run.heat))
-    assert hotter == [*MAP, "surface temperature rise [K]"]
+    temperature_labels = labels_of(friction_maps.temperature_map(run, run.friction, run.heat))
+    assert temperature_labels == [*MAP, "surface temperature rise [K]"]
     assert labels_of(friction_maps.temperature_line(run, run.heat)) == [
         "x along rolling [µm]",
         "temperature rise [K]",
     ]
 
 
-def test_resonance_over_roughness_has_its_whole_interval():
-    """Not the fit's alone, which leaves out what cells and surfaces do."""
+def test_resonance_over_roughness_has_its_full_interval():
+    """Including the errors of grid and surfaces, not only that of the fit."""
     points = [
         {**run_like().scalars(), "crf_hz": 2500.0, "crf_low_hz": 2300.0, "crf_high_hz": 2550.0}
     ]
@@ -646,7 +652,7 @@ def test_every_axis_over_roughness_and_frequency_has_a_label_with_its_unit():
     assert density == ["frequency [Hz]", "acceleration density [(m/s²)²/Hz]"]
 
 
-def test_the_circle_in_the_section_stands_on_the_largest_stress():
+def test_the_circle_in_the_section_marks_the_largest_stress():
     run = run_like()
     axes = friction_maps.stress_section(run).figure().axes[0]
     (image,), (circle,) = axes.images, axes.get_lines()
@@ -655,13 +661,13 @@ def test_the_circle_in_the_section_stands_on_the_largest_stress():
     peak = run.stress.peak
     x, depth = (float(value[0]) for value in circle.get_data())
     assert (x, depth) == pytest.approx((peak.x * 1e6, peak.depth * 1e6))
-    shown = image.get_array()
-    row, column = np.unravel_index(shown.argmax(), shown.shape)
-    assert left + (column + 0.5) / shown.shape[1] * (right - left) == pytest.approx(x)
-    assert (row + 0.5) / shown.shape[0] * bottom == pytest.approx(depth, abs=0.15 * bottom)
+    pixels = image.get_array()
+    row, column = np.unravel_index(pixels.argmax(), pixels.shape)
+    assert left + (column + 0.5) / pixels.shape[1] * (right - left) == pytest.approx(x)
+    assert (row + 0.5) / pixels.shape[0] * bottom == pytest.approx(depth, abs=0.15 * bottom)
 
 
-def test_stress_over_depth_stands_beside_that_of_hertz():
+def test_stress_over_depth_is_compared_with_hertz():
     run = run_like()
     axes = friction_maps.stress_over_depth(run).figure().axes[0]
     lines = {line.get_label(): line for line in axes.get_lines()}
@@ -681,7 +687,7 @@ def test_temperatures_are_cut_through_the_hottest_cell():
     assert max(first.max(), second.max()) == pytest.approx(run.heat.max_k)
 
 
-def test_friction_heat_and_stress_are_numbers_of_the_page(single):
+def test_friction_heat_and_stress_are_on_the_page(single):
     rows = {row[0]: row[1] for row in single.rows}
     run = run_like()
     assert (
@@ -705,8 +711,8 @@ def test_friction_heat_and_stress_are_numbers_of_the_page(single):
     )
 
 
-@pytest.mark.usefixtures("unprinted")
-def test_a_run_in_pure_rolling_and_one_without_friction_say_so(monkeypatch):
+@pytest.mark.usefixtures("without_image_files")
+def test_pure_rolling_and_failed_friction_are_stated(monkeypatch):
     rolling = Page(page.render_page([run_like(CASE.replace("slip = 0.2", "slip = 0.0"))]))
     assert "both surfaces move at the same speed" in rolling.text
     assert len(rolling.images()) == len(Page(page.render_page([run_like()])).images()) - 3
@@ -715,27 +721,25 @@ def test_a_run_in_pure_rolling_and_one_without_friction_say_so(monkeypatch):
         raise AsperityError("friction and temperature did not converge")
 
     monkeypatch.setattr("asperity.results.run.friction_and_heat", refuse)
-    unsettled = Page(page.render_page([run_like()]))
-    assert "No friction and temperature figures: friction and temperature did not" in unsettled.text
-    assert (
-        next(row[1] for row in unsettled.rows if row[0].startswith("Friction coefficient")) == "–"
-    )
+    failed = Page(page.render_page([run_like()]))
+    assert "No friction and temperature figures: friction and temperature did not" in failed.text
+    assert next(row[1] for row in failed.rows if row[0].startswith("Friction coefficient")) == "–"
 
 
-@pytest.mark.usefixtures("unprinted")
-def test_heat_that_acts_back_is_not_left_out():
+@pytest.mark.usefixtures("without_image_files")
+def test_thermal_feedback_is_not_listed_as_omitted():
     assert "Isothermal film." in Page(page.render_page([run_like()])).text
     warm = CASE + "[thermal]\nfeedback = true\n"
     assert "Isothermal film." not in Page(page.render_page([run_like(warm)])).text
 
 
-def test_contact_is_drawn_where_it_is():
+def test_contact_is_drawn_at_its_position():
     run = run_like()
     solution = run.solution
-    touching = np.zeros(solution.grid.cells, dtype=bool)
-    touching[3, 20] = True
+    in_contact = np.zeros(solution.grid.cells, dtype=bool)
+    in_contact[3, 20] = True
     axes = (
-        contact.contact_map(replace(run, solution=replace(solution, in_contact=touching)))
+        contact.contact_map(replace(run, solution=replace(solution, in_contact=in_contact)))
         .figure()
         .axes[0]
     )
@@ -753,7 +757,7 @@ def test_contact_is_drawn_where_it_is():
     )
 
 
-def test_shares_of_the_map_are_those_of_the_run():
+def test_map_shares_equal_those_of_the_run():
     run = run_like()
     alt = contact.contact_map(run).alt
     shares = [float(share) for share in re.findall(r"([\d.]+) %", alt)]
@@ -762,7 +766,7 @@ def test_shares_of_the_map_are_those_of_the_run():
     assert sum(shares) == pytest.approx(100.0, abs=0.11)
 
 
-def test_hertz_is_dashed_beside_the_solved_pressure():
+def test_hertz_is_dashed_with_the_solved_pressure():
     run = run_like()
     solution = run.solution
     upper, lower = contact.centre_line(run).figure().axes
@@ -776,20 +780,20 @@ def test_hertz_is_dashed_beside_the_solved_pressure():
     np.testing.assert_allclose(lower.lines[0].get_ydata(), solution.gap[:, row] * 1e6)
 
 
-def test_resonance_is_marked_where_it_was_found():
+def test_the_resonance_is_marked_at_its_frequency():
     run = run_like()
     (axes,) = vibration.spectrum(run.vibration, run.resonance_text()).figure().axes
-    marks = {
+    markers = {
         line.get_label(): line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2
     }
-    assert marks["CRF ± 2 std"] == run.vibration.resonance.crf_hz
-    assert marks["CRF at full load"] == run.vibration.full_load_crf_hz
+    assert markers["CRF ± 2 std"] == run.vibration.resonance.crf_hz
+    assert markers["CRF at full load"] == run.vibration.full_load_crf_hz
     fitted = next(line for line in axes.lines if line.get_label() == "fitted resonance")
     peak = fitted.get_xdata()[np.argmax(fitted.get_ydata())]
     assert peak == pytest.approx(run.vibration.resonance.crf_hz, rel=2e-3)
 
 
-def test_highest_point_has_neither_curve_nor_interval():
+def test_a_peak_search_has_neither_curve_nor_interval():
     run = run_like(CASE + 'method = "peak"\n')
     (axes,) = vibration.spectrum(run.vibration, run.resonance_text()).figure().axes
     labels = {line.get_label() for line in axes.lines}
@@ -797,23 +801,23 @@ def test_highest_point_has_neither_curve_nor_interval():
     assert "fitted resonance" not in labels
 
 
-def test_surface_map_is_a_png_and_nothing_else(tmp_path):
+def test_surface_map_is_only_a_png(tmp_path):
     heights = 1e-6 * np.random.default_rng(1).standard_normal((40, 30))
     heights[5, 7] = np.nan
     grid = Grid((40, 30), (0.0, 0.0), (40e-6, 30e-6), (False, False))
     surface = MeasuredSurface(heights, grid, "ring $1$.x3p", "X3P")
-    described = SurfaceDescription(
+    description = SurfaceDescription(
         Path(surface.name), surface, surface, surface_parameters(surface), ()
     )
-    out = surface_map(described, tmp_path / "map.png")
+    out = surface_map(description, tmp_path / "map.png")
     assert out.read_bytes().startswith(b"\x89PNG")
-    assert out.read_bytes() == surface_map(described, tmp_path / "again.png").read_bytes()
+    assert out.read_bytes() == surface_map(description, tmp_path / "again.png").read_bytes()
     with pytest.raises(BadInput, match="png"):
-        surface_map(described, tmp_path / "map.jpg")
+        surface_map(description, tmp_path / "map.jpg")
     assert sorted(file.name for file in tmp_path.iterdir()) == ["again.png", "map.png"]
 
 
-def test_flat_surface_can_be_drawn():
+def test_a_flat_surface_can_be_drawn():
     surface = flat_surface(load_case(CASE).grid)
     assert isinstance(surface, Surface)
     run = run_like()

@@ -1,6 +1,4 @@
-"""A roller's shape along its length: closed forms, refusals, slices, and the way through a case and
-a file.
-"""
+"""Roller profiles: closed forms, refusals, slices, case and file."""
 
 import json
 import math
@@ -62,7 +60,7 @@ def case_text(**changes: str) -> str:
     )
 
 
-def test_johns_and_gohars_drop_is_that_of_the_reference():
+def test_johns_and_gohars_drop_equals_the_reference():
     """w'/(pi E*) 0.56245 um, end drop 2.9284 um at 2000 N on 10 mm."""
     shape = RollerShape.johns_gohar(LOAD, LENGTH, RADIUS, STEEL.reduced_modulus)
     assert shape.amplitude == pytest.approx(0.56245e-6, rel=1e-5)
@@ -72,14 +70,16 @@ def test_johns_and_gohars_drop_is_that_of_the_reference():
     assert math.exp(-0.5) / 2.0 == pytest.approx(0.3033, abs=5e-5)
 
 
-def test_isos_profile_is_the_printed_one():
+def test_isos_profile_equals_the_printed_formula():
     y = np.array([0.0, 1e-3, -3e-3, 4.5e-3])
     assert ISO.drop(y, LENGTH) == pytest.approx(
         0.00035 * 9e-3 * np.log(1.0 / (1.0 - (2.0 * y / LENGTH) ** 2))
     )
     long = RollerShape.iso(3e-3, LENGTH)
-    beyond = np.maximum(2.0 * np.abs(y) - (LENGTH - 7.5e-3), 0.0) / 7.5e-3
-    assert long.drop(y, LENGTH) == pytest.approx(0.0005 * 3e-3 * np.log(1.0 / (1.0 - beyond**2)))
+    relative_excess = np.maximum(2.0 * np.abs(y) - (LENGTH - 7.5e-3), 0.0) / 7.5e-3
+    assert long.drop(y, LENGTH) == pytest.approx(
+        0.0005 * 3e-3 * np.log(1.0 / (1.0 - relative_excess**2))
+    )
 
 
 def test_crown_flat_chamfer_and_tilt_add_up():
@@ -96,7 +96,7 @@ def test_crown_flat_chamfer_and_tilt_add_up():
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         ({"amplitude": -1e-6}, "amplitude must be 0 m or more"),
         ({"end_drop": 1e-6}, "belongs to a logarithm"),
@@ -108,12 +108,12 @@ def test_crown_flat_chamfer_and_tilt_add_up():
         ),
     ],
 )
-def test_a_shape_that_cannot_be_is_refused(given, said):
-    with pytest.raises(asp.BadInput, match=said):
+def test_an_impossible_shape_is_refused(given, message):
+    with pytest.raises(asp.BadInput, match=message):
         RollerShape(**given)
 
 
-def test_conditions_that_do_not_fit_are_refused():
+def test_inconsistent_conditions_are_refused():
     with pytest.raises(asp.BadInput, match="a roller contact needs its length"):
         roller(length=None)
     with pytest.raises(asp.BadInput, match="no room for chamfers"):
@@ -125,7 +125,7 @@ def test_conditions_that_do_not_fit_are_refused():
 
 
 @pytest.mark.parametrize(
-    ("given", "load", "said"),
+    ("given", "load", "message"),
     [
         (
             {"length": 10e-6},
@@ -142,20 +142,20 @@ def test_conditions_that_do_not_fit_are_refused():
         ),
     ],
 )
-def test_what_is_no_roller_contact_is_refused_at_once(given, load, said):
+def test_contacts_other_than_rollers_are_refused_before_solving(given, load, message):
     oil = asp.Lubricant(
         viscosity=asp.Roelands(0.04, 20e-9),
         density=asp.DowsonHigginson(870.0),
         rheology=asp.Newtonian(),
     )
     conditions = roller(None, load, **given)
-    with pytest.raises(asp.BadInput, match=said):
+    with pytest.raises(asp.BadInput, match=message):
         asp.solve_contact(conditions, oil, asp.flat_surface(auto_grid(conditions, oil)))
 
 
-def test_slices_share_the_load_about_as_iso_does():
-    """w'max/w'mean 1.3318 on 0.955 of the length by ISO's slices; a half-space's differ by a few
-    per cent.
+def test_slices_share_the_load_approximately_as_in_iso():
+    """ISO's slices: w'max/w'mean 1.3318 on 0.955 of the length; the half-space differs by a few
+    %.
     """
     load = sliced_load(ISO, LENGTH, LOAD, RADIUS, STEEL.reduced_modulus)
     assert load.line_load.mean() * LENGTH == pytest.approx(LOAD)
@@ -167,19 +167,21 @@ def test_slices_share_the_load_about_as_iso_does():
     assert straight.peak == pytest.approx(1.0)
 
 
-def test_the_chosen_grid_ends_past_the_roller_or_where_no_load_is():
-    """Past it so many cells that the end lies on a border of coarser ones too, where there are
-    enough.
-    """
-    whole = auto_grid(roller(ISO), None)
-    few = auto_grid(roller(ISO), None, cells=(32, 64))
-    assert few.y[[1, -2]] == pytest.approx(np.array([-0.5, 0.5]) * (LENGTH - few.spacing[1]))
-    assert whole.y[[4, -5]] == pytest.approx(np.array([-0.5, 0.5]) * (LENGTH - whole.spacing[1]))
-    assert whole.periodic == (False, False)
-    crowned = roller(RollerShape(crown_radius=0.1), load=50.0)
-    part = auto_grid(crowned, None)
+def test_the_chosen_grid_ends_beyond_the_roller_or_its_loaded_part():
+    """The end coincides with a cell border of the coarser grids, too, where cells suffice."""
+    automatic = auto_grid(roller(ISO), None)
+    with_cells = auto_grid(roller(ISO), None, cells=(32, 64))
+    assert with_cells.y[[1, -2]] == pytest.approx(
+        np.array([-0.5, 0.5]) * (LENGTH - with_cells.spacing[1])
+    )
+    assert automatic.y[[4, -5]] == pytest.approx(
+        np.array([-0.5, 0.5]) * (LENGTH - automatic.spacing[1])
+    )
+    assert automatic.periodic == (False, False)
+    crowned_roller = roller(RollerShape(crown_radius=0.1), load=50.0)
+    part = auto_grid(crowned_roller, None)
     assert part.upper[1] < 0.4 * LENGTH
-    assert part.upper[1] > crowned.sliced_load.ends[1]
+    assert part.upper[1] > crowned_roller.sliced_load.ends[1]
     tilted = auto_grid(roller(ISO.tilted(5e-3)), None)
     assert tilted.upper[1] < 0.3 * LENGTH
     assert tilted.y[3] < -0.5 * LENGTH < tilted.y[4]
@@ -193,30 +195,30 @@ def test_a_grid_that_cuts_the_load_off_is_refused():
         asp.solve_contact(roller(ISO), None, surface)
 
 
-def test_a_case_states_a_roller_and_a_run_keeps_it(tmp_path):
+def test_a_roller_in_a_case_is_stored_with_its_run(tmp_path):
     shape = '{ design_load = "2000 N", tilt = "-0.2 mrad" }'
     case = load_case(case_text(shape=shape), name="case")
-    wanted = RollerShape.johns_gohar(LOAD, LENGTH, RADIUS, STEEL.reduced_modulus).tilted(-0.2e-3)
-    assert case.conditions == roller(wanted)
+    expected = RollerShape.johns_gohar(LOAD, LENGTH, RADIUS, STEEL.reduced_modulus).tilted(-0.2e-3)
+    assert case.conditions == roller(expected)
     assert load_case(case.text, name="restated").conditions == case.conditions
     assert case.with_overrides({"contact.shape.tilt": "0 mrad"}).conditions.roller.tilt == 0.0
     run = asp.solve_case(case)
-    kept = asp.load_run(run.save(tmp_path / "run.nc"))
-    assert kept.summary() == run.summary()
-    said = json.loads(json.dumps(run.summary()))
-    assert said["load_centre_m"] > 0.1e-3
-    assert said["tilting_moment_n_m"] == pytest.approx(said["load_centre_m"] * LOAD, rel=1e-6)
+    loaded = asp.load_run(run.save(tmp_path / "run.nc"))
+    assert loaded.summary() == run.summary()
+    summary = json.loads(json.dumps(run.summary()))
+    assert summary["load_centre_m"] > 0.1e-3
+    assert summary["tilting_moment_n_m"] == pytest.approx(summary["load_centre_m"] * LOAD, rel=1e-6)
     assert (
         "; edge pressure not determined, mid-length pressure 1.4" in run.verdict()
-    )  # too few lines for its ends
-    assert said["edge_pressure_pa"] is said["edge_pressure_error_pa"] is None
+    )  # too few lines to resolve its ends
+    assert summary["edge_pressure_pa"] is summary["edge_pressure_error_pa"] is None
     assert any(
         note.startswith("The edge pressure is not determined: the lines of cells")
-        for note in said["notes"]
+        for note in summary["notes"]
     )
 
 
-def test_an_edge_pressure_that_is_determined_is_said_with_its_bar():
+def test_a_determined_edge_pressure_is_reported_with_its_error():
     run = asp.solve_case(
         load_case(case_text(shape='{ iso_diameter = "9 mm" }'), name="case").with_overrides(
             {"grid": {"cells": [48, 128]}}
@@ -230,16 +232,16 @@ def test_an_edge_pressure_that_is_determined_is_said_with_its_bar():
         < numbers["edge_pressure_pa"]
         < numbers["middle_pressure_pa"]
     )
-    said = run.verdict().partition("; edge pressure ")[2].partition(" GPa, ")[0]
-    assert float(said.partition(" ± ")[0]) == pytest.approx(
+    value = run.verdict().partition("; edge pressure ")[2].partition(" GPa, ")[0]
+    assert float(value.partition(" ± ")[0]) == pytest.approx(
         1e-9 * numbers["edge_pressure_pa"], abs=0.01
     )
-    assert float(said.partition(" ± ")[2]) == pytest.approx(
+    assert float(value.partition(" ± ")[2]) == pytest.approx(
         1e-9 * numbers["edge_pressure_error_pa"], rel=0.1
     )
 
 
-def test_other_contacts_say_nothing_of_ends():
+def test_other_contacts_report_no_end_effects():
     case = load_case(case_text(geometry='"line"'), name="case").with_overrides(
         {"grid": {"cells": [32, 8]}}
     )
@@ -249,7 +251,7 @@ def test_other_contacts_say_nothing_of_ends():
 
 
 @pytest.mark.parametrize(
-    ("shape", "said"),
+    ("shape", "message"),
     [
         (
             '{ design_load = "1 N", amplitude = "1 um" }',
@@ -268,8 +270,8 @@ def test_other_contacts_say_nothing_of_ends():
         ('{ tilt = "6 deg" }', "contact and material: tilt must lie between -0.05 and 0.05 rad"),
     ],
 )
-def test_a_shape_that_a_case_cannot_mean_is_refused(shape, said):
-    with pytest.raises(asp.BadInput, match=said):
+def test_an_impossible_shape_in_a_case_is_refused(shape, message):
+    with pytest.raises(asp.BadInput, match=message):
         load_case(case_text(shape=shape), name="case")
 
 
@@ -287,27 +289,27 @@ def test_sharp_ends_and_an_uneven_load_are_noted():
     assert "By slices" not in notes(ISO)
 
 
-def test_readings_are_those_of_a_known_pressure():
-    """Pressure that falls to one end as (1 + y/L): its centre, moment and edge by hand."""
+def test_the_axial_distribution_of_a_known_pressure_is_correct():
+    """Pressure ~ (1 + y/L): centre, moment and edge are computed by hand."""
     conditions = roller(RollerShape(chamfer=0.5e-3))
     grid = asp.Grid((32, 92), (-2e-4, -4.6e-3), (2e-4, 4.6e-3), (False, False))
     solution = asp.solve_contact(conditions, None, asp.flat_surface(grid))
-    on = np.abs(grid.y) < 4.5e-3
-    made = np.where(on, 1.0 + grid.y / 9e-3, 0.0) * np.ones((32, 1)) * 1e9
-    along = axial_distribution(replace(solution, pressure=made))
-    assert along.y.size == 90
-    assert along.load_centre == pytest.approx(9e-3 / 12.0, rel=1e-3)
-    assert along.moment == pytest.approx(1e9 * 4e-4 * (9e-3) ** 2 / 12.0, rel=1e-3)
-    assert along.largest_line_load == pytest.approx(1.5e9 * 4e-4, rel=0.01)
-    assert along.edge_pressure.on_grid == pytest.approx(1.5e9, rel=0.01)
-    assert along.middle_pressure == pytest.approx(1e9)
-    assert along.loaded_share == pytest.approx(1.0)
+    on_roller = np.abs(grid.y) < 4.5e-3
+    pressure = np.where(on_roller, 1.0 + grid.y / 9e-3, 0.0) * np.ones((32, 1)) * 1e9
+    distribution = axial_distribution(replace(solution, pressure=pressure))
+    assert distribution.y.size == 90
+    assert distribution.load_centre == pytest.approx(9e-3 / 12.0, rel=1e-3)
+    assert distribution.moment == pytest.approx(1e9 * 4e-4 * (9e-3) ** 2 / 12.0, rel=1e-3)
+    assert distribution.largest_line_load == pytest.approx(1.5e9 * 4e-4, rel=0.01)
+    assert distribution.edge_pressure.on_grid == pytest.approx(1.5e9, rel=0.01)
+    assert distribution.middle_pressure == pytest.approx(1e9)
+    assert distribution.loaded_share == pytest.approx(1.0)
     short = axial_distribution(
-        replace(solution, pressure=np.where(np.abs(grid.y) < 0.44 * 9e-3, made, 0.0))
+        replace(solution, pressure=np.where(np.abs(grid.y) < 0.44 * 9e-3, pressure, 0.0))
     )
     assert (short.edge_pressure.on_grid, short.loaded_share) == (0.0, pytest.approx(0.88, abs=0.01))
     longer = axial_distribution(
-        replace(solution, pressure=np.where(np.abs(grid.y) < 0.47 * 9e-3, made, 0.0))
+        replace(solution, pressure=np.where(np.abs(grid.y) < 0.47 * 9e-3, pressure, 0.0))
     )
     assert longer.edge_pressure.on_grid > 1.4e9
     assert (
@@ -317,5 +319,5 @@ def test_readings_are_those_of_a_known_pressure():
         is None
     )
     assert not any("sides" in note for note in solution_notes(solution))
-    assert hertz_zone(conditions, grid)[:, on].any(axis=0).all()
-    assert not hertz_zone(conditions, grid)[:, ~on].any()
+    assert hertz_zone(conditions, grid)[:, on_roller].any(axis=0).all()
+    assert not hertz_zone(conditions, grid)[:, ~on_roller].any()

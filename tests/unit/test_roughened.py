@@ -1,6 +1,4 @@
-"""What roughens, as a case that wears asks it: booked, handed over, kept to the bit, no longer
-jumps than allowed.
-"""
+"""Roughening mechanisms in a wear case: reported, transferred, stored bit by bit, jump limit."""
 
 import math
 from dataclasses import replace
@@ -15,7 +13,7 @@ from asperity.wear import combined_roughness
 from support.wearing import worn_case
 
 GENTLE = {"motion.rough": "second", "wear.k": "1e-17 1/Pa", "wear.patches": 3}
-WAYS = {
+MECHANISMS = {
     "fatigue": {"law": "von-mises", "limit": "700 MPa", "cycles": 1e4},
     "ploughing": {"law": "debris", "concentration": "3e11 1/m^3"},
     "scuffing": {"law": "pressure-shear", "limit": "1e17 Pa^2"},
@@ -23,85 +21,87 @@ WAYS = {
 SECONDS = 100.0
 
 
-def ageing(*ways):
-    case = worn_case(GENTLE | {f"wear.{way}": WAYS[way] for way in ways})
+def wear_model(*mechanisms):
+    case = worn_case(
+        GENTLE | {f"wear.{mechanism}": MECHANISMS[mechanism] for mechanism in mechanisms}
+    )
     assert case.wear is not None
     return WearingContact(case, case.wear, case.moving_surfaces())
 
 
 @pytest.fixture(scope="module")
 def solved():
-    """The contact at three positions of the new tracks, solved once for all."""
-    new = ageing()
-    worn = WearState.unworn(new.surfaces)
+    """The contact at three positions of the new tracks, solved once."""
+    model = wear_model()
+    worn = WearState.unworn(model.surfaces)
     return [
-        (place, new.solver(combined_roughness(new.worn_surfaces(worn), place)))
-        for place in new.positions(worn)
+        (place, model.solver(combined_roughness(model.worn_surfaces(worn), place)))
+        for place in model.positions(worn)
     ]
 
 
-def jumped(model, solved, jumps=1):
+def after_jumps(model, solved, jumps=1):
     worn = WearState.unworn(model.surfaces)
     for _ in range(jumps):
         worn = model.after_jump(worn, solved, SECONDS)
     return worn
 
 
-@pytest.mark.parametrize("way", list(WAYS))
-def test_each_way_acts_and_is_booked(way, solved):
-    model = ageing(way)
-    worn, calm = jumped(model, solved, 2), jumped(ageing(), solved, 2)
-    assert not calm.facts
-    assert not calm.changed[1].any()
-    assert {name.rpartition(".")[0] for name in worn.facts} == {f"{way}.1", f"{way}.2"}
+@pytest.mark.parametrize("mechanism", list(MECHANISMS))
+def test_each_mechanism_acts_and_is_reported(mechanism, solved):
+    model = wear_model(mechanism)
+    worn, unchanged = after_jumps(model, solved, 2), after_jumps(wear_model(), solved, 2)
+    assert not unchanged.facts
+    assert not unchanged.changed[1].any()
+    assert {name.rpartition(".")[0] for name in worn.facts} == {f"{mechanism}.1", f"{mechanism}.2"}
     assert worn.changed[1].any()
     for body in (0, 1):
         lost = model.volume(worn.worn[body] - worn.changed[body], body)
         assert lost == pytest.approx(worn.booked[body] + worn.mechanical[body], rel=1e-9, abs=0.0)
 
 
-def test_what_scuffing_hands_over_is_what_the_other_gains(solved):
-    model = ageing("scuffing")
-    worn = jumped(model, solved)
-    taken = [
+def test_scuffing_transfers_material_to_the_other_body(solved):
+    model = wear_model("scuffing")
+    worn = after_jumps(model, solved)
+    depths = [
         worn.facts[f"scuffing.{body}.volume_m3"] / float(np.prod(model.surfaces.grid.extent))
         for body in (1, 2)
     ]
-    assert min(taken) > 0.0
-    volumes = [model.volume(np.full((2, 2), depth), body) for body, depth in enumerate(taken)]
+    assert min(depths) > 0.0
+    volumes = [model.volume(np.full((2, 2), depth), body) for body, depth in enumerate(depths)]
     assert worn.mechanical[0] == pytest.approx(volumes[0] - 0.5 * volumes[1], rel=1e-9, abs=0.0)
     assert worn.mechanical[1] == pytest.approx(volumes[1] - 0.5 * volumes[0], rel=1e-9, abs=0.0)
 
 
-def test_what_was_kept_goes_on_to_the_bit(solved):
-    model = ageing("fatigue", "ploughing")
-    once = jumped(model, solved)
-    again = WearState.from_arrays(once.arrays())
-    assert again.longest == once.longest
-    one, other = (model.after_jump(worn, solved, SECONDS) for worn in (once, again))
+def test_a_restored_state_continues_bit_by_bit(solved):
+    model = wear_model("fatigue", "ploughing")
+    state = after_jumps(model, solved)
+    restored = WearState.from_arrays(state.arrays())
+    assert restored.longest == state.longest
+    first, continued = (model.after_jump(worn, solved, SECONDS) for worn in (state, restored))
     for body in (0, 1):
-        np.testing.assert_array_equal(one.changed[body], other.changed[body])
+        np.testing.assert_array_equal(first.changed[body], continued.changed[body])
     np.testing.assert_array_equal(
-        one.states["fatigue.2"]["damage"], other.states["fatigue.2"]["damage"]
+        first.states["fatigue.2"]["damage"], continued.states["fatigue.2"]["damage"]
     )
-    assert one.facts == other.facts
+    assert first.facts == continued.facts
 
 
-def test_a_jump_is_no_longer_than_what_roughens_allows(solved):
-    """Of both bodies the one that passes more often decides, at its own rate; without what roughens
-    nobody does.
+def test_the_jump_limit_of_roughening_applies(solved):
+    """The more frequently overrolled body decides, at its own rate; without roughening, no
+    limit.
     """
-    model = ageing("ploughing")
-    worn = jumped(model, solved)
+    model = wear_model("ploughing")
+    worn = after_jumps(model, solved)
     assert 0.0 < worn.longest < SECONDS
-    free = replace(worn, longest=math.inf)
-    assert model.seconds(worn, solved) == worn.longest < ageing().seconds(free, solved)
-    assert model.seconds(free, solved) == ageing().seconds(free, solved) > worn.time
-    assert jumped(ageing(), solved).longest == math.inf
+    unlimited = replace(worn, longest=math.inf)
+    assert model.seconds(worn, solved) == worn.longest < wear_model().seconds(unlimited, solved)
+    assert model.seconds(unlimited, solved) == wear_model().seconds(unlimited, solved) > worn.time
+    assert after_jumps(wear_model(), solved).longest == math.inf
 
 
 @pytest.mark.parametrize(
-    ("way", "said"),
+    ("mechanism", "message"),
     [
         (
             {"law": "tresca", "limit": "1 GPa"},
@@ -115,6 +115,6 @@ def test_a_jump_is_no_longer_than_what_roughens_allows(solved):
         ),
     ],
 )
-def test_what_a_case_may_not_state(way, said):
-    with pytest.raises(BadInput, match=said):
-        worn_case(GENTLE | {"wear.fatigue": way}).wear  # noqa: B018
+def test_invalid_roughening_settings_are_refused(mechanism, message):
+    with pytest.raises(BadInput, match=message):
+        worn_case(GENTLE | {"wear.fatigue": mechanism}).wear  # noqa: B018

@@ -1,6 +1,4 @@
-"""What a run works out beside the contact: friction, heat and stress, kept as maps and worked out
-anew.
-"""
+"""Derived results of a run: friction, heat and stress, stored as maps and recomputed."""
 
 from importlib.resources import files
 
@@ -31,21 +29,21 @@ def run() -> Run:
 
 
 def test_scalars_state_friction_heat_and_stress(run):
-    found, p_max = run.scalars(), run.state.p_max
-    parts = found["friction_asperity_part"] + found["friction_oil_part"]
-    assert found["friction_coefficient"] == pytest.approx(parts)
-    assert found["friction_asperity_part"] == pytest.approx(0.15 * found["clr"])
-    assert found["friction_power_w"] == pytest.approx(
-        found["friction_coefficient"] * 500.0 * 0.2 * 1.91
+    scalars, p_max = run.scalars(), run.state.p_max
+    parts = scalars["friction_asperity_part"] + scalars["friction_oil_part"]
+    assert scalars["friction_coefficient"] == pytest.approx(parts)
+    assert scalars["friction_asperity_part"] == pytest.approx(0.15 * scalars["clr"])
+    assert scalars["friction_power_w"] == pytest.approx(
+        scalars["friction_coefficient"] * 500.0 * 0.2 * 1.91
     )
-    assert 0.0 < found["flash_temperature_max_k"] < 200.0
-    assert 0.3 * p_max < found["von_mises_max_pa"] < p_max
-    assert 0.0 < found["von_mises_core_pa"] <= found["von_mises_max_pa"]
-    assert found["von_mises_core_depth_m"] >= 0.1 * run.case.conditions.hertz.half_widths[0]
+    assert 0.0 < scalars["flash_temperature_max_k"] < 200.0
+    assert 0.3 * p_max < scalars["von_mises_max_pa"] < p_max
+    assert 0.0 < scalars["von_mises_core_pa"] <= scalars["von_mises_max_pa"]
+    assert scalars["von_mises_core_depth_m"] >= 0.1 * run.case.conditions.hertz.half_widths[0]
     assert (
-        found["von_mises_max_pa"] / 2.0
-        <= found["shear_stress_max_pa"]
-        <= found["von_mises_max_pa"] / np.sqrt(3.0)
+        scalars["von_mises_max_pa"] / 2.0
+        <= scalars["shear_stress_max_pa"]
+        <= scalars["von_mises_max_pa"] / np.sqrt(3.0)
     )
 
 
@@ -53,32 +51,36 @@ def test_scalars_state_the_contacts_own_stiffness_and_damping(run):
     assert run.scalars()["contact_damping_ratio"] is None  # without [vibration] there is no mass
     assert "mass" in run.own_resonance_failure
     for model in ("unified", "mixed"):
-        shaken = solve_case(run.case.with_overrides({"vibration": MASS, "model": model}))
-        found, own = shaken.scalars(), own_resonance(shaken.solution, 0.5)
-        omega = 2.0 * np.pi * found["contact_resonance_hz"]
+        vibrating = solve_case(run.case.with_overrides({"vibration": MASS, "model": model}))
+        scalars, own = vibrating.scalars(), own_resonance(vibrating.solution, 0.5)
+        omega = 2.0 * np.pi * scalars["contact_resonance_hz"]
         assert (
-            found["contact_stiffness_n_m"]
+            scalars["contact_stiffness_n_m"]
             == own.elastic.stiffness
             == pytest.approx(0.5 * omega**2, rel=0.02)
         )
-        assert found["contact_damping_ratio"] == pytest.approx(
+        assert scalars["contact_damping_ratio"] == pytest.approx(
             own.elastic.damping * omega / (2.0 * own.elastic.stiffness)
         )
-        assert 0.0 < found["contact_damping_ratio"] < found["contact_damping_ratio_virgin"]
-        assert found["contact_stiffness_virgin_n_m"] == own.virgin.stiffness < own.elastic.stiffness
+        assert 0.0 < scalars["contact_damping_ratio"] < scalars["contact_damping_ratio_virgin"]
+        assert (
+            scalars["contact_stiffness_virgin_n_m"] == own.virgin.stiffness < own.elastic.stiffness
+        )
         assert own.virgin.frequency_hz == own.elastic.frequency_hz
-        assert shaken.own_resonance_failure is None
+        assert vibrating.own_resonance_failure is None
 
 
-def test_the_deviation_of_damping_is_of_one_further_surface(run):
-    """Student's prediction interval by hand, of three surfaces: t 2.92 at 95 %."""
-    shaken = solve_case(run.case.with_overrides({"vibration": MASS}), surfaces=3)
-    found = [row["contact_damping_ratio"] for row in (shaken.own_scalars, *shaken.others)]
-    assert len(set(found)) == 3
-    scalars = shaken.scalars()
-    assert scalars["contact_damping_ratio"] == pytest.approx(np.mean(found))
+def test_the_error_of_damping_is_the_prediction_interval_of_a_further_surface(run):
+    """Student's prediction interval of three surfaces by hand: t = 2.92 at 95 %."""
+    vibrating = solve_case(run.case.with_overrides({"vibration": MASS}), surfaces=3)
+    damping_ratios = [
+        row["contact_damping_ratio"] for row in (vibrating.own_scalars, *vibrating.others)
+    ]
+    assert len(set(damping_ratios)) == 3
+    scalars = vibrating.scalars()
+    assert scalars["contact_damping_ratio"] == pytest.approx(np.mean(damping_ratios))
     assert scalars["contact_damping_error"] == pytest.approx(
-        2.91999 * np.sqrt(4.0 / 3.0) * np.std(found, ddof=1), rel=1e-5
+        2.91999 * np.sqrt(4.0 / 3.0) * np.std(damping_ratios, ddof=1), rel=1e-5
     )
     assert (
         solve_case(run.case.with_overrides({"vibration": MASS})).scalars()["contact_damping_error"]
@@ -87,91 +89,94 @@ def test_the_deviation_of_damping_is_of_one_further_surface(run):
 
 
 def test_only_requested_quantities_are_computed(run, tmp_path, monkeypatch):
-    """And what was not, on every surface, has no mean once a run is read back."""
+    """Quantities not computed on every surface have no mean in a stored run."""
     case = run.case.with_overrides({"vibration": MASS})
-    whole = solve_case(case, surfaces=2)
+    complete = solve_case(case, surfaces=2)
     with monkeypatch.context() as patched:
         patched.setattr(
-            OwnResonance, "virgin", property(lambda _: pytest.fail("shaken without being asked to"))
+            OwnResonance, "virgin", property(lambda _: pytest.fail("computed without a request"))
         )
         short = solve_case(case, surfaces=2, groups=SHORT_GROUPS)
-        found = short.scalars()
-        least = solve_case(case, surfaces=2, groups=())
-        assert least.verdict() == whole.verdict()
-    assert not {"clr", "crf_hz", "h_mean_m"} & set(least.scalars())
+        scalars = short.scalars()
+        minimal = solve_case(case, surfaces=2, groups=())
+        assert minimal.verdict() == complete.verdict()
+    assert not {"clr", "crf_hz", "h_mean_m"} & set(minimal.scalars())
     virgin = {"contact_damping_ratio_virgin", "contact_stiffness_virgin_n_m"}
-    assert set(whole.scalars()) - set(found) == virgin
+    assert set(complete.scalars()) - set(scalars) == virgin
     assert all(
-        found[key] == value
-        for key, value in whole.scalars().items()
+        scalars[key] == value
+        for key, value in complete.scalars().items()
         if key not in virgin | {"seconds"}
     )
-    back = load_run(short.save(tmp_path / "short.nc"))
-    assert back.scalars() | dict.fromkeys(virgin) == back.scalars()
+    loaded = load_run(short.save(tmp_path / "short.nc"))
+    assert loaded.scalars() | dict.fromkeys(virgin) == loaded.scalars()
     assert (
-        back.own_scalars["contact_damping_ratio_virgin"]
-        == whole.own_scalars["contact_damping_ratio_virgin"]
+        loaded.own_scalars["contact_damping_ratio_virgin"]
+        == complete.own_scalars["contact_damping_ratio_virgin"]
     )
 
 
 def test_the_elastic_limit_remains_if_the_virgin_one_fails(run, monkeypatch):
-    def lost(_):
+    def fail(_):
         raise AsperityError("dynamic stiffness did not converge at 3000 Hz")
 
-    monkeypatch.setattr(OwnResonance, "virgin", property(lost))
-    found = solve_case(run.case.with_overrides({"vibration": MASS})).summary()
-    assert found["contact_damping_ratio_virgin"] is None
-    assert found["contact_damping_ratio"] > 0.0
+    monkeypatch.setattr(OwnResonance, "virgin", property(fail))
+    summary = solve_case(run.case.with_overrides({"vibration": MASS})).summary()
+    assert summary["contact_damping_ratio_virgin"] is None
+    assert summary["contact_damping_ratio"] > 0.0
     assert (
         "no stiffness of virgin roughness: dynamic stiffness did not converge at 3000 Hz."
-        in found["notes"][-1]
+        in summary["notes"][-1]
     )
 
 
 def test_each_surface_vibrates_once(run, monkeypatch):
-    heard = []
+    calls = []
 
-    def listening(*contact, **solved):
-        heard.append(contact)
+    def record_call(*contact, **solved):
+        calls.append(contact)
         return contact_vibration(*contact, **solved)
 
-    monkeypatch.setattr(results, "contact_vibration", listening)
+    monkeypatch.setattr(results, "contact_vibration", record_call)
     several = solve_case(run.case.with_overrides({"vibration": MASS}), surfaces=3)
-    assert len(heard) == 3
+    assert len(calls) == 3
     assert (
         several.vibration.resonance
-        == contact_vibration(*heard[0], solution=several.solution).resonance
+        == contact_vibration(*calls[0], solution=several.solution).resonance
     )
 
 
 def test_a_failed_dynamic_stiffness_is_stated_on_the_page(run, tmp_path):
-    shaken = solve_case(
+    vibrating = solve_case(
         run.case.with_overrides({"vibration": MASS, "model": "conserving", "surface": "flat"})
     )
-    assert shaken.scalars()["contact_stiffness_n_m"] is None
-    page = write_report([shaken], tmp_path / "page.html").read_text("utf-8")
+    assert vibrating.scalars()["contact_stiffness_n_m"] is None
+    page = write_report([vibrating], tmp_path / "page.html").read_text("utf-8")
     assert "No dynamic stiffness and damping: " in page
     assert "got conserving" in page
 
 
-def test_a_film_too_hot_for_its_viscosity_is_remarked_on(run, monkeypatch):
+def test_a_film_too_hot_for_its_viscosity_law_is_noted(run, monkeypatch):
     monkeypatch.setattr(results, "HOT", 1e3)
     assert run.remarks == run.notes
     monkeypatch.setattr(results, "HOT", 0.9 * run.heat.film_max_k)
-    *notes, hot = run.remarks
+    *notes, too_hot = run.remarks
     assert tuple(notes) == run.notes
-    assert f"{run.heat.film_max_k:.4g} K" in hot
+    assert f"{run.heat.film_max_k:.4g} K" in too_hot
 
 
-def test_the_traction_of_friction_is_part_of_the_stress(run):
+def test_friction_traction_contributes_to_the_stress(run):
     surface = run.stress.tensor_at(0.0)
     np.testing.assert_allclose(surface.xz, -run.friction.shear, atol=1e-3 * run.state.p_max)
     assert np.abs(run.friction.shear).max() > 0.1 * run.state.p_max
 
 
-def test_a_kept_run_shows_its_maps_and_does_not_need_them(run, tmp_path):
-    full, bare = run.save(tmp_path / "full.nc"), run.solution.save(tmp_path / "bare.nc")
-    with xarray.open_dataset(full) as kept:
+def test_a_stored_run_shows_its_maps_and_does_not_need_them(run, tmp_path):
+    complete, solution_only = (
+        run.save(tmp_path / "full.nc"),
+        run.solution.save(tmp_path / "bare.nc"),
+    )
+    with xarray.open_dataset(complete) as dataset:
         for name, values in {
             "shear": run.friction.shear,
             "temperature_1": run.heat.surface_1,
@@ -181,31 +186,31 @@ def test_a_kept_run_shows_its_maps_and_does_not_need_them(run, tmp_path):
             "von_mises_depth": run.stress.depth_of_largest,
         }.items():
             np.testing.assert_allclose(
-                kept[name], values, rtol=1e-6, atol=1e-6 * np.abs(values).max()
+                dataset[name], values, rtol=1e-6, atol=1e-6 * np.abs(values).max()
             )
-            assert kept[name].attrs["units"] in ("Pa", "K", "m")
+            assert dataset[name].attrs["units"] in ("Pa", "K", "m")
         np.testing.assert_allclose(
-            kept["von_mises_section"].max(), run.stress.largest.max(), rtol=1e-6
+            dataset["von_mises_section"].max(), run.stress.largest.max(), rtol=1e-6
         )
-        np.testing.assert_array_equal(kept["depth"], run.stress.depths)
+        np.testing.assert_array_equal(dataset["depth"], run.stress.depths)
         for key, value in run.scalars().items():
             if isinstance(value, float):
-                assert float(kept[key]) == value
-                assert kept[key].attrs["units"] == quantity(key).unit
-    assert load_run(full).scalars() == load_run(bare).scalars() == run.scalars()
+                assert float(dataset[key]) == value
+                assert dataset[key].attrs["units"] == quantity(key).unit
+    assert load_run(complete).scalars() == load_run(solution_only).scalars() == run.scalars()
 
 
-def test_a_failure_of_friction_keeps_all_other_results(run, monkeypatch):
+def test_a_friction_failure_keeps_all_other_results(run, monkeypatch):
     def refuse(*_, **__):
         raise AsperityError("friction and temperature did not converge")
 
     monkeypatch.setattr(results, "friction_and_heat", refuse)
-    apart = Run(case=run.case, solution=run.solution, state=run.state, vibration=None)
-    found = apart.scalars()
-    assert found["friction_coefficient"] is found["flash_temperature_max_k"] is None
-    assert found["von_mises_max_pa"] > 0.0
-    assert found["clr"] == run.scalars()["clr"]
-    lines = list(run_table(apart))
+    failed_run = Run(case=run.case, solution=run.solution, state=run.state, vibration=None)
+    scalars = failed_run.scalars()
+    assert scalars["friction_coefficient"] is scalars["flash_temperature_max_k"] is None
+    assert scalars["von_mises_max_pa"] > 0.0
+    assert scalars["clr"] == run.scalars()["clr"]
+    lines = list(run_table(failed_run))
     assert lines[-1] == "  note: no friction: friction and temperature did not converge"
     title = quantity("friction_coefficient").title
     assert (
@@ -214,37 +219,37 @@ def test_a_failure_of_friction_keeps_all_other_results(run, monkeypatch):
         .strip()
         == NO_VALUE
     )
-    assert "shear" not in apart.to_dataset()
+    assert "shear" not in failed_run.to_dataset()
 
 
-def test_the_command_line_prints_every_number_the_catalogue_has_for_a_table(run):
+def test_the_command_line_prints_every_table_quantity_of_the_catalogue(run):
     rows = dict(line.strip().split("  ", 1) for line in run_table(run) if "  " in line.strip())
-    shown = {title.strip(): value.strip() for title, value in rows.items()}
+    printed = {title.strip(): value.strip() for title, value in rows.items()}
     values = run.scalars()
     deviations = {entry.deviation for entry in catalogue().values()}
     for key in values.keys() - deviations:
         entry = quantity(key)
-        assert entry.detail or shown[entry.title] == entry.text_in(values)
-    assert shown[quantity("p_max_pa").title] == f"{run.state.p_max / 1e9:.3f} GPa"
+        assert entry.detail or printed[entry.title] == entry.text_in(values)
+    assert printed[quantity("p_max_pa").title] == f"{run.state.p_max / 1e9:.3f} GPa"
 
 
-def test_one_line_of_the_catalogue_brings_a_number_wherever_numbers_are(run, tmp_path):
+def test_one_catalogue_line_adds_a_number_everywhere(run, tmp_path):
     slope, name = run.state.contact_slope, "mean slope of contact cells"
     assert run.scalars()["contact_slope"] == slope
     assert any(
         line.split("  ")[1:] and name in line and f"{slope:.3f}" in line for line in run_table(run)
     )
-    kept = run.save(tmp_path / "run.nc")
-    with xarray.open_dataset(kept, engine="h5netcdf") as dataset:
+    stored = run.save(tmp_path / "run.nc")
+    with xarray.open_dataset(stored, engine="h5netcdf") as dataset:
         assert float(dataset["contact_slope"]) == slope
         assert dataset["contact_slope"].attrs == {"long_name": name, "units": "1"}
-    page = write_report([load_run(kept)], tmp_path / "run.html").read_text("utf-8")
+    page = write_report([load_run(stored)], tmp_path / "run.html").read_text("utf-8")
     assert name.capitalize() in page
     assert f"{slope:.3f}" in page
 
 
 @pytest.mark.parametrize("coefficient", [2.5, -0.1])
-def test_a_boundary_friction_that_cannot_be_is_refused_before_the_solve(coefficient):
+def test_invalid_boundary_friction_is_refused_before_the_solve(coefficient):
     case = load_case(files("asperity.paper").joinpath("paper.toml").read_text("utf-8"))
     with pytest.raises(BadInput, match="boundary_friction must be"):
         case.with_overrides({"material.boundary_friction": coefficient})

@@ -28,7 +28,7 @@ TRUTH = np.linspace(2900.0, 3750.0, 12)
 
 
 def machine() -> np.ndarray:
-    """What stays: two structural modes, one of them where the contact passes, over a sloping
+    """Transfer of the structure: two modes, one of them in the contact's range, and a sloping
     floor.
     """
     f = np.maximum(FREQUENCY, 1.0)
@@ -39,11 +39,11 @@ def machine() -> np.ndarray:
     return 0.1 * (f / 2000.0) ** -0.7 + modes
 
 
-def series(contact_height=0.7, *, averages=100.0, seed=0, truth=TRUTH, damping=0.02, passed=1.0):
+def series(contact_height=0.7, *, averages=100.0, seed=0, truth=TRUTH, damping=0.02, gain=1.0):
     rng = np.random.default_rng(seed)
     gains = np.exp(0.2 * rng.standard_normal(truth.size))
     densities = [
-        g * machine() + passed * contact_height * line_shape(FREQUENCY, f, damping)
+        g * machine() + gain * contact_height * line_shape(FREQUENCY, f, damping)
         for g, f in zip(gains, truth, strict=True)
     ]
     return [
@@ -61,62 +61,75 @@ def series(contact_height=0.7, *, averages=100.0, seed=0, truth=TRUTH, damping=0
     ]
 
 
-def test_the_moving_line_is_told_from_standing_modes_as_high():
-    found = series_resonances(series(), band_hz=BAND)
-    assert all(one.found for one in found)
-    errors = np.array([one.crf_hz for one in found]) - TRUTH
+def test_a_moving_line_is_separated_from_equally_high_fixed_modes():
+    resonances = series_resonances(series(), band_hz=BAND)
+    assert all(resonance.found for resonance in resonances)
+    errors = np.array([resonance.crf_hz for resonance in resonances]) - TRUTH
     assert np.max(np.abs(errors)) < 3.0
-    assert [one.crfa for one in found] == pytest.approx(np.full(TRUTH.size, 0.7), rel=0.1)
-    fooled = series_resonances(series(), band_hz=BAND, method="peak")
+    assert [resonance.crfa for resonance in resonances] == pytest.approx(
+        np.full(TRUTH.size, 0.7), rel=0.1
+    )
+    by_peak = series_resonances(series(), band_hz=BAND, method="peak")
     assert (
-        np.mean([abs(one.crf_hz - f) > 100.0 for one, f in zip(fooled, TRUTH, strict=True)]) > 0.5
+        np.mean(
+            [abs(resonance.crf_hz - f) > 100.0 for resonance, f in zip(by_peak, TRUTH, strict=True)]
+        )
+        > 0.5
     )
 
 
-def test_a_further_recording_is_judged_beside_what_others_have_settled():
-    """As if all had been separated together, within the deviations; and what is no line of the
-    contact is none.
-    """
+def test_a_further_recording_is_judged_with_the_fitted_series():
+    """Agrees with the joint fit within its deviations; a spectrum without a line yields none."""
     truth = 3300.0 + 300.0 * np.random.default_rng(5).standard_normal(60).clip(-1.3, 1.3)
     spectra = series(truth=truth, seed=5)
-    together = series_resonances(spectra, band_hz=BAND)
+    joint = series_resonances(spectra, band_hz=BAND)
     first, shared, moved = learn_series(spectra[:40], band_hz=BAND)
     assert moved == ()
-    assert [one.crf_hz for one in first] == [
-        one.crf_hz for one in series_resonances(spectra[:40], band_hz=BAND)
+    assert [resonance.crf_hz for resonance in first] == [
+        resonance.crf_hz for resonance in series_resonances(spectra[:40], band_hz=BAND)
     ]
-    beside = shared.resonances(spectra[40:])
-    pulls = [
-        (one.crf_hz - all_.crf_hz) / all_.crf_std
-        for one, all_ in zip(beside, together[40:], strict=True)
+    further = shared.resonances(spectra[40:])
+    differences = [
+        (resonance.crf_hz - joint_resonance.crf_hz) / joint_resonance.crf_std
+        for resonance, joint_resonance in zip(further, joint[40:], strict=True)
     ]
-    assert np.max(np.abs(pulls)) < 1.0
-    errors = [(one.crf_hz - f) / one.crf_std for one, f in zip(beside, truth[40:], strict=True)]
+    assert np.max(np.abs(differences)) < 1.0
+    errors = [
+        (resonance.crf_hz - f) / resonance.crf_std
+        for resonance, f in zip(further, truth[40:], strict=True)
+    ]
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.6
-    assert [one.crf_std for one in beside] == pytest.approx(
-        [one.crf_std for one in together[40:]], rel=0.3
+    assert [resonance.crf_std for resonance in further] == pytest.approx(
+        [resonance.crf_std for resonance in joint[40:]], rel=0.3
     )
-    (silent,) = shared.resonances(series(0.0, truth=truth[:1], seed=6))
-    assert not silent.found
+    (without_line,) = shared.resonances(series(0.0, truth=truth[:1], seed=6))
+    assert not without_line.found
     with pytest.raises(BadInput, match="not belong to this series"):
         shared.resonances([replace(spectra[0], frequency_hz=2.0 * FREQUENCY)])
 
 
-def test_the_fit_scatters_as_it_says():
-    pulls = []
+def test_the_fit_scatters_as_its_deviations_state():
+    errors = []
     for seed in range(12):
-        for one, f in zip(series_resonances(series(seed=seed), band_hz=BAND), TRUTH, strict=True):
-            pulls.append([(one.crf_hz - f) / one.crf_std, (one.crfa - 0.7) / one.crfa_std])
-    assert np.mean(np.abs(pulls) < 1.645, axis=0) == pytest.approx(0.9, abs=0.06)
+        for resonance, f in zip(
+            series_resonances(series(seed=seed), band_hz=BAND), TRUTH, strict=True
+        ):
+            errors.append(
+                [
+                    (resonance.crf_hz - f) / resonance.crf_std,
+                    (resonance.crfa - 0.7) / resonance.crfa_std,
+                ]
+            )
+    assert np.mean(np.abs(errors) < 1.645, axis=0) == pytest.approx(0.9, abs=0.06)
 
 
 @pytest.fixture
 def fit_of_seven():
-    """Blocks of seven spectra of chance, and parameters that say something else of them."""
+    """Seven blocks of random spectra, and parameters that do not match them."""
     rng = np.random.default_rng(4)
     centre = np.linspace(2000.0, 4000.0, 50)
     blocks = SpectrumBlocks(centre, rng.gamma(5.0, 0.2, (7, 50)), np.full((7, 50), 30.0))
-    own = np.column_stack(
+    lines = np.column_stack(
         [
             rng.normal(0, 1, 7),
             np.log(rng.uniform(2500, 3500, 7)),
@@ -124,20 +137,23 @@ def fit_of_seven():
             rng.normal(0, 1, 7),
         ]
     )
-    passed = unit_transfer(1900.0, 4100.0)
-    passed = passed._replace(coefficients=rng.normal(0.0, 0.3, passed.coefficients.size))
-    return blocks, ModelParameters(own, rng.normal(0.0, 0.5, 50), passed)
+    transfer = unit_transfer(1900.0, 4100.0)
+    transfer = transfer._replace(coefficients=rng.normal(0.0, 0.3, transfer.coefficients.size))
+    return blocks, ModelParameters(lines, rng.normal(0.0, 0.5, 50), transfer)
 
 
-def test_the_score_is_the_slope_of_the_cost(fit_of_seven):
-    blocks, at = fit_of_seven
-    own, passed = at.own, at.transfer
-    point, d = joint_scoring_point(blocks, at, np.zeros((passed.coefficients.size,) * 2)), 1e-6
+def test_the_score_is_the_gradient_of_the_cost(fit_of_seven):
+    blocks, parameters = fit_of_seven
+    lines, transfer = parameters.own, parameters.transfer
+    point, d = (
+        joint_scoring_point(blocks, parameters, np.zeros((transfer.coefficients.size,) * 2)),
+        1e-6,
+    )
     for row, column in ((0, 0), (3, 1), (5, 2), (6, 3)):
-        shift = np.zeros_like(own)
+        shift = np.zeros_like(lines)
         shift[row, column] = d
         up, down = (
-            np.sum(recording_costs(blocks, at._replace(own=own + side * shift)))
+            np.sum(recording_costs(blocks, parameters._replace(own=lines + side * shift)))
             for side in (1.0, -1.0)
         )
         slope = (up - down) / (2 * d)
@@ -145,108 +161,119 @@ def test_the_score_is_the_slope_of_the_cost(fit_of_seven):
     shift = np.zeros(50)
     shift[20] = d
     up, down = (
-        np.sum(recording_costs(blocks, at._replace(base=at.base + side * shift)))
+        np.sum(recording_costs(blocks, parameters._replace(base=parameters.base + side * shift)))
         for side in (1.0, -1.0)
     )
     assert point.base_score[20] == pytest.approx(-(up - down) / (2 * d), rel=1e-4, abs=1e-3)
     for number in (0, 7, 30):
-        shift = np.zeros(passed.coefficients.size)
+        shift = np.zeros(transfer.coefficients.size)
         shift[number] = d
         ends = [
-            passed._replace(coefficients=passed.coefficients + side * shift) for side in (1.0, -1.0)
+            transfer._replace(coefficients=transfer.coefficients + side * shift)
+            for side in (1.0, -1.0)
         ]
-        up, down = (np.sum(recording_costs(blocks, at._replace(transfer=end))) for end in ends)
+        up, down = (
+            np.sum(recording_costs(blocks, parameters._replace(transfer=end))) for end in ends
+        )
         assert point.transfer_score[number] == pytest.approx(
             -(up - down) / (2 * d), rel=1e-4, abs=1e-3
         )
 
 
-def test_lines_beside_what_is_settled_are_those_of_the_whole_fit(fit_of_seven):
-    """What the transfer does to a line, in sums over blocks, is what it does block by block."""
-    blocks, at = fit_of_seven
-    whole = joint_scoring_point(blocks, at, np.zeros((at.transfer.coefficients.size,) * 2))
-    alone = line_scoring_point(blocks, at)
-    np.testing.assert_array_equal(alone.score, whole.own_score)
-    np.testing.assert_array_equal(alone.information, whole.own_information)
+def test_lines_with_a_fixed_transfer_equal_those_of_the_full_fit(fit_of_seven):
+    """The transfer's effect on a line, summed over blocks, equals that block by block."""
+    blocks, parameters = fit_of_seven
+    joint = joint_scoring_point(
+        blocks, parameters, np.zeros((parameters.transfer.coefficients.size,) * 2)
+    )
+    lines = line_scoring_point(blocks, parameters)
+    np.testing.assert_array_equal(lines.score, joint.own_score)
+    np.testing.assert_array_equal(lines.information, joint.own_information)
     np.testing.assert_allclose(
-        alone.transfer_coupling(blocks.centre, at), whole.transfer_own, rtol=1e-12, atol=1e-9
+        lines.transfer_coupling(blocks.centre, parameters),
+        joint.transfer_own,
+        rtol=1e-12,
+        atol=1e-9,
     )
     np.testing.assert_array_equal(
-        line_densities(blocks.centre, at), line_densities_and_slopes(blocks.centre, at)[0]
+        line_densities(blocks.centre, parameters),
+        line_densities_and_slopes(blocks.centre, parameters)[0],
     )
-    level, f0, damping = (np.exp(at.own[:, column, None]) for column in range(3))
-    apart = np.exp(relative_columns(blocks.centre, at) @ at.transfer.coefficients)
-    told = level * apart * line_shape(blocks.centre, f0, damping)
-    np.testing.assert_allclose(line_densities(blocks.centre, at), told, rtol=1e-12)
+    level, f0, damping = (np.exp(parameters.own[:, column, None]) for column in range(3))
+    transfer = np.exp(
+        relative_columns(blocks.centre, parameters) @ parameters.transfer.coefficients
+    )
+    density = level * transfer * line_shape(blocks.centre, f0, damping)
+    np.testing.assert_allclose(line_densities(blocks.centre, parameters), density, rtol=1e-12)
 
 
-def test_a_line_heard_through_a_structure_is_held_by_its_interval():
-    """What is passed on more at one frequency than at another draws the line there, alike in all
-    recordings.
-    """
+def test_a_line_distorted_by_a_structure_is_covered_by_its_interval():
+    """A frequency-dependent transfer shifts the line equally in all recordings."""
     mode = 1.0 + 0.8 * 0.03j / (1.0 - (FREQUENCY / 3150.0) ** 2 + 0.03j * FREQUENCY / 3150.0)
-    pulls = []
+    errors = []
     for seed in range(6):
         truth = TRUTH + 20.0 * np.random.default_rng(seed).standard_normal(TRUTH.size)
-        heard = series(truth=truth, seed=seed, passed=np.abs(mode) ** 2)
-        for one, f in zip(series_resonances(heard, band_hz=BAND), truth, strict=True):
-            pulls.append((one.crf_hz - f) / one.crf_std)
-    assert 0.85 <= np.mean(np.abs(pulls) < 1.645) <= 1.0
+        spectra = series(truth=truth, seed=seed, gain=np.abs(mode) ** 2)
+        for resonance, f in zip(series_resonances(spectra, band_hz=BAND), truth, strict=True):
+            errors.append((resonance.crf_hz - f) / resonance.crf_std)
+    assert 0.85 <= np.mean(np.abs(errors) < 1.645) <= 1.0
 
 
-def test_a_recording_without_the_contact_is_said_to_have_none():
+def test_a_recording_without_contact_is_reported_as_such():
     spectra = series()
-    lifted = series(contact_height=1e-12, seed=5)[4]
-    found = series_resonances([*spectra[:4], lifted, *spectra[5:]], band_hz=BAND)
-    assert [one.found for one in found] == [True] * 4 + [False] + [True] * 7
-    assert "no line moves" in found[4].reason
-    assert np.isnan(found[4].crf_hz)
+    without_contact = series(contact_height=1e-12, seed=5)[4]
+    resonances = series_resonances([*spectra[:4], without_contact, *spectra[5:]], band_hz=BAND)
+    assert [resonance.found for resonance in resonances] == [True] * 4 + [False] + [True] * 7
+    assert "no line moves" in resonances[4].reason
+    assert np.isnan(resonances[4].crf_hz)
 
 
-def test_where_nothing_moves_nothing_is_found():
-    found = series_resonances(series(contact_height=1e-12), band_hz=BAND)
-    assert not any(one.found for one in found)
+def test_without_a_moving_line_nothing_is_found():
+    resonances = series_resonances(series(contact_height=1e-12), band_hz=BAND)
+    assert not any(resonance.found for resonance in resonances)
 
 
-def test_a_line_that_keeps_its_place_is_found_by_its_changing_share_and_has_no_exact_height():
-    found = [
-        one
-        for one in series_resonances(series(truth=np.full(12, 3100.0)), band_hz=BAND)
-        if one.found
+def test_a_fixed_line_is_detected_by_its_varying_share_without_exact_height():
+    detected = [
+        resonance
+        for resonance in series_resonances(series(truth=np.full(12, 3100.0)), band_hz=BAND)
+        if resonance.found
     ]
-    assert found
-    for one in found:
-        assert abs(one.crf_hz - 3100.0) < 4.0 * one.crf_std
-        assert one.crfa < 0.7
-        assert np.isnan(one.crfa_std)
-        assert "lower bound" in one.reason
+    assert detected
+    for resonance in detected:
+        assert abs(resonance.crf_hz - 3100.0) < 4.0 * resonance.crf_std
+        assert resonance.crfa < 0.7
+        assert np.isnan(resonance.crfa_std)
+        assert "lower bound" in resonance.reason
 
 
-def test_lines_that_do_not_count_are_not_seen():
+def test_masked_lines_are_ignored():
     spectra = series()
-    kept = [np.ones(FREQUENCY.size, dtype=bool) for _ in spectra]
-    spoilt = []
-    for number, (spectrum, mask) in enumerate(zip(spectra, kept, strict=True)):
-        at = 2600 + 17 * number
+    masks = [np.ones(FREQUENCY.size, dtype=bool) for _ in spectra]
+    disturbed = []
+    for number, (spectrum, mask) in enumerate(zip(spectra, masks, strict=True)):
+        index = 2600 + 17 * number
         density = spectrum.density.copy()
-        density[at - 1 : at + 2] *= 1e4
-        mask[at - 1 : at + 2] = False
-        spoilt.append(replace(spectrum, density=density))
+        density[index - 1 : index + 2] *= 1e4
+        mask[index - 1 : index + 2] = False
+        disturbed.append(replace(spectrum, density=density))
     clean = series_resonances(spectra, band_hz=BAND)
-    masked = series_resonances(spoilt, band_hz=BAND, kept=kept)
-    assert [one.crf_hz for one in masked] == pytest.approx([one.crf_hz for one in clean], abs=0.5)
+    masked = series_resonances(disturbed, band_hz=BAND, kept=masks)
+    assert [resonance.crf_hz for resonance in masked] == pytest.approx(
+        [resonance.crf_hz for resonance in clean], abs=0.5
+    )
 
 
-def test_the_fitted_curve_is_the_spectrum():
+def test_the_fitted_curve_equals_the_spectrum():
     spectra = series(averages=1e4)
-    inside = (FREQUENCY > 1900) & (FREQUENCY < 3900)
-    for spectrum, one in zip(spectra, series_resonances(spectra, band_hz=BAND), strict=True):
-        off = one.curve(FREQUENCY[inside]) / spectrum.density[inside] - 1.0
-        assert np.sqrt(np.mean(off**2)) < 0.03
+    in_band = (FREQUENCY > 1900) & (FREQUENCY < 3900)
+    for spectrum, resonance in zip(spectra, series_resonances(spectra, band_hz=BAND), strict=True):
+        error = resonance.curve(FREQUENCY[in_band]) / spectrum.density[in_band] - 1.0
+        assert np.sqrt(np.mean(error**2)) < 0.03
 
 
 @pytest.mark.parametrize(
-    ("spectra", "method", "named"),
+    ("spectra", "method", "message"),
     [
         (lambda: series()[:5], "joint", "at least 6 recordings"),
         (lambda: series(), "loudest", "series method"),
@@ -260,31 +287,40 @@ def test_the_fitted_curve_is_the_spectrum():
             "joint",
             "no vibration",
         ),
-        (lambda: [replace(one, smoothing_passes=3) for one in series()], "joint", "unsmoothed"),
+        (
+            lambda: [replace(spectrum, smoothing_passes=3) for spectrum in series()],
+            "joint",
+            "unsmoothed",
+        ),
     ],
 )
-def test_what_cannot_be_separated_is_refused(spectra, method, named):
-    with pytest.raises(BadInput, match=named):
+def test_spectra_that_cannot_be_separated_are_refused(spectra, method, message):
+    with pytest.raises(BadInput, match=message):
         series_resonances(spectra(), band_hz=BAND, method=method)
 
 
-def test_other_methods_take_each_spectrum_by_itself():
+def test_other_methods_take_each_spectrum_alone():
     spectra = series(averages=50.0)[:3]
-    alone = series_resonances(spectra, band_hz=(2600.0, 3300.0), method="likelihood")
-    assert len(alone) == 3
-    assert alone[0].method == "likelihood"
+    resonances = series_resonances(spectra, band_hz=(2600.0, 3300.0), method="likelihood")
+    assert len(resonances) == 3
+    assert resonances[0].method == "likelihood"
 
 
-def test_of_a_long_series_some_settle_what_all_share():
+def test_a_subset_of_a_long_series_determines_the_common_transfer():
     truth = np.linspace(2900.0, 3750.0, 150)
-    found = series_resonances(series(averages=60.0, truth=truth), band_hz=BAND)
-    assert all(one.found for one in found)
-    pulls = np.array([(one.crf_hz - f) / one.crf_std for one, f in zip(found, truth, strict=True)])
-    assert np.mean(np.abs(pulls) < 1.645) == pytest.approx(0.9, abs=0.07)
+    resonances = series_resonances(series(averages=60.0, truth=truth), band_hz=BAND)
+    assert all(resonance.found for resonance in resonances)
+    errors = np.array(
+        [
+            (resonance.crf_hz - f) / resonance.crf_std
+            for resonance, f in zip(resonances, truth, strict=True)
+        ]
+    )
+    assert np.mean(np.abs(errors) < 1.645) == pytest.approx(0.9, abs=0.07)
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("changes", "message"),
     [
         ({}, None),
         ({"evidence": 9.0}, "no line moves"),
@@ -296,77 +332,84 @@ def test_of_a_long_series_some_settle_what_all_share():
         ({"f0_std": 130.0}, "cannot be separated"),
     ],
 )
-def test_every_line_that_is_not_the_contacts_is_refused_with_its_reason(changes, words):
+def test_other_lines_are_refused_with_their_reason(changes, message):
     line = JudgedLine(
         f0=2800.0, f0_std=2.0, damping=0.02, evidence=50.0, misfit=0.05, rival=2300.0, lead=40.0
     )
-    said = line_objection(line._replace(**changes), BAND)
-    assert said is None if words is None else words in said
+    objection = line_objection(line._replace(**changes), BAND)
+    assert objection is None if message is None else message in objection
 
 
 def through_structures(seed, *, moved):
-    """Twenty-four recordings through one structure, or through another one behind the twelfth."""
+    """Twenty-four recordings through one structure, or through another after the twelfth."""
     truth = np.tile(np.linspace(2700.0, 3700.0, 12), 2)
-    ways = []
-    for at, height in ((3000.0, 1.5), (3350.0, -0.8)):
-        passed = 1.0 + height * 2j * 0.02 / (
-            1.0 - (FREQUENCY / at) ** 2 + 2j * 0.02 * FREQUENCY / at
+    gains = []
+    for frequency, height in ((3000.0, 1.5), (3350.0, -0.8)):
+        response = 1.0 + height * 2j * 0.02 / (
+            1.0 - (FREQUENCY / frequency) ** 2 + 2j * 0.02 * FREQUENCY / frequency
         )
-        ways.append(np.abs(passed) ** 2)
-    first = series(truth=truth[:12], passed=ways[0], seed=seed)
+        gains.append(np.abs(response) ** 2)
+    first = series(truth=truth[:12], gain=gains[0], seed=seed)
     return [
         *first,
-        *series(truth=truth[12:], passed=ways[1 if moved else 0], seed=100 + seed),
+        *series(truth=truth[12:], gain=gains[1 if moved else 0], seed=100 + seed),
     ], truth
 
 
-def test_a_moved_sensor_is_told_and_each_part_has_its_own_transfer():
-    """Places twice over: what moves them there is the structure, and only the parts by themselves
-    hold the truth.
-    """
+def test_a_moved_sensor_is_reported_and_each_part_has_its_transfer():
+    """The structure shifts the lines; only separate fits of both parts recover the truth."""
     spectra, truth = through_structures(1, moved=True)
-    found, shared, moved = learn_series(spectra, band_hz=BAND)
+    resonances, shared, moved = learn_series(spectra, band_hz=BAND)
     assert moved == (12,)
-    errors = np.array([(one.crf_hz - f) / one.crf_std for one, f in zip(found, truth, strict=True)])
-    assert np.sqrt(np.mean(errors**2)) < 1.5
-    whole = separate_series(spectra, band_hz=BAND).resonances
-    together = np.array(
-        [(one.crf_hz - f) / one.crf_std for one, f in zip(whole, truth, strict=True)]
+    errors = np.array(
+        [
+            (resonance.crf_hz - f) / resonance.crf_std
+            for resonance, f in zip(resonances, truth, strict=True)
+        ]
     )
-    assert np.sqrt(np.mean(together**2)) > 2.0
-    (beside,) = shared.resonances(spectra[-1:])  # what is learned is the last part's
-    assert beside.crf_hz == pytest.approx(found[-1].crf_hz, abs=found[-1].crf_std)
+    assert np.sqrt(np.mean(errors**2)) < 1.5
+    unsplit = separate_series(spectra, band_hz=BAND).resonances
+    unsplit_errors = np.array(
+        [
+            (resonance.crf_hz - f) / resonance.crf_std
+            for resonance, f in zip(unsplit, truth, strict=True)
+        ]
+    )
+    assert np.sqrt(np.mean(unsplit_errors**2)) > 2.0
+    (further,) = shared.resonances(spectra[-1:])  # uses the transfer of the last part
+    assert further.crf_hz == pytest.approx(resonances[-1].crf_hz, abs=resonances[-1].crf_std)
     spectra, _ = through_structures(1, moved=False)
     assert learn_series(spectra, band_hz=BAND).moved == ()
 
 
-def test_a_louder_sensor_and_modes_that_drift_have_not_moved():
+def test_a_louder_sensor_and_drifting_modes_are_not_reported_as_moved():
     spectra, _ = through_structures(2, moved=False)
-    louder = [
-        replace(one, density=(2.0 if i >= 12 else 1.0) * one.density)
-        for i, one in enumerate(spectra)
+    with_gain = [
+        replace(spectrum, density=(2.0 if i >= 12 else 1.0) * spectrum.density)
+        for i, spectrum in enumerate(spectra)
     ]
-    assert learn_series(louder, band_hz=BAND).moved == ()
+    assert learn_series(with_gain, band_hz=BAND).moved == ()
     drifting = [
-        replace(one, density=np.interp(FREQUENCY / (1.0 + 1e-4 * number), FREQUENCY, one.density))
-        for number, one in enumerate(spectra)
+        replace(
+            spectrum,
+            density=np.interp(FREQUENCY / (1.0 + 1e-4 * number), FREQUENCY, spectrum.density),
+        )
+        for number, spectrum in enumerate(spectra)
     ]
     assert learn_series(drifting, band_hz=BAND).moved == ()
 
 
-def test_a_base_that_was_nil_below_a_line_comes_back():
-    """The logarithm of nothing has no slope: a fit that began there stayed there, far from the
-    best.
-    """
+def test_a_zero_base_below_a_line_recovers():
+    """The logarithm of zero has no slope, so a fit started there did not leave it."""
     blocks = separate_series(series(), band_hz=BAND).blocks
     converged = separate(blocks).joint
-    below = np.argmin(np.abs(blocks.centre - 3300.0))
+    cell = np.argmin(np.abs(blocks.centre - 3300.0))
     base = converged.parameters.base.copy()
-    base[below - 20 : below + 20] = -60.0
-    nil = converged.parameters._replace(base=base)
-    stays, comes_back = (
+    base[cell - 20 : cell + 20] = -60.0
+    zero_base = converged.parameters._replace(base=base)
+    uncorrected, corrected = (
         _fit_jointly(blocks, start, converged.step_std)
-        for start in (nil, _with_positive_base(blocks, nil))
+        for start in (zero_base, _with_positive_base(blocks, zero_base))
     )
-    assert comes_back.cost == pytest.approx(converged.cost, abs=1.0)
-    assert stays.cost > converged.cost + 100.0
+    assert corrected.cost == pytest.approx(converged.cost, abs=1.0)
+    assert uncorrected.cost > converged.cost + 100.0

@@ -1,6 +1,4 @@
-"""Velocity and its zones, and envelopes, held against closed forms and the standard's table; and
-what they raise.
-"""
+"""Velocity and its zones, and envelopes, against closed forms and the standard's table; alarms."""
 
 import json
 from pathlib import Path
@@ -31,15 +29,15 @@ def test_velocity_of_a_tone_is_acceleration_over_angular_frequency(hertz, within
 
 
 def test_velocity_of_white_noise_is_the_integral_of_its_band():
-    """∫ S/(2πf)² df from 10 to 1000 Hz = S/(4π²) (1/10 - 1/1000); lines as wide as 1 Hz add 5 % at
-    the lower end.
+    """∫ S/(2πf)² df from 10 to 1000 Hz = S/(4π²) (1/10 - 1/1000); 1 Hz lines add 5 % at the lower
+    end.
     """
     frequency = np.arange(0.0, 5000.0, 0.1)
     exact = np.sqrt(2.0 / (4.0 * np.pi**2) * (1.0 / 10.0 - 1.0 / 1000.0))
     assert velocity_rms(frequency, np.full(frequency.size, 2.0)) == pytest.approx(exact, rel=5e-3)
 
 
-def test_velocity_is_not_told_by_coarse_lines_or_a_low_rate():
+def test_velocity_is_undetermined_for_coarse_lines_or_a_low_rate():
     assert np.isnan(velocity_rms(np.arange(0.0, 2000.0, 6.0), np.ones(334)))
     assert np.isnan(velocity_rms(np.arange(0.0, 900.0, 1.0), np.ones(900)))
 
@@ -64,9 +62,9 @@ def test_zones_are_those_of_the_standard(machine, mm_s, zone):
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 1.0])
-def test_a_modulated_tone_is_as_deep_as_its_closed_form(share):
+def test_envelope_depth_of_a_modulated_tone_is_its_closed_form(share):
     """(1 + m cos)² = 1 + m²/2 + 2m cos + m²/2 cos 2: rms of both lines over the mean; a taper takes
-    15 % at most.
+    up to 15 %.
     """
     time = np.arange(round(8 * RATE)) / RATE
     wave = (1.0 + share * np.cos(2.0 * np.pi * 87.3 * time)) * np.cos(2.0 * np.pi * 4321.0 * time)
@@ -81,37 +79,41 @@ def test_a_modulated_tone_is_as_deep_as_its_closed_form(share):
     assert np.isnan(envelope.depths({"beyond the band": 0.16 * RATE})["beyond the band"])
 
 
-def test_an_envelope_of_a_short_record_or_of_gaps_says_what_it_can():
+def test_an_envelope_of_a_short_or_interrupted_record_gives_what_it_supports():
     noise = np.random.default_rng(1).standard_normal(round(9 * RATE))
     short, gaps = Envelope(RATE), Envelope(RATE)
     list(short.watch([noise[:2000]]))
     assert 0.0 < short.depths({"fault": 87.3})["fault"] < 0.4
-    assert np.isnan(short.depths({"fault": 30.0})["fault"])  # fewer than four turns
+    assert np.isnan(short.depths({"fault": 30.0})["fault"])  # fewer than four revolutions
     noise[1000] = np.nan
     list(gaps.watch([noise]))
-    assert gaps.chunks == 1  # of two, one has a gap
-    silent = Envelope(RATE)
-    list(silent.watch([np.zeros(2000)]))
-    assert np.isnan(silent.depths({"fault": 87.3})["fault"])
+    assert gaps.chunks == 1  # one of two blocks has a gap
+    empty = Envelope(RATE)
+    list(empty.watch([np.zeros(2000)]))
+    assert np.isnan(empty.depths({"fault": 87.3})["fault"])
 
 
-def recordings(folder, velocities, depths, seconds=2.0, **stated):
-    """A machine that shakes at 50 Hz, of this velocity [m/s], whose bearing rings at 4 kHz every
-    1/87.3 s, so deep.
+def recordings(folder, velocities, depths, seconds=2.0, **sidecar):
+    """A machine with this velocity [m/s] at 50 Hz; bearing impulses at 87.3 Hz excite 4 kHz to
+    `depths`.
     """
     folder.mkdir()
     time = np.arange(round(seconds * RATE)) / RATE
     for number, (velocity, depth) in enumerate(zip(velocities, depths, strict=True)):
         rng = np.random.default_rng(number)
-        shaken = np.sqrt(2.0) * velocity * 2.0 * np.pi * 50.0 * np.sin(2.0 * np.pi * 50.0 * time)
-        ringing = rng.standard_normal(time.size) * (1.0 + depth * np.cos(2.0 * np.pi * 87.3 * time))
-        np.savez(folder / f"s-{number:03}.npz", acc=shaken + 0.3 * ringing, fs=RATE, unit="m/s^2")
-    (folder / "recordings.json").write_text(json.dumps(stated))
+        vibration = np.sqrt(2.0) * velocity * 2.0 * np.pi * 50.0 * np.sin(2.0 * np.pi * 50.0 * time)
+        impulses = rng.standard_normal(time.size) * (
+            1.0 + depth * np.cos(2.0 * np.pi * 87.3 * time)
+        )
+        np.savez(
+            folder / f"s-{number:03}.npz", acc=vibration + 0.3 * impulses, fs=RATE, unit="m/s^2"
+        )
+    (folder / "recordings.json").write_text(json.dumps(sidecar))
     return folder
 
 
 @pytest.mark.parametrize(
-    ("velocity", "zone", "state", "said"),
+    ("velocity", "zone", "state", "message"),
     [
         (
             8e-3,
@@ -126,23 +128,23 @@ def recordings(folder, velocities, depths, seconds=2.0, **stated):
         (3e-3, "B", "cannot-tell", "Cannot tell: no contact"),
     ],
 )
-def test_a_zone_raises_what_the_standard_says(tmp_path, velocity, zone, state, said):
+def test_a_zone_raises_the_standards_state(tmp_path, velocity, zone, state, message):
     folder = recordings(
         tmp_path / "in", [velocity] * 3, [0.0] * 3, seconds=4.0, machine_class="large-rigid"
     )
     track = track_recordings([folder], TrackSettings(band_hz=(2000.0, 4000.0)))
     assert {recording.zone for recording in track.recordings} == {zone}
     assert track.alarm.state == state
-    assert said in track.verdict()
+    assert message in track.verdict()
     assert track.scalars()["recordings"][0]["velocity_rms"] == pytest.approx(velocity, rel=0.02)
     if state == "alarm":
-        assert track.alarm.since == 1  # the second in zone D
+        assert track.alarm.since == 1  # the second recording in zone D
         assert track.alarm.states == ("cannot-tell", "alarm", "alarm")
     looked = track_recordings([folder], TrackSettings(band_hz=(2000.0, 4000.0), acknowledge="last"))
     assert looked.alarm.state == "none"
 
 
-def test_zone_d_alarms_though_it_has_gone_since(tmp_path):
+def test_zone_d_alarms_even_if_left_again(tmp_path):
     velocities = [1e-3, 9e-3, 9e-3, 1e-3, 1e-3]
     folder = recordings(
         tmp_path / "in", velocities, [0.0] * 5, seconds=4.0, machine_class="large-rigid"
@@ -151,7 +153,7 @@ def test_zone_d_alarms_though_it_has_gone_since(tmp_path):
     assert (track.alarm.state, track.alarm.since, track.alarm.raised_by) == ("alarm", 2, "zone")
 
 
-def test_without_a_class_there_is_a_velocity_and_no_zone(tmp_path):
+def test_without_a_class_velocity_has_no_zone(tmp_path):
     folder = recordings(tmp_path / "in", [8e-3] * 3, [0.0] * 3, seconds=4.0)
     track = track_recordings([folder], TrackSettings(band_hz=(2000.0, 4000.0)))
     assert track.recordings[-1].zone is None
@@ -165,8 +167,8 @@ def test_without_a_class_there_is_a_velocity_and_no_zone(tmp_path):
 @pytest.mark.parametrize(
     "late", [np.geomspace(0.05, 0.9, 14), np.full(14, 0.3)], ids=["grows", "jumps"]
 )
-def test_a_fault_that_is_heard_in_the_envelope_alarms_where_the_level_does_not(tmp_path, late):
-    """The level stays where it is; only the outer ring is heard more and more."""
+def test_an_envelope_fault_alarms_at_constant_level(tmp_path, late):
+    """Only the outer-race fault grows."""
     depths = np.concatenate([np.zeros(14), late])
     folder = recordings(
         tmp_path / "in", [1e-3] * 28, depths, faults_hz={"outer ring": 87.3, "inner ring": 131.9}
@@ -177,7 +179,7 @@ def test_a_fault_that_is_heard_in_the_envelope_alarms_where_the_level_does_not(t
 
 
 @pytest.mark.parametrize(
-    ("stated", "said"),
+    ("sidecar", "message"),
     [
         ({"machine_class": "huge"}, "machine_class must be one of large-rigid"),
         ({"faults_hz": 87.3}, "faults_hz must be positive rates by name"),
@@ -185,7 +187,7 @@ def test_a_fault_that_is_heard_in_the_envelope_alarms_where_the_level_does_not(t
         ({"faults_hz": {}}, "faults_hz must be positive rates by name"),
     ],
 )
-def test_what_a_sidecar_cannot_mean_is_refused(tmp_path, stated, said):
-    folder = recordings(tmp_path / "in", [1e-3], [0.0], **stated)
-    with pytest.raises(BadInput, match=said):
+def test_an_invalid_sidecar_is_refused(tmp_path, sidecar, message):
+    folder = recordings(tmp_path / "in", [1e-3], [0.0], **sidecar)
+    with pytest.raises(BadInput, match=message):
         read_recording(Path(folder) / "s-000.npz")

@@ -19,9 +19,9 @@ def white(samples: int, seed: int = 0) -> Signal:
     return Signal(np.random.default_rng(seed).standard_normal(samples), 1000.0, "m/s^2")
 
 
-def impulse_spectrum(at: int, lines: int = 12) -> Spectrum:
+def impulse_spectrum(index: int, lines: int = 12) -> Spectrum:
     density = np.zeros(lines)
-    density[at] = 1.0
+    density[index] = 1.0
     frequency = np.arange(lines, dtype=float)
     return Spectrum(
         frequency_hz=frequency,
@@ -61,9 +61,9 @@ def test_a_sine_on_a_line_shows_its_power_over_the_resolution():
     spectrum = power_spectrum(
         Signal(3.0 * np.sin(2 * np.pi * 100.0 * time), 1000.0, "g"), window="hann"
     )
-    at = int(np.argmax(spectrum.density))
-    assert spectrum.frequency_hz[at] == pytest.approx(100.0)
-    assert spectrum.density[at] * spectrum.resolution_hz == pytest.approx(4.5, rel=1e-9)
+    peak = int(np.argmax(spectrum.density))
+    assert spectrum.frequency_hz[peak] == pytest.approx(100.0)
+    assert spectrum.density[peak] * spectrum.resolution_hz == pytest.approx(4.5, rel=1e-9)
     assert spectrum.resolution_hz == pytest.approx(1.5)  # the Hann window's 1.5 lines
     assert spectrum.unit == "g^2/Hz"
 
@@ -75,8 +75,8 @@ def test_the_unit_is_squared_as_a_whole():
 @pytest.mark.parametrize(
     ("segment", "window"), [(None, "boxcar"), (None, "hann"), (200, "hann"), (200, "boxcar")]
 )
-def test_averages_say_how_much_a_sum_over_lines_scatters(segment, window):
-    """Mean of n lines of unit white noise: variance 1 / (n averages), by 1500 records."""
+def test_averages_state_the_scatter_of_a_sum_over_lines(segment, window):
+    """Mean of n lines of unit white noise has variance 1 / (n averages); 1500 records."""
     means = []
     for seed in range(1500):
         spectrum = power_spectrum(white(2000, seed), segment=segment, window=window)
@@ -93,7 +93,7 @@ def test_known_averages_of_hann_windows():
     many = power_spectrum(white(400_000), segment=1000, window="hann")
     assert many.averages == pytest.approx(
         18.0 / 19.0 * 400, rel=0.01
-    )  # half overlapped: 94.7 % of all there is
+    )  # half overlap gives 94.7 % of the maximum
 
 
 ROWS = {
@@ -112,15 +112,15 @@ def test_smoothing_has_the_five_point_cubic_coefficients_to_the_ends(row):
         assert end[11 - row] == pytest.approx(ROWS[row][column], abs=1e-12)
 
 
-def test_three_passes_are_one_after_the_other_and_are_counted():
+def test_three_passes_are_applied_in_turn_and_counted():
     spectrum = power_spectrum(white(2000))
-    thrice = smooth(spectrum, 3)
-    assert np.array_equal(thrice.density, smooth(smooth(smooth(spectrum, 1), 1), 1).density)
-    assert thrice.smoothing_passes == 3
+    smoothed = smooth(spectrum, 3)
+    assert np.array_equal(smoothed.density, smooth(smooth(smooth(spectrum, 1), 1), 1).density)
+    assert smoothed.smoothing_passes == 3
     assert smooth(spectrum, 1).resolution_hz == pytest.approx(spectrum.resolution_hz * 35 / 17)
 
 
-def test_what_has_no_spectrum_is_refused_by_name():
+def test_invalid_input_is_refused_by_name():
     with pytest.raises(BadInput, match="8 to 100 samples"):
         power_spectrum(white(100), segment=101)
     with pytest.raises(BadInput, match="'parabola'"):
@@ -139,30 +139,30 @@ def test_a_record_in_blocks_has_the_spectrum_of_the_whole(samples, segment, wind
     values = np.random.default_rng(3).standard_normal(samples) + 5.0
     blocks = [values[:13], values[13:200], values[200:200], values[200:]]
     spectrum = averaged_spectrum(blocks, 10.0, "m", segment=segment, window=window)
-    whole = power_spectrum(Signal(values, 10.0, "m"), segment=segment, window=window)
-    assert np.allclose(spectrum.density, whole.density, rtol=1e-12)
+    complete = power_spectrum(Signal(values, 10.0, "m"), segment=segment, window=window)
+    assert np.allclose(spectrum.density, complete.density, rtol=1e-12)
     overlap = 0 if window == "boxcar" else segment // 2
     frequency, density = welch(values, 10.0, window, segment, overlap)
     assert np.allclose(spectrum.density[1:], density[1:], rtol=1e-12)
     assert np.allclose(spectrum.frequency_hz, frequency, rtol=1e-15)
-    assert (spectrum.duration_s, spectrum.averages) == (whole.duration_s, whole.averages)
+    assert (spectrum.duration_s, spectrum.averages) == (complete.duration_s, complete.averages)
 
 
-def test_pieces_with_a_gap_are_left_out_of_a_spectrum():
+def test_segments_with_a_gap_are_excluded_from_a_spectrum():
     values = np.random.default_rng(4).standard_normal(1000)
     holed = values.copy()
     holed[310:330] = np.nan
     spectrum = averaged_spectrum([holed], 1.0, "m", segment=100, window="boxcar")
-    kept = np.delete(values.reshape(10, 100), 3, axis=0).ravel()
-    expected = averaged_spectrum([kept], 1.0, "m", segment=100, window="boxcar")
+    valid = np.delete(values.reshape(10, 100), 3, axis=0).ravel()
+    expected = averaged_spectrum([valid], 1.0, "m", segment=100, window="boxcar")
     assert np.allclose(spectrum.density, expected.density, rtol=1e-12)
     assert spectrum.averages == pytest.approx(9.0)
     with pytest.raises(BadInput, match="without a gap"):
         averaged_spectrum([np.full(500, np.nan)], 1.0, "m", segment=100)
 
 
-def test_averages_count_what_the_pieces_beside_a_gap_share():
-    """1 / (n sum w_t^2), the weight of every sample added up piece by piece."""
+def test_averages_count_the_overlap_of_segments_around_a_gap():
+    """1 / (n sum w_t^2), with the weight of each sample summed segment by segment."""
     values = np.random.default_rng(5).standard_normal(1000)
     values[310:330] = np.nan
     spectrum = averaged_spectrum([values], 1.0, "m", segment=100)
@@ -182,16 +182,18 @@ def test_averages_count_what_the_pieces_beside_a_gap_share():
 @pytest.mark.parametrize(
     "filter_", [([0.3], [1.0]), ([0.1, 0.2], [2.0, -1.9]), ([1.0, 0.5, 0.1], [1.0, -1.9, 0.95])]
 )
-def test_recursion_is_lfilter(samples, filter_):
+def test_recursion_equals_lfilter(samples, filter_):
     numerator, denominator = map(np.array, filter_)
     values = np.random.default_rng(3).standard_normal(samples)
     expected = lfilter(numerator, denominator, values)
-    found = recursion(numerator, denominator, values)
-    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.max(np.abs(expected)))
+    computed = recursion(numerator, denominator, values)
+    np.testing.assert_allclose(
+        computed, expected, rtol=1e-10, atol=1e-12 * np.max(np.abs(expected))
+    )
 
 
 @pytest.mark.parametrize("samples", [8, 9, 1000])
-def test_tapers_are_scipys(samples):
+def test_tapers_equal_scipys(samples):
     for window in ("hann", "boxcar", "hamming"):
         np.testing.assert_allclose(
             taper(window, samples), get_window(window, samples), rtol=1e-12, atol=1e-15

@@ -1,4 +1,4 @@
-"""Tangent stiffness of solved contacts against closed forms: issue 4, item 5."""
+"""Tangent stiffness of solved contacts against closed forms."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -30,42 +30,41 @@ PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 @pytest.mark.parametrize("load", [100.0, 500.0])
 @pytest.mark.parametrize("depth", [2e-3, 20e-3])
 def test_a_smooth_dry_line_contact_has_johnsons_stiffness(load, depth):
-    """dδ/dP' of δ = (P'/πE*) (2 ln(2d/a) + 1), by hand: (2/πE*) ln(2d/a)."""
+    """dδ/dP' of δ = (P'/πE*) (2 ln(2d/a) + 1) by hand: (2/πE*) ln(2d/a)."""
     conditions = replace(STEEL, load=load)
     a = conditions.hertz.half_widths[0]
     smooth = solve_contact(
         conditions, None, flat_surface(Grid((96, 8), (-1.5 * a, -a / 2), (1.5 * a, a / 2)))
     )
-    found = tangent_stiffness(smooth, reference_depth=depth)
+    stiffness = tangent_stiffness(smooth, reference_depth=depth)
     compliance = 2.0 * np.log(2.0 * depth / a) / (np.pi * STEEL.pair.reduced_modulus * STEEL.length)
-    assert found.total == pytest.approx(1.0 / compliance, rel=5e-3)
-    assert found.film == pytest.approx(0.0, abs=1e-3 * found.total)
-    assert abs(found.step_change) < 2e-3
+    assert stiffness.total == pytest.approx(1.0 / compliance, rel=5e-3)
+    assert stiffness.film == pytest.approx(0.0, abs=1e-3 * stiffness.total)
+    assert abs(stiffness.step_change) < 2e-3
 
 
 @pytest.mark.parametrize("radius", [5.4e-3, (5.4e-3, 10.8e-3), (10.8e-3, 5.4e-3)], ids=str)
 def test_a_smooth_dry_point_contact_has_hertzs_stiffness(radius):
-    """δ ~ F^(2/3), so S = 1.5 F/δ; for a sphere the paper's Eq 3."""
+    """δ ~ F^(2/3), so S = 1.5 F/δ; for a sphere Eq 3 of the paper."""
     geometry = "elliptic" if isinstance(radius, tuple) else "point"
     conditions = replace(STEEL, geometry=geometry, radius=radius, length=None, load=200.0)
     a, b = conditions.hertz.half_widths
     grid = Grid((64, 64), (-1.5 * a, -1.5 * b), (1.5 * a, 1.5 * b), (False, False))
-    found = tangent_stiffness(solve_contact(conditions, None, flat_surface(grid)))
-    assert found.total == pytest.approx(1.5 * 200.0 / conditions.hertz.approach, rel=0.01)
+    stiffness = tangent_stiffness(solve_contact(conditions, None, flat_surface(grid)))
+    assert stiffness.total == pytest.approx(1.5 * 200.0 / conditions.hertz.approach, rel=0.01)
     if geometry == "point":
-        assert found.total == pytest.approx(
+        assert stiffness.total == pytest.approx(
             point_stiffness(200.0, 5.4e-3, STEEL.pair.reduced_modulus), rel=0.01
         )
-    assert found.reference_depth is None
+    assert stiffness.reference_depth is None
 
 
 @pytest.mark.parametrize("load", [50.0, 200.0])
 def test_a_row_of_point_contacts_has_hertzs_stiffness(load):
-    """A sphere a period L, as roughness on a line contact: the paper's Eq 3 within 2 %.
-
-    The row's other spheres and the line's own reference add F (2/L) (γ + ln(d/2L)) / πE* to each
-    one's approach, which is nothing from d = 2L e^-γ: the limit of Σ 1/|r - nL| against the line
-    potential -(2/L) ln r.
+    """One sphere per period L, as roughness on a line contact: Eq 3 of the paper within 2 %. The
+    other spheres of the row and the reference of the line add F (2/L) (γ + ln(d/2L)) / πE* to each
+    approach, which vanishes for d = 2L e^-γ: the limit of Σ 1/|r - nL| against the line potential
+    -(2/L) ln r.
     """
     radius, modulus = STEEL.radius_along_rolling, STEEL.pair.reduced_modulus
     a = point_contact(load, radius, modulus).half_widths[0]
@@ -78,11 +77,11 @@ def test_a_row_of_point_contacts_has_hertzs_stiffness(load):
     assert solved.pressure.max() == pytest.approx(
         point_contact(load, radius, modulus).p_max, rel=0.01
     )
-    found = tangent_stiffness(solved, reference_depth=2.0 * period * np.exp(-np.euler_gamma))
-    assert found.total == pytest.approx(point_stiffness(load, radius, modulus), rel=0.01)
+    stiffness = tangent_stiffness(solved, reference_depth=2.0 * period * np.exp(-np.euler_gamma))
+    assert stiffness.total == pytest.approx(point_stiffness(load, radius, modulus), rel=0.01)
 
 
-def test_a_point_contact_vibrates_on_its_tangent_stiffness():
+def test_a_point_contact_resonates_at_its_tangent_stiffness():
     conditions = replace(STEEL, geometry="point", length=None, load=200.0)
     a = conditions.hertz.half_widths[0]
     solved = solve_contact(
@@ -91,13 +90,13 @@ def test_a_point_contact_vibrates_on_its_tangent_stiffness():
         flat_surface(Grid((64, 64), (-1.5 * a, -1.5 * a), (1.5 * a, 1.5 * a), (False, False))),
     )
     model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="tangent")
-    heard = contact_vibration(
+    vibration = contact_vibration(
         replace(contact_state(solved), sq=1e-6), conditions, model, solution=solved
     )
-    assert heard.full_load_crf_hz == pytest.approx(
+    assert vibration.full_load_crf_hz == pytest.approx(
         3292.0, abs=1.0
     )  # docs/paper.md: 200 N, E* 109.89 GPa
-    assert heard.resonance.crf_hz == pytest.approx(3292.0, rel=0.005)
+    assert vibration.resonance.crf_hz == pytest.approx(3292.0, rel=0.005)
 
 
 @pytest.fixture(scope="module")
@@ -110,18 +109,18 @@ def mixed():
 
 
 def test_a_mixed_contact_is_softer_than_a_smooth_one_and_its_parts_add_up(mixed):
-    found = tangent_stiffness(mixed)
+    stiffness = tangent_stiffness(mixed)
     depth, a = roller_depth(mixed.conditions), mixed.conditions.hertz.half_widths[0]
     smooth = np.pi * mixed.conditions.pair.reduced_modulus * 10e-3 / (2.0 * np.log(2.0 * depth / a))
-    assert found.reference_depth == depth
-    assert 0.5 * smooth < found.total < smooth
-    assert found.asperity > 0.0
-    assert found.film > 0.0
-    assert found.asperity + found.film == found.total
-    assert abs(found.step_change) < 0.05
+    assert stiffness.reference_depth == depth
+    assert 0.5 * smooth < stiffness.total < smooth
+    assert stiffness.asperity > 0.0
+    assert stiffness.film > 0.0
+    assert stiffness.asperity + stiffness.film == stiffness.total
+    assert abs(stiffness.step_change) < 0.05
 
 
-def test_a_contact_vibrates_on_its_own_stiffness_and_its_own_surface(mixed):
+def test_a_contact_resonates_at_its_own_stiffness_on_its_own_surface(mixed):
     model = VibrationModel(
         mass=0.1,
         damping_ratio=0.02,
@@ -130,19 +129,19 @@ def test_a_contact_vibrates_on_its_own_stiffness_and_its_own_surface(mixed):
         patch="line",
         rate_hz=200e3,
         duration_s=1.0,
-        # the fitted line takes the base for white in acceleration, which this surface's is not
+        # the fit assumes white base acceleration, which this surface does not have
         method="peak",
     )
-    heard = contact_vibration(contact_state(mixed), mixed.conditions, model, solution=mixed)
+    vibration = contact_vibration(contact_state(mixed), mixed.conditions, model, solution=mixed)
     expected = np.sqrt(tangent_stiffness(mixed).total / 0.1) / (2.0 * np.pi)
-    assert heard.oscillator.natural_frequency_hz == pytest.approx(expected, rel=1e-9)
-    assert heard.resonance.found
-    assert heard.resonance.crf_hz == pytest.approx(expected, rel=0.02)
+    assert vibration.oscillator.natural_frequency_hz == pytest.approx(expected, rel=1e-9)
+    assert vibration.resonance.found
+    assert vibration.resonance.crf_hz == pytest.approx(expected, rel=0.02)
     track = excitation(contact_state(mixed), mixed.conditions, model, solution=mixed).source
     assert track.speed == pytest.approx(0.2 * 1.91)
 
 
-def test_bad_input_is_named(mixed):
+def test_invalid_input_is_refused_by_name(mixed):
     with pytest.raises(BadInput, match="load step"):
         tangent_stiffness(mixed, step=0.5)
     with pytest.raises(BadInput, match="half-width"):

@@ -70,7 +70,7 @@ def solution():
     )
 
 
-def same(one, other):
+def assert_equal(loaded, expected):
     for name in (
         "conditions",
         "lubricant",
@@ -80,17 +80,17 @@ def same(one, other):
         "attributes",
         "grid",
     ):
-        assert getattr(one, name) == getattr(other, name), name
+        assert getattr(loaded, name) == getattr(expected, name), name
     for name in ("pressure", "gap", "in_contact"):
-        a, b = getattr(one, name), getattr(other, name)
+        a, b = getattr(loaded, name), getattr(expected, name)
         assert a.dtype == b.dtype
         assert a.tobytes() == b.tobytes(), name
-    assert one.surface.heights.tobytes() == other.surface.heights.tobytes()
+    assert loaded.surface.heights.tobytes() == expected.surface.heights.tobytes()
 
 
-def test_every_number_comes_back_bit_for_bit(solution, tmp_path):
+def test_every_number_is_restored_bit_for_bit(solution, tmp_path):
     path = solution.save(tmp_path / "run.nc")
-    same(load_solution(path), solution)
+    assert_equal(load_solution(path), solution)
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.nc"]
 
 
@@ -106,18 +106,18 @@ def test_every_number_comes_back_bit_for_bit(solution, tmp_path):
         {"attributes": {}},
     ],
 )
-def test_other_oils_and_none_come_back(solution, tmp_path, changes):
+def test_other_lubricants_and_none_are_restored(solution, tmp_path, changes):
     changed = replace(solution, **changes)
-    same(load_solution(changed.save(tmp_path / "run.nc")), changed)
+    assert_equal(load_solution(changed.save(tmp_path / "run.nc")), changed)
 
 
-def test_infinities_of_an_unfinished_solve_come_back(solution, tmp_path):
+def test_infinities_of_an_unfinished_solve_are_restored(solution, tmp_path):
     solution.pressure[3, 3] = np.nan
     solution.gap[2, 2] = np.inf
-    same(load_solution(solution.save(tmp_path / "run.nc")), solution)
+    assert_equal(load_solution(solution.save(tmp_path / "run.nc")), solution)
 
 
-def test_anyone_can_read_the_file_without_asperity(solution, tmp_path):
+def test_the_file_is_readable_without_asperity(solution, tmp_path):
     with xarray.open_dataset(solution.save(tmp_path / "run.nc"), engine="h5netcdf") as opened:
         assert opened.attrs["Conventions"].startswith("CF-")
         assert opened.attrs["case"] == solution.attributes["case"]
@@ -133,7 +133,7 @@ def test_anyone_can_read_the_file_without_asperity(solution, tmp_path):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.3, 0.7, 0.99])
-def test_a_file_cut_short_is_refused(solution, tmp_path, share):
+def test_a_truncated_file_is_refused(solution, tmp_path, share):
     path = solution.save(tmp_path / "run.nc")
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
@@ -141,11 +141,11 @@ def test_a_file_cut_short_is_refused(solution, tmp_path, share):
         load_solution(path)
 
 
-def test_a_flipped_bit_anywhere_is_noticed(solution, tmp_path):
+def test_any_flipped_bit_is_detected(solution, tmp_path):
     path = solution.save(tmp_path / "run.nc")
-    whole = path.read_bytes()
-    for place in np.random.default_rng(2).integers(8 * len(whole), size=100):
-        content = bytearray(whole)
+    intact = path.read_bytes()
+    for place in np.random.default_rng(2).integers(8 * len(intact), size=100):
+        content = bytearray(intact)
         content[place // 8] ^= 1 << place % 8
         path.write_bytes(content)
         with pytest.raises(UnreadableFile, match="digest"):
@@ -179,35 +179,35 @@ def test_files_without_a_run_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("failure", "raised"),
+    ("failure", "error"),
     [
         (KeyboardInterrupt(), KeyboardInterrupt),
         (OSError(errno.ENOSPC, "No space left on device"), AsperityError),
     ],
 )
-def test_an_interrupted_save_keeps_the_old_file(solution, tmp_path, monkeypatch, failure, raised):
+def test_an_interrupted_save_keeps_the_old_file(solution, tmp_path, monkeypatch, failure, error):
     path = solution.save(tmp_path / "run.nc")
     before = path.read_bytes()
 
-    def half_written(part, content):
+    def write_half(part, content):
         with part.open("wb") as file:
             file.write(content[: len(content) // 2])
         raise failure
 
-    monkeypatch.setattr(Path, "write_bytes", half_written)
-    with pytest.raises(raised):
+    monkeypatch.setattr(Path, "write_bytes", write_half)
+    with pytest.raises(error):
         solution.save(path)
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.nc"]
 
 
-def test_a_folder_that_is_not_there_is_named(solution, tmp_path):
+def test_a_missing_folder_is_named(solution, tmp_path):
     with pytest.raises(BadInput, match="nowhere does not exist"):
         solution.save(tmp_path / "nowhere" / "run.nc")
     with pytest.raises(BadInput, match="it is a folder"):
         solution.save(tmp_path)
 
 
-def test_an_attribute_cannot_hide_the_formats_own(solution):
+def test_an_attribute_cannot_overwrite_the_formats_own(solution):
     with pytest.raises(BadInput, match="options"):
         replace(solution, attributes={"options": "mine"}).to_dataset()

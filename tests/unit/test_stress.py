@@ -38,20 +38,29 @@ def test_equivalent_stresses_are_those_of_the_principal_stresses():
     np.testing.assert_allclose(
         tensor.max_shear, (principal[:, 2] - principal[:, 0]) / 2.0, rtol=1e-9
     )
-    apart = np.diff(principal, axis=1).T
-    expected = np.sqrt((apart[0] ** 2 + apart[1] ** 2 + (apart[0] + apart[1]) ** 2) / 2.0)
+    differences = np.diff(principal, axis=1).T
+    expected = np.sqrt(
+        (differences[0] ** 2 + differences[1] ** 2 + (differences[0] + differences[1]) ** 2) / 2.0
+    )
     np.testing.assert_allclose(tensor.von_mises, expected, rtol=1e-9)
 
 
 def test_equal_pressure_from_all_sides_has_no_equivalent_stress():
-    one = np.array([-2.0])
-    tensor = StressTensor(one, one, one, 0 * one, 0 * one, 0 * one)
+    normal_stress = np.array([-2.0])
+    tensor = StressTensor(
+        normal_stress,
+        normal_stress,
+        normal_stress,
+        0 * normal_stress,
+        0 * normal_stress,
+        0 * normal_stress,
+    )
     assert tensor.von_mises[0] == tensor.max_shear[0] == 0.0
 
 
-def images_summed(cells, spacing, depth, loaded, images=60):
-    """Stresses of unit pressure and unit traction on one cell each of a grid that repeats in y,
-    image by image.
+def sum_over_images(cells, spacing, depth, loaded, images=60):
+    """Stresses of unit pressure and unit traction, each on one cell, summed over the periodic
+    images in y.
     """
     nx, ny = cells
     kernels = _rectangles((nx, (images + 1) * ny), spacing, depth, 0.3)
@@ -60,11 +69,11 @@ def images_summed(cells, spacing, depth, loaded, images=60):
         for component in range(6):
             i, j = np.arange(nx) - i0, np.arange(ny) - j0
             for image in range(-images, images + 1):
-                away = j + image * ny
+                distance = j + image * ny
                 sign_x = np.where(i < 0, -1.0 if ODD_IN_X[traction][component] else 1.0, 1.0)
-                sign_y = np.where(away < 0, -1.0 if ODD_IN_Y[component] else 1.0, 1.0)
-                found = kernels[traction, component][np.ix_(np.abs(i), np.abs(away))]
-                total[component] += sign_x[:, None] * sign_y * found
+                sign_y = np.where(distance < 0, -1.0 if ODD_IN_Y[component] else 1.0, 1.0)
+                computed = kernels[traction, component][np.ix_(np.abs(i), np.abs(distance))]
+                total[component] += sign_x[:, None] * sign_y * computed
     return total
 
 
@@ -72,30 +81,35 @@ def images_summed(cells, spacing, depth, loaded, images=60):
     ("cells", "size"), [((16, 12), (1.2, 0.5)), ((12, 15), (0.5, 2.5)), ((13, 16), (1.0, 1.0))]
 )
 @pytest.mark.parametrize("depth", [0.0, 0.3, 1.5, 3.0, 12.0])
-def test_waves_and_strips_meet_closed_forms_of_rectangles_and_their_images(cells, size, depth):
-    """Two derivations: the half-space's answer to waves, and Love's corners. Depths in cells along
-    x.
+def test_fourier_stresses_agree_with_closed_forms_of_rectangles_and_their_images(
+    cells, size, depth
+):
+    """Compare the half-space's response to waves with Love's solution for rectangles.
+
+    Depths are in cells along x.
     """
     spacing = (size[0] / cells[0], size[1] / cells[1])
     loaded = ((3, 5), (8, 2))
     pressure, shear = np.zeros(cells), np.zeros(cells)
     pressure[loaded[0]] = shear[loaded[1]] = 1.0
     grid = Grid(cells, (0.0, 0.0), size)
-    found = Tractions.from_fields(grid, pressure, shear).stresses(
+    computed = Tractions.from_fields(grid, pressure, shear).stresses(
         depth * spacing[0], 0.3, cache=False
     )
-    expected = images_summed(cells, spacing, depth * spacing[0], loaded)
+    expected = sum_over_images(cells, spacing, depth * spacing[0], loaded)
     np.testing.assert_allclose(
-        found, expected, atol=2e-4
-    )  # of the load; images left out matter as much
+        computed, expected, atol=2e-4
+    )  # relative to the load; the neglected images contribute as much
 
 
-def test_deep_kernels_hold_only_the_waves_that_reach_so_far():
+def test_deep_kernels_store_only_the_waves_that_reach_their_depth():
     widths = [
         _influence((16, 64), (0.1, 0.1), True, depth, 0.3).shape[-1]
         for depth in (0.05, 1.0, 2.0, 50.0)
     ]
-    reach = -np.log(1e-8) / (2.0 * np.pi / 6.4)  # over depth: the wavenumber of which 1e-8 is left
+    reach = -np.log(1e-8) / (
+        2.0 * np.pi / 6.4
+    )  # times depth: a wave of this wavenumber decays to 1e-8
     assert widths == [33, int(reach / 1.0) + 1, int(reach / 2.0) + 1, 1]
 
 
@@ -113,9 +127,9 @@ def test_surface_stresses_equal_the_applied_tractions(repeats):
 
 
 @pytest.mark.parametrize("repeats", [True, False])
-def test_every_plane_below_carries_the_load(repeats):
-    """The force through a plane is that on the surface; the plane's own width leaves a little of it
-    out.
+def test_every_plane_below_the_surface_carries_the_load(repeats):
+    """The force through a plane equals the applied force, except for the part outside the plane's
+    finite width.
     """
     generator = np.random.default_rng(6)
     grid = Grid((96, 96), (-1.5, -1.5), (1.5, 1.5), (False, repeats))
@@ -127,9 +141,7 @@ def test_every_plane_below_carries_the_load(repeats):
 
 
 def test_material_is_in_equilibrium():
-    """div sigma = 0 by central differences, all six components, between a rough pressure's
-    cells.
-    """
+    """The divergence of the stress vanishes below a rough pressure (central differences)."""
     generator = np.random.default_rng(7)
     grid = Grid((48, 32), (0.0, 0.0), (1.5, 1.0))
     stress = stress_below(
@@ -151,11 +163,11 @@ def test_material_is_in_equilibrium():
         return (along + across + down)[1:-1], np.abs(down).max()
 
     for row in (("xx", "xy", "xz"), ("xy", "yy", "yz"), ("xz", "yz", "zz")):
-        left, scale = divergence(*row)
-        assert np.abs(left).max() < 0.02 * scale
+        residual, scale = divergence(*row)
+        assert np.abs(residual).max() < 0.02 * scale
 
 
-def test_the_peak_between_depths_hardly_depends_on_the_depths():
+def test_the_interpolated_peak_hardly_depends_on_the_depths():
     grid = Grid((64, 8), (-2.0, -1.0), (2.0, 1.0))
     pressure = np.repeat(np.sqrt(np.maximum(1.0 - grid.x**2, 0.0))[:, None], 8, axis=1)
     peaks = [
@@ -187,7 +199,7 @@ def test_the_core_is_the_largest_stress_below_a_depth(core):
     assert stress.core.depth >= core == stress.core_depth
 
 
-def test_maps_and_section_are_of_the_same_stresses():
+def test_maps_and_section_show_the_same_stresses():
     generator = np.random.default_rng(8)
     grid = Grid((24, 20), (0.0, 0.0), (1.2, 1.0))
     stress = stress_below(
@@ -211,9 +223,7 @@ def test_maps_and_section_are_of_the_same_stresses():
     ],
 )
 def test_stress_below_hertz_contacts_of_all_geometries(geometry, radius, length, value, depth):
-    """Johnson, section 4.2 and table 4.1: a slim ellipse (axis ratio 0.08) is nearly a line, depth
-    in short axes.
-    """
+    """Johnson (1985), section 4.2 and table 4.1; an ellipse of axis ratio 0.08 is nearly a line."""
     pair = ElasticPair((2e11, 2e11), (0.3, 0.3))
     bodies = ContactConditions(
         pair=pair,
@@ -225,12 +235,12 @@ def test_stress_below_hertz_contacts_of_all_geometries(geometry, radius, length,
     )
     a = min(bodies.hertz.half_widths) if geometry == "elliptic" else bodies.hertz.half_widths[0]
     stress = hertz_stress(bodies, np.concatenate([[0.0], np.geomspace(0.01, 2.5, 15)]) * a)
-    tight = 0.004 if geometry != "elliptic" else 0.03
-    assert stress.peak.value == pytest.approx(value * bodies.hertz.p_max, rel=tight)
-    assert stress.peak.depth == pytest.approx(depth * a, rel=5.0 * tight)
+    tolerance = 0.004 if geometry != "elliptic" else 0.03
+    assert stress.peak.value == pytest.approx(value * bodies.hertz.p_max, rel=tolerance)
+    assert stress.peak.depth == pytest.approx(depth * a, rel=5.0 * tolerance)
 
 
-def test_default_depths_go_from_the_surface_to_below_the_contact():
+def test_default_depths_range_from_the_surface_to_below_the_contact():
     pair = ElasticPair((2e11, 2e11), (0.3, 0.3))
     ball = ContactConditions(
         pair=pair, geometry="point", radius=0.01, load=10.0, surface_speeds=(1.0, 1.0)
@@ -246,7 +256,7 @@ def test_default_depths_go_from_the_surface_to_below_the_contact():
 
 
 @pytest.mark.parametrize(
-    ("shear", "depths", "told"),
+    ("shear", "depths", "message"),
     [
         (np.zeros((4, 4)), [0.1], "shear must have the grid's shape"),
         (None, [0.2, 0.1], "depths must increase"),
@@ -255,13 +265,13 @@ def test_default_depths_go_from_the_surface_to_below_the_contact():
         (None, [np.nan], "finite lengths of 0 m"),
     ],
 )
-def test_invalid_stress_input_is_refused(shear, depths, told):
+def test_invalid_stress_input_is_refused(shear, depths, message):
     grid = Grid((8, 8), (0.0, 0.0), (1.0, 1.0))
-    with pytest.raises(BadInput, match=told):
+    with pytest.raises(BadInput, match=message):
         stress_below(np.ones((8, 8)), shear, grid, np.array(depths), poisson_ratio=0.3)
 
 
-def test_the_second_body_feels_the_opposite_traction_and_has_its_own_poisson_ratio():
+def test_the_second_body_has_the_opposite_traction_and_its_own_poisson_ratio():
     pair = ElasticPair((2e11, 1e11), (0.3, 0.2))
     bodies = ContactConditions(
         pair=pair, geometry="line", radius=0.01, load=500.0, length=0.01, surface_speeds=(1.0, 1.0)
@@ -286,15 +296,13 @@ def test_the_second_body_feels_the_opposite_traction_and_has_its_own_poisson_rat
         subsurface_stress(solution, body=0)
 
 
-def test_the_largest_shear_of_single_precision_keeps_its_digits():
-    """Below the middle of a ball two principal stresses are equal: on Hertz's axis, K. L. Johnson
-    (1985), eq. 3.45.
-    """
+def test_the_largest_shear_is_accurate_in_single_precision():
+    """On the axis of a ball contact two principal stresses are equal (Johnson 1985, eq. 3.45)."""
     depth, nu = np.linspace(0.05, 2.0, 200), 0.3
-    inside = 1.0 - depth * np.arctan(1.0 / depth)
-    across, down = -(1.0 + nu) * inside + 0.5 / (1.0 + depth**2), -1.0 / (1.0 + depth**2)
-    nothing = np.zeros_like(depth)
+    factor = 1.0 - depth * np.arctan(1.0 / depth)
+    across, down = -(1.0 + nu) * factor + 0.5 / (1.0 + depth**2), -1.0 / (1.0 + depth**2)
+    zero = np.zeros_like(depth)
     single = StressTensor(
-        *(part.astype(np.float32) for part in (across, across, down, nothing, nothing, nothing))
+        *(part.astype(np.float32) for part in (across, across, down, zero, zero, zero))
     )
     np.testing.assert_allclose(single.max_shear, 0.5 * np.abs(across - down), rtol=2e-6)

@@ -1,5 +1,5 @@
-"""What a structure between contact and sensor does to a line: deviations that carry it, lines that
-it alone makes.
+"""Effect of a structure between contact and sensor on a resonance line: wider standard deviations,
+and lines that the structure alone causes.
 """
 
 import numpy as np
@@ -12,63 +12,61 @@ from asperity.resonance import line_shape, series_resonances
 from asperity.resonance import residuals as misfit
 
 
-def held(rig):
-    found = joint(spectra_of(rig))
-    off = [
-        abs(one.crf_hz - true.crf_hz) < NINETY * one.crf_std
-        for one, true in zip(found, rig.recordings, strict=True)
+def coverage_and_std(rig):
+    resonances = joint(spectra_of(rig))
+    covered = [
+        abs(resonance.crf_hz - true.crf_hz) < NINETY * resonance.crf_std
+        for resonance, true in zip(resonances, rig.recordings, strict=True)
     ]
-    return np.mean(off), np.array([one.crf_std for one in found])
+    return np.mean(covered), np.array([resonance.crf_std for resonance in resonances])
 
 
 @pytest.fixture
-def without(monkeypatch):
-    """Deviations as they were before they carried what fits leave."""
+def without_model_error(monkeypatch):
+    """Function that removes the model error from the standard deviations."""
 
-    def left_out():
+    def set_to_zero():
         monkeypatch.setattr(
             misfit, "_model_error_std", lambda _, line, *__: np.zeros((len(line), 4))
         )
 
-    return left_out
+    return set_to_zero
 
 
-def test_intervals_hold_what_splines_do_not_follow(without):
-    """Modes as loud as the direct way, one of them narrower than the splines; 60 recordings of 300
-    s.
-    """
+def test_intervals_cover_structural_modes_that_the_splines_do_not_resolve(without_model_error):
+    """Modes as strong as the direct path, one narrower than the splines; 60 recordings of 300 s."""
     rig = transferred(drawn(6.0, 3102), 1.0, 102)
-    share, _ = held(rig)
-    without()
-    before, _ = held(rig)
-    assert share > 0.8
-    assert before < 0.65
+    full, _ = coverage_and_std(rig)
+    without_model_error()
+    reduced, _ = coverage_and_std(rig)
+    assert full > 0.8
+    assert reduced < 0.65
 
 
-def test_intervals_are_no_wider_where_no_structure_is_heard(without):
+def test_intervals_are_no_wider_without_structural_modes(without_model_error):
     rig = drawn(6.0, 3101, duration_s=60.0)
-    _, std = held(rig)
-    without()
-    _, before = held(rig)
-    assert np.median(std / before) == pytest.approx(1.0, abs=0.02)
+    _, std = coverage_and_std(rig)
+    without_model_error()
+    _, reduced = coverage_and_std(rig)
+    assert np.median(std / reduced) == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_housing_that_impulses_ring_is_no_contact():
-    """Snapshots of a second of an outer race that fails: healthy and failing spectra differ in
-    shape, nothing moves.
+def test_a_housing_resonance_excited_by_impulses_is_not_taken_for_the_contact():
+    """One-second snapshots of a failing outer race: the spectrum changes its shape, but no line
+    moves.
     """
     for seed in (0, 1):
         assert failures.outcome("outer race", seed, 1.0, 20_000.0).claims == 0
 
 
-def test_a_line_that_keeps_its_place_is_found_by_its_height():
+def test_a_line_at_constant_frequency_is_detected_by_its_height():
     rng = np.random.default_rng(5)
-    rest = machine(rng)
+    background = machine(rng)
     spectra = []
     for height in np.geomspace(0.1, 2.0, 12):
-        density = rest + height * line_shape(FREQUENCY, 3100.0, 0.02)
+        density = background + height * line_shape(FREQUENCY, 3100.0, 0.02)
         spectra.append(_spectrum(density * rng.gamma(50.0, 1.0 / 50.0, density.size), 50))
-    found = [one for one in series_resonances(spectra, band_hz=BAND) if one.found]
-    assert len(found) >= 8
-    assert np.mean([one.crf_hz for one in found]) == pytest.approx(3100.0, abs=10.0)
-    assert all("keeps its frequency" in one.reason for one in found)
+    detected = [item for item in series_resonances(spectra, band_hz=BAND) if item.found]
+    assert len(detected) >= 8
+    assert np.mean([item.crf_hz for item in detected]) == pytest.approx(3100.0, abs=10.0)
+    assert all("keeps its frequency" in item.reason for item in detected)

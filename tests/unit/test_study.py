@@ -1,5 +1,5 @@
-"""A study on disk and in memory: nothing lost, nothing twice, the same however it is spread; small
-dry contacts.
+"""Studies on disk and in memory: each case is computed exactly once, and the result is independent
+of the distribution of the work. All cases are small dry contacts.
 """
 
 import json
@@ -64,8 +64,8 @@ def unbroken(plan, executor):
     return run_study(plan, executor=executor).table.drop(columns="seconds")
 
 
-class Dying:
-    """An executor whose process dies over some cases, every time."""
+class FailingExecutor:
+    """An executor whose process dies at given cases."""
 
     def __init__(self, deadly):
         self.deadly, self.broken = deadly, False
@@ -85,19 +85,19 @@ class Dying:
         pass
 
 
-def same(result, unbroken):
+def assert_same(result, unbroken):
     pandas.testing.assert_frame_equal(
         result.table.drop(columns="seconds"), unbroken, check_exact=True
     )
 
 
-def test_a_row_is_what_solving_the_case_gives(plan, unbroken):
+def test_a_row_equals_the_solution_of_its_case(plan, unbroken):
     chosen = plan.cases[4]
-    alone = solve_case(plan.case.with_overrides(chosen.overrides))
+    single = solve_case(plan.case.with_overrides(chosen.overrides))
     row = unbroken.iloc[4]
     assert row["case_id"] == chosen.id
     assert row["surface.sq"] == 2e-6
-    quick = alone.numbers([group for group in RUN_GROUPS if group not in ("own", "virgin")])
+    quick = single.numbers([group for group in RUN_GROUPS if group not in ("own", "virgin")])
     scalars = {
         name: value for name, value in quick.items() if name != "seconds" and value is not None
     }
@@ -106,53 +106,53 @@ def test_a_row_is_what_solving_the_case_gives(plan, unbroken):
     assert row["crf_paper_hz"] == pytest.approx(row["crf_sound_hz"], rel=0.05)
 
 
-def test_a_study_that_shakes_has_the_contacts_own_stiffness_and_damping(case):
-    """A dry contact of rough bodies: elastic where it yielded, it is stiffer than flowing, and
-    nothing damps it.
+def test_a_study_with_vibration_reports_the_contacts_stiffness_and_damping(case):
+    """In a dry rough contact, yielded cells that respond elastically are stiffer than flowing ones,
+    and damping is zero.
     """
-    shaken = case.with_overrides({"study": {"sq": ["2 um"], "kind": "shake"}})
-    row = run_study(plan_study(shaken)).table.iloc[0]
+    vibrating = case.with_overrides({"study": {"sq": ["2 um"], "kind": "shake"}})
+    row = run_study(plan_study(vibrating)).table.iloc[0]
     chosen = {"surface.sq": "2 um", "surface.seed": int(row["surface.seed"])}
-    alone = solve_case(shaken.with_overrides(chosen)).own_scalars
-    assert row["contact_stiffness_n_m"] == alone["contact_stiffness_n_m"]
+    single = solve_case(vibrating.with_overrides(chosen)).own_scalars
+    assert row["contact_stiffness_n_m"] == single["contact_stiffness_n_m"]
     assert row["contact_stiffness_n_m"] > 1.1 * row["contact_stiffness_virgin_n_m"]
     assert row["contact_damping_ratio"] == 0.0
     assert row["crf_sound_hz"] > 0.0
 
 
-def test_a_study_on_disk_is_the_study_in_memory_and_goes_on_where_it_was(
-    plan, unbroken, executor, tmp_path
-):
+def test_a_study_on_disk_equals_the_study_in_memory_and_resumes(plan, unbroken, executor, tmp_path):
     def stop(progress):
         if progress.done >= 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         run_study(plan, out=tmp_path, executor=executor, progress=stop)
-    there = load_study(tmp_path)
-    assert 2 <= len(there.table) < 6
-    assert there.missing == 6 - len(there.table)
+    stored = load_study(tmp_path)
+    assert 2 <= len(stored.table) < 6
+    assert stored.missing == 6 - len(stored.table)
     result = run_study(plan, out=tmp_path, executor=executor)
-    assert result.computed == there.missing
-    same(result, unbroken)
-    same(load_study(tmp_path), unbroken)
+    assert result.computed == stored.missing
+    assert_same(result, unbroken)
+    assert_same(load_study(tmp_path), unbroken)
     pandas.testing.assert_frame_equal(pandas.read_parquet(tmp_path / "table.parquet"), result.table)
     assert run_study(plan, out=tmp_path, executor=executor).computed == 0
 
 
-def test_shards_make_up_the_whole_in_one_folder_or_merged(plan, unbroken, executor, tmp_path):
+def test_shards_make_up_the_study_in_one_folder_or_merged(plan, unbroken, executor, tmp_path):
     for k in (1, 2, 3):
-        alone = run_study(plan, out=tmp_path / f"{k}", executor=executor, shard=(k, 3))
-        assert len(alone.table) == 2
+        part = run_study(plan, out=tmp_path / f"{k}", executor=executor, shard=(k, 3))
+        assert len(part.table) == 2
         run_study(plan, out=tmp_path / "together", executor=executor, shard=(k, 3))
-    same(load_study(tmp_path / "together"), unbroken)
+    assert_same(load_study(tmp_path / "together"), unbroken)
     merge_studies(plan, [tmp_path / f"{k}" for k in (1, 2, 3)], out=tmp_path / "merged")
     merged = run_study(plan, out=tmp_path / "merged", executor=executor)
     assert merged.computed == 0
-    same(merged, unbroken)
+    assert_same(merged, unbroken)
 
 
-def test_what_a_crash_leaves_is_cleared_and_computed_again(plan, unbroken, executor, tmp_path):
+def test_partial_files_of_a_crash_are_removed_and_their_cases_recomputed(
+    plan, unbroken, executor, tmp_path
+):
     run_study(plan, out=tmp_path, executor=executor)
     part = next((tmp_path / "parts").glob("*.parquet"))
     (tmp_path / "parts" / f".{part.name}.123.part").write_bytes(
@@ -161,7 +161,7 @@ def test_what_a_crash_leaves_is_cleared_and_computed_again(plan, unbroken, execu
     part.unlink()
     result = run_study(plan, out=tmp_path, executor=executor)
     assert result.computed > 0
-    same(result, unbroken)
+    assert_same(result, unbroken)
     assert not list(tmp_path.rglob("*.part"))
 
 
@@ -175,7 +175,7 @@ def test_a_damaged_part_is_named(plan, executor, tmp_path):
 
 def test_a_case_that_kills_its_process_fails_alone(plan, unbroken, monkeypatch, tmp_path):
     deadly = plan.cases[3].overrides
-    monkeypatch.setattr(execution, "_pool", lambda _: Dying([deadly]))
+    monkeypatch.setattr(execution, "_pool", lambda _: FailingExecutor([deadly]))
     result = run_study(plan, out=tmp_path, workers=2)
     assert list(result.failures["number"]) == [3]
     assert "process that computed it died" in result.failures["reason"].iloc[0]
@@ -184,14 +184,14 @@ def test_a_case_that_kills_its_process_fails_alone(plan, unbroken, monkeypatch, 
         unbroken.drop(index=3),
         check_dtype=False,
     )
-    monkeypatch.setattr(execution, "_pool", lambda _: Dying([]))
+    monkeypatch.setattr(execution, "_pool", lambda _: FailingExecutor([]))
     assert run_study(plan, out=tmp_path, workers=2).computed == 0
-    again = run_study(plan, out=tmp_path, workers=2, retry_failed=True)
-    assert again.computed == 1
-    same(again, unbroken)
+    recomputed = run_study(plan, out=tmp_path, workers=2, retry_failed=True)
+    assert recomputed.computed == 1
+    assert_same(recomputed, unbroken)
 
 
-def test_a_case_that_is_refused_is_a_row_with_its_reason(case, executor):
+def test_a_refused_case_is_a_row_with_its_reason(case, executor):
     plan = plan_points(case, [{"surface.sq": "1 um"}, {"surface.correlation_length": "3 um"}])
     result = run_study(plan, executor=executor)
     assert result.failed == 1
@@ -220,7 +220,7 @@ def test_another_case_in_the_folder_is_refused(case, plan, executor, tmp_path):
         run_study(plan, out=tmp_path, executor=executor)
 
 
-def test_ids_that_are_not_those_of_the_points_are_refused(plan, executor, tmp_path):
+def test_ids_that_do_not_match_the_points_are_refused(plan, executor, tmp_path):
     run_study(plan, out=tmp_path, executor=executor)
     manifest = read_json(tmp_path / "manifest.json", "")
     manifest["ids"][:2] = reversed(manifest["ids"][:2])
@@ -234,7 +234,7 @@ def test_a_study_of_another_version_can_still_be_read(plan, unbroken, executor, 
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     manifest["versions"]["asperity"], manifest["design"] = (
         "0.0.1",
-        "that of a case file with other keys",
+        "design of a case file with other keys",
     )
     renamed = {old: f"{number:016x}" for number, old in enumerate(manifest["ids"])}
     manifest["ids"] = list(renamed.values())
@@ -251,34 +251,34 @@ def test_a_study_of_another_version_can_still_be_read(plan, unbroken, executor, 
 
 
 def test_two_processes_do_not_compute_in_one_folder(plan, executor, tmp_path):
-    def again(_):
+    def start_second_run(_):
         with pytest.raises(BadInput, match="another process computes this study"):
             run_study(plan, out=tmp_path, executor=executor)
         with pytest.raises(BadInput, match="another process computes this study"):
             run_study(plan, out=tmp_path, executor=executor, shard=(1, 2))
 
-    run_study(plan, out=tmp_path, executor=executor, progress=again)
+    run_study(plan, out=tmp_path, executor=executor, progress=start_second_run)
 
 
-def test_a_full_disk_is_a_sentence_and_loses_nothing(
+def test_a_full_disk_is_reported_and_no_result_is_lost(
     plan, unbroken, executor, tmp_path, monkeypatch
 ):
     run_study(plan, out=tmp_path, executor=executor, shard=(1, 3))
     before = load_study(tmp_path).table
-    kept = os.fsync
+    fsync = os.fsync
 
-    def full(_):
+    def fail(_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", fail)
     with pytest.raises(AsperityError, match="No space left on device; nothing was left behind"):
         run_study(plan, out=tmp_path, executor=executor)
-    monkeypatch.setattr(os, "fsync", kept)
+    monkeypatch.setattr(os, "fsync", fsync)
     pandas.testing.assert_frame_equal(load_study(tmp_path).table, before)
-    same(run_study(plan, out=tmp_path, executor=executor), unbroken)
+    assert_same(run_study(plan, out=tmp_path, executor=executor), unbroken)
 
 
-def test_fields_are_kept_before_their_row_and_are_the_solutions(plan, executor, tmp_path):
+def test_stored_fields_equal_those_of_the_solution(plan, executor, tmp_path):
     import zarr
 
     run_study(plan, out=tmp_path, executor=executor, fields=("pressure", "in_contact"))
@@ -289,14 +289,14 @@ def test_fields_are_kept_before_their_row_and_are_the_solutions(plan, executor, 
     assert (group[f"{chosen.id}/pressure"][:] == solution.pressure).all()
     assert (group[f"{chosen.id}/in_contact"][:] == solution.in_contact).all()
     assert group[f"{chosen.id}/pressure"].chunks == solution.pressure.shape
-    kept = load_study(tmp_path).maps(chosen.id)
-    assert sorted(kept) == ["in_contact", "pressure"]
-    assert (kept["pressure"] == solution.pressure).all()
+    maps = load_study(tmp_path).maps(chosen.id)
+    assert sorted(maps) == ["in_contact", "pressure"]
+    assert (maps["pressure"] == solution.pressure).all()
 
 
 @pytest.fixture(scope="module")
 def mapped(case, executor, tmp_path_factory):
-    """Folders of two studies that keep maps, and differ in their load."""
+    """Folders of two studies with stored maps that differ in their load."""
     folders = []
     for load in ("500 N", "400 N"):
         plan = plan_study(
@@ -316,30 +316,30 @@ def map_files(folder):
 
 def test_a_flipped_bit_in_any_file_of_a_map_is_refused_or_changes_nothing(mapped):
     result, case_id, files = map_files(mapped[0])
-    told = result.maps(case_id)
-    assert len(files) == 5  # of the group, and of each map its description and its one chunk
+    original = result.maps(case_id)
+    assert len(files) == 5  # metadata of the group; metadata and one chunk of each of 2 maps
     rng = np.random.default_rng(1)
     refused = 0
     for path in files:
-        whole = path.read_bytes()
-        for place in rng.integers(8 * len(whole), size=12):
-            changed = bytearray(whole)
-            changed[place // 8] ^= 1 << place % 8
+        intact = path.read_bytes()
+        for bit in rng.integers(8 * len(intact), size=12):
+            changed = bytearray(intact)
+            changed[bit // 8] ^= 1 << bit % 8
             path.write_bytes(changed)
             try:
-                again = result.maps(case_id)
+                reloaded = result.maps(case_id)
             except UnreadableFile:
                 refused += 1
             else:
-                assert {name: again[name].tobytes() for name in again} == {
-                    name: told[name].tobytes() for name in told
+                assert {name: reloaded[name].tobytes() for name in reloaded} == {
+                    name: original[name].tobytes() for name in original
                 }
-        path.write_bytes(whole)
+        path.write_bytes(intact)
     assert refused > 40
     result.maps(case_id)
 
 
-def test_a_map_that_is_missing_exchanged_or_anothers_is_refused(mapped, tmp_path):
+def test_a_missing_exchanged_or_foreign_map_is_refused(mapped, tmp_path):
     folder = shutil.copytree(mapped[0], tmp_path / "study")
     result, case_id, _ = map_files(folder)
     group = folder / "fields.zarr" / case_id
@@ -347,7 +347,7 @@ def test_a_map_that_is_missing_exchanged_or_anothers_is_refused(mapped, tmp_path
     with pytest.raises(UnreadableFile, match="digest mismatch"):
         result.maps(case_id)
     (group / "other").rename(group / "pressure")
-    (group / "gap" / "c" / "0" / "0").unlink()  # to zarr, a chunk that was never written is zeros
+    (group / "gap" / "c" / "0" / "0").unlink()  # zarr reads a missing chunk as zeros
     with pytest.raises(UnreadableFile, match="digest mismatch"):
         result.maps(case_id)
     shutil.rmtree(group)
@@ -361,45 +361,45 @@ def test_a_map_that_is_missing_exchanged_or_anothers_is_refused(mapped, tmp_path
         result.maps("../parts")
 
 
-def test_a_map_that_claims_more_than_it_stores_is_refused_before_it_is_read(mapped, tmp_path):
+def test_a_map_that_declares_too_large_a_shape_is_refused_before_it_is_read(mapped, tmp_path):
     folder = shutil.copytree(mapped[0], tmp_path / "study")
     result, case_id, _ = map_files(folder)
-    about = folder / "fields.zarr" / case_id / "gap" / "zarr.json"
-    told = json.loads(about.read_text())
-    about.write_text(json.dumps({**told, "shape": [10**6, 10**6]}))
+    metadata = folder / "fields.zarr" / case_id / "gap" / "zarr.json"
+    content = json.loads(metadata.read_text())
+    metadata.write_text(json.dumps({**content, "shape": [10**6, 10**6]}))
     with pytest.raises(UnreadableFile, match="declares 8e"):
         result.maps(case_id)
 
 
-def test_other_readers_notice_damage_of_a_map_too(mapped, tmp_path):
+def test_other_readers_detect_damage_of_a_map_too(mapped, tmp_path):
     import zarr
 
     folder = shutil.copytree(mapped[0], tmp_path / "study")
     _, case_id, _ = map_files(folder)
     chunk = folder / "fields.zarr" / case_id / "gap" / "c" / "0" / "0"
-    whole = chunk.read_bytes()
-    chunk.write_bytes(whole[:50] + bytes([whole[50] ^ 1]) + whole[51:])
+    intact = chunk.read_bytes()
+    chunk.write_bytes(intact[:50] + bytes([intact[50] ^ 1]) + intact[51:])
     with pytest.raises(Exception, match="checksum"):
         zarr.open_array(folder / "fields.zarr" / case_id / "gap", mode="r")[...]
 
 
 def test_progress_counts_every_case_once(plan, executor):
-    told = []
-    run_study(plan, executor=executor, progress=told.append)
-    assert [told[0].done, told[-1].done] == [0, 6]
-    assert told[0].seconds_left is None
-    assert told[-1].seconds_left == 0.0
-    assert sorted(entry.done for entry in told) == [entry.done for entry in told]
+    entries = []
+    run_study(plan, executor=executor, progress=entries.append)
+    assert [entries[0].done, entries[-1].done] == [0, 6]
+    assert entries[0].seconds_left is None
+    assert entries[-1].seconds_left == 0.0
+    assert sorted(entry.done for entry in entries) == [entry.done for entry in entries]
 
 
-def test_a_dry_run_says_what_is_left_and_keeps_nothing(plan, executor, tmp_path):
-    run_study(plan, out=tmp_path / "there", executor=executor, shard=(1, 2))
-    cost = estimate_study(plan, out=tmp_path / "there", workers=2)
+def test_a_dry_run_estimates_the_remaining_cases_and_stores_nothing(plan, executor, tmp_path):
+    run_study(plan, out=tmp_path / "existing", executor=executor, shard=(1, 2))
+    cost = estimate_study(plan, out=tmp_path / "existing", workers=2)
     assert (cost.cases, cost.kept, cost.tried) == (6, 3, 3)
     assert cost.start_s >= 2.0
     assert cost.seconds == pytest.approx(3 * cost.case_s / min(2, cores()) + cost.start_s)
-    assert estimate_study(plan, out=tmp_path / "not there", workers=1).kept == 0
-    assert not (tmp_path / "not there").exists()
+    assert estimate_study(plan, out=tmp_path / "missing", workers=1).kept == 0
+    assert not (tmp_path / "missing").exists()
 
 
 @pytest.mark.parametrize(
@@ -413,12 +413,12 @@ def test_a_dry_run_says_what_is_left_and_keeps_nothing(plan, executor, tmp_path)
         ),
     ],
 )
-def test_what_cannot_be_meant_is_refused(plan, tmp_path, settings, sentence):
+def test_invalid_settings_are_refused(plan, tmp_path, settings, sentence):
     with pytest.raises(BadInput, match=sentence):
         run_study(plan, out=tmp_path, **settings)
 
 
-def test_a_folder_that_is_no_study_is_said_so(tmp_path):
+def test_a_folder_without_a_study_is_refused(tmp_path):
     with pytest.raises(UnreadableFile, match="holds no study"):
         load_study(tmp_path)
     (tmp_path / "manifest.json").write_text("{}")
@@ -429,35 +429,35 @@ def test_a_folder_that_is_no_study_is_said_so(tmp_path):
         load_study(tmp_path)
 
 
-def test_a_script_that_workers_cannot_import_is_told_so_and_no_case_is_blamed(case, tmp_path):
+def test_a_script_that_workers_cannot_import_is_reported_and_no_case_is_marked_failed(
+    case, tmp_path
+):
     (tmp_path / "case.toml").write_text(case.text)
     script = tmp_path / "script.py"
     script.write_text(
         "import asperity as asp\n"
-        # and no __main__
+        # without a __main__ guard
         "asp.run_study(asp.study.plan_study(asp.load_case('case.toml')), out='out', workers=1)\n"
     )
-    ran = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, script], cwd=tmp_path, capture_output=True, text=True, timeout=100
     )
-    assert ran.returncode == 1
-    assert 'under if __name__ == "__main__":, or give executor' in ran.stderr
+    assert completed.returncode == 1
+    assert 'under if __name__ == "__main__":, or give executor' in completed.stderr
     assert not list((tmp_path / "out" / "parts").glob("*"))
 
 
-def test_what_is_finished_is_read_without_the_measured_surface_it_was_computed_on(
-    case, executor, tmp_path
-):
+def test_a_finished_study_can_be_loaded_without_its_measured_surface(case, executor, tmp_path):
     heights = np.random.default_rng(1).normal(scale=1e-7, size=(40, 40))
     np.savetxt(tmp_path / "worn.txt", heights, fmt="%.6e")
     surface = {"file": str(tmp_path / "worn.txt"), "pixel": "5 um", "unit": "m", "fit": "tile"}
     plan = plan_study(
         case.with_overrides({"surface": surface, "study": {"load": ["200 N"], "seeds": 2}})
     )
-    there = run_study(plan, out=tmp_path / "study", executor=executor)
-    assert not there.failed
+    stored = run_study(plan, out=tmp_path / "study", executor=executor)
+    assert not stored.failed
     (tmp_path / "worn.txt").unlink()
-    pandas.testing.assert_frame_equal(load_study(tmp_path / "study").table, there.table)
+    pandas.testing.assert_frame_equal(load_study(tmp_path / "study").table, stored.table)
 
 
 SWEPT = {
@@ -478,7 +478,7 @@ SWEPT = {
         ("surface", SWEPT["surface"], [json.dumps(table) for table in SWEPT["surface"]]),
     ],
 )
-def test_pairs_tables_and_numbers_beside_names_are_columns_of_text(
+def test_swept_pairs_tables_and_mixed_values_become_text_columns(
     case, executor, tmp_path, key, swept, written
 ):
     plan = plan_study(case.with_overrides({"study": {key.partition(".")[0]: swept}}))

@@ -1,10 +1,10 @@
-"""A study that shakes its contacts: damping and stiffness over Sq, and how well each tells the load
-share.
+"""Studies with contact vibration: damping and stiffness against Sq, and their correlation with the
+load share.
 """
 
 import numpy as np
 import pytest
-from test_study_report import PAPERS, figure_of, made, page_of, with_knee, without_maps
+from test_study_report import PAPERS, figure_of, page_of, synthetic_study, with_knee, without_maps
 
 from asperity.report.study.dynamic import clr_correlations, damping_over_roughness, rank_correlation
 from asperity.report.study.page import study_exhibits
@@ -13,9 +13,9 @@ from asperity.report.style import ON_PAPER
 from asperity.study import StudyOverview, curve_from_study
 
 
-def shaken(*, seeds=5):
-    """Damping that falls with the load share, a stiffness that has nothing to do with it; one
-    surface has neither.
+def vibrating(*, seeds=5):
+    """A study in which damping falls with the load share and stiffness is independent of it; one
+    case has neither.
     """
     result = with_knee(seeds=seeds)
     table, random = result.table, np.random.default_rng(3)
@@ -29,44 +29,44 @@ def shaken(*, seeds=5):
     return result
 
 
-def test_damping_and_stiffness_stand_over_sq_with_their_intervals():
-    result = shaken()
+def test_damping_and_stiffness_are_plotted_against_sq_with_their_intervals():
+    result = vibrating()
     curve = curve_from_study(result)
-    above, below = figure_of(damping_over_roughness, result).axes
-    (mean,) = [line for line in above.get_lines() if line.get_label() == "yielded cells elastic"]
+    upper, lower = figure_of(damping_over_roughness, result).axes
+    (mean,) = [line for line in upper.get_lines() if line.get_label() == "yielded cells elastic"]
     assert mean.get_ydata() == pytest.approx(curve.mean("contact_damping_ratio"))
-    assert "damping ratio" in above.get_ylabel()
-    assert below.get_ylabel() == "k [N/µm]"
-    assert 280.0 < below.get_ylim()[0] < below.get_ylim()[1] < 380.0
+    assert "damping ratio" in upper.get_ylabel()
+    assert lower.get_ylabel() == "k [N/µm]"
+    assert 280.0 < lower.get_ylim()[0] < lower.get_ylim()[1] < 380.0
 
 
-def test_the_load_share_stands_over_each_indicator_with_its_rank_correlation():
-    result = shaken()
+def test_the_load_share_is_plotted_against_each_indicator_with_its_rank_correlation():
+    result = vibrating()
     panels = figure_of(clr_correlations, result).axes
     assert [panel.get_xlabel() for panel in panels[:3]] == ["CRF, sound [Hz]", "k [N/µm]", "ζ"]
-    found = {panel.get_xlabel(): panel.collections[0].get_offsets() for panel in panels[:3]}
-    assert len(found["ζ"]) == len(result.table) - 1
+    offsets = {panel.get_xlabel(): panel.collections[0].get_offsets() for panel in panels[:3]}
+    assert len(offsets["ζ"]) == len(result.table) - 1
     exhibit = clr_correlations(StudyOverview(result), curve_from_study(result))
     for key in ("contact_damping_ratio", "contact_stiffness_n_m", "crf_sound_hz"):
         rank = rank_correlation(result.table, key)
         assert f"{rank:+.2f}".replace("-", "−") in exhibit.caption
 
 
-def test_the_rank_correlation_is_that_of_ranks():
+def test_the_rank_correlation_agrees_with_spearman():
     from scipy.stats import spearmanr
 
-    table = shaken().table
+    table = vibrating().table
     known = table.dropna(subset=["contact_damping_ratio"])
     assert rank_correlation(table, "contact_damping_ratio") == pytest.approx(
         spearmanr(known["clr"], known["contact_damping_ratio"]).statistic
     )
     assert rank_correlation(table, "contact_damping_ratio") < -0.95
     assert abs(rank_correlation(table, "contact_stiffness_n_m")) < 0.3
-    assert np.isnan(rank_correlation(table, "contact_resonance_hz"))  # one value alone has no rank
+    assert np.isnan(rank_correlation(table, "contact_resonance_hz"))  # a constant has no ranks
 
 
-def test_page_and_levels_have_them_and_a_study_that_did_not_shake_has_none():
-    result = shaken()
+def test_only_a_study_with_vibration_shows_damping_on_its_page_and_levels():
+    result = vibrating()
     names = [exhibit.name for exhibit in study_exhibits(without_maps(result))]
     assert names[-2:] == ["damping", "load-share-correlations"]
     summary = curve_from_study(result).summary()
@@ -80,15 +80,15 @@ def test_page_and_levels_have_them_and_a_study_that_did_not_shake_has_none():
     } <= set(summary)
     page = page_of(without_maps(result))
     assert "Contact damping ratio" in page.text
-    still = with_knee()
-    names = [exhibit.name for exhibit in study_exhibits(without_maps(still))]
+    static = with_knee()
+    names = [exhibit.name for exhibit in study_exhibits(without_maps(static))]
     assert not {"damping", "load-share-correlations"} & set(names)
-    assert "Damping ratio of the contact" not in page_of(without_maps(still)).text
+    assert "Damping ratio of the contact" not in page_of(without_maps(static)).text
 
 
-def test_any_other_study_shows_the_damping_as_an_output():
+def test_another_study_shows_the_damping_as_an_output():
     points = [{"contact.load": f"{load} N"} for load in (300, 400, 500)]
-    result = made(
+    result = synthetic_study(
         points,
         case=PAPERS,
         **{

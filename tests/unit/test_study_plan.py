@@ -22,7 +22,7 @@ def sq_range(**more):
     return {"from": "0.5 um", "to": "4 um", **more}
 
 
-def test_the_papers_study_is_36_levels_of_5_surfaces(paper):
+def test_the_papers_study_has_36_levels_of_5_surfaces(paper):
     plan = plan_study(paper)
     assert len(plan.points) == 36
     assert len(plan.cases) == 180
@@ -32,16 +32,15 @@ def test_the_papers_study_is_36_levels_of_5_surfaces(paper):
     assert len({case.overrides["surface.seed"] for case in plan.cases}) == 180
 
 
-def test_steps_are_decimal_so_that_a_level_is_the_number_a_user_would_write(paper):
-    case = planned(paper, sq=sq_range(step="0.1 um")).cases[
-        7
-    ]  # 7 x 0.1 + 0.5 is 1.2000000000000002 in floats
-    by_hand = plan_points(paper, [{"surface.sq": "1.2 um"}]).cases[0]
+def test_steps_are_decimal_so_that_levels_equal_hand_written_values(paper):
+    # in binary floating point, 7 x 0.1 + 0.5 is 1.2000000000000002
+    case = planned(paper, sq=sq_range(step="0.1 um")).cases[7]
+    explicit = plan_points(paper, [{"surface.sq": "1.2 um"}]).cases[0]
     assert case.overrides["surface.sq"] == "1.2 um"
-    assert case.id == by_hand.id
+    assert case.id == explicit.id
 
 
-def test_several_quantities_make_their_product_the_last_varying_fastest(paper):
+def test_several_quantities_form_a_product_whose_last_factor_varies_fastest(paper):
     plan = planned(
         paper, sq=["1 um", "2 um"], contact={"load": ["200 N", "500 N", "1 kN"]}, seeds=2
     )
@@ -52,14 +51,14 @@ def test_several_quantities_make_their_product_the_last_varying_fastest(paper):
     assert len(plan.cases) == 12
 
 
-def test_ranges_by_count_meet_their_ends_on_either_scale(paper):
+def test_ranges_by_count_include_both_ends_on_either_scale(paper):
     by_log = planned(paper, sq=sq_range(count=4, scale="log")).points
     assert [point["surface.sq"] for point in by_log] == ["0.5 um", "1 um", "2 um", "4 um"]
     linear = planned(paper, slip={"from": 0, "to": 0.3, "count": 4}).points
     assert [point["contact.slip"] for point in linear] == pytest.approx([0.0, 0.1, 0.2, 0.3])
 
 
-def test_a_latin_hypercube_has_one_point_in_every_stripe_of_every_quantity(paper):
+def test_a_latin_hypercube_has_one_point_in_every_interval_of_every_quantity(paper):
     plan = planned(
         paper,
         sq=sq_range(scale="log"),
@@ -69,33 +68,33 @@ def test_a_latin_hypercube_has_one_point_in_every_stripe_of_every_quantity(paper
     )
     slips = sorted(point["contact.slip"] for point in plan.points)
     assert [int(20 * slip / 0.5) for slip in slips] == list(range(20))
-    again = planned(
+    repeated = planned(
         paper,
         sq=sq_range(scale="log"),
         slip={"from": 0.0, "to": 0.5},
         surface={"kind": ["gaussian"]},
         samples=20,
     )
-    assert again.points == plan.points
+    assert repeated.points == plan.points
 
 
 def test_the_same_case_has_the_same_id_however_it_is_written(paper):
-    one = plan_points(paper, [{"surface.sq": "0.5 um"}]).cases[0]
-    other = plan_points(paper, [{"surface.sq": "500 nm"}]).cases[0]
-    assert one.id == other.id
-    assert one.overrides["surface.seed"] == other.overrides["surface.seed"]
-    assert plan_points(paper, [{"surface.sq": "0.51 um"}]).cases[0].id != one.id
+    case = plan_points(paper, [{"surface.sq": "0.5 um"}]).cases[0]
+    rewritten = plan_points(paper, [{"surface.sq": "500 nm"}]).cases[0]
+    assert case.id == rewritten.id
+    assert case.overrides["surface.seed"] == rewritten.overrides["surface.seed"]
+    assert plan_points(paper, [{"surface.sq": "0.51 um"}]).cases[0].id != case.id
     harder = paper.with_overrides({"material.hardness": "3 GPa"})
-    assert plan_points(harder, [{"surface.sq": "0.5 um"}]).cases[0].id != one.id
+    assert plan_points(harder, [{"surface.sq": "0.5 um"}]).cases[0].id != case.id
 
 
-def test_adding_levels_or_seeds_keeps_the_cases_there_are(paper):
+def test_adding_levels_or_seeds_keeps_the_existing_cases(paper):
     few = {case.id for case in planned(paper, sq=["1 um", "2 um"], seeds=2).cases}
     more = {case.id for case in planned(paper, sq=["0.5 um", "1 um", "2 um"], seeds=3).cases}
     assert few < more
 
 
-def test_common_seeds_are_those_of_the_realisation_not_of_the_point(paper):
+def test_common_seeds_depend_on_the_realisation_only(paper):
     plan = planned(paper, sq=["1 um", "2 um"], seeds=3, seeding="common")
     seeds = [case.overrides["surface.seed"] for case in plan.cases]
     assert seeds[:3] == seeds[3:]
@@ -107,13 +106,13 @@ def test_given_seeds_are_the_surfaces_seeds(paper):
     assert [case.overrides["surface.seed"] for case in plan.cases] == [7, 11, 7, 11]
 
 
-def test_a_measured_surface_that_changes_makes_other_cases(paper, tmp_path):
+def test_a_change_of_the_measured_surface_changes_the_case_ids(paper, tmp_path):
     heights = "1 2 3\n2 3 4\n5 6 7\n"
     (tmp_path / "map.txt").write_text(heights)
     case = load_case(paper.text, folder=tmp_path).with_overrides({"surface": {"file": "map.txt"}})
-    one = plan_points(case, [{"contact.load": "200 N"}]).cases[0].id
+    before = plan_points(case, [{"contact.load": "200 N"}]).cases[0].id
     (tmp_path / "map.txt").write_text(heights.replace("7", "8"))
-    assert plan_points(case, [{"contact.load": "200 N"}]).cases[0].id != one
+    assert plan_points(case, [{"contact.load": "200 N"}]).cases[0].id != before
 
 
 REFUSED = [
@@ -148,14 +147,14 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("study", "sentence"), REFUSED)
-def test_a_study_that_cannot_be_meant_is_refused_in_one_sentence(paper, study, sentence):
-    with pytest.raises(BadInput) as refused:
+def test_an_invalid_study_is_refused_in_one_sentence(paper, study, sentence):
+    with pytest.raises(BadInput) as caught:
         planned(paper, **study)
-    assert sentence in str(refused.value)
-    assert "\n" not in str(refused.value)
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
-def test_a_case_without_a_study_says_how_to_add_one(paper):
+def test_the_error_for_a_case_without_a_study_explains_how_to_add_one(paper):
     with pytest.raises(BadInput, match=r"add \[study\] with the quantity to vary"):
         plan_study(paper.with_overrides({"study": "none"}))
 
@@ -175,7 +174,7 @@ def test_the_text_of_a_case_restates_its_study(paper):
     assert plan_study(load_case(case.text)).points == plan_study(case).points
 
 
-def test_whole_tables_are_swept_and_each_has_the_seeds_that_it_knows(paper):
+def test_swept_tables_keep_the_seeds_they_specify(paper):
     plan = planned(
         paper,
         surface=[
@@ -201,7 +200,7 @@ def test_whole_tables_are_swept_and_each_has_the_seeds_that_it_knows(paper):
     ).axes == ("lubricant.viscosity",)
 
 
-def test_a_swept_surface_file_that_changes_makes_another_case(paper, tmp_path):
+def test_a_change_of_one_swept_surface_file_changes_only_its_case_id(paper, tmp_path):
     files = [tmp_path / "one.txt", tmp_path / "two.txt"]
     for file in files:
         file.write_text("1 2 3")

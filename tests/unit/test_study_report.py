@@ -1,5 +1,5 @@
-"""The page of a study and its figures: the numbers of the table, the printed ones beside them,
-failures loud.
+"""Page and figures of a study: they show the numbers of the table beside the published ones, and
+report failures.
 """
 
 import io
@@ -68,7 +68,7 @@ RINGS_STD_UM = (0.10, 0.08, 0.05, 0.05, 0.10, 0.06, 0.10, 0.08, 0.05, 0.05, 0.10
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A small wear study, solved and kept."""
+    """A small wear study, solved and stored."""
     folder = tmp_path_factory.mktemp("study") / "wear"
     points = [{"surface.sq": f"{sq} um"} for sq in LEVELS_UM]
     with ThreadPoolExecutor(1) as executor:
@@ -91,15 +91,15 @@ def page(written):
     return Page(written[0].read_text("utf-8"))
 
 
-def made(points, *, case=PAPERS, seeds=1, **columns):
-    """A study whose table says what the test wants."""
+def synthetic_study(points, *, case=PAPERS, seeds=1, **columns):
+    """A study with the given columns in its table."""
     plan = plan_points(case, points, seeds=seeds)
     table = pandas.DataFrame(
         {
-            "case_id": [one.id for one in plan.cases],
-            "number": [one.number for one in plan.cases],
-            "point": [one.point for one in plan.cases],
-            "realisation": [one.realisation for one in plan.cases],
+            "case_id": [planned.id for planned in plan.cases],
+            "number": [planned.number for planned in plan.cases],
+            "point": [planned.point for planned in plan.cases],
+            "realisation": [planned.realisation for planned in plan.cases],
             "status": "done",
             "reason": "",
             **columns,
@@ -114,7 +114,7 @@ def with_knee(knee_um=2.5, *, seeds=5, scatter_hz=4.0):
     random = np.random.default_rng(5)
     crf = 2800.0 + 400.0 * np.minimum(sq_um, knee_um) + 20.0 * np.maximum(sq_um - knee_um, 0.0)
     crf += random.normal(0.0, scatter_hz, crf.size)
-    heard = {
+    vibration = {
         f"{name}_{preset}{unit}": values
         for preset in ("sound", "paper")
         for name, unit, values in (
@@ -125,55 +125,55 @@ def with_knee(knee_um=2.5, *, seeds=5, scatter_hz=4.0):
     }
     shares = {"clr": 0.2 * sq_um, "car": 0.1 * sq_um, "car_domain": 0.15 * sq_um}
     points = [{"surface.sq": f"{sq:g} um"} for sq in np.unique(sq_um)]
-    return made(
+    return synthetic_study(
         points,
         seeds=seeds,
         **{"surface.sq": 1e-6 * sq_um},
         **shares,
-        **heard,
+        **vibration,
         full_load_crf_hz=3834.0,
     )
 
 
 def without_maps(result):
-    """The report of a study that was never solved, and so has no contacts to map."""
+    """Overview without contact maps, for a study that was not solved."""
     overview = StudyOverview(result)
     overview.__dict__["mapped"] = []
     return overview
 
 
 def page_of(study):
-    """Its page, read."""
+    """The parsed page of a study."""
     return Page(render_study_page(study, study_exhibits(study), lambda _: None))
 
 
 def figure_of(exhibit, result, anchors=None, medium=ON_PAPER):
-    """An exhibit of a wear study, drawn."""
+    """Draw an exhibit of a wear study."""
     study = StudyOverview(result, anchors)
     return exhibit(study, study.curve).figure(medium)
 
 
-def plain(text):
-    """With spaces that may break."""
+def with_ordinary_spaces(text):
+    """`text` with ordinary instead of no-break spaces."""
     return text.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def line(axes, label):
-    (found,) = [one for one in axes.get_lines() if one.get_label() == label]
-    return found
+    (match,) = [curve for curve in axes.get_lines() if curve.get_label() == label]
+    return match
 
 
 def points_of(axes, label):
-    """x, y of the markers of an error bar."""
-    (found,) = [one for one in axes.containers if one.get_label() == label]
-    return found[0].get_xydata()
+    """Coordinates x, y of the markers of an error bar."""
+    (bars,) = [container for container in axes.containers if container.get_label() == label]
+    return bars[0].get_xydata()
 
 
 # The page
 # -------------------------------------------------------------------------------------------------
 
 
-def test_page_loads_nothing(page):
+def test_the_page_loads_no_external_resources(page):
     assert not {tag for tag, _ in page.tags} & {
         "script",
         "iframe",
@@ -187,7 +187,7 @@ def test_page_loads_nothing(page):
             target = attributes.get(name, "data:")
             linked = tag == "a" and target.startswith(
                 ("#", "https://doi.org/")
-            )  # a link loads nothing by itself
+            )  # a link alone loads nothing
             assert linked or target.startswith("data:"), (tag, name, target[:80])
     assert len(page.images()) == 5  # the paper's Figs 5, 6, 7, 8 and 13
     assert all(len(image["alt"]) > 40 for image in page.images())
@@ -198,20 +198,22 @@ def test_levels_are_means_with_students_interval(page, wear):
     clr = 100.0 * wear.table.loc[np.isclose(wear.table["surface.sq"], 2e-6), "clr"]
     reach = student.ppf(0.95, 2) * clr.std() / np.sqrt(3)
     (row,) = [row for row in page.rows if row[:2] == ["2", "3"]]
-    shown = [float(number.replace("−", "-")) for number in re.findall(r"−?[\d.]+", row[2])]
-    assert shown == pytest.approx([clr.mean(), clr.mean() - reach, clr.mean() + reach], abs=0.051)
+    values = [float(number.replace("−", "-")) for number in re.findall(r"−?[\d.]+", row[2])]
+    assert values == pytest.approx([clr.mean(), clr.mean() - reach, clr.mean() + reach], abs=0.051)
 
 
-def test_anchors_stand_in_a_table(page, wear):
+def test_anchors_are_listed_in_a_table(page, wear):
     rows = {
-        plain(row[0]).split(" section")[0]: row[1:] for row in page.rows if "Lubricants" in row[0]
+        with_ordinary_spaces(row[0]).split(" section")[0]: row[1:]
+        for row in page.rows
+        if "Lubricants" in row[0]
     }
     assert len(rows) == len(PAPER_ANCHORS)
-    wanted, ours, *_ = rows["CRF at 3.49 µm, rig"]
-    assert wanted.startswith("3812 ±")
+    published, computed, *_ = rows["CRF at 3.49 µm, rig"]
+    assert published.startswith("3812 ±")
     crf = wear.table.groupby("surface.sq")["crf_sound_hz"].mean().to_numpy()
-    between = np.interp(3.49, LEVELS_UM, crf)
-    assert float(ours.removesuffix(" Hz")) == pytest.approx(between, abs=0.6)
+    interpolated = np.interp(3.49, LEVELS_UM, crf)
+    assert float(computed.removesuffix(" Hz")) == pytest.approx(interpolated, abs=0.6)
     assert rows["CAR of the domain at 0.5 µm"][1:] == [
         "–",
         "–",
@@ -220,31 +222,37 @@ def test_anchors_stand_in_a_table(page, wear):
     ]  # the study begins at 0.75 um
 
 
-def test_page_says_what_was_computed(page, wear):
-    facts = {name: plain(value) for name, value in (row for row in page.rows if len(row) == 2)}
+def test_the_page_states_what_was_computed(page, wear):
+    facts = {
+        name: with_ordinary_spaces(value)
+        for name, value in (row for row in page.rows if len(row) == 2)
+    }
     assert facts["Cases"] == "12: 4 points of 3 surfaces"
     assert facts["surface.sq"] == "0.75 µm, 1.0 µm, 2.0 µm, 3.5 µm"
     assert f"asperity {asperity.__version__}" in facts["Versions"]
     assert wear.plan.case.text in page.text
 
 
-def test_failures_are_loud_and_left_out():
+def test_failures_are_reported_and_excluded():
     study = with_knee()
-    broken = study.table.copy()
-    broken.loc[3, ["status", "reason", "clr"]] = ["failed", "<b>no</b> surface", 9.0]
-    broken.loc[7, ["status", "reason", "clr"]] = ["not converged", "stalled", 9.0]
-    overview = without_maps(replace(study, table=broken))
+    with_failures = study.table.copy()
+    with_failures.loc[3, ["status", "reason", "clr"]] = ["failed", "<b>no</b> surface", 9.0]
+    with_failures.loc[7, ["status", "reason", "clr"]] = ["not converged", "stalled", 9.0]
+    overview = without_maps(replace(study, table=with_failures))
     page = page_of(overview)
     assert ("section", {"class": "verdict unfinished"}) in page.tags
     assert "2 of 75 cases failed or did not converge" in page.text
     (row,) = [row for row in page.rows if row[0] == "failed: <b>no</b> surface"]
-    assert [plain(cell) for cell in row[1:]] == ["1", "surface.sq 0.5 µm (1 of 5 surfaces)"]
+    assert [with_ordinary_spaces(cell) for cell in row[1:]] == [
+        "1",
+        "surface.sq 0.5 µm (1 of 5 surfaces)",
+    ]
     axes = figure_of(shares, overview.result, (), ON_PAGE).axes[0]
-    assert line(axes, "CLR").get_ydata()[0] == pytest.approx(10.0)  # 0.2 a micrometre, not 900 %
-    assert max(np.max(one.get_ydata()) for one in axes.get_lines()) < 100.0
+    assert line(axes, "CLR").get_ydata()[0] == pytest.approx(10.0)  # 0.2 per micrometre, not 900 %
+    assert max(np.max(curve.get_ydata()) for curve in axes.get_lines()) < 100.0
 
 
-def test_many_reasons_are_summed_up():
+def test_many_failure_reasons_are_summarised():
     study = with_knee()
     table = study.table.copy()
     table.loc[:13, "status"] = "not converged"
@@ -256,20 +264,20 @@ def test_many_reasons_are_summed_up():
     assert reasons[-1].text == "2 other reasons"
 
 
-def test_all_failed_is_a_page_and_nothing_computed_is_refused():
+def test_a_study_with_only_failures_has_a_page_and_an_empty_study_is_refused():
     study = with_knee()
-    none = replace(study, table=study.table.assign(status="failed", reason="no oil"))
-    page = page_of(StudyOverview(none))
+    failed = replace(study, table=study.table.assign(status="failed", reason="no oil"))
+    page = page_of(StudyOverview(failed))
     assert "75 OF 75 CASES FAILED" in page.text
     assert not page.images()
     with pytest.raises(BadInput, match=r"no computed case yet, of 75"):
         StudyOverview(replace(study, table=study.table[:0]))
 
 
-def test_a_case_without_vibration_has_no_resonance_to_show():
+def test_a_case_without_vibration_shows_no_resonance():
     study = with_knee()
-    heard = [name for name in study.table if name.startswith("crf")] + ["full_load_crf_hz"]
-    overview = without_maps(replace(study, table=study.table.drop(columns=heard)))
+    vibration = [name for name in study.table if name.startswith("crf")] + ["full_load_crf_hz"]
+    overview = without_maps(replace(study, table=study.table.drop(columns=vibration)))
     page = page_of(overview)
     assert len(page.images()) == 1  # Fig 7 alone
     assert "The case has no [vibration]" in page.text
@@ -278,7 +286,7 @@ def test_a_case_without_vibration_has_no_resonance_to_show():
     assert not any("CRF at" in name or "split" in name for name in anchors)
 
 
-def test_unfinished_study_says_so():
+def test_an_unfinished_study_has_a_note():
     study = with_knee()
     overview = without_maps(replace(study, table=study.table[:60]))
     assert overview.notes == ["15 of 75 cases have not been computed yet: run the study again."]
@@ -313,9 +321,9 @@ def test_stages_are_marked_where_crf_bends():
         assert low <= 2.5 <= high
         assert high - low < 0.3
         splits = sorted(
-            float(one.get_xdata()[0])
-            for one in axes.get_lines()
-            if "printed split" in str(one.get_label())
+            float(curve.get_xdata()[0])
+            for curve in axes.get_lines()
+            if "printed split" in str(curve.get_label())
         )
         assert splits == [1.8, 2.5]  # simulated and between the rig's samples of 1.68 and 1.92 um
     assert [text.get_text() for text in figure.axes[0].texts] == ["normal", "severe"]
@@ -324,16 +332,15 @@ def test_stages_are_marked_where_crf_bends():
     )
 
 
-def test_levels_at_which_nothing_is_heard_keep_their_place():
+def test_levels_without_a_resonance_stay_on_the_axis():
     study = with_knee()
-    quiet = study.table.copy()
-    quiet.loc[
-        quiet["surface.sq"] < 3.9e-6, ["crf_sound_hz", "crfa_sound", "crf_paper_hz", "crfa_paper"]
+    table = study.table.copy()
+    table.loc[
+        table["surface.sq"] < 3.9e-6, ["crf_sound_hz", "crfa_sound", "crf_paper_hz", "crfa_paper"]
     ] = np.nan
-    figure = figure_of(resonance, replace(study, table=quiet), ())
-    figure.savefig(
-        io.BytesIO()
-    )  # a name of a stage outside the axes would leave them no room, and warn
+    figure = figure_of(resonance, replace(study, table=table), ())
+    # matplotlib warns if the label of a stage lies outside the axes and leaves them no room
+    figure.savefig(io.BytesIO())
     low, high = figure.axes[0].get_xlim()
     assert low < 0.5
     assert high > 4.0
@@ -345,16 +352,16 @@ def test_a_smooth_curve_has_no_stages(wear):
     assert [text.get_text() for text in figure.axes[0].texts] == ["too few"]
 
 
-def test_rings_of_the_rig_stand_beside_the_prediction():
+def test_the_rigs_rings_are_plotted_beside_the_prediction():
     curve = curve_from_study(with_knee(2.5, scatter_hz=0.01))
     axes = rig(curve, "sound").figure(ON_PAPER).axes[0]
-    ours = points_of(axes, "study at a ring's Sq")
+    predicted = points_of(axes, "study at a ring's Sq")
     sq = np.array(RINGS_UM)
     expected = 2800.0 + 400.0 * np.minimum(sq, 2.5) + 20.0 * np.maximum(sq - 2.5, 0.0)
-    assert ours == pytest.approx(np.column_stack([sq, expected]), rel=1e-4)
-    (container,) = [one for one in axes.containers if one.get_label() == "study at a ring's Sq"]
-    sideways = container[2][0].get_segments()
-    assert [bar[1, 0] - bar[0, 0] for bar in sideways] == pytest.approx(
+    assert predicted == pytest.approx(np.column_stack([sq, expected]), rel=1e-4)
+    (bars,) = [item for item in axes.containers if item.get_label() == "study at a ring's Sq"]
+    horizontal = bars[2][0].get_segments()
+    assert [bar[1, 0] - bar[0, 0] for bar in horizontal] == pytest.approx(
         2.0 * np.array(RINGS_STD_UM)
     )
     assert dict(points_of(axes, "rings, CRF printed")) == pytest.approx(PRINTED_CRF)
@@ -363,13 +370,15 @@ def test_rings_of_the_rig_stand_beside_the_prediction():
 def test_maps_show_the_contact_of_the_study(overview_of_wear, wear):
     figure = contacts.contact_maps(overview_of_wear.runs).figure(ON_PAPER)
     panels = [axes for axes in figure.axes if axes.images]
-    firsts = wear.table.groupby("surface.sq").first()
+    first_rows = wear.table.groupby("surface.sq").first()
     assert len(panels) == len(LEVELS_UM)
-    for axes, (sq, row), run in zip(panels, firsts.iterrows(), overview_of_wear.runs, strict=True):
+    for axes, (sq, row), run in zip(
+        panels, first_rows.iterrows(), overview_of_wear.runs, strict=True
+    ):
         title = axes.get_title("left")
         assert f"Sq {1e6 * sq:.3g} µm" in title
-        shown = [float(share) for share in re.findall(r"([\d.]+) %", title)]
-        assert shown == pytest.approx(
+        shares = [float(share) for share in re.findall(r"([\d.]+) %", title)]
+        assert shares == pytest.approx(
             [100 * row[name] for name in ("clr", "car", "car_domain")], abs=0.051
         )
         image = np.asarray(axes.images[0].get_array())
@@ -387,7 +396,7 @@ def test_surfaces_share_one_scale(overview_of_wear):
     assert spread == pytest.approx(LEVELS_UM, rel=1e-6)  # um
 
 
-def test_a_map_that_differs_from_the_table_is_said(wear):
+def test_a_map_that_differs_from_the_table_is_noted(wear):
     table = wear.table.copy()
     table.loc[table["number"] == 3, "clr"] += 0.01
     overview = StudyOverview(replace(wear, table=table))
@@ -405,20 +414,20 @@ def test_a_map_that_differs_from_the_table_is_said(wear):
         ({"lubricant": "none"}, False),
     ],
 )
-def test_printed_numbers_stand_beside_the_papers_contact_only(overrides, papers):
+def test_published_numbers_are_shown_for_the_papers_contact_only(overrides, papers):
     assert is_papers_contact(PAPERS.with_overrides(overrides)) is papers
 
 
-def test_anchors_of_ones_own_replace_the_papers(wear):
-    own = (Anchor(name="CLR of my rig", quantity="clr", value=0.7, tolerance=0.1, sq=2e-6),)
-    overview = StudyOverview(wear, own)
+def test_user_anchors_replace_the_papers_anchors(wear):
+    anchors = (Anchor(name="CLR of my rig", quantity="clr", value=0.7, tolerance=0.1, sq=2e-6),)
+    overview = StudyOverview(wear, anchors)
     assert [exhibit.name for exhibit in study_exhibits(overview)] == [
         "shares",
         "resonance",
         "contact-maps",
         "surfaces",
     ]
-    axes = figure_of(shares, wear, own, ON_PAGE).axes[0]
+    axes = figure_of(shares, wear, anchors, ON_PAGE).axes[0]
     assert points_of(axes, "CLR, given") == pytest.approx(np.array([[2.0, 70.0]]))
     assert [row["name"] for row in anchor_rows(overview)] == ["CLR of my rig"]
 
@@ -427,18 +436,18 @@ def test_anchors_of_ones_own_replace_the_papers(wear):
 # -------------------------------------------------------------------------------------------------
 
 
-def over_two():
+def two_quantity_study():
     points = [
         {"contact.load": f"{load} N", "surface.correlation_length": length}
         for load in (200, 300)
         for length in ("10 um", "0.02 mm", "80 um")
     ]
     clr = np.array([10, 20, 30, 40, 50, 60, 70, 80, 90, 15, 25, 35]) / 100.0
-    return made(points, seeds=2, clr=clr, crf_hz=3000.0 + 100.0 * clr)
+    return synthetic_study(points, seeds=2, clr=clr, crf_hz=3000.0 + 100.0 * clr)
 
 
-def test_means_over_two_quantities_as_a_map():
-    overview = StudyOverview(over_two())
+def test_means_over_two_quantities_are_shown_as_a_map():
+    overview = StudyOverview(two_quantity_study())
     assert [exhibit.name for exhibit in study_exhibits(overview)] == [
         "against-contact-load",
         "against-surface-correlation-length",
@@ -448,15 +457,15 @@ def test_means_over_two_quantities_as_a_map():
     image = figure.axes[0].images[0].get_array()
     assert np.asarray(image) == pytest.approx(
         np.array([[15, 75], [35, 52.5], [55, 30]])
-    )  # means of pairs, by hand
+    )  # means of pairs, computed by hand
     labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]
     assert labels == ["10", "20", "80"]  # um, one of them written in mm
     assert figure.get_supylabel() == "correlation length [µm]"
     assert figure.get_supxlabel() == "load [N]"
 
 
-def test_what_has_no_case_has_no_colour():
-    study = over_two()
+def test_map_cells_without_a_case_have_no_colour():
+    study = two_quantity_study()
     study.table.loc[study.table["point"] == 4, "status"] = "failed"
     figure = study_exhibits(StudyOverview(study))[-1].figure(ON_PAGE)
     image = np.ma.filled(figure.axes[0].images[0].get_array(), np.nan)
@@ -465,7 +474,7 @@ def test_what_has_no_case_has_no_colour():
 
 
 def test_means_against_one_quantity_have_students_interval():
-    overview = StudyOverview(over_two())
+    overview = StudyOverview(two_quantity_study())
     axes = study_exhibits(overview)[0].figure(ON_PAPER).axes[0]
     at_200 = np.array([10, 20, 30, 40, 50, 60])
     (bars,) = axes.containers
@@ -479,8 +488,8 @@ def test_samples_are_averaged_in_groups():
     points = [
         {"surface.sq": f"{value:.4f} um", "lubricant.viscosity.alpha": "20 1/GPa"} for value in sq
     ]
-    overview = StudyOverview(made(points, clr=sq / 4.0))
-    (axis,) = overview.axes  # alpha has one value: no axis
+    overview = StudyOverview(synthetic_study(points, clr=sq / 4.0))
+    (axis,) = overview.axes  # alpha has a single value and no axis
     assert axis.binned
     x, mean, low, high = group_means(axis.values, 25.0 * axis.values, binned=True)
     assert len(x) == 8
@@ -494,32 +503,36 @@ def test_samples_are_averaged_in_groups():
     ("values", "logarithmic"),
     [((10, 20, 40, 80), True), ((1, 2, 3, 4, 5), False), ((1, 10), False), ((0, 1, 9), False)],
 )
-def test_values_that_crowd_low_get_a_logarithmic_axis(values, logarithmic):
-    study = made([{"contact.slip": float(value)} for value in values], clr=np.arange(len(values)))
+def test_geometrically_spaced_values_get_a_logarithmic_axis(values, logarithmic):
+    study = synthetic_study(
+        [{"contact.slip": float(value)} for value in values], clr=np.arange(len(values))
+    )
     assert swept_axis(study.plan, study.table, "contact.slip").logarithmic is logarithmic
 
 
-def test_a_point_that_leaves_a_key_alone_has_the_cases_own_value():
-    study = made([{"contact.load": "200 N"}, {"surface.sq": "2 um"}], clr=[0.1, 0.2])
+def test_a_key_that_a_point_does_not_set_has_the_cases_value():
+    study = synthetic_study([{"contact.load": "200 N"}, {"surface.sq": "2 um"}], clr=[0.1, 0.2])
     assert swept_axis(study.plan, study.table, "contact.load").values.tolist() == [200.0, 500.0]
     assert swept_axis(study.plan, study.table, "surface.sq").values.tolist() == [1.0, 2.0]
 
 
-def test_many_cases_are_a_picture():
+def test_many_cases_are_drawn_as_a_raster_image():
     sq = np.linspace(0.5, 3.0, 4000)
-    study = made([{"surface.sq": f"{value:.6f} um"} for value in sq], clr=sq / 4.0, car=sq / 5.0)
+    study = synthetic_study(
+        [{"surface.sq": f"{value:.6f} um"} for value in sq], clr=sq / 4.0, car=sq / 5.0
+    )
     axis = swept_axis(study.plan, study.table, "surface.sq")
     figure = output_curves(StudyOverview(study), axis).figure(ON_PAGE)
     drawing = io.BytesIO()
     figure.savefig(drawing, format="svg")
-    assert drawing.tell() < 200_000  # 8000 dots as drawings take a megabyte
+    assert drawing.tell() < 200_000  # 8000 dots as vector graphics take a megabyte
 
 
-def test_names_are_places_on_an_axis():
+def test_non_numeric_values_are_categories_on_an_axis():
     points = [
         {"surface.correlation_length": pair} for pair in (["10 um", "40 um"], ["20 um", "40 um"])
     ]
-    study = made(points, clr=[0.1, 0.2])
+    study = synthetic_study(points, clr=[0.1, 0.2])
     axis = swept_axis(study.plan, study.table, "surface.correlation_length")
     assert axis.names == ("10 um, 40 um", "20 um, 40 um")
     assert axis.values.tolist() == [0.0, 1.0]
@@ -531,13 +544,13 @@ def test_names_are_places_on_an_axis():
 
 @pytest.fixture(scope="module")
 def written(wear, tmp_path_factory):
-    """The page, and the folder of figures beside it, written from Python."""
+    """Page and folder of figures, written from Python."""
     out = tmp_path_factory.mktemp("written")
     write_study_report(wear, out / "page.html", figures=out / "paper" / "figures")
     return out / "page.html", out / "paper" / "figures"
 
 
-def test_figures_and_tables_for_a_paper(written, wear):
+def test_figures_and_tables_for_a_paper_are_written(written, wear):
     _, out = written
     names = {
         "shares": 84.0,
@@ -551,7 +564,7 @@ def test_figures_and_tables_for_a_paper(written, wear):
         assert pixels / 300.0 * 25.4 == pytest.approx(width_mm, abs=0.2), name
         document = (out / f"{name}.pdf").read_bytes()
         assert document.startswith(b"%PDF")
-        assert b"/FontFile2" in document  # TrueType: text can be searched and edited
+        assert b"/FontFile2" in document  # TrueType, so that text can be searched and edited
         assert b"/Type3" not in document
         assert f"**{name}**" in (out / "captions.md").read_text("utf-8")
     cases = pandas.read_csv(out / "cases.csv")
@@ -563,7 +576,7 @@ def test_figures_and_tables_for_a_paper(written, wear):
     assert {file.suffix for file in out.iterdir()} == {".pdf", ".png", ".csv", ".md"}
 
 
-def test_command_writes_the_same_to_the_last_byte(written, folder, tmp_path, capsys):
+def test_the_command_writes_identical_files(written, folder, tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         main(
             [
@@ -577,10 +590,10 @@ def test_command_writes_the_same_to_the_last_byte(written, folder, tmp_path, cap
             ]
         )
     assert not end.value.code
-    said = json.loads(capsys.readouterr().out)
-    assert said["report"] == str(tmp_path / "p.html")
-    assert said["figures"] == str(tmp_path / "f")
-    assert (said["cases"], said["failed"]) == (12, 0)
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["report"] == str(tmp_path / "p.html")
+    assert printed["figures"] == str(tmp_path / "f")
+    assert (printed["cases"], printed["failed"]) == (12, 0)
     page, figures = written
     assert (tmp_path / "p.html").read_bytes() == page.read_bytes()
     assert {file.name for file in (tmp_path / "f").iterdir()} == {
@@ -590,9 +603,7 @@ def test_command_writes_the_same_to_the_last_byte(written, folder, tmp_path, cap
         assert file.read_bytes() == (tmp_path / "f" / file.name).read_bytes(), file.name
 
 
-def test_a_place_that_cannot_be_written_to_is_refused_before_anything_is_drawn(
-    wear, tmp_path, monkeypatch
-):
+def test_an_unwritable_output_is_refused_before_anything_is_solved(wear, tmp_path, monkeypatch):
     monkeypatch.setattr(overview, "solve_case", lambda *_, **__: pytest.fail("solved first"))
     (tmp_path / "file").write_text("")
     with pytest.raises(BadInput, match="it is a file; name a folder"):
@@ -612,7 +623,7 @@ def test_a_place_that_cannot_be_written_to_is_refused_before_anything_is_drawn(
         (["STUDY", "--out", "page.pdf"], "--out must be a file that ends in .html"),
     ],
 )
-def test_command_refuses_in_one_sentence(
+def test_the_command_refuses_in_one_sentence(
     arguments, sentence, folder, tmp_path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
@@ -620,9 +631,9 @@ def test_command_refuses_in_one_sentence(
     with pytest.raises(SystemExit) as end:
         main(["report", *(str(folder) if word == "STUDY" else word for word in arguments)])
     assert end.value.code == 2
-    said = capsys.readouterr()
-    assert not said.out
-    assert sentence in said.err
-    assert len(said.err.strip().splitlines()) == 1
+    output = capsys.readouterr()
+    assert not output.out
+    assert sentence in output.err
+    assert len(output.err.strip().splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["EMPTY"]
     assert not (folder / "report.html").exists()

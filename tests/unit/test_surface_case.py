@@ -1,4 +1,4 @@
-"""The case file's [surface]: every kind it takes, and what it says when one cannot be meant."""
+"""Table [surface] of the case file: every kind of surface, and the errors for invalid ones."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ def paper():
     return load_case(PAPER).with_overrides(COARSE)
 
 
-def ring(folder, name="ring.x3p", seed=1):
+def write_ring(folder, name="ring.x3p", seed=1):
     import x3pio
 
     heights = np.random.default_rng(seed).standard_normal((200, 220)).cumsum(0).cumsum(1)
@@ -36,27 +36,27 @@ def ring(folder, name="ring.x3p", seed=1):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_of_surface_is_made_and_restated(paper, kind):
+def test_every_kind_of_surface_is_generated_and_restated(paper, kind):
     case = paper.with_overrides(
         {"surface": {"kind": kind, "sq": "0.7 um", "seed": 3, **KINDS[kind]}}
     )
     assert case.surface().sq == pytest.approx(0.7e-6, rel=1e-9)
-    again = load_case(case.text, folder=case.folder)
-    assert again == case
-    np.testing.assert_array_equal(again.surface().heights, case.surface().heights)
+    restated = load_case(case.text, folder=case.folder)
+    assert restated == case
+    np.testing.assert_array_equal(restated.surface().heights, case.surface().heights)
     other = case.with_overrides({"surface.seed": 4})
     assert not np.allclose(other.surface().heights, case.surface().heights)
 
 
-def test_a_sample_that_strays_from_its_correlation_lengths_says_so(paper):
+def test_a_sample_that_misses_its_correlation_lengths_is_noted(paper):
     notes = paper.with_overrides({"surface.correlation_length": ["150 um", "60 um"]}).surface_notes
     assert len(notes) == 1
     assert "150 x 60 um were requested" in notes[0]
 
 
 def test_two_measured_surfaces_keep_their_speeds(paper, tmp_path):
-    ring(tmp_path)
-    ring(tmp_path, "roller.x3p", seed=2)
+    write_ring(tmp_path)
+    write_ring(tmp_path, "roller.x3p", seed=2)
     text = paper.with_overrides(
         {
             "surface": {
@@ -81,7 +81,7 @@ def test_two_measured_surfaces_keep_their_speeds(paper, tmp_path):
     assert paper.composite() is None
 
 
-def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_path):
+def test_turning_a_grooved_surface_aligns_its_grooves_with_rolling(paper, tmp_path):
     import x3pio
 
     grooves = 1e-6 * np.sin(np.arange(200) / 3.0)[:, None] * np.ones(220)
@@ -90,8 +90,8 @@ def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_pat
         paper.with_overrides({"surface": {"file": "ring.x3p"}}).text, folder=tmp_path
     )
     along = across.with_overrides({"surface.turn": True})
-    assert np.ptp(across.surface().heights, axis=1).max() < 1e-12  # nothing changes along y ...
-    assert np.ptp(along.surface().heights, axis=0).max() < 1e-12  # ... and turned, nothing along x
+    assert np.ptp(across.surface().heights, axis=1).max() < 1e-12  # constant along y
+    assert np.ptp(along.surface().heights, axis=0).max() < 1e-12  # turned: constant along x
     assert along.surface().sq == pytest.approx(across.surface().sq, rel=0.1)
 
 
@@ -141,7 +141,7 @@ def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_pat
         ),
     ],
 )
-def test_what_cannot_be_meant_is_refused(paper, surface, message):
+def test_an_invalid_surface_is_refused(paper, surface, message):
     with pytest.raises(BadInput, match=message):
         paper.with_overrides({"surface": surface}).surface()
 
@@ -158,29 +158,29 @@ GROUND = {
 }
 
 
-def test_two_bodies_have_each_its_own_roughness_and_lay(paper):
+def test_each_of_two_bodies_has_its_own_roughness_and_lay(paper):
     along = GROUND | {"second": GROUND | {"sq": "0.4 um", "direction_deg": 90}}
     case = paper.with_overrides({"surface": along})
     both = case.composite()
     assert (both.first.sq, both.second.sq) == pytest.approx((0.3e-6, 0.4e-6), rel=1e-6)
     assert both.speeds == case.conditions.surface_speeds
-    steep = [
+    slopes = [
         [
             np.abs(np.diff(body.heights, axis=axis)).mean() / case.grid.spacing[axis]
             for axis in (0, 1)
         ]
         for body in (both.first, both.second)
     ]
-    assert steep[0][1] > 1.5 * steep[0][0]  # grooves along rolling
-    assert steep[1][0] > 1.3 * steep[1][1]  # and across it
-    together = case.surface()
-    assert together.heights == pytest.approx(both.first.heights + both.second.heights[:, ::-1])
+    assert slopes[0][1] > 1.5 * slopes[0][0]  # grooves along rolling
+    assert slopes[1][0] > 1.3 * slopes[1][1]  # and across it
+    combined = case.surface()
+    assert combined.heights == pytest.approx(both.first.heights + both.second.heights[:, ::-1])
     assert any("ground (moving at" in note for note in case.surface_notes)
-    assert load_case(case.text).surface().heights == pytest.approx(together.heights)
+    assert load_case(case.text).surface().heights == pytest.approx(combined.heights)
 
 
-def test_two_drawn_bodies_are_no_copies(paper):
-    """Of one kind and seed: independent, and other ones with another seed of the first."""
+def test_two_random_bodies_are_independent(paper):
+    """Bodies of the same kind and seed are independent; a new seed of the first changes both."""
     gaussian = {"kind": "gaussian", "sq": "1 um", "correlation_length": "14 um", "seed": 4}
     case = paper.with_overrides({"surface": gaussian | {"second": gaussian}})
     both = case.composite()
@@ -195,19 +195,19 @@ def test_two_drawn_bodies_are_no_copies(paper):
 
 def test_a_flat_body_beside_a_rough_one_changes_nothing(paper):
     gaussian = {"kind": "gaussian", "sq": "1 um", "correlation_length": "14 um", "seed": 4}
-    alone = paper.with_overrides({"surface": gaussian})
-    beside = paper.with_overrides({"surface": gaussian | {"second": {"kind": "flat"}}})
-    assert np.array_equal(alone.surface().heights, beside.surface().heights)
-    assert beside.surface_count(3) == 3
+    single = paper.with_overrides({"surface": gaussian})
+    with_flat = paper.with_overrides({"surface": gaussian | {"second": {"kind": "flat"}}})
+    assert np.array_equal(single.surface().heights, with_flat.surface().heights)
+    assert with_flat.surface_count(3) == 3
     smooth = paper.with_overrides({"surface": {"kind": "flat", "second": {"kind": "flat"}}})
     assert smooth.surface_count(3) == 1
-    turned = paper.with_overrides({"surface": {"kind": "flat", "second": gaussian}})
-    assert turned.surface().sq == pytest.approx(1e-6, rel=1e-6)
-    assert turned.surface_count(3) == 3
+    swapped = paper.with_overrides({"surface": {"kind": "flat", "second": gaussian}})
+    assert swapped.surface().sq == pytest.approx(1e-6, rel=1e-6)
+    assert swapped.surface_count(3) == 3
 
 
-def test_a_chosen_grid_knows_both_bodies(paper):
-    """The finer of both asks for the cells."""
+def test_the_automatic_grid_resolves_both_bodies(paper):
+    """The finer roughness determines the number of cells."""
     coarse = {"kind": "gaussian", "sq": "1 um", "correlation_length": "40 um"}
     fine = {"kind": "gaussian", "sq": "0.2 um", "correlation_length": "6 um"}
     cells = [
@@ -217,22 +217,22 @@ def test_a_chosen_grid_knows_both_bodies(paper):
     assert cells[1][0] > 1.5 * cells[0][0]
 
 
-def test_two_drawn_bodies_move_each_at_its_speed(paper):
+def test_two_random_bodies_move_at_their_own_speeds(paper):
     gaussian = {"kind": "gaussian", "sq": "1 um", "correlation_length": "20 um", "seed": 4}
     case = paper.with_overrides({"surface": gaussian | {"second": gaussian | {"sq": "0.5 um"}}})
     moving = case.moving_surfaces()
     assert (moving.first.sq, moving.second.sq) == pytest.approx((1e-6, 0.5e-6), rel=1e-3)
 
 
-def test_a_solve_works_a_surfaces_correlation_lengths_out_once(monkeypatch):
-    asked = []
-    worked_out = parameters._autocorrelation
+def test_a_solve_computes_the_correlation_lengths_of_a_surface_once(monkeypatch):
+    calls = []
+    autocorrelation = parameters._autocorrelation
     monkeypatch.setattr(
-        parameters, "_autocorrelation", lambda *given: asked.append(1) or worked_out(*given)
+        parameters, "_autocorrelation", lambda *args: calls.append(1) or autocorrelation(*args)
     )
     case = load_case(PAPER).with_overrides(
         {"grid.cells": [32, 24], "surface.correlation_length": "40 um"}
     )
     run = solve_case(case, surfaces=2)
     assert run.determined in (True, False)
-    assert len(asked) == 2
+    assert len(calls) == 2

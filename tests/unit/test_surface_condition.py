@@ -33,14 +33,14 @@ def wave(cells, wavelength, axis=0):
 
 @pytest.mark.parametrize("hollow", [False, True])
 @pytest.mark.parametrize(("angle", "tilt"), [(0.0, 0.0), (0.7, 0.1), (1.5, -0.2)])
-def test_a_cylinder_of_any_axis_leaves_nothing(hollow, angle, tilt):
+def test_removing_a_cylinder_of_any_axis_leaves_no_residual(hollow, angle, tilt):
     grid = measured(np.zeros((120, 90))).grid
     x, y = np.meshgrid(grid.x, grid.y, indexing="ij")
     across, along = (
         x * np.cos(angle) + y * np.sin(angle) - 9e-6,
         y * np.cos(angle) - x * np.sin(angle),
     )
-    # all points at one distance from the axis: z from the circle, stretched by the tilt
+    # points at a constant distance from the axis: z of the circle, stretched by the tilt
     heights = tilt * along + np.sqrt(1.0 + tilt**2) * np.sqrt((150e-6) ** 2 - across**2)
     heights[20:30, 40:60] = np.nan
     levelled, step = level(measured(-heights if hollow else heights), "cylinder")
@@ -49,7 +49,7 @@ def test_a_cylinder_of_any_axis_leaves_nothing(hollow, angle, tilt):
     assert ("hollow" in step) == hollow
 
 
-def test_the_cylinder_of_a_profile():
+def test_a_circle_is_removed_from_a_profile():
     x = (np.arange(400) - 199.5)[:, None] * np.ones(8) * 1e-6
     levelled, step = level(measured(np.sqrt((5e-3) ** 2 - (x - 30e-6) ** 2), uniform=1), "cylinder")
     assert np.max(np.abs(levelled.heights)) < 1e-12
@@ -59,10 +59,10 @@ def test_the_cylinder_of_a_profile():
 @pytest.mark.parametrize(
     ("form", "degree"), [("plane", 1), ("quadratic", 2), ("cubic", 3), ("quartic", 4)]
 )
-def test_a_polynomial_takes_its_degree_and_no_higher(form, degree):
+def test_a_polynomial_form_removes_terms_up_to_its_degree_only(form, degree):
     x, y = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1, 1, 50), indexing="ij")
-    own = 1e-6 * (x + y) ** degree
-    assert level(measured(own), form)[0].sq < 1e-18
+    polynomial = 1e-6 * (x + y) ** degree
+    assert level(measured(polynomial), form)[0].sq < 1e-18
     assert level(measured(1e-6 * x ** (degree + 1)), form)[0].sq > 1e-8
 
 
@@ -70,10 +70,8 @@ def test_a_polynomial_takes_its_degree_and_no_higher(form, degree):
     ("wavelength", "passed"), [(10e-6, 0.5 ** (2.0**2)), (20e-6, 0.5), (60e-6, 0.5 ** (1 / 9))]
 )
 @pytest.mark.parametrize("axis", [0, 1])
-def test_the_filters_pass_what_iso_16610_says(wavelength, passed, axis):
-    """Transmission exp(-ln 2 (cut-off/wavelength)^2) of the Gaussian, and the rest of 1 for the
-    L-filter.
-    """
+def test_the_filters_transmit_as_in_iso_16610(wavelength, passed, axis):
+    """The S-filter transmits exp(-ln 2 (cut-off/wavelength)^2), the L-filter the rest of 1."""
     z = wave((600, 600), wavelength, axis)
     short, _ = condition_surface(measured(z), SurfaceConditioning(form="none", s_filter=20e-6))
     long, _ = condition_surface(measured(z), SurfaceConditioning(form="none", l_filter=20e-6))
@@ -90,47 +88,47 @@ def test_the_filters_leave_missing_cells_missing_and_a_plateau_flat():
     assert np.nanmax(np.abs(filtered.heights)) < 1e-18
 
 
-def test_outliers_are_told_and_dropped_when_asked():
+def test_outliers_are_reported_and_removed_on_request():
     z = rough()
     z[[30, 70, 100], [20, 50, 90]] += 30e-6
-    kept, said = condition_surface(measured(z))
-    assert kept.missing == 0.0
-    assert said[0].startswith("kept 3 heights")
-    dropped, said = condition_surface(measured(z), SurfaceConditioning(outliers="remove"))
-    assert said[0].startswith("removed 3 outliers")
-    assert np.isnan(dropped.heights[[30, 70, 100], [20, 50, 90]]).all()
-    assert np.count_nonzero(np.isnan(dropped.heights)) == 3
+    unchanged, steps = condition_surface(measured(z))
+    assert unchanged.missing == 0.0
+    assert steps[0].startswith("kept 3 heights")
+    cleaned, steps = condition_surface(measured(z), SurfaceConditioning(outliers="remove"))
+    assert steps[0].startswith("removed 3 outliers")
+    assert np.isnan(cleaned.heights[[30, 70, 100], [20, 50, 90]]).all()
+    assert np.count_nonzero(np.isnan(cleaned.heights)) == 3
 
 
 def test_a_rough_surface_has_no_outliers():
     assert len(condition_surface(measured(rough()))[1]) == 1
 
 
-def test_a_quarter_turn_makes_y_of_x():
+def test_a_quarter_turn_maps_x_to_y():
     z = rough()
     turned = measured(z).turned()
     assert turned.grid.cells == (120, 160)
-    # counter-clockwise: the point (x, y) comes to lie at (-y, x)
+    # counter-clockwise: the point (x, y) moves to (-y, x)
     i, j = 100, 30
     x, y = measured(z).grid.x[i], measured(z).grid.y[j]
-    at = (np.argmin(np.abs(turned.grid.x + y)), np.argmin(np.abs(turned.grid.y - x)))
-    assert turned.heights[at] == z[i, j]
-    again = turned.turned().turned().turned()
-    np.testing.assert_array_equal(again.heights, z)
+    indices = (np.argmin(np.abs(turned.grid.x + y)), np.argmin(np.abs(turned.grid.y - x)))
+    assert turned.heights[indices] == z[i, j]
+    restored = turned.turned().turned().turned()
+    np.testing.assert_array_equal(restored.heights, z)
     assert (
         "turned by 90 degrees"
         in condition_surface(measured(z), SurfaceConditioning(turn=True))[1][0]
     )
 
 
-def test_a_turned_profile_goes_on_unchanged_along_x():
+def test_a_turned_profile_is_constant_along_x():
     z = rough()[:, :1] * np.ones(8)
     turned = measured(z, uniform=1).turned()
     assert turned.uniform == 0
     np.testing.assert_array_equal(turned.profile, z[:, 0])
 
 
-def test_too_few_heights_for_a_form():
+def test_too_few_heights_for_a_form_are_refused():
     z = np.full((20, 20), np.nan)
     z[0, :5] = 1e-6
     with pytest.raises(BadInput, match="too few valid heights"):

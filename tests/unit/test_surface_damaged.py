@@ -1,4 +1,4 @@
-"""Damaged surface files: read or refused in one sentence, and never a traceback."""
+"""Damaged surface files are read or refused in one sentence, without a traceback."""
 
 import gc
 from pathlib import Path
@@ -14,9 +14,7 @@ UNITS = {"xyz": ("um", "um"), "csv": ("um", "mm"), "txt": ("um", "mm"), "npy": (
 
 
 def originals(folder):
-    """A small file of each format that can be written here, and the developers' own where they are
-    at hand.
-    """
+    """Contents of a small file of each writable format and of the large shared files, if any."""
     import sdfio
     import x3pio
 
@@ -31,38 +29,38 @@ def originals(folder):
     (folder / "a.csv").write_text('"x","z"\n' + "".join(rows))
     (folder / "a.txt").write_text("\n".join(" ".join(f"{v:.4f}" for v in row) for row in z.T))
     np.save(folder / "a.npy", z)
-    own = sorted(FILES.iterdir()) if FILES.is_dir() else []
+    shared = sorted(FILES.iterdir()) if FILES.is_dir() else []
     return [
         [(path.name, path.read_bytes()) for path in paths]
-        for paths in (sorted(folder.iterdir()), own)
+        for paths in (sorted(folder.iterdir()), shared)
     ]
 
 
 def damaged(content, rng):
     data = bytearray(content)
     size = len(data)
-    where, length = int(rng.integers(size)), int(rng.integers(1, 2000))
+    start, length = int(rng.integers(size)), int(rng.integers(1, 2000))
     match rng.integers(6):
         case 0:  # cut short
-            del data[where:]
+            del data[start:]
         case 1:  # bytes flipped anywhere
             for i in rng.integers(size, size=rng.integers(1, 40)):
                 data[i] = rng.integers(256)
         case 2:  # bytes flipped in the header
             for i in rng.integers(min(size, 400), size=rng.integers(1, 20)):
                 data[i] = rng.integers(256)
-        case 3:  # a stretch zeroed
-            data[where : where + length] = bytes(len(data[where : where + length]))
-        case 4:  # a stretch put in
-            data[where:where] = rng.bytes(length)
-        case 5:  # a stretch lost
-            del data[where : where + length]
+        case 3:  # a block zeroed
+            data[start : start + length] = bytes(len(data[start : start + length]))
+        case 4:  # a block inserted
+            data[start:start] = rng.bytes(length)
+        case 5:  # a block removed
+            del data[start : start + length]
     return bytes(data)
 
 
 @pytest.mark.filterwarnings(
     "ignore::pytest.PytestUnraisableExceptionWarning"
-)  # readers that fail leave files open
+)  # failing readers leave files open
 def test_300_damaged_files_leave_no_traceback(tmp_path, capfd):
     (tmp_path / "good").mkdir()
     (tmp_path / "bad").mkdir()
@@ -78,21 +76,19 @@ def test_300_damaged_files_leave_no_traceback(tmp_path, capfd):
         path = tmp_path / "bad" / name
         path.write_bytes(damaged(content, rng))
         outcomes.append((name, outcome(path)))
-    for name, said in outcomes:
-        if isinstance(said, str):
-            assert name.split(".")[0] in said
-            assert "\n" not in said
-            assert len(said) < 400
-    read = sum(isinstance(said, float) for _, said in outcomes)
-    assert 20 < read < 280  # neither everything refused nor everything swallowed
+    for name, result in outcomes:
+        if isinstance(result, str):
+            assert name.split(".")[0] in result
+            assert "\n" not in result
+            assert len(result) < 400
+    read = sum(isinstance(result, float) for _, result in outcomes)
+    assert 20 < read < 280  # some are refused and some are read
     assert capfd.readouterr() == ("", "")
     gc.collect()
 
 
 def outcome(path):
-    """Sq of what was read, or the sentence that refuses it; anything else is the traceback not to
-    be seen.
-    """
+    """Return Sq of the surface or the message of `BadInput`; other exceptions fail the test."""
     unit, lateral = UNITS.get(path.suffix[1:], (None, None))
     pixel = 1e-6 if path.name in ("a.npy", "a.txt") else None
     try:

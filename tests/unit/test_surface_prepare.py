@@ -40,7 +40,7 @@ def form_on(cells):
     return 76e-3 + 1e-6 * (30.0 * x - 12.0 * y + 5.0 * x**2 - 7.0 * x * y + 3.0 * y**2)
 
 
-def test_a_pure_form_leaves_nothing_whatever_is_missing():
+def test_a_pure_form_leaves_no_residual_despite_missing_cells():
     heights = form_on((120, 90))
     heights[10:30, 40:60] = np.nan
     levelled, step = level(measured(heights), "quadratic")
@@ -49,14 +49,14 @@ def test_a_pure_form_leaves_nothing_whatever_is_missing():
     assert "quadratic form" in step
 
 
-def test_form_removal_takes_the_form_and_not_the_roughness():
+def test_form_removal_does_not_change_the_roughness():
     roughness = rough()
-    bare, _ = level(measured(roughness), "quadratic")
+    levelled, _ = level(measured(roughness), "quadratic")
     formed, _ = level(measured(roughness + form_on(roughness.shape)), "quadratic")
-    np.testing.assert_allclose(formed.heights, bare.heights, atol=1e-14)
+    np.testing.assert_allclose(formed.heights, levelled.heights, atol=1e-14)
 
 
-def test_a_plane_leaves_curvature_and_none_leaves_tilt():
+def test_a_plane_leaves_curvature_and_no_form_leaves_tilt():
     cells = (60, 50)
     x = np.linspace(-1.0, 1.0, cells[0])[:, None] * np.ones(cells[1])
     assert level(measured(x * 1e-6), "none")[0].sq == pytest.approx(np.std(x * 1e-6))
@@ -64,7 +64,7 @@ def test_a_plane_leaves_curvature_and_none_leaves_tilt():
     assert level(measured(x**2 * 1e-6), "plane")[0].sq == pytest.approx(np.std(x**2 * 1e-6))
 
 
-def test_the_centre_of_the_map_becomes_the_contact():
+def test_the_contact_is_cut_from_the_centre_of_the_map():
     heights = rough()
     grid = contact((120, 80), periodic=(False, False))
     prepared = prepare_surface(
@@ -91,12 +91,12 @@ def test_interpolation_follows_a_wave():
 @pytest.mark.parametrize(
     ("wavelength", "passed"), [(40e-6, 1.0), (12.5e-6, 1.0), (8e-6, 0.0), (3.7e-6, 0.0)]
 )
-def test_a_coarser_grid_keeps_the_waves_it_can_show_and_no_others(wavelength, passed):
+def test_a_coarser_grid_keeps_only_the_waves_it_can_resolve(wavelength, passed):
     x = (np.arange(800) - 399.5)[:, None] * np.ones(200) * 1e-6
     heights = np.cos(2.0 * np.pi * x / wavelength)
     grid = Grid(
         (48, 16), (-120e-6, -40e-6), (120e-6, 40e-6), periodic=(False, False)
-    )  # 5 um cells: none below 10 um
+    )  # 5 um cells resolve waves from 10 um
     resampled = prepare_surface(
         measured(heights), grid, conditioning=SurfaceConditioning(form="none")
     ).surface.heights
@@ -104,7 +104,7 @@ def test_a_coarser_grid_keeps_the_waves_it_can_show_and_no_others(wavelength, pa
     np.testing.assert_allclose(resampled[:, 8], expected - expected.mean(), atol=0.005)
 
 
-def test_the_ends_of_a_repeating_axis_meet():
+def test_the_ends_of_a_periodic_axis_match():
     heights = rough(seed=4)
     grid = contact()
     prepared = prepare_surface(measured(heights), grid).surface.heights
@@ -117,8 +117,8 @@ def test_the_ends_of_a_repeating_axis_meet():
 
 
 @pytest.mark.parametrize("grooved", [False, True])
-def test_closing_the_ends_keeps_the_roughness_of_both_scattered_and_grooved_surfaces(grooved):
-    blended, untouched = [], []
+def test_blending_the_ends_keeps_the_roughness_of_isotropic_and_grooved_surfaces(grooved):
+    blended, unblended = [], []
     for seed in range(24):
         heights = rough(seed=seed, length=4e-6)
         if grooved:
@@ -127,20 +127,20 @@ def test_closing_the_ends_keeps_the_roughness_of_both_scattered_and_grooved_surf
             measured(heights), contact((120, 80)), conditioning=SurfaceConditioning(form="none")
         ).surface.heights
         blended.append(np.var(closed[:, :10]))
-        untouched.append(np.var(closed[:, 10:]))
-    assert np.mean(blended) / np.mean(untouched) == pytest.approx(1.0, abs=0.1)
+        unblended.append(np.var(closed[:, 10:]))
+    assert np.mean(blended) / np.mean(unblended) == pytest.approx(1.0, abs=0.1)
 
 
-def test_holes_are_filled_from_around_them():
+def test_holes_are_filled_from_their_surroundings():
     truth = rough(length=20e-6)
     holed = truth.copy()
     holed[np.random.default_rng(1).random(holed.shape) < 0.1] = np.nan
     grid = contact((120, 80))
-    whole, filled = (
+    complete, filled = (
         prepare_surface(measured(h), grid, conditioning=SurfaceConditioning(form="none"))
         for h in (truth, holed)
     )
-    assert np.std(filled.surface.heights - whole.surface.heights) < 0.01 * whole.surface.sq
+    assert np.std(filled.surface.heights - complete.surface.heights) < 0.01 * complete.surface.sq
     assert any("missing cells" in step and "10 %" in step for step in filled.steps)
 
 
@@ -151,7 +151,7 @@ def test_too_many_holes_are_refused():
         prepare_surface(measured(heights), contact())
 
 
-def test_a_map_smaller_than_the_contact_is_refused_with_both_sizes_and_tiled_when_asked():
+def test_a_map_smaller_than_the_contact_is_refused_with_both_sizes_or_tiled_on_request():
     small = measured(rough((80, 130)))
     with pytest.raises(
         BadInput, match=r"80 x 130 um, smaller than the contact's 120 x 80 um.*smaller grid"
@@ -161,12 +161,12 @@ def test_a_map_smaller_than_the_contact_is_refused_with_both_sizes_and_tiled_whe
         small, contact((120, 80)), conditioning=SurfaceConditioning(form="none"), fit="tile"
     )
     heights = tiled.surface.heights
-    # 20 cells stand out on either side: they mirror what lies inside of the map's edge
+    # 20 cells on either side lie outside the map and mirror its edge
     np.testing.assert_allclose(heights[:20], heights[20:40][::-1], atol=1e-12)
     assert any("mirrored" in step for step in tiled.steps)
 
 
-def test_scaling_gives_the_sq_asked_for_and_nothing_else_changes():
+def test_scaling_gives_the_requested_sq_and_changes_nothing_else():
     as_measured, scaled = (
         prepare_surface(measured(rough()), contact(), sq=sq) for sq in (None, 2.5e-6)
     )
@@ -179,7 +179,7 @@ def test_scaling_gives_the_sq_asked_for_and_nothing_else_changes():
 
 
 @pytest.mark.parametrize(
-    ("option", "said"),
+    ("option", "message"),
     [
         ({"form": "sphere"}, "form"),
         ({"fit": "stretch"}, "fit"),
@@ -189,10 +189,10 @@ def test_scaling_gives_the_sq_asked_for_and_nothing_else_changes():
         ({"s_filter": 80e-6, "l_filter": 20e-6}, "s_filter must be shorter"),
     ],
 )
-def test_unknown_options_are_refused(option, said):
+def test_unknown_options_are_refused(option, message):
     others = {name: value for name, value in option.items() if name in ("fit", "sq")}
     settings = {name: value for name, value in option.items() if name not in others}
-    with pytest.raises(BadInput, match=said):
+    with pytest.raises(BadInput, match=message):
         prepare_surface(
             measured(rough()), contact(), conditioning=SurfaceConditioning(**settings), **others
         )
@@ -210,7 +210,7 @@ def profile(length=400e-6, pixel=1e-6, seed=2):
     return MeasuredSurface(line[:, None] * np.ones(8), grid, "line.hfm", "xyz", uniform=1)
 
 
-def test_a_profile_becomes_roughness_that_goes_on_along_y():
+def test_a_profile_is_extended_along_y():
     prepared = prepare_surface(
         profile(), contact((120, 64)), conditioning=SurfaceConditioning(form="none")
     )
@@ -221,7 +221,7 @@ def test_a_profile_becomes_roughness_that_goes_on_along_y():
     assert any("extended unchanged along y" in step for step in prepared.steps)
 
 
-def test_a_turned_profile_repeats_along_y_and_goes_on_along_x():
+def test_a_turned_profile_is_periodic_along_y_and_extended_along_x():
     prepared = prepare_surface(
         profile(), contact((64, 96)), conditioning=SurfaceConditioning(turn=True)
     )
@@ -230,7 +230,7 @@ def test_a_turned_profile_repeats_along_y_and_goes_on_along_x():
     assert abs(heights[0, 0] - heights[0, -1]) < 4.0 * np.std(np.diff(heights[0]))
 
 
-def test_a_profile_shorter_than_the_contact_is_refused_and_mirrored_when_asked():
+def test_a_profile_shorter_than_the_contact_is_refused_or_mirrored_on_request():
     with pytest.raises(BadInput, match=r"profile of 80 um, shorter than the contact's 120 um"):
         prepare_surface(profile(80e-6), contact())
     prepared = prepare_surface(
@@ -244,7 +244,7 @@ def test_a_profile_shorter_than_the_contact_is_refused_and_mirrored_when_asked()
     )
 
 
-def test_resampling_keeps_the_spectrum_up_to_nine_tenths_of_the_last_wave():
+def test_resampling_keeps_the_spectrum_up_to_0_9_of_the_nyquist_wavenumber():
     grid = Grid(
         (100, 80), (-100e-6, -80e-6), (100e-6, 80e-6), (False, False)
     )  # 2 um cells over 1 um pixels
@@ -255,22 +255,22 @@ def test_resampling_keeps_the_spectrum_up_to_nine_tenths_of_the_last_wave():
         for g in (grid, fine)
     )
     window = np.outer(np.hanning(100), np.hanning(80))
-    found = np.abs(np.fft.fft2(coarse.heights * window))[:45, :36]
+    resampled = np.abs(np.fft.fft2(coarse.heights * window))[:45, :36]
     truth = np.abs(np.fft.fft2(same.heights * np.kron(window, np.ones((2, 2)))))[:45, :36] / 4.0
-    assert np.sum(found**2) / np.sum(truth**2) == pytest.approx(1.0, abs=0.01)
-    assert np.sum(found[30:40] ** 2) / np.sum(truth[30:40] ** 2) == pytest.approx(1.0, abs=0.03)
+    assert np.sum(resampled**2) / np.sum(truth**2) == pytest.approx(1.0, abs=0.01)
+    assert np.sum(resampled[30:40] ** 2) / np.sum(truth[30:40] ** 2) == pytest.approx(1.0, abs=0.03)
 
 
-def test_turning_a_map_turns_what_is_prepared():
+def test_turning_a_map_turns_the_prepared_surface():
     heights = rough((300, 300))
     square = contact((80, 80), (80e-6, 80e-6), periodic=(False, False))
-    plain, turned = (
+    unturned, turned = (
         prepare_surface(
             measured(heights), square, conditioning=SurfaceConditioning(turn=turn)
         ).surface
         for turn in (False, True)
     )
-    np.testing.assert_allclose(turned.heights, plain.heights[:, ::-1].T, atol=1e-12)
+    np.testing.assert_allclose(turned.heights, unturned.heights[:, ::-1].T, atol=1e-12)
 
 
 def test_two_surfaces_add_up_face_to_face():
@@ -283,36 +283,35 @@ def test_two_surfaces_add_up_face_to_face():
         CompositeSurface(first, other, (2.2, 1.8))
 
 
-def test_blending_says_what_it_changes():
+def test_the_blending_step_reports_the_changed_parameters():
     steps = prepare_surface(measured(rough(seed=4)), contact()).steps
     blending = next(step for step in steps if step.startswith("blended"))
     assert all(name in blending for name in ("Sq", "Sdq", "Ssk", "Sku"))
 
 
-def test_another_place_is_what_lies_beside_the_centre():
-    """What is cut there is what a map has in its middle that was measured a place further on."""
+def test_the_places_of_a_map_are_non_overlapping_blocks():
+    """The places are the 25 non-overlapping blocks of the map, starting with the central one."""
     heights = rough((600, 500), seed=4)
     grid = contact((120, 80), periodic=(False, False))
-    everywhere = [
+    cuts = [
         prepare_surface(
             measured(heights), grid, conditioning=SurfaceConditioning(form="none"), place=place
         ).surface.heights
         for place in range(count_places(measured(heights), grid))
     ]
-    assert (
-        len(everywhere) == 5 * 5
-    )  # 600/120 along, 500/80 across, an odd number of each about the centre
+    # 600/120 along and 500/80 across, rounded down to odd numbers centred in the map
+    assert len(cuts) == 5 * 5
     blocks = [
         block - block.mean()
         for i in range(5)
         for j in range(5)
         for block in [heights[120 * i : 120 * (i + 1), 50 + 80 * j : 50 + 80 * (j + 1)]]
     ]
-    for place in everywhere:
+    for place in cuts:
         assert min(np.abs(place - block).max() for block in blocks) < 1e-12
-    assert len({place.tobytes() for place in everywhere}) == 25
+    assert len({place.tobytes() for place in cuts}) == 25
     np.testing.assert_array_equal(
-        everywhere[0],
+        cuts[0],
         prepare_surface(
             measured(heights), grid, conditioning=SurfaceConditioning(form="none")
         ).surface.heights,
@@ -321,7 +320,7 @@ def test_another_place_is_what_lies_beside_the_centre():
         prepare_surface(measured(heights), grid, place=25)
 
 
-def test_a_small_map_has_one_place_and_a_profile_those_along_it():
+def test_a_small_map_has_one_place_and_a_profile_several_along_its_length():
     grid = contact((120, 80), periodic=(False, False))
     assert count_places(measured(rough((130, 90))), grid) == 1
     assert count_places(replace(measured(rough((400, 500))), uniform=1), grid) == 3

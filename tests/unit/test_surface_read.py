@@ -35,7 +35,7 @@ def x3p(tmp_path):
     return tmp_path / "map.x3p", heights
 
 
-def test_x_comes_first_missing_is_nan_and_lengths_are_metres(x3p):
+def test_x_is_the_first_axis_missing_cells_are_nan_and_lengths_are_in_metres(x3p):
     path, heights = x3p
     measured = read_surface(path)
     np.testing.assert_allclose(measured.heights, heights, rtol=1e-12)
@@ -45,7 +45,7 @@ def test_x_comes_first_missing_is_nan_and_lengths_are_metres(x3p):
     assert any("not square" in note for note in measured.notes)
 
 
-def test_an_x3p_in_a_folder_of_its_own_is_read_and_noted(x3p, tmp_path):
+def test_an_x3p_with_an_inner_folder_is_read_and_noted(x3p, tmp_path):
     import zipfile
 
     path, heights = x3p
@@ -71,7 +71,7 @@ def test_sdf_gives_the_same_surface_as_x3p(tmp_path):
     assert measured.grid.spacing == pytest.approx((2e-6, 2e-6))
 
 
-def test_a_file_without_units_asks_for_them_and_takes_them(tmp_path):
+def test_a_file_without_units_requires_them_as_arguments(tmp_path):
     path = xyz(tmp_path / "points.txt")
     with pytest.raises(BadInput, match=r"states no units.*lateral_unit"):
         read_surface(path)
@@ -80,12 +80,12 @@ def test_a_file_without_units_asks_for_them_and_takes_them(tmp_path):
     assert measured.heights[7, 3] == pytest.approx(307e-9)
 
 
-def test_units_that_a_file_states_are_not_overridden(x3p):
+def test_units_stated_in_a_file_are_not_overridden(x3p):
     with pytest.raises(BadInput, match="states its own unit"):
         read_surface(x3p[0], unit="um", lateral_unit="um")
 
 
-def test_a_unit_that_is_no_length_is_refused(tmp_path):
+def test_a_unit_other_than_a_length_is_refused(tmp_path):
     with pytest.raises(BadInput, match="'furlong'"):
         read_surface(xyz(tmp_path / "points.txt"), unit="furlong", lateral_unit="um")
 
@@ -98,25 +98,25 @@ def test_an_implausible_pixel_is_noted(tmp_path, unit):
     assert sum("check the lateral unit" in note for note in measured.notes) == 2
 
 
-def refused(path, said):
-    with pytest.raises(UnreadableFile, match=said) as caught:
+def assert_refused(path, message):
+    with pytest.raises(UnreadableFile, match=message) as caught:
         read_surface(path)
-    message = str(caught.value)
-    assert path.name in message
-    assert "\n" not in message
-    assert len(message) < 300
+    text = str(caught.value)
+    assert path.name in text
+    assert "\n" not in text
+    assert len(text) < 300
 
 
-def test_a_missing_file(tmp_path):
-    refused(tmp_path / "nowhere.opd", "does not exist")
+def test_a_missing_file_is_refused(tmp_path):
+    assert_refused(tmp_path / "nowhere.opd", "does not exist")
 
 
-def test_a_folder(tmp_path):
-    refused(tmp_path, "is a folder")
+def test_a_folder_is_refused(tmp_path):
+    assert_refused(tmp_path, "is a folder")
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    ("name", "content", "message"),
     [
         ("empty.opd", b"", "empty"),
         ("text.opd", b"this is not a Wyko file\n" * 40, "another format"),
@@ -127,40 +127,40 @@ def test_a_folder(tmp_path):
         ("cut.xyz", b"0 0 1\n1 0 2\n0 1 3\n1 ", "xyz"),
     ],
 )
-def test_a_file_that_is_not_what_it_says(tmp_path, name, content, said, capfd):
+def test_a_file_with_the_wrong_content_is_refused(tmp_path, name, content, message, capfd):
     path = tmp_path / name
     path.write_bytes(content)
-    refused(path, said)
+    assert_refused(path, message)
     assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("share", [0.01, 0.3, 0.7, 0.99])
-def test_a_truncated_file(x3p, share):
+def test_a_truncated_file_is_refused(x3p, share):
     path, _ = x3p
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
-    refused(path, "x3p")
+    assert_refused(path, "x3p")
 
 
-def test_a_wrong_name_is_told_from_the_right_one(tmp_path):
+def test_a_file_with_the_suffix_of_another_format_is_refused_with_the_right_suffix(tmp_path):
     import sdfio
 
     sdfio.write(tmp_path / "map.opd", hills().T, x_scale=2e-6, y_scale=2e-6)
-    refused(tmp_path / "map.opd", r"looks like sdf; rename it to \.sdf")
+    assert_refused(tmp_path / "map.opd", r"looks like sdf; rename it to \.sdf")
 
 
-def test_nothing_but_missing_cells(tmp_path):
+def test_a_map_without_valid_heights_is_refused(tmp_path):
     import x3pio
 
     x3pio.write(tmp_path / "blind.x3p", np.full((16, 16), np.nan), x_scale=1e-6, y_scale=1e-6)
-    refused(tmp_path / "blind.x3p", "no valid height")
+    assert_refused(tmp_path / "blind.x3p", "no valid height")
 
 
-def test_a_map_of_a_few_points(tmp_path):
+def test_a_map_of_too_few_points_is_refused(tmp_path):
     with pytest.raises(UnreadableFile, match="3 x 4 heights, too few"):
         read_surface(xyz(tmp_path / "few.xyz", cells=(3, 4)), unit="um", lateral_unit="um")
 
 
-def test_a_profile_goes_on_unchanged_along_y(tmp_path):
+def test_a_profile_is_constant_along_y(tmp_path):
     path = tmp_path / "line.hfm"
     path.write_text("".join(f"{0.0005 * i:.4f} {np.sin(i):.5f}\n" for i in range(200)))
     measured = read_surface(path, unit="um", lateral_unit="mm")
@@ -171,12 +171,12 @@ def test_a_profile_goes_on_unchanged_along_y(tmp_path):
     )
 
 
-def test_a_row_of_an_x3p_is_a_profile_too(tmp_path):
+def test_a_single_row_is_read_as_a_profile(tmp_path):
     import sdfio
 
     sdfio.write(tmp_path / "row.sdf", hills((40, 1)), x_scale=2e-6, y_scale=2e-6)
     with pytest.raises(UnreadableFile, match="too few"):
-        read_surface(tmp_path / "row.sdf")  # 1 x 40: along y, where a profile is not looked for
+        read_surface(tmp_path / "row.sdf")  # 1 x 40: a profile must lie along x
     sdfio.write(tmp_path / "row.sdf", hills((40, 1)).T, x_scale=2e-6, y_scale=2e-6)
     measured = read_surface(tmp_path / "row.sdf")
     np.testing.assert_allclose(measured.profile, hills((40, 1))[:, 0], atol=1e-15)
@@ -196,7 +196,7 @@ TABLES = {
 
 
 @pytest.mark.parametrize("table", TABLES)
-def test_columns_are_read_whatever_separates_them(tmp_path, table):
+def test_columns_are_read_with_any_separator(tmp_path, table):
     name, text = TABLES[table]
     (tmp_path / name).write_text(text)
     measured = read_surface(tmp_path / name, unit="um", lateral_unit="mm")
@@ -204,7 +204,7 @@ def test_columns_are_read_whatever_separates_them(tmp_path, table):
     np.testing.assert_allclose(measured.profile, 1e-6 * (10.0 * np.arange(12) + 0.25), atol=1e-12)
 
 
-def test_points_that_are_not_evenly_spaced_are_interpolated_and_noted(tmp_path):
+def test_unevenly_spaced_points_are_interpolated_and_noted(tmp_path):
     x = np.linspace(0.0, 1.0, 50) ** 1.2
     (tmp_path / "line.csv").write_text("".join(f"{a:.6f};{2.0 * a:.6f}\n" for a in x))
     measured = read_surface(tmp_path / "line.csv", unit="um", lateral_unit="mm")
@@ -213,13 +213,15 @@ def test_points_that_are_not_evenly_spaced_are_interpolated_and_noted(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["bare.txt", "bare.csv", "bare.npy"])
-def test_a_matrix_of_bare_heights_needs_its_pixel(tmp_path, name):
+def test_a_matrix_of_heights_requires_the_pixel_size(tmp_path, name):
     heights = hills((12, 9)) * 1e6
     if name == "bare.npy":
         np.save(tmp_path / name, heights)
     else:
         separator = "," if name == "bare.csv" else " "
-        rows = heights.T[::-1]  # a file's first line is its top, an array's first column its bottom
+        rows = heights.T[
+            ::-1
+        ]  # the first line of a file is the top, the first column of an array the bottom
         (tmp_path / name).write_text(
             "\n".join(separator.join(f"{z:.9f}" for z in row) for row in rows)
         )
@@ -232,21 +234,21 @@ def test_a_matrix_of_bare_heights_needs_its_pixel(tmp_path, name):
     np.testing.assert_allclose(measured.heights, hills((12, 9)), atol=1e-14)
 
 
-def test_a_pixel_that_the_file_states_is_not_overridden(x3p):
+def test_a_pixel_size_stated_in_the_file_is_not_overridden(x3p):
     with pytest.raises(BadInput, match="states its own pixel"):
         read_surface(x3p[0], pixel=1e-6)
 
 
-def test_heights_as_steep_as_walls_are_questioned(tmp_path):
+def test_implausibly_steep_heights_are_noted(tmp_path):
     measured = read_surface(xyz(tmp_path / "points.txt"), unit="mm", lateral_unit="um")
     assert any("check the units of both" in note for note in measured.notes)
 
 
-def test_the_library_stays_quiet_about_mpi():
+def test_the_library_is_imported_without_a_message_about_mpi():
     assert surface_topography().__name__ == "SurfaceTopography"
 
 
-def test_what_a_reader_logs_does_not_reach_the_terminal(caplog):
+def test_log_messages_of_a_reader_do_not_reach_the_terminal(caplog):
     with suppress_output() as notes:
         logging.getLogger("reader").error("could not reshape")
         warnings.warn("odd header", UserWarning, stacklevel=1)

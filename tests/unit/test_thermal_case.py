@@ -14,14 +14,14 @@ from asperity.results import load_run, solve_case
 CASE = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
 
 
-def test_left_out_means_the_papers_friction_and_steel():
+def test_default_friction_and_solids_are_those_of_the_paper():
     case = load_case(CASE.text.replace("boundary_friction = 0.15", ""))
     assert case.boundary_friction == 0.15
     assert case.thermal == Thermal()
     assert case.lubricant.friction == BairWiner()
 
 
-def test_what_is_said_arrives_in_si_and_comes_back():
+def test_thermal_keys_are_converted_to_si_and_restated():
     case = CASE.with_overrides(
         {
             "thermal.ambient": "60 degC",
@@ -51,7 +51,7 @@ def test_what_is_said_arrives_in_si_and_comes_back():
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "says"),
+    ("key", "value", "message"),
     [
         ("thermal.ambient", 60, 'must be a temperature such as "40 degC", got the bare number 60'),
         (
@@ -87,19 +87,19 @@ def test_what_is_said_arrives_in_si_and_comes_back():
         ),
     ],
 )
-def test_a_mistake_is_one_sentence(key, value, says):
-    with pytest.raises(BadInput, match=says):
+def test_invalid_values_are_refused_in_one_sentence(key, value, message):
+    with pytest.raises(BadInput, match=message):
         CASE.with_overrides({key: value})
 
 
 @pytest.mark.parametrize("text", ["60 °C", "60°C", "60 degC"])
-def test_degrees_celsius_are_read_as_people_write_them(text):
+def test_degrees_celsius_are_read_in_common_spellings(text):
     case = CASE.with_overrides({"thermal.ambient": text})
     assert case.thermal.ambient == 333.15
     assert load_case(case.text) == case
 
 
-def test_a_run_with_feedback_is_warmer_oil_and_comes_back_from_disk(tmp_path):
+def test_thermal_feedback_lowers_the_viscosity_and_survives_saving_and_loading(tmp_path):
     small = {"grid.cells": [64, 64], "surface.correlation_length": "30 um", "vibration": "none"}
     case = CASE.with_overrides(
         small | {"lubricant.friction": {"law": "ree-eyring", "tau0": "5 MPa"}}
@@ -108,8 +108,8 @@ def test_a_run_with_feedback_is_warmer_oil_and_comes_back_from_disk(tmp_path):
     warm = solve_case(case.with_overrides({"thermal.feedback": "true"}))
     assert cold.solution.viscosity_factor is None
     assert 0.2 < warm.solution.viscosity_factor.min() < 0.95
-    read = load_run(warm.save(tmp_path / "warm.nc"))
-    np.testing.assert_array_equal(read.solution.viscosity_factor, warm.solution.viscosity_factor)
-    assert read.case == warm.case
-    assert read.solution.lubricant.friction == EyringShear(5e6)
-    assert read.state == warm.state
+    loaded = load_run(warm.save(tmp_path / "warm.nc"))
+    np.testing.assert_array_equal(loaded.solution.viscosity_factor, warm.solution.viscosity_factor)
+    assert loaded.case == warm.case
+    assert loaded.solution.lubricant.friction == EyringShear(5e6)
+    assert loaded.state == warm.state

@@ -1,4 +1,4 @@
-"""Rates from columns of times that are printed with few digits, and the gaps in them."""
+"""Sampling rates and gaps from columns of times with few digits."""
 
 from functools import partial
 
@@ -10,42 +10,42 @@ from asperity.recording import open_recording
 from asperity.recording import text as text_reader
 from asperity.recording.timing import GapFiller, fit_clock, rate_from_times
 
-FAULT_RATE_KEYS = (2560, 8192, 10_240, 12_800, 20_000, 25_600, 44_100, 48_000, 51_200)
+RATES = (2560, 8192, 10_240, 12_800, 20_000, 25_600, 44_100, 48_000, 51_200)
 
 
 @pytest.mark.parametrize("digits", [5, 6, 9])
-@pytest.mark.parametrize("rate", FAULT_RATE_KEYS)
-def test_the_whole_slope_tells_the_rate(rate, digits):
+@pytest.mark.parametrize("rate", RATES)
+def test_the_rate_is_estimated_from_the_slope_of_all_times(rate, digits):
     times = np.round(3.0 + np.arange(rate) / rate, digits)
-    whole = rate_from_times("t", "s", times)
-    assert whole["rate_hz"] == rate
-    assert whole["rate_doubt"] < 2.5e-5
+    complete = rate_from_times("t", "s", times)
+    assert complete["rate_hz"] == rate
+    assert complete["rate_doubt"] < 2.5e-5
     assert rate_from_times("t", "s", np.delete(times, slice(1000, 1400)))["rate_hz"] == rate
 
 
-def test_a_rate_that_no_converter_has_is_known_as_well_as_its_times_say():
+def test_an_unusual_rate_is_estimated_to_the_precision_of_its_times():
     times = np.round(np.arange(6000) / 11_937.4, 5)  # half a second
-    found = rate_from_times("t", "s", times)
-    assert abs(found["rate_hz"] / 11_937.4 - 1.0) < found["rate_doubt"] < 4e-5
+    estimate = rate_from_times("t", "s", times)
+    assert abs(estimate["rate_hz"] / 11_937.4 - 1.0) < estimate["rate_doubt"] < 4e-5
 
 
-def test_gaps_are_found_behind_coarse_times():
+def test_gaps_are_detected_in_coarse_times():
     times = np.round(np.arange(44_100) / 44_100.0, 5)
-    kept = np.delete(np.arange(44_100), np.r_[500:501, 20_000:23_000])
-    filling = GapFiller(fit_clock(times[kept]))
-    whole = np.concatenate(
-        [filling.fill(times[part], part.astype(float)) for part in np.array_split(kept, 7)]
+    present = np.delete(np.arange(44_100), np.r_[500:501, 20_000:23_000])
+    filler = GapFiller(fit_clock(times[present]))
+    complete = np.concatenate(
+        [filler.fill(times[part], part.astype(float)) for part in np.array_split(present, 7)]
     )
-    assert whole.size == 44_100
-    assert np.flatnonzero(np.isnan(whole)).tolist() == [500, *range(20_000, 23_000)]
-    assert np.array_equal(whole[~np.isnan(whole)], kept)
-    assert filling.note == "2 gaps in its times: 3001 samples are missing"
-    full = GapFiller(fit_clock(times))
-    assert full.fill(times, times).size == 44_100
-    assert full.note == ""
+    assert complete.size == 44_100
+    assert np.flatnonzero(np.isnan(complete)).tolist() == [500, *range(20_000, 23_000)]
+    assert np.array_equal(complete[~np.isnan(complete)], present)
+    assert filler.note == "2 gaps in its times: 3001 samples are missing"
+    without_gaps = GapFiller(fit_clock(times))
+    assert without_gaps.fill(times, times).size == 44_100
+    assert without_gaps.note == ""
 
 
-def test_times_with_next_to_nothing_between_gaps_are_refused():
+def test_times_with_a_dominant_gap_are_refused():
     times = np.concatenate([np.arange(100.0), 1e9 + np.arange(100.0)])
     with pytest.raises(UnreadableFile, match="split the recording"):
         GapFiller(fit_clock(np.arange(200.0))).fill(times, times)
@@ -79,13 +79,13 @@ def parquet(path, times, values, dates=False):
     "write", [csv, parquet, partial(parquet, dates=True)], ids=["csv", "parquet", "dates"]
 )
 @pytest.mark.parametrize("large", [False, True])
-def test_a_gap_is_a_gap_in_every_file_with_times(tmp_path, monkeypatch, write, large):
+def test_a_gap_is_detected_in_every_format_with_times(tmp_path, monkeypatch, write, large):
     if large:
         monkeypatch.setattr(text_reader, "_LARGE", 1000)
         monkeypatch.setattr(text_reader, "_CHUNK", 40_000)
-    whole = rows(12_800, None)
+    complete = rows(12_800, None)
     holed = rows(12_800, (9000, 9400))
-    for name, (times, values), missing in (("a", whole, 0), ("b", holed, 400)):
+    for name, (times, values), missing in (("a", complete, 0), ("b", holed, 400)):
         opened = open_recording(write(tmp_path / f"{name}.dat", times, values))
         assert opened.rate_hz == 12_800
         read = opened.read()
@@ -97,7 +97,7 @@ def test_a_gap_is_a_gap_in_every_file_with_times(tmp_path, monkeypatch, write, l
         ) == (missing > 0)
 
 
-def test_what_a_rate_is_in_doubt_by_crf_is_too():
+def test_the_uncertainty_of_the_rate_is_propagated_to_crf():
     from dataclasses import replace
 
     from asperity.monitoring.judgement import judge
@@ -106,18 +106,20 @@ def test_what_a_rate_is_in_doubt_by_crf_is_too():
     from asperity.paper import RigSettings, simulate_rig
 
     rig = simulate_rig(RigSettings(samples=6, repeats=1, duration_s=10.0))
-    sure = [
-        Reading(file=f"{k}", spectrum=one.spectrum(20_000), rate_hz=20e3, unit="m/s^2")
-        for k, one in enumerate(rig.recordings)
+    exact = [
+        Reading(file=f"{k}", spectrum=recording.spectrum(20_000), rate_hz=20e3, unit="m/s^2")
+        for k, recording in enumerate(rig.recordings)
     ]
     target = search_target(None, rig.band_hz)
-    known, doubted = (
-        judge([replace(one, rate_doubt=doubt) for one in sure], target).recordings[0].resonance
+    known, uncertain = (
+        judge([replace(reading, rate_doubt=doubt) for reading in exact], target)
+        .recordings[0]
+        .resonance
         for doubt in (0.0, 0.01)
     )
     assert known.found
-    assert doubted.crf_std == pytest.approx(np.hypot(known.crf_std, 0.01 * known.crf_hz))
-    assert doubted.crf_shared_std == pytest.approx(
+    assert uncertain.crf_std == pytest.approx(np.hypot(known.crf_std, 0.01 * known.crf_hz))
+    assert uncertain.crf_shared_std == pytest.approx(
         np.hypot(known.crf_shared_std, 0.01 * known.crf_hz)
     )
     assert known.crf_shared_std <= known.crf_std

@@ -1,4 +1,4 @@
-"""Titles of figures are read whole: none leaves its figure, and none runs into the next panel's."""
+"""Titles of figures are readable: each lies inside its figure and overlaps no other title."""
 
 from itertools import pairwise
 
@@ -13,7 +13,7 @@ from asperity.results import FrictionCurve, FrictionPoint
 
 
 def boxes(figure):
-    """Where the titles are, from left to right."""
+    """Bounding boxes of the titles, from left to right."""
     figure.draw_without_rendering()
     titles = [
         title
@@ -25,14 +25,14 @@ def boxes(figure):
 
 
 def all_readable(figure):
-    found = boxes(figure)
-    assert found
+    extents = boxes(figure)
+    assert extents
     inside = all(
         box.x0 >= 0.0 and box.x1 <= figure.bbox.width and box.y1 <= figure.bbox.height
-        for box in found
+        for box in extents
     )
     return inside and all(
-        left.x1 <= right.x0 or left.y0 >= right.y1 for left, right in pairwise(found)
+        left.x1 <= right.x0 or left.y0 >= right.y1 for left, right in pairwise(extents)
     )
 
 
@@ -48,9 +48,9 @@ def curve():
     )
 
 
-def test_both_titles_of_a_friction_curve_are_read_whole(curve, tmp_path):
+def test_both_titles_of_a_friction_curve_are_readable(curve, tmp_path):
     figure = friction_figure([curve])
-    assert not all_readable(figure)  # as they were written
+    assert not all_readable(figure)  # before `write_figure` fits them
     write_figure(figure, tmp_path / "stribeck.png")
     assert all_readable(figure)
     (first, second) = (axes._left_title.get_text() for axes in figure.axes)
@@ -62,17 +62,17 @@ def test_both_titles_of_a_friction_curve_are_read_whole(curve, tmp_path):
 @pytest.mark.parametrize(
     "title", ["Film thickness", "Shear stress (square-root scale), friction 0.0394"]
 )
-def test_the_title_of_a_map_is_read_whole_however_narrow_the_map(extent, title):
+def test_the_title_of_a_narrow_map_is_readable(extent, title):
     with ON_PAGE.drawing():
         figure, axes = map_figure(ON_PAGE, extent)
         axes.imshow(np.zeros((2, 2)), extent=(0.0, extent[0], 0.0, extent[1]), aspect="equal")
         axes.set_title(title)
     text = svg(figure)
     assert all_readable(figure)
-    assert title in text  # in one line: there is no room for two above a map
+    assert title in text  # in one line, as there is no room for two above a map
 
 
-def test_a_title_with_room_stays_as_it_was():
+def test_a_title_that_fits_is_unchanged():
     with ON_PAGE.drawing():
         figure, axes = ON_PAGE.panel(3.0)
         axes.set_title("Bearing curve")
@@ -81,7 +81,7 @@ def test_a_title_with_room_stays_as_it_was():
     assert boxes(figure)[0].bounds == pytest.approx(before)
 
 
-def test_a_title_too_long_for_any_size_is_broken_into_lines():
+def test_a_title_too_long_for_any_font_size_is_broken_into_lines():
     with ON_PAGE.drawing():
         figure = Figure(figsize=(7.0, 3.5), layout="constrained")
         for axes in figure.subplots(1, 2):

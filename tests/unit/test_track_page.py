@@ -1,5 +1,5 @@
-"""What a track's page says to who must act: what changed, since when, how sure, what next; never
-that it is certain.
+"""Page of a track: it states the finding, its start, the confidence and the action, and reports no
+result as certain.
 """
 
 import re
@@ -19,7 +19,7 @@ BAND = (2000.0, 4000.0)
 
 @pytest.fixture(scope="module")
 def failing(tmp_path_factory):
-    """Snapshots of a machine whose level rises twenty times, an hour apart."""
+    """Hourly snapshots of a machine whose level rises to 20 times its baseline."""
     folder = tmp_path_factory.mktemp("in")
     levels = [*np.ones(12), *np.exp(np.log(20.0) * np.arange(24) / 23)]
     for number, level in enumerate(levels):
@@ -29,35 +29,44 @@ def failing(tmp_path_factory):
     return track_recordings([folder], TrackSettings(band_hz=BAND))
 
 
-def acted(track):
-    """The block for who must act, by its headings."""
+def action_block(track):
+    """Entries of the page's block of actions by their headings."""
     html = render_track_page(track)
     block = html.partition('<dl class="actions">')[2].partition("</dl>")[0]
     return dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", block))
 
 
-def test_who_must_act_reads_what_since_when_how_sure_and_what_next(failing):
-    said = acted(failing)
-    assert list(said) == ["Finding", "Since", "Last recording", "Severity", "Confidence", "Action"]
+def test_the_action_block_states_finding_start_confidence_and_action(failing):
+    entries = action_block(failing)
+    assert list(entries) == [
+        "Finding",
+        "Since",
+        "Last recording",
+        "Severity",
+        "Confidence",
+        "Action",
+    ]
     assert re.fullmatch(
-        r"The level \(rms\) rose to [\d.]+ times its baseline since [\d.]+ h\.", said["Finding"]
+        r"The level \(rms\) rose to [\d.]+ times its baseline since [\d.]+ h\.",
+        entries["Finding"],
     )
     first = failing.recordings[failing.alarm.since]
-    assert first.reading.started.replace("T", " ") in said["Since"]
-    assert said["Last recording"].endswith("2024-01-02 11:00:00")
-    assert "velocity not determined" in said["Severity"].lower()
-    assert said["Confidence"] == "False-alarm rate: one in 1000 recordings."
-    assert said["Action"].startswith("Find the source of the increase")
+    assert first.reading.started.replace("T", " ") in entries["Since"]
+    assert entries["Last recording"].endswith("2024-01-02 11:00:00")
+    assert "velocity not determined" in entries["Severity"].lower()
+    assert entries["Confidence"] == "False-alarm rate: one in 1000 recordings."
+    assert entries["Action"].startswith("Find the source of the increase")
 
 
-def test_levels_are_drawn_over_their_first_beside_the_least_that_alarms(failing):
-    struck = [
+def test_levels_are_drawn_relative_to_the_first_with_the_alarm_threshold(failing):
+    with_fault = [
         replace(
-            one, reading=replace(one.reading, depths={"BPFO": 0.1 * 1.1**number, "BSF": np.nan})
+            recording,
+            reading=replace(recording.reading, depths={"BPFO": 0.1 * 1.1**number, "BSF": np.nan}),
         )
-        for number, one in enumerate(failing.recordings)
+        for number, recording in enumerate(failing.recordings)
     ]
-    figure = levels(replace(failing, recordings=tuple(struck))).draw(ON_PAGE)
+    figure = levels(replace(failing, recordings=tuple(with_fault))).draw(ON_PAGE)
     drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in figure.axes[0].get_lines()}
     assert set(drawn) == {"rms", "kurtosis", "envelope BPFO", "alarm threshold"}
     assert drawn["rms"][-1] == pytest.approx(20.0, rel=0.1)
@@ -68,17 +77,19 @@ def test_levels_are_drawn_over_their_first_beside_the_least_that_alarms(failing)
     assert levels(replace(failing, recordings=failing.recordings[:1])) is None
 
 
-def test_a_crf_that_conditions_explain_is_drawn_without_them(failing):
-    """Where it would be at the first load, speed and temperature, beside where it is."""
+def test_a_crf_corrected_to_reference_conditions_is_drawn(failing):
+    """The page shows CRF at the first load, speed and temperature beside the measured CRF."""
     moved = [
         replace(
-            one,
-            resonance=replace(one.resonance, found=True, crf_hz=3e3 + 10.0 * number, crf_std=5.0),
+            recording,
+            resonance=replace(
+                recording.resonance, found=True, crf_hz=3e3 + 10.0 * number, crf_std=5.0
+            ),
         )
-        for number, one in enumerate(failing.recordings)
+        for number, recording in enumerate(failing.recordings)
     ]
-    resample_to_constant_speed = [replace(one, crf_reference_hz=3e3) for one in moved]
-    track = replace(failing, recordings=tuple(resample_to_constant_speed))
+    corrected = [replace(recording, crf_reference_hz=3e3) for recording in moved]
+    track = replace(failing, recordings=tuple(corrected))
     (shown,) = (
         line
         for line in trend(track).draw(ON_PAGE).axes[0].get_lines()
@@ -88,23 +99,25 @@ def test_a_crf_that_conditions_explain_is_drawn_without_them(failing):
 
 
 @pytest.mark.parametrize("state", [state for state in ALARM_STATES if state != "alarm"])
-def test_every_state_has_something_to_do(failing, state):
-    said = acted(replace(failing, alarm=replace(failing.alarm, state=state, raised_by="")))
-    assert said["Action"] == ACTIONS[state].replace("'", "&#39;")
+def test_every_state_has_an_action(failing, state):
+    entries = action_block(
+        replace(failing, alarm=replace(failing.alarm, state=state, raised_by=""))
+    )
+    assert entries["Action"] == ACTIONS[state].replace("'", "&#39;")
 
 
 @pytest.mark.parametrize(
-    ("probability", "said"),
+    ("probability", "shown_text"),
     [(1.0, "above 0.99"), (0.997, "above 0.99"), (0.42, "0.42"), (0.0, "below 0.01")],
 )
-def test_a_probability_is_never_certain(failing, probability, said):
+def test_a_probability_is_never_shown_as_certain(failing, probability, shown_text):
     *others, last = failing.recordings
-    found = replace(
+    detected = replace(
         last,
         resonance=replace(last.resonance, found=True, crf_hz=3e3),
         severe_probability=probability,
     )
-    html = render_track_page(replace(failing, recordings=(*others, found)))
+    html = render_track_page(replace(failing, recordings=(*others, detected)))
     tile = re.search(r"Severe, last recording.*?</div>", html, re.S)[0]
-    assert said in re.sub("<[^>]*>", "", tile)
+    assert shown_text in re.sub("<[^>]*>", "", tile)
     assert not re.search(r"\b1\.00\b|\b100 %", html)

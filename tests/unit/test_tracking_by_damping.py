@@ -1,5 +1,5 @@
-"""A series whose line narrows and keeps its frequency: what `track` reads from CRF, from damping
-and from both.
+"""Stages that `track` detects from CRF, damping and both in a series whose line narrows at constant
+frequency.
 """
 
 import json
@@ -20,12 +20,12 @@ RATIO = np.exp(np.interp(PLACES, [1.0, 6.5, 12.0], np.log([0.04, 0.014, 0.0132])
 
 
 def record(path, seed, ratio, seconds=SECONDS):
-    """White noise through an oscillator at F0, in a little more noise."""
+    """Write white noise filtered by an oscillator at F0, plus additive noise."""
     rng = np.random.default_rng(seed)
-    turn, shrink = 2.0 * np.pi * F0 / RATE, np.exp(-2.0 * np.pi * ratio * F0 / RATE)
+    angle, decay = 2.0 * np.pi * F0 / RATE, np.exp(-2.0 * np.pi * ratio * F0 / RATE)
     noise = rng.standard_normal((2, round(seconds * RATE)))
     ringing = lfilter(
-        [1.0], [1.0, -2.0 * shrink * np.cos(turn * np.sqrt(1 - ratio**2)), shrink**2], noise[0]
+        [1.0], [1.0, -2.0 * decay * np.cos(angle * np.sqrt(1 - ratio**2)), decay**2], noise[0]
     )
     np.savez(path, acc=ringing + noise[1], fs=RATE, unit="m/s^2")
     return path
@@ -46,28 +46,28 @@ def track(series):
     )
 
 
-def test_crf_sees_nothing_where_damping_sees_the_stage(track):
+def test_damping_detects_a_stage_that_crf_does_not_show(track):
     by = track.stages_by
     assert by["crf"].kind == "no change"
     assert (by["damping"].kind, by["both"].kind) == ("severe", "severe")
     low, high = by["damping"].interval
     assert low < 6.5 < high < 8.0
     assert "in the damping alone" in by["both"].verdict
-    for one, ratio in zip(track.recordings, RATIO, strict=True):
-        damping, std = one.damping
+    for recording, ratio in zip(track.recordings, RATIO, strict=True):
+        damping, std = recording.damping
         assert damping == pytest.approx(ratio, abs=4.0 * std)
 
 
-def test_what_decides_has_labels_and_alarm(track, series):
+def test_the_deciding_indicator_sets_labels_and_alarm(track, series):
     assert track.stages is track.stages_by["damping"]
     assert track.recordings[-1].label == "severe"
     assert track.alarm.state in ("alert", "alarm")
-    plain = track_recordings(
+    by_crf = track_recordings(
         series, TrackSettings(band_hz=(2e3, 4e3), method="likelihood"), x=PLACES
     )
-    assert plain.stages is plain.stages_by["crf"]
-    assert plain.alarm.state == "none"
-    assert {one.label for one in plain.recordings} == {"none"}
+    assert by_crf.stages is by_crf.stages_by["crf"]
+    assert by_crf.alarm.state == "none"
+    assert {recording.label for recording in by_crf.recordings} == {"none"}
     rows = dict(track.stage_rows())
     assert set(rows) == {
         "stage by CRF",
@@ -76,48 +76,50 @@ def test_what_decides_has_labels_and_alarm(track, series):
     }
 
 
-def test_json_has_every_way_and_which_decides(track):
-    said = json.loads(json.dumps(track.scalars()))
-    assert said["stages"]["source"] == "damping"
-    assert list(said["stages_by"]) == ["crf", "damping", "both"]
-    by_damping = said["stages_by"]["damping"]
-    assert by_damping["split"] == said["stages"]["split"]
+def test_json_lists_all_indicators_and_the_deciding_one(track):
+    output = json.loads(json.dumps(track.scalars()))
+    assert output["stages"]["source"] == "damping"
+    assert list(output["stages_by"]) == ["crf", "damping", "both"]
+    by_damping = output["stages_by"]["damping"]
+    assert by_damping["split"] == output["stages"]["split"]
     assert by_damping["damping"][0] > 2.0 * by_damping["damping"][1] > by_damping["damping"][2]
     assert by_damping["slopes"] == [None, None]
-    assert said["recordings"][0]["damping_reason"] == ""
+    assert output["recordings"][0]["damping_reason"] == ""
     attribute = json.loads(track.to_dataset().attrs["track"])
     assert attribute["stages_by"]["both"]["kind"] == "severe"
 
 
-def test_the_page_shows_each_way_and_the_damping_with_its_break(track):
+def test_the_page_shows_all_indicators_and_the_break_of_damping(track):
     page = render_track_page(track)
     assert "Damping (decides)" in page
     assert "From damping alone: Severe wear from" in page
     assert "Damping decides stage and alarm" in page
 
 
-def test_the_trend_has_a_drawing_of_its_own_for_telephones(track):
-    found = re.search(
+def test_the_trend_has_a_separate_drawing_for_narrow_screens(track):
+    match = re.search(
         r'<source media="([^"]*)" srcset="([^"]*)" width="(\d+)" height="\d+"><img ',
         render_track_page(track),
     )
-    assert found[1] == "(max-width: 480px)"
-    assert " " not in found[2]  # which ends an address in a srcset
-    assert unquote(found[2]).startswith("data:image/svg+xml,<svg ")
-    assert int(found[3]) < 480  # of a type that is drawn at its size, nearly
+    assert match[1] == "(max-width: 480px)"
+    assert " " not in match[2]  # a space ends an address in a srcset
+    assert unquote(match[2]).startswith("data:image/svg+xml,<svg ")
+    assert int(match[3]) < 480  # drawn at nearly its own size, so that the text stays readable
 
 
-def test_a_method_without_a_width_determines_no_damping(series):
+def test_a_method_that_fits_no_width_determines_no_damping(series):
     track = track_recordings(
         series, TrackSettings(band_hz=(2e3, 4e3), method="peak", stages_from="both"), x=PLACES
     )
-    assert {one.damping_reason for one in track.recordings} == {"the method peak fits no width"}
+    assert {recording.damping_reason for recording in track.recordings} == {
+        "the method peak fits no width"
+    }
     assert track.stages.kind == "too few"
     assert track.verdict().startswith(
         "Cannot tell: no deciding indicator found in the last 3 recordings"
     )
     assert "Too few points: " in track.verdict()
-    assert np.isnan([one.severe_probability for one in track.recordings]).all()
+    assert np.isnan([recording.severe_probability for recording in track.recordings]).all()
     assert track.alarm.state == "cannot-tell"
     assert any(
         "not determined for 12 of 12 resonances: the method peak" in note for note in track.notes
@@ -128,20 +130,20 @@ def test_a_method_without_a_width_determines_no_damping(series):
 
 
 @pytest.mark.parametrize(
-    ("ratio", "said"),
+    ("ratio", "reason"),
     [
         (0.003, "less than 4 times the spectrum's resolution of 6.0 Hz"),
         (0.0005, "of the line was removed as tones"),
     ],
 )
-def test_a_line_as_narrow_as_the_spectrum_is_not_taken_for_damping(tmp_path, ratio, said):
+def test_a_line_narrower_than_the_resolution_gives_no_damping(tmp_path, ratio, reason):
     path = record(tmp_path / "narrow.npz", 1, ratio, seconds=2.0)  # 18 and 3 Hz wide
-    one = track_recordings(
+    recording = track_recordings(
         [path], TrackSettings(band_hz=(2e3, 4e3), method="likelihood")
     ).recordings[0]
-    assert one.resonance.found
-    assert said in one.damping_reason
-    assert one.row()["damping_ratio"] is None
+    assert recording.resonance.found
+    assert reason in recording.damping_reason
+    assert recording.row()["damping_ratio"] is None
 
 
 def test_an_unknown_source_is_refused(series):

@@ -1,4 +1,4 @@
-"""Fields between grids: means are kept downwards, straight lines upwards."""
+"""Transfer between grids: averages preserve means, interpolation preserves linear fields."""
 
 import numpy as np
 import pytest
@@ -13,43 +13,43 @@ def centres(n):
 @pytest.mark.parametrize(
     "cells", [((8, 6), (4, 3)), ((9, 7), (5, 4)), ((257, 1), (129, 1)), ((6, 5), (6, 3))]
 )
-def test_averages_keep_the_mean_and_straight_lines(cells):
+def test_averaging_preserves_the_mean_and_linear_fields(cells):
     fine, coarse = cells
     field = np.random.default_rng(1).standard_normal(fine)
     assert average(field, coarse).shape == coarse
     assert average(field, coarse).mean() == pytest.approx(field.mean(), rel=1e-12)
     line = np.broadcast_to(centres(fine[0])[:, None], fine)
-    if fine[0] % coarse[0] == 0:  # cells that straddle an edge are steps, not slopes
+    if fine[0] % coarse[0] == 0:  # a cell that straddles an edge breaks the slope
         np.testing.assert_allclose(
             average(line, coarse), np.broadcast_to(centres(coarse[0])[:, None], coarse)
         )
 
 
-def test_two_by_two_cells_make_one():
+def test_two_by_two_cells_are_averaged():
     field = np.arange(24.0).reshape(4, 6)
     np.testing.assert_allclose(average(field, (2, 3)), field.reshape(2, 2, 3, 2).mean(axis=(1, 3)))
 
 
 @pytest.mark.parametrize("cells", [((8, 6), (16, 12)), ((9, 5), (17, 9)), ((129, 1), (257, 1))])
-def test_cubics_keep_cubics_and_what_goes_round(cells):
+def test_cubic_interpolation_preserves_cubics_and_periodic_fields(cells):
     coarse, fine = cells
-    x, found = (
+    x, interpolated = (
         centres(fine[0]),
         interpolate(centres(coarse[0])[:, None] ** 3 * np.ones(coarse), fine, cubic=True),
     )
     inside = (x > centres(coarse[0])[1]) & (x < centres(coarse[0])[-2])
     np.testing.assert_allclose(
-        found[inside], (x**3)[inside, None] * np.ones(fine)[inside], atol=1e-12
+        interpolated[inside], (x**3)[inside, None] * np.ones(fine)[inside], atol=1e-12
     )
     waves = np.broadcast_to(np.cos(2.0 * np.pi * centres(64)), (4, 64))
-    around = interpolate(waves, (4, 128), cubic=True)
+    periodic = interpolate(waves, (4, 128), cubic=True)
     np.testing.assert_allclose(
-        around, np.broadcast_to(np.cos(2.0 * np.pi * centres(128)), (4, 128)), atol=1e-5
+        periodic, np.broadcast_to(np.cos(2.0 * np.pi * centres(128)), (4, 128)), atol=1e-5
     )
 
 
 @pytest.mark.parametrize("cells", [((4, 3), (8, 6)), ((5, 4), (9, 7)), ((129, 1), (257, 1))])
-def test_interpolation_keeps_straight_lines_and_what_goes_round(cells):
+def test_linear_interpolation_preserves_linear_and_periodic_fields(cells):
     coarse, fine = cells
     line = interpolate(np.broadcast_to(centres(coarse[0])[:, None], coarse), fine)
     inside = (centres(fine[0]) > centres(coarse[0])[0]) & (
@@ -62,5 +62,7 @@ def test_interpolation_keeps_straight_lines_and_what_goes_round(cells):
     shifted = np.random.default_rng(2).standard_normal(coarse)
     if fine[1] % coarse[1] == 0:
         step = fine[1] // coarse[1]
-        turned = interpolate(np.roll(shifted, 1, axis=1), fine)
-        np.testing.assert_allclose(turned, np.roll(interpolate(shifted, fine), step, axis=1))
+        shifted_result = interpolate(np.roll(shifted, 1, axis=1), fine)
+        np.testing.assert_allclose(
+            shifted_result, np.roll(interpolate(shifted, fine), step, axis=1)
+        )

@@ -17,14 +17,14 @@ CONTACT = papers_contact(200.0)
 
 
 @pytest.fixture(scope="module")
-def heard():
+def vibration():
     return contact_vibration(dry_full_load(CONTACT, 2e-6), CONTACT, PAPER)
 
 
-def test_fig_3_shows_the_noise_the_profile_was_filtered_from(heard):
+def test_fig_3_shows_the_noise_before_filtering(vibration):
     from scipy.signal import butter, lfilter
 
-    figure = excitation_figure(heard, PAPER)
+    figure = excitation_figure(vibration, PAPER)
     noise, profile = (
         axes.get_lines()[0].get_ydata() for axes in (figure.get_axes()[0], figure.get_axes()[2])
     )
@@ -33,10 +33,10 @@ def test_fig_3_shows_the_noise_the_profile_was_filtered_from(heard):
     assert [axes.get_xlabel() for axes in figure.get_axes()] == ["time [s]", "frequency [Hz]"] * 2
 
 
-def test_fig_4_marks_the_resonance_that_was_found(heard):
-    marked = response_figure(heard, PAPER).get_axes()[3].get_lines()[2]
-    assert marked.get_xdata()[0] == heard.resonance.crf_hz
-    assert marked.get_ydata()[0] == heard.resonance.crfa
+def test_fig_4_marks_the_detected_resonance(vibration):
+    marked = response_figure(vibration, PAPER).get_axes()[3].get_lines()[2]
+    assert marked.get_xdata()[0] == vibration.resonance.crf_hz
+    assert marked.get_ydata()[0] == vibration.resonance.crfa
 
 
 def test_the_load_trend_vanishes_with_fine_sampling():
@@ -49,10 +49,10 @@ def test_the_load_trend_vanishes_with_fine_sampling():
         "200 kHz",
         "continuous",
     ]
-    falls = [values[0] / values[-1] for values in drawn.values()]
-    assert falls[0] > 5.0
-    assert falls == sorted(falls, reverse=True)
-    assert falls[-1] == pytest.approx(1.0, abs=1e-6)
+    ratios = [values[0] / values[-1] for values in drawn.values()]
+    assert ratios[0] > 5.0
+    assert ratios == sorted(ratios, reverse=True)
+    assert ratios[-1] == pytest.approx(1.0, abs=1e-6)
 
 
 def test_table_1_is_drawn_with_its_printed_values(tmp_path):
@@ -79,7 +79,7 @@ def test_table_1_is_drawn_with_its_printed_values(tmp_path):
     assert path.read_bytes().startswith(b"\x89PNG")
 
 
-def test_no_contact_gives_no_figure():
+def test_a_flat_contact_has_no_figure():
     flat = contact_vibration(dry_full_load(CONTACT, 0.0), CONTACT, PAPER)
     for draw in (excitation_figure, response_figure):
         with pytest.raises(BadInput, match="flat"):

@@ -1,4 +1,4 @@
-"""The wear curve and the anchors, on tables whose statistics are known."""
+"""Wear curve and anchors, on tables of known statistics."""
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -26,19 +26,19 @@ from asperity.study import WearCurve, curve_from_study, plan_points, run_study, 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-def made(sq_um, seeds, **columns):
-    """A curve of so many seeds at each level; a column is a function of Sq in um and of a seed's
-    number.
+def synthetic_curve(sq_um, seeds, **columns):
+    """A curve with `seeds` surfaces per level; each column is a function of Sq [um] and the seed's
+    index.
     """
-    at, seed = (grid.ravel() for grid in np.meshgrid(sq_um, np.arange(seeds), indexing="ij"))
-    table = pandas.DataFrame({"surface.sq": 1e-6 * at, "status": "done", "clr": 0.5})
+    level, seed = (grid.ravel() for grid in np.meshgrid(sq_um, np.arange(seeds), indexing="ij"))
+    table = pandas.DataFrame({"surface.sq": 1e-6 * level, "status": "done", "clr": 0.5})
     for name, law in columns.items():
-        table[name] = law(at, seed)
+        table[name] = law(level, seed)
     return WearCurve(np.unique(table["surface.sq"]), table)
 
 
-def heard(law, scatter=2.0, seed=3):
-    """Columns of both presets from a law of CRF over Sq in um."""
+def resonance_columns(law, scatter=2.0, seed=3):
+    """Columns of both presets from a function of CRF against Sq [um]."""
     rng = np.random.default_rng(seed)
     columns = {}
     for preset in ("sound", "paper"):
@@ -48,8 +48,8 @@ def heard(law, scatter=2.0, seed=3):
     return columns
 
 
-def test_means_deviations_and_intervals_are_students():
-    curve = made([1.0, 2.0], 3, car=lambda sq, seed: sq + (seed - 1.0))
+def test_means_deviations_and_intervals_follow_students_distribution():
+    curve = synthetic_curve([1.0, 2.0], 3, car=lambda sq, seed: sq + (seed - 1.0))
     assert curve.mean("car") == pytest.approx([1.0, 2.0])
     assert curve.std("car") == pytest.approx([1.0, 1.0])
     reach = 2.91998558 / np.sqrt(3.0)  # printed tables: t of 2 degrees of freedom, two-sided 90 %
@@ -58,18 +58,18 @@ def test_means_deviations_and_intervals_are_students():
     )
 
 
-def test_between_levels_the_curve_is_straight_and_their_surfaces_independent():
-    curve = made([1.0, 2.0], 3, car=lambda sq, seed: sq + (seed - 1.0))
+def test_interpolation_between_levels_is_linear_with_independent_errors():
+    curve = synthetic_curve([1.0, 2.0], 3, car=lambda sq, seed: sq + (seed - 1.0))
     reach = 2.91998558 / np.sqrt(3.0)
     middle, low, high = curve.interpolate(1.25e-6, "car")
-    off = reach * np.hypot(0.75, 0.25)
-    assert (middle, low, high) == pytest.approx((1.25, 1.25 - off, 1.25 + off))
+    deviation = reach * np.hypot(0.75, 0.25)
+    assert (middle, low, high) == pytest.approx((1.25, 1.25 - deviation, 1.25 + deviation))
     assert curve.interpolate(2e-6, "car") == pytest.approx((2.0, 2.0 - reach, 2.0 + reach))
     assert np.isnan(curve.interpolate(2.1e-6, "car")).all()
 
 
-def test_what_failed_or_was_not_heard_is_in_no_mean():
-    curve = made([1.0, 2.0], 3, car=lambda sq, seed: sq + seed)
+def test_failed_cases_and_missing_resonances_are_excluded_from_means():
+    curve = synthetic_curve([1.0, 2.0], 3, car=lambda sq, seed: sq + seed)
     curve.table.loc[0, "status"] = "not converged"
     curve.table.loc[4, "car"] = np.nan
     assert curve.left_out == 1
@@ -79,20 +79,24 @@ def test_what_failed_or_was_not_heard_is_in_no_mean():
         curve.mean("colour")
 
 
-def test_a_knee_is_found_where_it_is_and_a_smooth_curve_has_none():
+def test_a_knee_is_located_and_a_smooth_curve_has_none():
     sq = np.arange(0.5, 4.05, 0.25)
-    knee = made(sq, 3, **heard(lambda sq: 3600.0 + np.where(sq < 1.8, 500.0, 60.0) * (sq - 1.8)))
+    knee = synthetic_curve(
+        sq, 3, **resonance_columns(lambda sq: 3600.0 + np.where(sq < 1.8, 500.0, 60.0) * (sq - 1.8))
+    )
     for preset in ("sound", "paper"):
         stages = knee.stages[preset]
         assert stages.kind == "severe"
         assert stages.split == pytest.approx(1.8, abs=0.1)
-    smooth = made(sq, 3, **heard(lambda sq: 3800.0 - 900.0 * np.exp(-(sq - 0.5) / 0.8)))
+    smooth = synthetic_curve(
+        sq, 3, **resonance_columns(lambda sq: 3800.0 - 900.0 * np.exp(-(sq - 0.5) / 0.8))
+    )
     assert not smooth.stages["sound"].found
     assert "from 50 to 50 %" in smooth.verdict()
 
 
-def test_anchors_say_how_far_off_and_whether_that_is_within_tolerance():
-    curve = made([0.5, 2.5, 4.0], 4, car=lambda sq, seed: 0.1 * sq + 0.01 * (seed - 1.5))
+def test_anchors_report_their_deviation_and_whether_it_is_within_tolerance():
+    curve = synthetic_curve([0.5, 2.5, 4.0], 4, car=lambda sq, seed: 0.1 * sq + 0.01 * (seed - 1.5))
     common = {"quantity": "car", "tolerance": 0.02}
     anchors = [
         Anchor(name="met", sq=2.5e-6, value=0.26, **common),
@@ -119,10 +123,10 @@ def test_anchors_say_how_far_off_and_whether_that_is_within_tolerance():
     assert list(table.index[table["possible"]]) == ["met", "possible", "change", "enough"]
 
 
-def test_the_papers_anchors_are_its_printed_numbers():
+def test_the_papers_anchors_equal_its_printed_numbers():
     text = (Path(__file__).parents[2].parent / "shared" / "paper.txt").resolve()
     if not text.exists():
-        pytest.skip("the paper's text is not here")
+        pytest.skip("the text of the paper is missing")
     printed = text.read_text("utf-8")
     for number in ("5.57%", "59.22%", "2921.93 Hz", "3811.88 Hz", "1.68 μm", "1.92 μm"):
         assert number in printed
@@ -135,13 +139,15 @@ def test_the_papers_anchors_are_its_printed_numbers():
     assert values["split, rig"] == pytest.approx((1.68 + 1.92) / 2.0)
 
 
-def test_a_curve_along_the_rigs_own_trend_is_off_by_nothing():
+def test_a_curve_on_the_rigs_trend_has_no_deviation():
     levels = np.linspace(0.54, 3.49, 60)
-    curve = made(levels, 2, **heard(lambda sq: TRENDS["smooth"](1e-6 * sq), scatter=0.0))
-    off = rig_deviation(curve)
-    assert off["ends"] == pytest.approx(0.0, abs=0.1)
-    assert off["smooth"] == pytest.approx(0.0, abs=0.5)
-    assert off["knee"] > 20.0
+    curve = synthetic_curve(
+        levels, 2, **resonance_columns(lambda sq: TRENDS["smooth"](1e-6 * sq), scatter=0.0)
+    )
+    deviation = rig_deviation(curve)
+    assert deviation["ends"] == pytest.approx(0.0, abs=0.1)
+    assert deviation["smooth"] == pytest.approx(0.0, abs=0.5)
+    assert deviation["knee"] > 20.0
     table = rig_prediction(curve)
     assert table["sq_um"].tolist() == list(SAMPLES_SQ_UM)
     assert table["printed_hz"].dropna().tolist() == list(CRF_ENDS_HZ)
@@ -160,18 +166,18 @@ def test_wear_curve_solves_each_level_with_each_seed():
     with ThreadPoolExecutor(1) as executor:
         curve = wear_curve(case, sq_values=[2e-6, 1e-6], seeds=[4, 5], executor=executor)
     assert curve.sq == pytest.approx([1e-6, 2e-6])
-    wanted = [
+    expected = [
         solve_case(case.with_overrides({"surface.sq": sq, "surface.seed": seed})).state.car
         for sq in ("1 um", "2 um")
         for seed in (4, 5)
     ]
-    assert curve.table["car"].tolist() == wanted
-    assert curve.mean("car") == pytest.approx([np.mean(wanted[:2]), np.mean(wanted[2:])])
+    assert curve.table["car"].tolist() == expected
+    assert curve.mean("car") == pytest.approx([np.mean(expected[:2]), np.mean(expected[2:])])
     with pytest.raises(BadInput, match="Sq must be positive"):
         wear_curve(case, sq_values=[-1e-6], seeds=1)
 
 
-def test_a_study_of_something_else_has_no_wear_curve():
+def test_a_study_of_another_quantity_has_no_wear_curve():
     case = load_case(EXAMPLES / "paper.toml").with_overrides(
         {"lubricant": "none", "grid.cells": [32, 24]}
     )
@@ -183,7 +189,7 @@ def test_a_study_of_something_else_has_no_wear_curve():
         curve_from_study(result)
 
 
-def test_anchors_of_ones_own_are_read_and_mistakes_named(tmp_path):
+def test_user_anchors_are_read_and_invalid_ones_are_refused(tmp_path):
     file = tmp_path / "anchors.toml"
     own = (
         '[[anchor]]\nname = "ours"\nquantity = "clr"\nsq = "0.6 um"\nvalue = 0.2\ntolerance ='

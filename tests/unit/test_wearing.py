@@ -1,4 +1,4 @@
-"""Laws of removal, jumps and tracks against closed forms and against what they are told to keep."""
+"""Laws of removal, wear steps and tracks against closed forms and conservation."""
 
 import math
 
@@ -50,7 +50,7 @@ def test_a_flat_pin_wears_by_k_p_v_t():
         DissipatedEnergy().equivalent_coefficient(1e-16, 0.0)
 
 
-def test_a_cold_film_has_no_defects_and_a_hot_one_nothing_else():
+def test_the_defect_share_of_a_film_rises_from_0_when_cold_to_1_when_hot():
     law, speed = FilmDefect(spacing=3e-10, period=3e-12, heat=5e4), 0.5
     assert law.defects(np.array([200.0]), speed)[0] == pytest.approx(
         200.0 * math.exp(-5e4 / (8.31446 * 200.0)), rel=1e-3
@@ -58,24 +58,23 @@ def test_a_cold_film_has_no_defects_and_a_hot_one_nothing_else():
     assert law.defects(np.array([1e6]), speed)[0] == pytest.approx(1.0, abs=1e-12)
     warm = np.linspace(300.0, 700.0, 9)
     assert np.all(np.diff(law.defects(warm, speed)) > 0.0)
-    # a temperature at which the exponent is known: E/(R T) = ln(crossing), so that half the sites
-    # ... 1 - 1/e are bare
-    at = 5e4 / (8.31446261815324 * math.log(200.0))
-    assert law.defects(np.array([at]), speed)[0] == pytest.approx(
+    # at E/(R T) = ln(200), the share of bare sites is 1 - 1/e
+    temperature = 5e4 / (8.31446261815324 * math.log(200.0))
+    assert law.defects(np.array([temperature]), speed)[0] == pytest.approx(
         1.0 - math.exp(-1.0), rel=1e-12, abs=0.0
     )
-    still = RubbingConditions(
+    at_rest = RubbingConditions(
         pressure=np.ones(3), shear=np.ones(3), sliding_speed=0.0, temperature=np.full(3, 400.0)
     )
-    assert not law(still).any()
+    assert not law(at_rest).any()
 
 
-def test_a_class_of_wear_is_an_interval_of_k_times_the_hardness():
+def test_a_wear_class_is_an_interval_of_k_times_hardness():
     for name, (low, high) in PRIORS.items():
         known = WearCoefficient.from_severity(name, 2e9)
         assert known.k * known.low * 2e9 == pytest.approx(low, rel=1e-12, abs=0.0)
         assert known.k * known.high * 2e9 == pytest.approx(high, rel=1e-12, abs=0.0)
-        assert known.low * known.high == pytest.approx(1.0)  # of which k is the geometric middle
+        assert known.low * known.high == pytest.approx(1.0)  # k is the geometric mean
     with pytest.raises(BadInput, match="hardness"):
         WearCoefficient.from_severity("mild", None)
     stated = WearCoefficient.from_value(1e-17, 0.5)
@@ -83,36 +82,32 @@ def test_a_class_of_wear_is_an_interval_of_k_times_the_hardness():
     assert stated.low * stated.high == pytest.approx(1.0)
 
 
-def test_a_jump_takes_off_the_mean_and_adds_nothing():
+def test_a_jump_removes_the_mean_depth_and_adds_no_material():
     rng = np.random.default_rng(1)
     grid = Grid((64, 48), (0.0, 0.0), (1e-4, 6e-5), periodic=(True, True))
     rate = np.maximum(rng.normal(size=grid.cells) - 1.5, 0.0) * 1e-12
     spike = np.zeros(grid.cells)
     spike[20, 30] = 1e-12
-    for seconds in (
-        1e-3,
-        1.0,
-        1e3,
-        1e6,
-    ):  # at 1e3 s the spike's spectrum, cut off by the cells, dips below 0
+    # at 1e3 s the truncated spectrum of the spike would give depths below 0
+    for seconds in (1e-3, 1.0, 1e3, 1e6):
         for any_rate in (rate, spike):
             depth = removed_depth(any_rate, seconds, exposure(), grid, MODULUS)
             assert depth.mean() == pytest.approx(any_rate.mean() * seconds, rel=1e-12, abs=0.0)
             assert depth.min() >= 0.0
     short = exposure()
-    steps = 1e-6 / short.decay_exponent(1e6, 1.0, MODULUS)  # so short that no wave decays
+    duration = 1e-6 / short.decay_exponent(1e6, 1.0, MODULUS)  # too short for any wave to decay
     np.testing.assert_allclose(
-        removed_depth(rate, steps, short, grid, MODULUS),
-        rate * steps,
+        removed_depth(rate, duration, short, grid, MODULUS),
+        rate * duration,
         rtol=0,
-        atol=3e-6 * rate.max() * steps,
+        atol=3e-6 * rate.max() * duration,
     )
-    even = np.broadcast_to(rate[:1], rate.shape)
-    assert is_uniform_along(removed_depth(even, 1.0, exposure(), grid, MODULUS))
+    uniform = np.broadcast_to(rate[:1], rate.shape)
+    assert is_uniform_along(removed_depth(uniform, 1.0, exposure(), grid, MODULUS))
 
 
 @pytest.mark.parametrize("jumps", [1, 7])
-def test_a_wave_in_full_contact_decays_as_in_closed_form_whatever_the_jump(jumps):
+def test_a_wave_in_full_contact_decays_as_in_closed_form_at_any_jump(jumps):
     grid = Grid((64, 64), (0.0, 0.0), (8e-5, 8e-5), periodic=(True, True))
     wave = 2.0 * np.pi / 2e-5
     heights, body, mean = (
@@ -121,18 +116,18 @@ def test_a_wave_in_full_contact_decays_as_in_closed_form_whatever_the_jump(jumps
         1e9,
     )
     seconds = 2.0 / float(body.decay_exponent(wave, 1.0, MODULUS))  # two decay lengths in all
-    now = heights
+    worn = heights
     for _ in range(jumps):
-        pressure = mean + 0.5 * MODULUS * wave * (now - now.mean())
+        pressure = mean + 0.5 * MODULUS * wave * (worn - worn.mean())
         rate = body.k * pressure * body.sliding_speed * body.contact_time_share
-        now = now - removed_depth(rate, seconds / jumps, body, grid, MODULUS)
-    swing = 2.0 * np.abs(np.fft.rfft(now[:, 0]))[4] / 64
-    assert swing == pytest.approx(1e-8 * math.exp(-2.0), rel=1e-9, abs=0.0)
+        worn = worn - removed_depth(rate, seconds / jumps, body, grid, MODULUS)
+    amplitude = 2.0 * np.abs(np.fft.rfft(worn[:, 0]))[4] / 64
+    assert amplitude == pytest.approx(1e-8 * math.exp(-2.0), rel=1e-9, abs=0.0)
     sliding = seconds * body.sliding_speed * body.contact_time_share
-    assert -now.mean() == pytest.approx(body.k * mean * sliding, rel=1e-9, abs=0.0)
+    assert -worn.mean() == pytest.approx(body.k * mean * sliding, rel=1e-9, abs=0.0)
 
 
-def test_a_jump_is_no_longer_than_its_depth_and_its_shortest_wave_allow():
+def test_the_longest_jump_is_limited_by_its_depth_and_the_shortest_wave():
     grid = Grid((64, 64), (0.0, 0.0), (8e-5, 8e-5), periodic=(True, True))
     fast, slow = np.full(grid.cells, 1e-9), np.full(grid.cells, 1e-12)
     gentle = exposure(k=1e-22)
@@ -143,30 +138,30 @@ def test_a_jump_is_no_longer_than_its_depth_and_its_shortest_wave_allow():
     longest = longest_jump((gentle, steep), (slow, slow), 1.0, 0.7, grid.spacing, MODULUS)
     shortest_wave = math.pi * math.hypot(*(1.0 / side for side in grid.spacing))
     assert float(steep.decay_exponent(shortest_wave, longest, MODULUS)) == pytest.approx(0.7)
-    still = exposure(k=0.0)
+    at_rest = exposure(k=0.0)
     assert (
-        longest_jump((still, still), (0.0 * slow, 0.0 * slow), 1.0, 1.0, grid.spacing, MODULUS)
+        longest_jump((at_rest, at_rest), (0.0 * slow, 0.0 * slow), 1.0, 1.0, grid.spacing, MODULUS)
         == math.inf
     )
 
 
-def test_what_passes_is_in_the_contact_for_its_width_over_its_speed():
+def test_the_contact_time_is_the_width_over_the_speed():
     assert exposure().contact_time_share == pytest.approx(50.0 * 1e-4 / 2.0)
     assert exposure(speed=0.0).contact_time_share == 1.0
     assert exposure(speed=-2.0).depth_rate_factor(3e-4) == pytest.approx(50.0 * 3e-4 / 2.0)
     assert exposure(speed=0.0).depth_rate_factor(3e-4) == 1.0
 
 
-def test_maps_come_back_onto_the_cells_that_they_were_seen_on():
+def test_maps_are_returned_to_the_cells_of_their_tracks():
     rng = np.random.default_rng(2)
     contact = Grid((16, 12), (0.0, 0.0), (1.6, 1.2))
     track = Grid((40, 12), (0.0, 0.0), (4.0, 1.2), periodic=(True, True))
     first, second = (Surface(rng.normal(size=track.cells), track) for _ in range(2))
     surfaces = MovingSurfaces(first, second, (2.0, 1.5), contact)
     place = TrackPosition(33, 7)
-    there = combined_roughness(surfaces, place).heights
-    i, j = 5, 3  # a cell of the contact, and where it is on either track
-    assert there[i, j] == first.heights[(33 + i) % 40, j] + second.heights[(7 + i) % 40, 11 - j]
+    combined = combined_roughness(surfaces, place).heights
+    i, j = 5, 3  # a cell of the contact, mapped to both tracks
+    assert combined[i, j] == first.heights[(33 + i) % 40, j] + second.heights[(7 + i) % 40, 11 - j]
     marked = np.zeros(contact.cells)
     marked[i, j] = 1.0
     assert map_to_track(marked, track.cells, place, 0)[(33 + i) % 40, j] == 1.0
@@ -179,16 +174,18 @@ def test_maps_come_back_onto_the_cells_that_they_were_seen_on():
     )
 
 
-def test_positions_lie_evenly_and_differ_from_jump_to_jump():
+def test_positions_are_evenly_spaced_and_differ_between_jumps():
     places = [positions((120, 120), (True, True), 6, jump, 5) for jump in range(40)]
     assert places[3] == positions((120, 120), (True, True), 6, 3, 5)
     assert places[3] != places[4]
     for body in (0, 1):
         for jump in places:
-            steps = np.diff(sorted(place[body] for place in jump))
-            assert np.all((steps >= 19) & (steps <= 21))  # 120/6 cells apart, to rounding
+            spacings = np.diff(sorted(place[body] for place in jump))
+            assert np.all(
+                (spacings >= 19) & (spacings <= 21)
+            )  # spacing of 120/6 cells, up to rounding
         starts = {place[body] for jump in places for place in jump}
         assert len(starts) > 100  # almost every cell has been a start
     paired = {(place.first // 20, place.second // 20) for jump in places for place in jump}
-    assert len(paired) == 36  # every sixth of one track has met every sixth of the other
+    assert len(paired) == 36  # each sixth of one track meets each sixth of the other
     assert {place.second for place in positions((120, 120), (True, False), 6, 0, 5)} == {0}
