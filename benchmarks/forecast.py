@@ -31,7 +31,8 @@ from asperity.inference import (
     forecast_observations,
     inference_setting,
 )
-from asperity.inference.drifting_contact import KNOTS, along_range, between_knots
+from asperity.inference.drifting_contact import along_range
+from asperity.inference.kalman_filter import KNOTS, between_knots
 from asperity.inference.outputs import CLR, OUTPUTS
 from benchmarks.inference import CASE, KEPT, LEFT_S, share
 from benchmarks.rows import FOLDER, Rows

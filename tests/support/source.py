@@ -13,6 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
+from asperity.core import documents
+
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "src" / "asperity"
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -112,7 +114,8 @@ def _function(member: Any) -> Any:
 def _hints(item: Any) -> dict[str, Any]:
     item = inspect.unwrap(item)
     module = sys.modules[item.__module__]
-    known = vars(typing) | vars(module) | _names_for_type_checkers(module.__name__)
+    known = {**vars(typing), **vars(documents), **vars(module)}
+    known |= _names_for_type_checkers(module.__name__)
     hints = {}
     for name, hint in inspect.get_annotations(item).items():
         try:

@@ -24,16 +24,10 @@ from asperity.inference import (
     read_limit,
     wear_drift,
 )
-from asperity.inference.drifting_contact import (
-    DRIFT_STD,
-    KNOTS,
-    ChannelTable,
-    DriftModel,
-    DriftParameters,
-    between_knots,
-)
+from asperity.inference.drifting_contact import DRIFT_STD, DriftModel
 from asperity.inference.forecast import Limit
 from asperity.inference.gaussian_process import GaussianProcess
+from asperity.inference.kalman_filter import KNOTS, ChannelTable, DriftParameters, between_knots
 from asperity.inference.likelihood import (
     EMULATED_HEIGHT_STD,
     EXPONENT_STD,
@@ -389,13 +383,13 @@ def test_only_recent_recordings_describe_a_changing_contact():
         ),
         (
             lambda setting: read_limit("crf=3000 Hz", setting),
-            "--forecast takes a limit such as clr=0.5, of clr, sq or",
+            "`limit` takes a limit such as clr=0.5, of clr, sq or",
         ),
         (
             lambda setting: read_limit("clr=half", setting),
-            "--forecast clr takes a share of the load",
+            "`limit` clr takes a share of the load",
         ),
-        (lambda setting: read_limit("sq=2 N", setting), "--forecast sq must be"),
+        (lambda setting: read_limit("sq=2 N", setting), "`limit` sq must be"),
         (
             lambda _: visit_series([recording(float("nan"))]),
             "has no time; give a column x",
@@ -423,7 +417,7 @@ def test_only_recent_recordings_describe_a_changing_contact():
             lambda setting: forecast_series(
                 setting, None, OBSERVED, read_limit("hardness=2 GPa", setting), worn="worn"
             ),
-            "--worn is a prior for the drift of Sq, but the limit is of hardness_pa",
+            "`worn` is a prior for the drift of Sq, but the limit is of hardness_pa",
         ),
         (
             lambda setting: forecast_series(

@@ -64,7 +64,7 @@ def test_a_recording_without_a_sampling_rate_is_refused_in_the_pages_words(rig):
     )
     assert isinstance(failure, JobFailure)
     assert "give the sampling rate" in failure.message
-    assert "give rate_hz" not in failure.message
+    assert "rate_hz`" not in failure.message
 
 
 def test_a_folder_is_read_incrementally(rig, tmp_path):

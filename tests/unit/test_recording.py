@@ -70,7 +70,7 @@ def test_a_recording_is_read_in_blocks(folder):
 
 def test_missing_metadata_are_requested(folder, tmp_path):
     path, _ = folder
-    with pytest.raises(BadInput, match=r"bare.npy states no sampling rate; give rate_hz"):
+    with pytest.raises(BadInput, match=r"bare.npy states no sampling rate; give `rate_hz`"):
         read_recording(path / "bare.npy")
     (tmp_path / "a.csv").write_text(
         "time,acc\n" + "".join(f"{i / 100:.2f},{i % 7}.5\n" for i in range(50))
@@ -298,7 +298,7 @@ def test_every_measured_file_is_read_or_refused_with_a_message():
     assert (
         refusals["trib_c1.csv"]
         == "trib_c1.csv states no sampling rate (its column 'Time' names no unit; in seconds:"
-        " 9.99994 Hz); give rate_hz, or state it as rate_hz in trib_c1.csv.toml beside it"
+        " 9.99994 Hz); give `rate_hz`, or state it as rate_hz in trib_c1.csv.toml beside it"
     )
     assert channels["ActTest_009.IDE"] == 15
     assert channels["2003.10.22.12.06.24"] == 8

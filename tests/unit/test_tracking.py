@@ -87,7 +87,7 @@ def test_the_band_follows_from_the_contact_and_states_its_source():
     assert (given.band_hz, given.full_load_crf_hz, given.assumed) == ((2e3, 3e3), None, False)
     default = search_target()
     assert default.assumed
-    assert "give case or band_hz" in default.source
+    assert "give `case` or `band_hz`" in default.source
     assert search_target(CASE, (2e3, 3e3)).full_load_crf_hz == TARGET.full_load_crf_hz
 
 

@@ -24,10 +24,10 @@ from asperity.monitoring import (
 MAX_LINES = 600  # of a spectrum
 MAX_ROWS = 400  # recordings of a waterfall
 SETTLE_S = 2.0  # time for which a file must not have changed
-FIELDS = {
-    "give rate_hz": "give the sampling rate",
-    "give case or band_hz": "give the band",
-    "give scale": "give the scale",
+FIELDS = {  # of the page, by arguments as messages of the library name them
+    "`rate_hz`": "the sampling rate",
+    "`case` or `band_hz`": "the band",
+    "`scale`": "the scale",
 }
 
 

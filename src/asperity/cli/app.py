@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BadInput as error:
         code = _print_error(with_options(str(error)), 2)
     except AsperityError as error:
-        code = _print_error(str(error), 1)
+        code = _print_error(with_options(str(error)), 1)
     except typer.Abort:  # raised by typer for an end of file in a library
         code = _print_error("a file ended unexpectedly; read or copy it again", 1)
     except typer.TyperException as error:  # usage

@@ -124,10 +124,10 @@ def _summary(checks: "RecordingChecks") -> Block:
     rows: list[list[str]] = []
     holders: dict[str, list[str]] = {}
     for checked in checks.checked:
-        values, quality = checked.scalars(), checked.quality
-        name = f"{checked.recording.path.name}, {values['channel']}"
+        values, recording, quality = checked.scalars(), checked.recording, checked.quality
+        name = f"{recording.path.name}, {values['channel']}"
         state = "usable" if quality.usable else "NOT USABLE"
-        rows.append([name, *(entry.number_in(values) for entry in selected), values["unit"], state])
+        rows.append([name, *(entry.number_in(values) for entry in selected), recording.unit, state])
         for sentence in (*quality.faults, *quality.remarks):
             holders.setdefault(sentence, []).append(name)
     yield from columns(

@@ -1,6 +1,5 @@
 """Options shared by commands, each declared once, and their evaluation before the work starts."""
 
-import re
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
@@ -300,22 +299,29 @@ def lengths(option: str, texts: list[str] | None) -> list[float] | None:
     return [case.read_length(option, text) for text in texts] if texts else None
 
 
-# remedies in messages of the library, and the option that applies on the command line
-_REMEDIES = {
-    r"\b(give|state|set|use) (case or )band_hz\b": r"\1 --case or --band",
-    r"\b(give|state|set|use) rate_hz\b": r"\1 --rate",
-    r"\b(give|state|set|use) scale\b": r"\1 --scale",
-    r"; method modes\b": "; --method modes",
-    r"\bsuch as um and mm\b": "such as --unit um --lateral-unit mm",
-    r"\b(ask for|request|use) a dry run\b": "use --dry-run",
-    r"\bchoose another out\b": "choose another --out",
+# options by the name of an argument or function, which messages of the library give in backticks
+_OPTIONS = {
+    "band_hz": "--band",
+    "case": "--case",
+    "clr": "--design",
+    "lateral_unit": "--lateral-unit",
+    "limit": "--forecast",
+    "machine_conditions": "--dry-run",
+    "method": "--method",
+    "out": "--out",
+    "overdue_after_s": "--expect",
+    "rate_hz": "--rate",
+    "scale": "--scale",
+    "table": "--table",
+    "unit": "--unit",
+    "worn": "--worn",
 }
 
 
 def with_options(message: str) -> str:
     """Return a message of the library with options in place of the arguments that it names."""
-    for remedy, option in _REMEDIES.items():
-        message = re.sub(remedy, option, message)
+    for name, option in _OPTIONS.items():
+        message = message.replace(f"`{name}`", option)
     return message
 
 

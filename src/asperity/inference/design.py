@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from scipy.special import ndtr
 
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 from asperity.inference.forward import ForwardModel
@@ -47,7 +48,7 @@ class DesignVariable:
             return f"{entry.name}: {'any' if self.way == 'any' else 'none'} of {ends}"
         return f"{entry.name}: {self.way} {entry.text(self.bound)}"
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON output."""
         return {
             "key": self.key,
@@ -75,7 +76,7 @@ class Design:
             f"changing one quantity gives {PROBABILITY:.2f} for {ways}."
         )
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON output."""
         return {
             "clr": self.clr,
@@ -108,7 +109,7 @@ def design_contact(forward: ForwardModel, z: Field, *, clr: float) -> Design:
     BadInput
         for a `clr` outside 0 to 1.
     """
-    require_share("--design", clr)
+    require_share("`clr`", clr)
     chosen = z[:: max(1, len(z) // CONTACTS)][:CONTACTS]
     own = replace(forward, points=forward.points[:1])
     levers = [_design_variable(own, chosen, entry, clr) for entry in _variables(own.setting)]

@@ -9,6 +9,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ import pandas
 
 from asperity.case import MOST_POINTS
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.files import make_folder, user_cache
 from asperity.core.storage import read_json, write_json
@@ -107,7 +109,7 @@ class Emulator:
         x = self.features(shares)
         return {key: self.processes[key].mean(x) for key in keys}
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON output of the emulator."""
         return {
             "folder": str(self.folder),
@@ -174,34 +176,18 @@ def build_emulator(
     """
     sobol = sobol_shares(setting)
     plan = _plan(setting, sobol)
-    identity = hashlib.sha256(
-        json.dumps(
-            [plan.design, [case.id for case in plan.cases], version("asperity"), LAYOUT]
-        ).encode()
-    ).hexdigest()
+    identity = _identity(plan)
     home = emulators_folder() / identity[:16] if folder is None else Path(folder)
-    fitted = home / FITTED
-    if not fitted.exists():
-        require_learning()
-    elif read_json(fitted, REFIT).get("identity") != identity:
-        raise BadInput(
-            f"{home} holds the emulator of another case, range or version; choose another folder"
-        )
+    _require_identity(home, identity)
     make_folder(home)
-    options: dict[str, Any] = {"executor": executor, "workers": workers, "progress": progress}
-    result = run_study(plan, out=home, **options)
-    shares, table, failed = _with_further(setting, sobol, result, home, **options)
+    run = partial(run_study, executor=executor, workers=workers, progress=progress)
+    result = run(plan, out=home)
+    shares, table, failed = _with_further(setting, sobol, result, home, run)
     means = _Means.from_table(table, setting.surfaces)
-    if len(means.points) < (1.0 - MAX_MISSING) * len(shares):
-        reasons = table["reason"][table["status"] == "failed"]
-        first = reasons.iloc[0] if len(reasons) else "they are missing"
-        raise AsperityError(
-            f"{len(shares) - len(means.points)} of {len(shares)} points of the emulator failed "
-            f"({first}); narrow the ranges in [infer]"
-        )
+    _require_points(table, len(means.points), len(shares))
     features = emulator_features(setting)
-    finer = _finer(setting, sobol, home=home, **options)
-    processes, quality = _processes(means, features(shares[means.points]), fitted, identity)
+    finer = _finer(setting, sobol, home, run)
+    processes, quality = _processes(means, features(shares[means.points]), home / FITTED, identity)
     return Emulator(
         setting.ranges,
         features,
@@ -218,12 +204,46 @@ def build_emulator(
     )
 
 
+def _identity(plan: StudyPlan) -> str:
+    """Return the digest of all on which an emulator depends."""
+    content = [plan.design, [case.id for case in plan.cases], version("asperity"), LAYOUT]
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()
+
+
+def _require_identity(home: Path, identity: str) -> None:
+    """Raise BadInput for a folder with another emulator, or a new one without scikit-learn."""
+    fitted = home / FITTED
+    if not fitted.exists():
+        require_learning()
+    elif read_json(fitted, REFIT).get("identity") != identity:
+        raise BadInput(
+            f"{home} holds the emulator of another case, range or version; choose another folder"
+        )
+
+
+def _require_points(table: pandas.DataFrame, solved: int, planned: int) -> None:
+    """Raise AsperityError if too many points have failed."""
+    if solved < (1.0 - MAX_MISSING) * planned:
+        reasons = table["reason"][table["status"] == "failed"]
+        first = reasons.iloc[0] if len(reasons) else "they are missing"
+        raise AsperityError(
+            f"{planned - solved} of {planned} points of the emulator failed "
+            f"({first}); narrow the ranges in [infer]"
+        )
+
+
 def extend_emulator(
-    setting: Setting, emulator: Emulator, shares: Field, **options: Any
+    setting: Setting,
+    emulator: Emulator,
+    shares: Field,
+    *,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
 ) -> Emulator:
     """Add points at shares (n, ranges) to an emulator and its folder.
 
-    If interrupted, the next `build_emulator` resumes. `options` are those of `build_emulator`.
+    If interrupted, the next `build_emulator` resumes. The options are those of `build_emulator`.
 
     Raises
     ------
@@ -243,7 +263,9 @@ def extend_emulator(
     folder = emulator.folder / FURTHER / f"{last + 1:03d}"
     make_folder(folder)
     write_json(folder / SHARES, {"shares": np.asarray(shares, dtype=float).tolist()})
-    return build_emulator(setting, folder=emulator.folder, **options)
+    return build_emulator(
+        setting, folder=emulator.folder, executor=executor, workers=workers, progress=progress
+    )
 
 
 def _plan(setting: Setting, shares: Field) -> StudyPlan:
@@ -257,30 +279,33 @@ def _further(home: Path) -> list[Path]:
 
 
 def _with_further(
-    setting: Setting, sobol: Field, result: StudyResult, home: Path, **options: Any
+    setting: Setting,
+    sobol: Field,
+    result: StudyResult,
+    home: Path,
+    run: partial[StudyResult],
 ) -> tuple[Field, pandas.DataFrame, int]:
     """Return shares and rows of all points, added ones last, and the number of failed contacts."""
     shares, tables, failed = [sobol], [result.table], result.failed
     for folder in _further(home):
         own = np.array(read_json(folder / SHARES, f"delete {folder}")["shares"], dtype=float)
-        more = run_study(_plan(setting, own), out=folder / "study", **options)
+        more = run(_plan(setting, own), out=folder / "study")
         tables.append(more.table.assign(point=more.table["point"] + sum(map(len, shares))))
         shares.append(own)
         failed += more.failed
     return np.concatenate(shares), pandas.concat(tables, ignore_index=True), failed
 
 
-def _finer(setting: Setting, sobol: Field, *, home: Path, **options: Any) -> pandas.DataFrame:
+def _finer(
+    setting: Setting, sobol: Field, home: Path, run: partial[StudyResult]
+) -> pandas.DataFrame:
     """Solve the first points on twice the cells along each axis, with the same surfaces."""
     twice = setting.case.with_overrides(
         {"grid.cells": [2 * count if count > 1 else 1 for count in setting.case.grid.cells]}
     )
     points = [overrides_at(twice, setting.ranges, shares) for shares in sobol[:FINER_POINTS]]
-    return run_study(
-        plan_points(twice, points, seeds=setting.surfaces, kind="still"),
-        out=home / FINER,
-        **options,
-    ).table
+    plan = plan_points(twice, points, seeds=setting.surfaces, kind="still")
+    return run(plan, out=home / FINER).table
 
 
 def _grid_errors(coarse: pandas.DataFrame, fine: pandas.DataFrame) -> dict[str, EmulatorGridError]:

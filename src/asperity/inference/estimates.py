@@ -3,11 +3,12 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 
 ENDS = (0.05, 0.5, 0.95)
 BINS = 20  # equally probable bins of the prior
@@ -36,7 +37,7 @@ class Estimate:
         """True if the recordings are informative; False if the prior is essentially unchanged."""
         return self.information_bits >= LEARNT_FROM_BITS
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON output of the estimate."""
         return {
             "median": self.median,

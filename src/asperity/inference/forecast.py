@@ -3,24 +3,25 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
 
 from asperity.case import read_amount
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
 from asperity.inference.drifting_contact import (
+    CourseLikelihood,
     DriftModel,
-    DriftParameters,
     FilteredState,
-    between_knots,
     tabulated,
 )
 from asperity.inference.emulator import Emulator
 from asperity.inference.forward import LAWS, MIN_SHARE, ForwardModel, Law
+from asperity.inference.kalman_filter import DriftParameters, between_knots
 from asperity.inference.observations import Observation
 from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.posterior import join_rows, select_rows
@@ -150,7 +151,7 @@ class Forecast:
         )
         return f"{sentence}{rough}."
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON output; times in the series' unit, from the last recording."""
         return {
             "limit": {"key": self.limit.key, "value": self.limit.value, "rising": self.rising},
@@ -187,18 +188,18 @@ def read_limit(text: str, setting: Setting) -> Limit:
     known = {unknown.range.key.rpartition(".")[2]: unknown.key for unknown in setting.contact}
     if name not in (CLR, *known):
         raise BadInput(
-            f"--forecast takes a limit such as clr=0.5, of clr, {' or '.join(known)}, got {text!r}"
+            f"`limit` takes a limit such as clr=0.5, of clr, {' or '.join(known)}, got {text!r}"
         )
     if name != CLR:
         limit = Limit(
-            known[name], read_amount(f"--forecast {name}", quantity(known[name]).unit, amount)
+            known[name], read_amount(f"`limit` {name}", quantity(known[name]).unit, amount)
         )
     else:
         try:
             limit = Limit(CLR, float(amount))
         except ValueError:
             raise BadInput(
-                f"--forecast clr takes a share of the load such as clr=0.5, got {text!r}"
+                f"`limit` clr takes a share of the load such as clr=0.5, got {text!r}"
             ) from None
     require_limit(setting, limit)
     return limit
@@ -252,13 +253,9 @@ def forecast_observations(
         course = DriftModel(forward, series, law, drifting, *([drift] if drift else []))
         pool = Pool(course, join_rows, select_rows, course.dims, seed)  # shared by both models
         for changing in (True, False):
+            target = _target(changing=changing)
             sampled = importance(
-                pool,
-                _target(changing=changing),
-                enough=ENOUGH,
-                best=best,
-                least=ROUGH,
-                longest=LONGEST,
+                pool, target, enough=ENOUGH, best=best, least=ROUGH, longest=LONGEST
             )
             best = max(best, sampled.log_evidence)
             models.append(_Model(course, changing, sampled))
@@ -267,7 +264,7 @@ def forecast_observations(
             raise AsperityError(
                 "too few courses of the contact fit these recordings: effective sample size "
                 f"{model.sampled.effective:.0f}, required {FEWEST:.0f}; "
-                "leave recordings out, or --forecast"
+                "leave recordings out, or `limit`"
             )
     return _forecast(models, limit, seed)
 
@@ -282,8 +279,8 @@ def require_limit(
         )
     if worn and limit.key not in (CLR, "sq_m"):
         raise BadInput(
-            f"--worn is a prior for the drift of Sq, but the limit is of {limit.key}; "
-            "leave --worn out"
+            f"`worn` is a prior for the drift of Sq, but the limit is of {limit.key}; "
+            "leave `worn` out"
         )
     if limit.key == CLR and not 0.0 < limit.value < 1.0:
         raise BadInput(f"a limit of CLR must lie between 0 and 1, got {limit.value:g}")
@@ -299,76 +296,104 @@ def require_limit(
         )
 
 
-def _target(*, changing: bool) -> Callable[[Any], Field]:
+def _target(*, changing: bool) -> Callable[[CourseLikelihood], Field]:
     return lambda likelihood: likelihood.changing if changing else likelihood.steady
+
+
+class _Crossing(NamedTuple):
+    """Crossing of a limit by equally probable courses, and the times of those that cross it ahead.
+
+    `already` and `within` are the probabilities that it is crossed by the last visit and ahead.
+    """
+
+    rising: bool
+    already: float
+    within: float
+    times: Field
+    by: Field  # times of all that had not crossed it by the last visit, infinite if they never do
+
+    @classmethod
+    def from_courses(cls, past: Field, ahead: Field, limit: float, step: float) -> "_Crossing":
+        """Return the crossing by courses (n, visits) and their continuation (n, steps + 1)."""
+        rising = bool(np.mean(ahead[:, -1] >= past[:, 0]) >= 0.5)
+        crossed = ahead >= limit if rising else ahead <= limit
+        first = np.argmax(crossed, axis=1)
+        already, will = crossed[:, 0], crossed.any(axis=1) & ~crossed[:, 0]
+        rows = np.flatnonzero(will)
+        before, after = ahead[rows, first[rows] - 1], ahead[rows, first[rows]]
+        times = step * (first[rows] - 1 + (limit - before) / (after - before))
+        never = np.full(int(np.sum(~already & ~will)), np.inf)
+        return cls(
+            rising,
+            float(np.mean(already)),
+            float(np.mean(will)),
+            times,
+            np.concatenate([times, never]),
+        )
 
 
 def _forecast(models: list[_Model], limit: Limit, seed: int) -> Forecast:
     rng = np.random.default_rng([seed, 8])
     logs = np.array([model.sampled.log_evidence for model in models])
     changing = np.array([model.changing for model in models])
-    odds = float(logsumexp(logs[changing]) - logsumexp(logs[~changing]))
-    counts = np.round(COURSES * np.exp(logs - logsumexp(logs))).astype(int)
+    weights = np.exp(logs - logsumexp(logs))
+    past, ahead, clr, value = _draw_courses(models, weights, limit, rng)
+    series = models[0].course.series
+    step = HORIZON * series.span / STEPS
+    crossing = _Crossing.from_courses(past, ahead, limit.value, step)
+    return Forecast(
+        limit=limit,
+        drifting=models[0].course.drifting,
+        series=series,
+        rising=crossing.rising,
+        log_odds=float(logsumexp(logs[changing]) - logsumexp(logs[~changing])),
+        already=crossing.already,
+        within=crossing.within,
+        time=Interval.from_values(crossing.times),
+        by=Interval.from_values(crossing.by),
+        horizon=HORIZON * series.span,
+        clr=Interval.from_values(clr),
+        value=Interval.from_values(value),
+        effective=float(1.0 / np.sum(weights**2 / [m.sampled.effective for m in models])),
+        bands=_bands(limit, series, np.hstack([past, ahead[:, 1:]]), step),
+    )
+
+
+def _bands(limit: Limit, series: VisitSeries, courses: Field, step: float) -> Bands:
+    """Return the 90 % interval of courses (n, visits + steps)."""
+    x = np.concatenate([series.x, series.x[-1] + step * np.arange(1, STEPS + 1)])
+    return Bands(*limit, x, series.x[-1], np.quantile(courses, ENDS, axis=0))
+
+
+class _Courses(NamedTuple):
+    """The limit's quantity at visits and ahead, and CLR and drifting value at the last visit."""
+
+    past: Field
+    ahead: Field
+    clr: Field
+    value: Field
+
+
+def _draw_courses(
+    models: list[_Model], weights: Field, limit: Limit, rng: np.random.Generator
+) -> _Courses:
+    """Draw equally probable courses of all models and extrapolate them."""
+    counts = np.round(COURSES * weights).astype(int)
     parts = [
         _extrapolate(model, int(count), limit, rng)
         for model, count in zip(models, counts, strict=True)
         if count >= 1
     ]
-    past, ahead, clr, value = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    series = models[0].course.series
-    rising = bool(np.mean(ahead[:, -1] >= past[:, 0]) >= 0.5)
-    crossed = ahead >= limit.value if rising else ahead <= limit.value
-    first = np.argmax(crossed, axis=1)
-    already, will = crossed[:, 0], crossed.any(axis=1) & ~crossed[:, 0]
-    rows = np.flatnonzero(will)
-    before, after = ahead[rows, first[rows] - 1], ahead[rows, first[rows]]
-    step = HORIZON * series.span / STEPS
-    times = step * (first[rows] - 1 + (limit.value - before) / (after - before))
-    x_ahead = series.x[-1] + step * np.arange(1, STEPS + 1)
-    whole = np.hstack([past, ahead[:, 1:]])
-    return Forecast(
-        limit=limit,
-        drifting=models[0].course.drifting,
-        series=series,
-        rising=rising,
-        log_odds=odds,
-        already=float(np.mean(already)),
-        within=float(np.mean(will)),
-        time=Interval.from_values(times),
-        by=Interval.from_values(
-            np.concatenate([times, np.full(int(np.sum(~already & ~will)), np.inf)])
-        ),
-        horizon=HORIZON * series.span,
-        clr=Interval.from_values(clr),
-        value=Interval.from_values(value),
-        effective=float(
-            1.0
-            / np.sum((np.exp(logs - logsumexp(logs))) ** 2 / [m.sampled.effective for m in models])
-        ),
-        bands=Bands(
-            *limit,
-            np.concatenate([series.x, x_ahead]),
-            series.x[-1],
-            np.quantile(whole, ENDS, axis=0),
-        ),
-    )
+    return _Courses(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _extrapolate(
-    model: _Model, count: int, limit: Limit, rng: np.random.Generator
-) -> tuple[Field, Field, Field, Field]:
-    """Return the limit's quantity at visits and ahead, and CLR and drifting value at the last."""
-    course, weights = model.course, model.sampled.weights
-    levels = (rng.random() + np.arange(count)) / count  # systematic resampling
-    z = model.sampled.z[np.minimum(np.searchsorted(np.cumsum(weights), levels), len(weights) - 1)]
-    parameters, filtered = (
-        DriftParameters.from_normal(z[:, course.forward.dims :]),
-        course.filter_series(z, changing=model.changing),
-    )
+def _extrapolate(model: _Model, count: int, limit: Limit, rng: np.random.Generator) -> _Courses:
+    """Draw courses of one model and extrapolate them."""
+    course, z = model.course, model.sampled.resample(count, rng)
+    parameters = DriftParameters.from_normal(z[:, course.forward.dims :])
+    filtered = course.filter_series(z, changing=model.changing)
     share, drift, error = _draw_state(filtered, rng)
-    diffusion = parameters.diffusion if model.changing else np.zeros(count)
-    ahead = _integrate(share, drift, diffusion, rng)
-    unknown = course.forward.setting.unknowns[course.column]
+    ahead = _integrate(share, drift, parameters.diffusion * model.changing, rng)
     if not model.changing:
         ahead = np.repeat(share[:, None], STEPS + 1, axis=1)
     scale, std = tabulated(course.forward, z, course.column, course.series.main_point)
@@ -377,15 +402,11 @@ def _extrapolate(
     def values(key: str, shares: Field) -> Field:
         if key == CLR:
             return OUTPUTS[CLR].back(between_knots(scale, shares)[0] + error_clr[:, None])
-        return unknown.value(unknown.at_share(shares))
+        return course.unknown.value(course.unknown.at_share(shares))
 
-    now = share[:, None]
-    return (
-        values(limit.key, filtered.path),
-        values(limit.key, ahead),
-        values(CLR, now)[:, 0],
-        values(course.drifting, now)[:, 0],
-    )
+    past, now = filtered.path, share[:, None]
+    clr, value = (values(key, now)[:, 0] for key in (CLR, course.drifting))
+    return _Courses(values(limit.key, past), values(limit.key, ahead), clr, value)
 
 
 def _draw_state(filtered: FilteredState, rng: np.random.Generator) -> Field:

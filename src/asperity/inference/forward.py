@@ -180,26 +180,27 @@ class ForwardModel:
         machine_damping = self.unknown(z, "damping_ratio", model.damping_ratio)[:, None]
         loads = np.array([point.load_n for point in self.points])
         if law == "hertz-point":
-            stiffness, stiffness_std, log_force = self._sphere(emulated[CLR], loads)
-            damping = np.log(machine_damping) + np.zeros_like(stiffness)
-            damping_std = np.zeros_like(stiffness)
+            spring = self._sphere(emulated[CLR], loads, machine_damping)
         else:
-            stiffness, stiffness_std = emulated[STIFFNESS]
-            log_force = np.broadcast_to(np.log(loads), stiffness.shape)
-            own, own_std = emulated[DAMPING]
-            scale = OUTPUTS[DAMPING]
-            total = np.maximum(machine_damping + scale.back(own), MIN_DAMPING)
-            damping, damping_std = np.log(total), own_std / scale.slope(scale.back(own)) / total
-        crf = 0.5 * (stiffness - np.log(mass)) - math.log(2.0 * math.pi)
+            spring = _emulated_spring(emulated, loads, machine_damping)
+        crf = 0.5 * (spring.stiffness - np.log(mass)) - math.log(2.0 * math.pi)
         crfa, crfa_std = np.full(crf.shape, np.nan), np.full(crf.shape, np.nan)
         if heights and self._noise_excited:
-            crfa, crfa_std = self._log_crfa(z, crf, damping, emulated[CAR])
+            crfa, crfa_std = self._log_crfa(z, crf, spring.damping, emulated[CAR])
         return ChannelPrediction(
-            crf, 0.5 * stiffness_std, damping, damping_std, crfa, crfa_std, log_force
+            crf,
+            0.5 * spring.stiffness_std,
+            spring.damping,
+            spring.damping_std,
+            crfa,
+            crfa_std,
+            spring.log_force,
         )
 
-    def _sphere(self, emulated: tuple[Field, Field], loads: Field) -> tuple[Field, Field, Field]:
-        """Return ln of the sphere's stiffness under CLR F, its deviation, and ln(CLR F)."""
+    def _sphere(
+        self, emulated: tuple[Field, Field], loads: Field, machine_damping: Field
+    ) -> "_Spring":
+        """Return the spring of a sphere under CLR F, with the machine's damping."""
         mean, std = emulated
         share = OUTPUTS[CLR].back(mean)
         bounded = np.maximum(share, MIN_SHARE)
@@ -208,9 +209,12 @@ class ForwardModel:
             1.0, conditions.radius_along_rolling, conditions.pair.reduced_modulus
         )
         log_force = np.log(bounded * loads)
-        return (
-            math.log(one_newton) + log_force / 3.0,
+        stiffness = math.log(one_newton) + log_force / 3.0
+        return _Spring(
+            stiffness,
             std / OUTPUTS[CLR].slope(share) / bounded / 3.0,
+            np.log(machine_damping) + np.zeros_like(stiffness),
+            np.zeros_like(stiffness),
             log_force,
         )
 
@@ -241,6 +245,33 @@ class ForwardModel:
             - math.log(4.0)
         )
         return np.asarray(height), power * exponent * emulated[1] / (OUTPUTS[CAR].slope(car) * car)
+
+
+class _Spring(NamedTuple):
+    """Logarithms of stiffness, damping ratio and force, with standard deviations, (n, points)."""
+
+    stiffness: Field
+    stiffness_std: Field
+    damping: Field
+    damping_std: Field
+    log_force: Field
+
+
+def _emulated_spring(
+    emulated: Mapping[str, tuple[Field, Field]], loads: Field, machine_damping: Field
+) -> _Spring:
+    """Return the spring of the emulated contact, whose damping adds to the machine's."""
+    stiffness, stiffness_std = emulated[STIFFNESS]
+    own, own_std = emulated[DAMPING]
+    scale = OUTPUTS[DAMPING]
+    total = np.maximum(machine_damping + scale.back(own), MIN_DAMPING)
+    return _Spring(
+        stiffness,
+        stiffness_std,
+        np.log(total),
+        own_std / scale.slope(scale.back(own)) / total,
+        np.broadcast_to(np.log(loads), stiffness.shape),
+    )
 
 
 def _operating_value(setting: Setting, point: ObservationPoint, key: str) -> float:

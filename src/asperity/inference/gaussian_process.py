@@ -7,12 +7,12 @@ precision, accurate to 1e-5 of a standard deviation.
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 
 LENGTHS = (0.1, 30.0)  # bounds of the kernel's lengths, in widths of the cube
@@ -122,7 +122,7 @@ class GaussianProcess:
         scaled = covariance / deviations[:, :, None] / deviations[:, None]
         return np.asarray(np.clip(scaled, -1.0, 1.0))
 
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> JsonObject:
         """Return the fitted hyperparameters."""
         return {
             "lengths": [float(length) for length in self.lengths],

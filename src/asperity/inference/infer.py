@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from asperity.case import Case
 from asperity.core.arrays import Field
@@ -16,6 +15,7 @@ from asperity.inference.inference import Inference
 from asperity.inference.next_point import candidate_points, expected_information
 from asperity.inference.observations import Observation, ObservationPoint, operating_points
 from asperity.inference.posterior import (
+    ContactPool,
     Draws,
     Sampler,
     emulated_share,
@@ -28,7 +28,6 @@ from asperity.inference.posterior import (
 )
 from asperity.inference.priors import share_of
 from asperity.inference.recording_input import ObservedSeries, RecordingInput, observe_recordings
-from asperity.inference.sampling import Pool
 from asperity.inference.settings import Setting, inference_setting
 from asperity.inference.visits import visit_series
 from asperity.simulation import WearHistory, load_wear
@@ -117,14 +116,20 @@ def infer_contact(
 
 
 def refine_emulator(
-    inference: Inference, max_points: int, *, sampler: Sampler = "importance", **options: Any
+    inference: Inference,
+    max_points: int,
+    *,
+    sampler: Sampler = "importance",
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
 ) -> Inference:
     """Extend the emulator in the region of the posterior by up to `max_points` points; add a note.
 
     Points are added in rounds, each with a new posterior, while the emulator's variance exceeds a
     tenth of the posterior variance of CLR (on its scale, at the case's operating point). They are
     posterior draws at the measured operating points in turn, and are stored with the emulator.
-    `options` are those of `build_emulator`.
+    `executor`, `workers` and `progress` are those of `build_emulator`.
 
     Raises
     ------
@@ -136,7 +141,14 @@ def refine_emulator(
     while max_points > added and share > EMULATOR_SHARE and inference.observations:
         count = min(max_points - added, EXTENSION_STEP)
         shares = posterior_shares(inference.forward, inference.draws, count, inference.seed + added)
-        emulator = extend_emulator(inference.setting, inference.emulator, shares, **options)
+        emulator = extend_emulator(
+            inference.setting,
+            inference.emulator,
+            shares,
+            executor=executor,
+            workers=workers,
+            progress=progress,
+        )
         inference, added = (
             infer_observations(
                 inference.setting,
@@ -324,7 +336,7 @@ class _Source:
 def _infer(
     forward: ForwardModel,
     source: _Source,
-    pools: dict[Law, Pool],
+    pools: dict[Law, ContactPool],
     sampler: Sampler,
     seed: int,
     *,

@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 from asperity.core.quantities import quantity
 from asperity.inference.emulator import Emulator
 from asperity.inference.estimates import Estimate, quantity_estimates
@@ -14,8 +15,7 @@ from asperity.inference.forward import LAWS, ForwardModel, Law
 from asperity.inference.next_point import NextPoint
 from asperity.inference.observations import Observation, ObservationPoint
 from asperity.inference.outputs import CLR, FILM, OUTPUTS
-from asperity.inference.posterior import Draws, ModelEvidence
-from asperity.inference.sampling import Pool
+from asperity.inference.posterior import ContactPool, Draws, ModelEvidence
 from asperity.inference.settings import Setting
 from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW
 
@@ -59,7 +59,7 @@ class PointEstimates:
             f"{stage} ({100.0 * probability:.0f} %)",
         ]
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON output."""
         return {
             "load_n": self.point.load_n,
@@ -95,7 +95,7 @@ class Inference:
     draws: Draws
     exact: Draws
     candidates: tuple[NextPoint, ...]
-    pools: Mapping[Law, Pool] = field(repr=False)
+    pools: Mapping[Law, ContactPool] = field(repr=False)
     seed: int = 0
     notes: tuple[str, ...] = ()
 
@@ -289,7 +289,7 @@ class Inference:
             f"{following.information_bits:.1f} bits expected."
         )
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON output of `asperity infer`, SI."""
         conditions = self.setting.case.conditions
         return {

@@ -8,12 +8,12 @@ and common to similar ones. The law's exponent of the load is uncertain too. CRF
 gain common to all recordings.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, Mask
 from asperity.inference.forward import ChannelPrediction
 from asperity.inference.observations import ObservationPoint, point_similarity
 
@@ -45,7 +45,7 @@ def log_at_sizes(
     sizes: Sequence[float] = SIZES,
 ) -> Field:
     """Return the log-likelihood of one channel for each size of the law's error, (sizes, n)."""
-    value, std = _measured(points, channel)
+    value, std = measured_channel(points, channel)
     mean, log_force = getattr(prediction, channel), prediction.log_force
     here = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
     logs = np.zeros((len(sizes), len(mean)))
@@ -99,38 +99,54 @@ def predictive_mixture(
     Errors of law and emulator, and the sizes of the law's, are those of the likelihood,
     conditional on the measurements.
     """
-    value, measured = _measured(points, channel)
-    mean, log_force, similarity = (
-        getattr(prediction, channel),
-        prediction.log_force,
-        point_similarity(points),
-    )
+    value, measured = measured_channel(points, channel)
+    mean, similarity = getattr(prediction, channel), point_similarity(points)
     here = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
     logs = log_at_sizes(prediction, points, channel, sizes)
     share = logs - np.logaddexp.reduce(logs, axis=0)
     expected, std = np.tile(mean, (len(sizes), 1, 1)), np.empty((len(sizes), *mean.shape))
     for rows in _row_blocks(len(mean), len(points)):
-        pivot = (
-            log_force[rows][:, here].mean(axis=1, keepdims=True) if here.any() else log_force[rows]
-        )
-        emulated = emulated_errors(channel, _deviation(prediction, channel)[rows], similarity)
-        for number, size in enumerate(sizes):
-            errors = emulated + law_errors(
-                channel, log_force[rows], np.full(len(rows), size), similarity, pivot
-            )
+        covariances = _block_errors(prediction, channel, rows, similarity, here, sizes)
+        for number, errors in enumerate(covariances):
             variance = np.einsum("nii->ni", errors).copy()
             if here.any():
-                across = errors[:, here]
-                weights = np.linalg.solve(across[:, :, here] + np.diag(measured[here] ** 2), across)
-                expected[number, rows] += np.einsum(
-                    "nh,nhp->np", value[here] - mean[rows][:, here], weights
-                )
-                variance -= np.einsum("nhp,nhp->np", across, weights)
+                residual = (value - mean[rows])[:, here]
+                shift, explained = _explained_errors(errors, here, residual, measured[here] ** 2)
+                expected[number, rows] += shift
+                variance -= explained
             std[number, rows] = np.sqrt(np.maximum(variance, 0.0))
     return PredictiveMixture(np.broadcast_to(share[:, :, None], std.shape), expected, std)
 
 
-def _measured(points: Sequence[ObservationPoint], channel: str) -> tuple[Field, Field]:
+def _block_errors(
+    prediction: ChannelPrediction,
+    channel: str,
+    rows: Field,
+    similarity: Field,
+    here: Mask,
+    sizes: Sequence[float],
+) -> Iterator[Field]:
+    """Yield the covariance of all errors of some rows for each size, relative to points `here`."""
+    log_force = prediction.log_force[rows]
+    pivot = log_force[:, here].mean(axis=1, keepdims=True) if here.any() else log_force
+    emulated = emulated_errors(channel, _deviation(prediction, channel)[rows], similarity)
+    for size in sizes:
+        yield emulated + law_errors(channel, log_force, np.full(len(rows), size), similarity, pivot)
+
+
+def _explained_errors(
+    errors: Field, here: Mask, residual: Field, noise: Field
+) -> tuple[Field, Field]:
+    """Return the mean and the variance of errors at all points that residuals `here` explain."""
+    across = errors[:, here]
+    weights = np.linalg.solve(across[:, :, here] + np.diag(noise), across)
+    return (
+        np.asarray(np.einsum("nh,nhp->np", residual, weights)),
+        np.asarray(np.einsum("nhp,nhp->np", across, weights)),
+    )
+
+
+def measured_channel(points: Sequence[ObservationPoint], channel: str) -> tuple[Field, Field]:
     """Return values and standard deviations of a channel at points."""
     entries = [getattr(point, channel) for point in points]
     return np.array([entry.value for entry in entries]), np.array([entry.std for entry in entries])

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
 
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 from asperity.inference.forward import LAWS, ForwardModel
 from asperity.inference.likelihood import SIZES, PredictiveMixture, predictive_mixture
 from asperity.inference.observations import ObservationPoint
@@ -30,7 +31,7 @@ class NextPoint:
     entrainment_m_s: float
     information_bits: float
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON output."""
         return {
             "load_n": self.load_n,

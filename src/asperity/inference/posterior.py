@@ -5,12 +5,14 @@ A model is a spring law with or without a discrepancy term. Models are weighted 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, Mask
+from asperity.core.documents import JsonObject
 from asperity.core.errors import AsperityError
 from asperity.inference.forward import LAWS, MIN_SHARE, ChannelPrediction, ForwardModel, Law
 from asperity.inference.likelihood import (
@@ -20,11 +22,14 @@ from asperity.inference.likelihood import (
     law_errors,
     log_at_sizes,
     log_likelihood,
+    measured_channel,
 )
 from asperity.inference.observations import ObservationPoint, point_similarity
 from asperity.inference.outputs import CAR, CLR, FILM, FRICTION, OUTPUTS
 from asperity.inference.sampling import (
+    ENOUGH,
     FEWEST,
+    PROBED,
     QUICK_ENOUGH,
     RULED_OUT,
     Pool,
@@ -34,6 +39,7 @@ from asperity.inference.sampling import (
 )
 
 Sampler = Literal["importance", "nested"]
+ContactPool: TypeAlias = Pool[ChannelPrediction]
 DRAWS = 2000  # equally probable draws of a posterior
 STATE = (CLR, CAR, FILM, FRICTION)
 MODELS: tuple[tuple[Law, bool], ...] = tuple(
@@ -53,7 +59,7 @@ class ModelEvidence:
     information_bits: float
     effective: float
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON output of the model."""
         return dict(vars(self))
 
@@ -72,7 +78,7 @@ class Draws:
     states: Mapping[str, Field]
     effective: float
 
-    def select_rows(self, rows: Any) -> "Draws":
+    def select_rows(self, rows: NDArray[np.intp]) -> "Draws":
         """Return the draws of some rows."""
         sizes, states = (
             {key: values[rows] for key, values in columns.items()}
@@ -83,7 +89,7 @@ class Draws:
 
 def sample_models(
     forward: ForwardModel,
-    pools: Mapping[Law, Pool],
+    pools: Mapping[Law, ContactPool],
     *,
     sampler: Sampler,
     seed: int,
@@ -98,14 +104,14 @@ def sample_models(
     """
     forward = forward.observed
     sampled: dict[tuple[Law, bool], WeightedSamples] = {}
-    options: dict[str, Any] = {"enough": QUICK_ENOUGH, "probed": 0} if quickly else {}
+    enough, probed = (QUICK_ENOUGH, 0) if quickly else (ENOUGH, PROBED)
     best = -np.inf
     for law, discrepancy in _by_likelihood(forward, pools):
         target = _target(forward.points, discrepancy=discrepancy)
         if sampler == "nested":
             samples = nested(_evaluate(forward, law), target, forward.dims, seed)
         else:
-            samples = importance(pools[law], target, best=best, **options)
+            samples = importance(pools[law], target, best=best, enough=enough, probed=probed)
         sampled[law, discrepancy], best = samples, max(best, samples.log_evidence)
     for (law, _), samples in sampled.items():
         if samples.effective < FEWEST and samples.log_evidence > best - RULED_OUT:
@@ -113,8 +119,13 @@ def sample_models(
                 f"the posterior of the law {law} was not found: effective sample size "
                 f"{samples.effective:.0f}; use nested sampling or wider priors"
             )
+    return _evidence(sampled), sampled
+
+
+def _evidence(sampled: Mapping[tuple[Law, bool], WeightedSamples]) -> tuple[ModelEvidence, ...]:
+    """Return the evidence of each model and its posterior probability."""
     total = logsumexp([samples.log_evidence for samples in sampled.values()])
-    models = tuple(
+    return tuple(
         ModelEvidence(
             law,
             discrepancy,
@@ -128,10 +139,11 @@ def sample_models(
             sampled.items(), key=lambda entry: MODELS.index(entry[0])
         )
     )
-    return models, sampled
 
 
-def _by_likelihood(forward: ForwardModel, pools: Mapping[Law, Pool]) -> list[tuple[Law, bool]]:
+def _by_likelihood(
+    forward: ForwardModel, pools: Mapping[Law, ContactPool]
+) -> list[tuple[Law, bool]]:
     """Return the models by their largest likelihood so far, so that poor models need few draws."""
 
     def likelihood(model: tuple[Law, bool]) -> float:
@@ -150,7 +162,7 @@ def _evaluate(forward: ForwardModel, law: Law) -> Callable[[Field], ChannelPredi
     return lambda z: forward.predict(z, law)
 
 
-def new_pools(forward: ForwardModel, seed: int) -> dict[Law, Pool]:
+def new_pools(forward: ForwardModel, seed: int) -> dict[Law, ContactPool]:
     """Draw from the prior for each law."""
     return {
         law: Pool(_evaluate(forward.observed, law), join_rows, select_rows, forward.dims, seed)
@@ -159,8 +171,8 @@ def new_pools(forward: ForwardModel, seed: int) -> dict[Law, Pool]:
 
 
 def with_point(
-    pools: Mapping[Law, Pool], forward: ForwardModel, added: ForwardModel
-) -> dict[Law, Pool]:
+    pools: Mapping[Law, ContactPool], forward: ForwardModel, added: ForwardModel
+) -> dict[Law, ContactPool]:
     """Return the relevant draws with one more operating point; `forward` has all points."""
     extended, forward = {}, forward.observed
     previous = forward.points[: -len(added.points)]
@@ -179,7 +191,7 @@ def with_point(
 Columns = TypeVar("Columns", bound=tuple[Field, ...])
 
 
-def select_rows(columns: Columns, rows: Field) -> Columns:
+def select_rows(columns: Columns, rows: Mask | slice) -> Columns:
     """Return some rows of each column."""
     return type(columns)(*(column[rows] for column in columns))
 
@@ -264,11 +276,7 @@ def _draw(
     *,
     discrepancy: bool,
 ) -> Draws:
-    levels = (rng.random() + np.arange(count)) / count  # systematic resampling
-    chosen = np.minimum(
-        np.searchsorted(np.cumsum(sampled.weights), levels), len(sampled.weights) - 1
-    )
-    z = sampled.z[chosen]
+    z = sampled.resample(count, rng)
     emulated = forward.emulate(z, tuple(dict.fromkeys((*STATE, *forward.required_outputs(law)))))
     prediction = forward.predict_from(z, law, emulated)
     none = dict.fromkeys(WEIGHTS, np.zeros(count))
@@ -310,7 +318,7 @@ def _corrected(
     By Matheron's rule: a joint draw of shares and frequencies is corrected by the difference of
     the measured frequencies from it.
     """
-    measured = np.array([point.crf.value for point in points])
+    measured, measured_std = measured_channel(points, "crf")
     here = ~np.isnan(measured)
     similarity = point_similarity(points)
     emulator = emulated_errors("crf", std, similarity)
@@ -319,18 +327,13 @@ def _corrected(
         return mean + errors
     share = OUTPUTS[CLR].back(mean)
     # d ln CRF / d scale
-    slope = 1.0 / (6.0 * np.maximum(share, MIN_SHARE) * OUTPUTS[CLR].slope(share))
-    slope = slope[:, here]
-    measured_std = np.array([point.crf.std for point in points])[here]
+    slope = (1.0 / (6.0 * np.maximum(share, MIN_SHARE) * OUTPUTS[CLR].slope(share)))[:, here]
     law = law_errors("crf", prediction.log_force[:, here], size, similarity[np.ix_(here, here)])
-    noise = law + np.diag(measured_std**2)
+    noise = law + np.diag(measured_std[here] ** 2)
     across = emulator[:, :, here] * slope[:, None]  # covariance of shares and frequencies
     total = across[:, here] * slope[:, :, None] + noise
     residual = (
-        measured[here]
-        - prediction.crf[:, here]
-        - slope * errors[:, here]
-        - _draw_normal(noise, rng)
+        (measured - prediction.crf)[:, here] - slope * errors[:, here] - _draw_normal(noise, rng)
     )
     correction = across @ np.linalg.solve(total, residual[:, :, None])
     return np.asarray(mean + errors + correction[:, :, 0])

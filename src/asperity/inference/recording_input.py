@@ -1,14 +1,14 @@
 """Observations from recordings: tracked as a series, each with its operating point."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from asperity.case import Case
+from asperity.core.documents import Table
 from asperity.coupling import search_band
 from asperity.inference.observations import Observation
 from asperity.inference.settings import LOAD, Setting
@@ -131,7 +131,7 @@ def observations_from_track(tracked: Track, case: Case) -> ObservedSeries:
 
 
 def observations_from_rows(
-    rows: Sequence[Mapping[str, Any]], case: Case, *, comparable: bool
+    rows: Sequence[Table], case: Case, *, comparable: bool
 ) -> ObservedSeries:
     """Return observations from rows of `asperity track --json` or a store.
 
@@ -139,34 +139,14 @@ def observations_from_rows(
     """
     observations, excluded, assumed = [], [], set()
     for row in rows:
-        name, std = Path(row["file"]).name, row["crf_std_hz"]
+        name = Path(str(row["file"])).name
         if not row["found"]:
-            excluded.append((name, row["reason"]))
-            continue
-        if not std:
+            excluded.append((name, str(row["reason"])))
+        elif not row["crf_std_hz"]:
             excluded.append((name, "its method gives no standard deviation of CRF"))
-            continue
-        assumed |= {key for key in ("load_n", "entrainment_m_s") if row[key] is None}
-        speed, celsius = row["entrainment_m_s"], row["temperature_degc"]
-        crfa, crfa_std = _with_deviation(row, "crfa", "crfa_std") if comparable else (nan, nan)
-        damping, damping_std = _with_deviation(row, "damping_ratio", "damping_std")
-        observations.append(
-            Observation(
-                load_n=case.conditions.load if row["load_n"] is None else row["load_n"],
-                entrainment_m_s=case.conditions.entrainment_speed if speed is None else speed,
-                temperature_k=None if celsius is None else celsius + ZERO_CELSIUS,
-                crf_hz=row["crf_hz"],
-                crf_std_hz=std,
-                # missing in rows of an older store
-                crf_shared_std_hz=row.get("crf_shared_std_hz") or 0.0,
-                crfa=crfa,
-                crfa_std=crfa_std,
-                damping_ratio=damping,
-                damping_std=damping_std,
-                name=name,
-                x=nan if row["x"] is None else row["x"],
-            )
-        )
+        else:
+            assumed |= {key for key in ("load_n", "entrainment_m_s") if row[key] is None}
+            observations.append(_observation(row, name, case, comparable=comparable))
     words = {"load_n": "load", "entrainment_m_s": "entrainment speed"}
     notes = [
         f"The {words[key]} is not given for every recording; that of {case.source} was used."
@@ -175,6 +155,37 @@ def observations_from_rows(
     return ObservedSeries(None, tuple(observations), tuple(excluded), tuple(notes))
 
 
-def _with_deviation(row: Mapping[str, Any], key: str, std: str) -> tuple[float, float]:
+def _observation(row: Table, name: str, case: Case, *, comparable: bool) -> Observation:
+    """Return the observation of a row, by default at the case's load and speed."""
+    load, speed, celsius, x = (
+        _number(row, key) for key in ("load_n", "entrainment_m_s", "temperature_degc", "x")
+    )
+    crf, crf_std = _with_deviation(row, "crf_hz", "crf_std_hz")
+    crfa, crfa_std = _with_deviation(row, "crfa", "crfa_std") if comparable else (nan, nan)
+    damping, damping_std = _with_deviation(row, "damping_ratio", "damping_std")
+    return Observation(
+        load_n=case.conditions.load if load is None else load,
+        entrainment_m_s=case.conditions.entrainment_speed if speed is None else speed,
+        temperature_k=None if celsius is None else celsius + ZERO_CELSIUS,
+        crf_hz=crf,
+        crf_std_hz=crf_std,
+        # missing in rows of an older store
+        crf_shared_std_hz=_number(row, "crf_shared_std_hz") or 0.0,
+        crfa=crfa,
+        crfa_std=crfa_std,
+        damping_ratio=damping,
+        damping_std=damping_std,
+        name=name,
+        x=nan if x is None else x,
+    )
+
+
+def _number(row: Table, key: str) -> float | None:
+    value = row.get(key)
+    return value if isinstance(value, int | float) else None
+
+
+def _with_deviation(row: Table, key: str, std: str) -> tuple[float, float]:
     """Return a value of a row and its standard deviation; nan if either is missing."""
-    return (row[key], row[std]) if row[key] is not None and row[std] else (nan, nan)
+    value, deviation = _number(row, key), _number(row, std)
+    return (value, deviation) if value is not None and deviation else (nan, nan)

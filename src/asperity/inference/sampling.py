@@ -7,12 +7,12 @@ draw is kept and reused for all targets.
 from collections.abc import Callable, Sequence
 from copy import copy, deepcopy
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Generic, TypeVar
 
 import numpy as np
 from scipy.special import logsumexp, ndtri
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
 
 FIRST, BATCH, ROUNDS = 4096, 2048, 30  # draws from the prior, draws per round, rounds
@@ -29,12 +29,13 @@ PROBED = 4  # rounds before a model may be judged hopeless
 NEGLIGIBLE = 1e-5  # weight relative to the largest, below which a draw is dropped
 LIVE_POINTS = 400  # of nested sampling
 
-Target = Callable[[Any], Field]  # outputs of draws to log-likelihoods
-Evaluate = Callable[[Field], Any]  # unknowns (n, d) to the inputs of targets, indexable by rows
+Outputs = TypeVar("Outputs")  # of draws: the inputs of targets
+Target = Callable[[Outputs], Field]  # outputs of draws to log-likelihoods
+Evaluate = Callable[[Field], Outputs]  # unknowns (n, d) to outputs
 
 
 @dataclass
-class Pool:
+class Pool(Generic[Outputs]):
     """Draws from several proposals, and the outputs computed for each.
 
     Parameters
@@ -45,13 +46,13 @@ class Pool:
     seed : random seed
     """
 
-    evaluate: Evaluate
-    join: Callable[[Any, Any], Any]
-    take: Callable[[Any, Any], Any]
+    evaluate: Evaluate[Outputs]
+    join: Callable[[Outputs, Outputs], Outputs]
+    take: Callable[[Outputs, Mask | slice], Outputs]
     dims: int
     seed: int
     z: Field = field(init=False)
-    outputs: Any = field(init=False)
+    outputs: Outputs = field(init=False)
     proposals: list[tuple[int, Callable[[Field], Field]]] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -69,7 +70,7 @@ class Pool:
         """Number of draws, including those dropped since."""
         return sum(count for count, _ in self.proposals)
 
-    def reduced(self, targets: Sequence[Field]) -> "Pool":
+    def reduced(self, targets: Sequence[Field]) -> "Pool[Outputs]":
         """Return a pool of only the draws relevant for one of these targets."""
         counts = np.zeros(len(self.z), dtype=bool)
         for target in targets:
@@ -79,7 +80,7 @@ class Pool:
         other.z, other._log_proposed = self.z[counts], self._log_proposed[counts]
         return other
 
-    def with_columns(self, evaluate: Evaluate, outputs: Any) -> "Pool":
+    def with_columns(self, evaluate: Evaluate[Outputs], outputs: Outputs) -> "Pool[Outputs]":
         """Return the same draws with other outputs."""
         other = copy(self)
         other.evaluate, other.outputs, other.proposals = evaluate, outputs, list(self.proposals)
@@ -94,7 +95,8 @@ class Pool:
 
     def learn(self, log_weights: Field) -> None:
         """Draw another batch from a proposal fitted to the weights."""
-        proposal, drawn = _proposal(self.z, _tempered(log_weights), self.rng)
+        proposal = _Proposal.from_draws(self.z, _tempered(log_weights), self.rng)
+        drawn = proposal.draw(self.rng)
         self._log_proposed = np.logaddexp(self._log_proposed, proposal(self.z) + np.log(BATCH))
         earlier = np.stack([np.log(count) + density(drawn) for count, density in self.proposals])
         here = np.logaddexp(logsumexp(earlier, axis=0), proposal(drawn) + np.log(BATCH))
@@ -114,6 +116,12 @@ class WeightedSamples:
     log_evidence_std: float
     log_likelihood: Field
 
+    def resample(self, count: int, rng: np.random.Generator) -> Field:
+        """Draw equally probable unknowns (count, d) by systematic resampling."""
+        levels = (rng.random() + np.arange(count)) / count
+        rows = np.searchsorted(np.cumsum(self.weights), levels)
+        return np.asarray(self.z[np.minimum(rows, len(self.weights) - 1)])
+
     @property
     def effective(self) -> float:
         """Effective sample size."""
@@ -132,8 +140,8 @@ class WeightedSamples:
 
 
 def importance(
-    pool: Pool,
-    log_target: Target,
+    pool: Pool[Outputs],
+    log_target: Target[Outputs],
     *,
     enough: float = ENOUGH,
     rounds: int = ROUNDS,
@@ -174,7 +182,9 @@ def importance(
     )
 
 
-def nested(evaluate: Evaluate, log_target: Target, dims: int, seed: int) -> WeightedSamples:
+def nested(
+    evaluate: Evaluate[Outputs], log_target: Target[Outputs], dims: int, seed: int
+) -> WeightedSamples:
     """Sample a target by nested sampling (dynesty), slower and more robust to several modes.
 
     Raises
@@ -224,37 +234,53 @@ def _tempered(log_weights: Field) -> Field:
     return np.asarray(np.exp(power * log_weights - logsumexp(power * log_weights)))
 
 
-def _proposal(
-    z: Field, weights: Field, rng: np.random.Generator
-) -> tuple[Callable[[Field], Field], Field]:
-    """Return ln density and a batch of a proposal: normals at weighted draws, and the prior."""
-    mean = weights @ z
-    covariance = (weights[:, None] * (z - mean)).T @ (z - mean)
-    covariance = COMPONENT_WIDTH**2 * covariance + 1e-4 * np.eye(len(mean))
-    centres = z[rng.choice(len(z), CENTRES, p=weights)]
-    lower = np.linalg.cholesky(covariance)
-    log_norm = -np.sum(np.log(np.diag(lower))) - 0.5 * len(mean) * np.log(2.0 * np.pi)
-    inverse = np.linalg.inv(lower)
-    whitened = centres @ inverse.T
+@dataclass(frozen=True)
+class _Proposal:
+    """Mixture of equal normals around `centres` (n, d), and the prior.
 
-    def density(points: Field) -> Field:
-        own = points @ inverse.T
-        exponent = own @ whitened.T  # minus half the squared distance to each centre, in place
-        exponent -= 0.5 * np.sum(whitened**2, axis=1)
+    `lower` is the Cholesky factor of the normals' covariance, `inverse` its inverse.
+    """
+
+    centres: Field
+    lower: Field
+    inverse: Field
+    whitened: Field
+    log_norm: float
+
+    @classmethod
+    def from_draws(cls, z: Field, weights: Field, rng: np.random.Generator) -> "_Proposal":
+        """Fit a proposal to weighted draws."""
+        mean = weights @ z
+        covariance = (weights[:, None] * (z - mean)).T @ (z - mean)
+        covariance = COMPONENT_WIDTH**2 * covariance + 1e-4 * np.eye(len(mean))
+        centres = z[rng.choice(len(z), CENTRES, p=weights)]
+        lower = np.linalg.cholesky(covariance)
+        log_norm = -np.sum(np.log(np.diag(lower))) - 0.5 * len(mean) * np.log(2.0 * np.pi)
+        inverse = np.linalg.inv(lower)
+        return cls(centres, lower, inverse, centres @ inverse.T, log_norm)
+
+    def __call__(self, points: Field) -> Field:
+        """Return the ln density at points (n, d)."""
+        own = points @ self.inverse.T
+        exponent = own @ self.whitened.T  # minus half the squared distance to each centre, in place
+        exponent -= 0.5 * np.sum(self.whitened**2, axis=1)
         exponent -= 0.5 * np.sum(own**2, axis=1)[:, None]
         peak = exponent.max(axis=1)
         exponent -= peak[:, None]
-        parts = peak + np.log(np.exp(exponent, out=exponent).mean(axis=1)) + log_norm
+        parts = peak + np.log(np.exp(exponent, out=exponent).mean(axis=1)) + self.log_norm
         return np.asarray(
             np.logaddexp(
                 np.log1p(-PRIOR_WEIGHT) + parts, np.log(PRIOR_WEIGHT) + _log_normal(points)
             )
         )
 
-    drawn = (
-        centres[rng.integers(CENTRES, size=BATCH)]
-        + rng.standard_normal((BATCH, len(mean))) @ lower.T
-    )
-    from_prior = rng.random(BATCH) < PRIOR_WEIGHT
-    drawn[from_prior] = rng.standard_normal((int(from_prior.sum()), len(mean)))
-    return density, drawn
+    def draw(self, rng: np.random.Generator) -> Field:
+        """Draw a batch."""
+        dims = len(self.lower)
+        drawn = (
+            self.centres[rng.integers(CENTRES, size=BATCH)]
+            + rng.standard_normal((BATCH, dims)) @ self.lower.T
+        )
+        from_prior = rng.random(BATCH) < PRIOR_WEIGHT
+        drawn[from_prior] = rng.standard_normal((int(from_prior.sum()), dims))
+        return np.asarray(drawn)

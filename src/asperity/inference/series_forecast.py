@@ -1,9 +1,9 @@
 """Forecast of a tracked or watched series from its rows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from asperity.core.documents import JsonObject, Table
 from asperity.core.errors import AsperityError
 from asperity.inference.emulator import Emulator
 from asperity.inference.forecast import Forecast, Limit, require_limit
@@ -35,7 +35,7 @@ class SeriesForecast:
         """Return the forecast as a sentence."""
         return f"No forecast: {self.reason}." if self.forecast is None else self.forecast.sentence()
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON output; only a sentence without a forecast."""
         return {"sentence": self.sentence()} if self.forecast is None else self.forecast.scalars()
 
@@ -73,9 +73,7 @@ class SeriesForecaster:
         emulator = f"{self.emulator.folder}, {self.emulator.points} contacts"
         return f"{self.limit.key}={self.limit.value:g} by {emulator}, seed {self.seed}{worn}"
 
-    def __call__(
-        self, rows: Sequence[Mapping[str, Any]], x_name: str, *, comparable: bool
-    ) -> SeriesForecast:
+    def __call__(self, rows: Sequence[Table], x_name: str, *, comparable: bool) -> SeriesForecast:
         """Return the forecast, or the reason why there is none."""
         series = observations_from_rows(rows, self.setting.case, comparable=comparable)
         try:

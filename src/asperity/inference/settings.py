@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Literal
 
 from asperity.case import Case, InferSection, PriorSection, SheetSection, split_amount
 from asperity.core.errors import BadInput
@@ -17,6 +17,7 @@ OPERATING: Mapping[str, tuple[float, float]] = {LOAD: (0.4, 2.0), SPEED: (0.25, 
 TEMPERATURE_SPAN_K = 25.0  # either side of the case's temperature
 OFFSET_STD_K = 3.0
 MIN_CELLS_PER_LENGTH = 2.0  # the grid does not resolve shorter correlation lengths
+Prior = PriorSection | Literal["known"]
 LENGTHS = (
     "surface.correlation_length",
     "surface.correlation_length[0]",
@@ -107,14 +108,7 @@ def inference_setting(case: Case) -> Setting:
         for a case without [vibration], oil or roughness; a prior of a quantity that cannot be
         inferred; a range that the grid does not resolve.
     """
-    if case.vibration is None:
-        raise BadInput(
-            f"{case.source}: vibration is missing; add [vibration] with mass and damping_ratio"
-        )
-    if case.lubricant is None:
-        raise BadInput(f"{case.source}: the contact is dry, so that CLR is 1; add a lubricant")
-    if stated_value(case, "surface.kind") == "flat":
-        raise BadInput(f"{case.source}: surface is flat, without asperity contact; use a rough one")
+    _require_inferable(case)
     section = case.contents.infer or InferSection()
     base = case.with_overrides(
         {"infer": "none", "study": "none", "grid.cells": list(section.cells)}
@@ -131,11 +125,8 @@ def inference_setting(case: Case) -> Setting:
             f"{case.source}: surface has no sq to infer; use a generated surface, kind gaussian"
         )
     if any(entry.key == TEMPERATURE for entry in operating):
-        unknowns.append(
-            Unknown.stated(
-                OFFSET, TEMPERATURE, 0.0, OFFSET_STD_K, "K", "of the oil from the stated value"
-            )
-        )
+        label = "of the oil from the stated value"
+        unknowns.append(Unknown.stated(OFFSET, TEMPERATURE, 0.0, OFFSET_STD_K, "K", label))
     unknowns.append(
         Unknown.stated(GRID_ERROR, "grid.cells", 0.0, 1.0, "", "of the emulator's grid")
     )
@@ -150,6 +141,18 @@ def inference_setting(case: Case) -> Setting:
     return setting
 
 
+def _require_inferable(case: Case) -> None:
+    """Raise BadInput for a case without vibration, oil or roughness."""
+    if case.vibration is None:
+        raise BadInput(
+            f"{case.source}: vibration is missing; add [vibration] with mass and damping_ratio"
+        )
+    if case.lubricant is None:
+        raise BadInput(f"{case.source}: the contact is dry, so that CLR is 1; add a lubricant")
+    if stated_value(case, "surface.kind") == "flat":
+        raise BadInput(f"{case.source}: surface is flat, without asperity contact; use a rough one")
+
+
 def _key_of(case: Case, name: str) -> str:
     """Return the case key of a name in [infer]; BadInput for one that cannot be inferred."""
     key = name if name in UNKNOWNS else full_key(case, name, "infer")
@@ -161,7 +164,7 @@ def _key_of(case: Case, name: str) -> str:
     return key
 
 
-def _operating(case: Case, stated: Mapping[str, Any]) -> tuple[ParameterRange, ...]:
+def _operating(case: Case, stated: Mapping[str, Prior]) -> tuple[ParameterRange, ...]:
     ranges = []
     for key, (low, high) in OPERATING.items():
         own, unit = split_amount(stated_value(case, key))
@@ -182,24 +185,24 @@ def _operating(case: Case, stated: Mapping[str, Any]) -> tuple[ParameterRange, .
     return tuple(ranges)
 
 
-def _stated_range(case: Case, key: str, prior: Any) -> ParameterRange | None:
+def _stated_range(case: Case, key: str, prior: Prior | None) -> ParameterRange | None:
     """Return an operating range stated in [infer], or None."""
     if prior is None:
         return None
     if not isinstance(prior, PriorSection) or prior.start is None:
         name = key.rpartition(".")[2]
         raise BadInput(f"{case.source}: infer.{name} is an operating range; give from and to")
-    return _range(case, key, prior.start, prior.to)
+    return _range(case, key, prior)
 
 
-def _range(case: Case, key: str, start: Any, to: Any, reason: str = "as stated") -> ParameterRange:
-    low, unit = _amount(case, key, "from", start)
-    high, _ = _amount(case, key, "to", to, unit)
-    return ParameterRange(key, low, high, unit, reason)
+def _range(case: Case, key: str, prior: PriorSection) -> ParameterRange:
+    low, unit = _amount(case, key, "from", prior.start)
+    high, _ = _amount(case, key, "to", prior.to, unit)
+    return ParameterRange(key, low, high, unit, "as stated")
 
 
 def _amount(
-    case: Case, key: str, entry: str, value: Any, unit: str | None = None
+    case: Case, key: str, entry: str, value: object, unit: str | None = None
 ) -> tuple[float, str]:
     try:
         number, own = split_amount(value, unit)
@@ -209,39 +212,22 @@ def _amount(
 
 
 def _unknown(
-    case: Case, key: str, default: _Default, prior: Any, operating: tuple[ParameterRange, ...]
+    case: Case,
+    key: str,
+    default: _Default,
+    prior: Prior | None,
+    operating: tuple[ParameterRange, ...],
 ) -> Unknown | None:
     """Return an unknown with its stated or default prior; None if absent or known in the case."""
-    own = stated_value(case, key)
-    if key == LENGTHS[0] and isinstance(own, list):
-        own = own[0] if own[0] == own[1] else None
-    elif key in LENGTHS[1:] and (own is None or _isotropic(case)):
-        own = None
+    own = _own_value(case, key)
     if prior == "known" or own is None:
         if isinstance(prior, PriorSection):
             raise BadInput(
                 f"{case.source}: infer.{key} has a prior, but the case has no such quantity"
             )
         return None
-    if isinstance(prior, PriorSection) and prior.start is None:
-        mean, unit = _amount(case, key, "value", prior.value)
-        std, _ = _amount(case, key, "std", prior.std, unit)
-        if not 0.0 < std < math.inf:
-            raise BadInput(
-                f"{case.source}: infer.{key}.std must be positive, got {prior.std}; "
-                'for a certain value, write "known"'
-            )
-        return Unknown.stated(default.key, key, mean, std, unit, "as stated")
-    if isinstance(prior, PriorSection):
-        stated = _range(case, key, prior.start, prior.to)
-        resolved = _resolved(case, stated, operating) if key in LENGTHS else stated
-        if resolved != stated:
-            raise BadInput(
-                f"{case.source}: infer.{key.rpartition('.')[2]} must lie within {resolved.low:g} "
-                f"to {resolved.high:g} {resolved.unit}, which the emulator's grid resolves at "
-                "every load; narrow it, or increase infer.cells"
-            )
-        return Unknown(default.key, stated)
+    if prior is not None:
+        return _stated_unknown(case, key, default.key, prior, operating)
     number, unit = split_amount(own)
     mean = float(number)
     if not math.isnan(default.relative_std):
@@ -250,7 +236,43 @@ def _unknown(
         )
     low, high = default.ends or (mean / default.factor, mean * default.factor)
     entry = ParameterRange(key, float(f"{low:.4g}"), float(f"{high:.4g}"), unit, default.reason)
-    return Unknown(default.key, _resolved(case, entry, operating) if key in LENGTHS else entry)
+    return Unknown(default.key, _resolved(case, entry, operating))
+
+
+def _own_value(case: Case, key: str) -> object:
+    """Return the case's own value of a quantity; None if it has none, or as another quantity."""
+    own = stated_value(case, key)
+    if key == LENGTHS[0] and isinstance(own, list):
+        return own[0] if own[0] == own[1] else None
+    return None if key in LENGTHS[1:] and _isotropic(case) else own
+
+
+def _stated_unknown(
+    case: Case,
+    key: str,
+    name: str,
+    prior: PriorSection,
+    operating: tuple[ParameterRange, ...],
+) -> Unknown:
+    """Return an unknown with the prior stated in [infer]: a value and its deviation, or a range."""
+    if prior.start is None:
+        mean, unit = _amount(case, key, "value", prior.value)
+        std, _ = _amount(case, key, "std", prior.std, unit)
+        if not 0.0 < std < math.inf:
+            raise BadInput(
+                f"{case.source}: infer.{key}.std must be positive, got {prior.std}; "
+                'for a certain value, write "known"'
+            )
+        return Unknown.stated(name, key, mean, std, unit, "as stated")
+    stated = _range(case, key, prior)
+    resolved = _resolved(case, stated, operating)
+    if resolved != stated:
+        raise BadInput(
+            f"{case.source}: infer.{key.rpartition('.')[2]} must lie within {resolved.low:g} "
+            f"to {resolved.high:g} {resolved.unit}, which the emulator's grid resolves at "
+            "every load; narrow it, or increase infer.cells"
+        )
+    return Unknown(name, stated)
 
 
 def _isotropic(case: Case) -> bool:
@@ -261,7 +283,9 @@ def _isotropic(case: Case) -> bool:
 def _resolved(
     case: Case, lengths: ParameterRange, operating: tuple[ParameterRange, ...]
 ) -> ParameterRange:
-    """Limit a range of correlation lengths to those that the grid resolves at every load."""
+    """Limit a range, if of correlation lengths, to those that the grid resolves at every load."""
+    if lengths.key not in LENGTHS:
+        return lengths
     loads = next(entry for entry in operating if entry.key == LOAD)
     grids = [case.with_overrides(overrides_at(case, [loads], [end])).grid for end in (0.0, 1.0)]
     scale = 1.0 / float(Unknown("", lengths).to_si(1.0))  # type: ignore[arg-type]

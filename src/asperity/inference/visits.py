@@ -79,7 +79,7 @@ def visit_series(observations: Sequence[Observation]) -> VisitSeries:
         if not math.isfinite(observation.x):
             raise BadInput(
                 f"{observation.name or 'a recording'} has no time; "
-                "give a column x (hours) in --table"
+                "give a column x (hours) in `table`"
             )
     times = sorted({observation.x for observation in observations})
     if len(times) < MIN_VISITS:

@@ -84,7 +84,8 @@ def solve_machine(
     start = time.perf_counter()
     if not case.complete:
         raise BadInput(
-            f"{case.source}: solving needs [lubricant] and [surface]; add them, or use a dry run"
+            f"{case.source}: solving needs [lubricant] and [surface]; add them, or use "
+            "`machine_conditions`"
         )
     moving = [contact for contact in case.contacts if not contact.stands_still]
     if not moving:

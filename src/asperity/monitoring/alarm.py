@@ -273,26 +273,17 @@ def _levels_on_sensor(
     response: Response,
 ) -> list[MonitoredSeries]:
     """Return the indicators of a sensor, from recordings in its most frequent unit."""
-    units = Counter(
-        reading.unit for reading in readings if reading is not None and reading.quality is not None
-    )
-    if not units:
+    unit = _usual_unit(readings)
+    if unit is None:
         return []
-    (unit, _), *_ = units.most_common(1)
-
-    def named(field: str, words: str) -> dict[str, Callable[[Reading], float]]:
-        names = dict.fromkeys(
-            name for reading in readings if reading is not None for name in getattr(reading, field)
-        )
-        return {f"{words} {name}": _getter(field, name) for name in names}
-
     levels = {
         RMS: _quality_getter("rms"),
         KURTOSIS: _quality_getter("kurtosis"),
         "velocity (rms)": lambda reading: reading.velocity,
     }
-    lines, depths = named("lines", "the line at"), named("depths", "the envelope at")
-    levels |= named("bands", "the level") | lines
+    lines = _named_getters(readings, "lines", "the line at")
+    depths = _named_getters(readings, "depths", "the envelope at")
+    levels |= _named_getters(readings, "bands", "the level") | lines
     level_conditions, pulse_conditions = (
         _conditions(tracked, exponents, response) for exponents in (LEVEL, PULSES)
     )
@@ -316,6 +307,24 @@ def _levels_on_sensor(
         for words, values in values_by_name.items()
         if np.isfinite(values).any()
     ]
+
+
+def _usual_unit(readings: Sequence[Reading | None]) -> str | None:
+    """Return the most frequent unit of readings; None if nothing could be read."""
+    units = Counter(
+        reading.unit for reading in readings if reading is not None and reading.quality is not None
+    )
+    return units.most_common(1)[0][0] if units else None
+
+
+def _named_getters(
+    readings: Sequence[Reading | None], field: str, words: str
+) -> dict[str, Callable[[Reading], float]]:
+    """Return a function for each named value in a field of the readings, by its words."""
+    names = dict.fromkeys(
+        name for reading in readings if reading is not None for name in getattr(reading, field)
+    )
+    return {f"{words} {name}": _getter(field, name) for name in names}
 
 
 def _logarithms(

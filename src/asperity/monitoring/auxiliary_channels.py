@@ -64,13 +64,26 @@ class AuxiliaryData:
 
 def read_auxiliary(opened: OpenRecording, place: RecordingPlace | None) -> AuxiliaryData:
     """Read the channels that a sidecar names for load, speed, temperature and tacho."""
+    conditions, tacho = _condition_channels(opened), _tacho(opened)
+    stated = {
+        key: (f"{value:.10g}", "table")
+        for key in OPERATING_KEYS
+        if (value := getattr(place, key, None)) is not None
+    }
+    return AuxiliaryData(
+        facts=conditions.facts | tacho.facts | stated,
+        turning=conditions.turning if tacho.turning is None else tacho.turning,
+        remarks=conditions.remarks + tacho.remarks,
+    )
+
+
+def _condition_channels(opened: OpenRecording) -> AuxiliaryData:
+    """Read the channels for load, speed and temperature."""
     facts: dict[str, tuple[str, str]] = {}
     remarks: list[str] = []
     turning = None
-    named = (
-        {**opened.facts["condition_channels"].value} if "condition_channels" in opened.facts else {}
-    )
-    for key, name in named.items():
+    stated = opened.facts.get("condition_channels")
+    for key, name in ({} if stated is None else stated.value).items():
         try:
             values = _channel_in(opened.path, key, name)
             if not np.isfinite(values).any():
@@ -80,24 +93,23 @@ def read_auxiliary(opened: OpenRecording, place: RecordingPlace | None) -> Auxil
                 turning = turning_by_speed(values[:MAX_SAMPLES], opened.rate_hz)
         except BadInput as refusal:
             remarks.append(str(refusal))
-    if "tacho" in opened.facts:
-        name = opened.facts["tacho"].value
-        per_turn = (
-            opened.facts["pulses_per_turn"].value if "pulses_per_turn" in opened.facts else 1.0
-        )
-        try:
-            _require_same_clock(opened, name)
-            pulses = _values(opened.path, name, MAX_SAMPLES)
-            turning = turning_by_pulses(pulses, opened.rate_hz, per_turn)
-            facts["speed_hz"] = (f"{turning.speed_hz:.10g}", f"file (tacho, channel {name})")
-        except BadInput as refusal:
-            remarks.append(str(refusal))
-    stated = {
-        key: (f"{value:.10g}", "table")
-        for key in OPERATING_KEYS
-        if (value := getattr(place, key, None)) is not None
-    }
-    return AuxiliaryData(facts=facts | stated, turning=turning, remarks=tuple(remarks))
+    return AuxiliaryData(facts=facts, turning=turning, remarks=tuple(remarks))
+
+
+def _tacho(opened: OpenRecording) -> AuxiliaryData:
+    """Read the tacho."""
+    if "tacho" not in opened.facts:
+        return AuxiliaryData(facts={}, turning=None, remarks=())
+    name = opened.facts["tacho"].value
+    per_turn = opened.facts["pulses_per_turn"].value if "pulses_per_turn" in opened.facts else 1.0
+    try:
+        _require_same_clock(opened, name)
+        pulses = _values(opened.path, name, MAX_SAMPLES)
+        turning = turning_by_pulses(pulses, opened.rate_hz, per_turn)
+    except BadInput as refusal:
+        return AuxiliaryData(facts={}, turning=None, remarks=(str(refusal),))
+    speed = (f"{turning.speed_hz:.10g}", f"file (tacho, channel {name})")
+    return AuxiliaryData(facts={"speed_hz": speed}, turning=turning, remarks=())
 
 
 def fault_rates(

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from asperity.case import Case, MachineCase
+from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.monitoring.files import recordings_in
 from asperity.monitoring.reading import channels_in
@@ -19,7 +20,7 @@ class CheckedRecording(NamedTuple):
     recording: OpenRecording
     quality: Quality
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return its row of `asperity check --json`."""
         recording, quality = self
         numbers = (
@@ -73,7 +74,7 @@ class RecordingChecks:
         sentence = f"{len(self.checked) - len(bad)} of {total} {noun} can be used"
         return f"{sentence}{': ' if reasons else ''}{'; '.join(reasons)}."
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON of `asperity check`."""
         return {
             "verdict": self.verdict(),

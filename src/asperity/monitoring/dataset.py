@@ -9,9 +9,9 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from asperity.case import Case, load_case
+from asperity.core.documents import JsonObject, Table
 from asperity.core.errors import BadInput
 from asperity.monitoring.checks import check_recordings
 from asperity.surface import read_surface
@@ -48,7 +48,7 @@ class DataSet:
         more = f", and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
         return f"{self.folder} is not a complete data set: {self.missing[0]}{more}."
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the JSON of `asperity check --set`."""
         return {
             "verdict": self.verdict(),
@@ -89,7 +89,7 @@ def check_set(folder: Path) -> DataSet:
     return DataSet(folder, str(stated.get("title", "")), len(rows), len(maps), tuple(missing))
 
 
-def _stated(folder: Path) -> dict[str, Any]:
+def _stated(folder: Path) -> Table:
     if not folder.is_dir():
         raise BadInput(f"{folder} is not a folder; name the folder that holds {STATED}")
     try:
@@ -110,7 +110,7 @@ def _inside(folder: Path, name: object) -> Path:
     return path
 
 
-def _case(folder: Path, stated: dict[str, Any], missing: list[str]) -> Case | None:
+def _case(folder: Path, stated: Table, missing: list[str]) -> Case | None:
     if "case" not in stated:
         return None
     try:
@@ -120,7 +120,7 @@ def _case(folder: Path, stated: dict[str, Any], missing: list[str]) -> Case | No
         return None
 
 
-def _names(stated: dict[str, Any], key: str, missing: list[str]) -> list[str]:
+def _names(stated: Table, key: str, missing: list[str]) -> list[str]:
     names = stated.get(key, [])
     if not isinstance(names, list) or (key in stated and not names):
         missing.append(f"{key} must be a list of files, one of each body")
@@ -128,7 +128,7 @@ def _names(stated: dict[str, Any], key: str, missing: list[str]) -> list[str]:
     return [str(name) for name in names]
 
 
-def _table(folder: Path, stated: dict[str, Any], missing: list[str]) -> list[dict[str, str]]:
+def _table(folder: Path, stated: Table, missing: list[str]) -> list[dict[str, str]]:
     """Return the rows of the table of recordings; empty if it cannot be used."""
     if "recordings" not in stated:
         return []

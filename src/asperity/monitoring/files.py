@@ -242,27 +242,32 @@ def read_table(path: str | Path) -> RecordingTable:
         name = (row["file"] or "").strip()
         if not name:
             continue
-        values = {
-            column: _number(
-                (row.get(column) or "").strip(), delimiter, f"{path}, line {number}: {column}"
-            )
-            for column in (x_name, f"{x_name}_std", *OPERATING_KEYS)
-        }
-        _require_possible(values, f"{path}, line {number}")
-        x, x_std = values.pop(x_name), values.pop(f"{x_name}_std")
-        if not x_name:
-            x = float(number - 1)
-        if x is None:
-            raise BadInput(f"{path}, line {number}: {x_name} of {name} is missing; fill it in")
+        location = f"{path}, line {number}"
+        place = _place_in(row, x_name, number, delimiter, location)
         key = Path(name.replace("\\", "/")).as_posix()
         if key in places:
-            raise BadInput(
-                f"{path}, line {number}: {name} has a row already; leave one of the two out"
-            )
-        places[key] = RecordingPlace(
-            x=x, x_std=x_std, sensor=(row.get(SENSOR) or "").strip() or None, **values
-        )
+            raise BadInput(f"{location}: {name} has a row already; leave one of the two out")
+        places[key] = place
     return RecordingTable(name=path.name, x_name=x_name, places=places)
+
+
+def _place_in(
+    row: Mapping[str, str], x_name: str, number: int, delimiter: str, location: str
+) -> RecordingPlace:
+    """Return the place in line `number` of a table, which is x if no column states x."""
+    values = {
+        column: _number((row.get(column) or "").strip(), delimiter, f"{location}: {column}")
+        for column in (x_name, f"{x_name}_std", *OPERATING_KEYS)
+    }
+    _require_possible(values, location)
+    x, x_std = values.pop(x_name), values.pop(f"{x_name}_std")
+    if not x_name:
+        x = float(number - 1)
+    if x is None:
+        name = row["file"].strip()
+        raise BadInput(f"{location}: {x_name} of {name} is missing; fill it in")
+    sensor = (row.get(SENSOR) or "").strip() or None
+    return RecordingPlace(x=x, x_std=x_std, sensor=sensor, **values)
 
 
 def _read_csv(path: Path) -> tuple[list[str], list[dict[str, str]], str]:

@@ -4,13 +4,14 @@ The forecasting method is given by the caller; a forecast may raise the alarm. A
 limited share of its time on forecasts.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from time import monotonic
-from typing import Any, Protocol
+from typing import Protocol
 
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject, Table
 
 MAX_TIME_SHARE = 0.1  # of a watch's time
 FORECAST = "forecast"  # `raised_by` of an alarm
@@ -49,7 +50,7 @@ class ForecastResult(Protocol):
     def sentence(self) -> str:
         """Return the forecast as a sentence."""
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the forecast as in JSON."""
 
 
@@ -60,9 +61,7 @@ class Forecaster(Protocol):
     def question(self) -> str:
         """Text that identifies the forecast; a forecast of another question is made again."""
 
-    def __call__(
-        self, rows: Sequence[Mapping[str, Any]], x_name: str, *, comparable: bool
-    ) -> ForecastResult:
+    def __call__(self, rows: Sequence[Table], x_name: str, *, comparable: bool) -> ForecastResult:
         """Forecast a series; `comparable` if the amplitudes of its lines can be compared."""
 
 
@@ -94,7 +93,7 @@ class ForecastSchedule:
 
     def make(
         self,
-        rows: Sequence[Mapping[str, Any]],
+        rows: Sequence[Table],
         x_name: str,
         *,
         comparable: bool,

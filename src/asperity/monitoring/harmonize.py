@@ -51,37 +51,35 @@ def exclude_machine_off(series: list[Reading]) -> list[Reading]:
 
 def on_common_grid(series: list[Reading]) -> tuple[list[Reading], list[str]]:
     """Bring usable spectra to their most frequent grid; exclude the others, with the reason."""
-    spectra = {
-        number: spectrum_of(reading) for number, reading in enumerate(series) if reading.usable
-    }
-    if not spectra:
+    usable = [reading for reading in series if reading.usable]
+    if not usable:
         return series, []
-    grids = [
-        (spectrum.segment, round(series[number].rate_hz)) for number, spectrum in spectra.items()
-    ]
+    grids = [(spectrum_of(reading).segment, round(reading.rate_hz)) for reading in usable]
     (common, _), *_ = Counter(grids).most_common(1)
-    first = [*spectra.values()][grids.index(common)]
-    aligned = list(series)
-    left_out = 0
-    for number, spectrum in spectra.items():
-        same = spectrum.frequency_hz.shape == first.frequency_hz.shape
-        difference = abs(spectrum.frequency_hz[-1] - first.frequency_hz[-1]) if same else np.inf
-        if same and np.array_equal(spectrum.frequency_hz, first.frequency_hz):
-            continue  # as nearly all are
-        if difference <= GRID_TOLERANCE * first.spacing_hz:
-            spectrum = replace(spectrum, frequency_hz=first.frequency_hz)
-            aligned[number] = replace(aligned[number], spectrum=spectrum)
-        else:
-            rate = aligned[number].rate_hz
-            reason = (
-                f"sampled at {rate:g} Hz where the series has {common[1]:g} Hz; track it separately"
-            )
-            aligned[number] = replace(aligned[number], reason=reason)
-            left_out += 1
+    grid = spectrum_of(usable[grids.index(common)])
+    aligned = [
+        _on_grid(reading, grid, common[1]) if reading.usable else reading for reading in series
+    ]
+    left_out = len(usable) - sum(reading.usable for reading in aligned)
     notes = [
         f"{left_out} of {len(series)} recordings have another sampling rate and were left out."
     ]
     return aligned, notes if left_out else []
+
+
+def _on_grid(reading: Reading, grid: Spectrum, rate_hz: int) -> Reading:
+    """Bring a usable spectrum to a grid, or exclude it with the reason."""
+    spectrum, lines = spectrum_of(reading), grid.frequency_hz
+    if spectrum.frequency_hz.shape == lines.shape:
+        if np.array_equal(spectrum.frequency_hz, lines):
+            return reading  # as nearly all are
+        if abs(spectrum.frequency_hz[-1] - lines[-1]) <= GRID_TOLERANCE * grid.spacing_hz:
+            return replace(reading, spectrum=replace(spectrum, frequency_hz=lines))
+    reason = (
+        f"sampled at {reading.rate_hz:g} Hz where the series has {rate_hz:g} Hz; "
+        "track it separately"
+    )
+    return replace(reading, reason=reason)
 
 
 def spectrum_of(reading: Reading) -> Spectrum:

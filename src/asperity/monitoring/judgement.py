@@ -10,7 +10,6 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
-from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_choice
 from asperity.monitoring.alarm import at_reference, raise_alarm, severe_stage_weight
 from asperity.monitoring.files import RecordingPlace, locate_recordings
@@ -34,6 +33,7 @@ from asperity.resonance import (
     series_resonances,
 )
 from asperity.trend import (
+    Alarm,
     Detector,
     RecordingFacts,
     StageErrors,
@@ -95,6 +95,19 @@ class _Series(NamedTuple):
     method: SeriesMethod
     notes: list[str]
 
+    @property
+    def used(self) -> list[TrackedRecording]:
+        """Recordings with a usable spectrum."""
+        return [recording for recording in self.tracked if recording.clean is not None]
+
+
+class _Line(NamedTuple):
+    """Line of a usable spectrum; `moved` if the sensor was moved before it."""
+
+    clean: CleanSpectrum
+    resonance: Resonance
+    moved: bool
+
 
 def _single_sensor(
     readings: Sequence[Reading],
@@ -109,49 +122,64 @@ def _single_sensor(
     places, x_name = locate_recordings(
         names, times, [not reading.refused for reading in readings], places, x_name
     )
-    order = np.argsort(np.array([places[reading.file].x for reading in readings]), kind="stable")
-    series, notes = on_common_grid(exclude_machine_off([readings[number] for number in order]))
-    spectra = {
-        number: spectrum_of(reading) for number, reading in enumerate(series) if reading.usable
-    }
-    keys = [(series[number].file, series[number].sensor) for number in spectra]
+    ordered = sorted(readings, key=lambda reading: places[reading.file].x)
+    series, notes = on_common_grid(exclude_machine_off(ordered))
+    usable = [reading for reading in series if reading.usable]
+    method = settings.method or ("joint" if len(usable) >= FEWEST_RECORDINGS else FALLBACK)
+    notes += _method_notes(len(usable), settings.method, method)
+    lines = iter(_lines(usable, target, settings, method, memory))
+    tracked = []
+    for reading in series:
+        place = places[reading.file]
+        if reading.usable:
+            clean, resonance, moved = next(lines)
+            remounted = reading.sensor if moved else None
+            tracked.append(tracked_recording(reading, place, clean, resonance, remounted=remounted))
+        else:
+            nothing = no_resonance(reading.reason, target.band_hz, method)
+            tracked.append(tracked_recording(reading, place, None, nothing))
+    return _Series(tracked, x_name, method, notes)
+
+
+def _lines(
+    usable: Sequence[Reading],
+    target: Target,
+    settings: TrackSettings,
+    method: SeriesMethod,
+    memory: SeriesMemory | None,
+) -> list[_Line]:
+    """Return the line of each usable recording of a single sensor."""
     state = SeriesMemory() if memory is None else memory
+    keys = [(reading.file, reading.sensor) for reading in usable]
     cleaned = [
-        state.clean(key, spectrum, settings.shaft_hz)
-        for key, spectrum in zip(keys, spectra.values(), strict=True)
+        state.clean(key, spectrum_of(reading), settings.shaft_hz)
+        for key, reading in zip(keys, usable, strict=True)
     ]
-    method = settings.method or ("joint" if len(spectra) >= FEWEST_RECORDINGS else FALLBACK)
-    groups = -(-len(spectra) // MAX_GROUP) if method == "joint" else 1
-    notes += _method_notes(len(spectra), settings.method, method, groups)
     if memory is not None and method == "joint":
         resonances = memory.resonances(keys, cleaned, target.band_hz)
         moved = {keys.index(key) for key in memory.moved if key in keys}
     else:
-        resonances, moved = _resonances(cleaned, target, method, groups)
+        resonances, moved = _resonances(cleaned, target, method)
     if settings.method is None and method == FALLBACK:
         resonances = [_ambiguous(line) if line.found else line for line in resonances]
-    used = dict(zip(spectra, zip(cleaned, resonances, strict=True), strict=True))
-    moved_numbers = {number for place, number in enumerate(spectra) if place in moved}
-    tracked = []
-    for number, reading in enumerate(series):
-        clean, found = used.get(number, (None, None))
-        resonance = found or no_resonance(reading.reason, target.band_hz, method)
-        remounted = reading.sensor if number in moved_numbers else None
-        tracked.append(
-            tracked_recording(reading, places[reading.file], clean, resonance, remounted=remounted)
-        )
-    return _Series(tracked, x_name, method, notes)
+    return [
+        _Line(clean, resonance, number in moved)
+        for number, (clean, resonance) in enumerate(zip(cleaned, resonances, strict=True))
+    ]
 
 
-def _method_notes(
-    count: int, requested: SeriesMethod | None, method: SeriesMethod, groups: int
-) -> list[str]:
+def _group_count(recordings: int, method: SeriesMethod) -> int:
+    """Return the number of groups into which recordings are divided for their separation."""
+    return -(-recordings // MAX_GROUP) if method == "joint" else 1
+
+
+def _method_notes(count: int, requested: SeriesMethod | None, method: SeriesMethod) -> list[str]:
     """Return notes on the method for `count` usable recordings."""
-    notes = []
+    notes, groups = [], _group_count(count, method)
     if requested is None and method != "joint" and count:
         notes.append(
             f"The joint separation of contact and structure needs {FEWEST_RECORDINGS} recordings "
-            f"and has {count}; method {method} takes the most prominent line instead."
+            f"and has {count}; `method` {method} takes the most prominent line instead."
         )
     if groups > 1:
         notes.append(
@@ -166,76 +194,83 @@ def _staged(
 ) -> Track:
     """Add stages, alarm and load share to the recordings of a series."""
     tracked, x_name, method, notes = series
-    used = [recording for recording in tracked if recording.clean is not None]
-    comparable = bool(used) and all(recording.reading.unit == ACCELERATION for recording in used)
+    units = {recording.reading.unit for recording in series.used}
     conditions = [recording.operating for recording in tracked]
     response = operating_response(target.case, conditions)
     tracked = at_reference(tracked, response)
     remounted = _remounted(tracked)
-    heights = comparable and not remounted
-    source = settings.stages_from
-    stages_by = _StagesBySource(tracked, settings.detector, _unit_of(x_name), heights)
+    heights = units == {ACCELERATION} and not remounted
+    source, unit = settings.stages_from, _unit_of(x_name)
+    stages_by = _StagesBySource(tracked, settings.detector, unit, heights)
     stages = stages_by.get(source)
-    severe, labels = _severity(tracked, stages, source, response)
     alarm = raise_alarm(
         tracked,
         settings,
         stages,
         lambda part: _StagesBySource(part, settings.detector, "", heights).get(source),
         previous=previous,
-        unit=_unit_of(x_name),
+        unit=unit,
         response=response,
     )
+    tracked = _with_states(tracked, stages, source, response, alarm)
     if target.full_load_crf_hz is not None:
         tracked = _with_load_share(tracked, target.full_load_crf_hz)
-    if not comparable and used:
-        units = ", ".join(sorted({recording.reading.unit for recording in used}))
-        notes.append(
-            f"CRFA cannot be compared with other series: its unit is {units}, not m/s^2. CRF can."
-        )
-    copied = copies([recording.reading for recording in tracked])
     return Track(
-        recordings=tuple(
-            replace(recording, severe_probability=float(probability), label=label, state=state)
-            for recording, probability, label, state in zip(
-                tracked, severe, labels, alarm.states, strict=True
-            )
-        ),
+        recordings=tuple(tracked),
         x_name=x_name,
         target=target,
         method=method,
         stages=stages,
         stages_by=stages_by,
         alarm=alarm,
-        comparable=comparable,
-        problems=comparability([_facts_of(recording) for recording in used]),
+        comparable=units == {ACCELERATION},
+        problems=comparability([_facts_of(recording) for recording in series.used]),
         notes=(
             *notes,
+            *_incomparable_units(units),
             *filter(None, [response.note]),
             *unstated(conditions),
             *_without_damping(tracked),
-            *copied,
+            *copies([recording.reading for recording in tracked]),
             *remounted,
         ),
     )
 
 
-def _severity(
+def _with_states(
     tracked: Sequence[TrackedRecording],
     stages: Stages | None,
     source: StageSource,
     response: Response,
-) -> tuple[Field, tuple[str, ...]]:
-    """Return probability of severe wear (nan if unknown) and stage label of each recording."""
-    if stages is None:
-        return np.full(len(tracked), np.nan), ("none",) * len(tracked)
-    known = (
-        [np.isfinite(recording.damping_reference) for recording in tracked]
-        if source == "damping"
-        else [np.isfinite(recording.crf_reference_hz) for recording in tracked]
-    )
-    weight = severe_stage_weight(tracked, source, response)
-    return np.where(known, stages.probability * weight, np.nan), stages.labels
+    alarm: Alarm,
+) -> list[TrackedRecording]:
+    """Add probability of severe wear (nan if unknown), stage label and alarm state."""
+    severe, labels = np.full(len(tracked), np.nan), ("none",) * len(tracked)
+    if stages is not None:
+        known = [
+            np.isfinite(
+                recording.damping_reference if source == "damping" else recording.crf_reference_hz
+            )
+            for recording in tracked
+        ]
+        weight = severe_stage_weight(tracked, source, response)
+        severe, labels = np.where(known, stages.probability * weight, np.nan), stages.labels
+    return [
+        replace(recording, severe_probability=float(probability), label=label, state=state)
+        for recording, probability, label, state in zip(
+            tracked, severe, labels, alarm.states, strict=True
+        )
+    ]
+
+
+def _incomparable_units(units: set[str]) -> list[str]:
+    """Return a sentence if the spectra are not all of accelerations."""
+    if units <= {ACCELERATION}:
+        return []
+    return [
+        f"CRFA cannot be compared with other series: its unit is {', '.join(sorted(units))}, not "
+        "m/s^2. CRF can."
+    ]
 
 
 def _with_load_share(
@@ -351,7 +386,7 @@ def _without_damping(tracked: Sequence[TrackedRecording]) -> list[str]:
 
 
 def _resonances(
-    cleaned: list[CleanSpectrum], target: Target, method: SeriesMethod, groups: int
+    cleaned: list[CleanSpectrum], target: Target, method: SeriesMethod
 ) -> tuple[list[Resonance], set[int]]:
     """Return the resonance of each spectrum, and the numbers at which the sensor was moved.
 
@@ -359,6 +394,7 @@ def _resonances(
     """
     resonances: dict[int, Resonance] = {}
     moved: list[int] = []
+    groups = _group_count(len(cleaned), method)
     for first in range(min(groups, len(cleaned))):
         group = cleaned[first::groups]
         spectra, kept = [clean.spectrum for clean in group], [clean.kept for clean in group]

@@ -18,9 +18,9 @@ from hashlib import sha256
 from tempfile import TemporaryFile
 from threading import Thread
 from time import time
-from typing import Any
 from urllib.parse import SplitResult, unquote, urlsplit
 
+from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.core.third_party import first_line
 from asperity.monitoring.settings import Notifier
@@ -46,7 +46,7 @@ class Command:
         """Name of the recipient."""
         return f"command {self.arguments[0]} ({_fingerprint(*self.arguments)})"
 
-    def send(self, notification: dict[str, Any]) -> None:
+    def send(self, notification: JsonObject) -> None:
         """Run the program; raise NotificationFailed unless it ends with 0 in time."""
         with TemporaryFile() as content, TemporaryFile() as errors:
             content.write(json.dumps(notification).encode())
@@ -96,13 +96,13 @@ class Webhook:
             f"webhook {parts.scheme}://{parts.netloc.rpartition('@')[2]} ({_fingerprint(self.url)})"
         )
 
-    def send(self, notification: dict[str, Any]) -> None:
+    def send(self, notification: JsonObject) -> None:
         """Post the JSON; raise NotificationFailed for another status, OSError without an answer."""
         from urllib.error import HTTPError
         from urllib.request import HTTPRedirectHandler, Request, build_opener
 
         class NoRedirect(HTTPRedirectHandler):
-            def redirect_request(self, *_: Any) -> None:
+            def redirect_request(self, *_: object) -> None:
                 return None  # a redirected post becomes a get without content
 
         parts, headers = urlsplit(self.url), {"Content-Type": "application/json"}
@@ -130,15 +130,14 @@ class Topic:
         """Name of the recipient."""
         return f"mqtt {_without_credentials(urlsplit(self.url))}"
 
-    def send(self, notification: dict[str, Any]) -> None:
+    def send(self, notification: JsonObject) -> None:
         """Publish the JSON; raise NotificationFailed unless confirmed, OSError without a broker."""
         from paho.mqtt import client as mqtt
         from paho.mqtt.enums import CallbackAPIVersion
 
         parts = urlsplit(self.url)
-        topic = unquote(parts.path).strip("/") or "/".join(
-            ["asperity", *(_level(notification[name]) for name in ("machine", "point", "sensor"))]
-        )
+        address = [str(notification[name]) for name in ("machine", "point", "sensor")]
+        topic = unquote(parts.path).strip("/") or "/".join(["asperity", *map(_level, address)])
         answers: list[str] = []
         client = mqtt.Client(CallbackAPIVersion.VERSION2)
         client.on_connect = lambda _client, _data, _flags, reason, _more: answers.append(

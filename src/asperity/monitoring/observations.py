@@ -114,16 +114,9 @@ def combine_sensors(
     instants, x_name = _match_instants(readings, places, x_name)
     names = list(dict.fromkeys(reading.sensor for reading in readings if reading.sensor))
     instants, notes = _harmonized(instants, names)
-    usable = {
-        name: sum(
-            name in instant.readings and instant.readings[name].usable for instant in instants
-        )
-        for name in names
-    }
     state = SeriesMemory() if memory is None else memory
-    lead = state.lead if usable.get(state.lead, 0) >= FEWEST_RECORDINGS else ""
-    # stable: of equals the first named leads
-    names.sort(key=lambda name: (name != lead, -usable[name]))
+    usable = _usable_by_sensor(instants, names, state.lead)
+    names = list(usable)
     instants = _without_copies(names, instants, refused=memory is None)
     cleaned = [
         {
@@ -133,22 +126,12 @@ def combine_sensors(
         }
         for instant in instants
     ]
-    if usable[names[0]] < FEWEST_RECORDINGS:
-        reason = (
-            f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor and has "
-            f"{usable[names[0]]}"
+    lines = _joint_lines(instants, cleaned, usable, state, target.band_hz)
+    if usable[names[0]] >= FEWEST_RECORDINGS and np.isfinite(state.common):
+        notes.append(
+            f"Sensors share {100 * state.common:.0f} % of the error of a line; intervals "
+            "include the shared part in full."
         )
-        no_line = SensorLine(
-            no_resonance(reason, target.band_hz, "joint"), (), dict.fromkeys(names)
-        )
-        lines = [no_line] * len(instants)
-    else:
-        lines = _joint_lines(instants, cleaned, names, state, target.band_hz)
-        if np.isfinite(state.common):
-            notes.append(
-                f"Sensors share {100 * state.common:.0f} % of the error of a line; intervals "
-                "include the shared part in full."
-            )
     tracked = [
         _combined(instant, clean, line, names, state)
         for instant, clean, line in zip(instants, cleaned, lines, strict=True)
@@ -156,19 +139,45 @@ def combine_sensors(
     return tracked, x_name, notes
 
 
+def _usable_by_sensor(
+    instants: Sequence[Instant], names: Sequence[str], lead: str
+) -> dict[str, int]:
+    """Return the number of usable recordings of each sensor, the leading sensor first.
+
+    `lead` leads while it has enough of them, otherwise the sensor with most.
+    """
+    usable = {
+        name: sum(
+            name in instant.readings and instant.readings[name].usable for instant in instants
+        )
+        for name in names
+    }
+    leads = usable.get(lead, 0) >= FEWEST_RECORDINGS
+    # stable: of equals the first named leads
+    ranked = sorted(names, key=lambda name: (not leads or name != lead, -usable[name]))
+    return {name: usable[name] for name in ranked}
+
+
 def _joint_lines(
     instants: Sequence[Instant],
     cleaned: Sequence[Mapping[str, CleanSpectrum]],
-    names: Sequence[str],
+    usable: Mapping[str, int],
     memory: SeriesMemory,
     band_hz: tuple[float, float],
 ) -> list[SensorLine]:
-    """Return the line of each instant by joint separation on all sensors."""
+    """Return the line of each instant by joint separation, if there are enough recordings."""
+    most = max(usable.values())
+    if most < FEWEST_RECORDINGS:
+        reason = (
+            f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor and has {most}"
+        )
+        nothing = no_resonance(reason, band_hz, "joint")
+        return [SensorLine(nothing, (), dict.fromkeys(usable))] * len(instants)
     keys = [
         tuple((instant.readings[name].file, name) for name in clean)
         for instant, clean in zip(instants, cleaned, strict=True)
     ]
-    series = {name: [clean.get(name) for clean in cleaned] for name in names}
+    series = {name: [clean.get(name) for clean in cleaned] for name in usable}
     spectra = {
         name: [None if clean is None else clean.spectrum for clean in of_sensor]
         for name, of_sensor in series.items()
@@ -233,10 +242,7 @@ def _match_instants(
     readings: Sequence[Reading], places: Mapping[str, RecordingPlace] | None, x_name: str
 ) -> tuple[list[Instant], str]:
     """Match recordings of several sensors by file, x, time or number; return the name of x too."""
-    by_sensor: dict[str, list[Reading]] = {}
-    for reading in readings:
-        if reading.sensor:
-            by_sensor.setdefault(reading.sensor, []).append(reading)
+    by_sensor = _by_sensor(readings)
     lead = next(iter(by_sensor))  # recordings of an unknown sensor are shown under this name
     if (
         len({reading.file for reading in readings})
@@ -260,6 +266,14 @@ def _match_instants(
             reading if reading.sensor else replace(reading, sensor=lead)
         )
     return [instants[key] for key in sorted(instants)], x_name
+
+
+def _by_sensor(readings: Sequence[Reading]) -> dict[str, list[Reading]]:
+    by_sensor: dict[str, list[Reading]] = {}
+    for reading in readings:
+        if reading.sensor:
+            by_sensor.setdefault(reading.sensor, []).append(reading)
+    return by_sensor
 
 
 _SlotKey = tuple[float, ...]  # equal for simultaneous recordings

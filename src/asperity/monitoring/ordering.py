@@ -3,8 +3,9 @@
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from asperity.core.documents import JsonObject
 from asperity.monitoring.alarm import BASELINE, LAST
 from asperity.monitoring.files import RecordingPlace, RecordingTable, place_at, x_of_recordings
 from asperity.monitoring.simultaneous import (
@@ -54,13 +55,9 @@ def order_recordings(
             [Path(key.file) for key in series if table.row(Path(key.file)) is not None]
         )
         series = [key for key in series if key.file in places]
-    names, common_name = sensors.readable_names(series), sensors.address.sensor
-    unnamed: list[FileVersion] = []
-    if len(names) > sensors.channels and common_name in names:
-        unnamed = [key for key in series if _belongs_to(common_name, sensors.stored(key))]
-        names.discard(common_name)
-        waiting = {*unnamed}
-        series = [key for key in series if key not in waiting]
+    names, unnamed = _named_sensors(series, sensors)
+    waiting = {*unnamed}
+    series = [key for key in series if key not in waiting]
     waits = _wait_notes(
         unnamed, "does not name its sensor, and others do", "name it in a sidecar or a table"
     )
@@ -79,6 +76,17 @@ def order_recordings(
     return Order(
         [(key,) for key in sorted(series, key=lambda key: x[key.file])], x_name, x, places, waits
     )
+
+
+def _named_sensors(
+    series: Sequence[FileVersion], sensors: Sensors
+) -> tuple[set[str], list[FileVersion]]:
+    """Return the names of sensors, and recordings that lack a name while others have one."""
+    names, common_name = sensors.readable_names(series), sensors.address.sensor
+    if len(names) <= sensors.channels or common_name not in names:
+        return names, []
+    unnamed = [key for key in series if _belongs_to(common_name, sensors.stored(key))]
+    return names - {common_name}, unnamed
 
 
 def _match_sensors(
@@ -206,14 +214,19 @@ def file_name(key: FileVersion) -> str:
     return key.file.rpartition(os.sep)[2]
 
 
-def unacknowledged(
-    rows: Sequence[Mapping[str, Any]], acknowledged: str | None
-) -> Sequence[Mapping[str, Any]]:
+def unacknowledged(rows: Sequence[JsonObject], acknowledged: str | None) -> Sequence[JsonObject]:
     """Return the rows after the last acknowledged recording; the machine may have been repaired."""
     if acknowledged == LAST:
         return ()
     for number, row in enumerate(rows, 1):
-        files = [row["file"], *(sensor["file"] for sensor in row.get("sensors", {}).values())]
-        if acknowledged in [Path(file).name for file in files]:
+        if acknowledged in _file_names(row):
             return rows[number:]
     return rows
+
+
+def _file_names(row: JsonObject) -> list[str]:
+    """Return the names of a row's files on all sensors."""
+    sensors = row.get("sensors")
+    parts = sensors.values() if isinstance(sensors, Mapping) else ()
+    files = [row["file"], *(part["file"] for part in parts if isinstance(part, Mapping))]
+    return [Path(str(file)).name for file in files]

@@ -22,6 +22,7 @@ from asperity.core.processes import ignore_interrupts
 from asperity.core.signals import Spectrum, averaged_spectrum
 from asperity.core.storage import append_digest, strip_digest
 from asperity.monitoring.auxiliary_channels import (
+    AuxiliaryData,
     bands,
     envelope_and_lines,
     fault_rates,
@@ -112,7 +113,41 @@ def read_spectrum(
         opened = open_recording(path, **asdict(options))
     except BadInput as refusal:
         return Reading(file=str(path), sensor=_sensor_of_refused(path, place), reason=str(refusal))
-    known = Reading(
+    known = _with_facts(path, opened, place)
+    auxiliary = read_auxiliary(opened, place)
+    rates_hz = fault_rates(opened, auxiliary, target)
+    gauge, envelope = SampleStatistics(), Envelope(opened.rate_hz)
+    blocks = gauge.without_stuck(gauge.pass_through(opened.blocks()))
+    spectrum, failed = None, ""
+    try:
+        spectrum = averaged_spectrum(
+            envelope.watch(blocks) if rates_hz else blocks,
+            opened.rate_hz,
+            opened.unit,
+            segment=segment_length(opened.rate_hz, spacing_hz),
+            window=WINDOW,
+        )
+    except UnreadableFile as refusal:
+        return replace(known, reason=str(refusal))
+    except BadInput as refusal:
+        failed = str(refusal)
+    quality = gauge.quality(opened, width_hz=target.width_hz, band_hz=target.band_hz)
+    reading = replace(
+        known,
+        spectrum=spectrum,
+        quality=replace(quality, remarks=(*quality.remarks, *auxiliary.remarks)),
+        facts=known.facts | auxiliary.facts,
+        depths=envelope.depths(rates_hz),
+        reason="; ".join(quality.faults) or failed,
+    )
+    if spectrum is not None:
+        reading = _with_levels(reading, spectrum, opened, rates_hz)
+    return _with_order_tracking(reading, opened, auxiliary, rates_hz, spacing_hz)
+
+
+def _with_facts(path: Path, opened: OpenRecording, place: RecordingPlace | None) -> Reading:
+    """Return a reading of all that is known without the samples."""
+    return Reading(
         file=str(path),
         rate_hz=opened.rate_hz,
         rate_doubt=opened.rate_doubt,
@@ -121,52 +156,42 @@ def read_spectrum(
         started=opened.started.isoformat() if opened.started else "",
         sensor=_sensor(opened, place),
     )
-    auxiliary = read_auxiliary(opened, place)
-    rates_hz = fault_rates(opened, auxiliary, target)
-    gauge, envelope = SampleStatistics(), Envelope(opened.rate_hz)
-    blocks = gauge.without_stuck(gauge.pass_through(opened.blocks()))
-    segment = segment_length(opened.rate_hz, spacing_hz)
-    try:
-        spectrum: Spectrum | None = averaged_spectrum(
-            envelope.watch(blocks) if rates_hz else blocks,
-            opened.rate_hz,
-            opened.unit,
-            segment=segment,
-            window=WINDOW,
-        )
-        failed = ""
-    except UnreadableFile as refusal:
-        return replace(known, reason=str(refusal))
-    except BadInput as refusal:
-        spectrum, failed = None, str(refusal)
-    quality = gauge.quality(opened, width_hz=target.width_hz, band_hz=target.band_hz)
-    depths, remarks = envelope.depths(rates_hz), [*quality.remarks, *auxiliary.remarks]
-    values: dict[str, Any] = {}
-    if spectrum is not None:
-        frequency_hz, density = spectrum.frequency_hz, spectrum.density
-        values = {
-            "bands": bands(opened, frequency_hz, density),
-            "lines": lines(frequency_hz, density, rates_hz),
-        }
-        if opened.comparable:
-            values["velocity"] = velocity_rms(frequency_hz, density)
-    try:
-        tracked = order_tracked(opened, auxiliary) if rates_hz else None
-        if tracked is not None:
-            depths, values["lines"] = envelope_and_lines(
-                rates_hz, *tracked, opened.unit, segment_length(tracked[1], spacing_hz)
-            )
-    except BadInput as refusal:
-        remarks.append(str(refusal))
+
+
+def _with_levels(
+    reading: Reading, spectrum: Spectrum, opened: OpenRecording, rates_hz: Mapping[str, float]
+) -> Reading:
+    """Add the levels in bands, of lines and, if it is known, of velocity."""
+    frequency_hz, density = spectrum.frequency_hz, spectrum.density
     return replace(
-        known,
-        spectrum=spectrum,
-        quality=replace(quality, remarks=tuple(remarks)),
-        facts=known.facts | auxiliary.facts,
-        depths=depths,
-        reason="; ".join(quality.faults) or failed,
-        **values,
+        reading,
+        bands=bands(opened, frequency_hz, density),
+        lines=lines(frequency_hz, density, rates_hz),
+        velocity=velocity_rms(frequency_hz, density) if opened.comparable else np.nan,
     )
+
+
+def _with_order_tracking(
+    reading: Reading,
+    opened: OpenRecording,
+    auxiliary: AuxiliaryData,
+    rates_hz: Mapping[str, float],
+    spacing_hz: float,
+) -> Reading:
+    """Replace depths and lines by those at constant speed, if the shaft's angle is known."""
+    try:
+        resampled = order_tracked(opened, auxiliary) if rates_hz else None
+        if resampled is None:
+            return reading
+        values, rate_hz = resampled
+        depths, harmonics = envelope_and_lines(
+            rates_hz, values, rate_hz, opened.unit, segment_length(rate_hz, spacing_hz)
+        )
+    except BadInput as refusal:
+        assert reading.quality is not None
+        remarks = (*reading.quality.remarks, str(refusal))
+        return replace(reading, quality=replace(reading.quality, remarks=remarks))
+    return replace(reading, depths=depths, lines=harmonics)
 
 
 def _sensor(opened: OpenRecording, place: RecordingPlace | None) -> str:
@@ -262,7 +287,7 @@ def _size(path: Path) -> int:
 def pack_reading(reading: Reading) -> bytes:
     """Pack a reading as bytes with a digest, for `unpack_reading`."""
     density = np.empty(0) if reading.spectrum is None else reading.spectrum.density
-    content: dict[str, Any] = asdict(replace(reading, spectrum=None))
+    content = asdict(replace(reading, spectrum=None))
     if reading.spectrum is not None:
         kept = ("unit", "duration_s", "segment", "window", "resolution_hz", "averages")
         content["spectrum"] = {name: getattr(reading.spectrum, name) for name in kept}

@@ -3,11 +3,11 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
 
 import numpy as np
 
 from asperity.core.arrays import finite_or_none
+from asperity.core.documents import JsonObject
 from asperity.core.quantities import quantity
 from asperity.monitoring.operating_point import OperatingPoint
 from asperity.monitoring.reading import Reading
@@ -33,7 +33,7 @@ class OnSensor:
     alone: Resonance | None
     detects: bool
 
-    def row(self) -> dict[str, Any]:
+    def row(self) -> JsonObject:
         """Return its part of the recording's row."""
         quality, alone = self.reading.quality, self.alone
         return {
@@ -150,7 +150,7 @@ class TrackedRecording:
         machine_class = reading.facts["machine_class"][0]
         return f"{level}: zone {zone} of ISO 20816-3 ({machine_class}), {ZONES[zone]}"
 
-    def row(self) -> dict[str, Any]:
+    def row(self) -> JsonObject:
         """Return its row of the table, as in `asperity track --json`; None for missing values."""
         resonance, damping, read = self.resonance, self.damping, self._reading_row(self.reading)
         return {
@@ -182,11 +182,11 @@ class TrackedRecording:
             "sensors": {name: on_sensor.row() for name, on_sensor in self.on_sensors.items()},
         }
 
-    def row_on(self, sensor: str, row: Mapping[str, Any]) -> dict[str, Any]:
+    def row_on(self, sensor: str, row: JsonObject) -> JsonObject:
         """Return its row with the values of one of its sensors."""
         return {**row, **self._reading_row(self.readings[sensor])}
 
-    def _reading_row(self, reading: Reading) -> dict[str, Any]:
+    def _reading_row(self, reading: Reading) -> JsonObject:
         """Return the part of a row that depends on the reading."""
         quality = reading.quality
         return {

@@ -93,16 +93,13 @@ class SeriesMemory:
         self.found = {key: line for key, line in self.found.items() if key in self.cleaned}
         shared = self.shared
         new = [number for number, key in enumerate(keys) if key not in self.found]
-        known = (
-            isinstance(shared, Shared)
-            and shared.band_hz == band_hz
-            and shared.fits(cleaned[0].spectrum)
-        )
-        if not isinstance(shared, Shared) or not known or self._must_relearn(len(keys), len(new)):
-            spectra, kept = [clean.spectrum for clean in cleaned], [clean.kept for clean in cleaned]
-            lines, self.shared, moved = learn_series(spectra, band_hz=band_hz, kept=kept)
-            self.since, self.found = 0, dict(zip(keys, lines, strict=True))
-            self.moved = tuple(keys[number] for number in moved)
+        if (
+            not isinstance(shared, Shared)
+            or shared.band_hz != band_hz
+            or not shared.fits(cleaned[0].spectrum)
+            or self._must_relearn(len(keys), len(new))
+        ):
+            self._relearn(keys, cleaned, band_hz)
         elif new:
             added = [cleaned[number] for number in new]
             lines = shared.resonances(
@@ -111,6 +108,15 @@ class SeriesMemory:
             self.found |= {keys[number]: line for number, line in zip(new, lines, strict=True)}
             self._count_new(len(keys), len(new))
         return [self.found[key] for key in keys]
+
+    def _relearn(
+        self, keys: Sequence[Key], cleaned: Sequence[CleanSpectrum], band_hz: tuple[float, float]
+    ) -> None:
+        """Learn the shared part of one sensor and the resonance of each recording."""
+        spectra, kept = [clean.spectrum for clean in cleaned], [clean.kept for clean in cleaned]
+        lines, self.shared, moved = learn_series(spectra, band_hz=band_hz, kept=kept)
+        self.since, self.found = 0, dict(zip(keys, lines, strict=True))
+        self.moved = tuple(keys[number] for number in moved)
 
     def lines(
         self,
@@ -126,18 +132,12 @@ class SeriesMemory:
         }
         shared = self.shared
         new = [number for number, key in enumerate(keys) if key not in self.together]
-        known = isinstance(shared, SharedBySensors) and shared.fits(spectra, band_hz)
         if (
             not isinstance(shared, SharedBySensors)
-            or not known
+            or not shared.fits(spectra, band_hz)
             or self._must_relearn(len(keys), len(new))
         ):
-            sensor_lines, self.shared = learn_sensors(spectra, band_hz=band_hz, kept=kept)
-            self.since, self.together = 0, dict(zip(keys, _by_recording(sensor_lines), strict=True))
-            self.moved = tuple(
-                next((key for key in keys[number] if key[1] == name), keys[number][0])
-                for number, name in sensor_lines.moved
-            )
+            self._relearn_sensors(keys, spectra, kept, band_hz)
         elif new:
             sensor_lines = shared.lines(
                 {name: [series[number] for number in new] for name, series in spectra.items()},
@@ -149,6 +149,21 @@ class SeriesMemory:
             }
             self._count_new(len(keys), len(new))
         return [self.together[key] for key in keys]
+
+    def _relearn_sensors(
+        self,
+        keys: Sequence[tuple[Key, ...]],
+        spectra: Mapping[str, Sequence[Spectrum | None]],
+        kept: Mapping[str, Sequence[Mask | None]],
+        band_hz: tuple[float, float],
+    ) -> None:
+        """Learn the shared part of several sensors and the line of each recording."""
+        lines, self.shared = learn_sensors(spectra, band_hz=band_hz, kept=kept)
+        self.since, self.together = 0, dict(zip(keys, _by_recording(lines), strict=True))
+        self.moved = tuple(
+            next((key for key in keys[number] if key[1] == name), keys[number][0])
+            for number, name in lines.moved
+        )
 
     @property
     def lead(self) -> str:

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
+from asperity.core.documents import JsonObject
 from asperity.recording import ReadOptions
 from asperity.resonance import SeriesMethod
 from asperity.trend import ALARM_STATES, FALSE_ALARM_RATE, AlarmState, Detector, StageSource
@@ -47,7 +48,7 @@ class Notifier(Protocol):
     def name(self) -> str:
         """Name of the recipient, without passwords."""
 
-    def send(self, notification: dict[str, Any]) -> None:
+    def send(self, notification: JsonObject) -> None:
         """Deliver a notification; raise an Exception with the reason on failure."""
 
 

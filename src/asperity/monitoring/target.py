@@ -51,9 +51,7 @@ def search_target(
             search_target(_contact(case), band_hz), rates_per_turn=per_turn, shaft_hz=shaft
         )
     if band_hz is not None:
-        low, high = (require_positive("band", end, "Hz") for end in band_hz)
-        if not low < high:
-            raise BadInput(f"band must go from low to high, got {low:g} to {high:g} Hz; swap them")
+        low, high = _valid_band(band_hz)
         source = f"{low:.0f} to {high:.0f} Hz, as given"
         if case is None:
             return Target(
@@ -77,7 +75,7 @@ def search_target(
     else:
         source = (
             f"{searched[0]:.0f} to {searched[1]:.0f} Hz, that of the paper's contact, because "
-            "neither a case nor a band was given; give case or band_hz"
+            "neither a case nor a band was given; give `case` or `band_hz`"
         )
     return Target(
         band_hz=searched,
@@ -87,6 +85,13 @@ def search_target(
         assumed=case is None and band_hz is None,
         case=case,
     )
+
+
+def _valid_band(band_hz: tuple[float, float]) -> tuple[float, float]:
+    low, high = (require_positive("band", end, "Hz") for end in band_hz)
+    if not low < high:
+        raise BadInput(f"band must go from low to high, got {low:g} to {high:g} Hz; swap them")
+    return low, high
 
 
 def _contact(machine: MachineCase) -> Case | None:

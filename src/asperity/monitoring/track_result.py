@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.core.arrays import finite_or_none
+from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.core.files import atomic_write, write_csv
 from asperity.core.quantities import quantity
@@ -202,7 +203,7 @@ class Track:
             "notes": list(self.notes),
         }
 
-    def _alarm_row(self) -> dict[str, Any]:
+    def _alarm_row(self) -> JsonObject:
         alarm = self.alarm
         return {
             "state": alarm.state,
@@ -226,7 +227,7 @@ class Track:
         import xarray
 
         rows = [recording.row() for recording in self.recordings]
-        variables: dict[str, Any] = {}
+        variables: dict[str, object] = {}
         for key in NUMBERS:
             values = np.array(
                 [np.nan if row[key] is None else row[key] for row in rows], dtype=float
@@ -256,7 +257,7 @@ class Track:
         }
         return xarray.Dataset(variables | spectra, coordinates, attributes)
 
-    def _spectra(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _spectra(self) -> tuple[dict[str, object], dict[str, object]]:
         """Return variables and coordinates of the spectra; empty without spectra."""
         first = next(
             (recording.reading.spectrum for recording in self.recordings if recording.clean), None
@@ -273,7 +274,7 @@ class Track:
                 )
         spectral = {"long_name": "averaged power spectral density", "units": first.unit}
         flags = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "removed kept"}
-        variables = {
+        variables: dict[str, object] = {
             "density": (("recording", "frequency"), density, spectral),
             "kept": (
                 ("recording", "frequency"),
@@ -333,7 +334,7 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     return rest | named | by_sensor
 
 
-def _stages_row(stages: Stages) -> dict[str, Any]:
+def _stages_row(stages: Stages) -> JsonObject:
     """Return stages as JSON; damping ratios are those at the first x, the break and the last x."""
     return {
         "kind": stages.kind,

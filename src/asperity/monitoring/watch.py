@@ -14,15 +14,16 @@ from time import sleep
 from asperity.case import Case, MachineCase
 from asperity.core.errors import BadInput, require_choice, require_positive
 from asperity.core.files import make_folder
-from asperity.monitoring.files import natural_order, read_table
+from asperity.monitoring.files import RecordingTable, natural_order, read_table
 from asperity.monitoring.forecast import Forecaster, ForecastSchedule
 from asperity.monitoring.notify import deliver
 from asperity.monitoring.ordering import file_name, order_recordings
 from asperity.monitoring.reading import Reading
 from asperity.monitoring.settings import TrackSettings, WatchSettings
 from asperity.monitoring.silence import overdue_reason
-from asperity.monitoring.store.database import STORE
+from asperity.monitoring.store.database import STORE, FileVersion
 from asperity.monitoring.store.sensor_lookup import open_sensors
+from asperity.monitoring.store.sensors import Sensors
 from asperity.monitoring.target import search_target
 from asperity.monitoring.watch_state import Update, WatchState
 from asperity.trend import ALARM_STATES
@@ -60,7 +61,9 @@ def watch_folder(
         which the store was begun.
     """
     if watching.overdue_after_s is not None:
-        require_positive("the time without a recording (--expect)", watching.overdue_after_s, "s")
+        require_positive(
+            "the time without a recording (`overdue_after_s`)", watching.overdue_after_s, "s"
+        )
     for alarm_state in watching.notify_states:
         require_choice("tell", alarm_state, ALARM_STATES)
     folder, out = Path(folder).resolve(), Path(out)
@@ -91,38 +94,56 @@ def _updates(
     with closing(sensors.store):
         first, overdue_before = True, ""
         while True:
-            unread = state.unread(folder)
-            arrived = state.unchanged(unread)
-            table = None
-            if table_file is not None and (arrived or sensors.by_name):
-                table = read_table(table_file)
-                arrived = [key for key in arrived if table.row(Path(key.file)) is not None]
+            arrived, table, waiting = _arrivals(state, folder, table_file)
             new = state.read(arrived, table, progress)
-            series = sorted(sensors.series(), key=lambda key: natural_order(file_name(key)))
-            waiting = len(unread) - len(arrived)
-            acknowledge = state.settings.acknowledge if first else None
             overdue = (
                 ""
-                if new or acknowledge
+                if new or (first and state.settings.acknowledge)
                 else overdue_reason(sensors.arrivals(), watching.overdue_after_s)
             )
             judgement = sensors.record_overdue(overdue, state.recipients) if overdue else None
-            if judgement is not None:
-                failed = deliver(sensors, watching.notifiers, now=first)
-                if not overdue_before:
-                    track = state.overdue(order_recordings(series, table, sensors), overdue)
-                    yield Update(
-                        new=(), track=track, waiting=waiting, judgement=judgement, failed=failed
-                    )
-            elif new or first:
-                update = state.update(series, table, new, first=first)
-                yield replace(update, waiting=waiting)
-            elif (forecast := state.with_forecast()) is not None:
-                failed = deliver(sensors, watching.notifiers)
-                yield Update(new=(), track=forecast, waiting=waiting, failed=failed)
+            if judgement is None:
+                update = _update(state, table, new, first=first)
             else:
-                deliver(sensors, watching.notifiers)
+                failed = deliver(sensors, watching.notifiers, now=first)
+                update = None
+                if not overdue_before:
+                    track = state.overdue(
+                        order_recordings(_series(sensors), table, sensors), overdue
+                    )
+                    update = Update(new=(), track=track, judgement=judgement, failed=failed)
+            if update is not None:
+                yield replace(update, waiting=waiting)
             if watching.once:
                 return
             first, overdue_before = False, overdue
             sleep(watching.poll_interval_s)
+
+
+def _arrivals(
+    state: WatchState, folder: Path, table_file: str | Path | None
+) -> tuple[list[FileVersion], RecordingTable | None, int]:
+    """Return complete new files that the table contains, the table, and how many files wait."""
+    unread = state.unread(folder)
+    arrived = state.unchanged(unread)
+    table = None
+    if table_file is not None and (arrived or state.sensors.by_name):
+        table = read_table(table_file)
+        arrived = [key for key in arrived if table.row(Path(key.file)) is not None]
+    return arrived, table, len(unread) - len(arrived)
+
+
+def _update(
+    state: WatchState, table: RecordingTable | None, new: tuple[Reading, ...], *, first: bool
+) -> Update | None:
+    """Judge new recordings, or make a forecast that is due; send notifications that are due."""
+    if new or first:
+        return state.update(_series(state.sensors), table, new, first=first)
+    forecast = state.with_forecast()
+    failed = deliver(state.sensors, state.watching.notifiers)
+    return None if forecast is None else Update(new=(), track=forecast, failed=failed)
+
+
+def _series(sensors: Sensors) -> list[FileVersion]:
+    """Return the files of all recordings, in natural order of their names."""
+    return sorted(sensors.series(), key=lambda key: natural_order(file_name(key)))

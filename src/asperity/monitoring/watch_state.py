@@ -259,7 +259,7 @@ class WatchState:
         (track, order, question), self._awaiting_forecast = self._awaiting_forecast, None
         acknowledged = self.sensors.acknowledged
         rows = unacknowledged(
-            [row | {"x": order.x[row["file"]]} for row in self.sensors.rows(order.instants)],
+            [row | {"x": order.x[str(row["file"])]} for row in self.sensors.rows(order.instants)],
             acknowledged,
         )
         forecast = self.schedule.make(

@@ -237,7 +237,7 @@ def _open_chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRe
         total = float(stated["scale"].value)
         if not 0.0 < abs(total) < math.inf:
             raise BadInput(
-                f"scale must be finite and not 0, got {total:g}; give scale, the value of a "
+                f"scale must be finite and not 0, got {total:g}; give `scale`, the value of a "
                 f"stored 1"
             )
         facts["scale"] = Fact(total, stated["scale"].source)
@@ -327,7 +327,7 @@ def _rate(path: Path, channel: Channel, stated: Fact | None) -> Fact:
         return Fact(float(channel.rate_hz), channel.rate_source)
     if stated is None:
         raise BadInput(
-            f"{path.name} states no sampling rate{channel.rate_hint}; give rate_hz, "
+            f"{path.name} states no sampling rate{channel.rate_hint}; give `rate_hz`, "
             f"or state it as rate_hz in {path.name}.toml beside it"
         )
     return Fact(rate, stated.source)
@@ -341,7 +341,7 @@ def _unit(path: Path, channel: Channel, stated: Fact | None, *, scaled: bool) ->
     if channel.full_scale and not scaled:
         raise BadInput(
             f"{path.name} holds shares of full scale, so a unit needs its scale; "
-            f"give scale, the {stated.value} at full scale"
+            f"give `scale`, the {stated.value} at full scale"
         )
     if channel.full_scale or channel.unit is None or scaled:
         return stated

@@ -7,7 +7,7 @@ results.
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
@@ -20,6 +20,7 @@ import numpy.typing as npt
 import pyarrow
 
 from asperity.case import Case, load_case, relative_path
+from asperity.core.documents import JsonObject, Table
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import make_folder, require_writable, versions
 from asperity.core.storage import (
@@ -113,7 +114,7 @@ class RunFolder:
                 f"{path} is damaged or was written by another version; {REMEDY}"
             ) from error
 
-    def write_arrays(self, name: str, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
+    def write_arrays(self, name: str, arrays: Arrays) -> None:
         """Write arrays and the identity of the case."""
         everything: dict[str, Any] = {**arrays, IDENTITY: np.array(self.identity)}
         packed = BytesIO()
@@ -160,7 +161,7 @@ def stored_run(folder: Path, layout: FolderLayout) -> StoredRun:
     return StoredRun(case, files, version_notes(manifest["versions"]))
 
 
-def case_digest(tables: Mapping[str, Any], surfaces: MovingSurfaces) -> str:
+def case_digest(tables: Table, surfaces: MovingSurfaces) -> str:
     """Return the digest of all that must be unchanged to resume a run."""
     digest = hashlib.sha256(json.dumps(tables, sort_keys=True).encode())
     for surface in (surfaces.first, surfaces.second):
@@ -215,7 +216,7 @@ def locked_folder(files: RunFolder, case: Case, **entries: object) -> Iterator[N
         ) from None
 
 
-def _manifest(files: RunFolder, case: Case) -> dict[str, Any]:
+def _manifest(files: RunFolder, case: Case) -> JsonObject:
     return {
         "of": files.layout.kind,
         "format": files.layout.version,

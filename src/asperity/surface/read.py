@@ -193,7 +193,7 @@ def _scales(
     if unit is None or lateral_unit is None:
         raise BadInput(
             f"{name} states no units; give unit (of the heights) and lateral_unit, such as "
-            "um and mm, or surface.unit in a case"
+            "`unit` um `lateral_unit` mm, or surface.unit in a case"
         )
     return metres(unit), metres(lateral_unit)
 

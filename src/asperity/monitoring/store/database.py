@@ -6,12 +6,13 @@ All writing is transactional (write-ahead log): a watch may be killed at any mom
 
 import json
 import sqlite3
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
+from asperity.core.documents import JsonObject, Table
 from asperity.core.errors import AsperityError, UnreadableFile
 from asperity.core.files import require_writable
 from asperity.trend import AlarmState
@@ -56,6 +57,9 @@ CREATE VIEW trend AS
     FROM recording JOIN sensor ON sensor.id = recording.sensor JOIN point ON point.id = sensor.point
         JOIN machine ON machine.id = point.machine;
 """
+
+
+Run: TypeAlias = Callable[..., sqlite3.Cursor]  # runs a statement in a transaction
 
 
 class SensorAddress(NamedTuple):
@@ -170,7 +174,7 @@ class Store:
             ) from None
 
     @contextmanager
-    def transaction(self) -> Iterator[Callable[..., Any]]:
+    def transaction(self) -> Iterator[Run]:
         """Run statements as one transaction: all of them or none."""
         with self._translated_errors():
             self._connection.execute("BEGIN IMMEDIATE")
@@ -181,7 +185,7 @@ class Store:
                 raise
             self._connection.execute("COMMIT")
 
-    def read(self, query: str, *values: Any) -> list[Any]:
+    def read(self, query: str, *values: object) -> list[Any]:
         """Return the rows of a query."""
         with self._translated_errors():
             return self._connection.execute(query, values).fetchall()
@@ -195,7 +199,7 @@ class Store:
         )
         return [(number, SensorAddress(*names)) for number, *names in rows]
 
-    def sensors_at(self, machine: str, point: str) -> list[tuple[str, dict[str, Any]]]:
+    def sensors_at(self, machine: str, point: str) -> list[tuple[str, JsonObject]]:
         """Return names and settings of the sensors at a point, in order of registration."""
         rows = self.read(
             "SELECT sensor.name, settings FROM sensor JOIN point ON point.id = sensor.point "
@@ -205,9 +209,7 @@ class Store:
         )
         return [(name, json.loads(settings)) for name, settings in rows]
 
-    def register_sensor(
-        self, address: SensorAddress, settings: Mapping[str, Any]
-    ) -> tuple[int, dict[str, Any]]:
+    def register_sensor(self, address: SensorAddress, settings: Table) -> tuple[int, JsonObject]:
         """Return number and settings of a sensor; a new sensor gets the settings given."""
         with self.transaction() as run:
             run("INSERT OR IGNORE INTO machine (name) VALUES (?)", (address.machine,))

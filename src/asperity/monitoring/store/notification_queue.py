@@ -1,11 +1,12 @@
 """Queue of notifications in a store: an entry stays until its recipient has received it."""
 
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 from uuid import uuid4
 
-from asperity.monitoring.store.database import SensorAddress, Store
+from asperity.core.documents import JsonObject
+from asperity.monitoring.store.database import Run, SensorAddress, Store
 from asperity.monitoring.store.sensor import now
 from asperity.trend import ALARM_STATES
 
@@ -31,11 +32,11 @@ class NotificationQueue:
 
     def add(
         self,
-        run: Callable[..., Any],
+        run: Run,
         sensor: int,
         address: SensorAddress,
         recipients: Sequence[str],
-        content: Mapping[str, Any],
+        content: JsonObject,
     ) -> None:
         """Queue a notification to each recipient whose last known state differs.
 
@@ -88,6 +89,6 @@ class NotificationQueue:
             )
 
 
-def notification_content(judgement: Mapping[str, Any], recording: str) -> dict[str, Any]:
+def notification_content(judgement: Mapping[str, Any], recording: str) -> JsonObject:
     """Return the part of a judgement that is sent to recipients."""
     return {**judgement["alarm"], "verdict": judgement["verdict"], "recording": recording}

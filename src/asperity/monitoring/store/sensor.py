@@ -4,15 +4,15 @@
 """
 
 import json
-from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from math import nan
-from typing import Any
 
+from asperity.core.documents import Table
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.monitoring.reading import Reading, pack_reading, unpack_reading
 from asperity.monitoring.store.database import (
     FileVersion,
+    Run,
     SensorAddress,
     StandingAlarm,
     Store,
@@ -45,8 +45,8 @@ class Sensor:
         self,
         store: Store,
         address: SensorAddress,
-        settings: Mapping[str, Any],
-        initial: Mapping[str, Any] | None = None,
+        settings: Table,
+        initial: Table | None = None,
     ) -> None:
         self.store, self.address = store, address
         self.number, self.settings = store.register_sensor(address, {**settings, **(initial or {})})
@@ -56,7 +56,7 @@ class Sensor:
             ):
                 raise BadInput(
                     f"{store.path} was begun with {name} {self.settings.get(name)}, got {value}; "
-                    "keep the former value, or choose another out or another sensor"
+                    "keep the former value, or choose another `out` or another sensor"
                 )
         rows = store.read(
             "SELECT id, file, version, started, state, refused, duration FROM recording "
@@ -98,7 +98,8 @@ class Sensor:
     @property
     def spacing_hz(self) -> float | None:
         """Spacing of the spectra's lines [Hz]; None before the first recording."""
-        return self.settings.get("spacing_hz")
+        spacing_hz = self.settings.get("spacing_hz")
+        return spacing_hz if isinstance(spacing_hz, int | float) else None
 
     def set_spacing(self, spacing_hz: float) -> None:
         """Set the spacing of lines [Hz] for all recordings."""
@@ -158,7 +159,7 @@ class Sensor:
             self.unjudged.discard(key)
             return None
 
-    def insert_judgement(self, run: Callable[..., Any], judgement: Mapping[str, Any]) -> None:
+    def insert_judgement(self, run: Run, judgement: Table) -> None:
         """Insert a judgement, by names of columns, within a transaction."""
         values = {"sensor": self.number, "time": now(), **judgement}
         marks = ", ".join("?" * len(values))

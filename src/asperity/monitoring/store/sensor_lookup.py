@@ -2,8 +2,8 @@
 
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
+from asperity.core.documents import JsonObject
 from asperity.monitoring.reading import channels_in
 from asperity.monitoring.store.database import SensorAddress, Store
 from asperity.monitoring.store.sensor import FOLDER, TOGETHER
@@ -12,7 +12,7 @@ from asperity.monitoring.target import Target
 from asperity.recording import ReadOptions
 
 
-def settings_of(target: Target, options: ReadOptions) -> dict[str, Any]:
+def settings_of(target: Target, options: ReadOptions) -> JsonObject:
     """Return the settings of reading, equal for all recordings of a sensor."""
     machine = {"rates_per_turn": dict(target.rates_per_turn)} if target.rates_per_turn else {}
     return {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options) | machine
@@ -51,4 +51,4 @@ def open_sensors(
 def sensors_judged_with(store: Store, address: SensorAddress) -> Sensors:
     """Return a sensor of the store and those that are judged with it."""
     stored = dict(store.sensors_at(address.machine, address.point))[address.sensor]
-    return Sensors(store, address._replace(sensor=stored.get(TOGETHER, address.sensor)), {})
+    return Sensors(store, address._replace(sensor=str(stored.get(TOGETHER, address.sensor))), {})

@@ -5,17 +5,19 @@ each and notified once.
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
-from typing import Any, NamedTuple
+from typing import Any
 
+from asperity.core.documents import JsonObject, Table
 from asperity.core.errors import BadInput
 from asperity.monitoring.reading import Reading
 from asperity.monitoring.series_state import SeriesMemory, pack_shared, unpack_shared
 from asperity.monitoring.silence import SILENCE
 from asperity.monitoring.store.database import (
     FileVersion,
+    Run,
     SensorAddress,
     StandingAlarm,
     Store,
@@ -26,18 +28,12 @@ from asperity.monitoring.store.notification_queue import (
     PendingNotification,
     notification_content,
 )
+from asperity.monitoring.store.recording_rows import StoredRow, stored_rows
 from asperity.monitoring.store.sensor import ACKNOWLEDGED, TOGETHER, Sensor
 from asperity.monitoring.track_result import Track
 from asperity.trend import AlarmState
 
-
-class _StoredRow(NamedTuple):
-    """A row of a track for one sensor: number of the recording, row, sensor and file."""
-
-    number: int
-    row: dict[str, Any]
-    sensor: Sensor
-    key: FileVersion
+ALARM_COLUMNS = ("state", "since", "reason", "raised_by", "false_alarm_rate")
 
 
 class Sensors:
@@ -62,7 +58,7 @@ class Sensors:
         self,
         store: Store,
         address: SensorAddress,
-        settings: Mapping[str, Any],
+        settings: Table,
         *,
         channels: int = 1,
         stated: bool = False,
@@ -77,7 +73,7 @@ class Sensors:
         self.by_name: dict[str, Sensor] = {}
         self._spacing_hz: float | None = None
         # version of the database and rows by recording number, as of the last judgement
-        self._written: tuple[int | None, dict[int, dict[str, Any]]] = (None, {})
+        self._written: tuple[int | None, dict[int, JsonObject]] = (None, {})
         for name, stored in store.sensors_at(address.machine, address.point):
             if name == address.sensor or (stored.get(TOGETHER) == address.sensor and not stated):
                 self._registered(name)
@@ -187,7 +183,7 @@ class Sensors:
         held = [sensor.reading(key) for sensor in self._sensors() if key in sensor.recordings]
         return [reading for reading in held if reading is not None]
 
-    def rows(self, instants: Sequence[Sequence[FileVersion]]) -> list[dict[str, Any]]:
+    def rows(self, instants: Sequence[Sequence[FileVersion]]) -> list[JsonObject]:
         """Return one judged row per instant, as in `asperity track --json`."""
         rows: dict[int, str] = {}
         for sensor in self._sensors():
@@ -292,53 +288,63 @@ class Sensors:
         BadInput
             for recordings of several sensors if the user named one.
         """
-        if self.stated and track.sensors:
-            raise BadInput(
-                f"these recordings belong to the sensors {', '.join(track.sensors)}, got sensor "
-                f"{self.address.sensor}; omit the sensor"
-            )
+        self._require_single(track)
         self.refresh()
         track = self._with_standing_alarm(track)
         judgement = track.scalars(all_sources=False)
         alarm, lines = judgement["alarm"], judgement.pop("recordings")
-        last, leading, others = lines[-1]["file"], *self._stored_rows(track, lines, keys)
-        numbers = [stored.number for stored in leading]
-        rows = {stored.number: stored.row for stored in (*leading, *others)}
-        values = {
-            "asked": question,
-            "said": json.dumps({**judgement, "numbers": numbers}),
-        }
-        entry = {"false_alarm_rate": alarm["false_alarm_rate"], "verdict": judgement["verdict"]}
-        entry |= {name: alarm[name] for name in ("state", "since", "reason", "raised_by")}
+        leading, others = stored_rows([*self._sensors()], track, lines, keys)
+        content = json.dumps({**judgement, "numbers": [stored.number for stored in leading]})
+        entry = {name: alarm[name] for name in ALARM_COLUMNS}
+        entry |= {"verdict": judgement["verdict"], "recordings": len(lines), "new": new}
+        rows = [*leading, *others]
         with self.store.transaction() as run:
-            ((version,),) = run("PRAGMA data_version").fetchall()
-            # another program may have changed them
-            written = self._written[1] if self._written[0] == version else {}
-            for number, row in rows.items():
-                if written.get(number) != row:
-                    run(
-                        "UPDATE recording SET row = ?, state = ? WHERE id = ?",
-                        (json.dumps(row), row["state"], number),
-                    )
+            written = self._write_rows(run, rows)
             for sensor in self._sensors():
-                sensor.insert_judgement(
-                    run, {**entry, "recordings": len(track.recordings), "new": new}
-                )
+                sensor.insert_judgement(run, entry)
                 run(
-                    "UPDATE sensor SET asked = :asked, said = :said WHERE id = :id",
-                    {**values, "id": sensor.number},
+                    "UPDATE sensor SET asked = ?, said = ? WHERE id = ?",
+                    (question, content, sensor.number),
                 )
-            self._queue(run, recipients, notification_content(judgement, last))
+            self._queue(run, recipients, notification_content(judgement, lines[-1]["file"]))
             self._store_memory(run, memory)
-        self._written = (version, rows)
-        for stored in (*leading, *others):
-            stored.sensor.set_state(stored.key, stored.row["state"])
+        self._written = written
+        for stored in rows:
+            stored.sensor.set_state(stored.key, stored.state)
+        self._set_standing(alarm)
+        return track
+
+    def _write_rows(
+        self, run: Run, stored: Sequence[StoredRow]
+    ) -> tuple[int, dict[int, JsonObject]]:
+        """Write the rows that have changed; return the database's version and all rows."""
+        rows = {row.number: row.row for row in stored}
+        ((version,),) = run("PRAGMA data_version").fetchall()
+        # another program may have changed them
+        written = self._written[1] if self._written[0] == version else {}
+        for number, row in rows.items():
+            if written.get(number) != row:
+                run(
+                    "UPDATE recording SET row = ?, state = ? WHERE id = ?",
+                    (json.dumps(row), row["state"], number),
+                )
+        return version, rows
+
+    def _set_standing(self, alarm: Mapping[str, Any]) -> None:
+        """Let an alarm stand on the sensors that have none."""
         for sensor in self._sensors():
             if alarm["state"] == "alarm" and sensor.standing is None:
                 sensor.standing = StandingAlarm(
                     alarm["since"], alarm["reason"], alarm["raised_by"] or ""
                 )
-        return track
+
+    def _require_single(self, track: Track) -> None:
+        """Raise BadInput for recordings of several sensors if the user named one."""
+        if self.stated and track.sensors:
+            raise BadInput(
+                f"these recordings belong to the sensors {', '.join(track.sensors)}, got sensor "
+                f"{self.address.sensor}; omit the sensor"
+            )
 
     def _with_standing_alarm(self, track: Track) -> Track:
         """Put the standing alarm into a track whose own alarm has ended."""
@@ -353,7 +359,7 @@ class Sensors:
         )
         return replace(track, alarm=alarm)
 
-    def _store_memory(self, run: Callable[..., Any], memory: SeriesMemory | None) -> None:
+    def _store_memory(self, run: Run, memory: SeriesMemory | None) -> None:
         """Store what the series has in common, where it is new."""
         if memory is None or memory.shared is None or self._first is None:
             return
@@ -363,26 +369,6 @@ class Sensors:
             run("DELETE FROM learned WHERE sensor = ?", (number,))
             if not memory.moved:  # otherwise it covers only a part, and all is separated again
                 run("INSERT INTO learned VALUES (?, ?)", (number, pack_shared(memory.shared)))
-
-    def _stored_rows(
-        self, track: Track, rows: Sequence[dict[str, Any]], keys: Mapping[str, FileVersion]
-    ) -> tuple[list[_StoredRow], list[_StoredRow]]:
-        """Return the stored rows of each recording's leading sensor, and of the other sensors."""
-        leading: list[_StoredRow] = []
-        others: list[_StoredRow] = []
-        for recording, row in zip(track.recordings, rows, strict=True):
-            for name, reading in recording.readings.items():
-                key = keys[reading.file]
-                holders = [sensor for sensor in self._sensors() if key in sensor.recordings]
-                sensor = next(
-                    (holder for holder in holders if holder.address.sensor == name), holders[0]
-                )
-                leads = name == recording.reading.sensor
-                own_row = row if leads else recording.row_on(name, row)
-                (leading if leads else others).append(
-                    _StoredRow(sensor.recordings[key].number, own_row, sensor, key)
-                )
-        return leading, others
 
     def arrivals(self) -> list[datetime]:
         """Return when the last recordings arrived."""
@@ -428,9 +414,7 @@ class Sensors:
     # Notifications
     # ----------------------------------------------------------------------------------------------
 
-    def _queue(
-        self, run: Callable[..., Any], recipients: Sequence[str], content: Mapping[str, Any]
-    ) -> None:
+    def _queue(self, run: Run, recipients: Sequence[str], content: JsonObject) -> None:
         if self._first is not None:
             address = self.address._replace(sensor=", ".join(self.by_name))
             self.notifications.add(run, self._first.number, address, recipients, content)

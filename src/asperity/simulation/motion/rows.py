@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from asperity.case import Case
 from asperity.core.errors import BadInput
@@ -11,6 +11,9 @@ from asperity.coupling import oscillator
 from asperity.ehl import ContactSolution, ContactState
 from asperity.solution import Friction, friction
 from asperity.transient import Snapshot
+
+if TYPE_CHECKING:
+    import pandas
 
 Row = dict[str, float | int | bool]
 
@@ -95,9 +98,7 @@ def step_row(snapshot: Snapshot, case: Case, previous: Row | None) -> Row:
     return row
 
 
-def mean_state(means: Any) -> ContactState:
+def mean_state(means: "pandas.Series[float]") -> ContactState:
     """Return the contact state of a row of means, without a lambda ratio."""
-    fields: dict[str, Any] = {
-        quantity(key).source.removeprefix("state."): float(means[key]) for key in STATE
-    }
-    return ContactState(**fields, lambda_ratio=None)
+    fields = {quantity(key).source.removeprefix("state."): float(means[key]) for key in STATE}
+    return ContactState(**fields, lambda_ratio=None, error=None)

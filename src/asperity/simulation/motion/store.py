@@ -112,7 +112,7 @@ class HistoryRecorder(RunRecorder[Row]):
         if self.files is None or self.memory is None:
             return
         self.files.write_rows(pyarrow.Table.from_pylist(self.rows), self.case)
-        self.files.write_arrays(MEMORY, self.memory)
+        self.files.write_arrays(MEMORY, {**self.memory})
         self.saved_at = time.monotonic()
 
     def history(self, seconds: float, computed: int) -> History:

@@ -8,13 +8,14 @@ the same history for comparison.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from asperity import coupling
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 from asperity.core.errors import AsperityError, BadInput, NotConverged
 from asperity.core.quantities import lines, quantity, read
 from asperity.core.signals import Signal, Spectrum, power_spectrum
@@ -26,7 +27,7 @@ from asperity.coupling import (
     band_about,
     contact_vibration,
 )
-from asperity.ehl import Scales, solve_contact
+from asperity.ehl import ContactSolution, Scales, solve_contact
 from asperity.resonance import FEWEST_LINES, Resonance, contact_resonance, no_resonance
 from asperity.simulation.motion.history import History
 from asperity.solution import OscillatingContact, tangent_stiffness
@@ -155,7 +156,7 @@ class HistoryVibration:
             return f"{sentence}; the history shows {self.resonance.crf_hz:.0f} Hz."
         return f"{sentence}; the history shows no resonance ({self.resonance.reason})."
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the additional values of `asperity run --listen --json`."""
         reasons = {
             "history_crf_reason": self.resonance.reason,
@@ -199,10 +200,7 @@ def history_vibration(
         oscillator = coupling.damped_oscillator(
             float(np.mean(stiffness)), case.conditions.load, model
         )
-        alone = model
-        if model.needs_solution:
-            alone = model.with_choices(stiffness_law="hertz-point", excitation="noise")
-        coupled = contact_vibration(history.mean_state, case.conditions, alone)
+        coupled = _coupled(history, model)
     f0 = oscillator.natural_frequency_hz
     period, objection = _period(surfaces)
     profile, not_periodic, objection = (
@@ -233,6 +231,13 @@ def history_vibration(
         not_periodic=not_periodic,
         resonance=_resonance(spectrum, f0, model),
     )
+
+
+def _coupled(history: History, model: VibrationModel) -> Vibration:
+    """Return the vibration of the mean contact by the paper's coupling."""
+    if model.needs_solution:
+        model = model.with_choices(stiffness_law="hertz-point", excitation="noise")
+    return contact_vibration(history.mean_state, history.case.conditions, model)
 
 
 def _passage(history: History, period: float) -> tuple[Signal | None, float | None, str | None]:
@@ -274,21 +279,22 @@ def repeating(
             math.nan,
             f"{missing}; extend the history by {math.ceil(length) - time.size} steps",
         )
-    waves = int(WAVES * length)
-    phase = 2.0 * np.pi * np.outer(time / period, np.arange(1, waves + 1))
-    basis = np.hstack([np.ones((time.size, 1)), np.cos(phase), np.sin(phase)])
-    coefficients: Field = np.linalg.lstsq(basis, heights - heights.mean(), rcond=None)[0]
-    left, varied = float(np.std(heights - basis @ coefficients)), float(np.std(heights))
-    samples = math.ceil(length)
+    waves, samples = int(WAVES * length), math.ceil(length)
+    coefficients, remainder = _fitted_waves(time / period, heights, waves)
     spectrum = np.zeros(samples // 2 + 1, dtype=complex)
     spectrum[1 : waves + 1] = (
         samples / 2.0 * (coefficients[1 : waves + 1] - 1j * coefficients[waves + 1 :])
     )
-    return (
-        Signal(np.fft.irfft(spectrum, samples), samples / period, "m"),
-        left / varied if varied else 0.0,
-        None,
-    )
+    return Signal(np.fft.irfft(spectrum, samples), samples / period, "m"), remainder, None
+
+
+def _fitted_waves(periods: Field, heights: Field, waves: int) -> tuple[Field, float]:
+    """Return the coefficients of a fitted Fourier series, and the relative rms of the remainder."""
+    phase = 2.0 * np.pi * np.outer(periods, np.arange(1, waves + 1))
+    basis = np.hstack([np.ones((periods.size, 1)), np.cos(phase), np.sin(phase)])
+    coefficients: Field = np.linalg.lstsq(basis, heights - heights.mean(), rcond=None)[0]
+    left, varied = float(np.std(heights - basis @ coefficients)), float(np.std(heights))
+    return coefficients, left / varied if varied else 0.0
 
 
 def resampled(profile: Signal, rate_hz: float) -> Signal:
@@ -359,14 +365,9 @@ def _moments(
             unsolved.append(int(number))
             continue
         solved.append(int(number))
-        try:
-            found = OscillatingContact(contact, reference_depth=spring.reference_depth).resonance(
-                model.mass
-            )
-            shaken.append((found.damping_ratio, found.stiffness))
-        except AsperityError as refusal:  # all other numbers are valid without damping
-            shaken.append((math.nan, math.nan))
-            failure = str(refusal)
+        damping_ratio, dynamic_stiffness, reason = _oscillating(contact, spring, model.mass)
+        shaken.append((damping_ratio, dynamic_stiffness))
+        failure = reason or failure
     if not stiffness:
         reason = (
             f"the tangent stiffness could not be computed at any of {len(unsolved)} steps: {lost}"
@@ -374,6 +375,17 @@ def _moments(
         raise NotConverged(lost.solution, reason)
     damping, dynamic = np.array(shaken).T
     return _Moments(tuple(solved), np.array(stiffness), damping, dynamic, tuple(unsolved), failure)
+
+
+def _oscillating(
+    contact: ContactSolution, spring: Tangent, mass: float
+) -> tuple[float, float, str]:
+    """Return damping ratio and dynamic stiffness of a mass; nan with the reason if undetermined."""
+    try:
+        found = OscillatingContact(contact, reference_depth=spring.reference_depth).resonance(mass)
+    except AsperityError as refusal:  # all other numbers are valid without damping
+        return math.nan, math.nan, str(refusal)
+    return found.damping_ratio, found.stiffness, ""
 
 
 def _mean(values: Field) -> float:

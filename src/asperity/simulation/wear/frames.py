@@ -3,13 +3,13 @@
 The selection depends only on the number of jumps, so a resumed run keeps the same frames.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from asperity.core.arrays import Field, Mask
+from asperity.simulation.folder import Arrays
 from asperity.simulation.wear.contact import SolvedPosition
 from asperity.wear import TrackPosition
 
@@ -41,7 +41,7 @@ class WearFrame(NamedTuple):
         )
         return cls(number, hours, place, gap, pressure, solved.asperity_pressure > 0.0)
 
-    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+    def arrays(self) -> Arrays:
         """Return the arrays to store, by name."""
         numbers = np.array([self.number, self.hours, *self.position], dtype=float)
         return {
@@ -52,7 +52,7 @@ class WearFrame(NamedTuple):
         }
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "WearFrame":
+    def from_arrays(cls, arrays: Arrays) -> "WearFrame":
         """Rebuild a frame from `arrays`."""
         number, hours, first, second = map(float, arrays["told"])
         place = TrackPosition(int(first), int(second))

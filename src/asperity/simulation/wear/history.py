@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas
@@ -13,6 +13,7 @@ import scipy
 
 from asperity.case import Case
 from asperity.core.arrays import finite_or_none
+from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 from asperity.ehl import ContactState
@@ -275,10 +276,10 @@ class WearHistory:
             unit="h",
         )
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the values of `asperity wear --json`."""
         first, last = self.table.iloc[0], self.table.iloc[-1]
-        scalars: dict[str, Any] = {
+        scalars: JsonObject = {
             "verdict": self.verdict(),
             "hours": self.hours,
             "overrollings": list(self.overrollings),

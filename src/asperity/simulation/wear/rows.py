@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import scipy
@@ -111,12 +110,7 @@ def contact_row(case: Case, solved: Sequence[SolvedPosition], sq: float) -> Row:
     share = load_share(solved)
     low, high = share.interval or (math.nan, math.nan)
     flashes = [position.flash_temperature for position in solved]
-    row: Row = {"sq_m": sq}
-    for name, key in STATE.items():
-        known = (getattr(position.state, name) for position in solved)
-        values = [value for value in known if value is not None]
-        if name != "sq":
-            row[key] = float(np.mean(values)) if values else math.nan
+    row: Row = {"sq_m": sq} | _mean_state(solved)
     shares = [position.state.clr for position in solved]
     off = float(np.std(shares, ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
     reach = off * float(scipy.special.stdtrit(max(len(shares) - 1, 1), LEVEL))
@@ -132,6 +126,18 @@ def contact_row(case: Case, solved: Sequence[SolvedPosition], sq: float) -> Row:
         "flash_temperature_max_k": max(flashes) if all(map(math.isfinite, flashes)) else math.nan,
     }
     return row | _resonance(case, row, off)
+
+
+def _mean_state(solved: Sequence[SolvedPosition]) -> Row:
+    """Return the mean of each column of `STATE` besides Sq; nan if unknown."""
+    row: Row = {}
+    for name, key in STATE.items():
+        if name == "sq":
+            continue
+        known = (getattr(position.state, name) for position in solved)
+        values = [value for value in known if value is not None]
+        row[key] = float(np.mean(values)) if values else math.nan
+    return row
 
 
 def _resonance(case: Case, row: Row, off: float) -> Row:
@@ -166,9 +172,9 @@ def _resonance(case: Case, row: Row, off: float) -> Row:
     }
 
 
-def state_of_row(row: Mapping[str, Any]) -> ContactState:
+def state_of_row(row: Mapping[str, float]) -> ContactState:
     """Return the mean contact state of a row, without convergence data."""
-    known: dict[str, Any] = {name: float(row[key]) for name, key in STATE.items()}
+    known = {name: float(row[key]) for name, key in STATE.items()}
     slope = known.pop("contact_slope")
     return ContactState(
         **known,
@@ -177,4 +183,5 @@ def state_of_row(row: Mapping[str, Any]) -> ContactState:
         load_error=0.0,
         mass_flux_imbalance=0.0,
         contact_slope=None if math.isnan(slope) else slope,
+        error=None,
     )

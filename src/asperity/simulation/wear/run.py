@@ -95,13 +95,7 @@ def _advance(
     """Advance the history to `end`; return the number of jumps computed."""
     if recorder.end is not None and abs(recorder.end.worn.time - end) <= TIME_TOLERANCE * end:
         return 0
-    folder = None if recorder.files is None else recorder.files.path
-    held = max(recorder.worn.time, 0.0 if recorder.end is None else recorder.end.worn.time)
-    if held >= end * (1.0 - TIME_TOLERANCE):
-        raise BadInput(
-            f"{folder} holds {held / HOUR:.6g} h of wear, got {end / HOUR:.6g} h; state at least "
-            "as many hours, or name a new folder"
-        )
+    _require_longer(recorder, end)
     worn, at_end, computed = recorder.worn, False, 0
     while True:
         solutions, row = solve_positions(contact, worn, solve)
@@ -121,6 +115,17 @@ def _advance(
         computed += 1
         if not at_end:
             recorder.save(worn)
+
+
+def _require_longer(recorder: WearRecorder, end: float) -> None:
+    """Raise BadInput for fewer hours than the folder holds."""
+    folder = None if recorder.files is None else recorder.files.path
+    held = max(recorder.worn.time, 0.0 if recorder.end is None else recorder.end.worn.time)
+    if held >= end * (1.0 - TIME_TOLERANCE):
+        raise BadInput(
+            f"{folder} holds {held / HOUR:.6g} h of wear, got {end / HOUR:.6g} h; state at least "
+            "as many hours, or name a new folder"
+        )
 
 
 def solve_positions(

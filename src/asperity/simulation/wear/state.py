@@ -6,13 +6,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from asperity.core.arrays import Field
+from asperity.simulation.folder import Arrays
 from asperity.surface import MovingSurfaces
 from asperity.wear import MechanismState
 
-Arrays = dict[str, npt.NDArray[Any]]
 Both = tuple[Field, Field]
 FIELDS = ("worn", "flattened", "changed", "rates")
 
@@ -76,10 +75,10 @@ class WearState:
         return arrays
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "WearState":
+    def from_arrays(cls, arrays: Arrays) -> "WearState":
         """Rebuild a state from `arrays`."""
         number, time, seconds, error, longest, *volumes = map(float, arrays["numbers"])
-        states: dict[str, dict[str, npt.NDArray[Any]]] = {}
+        states: dict[str, Arrays] = {}
         for name, value in arrays.items():
             if name.startswith("state:"):
                 mechanism, _, key = name.removeprefix("state:").partition(":")

@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas
@@ -150,7 +150,9 @@ def _history(
     frames: Mapping[int, WearFrame],
     *,
     folder: Path | None,
-    **details: Any,
+    seconds: float = 0.0,
+    computed: int = 0,
+    remarks: tuple[str, ...] = (),
 ) -> WearHistory:
     """Return the history up to `end`, without rows that a longer run has added."""
     last = end.worn.number
@@ -163,7 +165,9 @@ def _history(
         folder=folder,
         path=None if folder is None else folder / LAYOUT.table,
         files=() if folder is None else surface_files(folder),
-        **details,
+        seconds=seconds,
+        computed=computed,
+        remarks=remarks,
     )
 
 
