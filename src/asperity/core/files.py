@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from platform import python_version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 
@@ -60,7 +60,7 @@ def write_csv(path: Path, table: "pandas.DataFrame") -> None:
     write_text(path, safe.to_csv(index=False, lineterminator="\n"))
 
 
-def _escape_formula(value: Any) -> Any:
+def _escape_formula(value: object) -> object:
     return f"'{value}" if isinstance(value, str) and value.startswith(FORMULAS) else value
 
 

@@ -11,8 +11,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
-from typing import Any, get_type_hints
+from typing import Any, SupportsFloat, get_type_hints
 
+from asperity.core.documents import Table
 from asperity.core.errors import require_positive
 
 NO_VALUE = "–"
@@ -103,7 +104,7 @@ class Quantity:
         known = {"long_name": self.title, "units": self.unit, "standard_name": self.standard_name}
         return {name: text for name, text in known.items() if text}
 
-    def value_from(self, owner: Any) -> Any:
+    def value_from(self, owner: object) -> Any:
         """Return the value at the path `source` in its owner; None if a part of it is None."""
         for name in self.source.split("."):
             if owner is None:
@@ -121,7 +122,7 @@ class Quantity:
             value * self.factor, None if deviation is None else deviation * self.factor, self.form
         )
 
-    def text(self, value: Any, deviation: float | None = None) -> str:
+    def text(self, value: float | str | None, deviation: float | None = None) -> str:
         """Format a stored value with its unit: "84.0 ± 2.4 %"."""
         number = self.number(value, deviation)
         return number if number == NO_VALUE or not self.display else f"{number} {self.display}"
@@ -138,7 +139,7 @@ class Quantity:
             form = f".{min(decimals, int(form.strip('.f')))}f"
         return " to ".join(with_deviation(end * self.factor, None, form) for end in (low, high))
 
-    def named(self, value: Any, deviation: float | None = None) -> str:
+    def named(self, value: float | str | None, deviation: float | None = None) -> str:
         """Format a stored value after its symbol: "CLR 84.0 ± 2.4 %"."""
         return f"{self.short} {self.text(value, deviation)}"
 
@@ -150,17 +151,17 @@ class Quantity:
         )
         return f"{stem}_low{unit}", f"{stem}_high{unit}"
 
-    def number_in(self, values: Mapping[str, Any]) -> str:
+    def number_in(self, values: Table) -> str:
         """Format its number in a row of a run or table: "61.3 (44 to 78)", or "61.3 ± 2.4".
 
         A quantity with keys for an interval shows no deviation, which is only a part of the
         uncertainty. A share or film thickness whose deviation exceeds the physical range shows the
         clipped interval: "0.2 (0.0 to 7.1)".
         """
-        value, (low, high) = values.get(self.key), (values.get(end) for end in self.ends)
+        value, (low, high) = values.get(self.key), (_as_float(values.get(end)) for end in self.ends)
         if self.ends[0] not in values:
-            deviation = values.get(self.deviation)
-            clipped = self.clipped_interval(value, deviation)
+            deviation = _as_float(values.get(self.deviation))
+            clipped = self.clipped_interval(_as_float(value), deviation)
             return (
                 self.number(value, deviation)
                 if clipped is None
@@ -185,10 +186,14 @@ class Quantity:
         low, high = max(0.0, value - deviation), min(most, value + deviation)
         return None if (low, high) == (value - deviation, value + deviation) else (low, high)
 
-    def text_in(self, values: Mapping[str, Any]) -> str:
+    def text_in(self, values: Table) -> str:
         """Format its number in a row with its unit: "61.3 (44 to 78) %"."""
         number = self.number_in(values)
         return number if number == NO_VALUE or not self.display else f"{number} {self.display}"
+
+
+def _as_float(value: object) -> float | None:
+    return float(value) if isinstance(value, SupportsFloat) else None
 
 
 def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> str:
@@ -206,10 +211,8 @@ def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> 
     exponent = math.floor(math.log10(abs(value))) if value and not form.endswith("f") else 0
     if not form.endswith("e") and -3 <= exponent < 6:
         exponent = 0
-    scaled, power = (
-        value / 10.0**exponent,
-        f"×10{str(exponent).translate(SUPERSCRIPTS)}" if exponent else "",
-    )
+    scaled = value / 10.0**exponent
+    power = f"×10{str(exponent).translate(SUPERSCRIPTS)}" if exponent else ""
     if deviation is None or not 0.0 < deviation < math.inf:
         return f"{scaled:{form.replace('e', 'f')}}{power}".replace("-", "−")
     spread = deviation / 10.0**exponent

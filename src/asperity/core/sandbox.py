@@ -32,7 +32,7 @@ _START = "import sys; sys.path[:] = sys.argv[1:]; from asperity.core.sandbox imp
 
 
 def read_in_subprocess(
-    path: Path, reader: str, *arguments: Any, remedy: str, library: str = ""
+    path: Path, reader: str, *arguments: object, remedy: str, library: str = ""
 ) -> Any:
     """Return `reader(path, *arguments)`, run in the subprocess.
 
@@ -63,9 +63,8 @@ def read_in_subprocess(
     )
     if outcome == "read":
         return content
-    if outcome == "refused":
-        refusal: BadInput = content
-        raise refusal
+    if isinstance(content, BadInput) and outcome == "refused":
+        raise content
     if outcome == "missing":
         raise ImportError(content)
     raise UnreadableFile(
@@ -91,7 +90,7 @@ class _Server:
         self.lock = threading.Lock()
         self.process: subprocess.Popen[bytes] | None = None
 
-    def request(self, message: Any, seconds: float) -> tuple[str, Any]:
+    def request(self, message: object, seconds: float) -> tuple[str, object]:
         """Send a request; return its outcome and content."""
         with self.lock:
             if self.process is None:
@@ -115,7 +114,7 @@ class _Server:
             try:
                 pickle.dump(message, process.stdin, 5)
                 process.stdin.flush()
-                answer: tuple[str, Any] = pickle.load(process.stdout)
+                answer: tuple[str, object] = pickle.load(process.stdout)
             except (EOFError, OSError, pickle.UnpicklingError):
                 with suppress(subprocess.TimeoutExpired):
                     process.wait(EXIT_TIMEOUT_S)
@@ -185,8 +184,8 @@ def load(library: str) -> None:
 
 
 def _answer(
-    reader: str, arguments: tuple[Any, ...], memory: float, seconds: float
-) -> tuple[str, Any]:
+    reader: str, arguments: tuple[object, ...], memory: float, seconds: float
+) -> tuple[str, object]:
     module, _, name = reader.partition(":")
     try:
         function = getattr(import_module(module), name)

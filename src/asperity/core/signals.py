@@ -207,19 +207,24 @@ def _summed_periodograms(
         )
         for first in range(0, count, batch):
             group = segments[first : min(first + batch, count)]
-            means = group.mean(axis=1, keepdims=True)
-            finite = np.isfinite(means[:, 0])
-            if not finite.all():
-                group, means = group[finite], means[finite]
-            tapered = np.subtract(group, means, out=work[: group.shape[0]])
-            tapered *= weights
-            lines = scipy.fft.rfft(tapered, axis=1)
-            total += np.einsum("ij,ij->j", lines.real, lines.real) + np.einsum(
-                "ij,ij->j", lines.imag, lines.imag
-            )
+            power, finite = _batch_periodogram(group, weights, work)
+            total += power
             complete.append(finite)
         pending = pending[count * step :]
     return total, np.concatenate(complete), samples
+
+
+def _batch_periodogram(segments: Field, weights: Field, work: Field) -> tuple[Field, Mask]:
+    """Return the sum of |rfft|^2 over complete segments, and their mask; overwrites `work`."""
+    means = segments.mean(axis=1, keepdims=True)
+    finite = np.isfinite(means[:, 0])
+    if not finite.all():
+        segments, means = segments[finite], means[finite]
+    tapered = np.subtract(segments, means, out=work[: segments.shape[0]])
+    tapered *= weights
+    lines = scipy.fft.rfft(tapered, axis=1)
+    real, imaginary = (np.einsum("ij,ij->j", part, part) for part in (lines.real, lines.imag))
+    return real + imaginary, finite
 
 
 def _averages(weights: Field, complete: Mask, step: int) -> float:

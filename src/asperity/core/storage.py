@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import asperity
+from asperity.core.documents import Table
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import require_file, write_bytes, write_text
 from asperity.core.third_party import first_line
@@ -26,14 +27,14 @@ _MARK, _DIGITS = b"\nasperity-sha256 ", 64
 _SEAL, _CASE = "seal", "asperity_case"  # keys of the digest and of a table's case
 
 
-def digest(content: Any) -> str:
+def digest(content: object) -> str:
     """Return the SHA-256 of bytes, arrays, JSON values, or mappings of them in any order."""
     state = hashlib.sha256()
     _feed(state, content)
     return state.hexdigest()
 
 
-def _feed(state: Any, content: Any) -> None:
+def _feed(state: "hashlib._Hash", content: Any) -> None:
     if isinstance(content, Mapping):
         for name in sorted(content):
             state.update(f"\n{name!r}:".encode())
@@ -47,7 +48,7 @@ def _feed(state: Any, content: Any) -> None:
         state.update(json.dumps(content, sort_keys=True).encode())
 
 
-def _verify(path: Path, stated: str | None, content: Any, remedy: str) -> None:
+def _verify(path: Path, stated: str | None, content: object, remedy: str) -> None:
     if stated is None:
         raise UnreadableFile(
             f"{path} has no digest: it is from another version of asperity, truncated or modified; "
@@ -70,11 +71,9 @@ def append_digest(body: bytes) -> bytes:
 
 def strip_digest(content: bytes, name: str, remedy: str) -> bytes:
     """Return the bytes before the digest of `append_digest`; UnreadableFile on a mismatch."""
-    body, mark, stated = (
-        content[: -_DIGITS - len(_MARK)],
-        content[-_DIGITS - len(_MARK) : -_DIGITS],
-        content[-_DIGITS:],
-    )
+    body = content[: -_DIGITS - len(_MARK)]
+    mark = content[-_DIGITS - len(_MARK) : -_DIGITS]
+    stated = content[-_DIGITS:]
     _verify(Path(name), stated.decode("latin-1") if mark == _MARK else None, body, remedy)
     return body
 
@@ -102,7 +101,7 @@ def read_with_digest(path: Path, remedy: str) -> bytes:
     return content
 
 
-def netcdf_bytes(dataset: "xarray.Dataset", encoding: Mapping[str, Any]) -> bytes:
+def netcdf_bytes(dataset: "xarray.Dataset", encoding: Mapping[str, Mapping[str, object]]) -> bytes:
     """Return a dataset as netCDF bytes, made in memory, as HDF5 crashes on a full disk."""
     buffer = BytesIO()
     dataset.to_netcdf(buffer, engine="h5netcdf", encoding=encoding)
@@ -171,11 +170,11 @@ def _metadata(table: "pyarrow.Table") -> dict[str, str]:
     return {key.decode(): value.decode() for key, value in metadata.items()}
 
 
-def _columns(table: "pyarrow.Table") -> dict[str, Any]:
+def _columns(table: "pyarrow.Table") -> dict[str, object]:
     """Return a table's metadata, and the type and values of each column."""
     import pyarrow
 
-    content: dict[str, Any] = {"": [_metadata(table), table.column_names]}
+    content: dict[str, object] = {"": [_metadata(table), table.column_names]}
     for name, column in zip(table.column_names, table.columns, strict=True):
         kind = column.type
         # parquet renames the items of a list type
@@ -194,7 +193,7 @@ def _columns(table: "pyarrow.Table") -> dict[str, Any]:
 # ------------------------------------------------------------------------------------------
 
 
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
+def write_json(path: Path, content: Table) -> None:
     """Write a JSON object with its digest; raises as `files.atomic_write`."""
     plain = json.loads(json.dumps(content))
     write_text(path, json.dumps({**plain, _SEAL: digest(plain)}, indent=1))
@@ -240,7 +239,7 @@ def require_same_version(manifest: Mapping[str, Any], folder: Path) -> None:
         )
 
 
-def version_notes(versions: Mapping[str, Any]) -> tuple[str, ...]:
+def version_notes(versions: Table) -> tuple[str, ...]:
     """Return a note if the results are from another version of asperity."""
     found, current = versions.get("asperity"), asperity.__version__
     if found == current:

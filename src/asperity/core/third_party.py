@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
-from typing import Any
 
 MAX_LENGTH = 100  # characters of an error message
 _CONTROL_CHARACTERS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
@@ -32,7 +31,7 @@ def suppress_output() -> Iterator[list[str]]:
         logging.disable(disabled_level)
 
 
-def first_line(reason: Any) -> str:
+def first_line(reason: object) -> str:
     """Return the first line of an error message, at most `MAX_LENGTH` characters long."""
     text = next(
         (line.strip() for line in str(reason).splitlines() if line.strip()), type(reason).__name__

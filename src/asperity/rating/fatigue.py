@@ -136,11 +136,9 @@ def _as_vectors(stresses: Field) -> Field:
 def _half_tresca(vectors: Field) -> Field:
     """Return half the Tresca stress of deviators, shape (times, 5) to (times,)."""
     first, second, xy, yz, xz = vectors.T
-    xx, yy, zz = (
-        _HALF * first - _SIXTH * second,
-        -_HALF * first - _SIXTH * second,
-        2.0 * _SIXTH * second,
-    )
+    xx = _HALF * first - _SIXTH * second
+    yy = -_HALF * first - _SIXTH * second
+    zz = 2.0 * _SIXTH * second
     xy, yz, xz = _HALF * xy, _HALF * yz, _HALF * xz
     tensors = np.stack(
         [np.stack([xx, xy, xz], -1), np.stack([xy, yy, yz], -1), np.stack([xz, yz, zz], -1)], -1

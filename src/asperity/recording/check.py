@@ -72,6 +72,14 @@ class Quality:
         return not self.faults
 
 
+def _central_sums(values: Field, mean: float) -> Iterator[float]:
+    """Yield the sums of the second to fourth powers about the mean."""
+    centred = values - mean
+    square = centred**2
+    for pair in ((centred, centred), (square, centred), (square, square)):
+        yield float(np.einsum("i,i->", *pair))  # not by BLAS, which would start its threads
+
+
 class SampleStatistics:
     """Statistics of blocks, gathered as they pass through `pass_through`."""
 
@@ -121,12 +129,7 @@ class SampleStatistics:
 
     def _add_moments(self, values: Field, mean: float) -> None:
         """Merge the block's central moments (Pébay, Sandia report SAND2008-6212)."""
-        centred = values - mean
-        square = centred**2
-        squares, cubes, fourths = (  # not by BLAS, which would start its threads
-            float(np.einsum("i,i->", *pair))
-            for pair in ((centred, centred), (square, centred), (square, square))
-        )
+        squares, cubes, fourths = _central_sums(values, mean)
         before, added = self.finite, values.size
         total, distance = before + added, mean - self.mean
         self.fourths += (

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.core.errors import UnreadableFile
 from asperity.recording.model import Channel, Contents
@@ -41,9 +42,9 @@ def _channels(
     path: Path,
     group: Any,
     name: str,
-    inherited: dict[str, Any],
+    inherited: dict[str, object],
     notes: list[str],
-    visited: set[Any],
+    visited: set[object],
 ) -> Iterator[Channel]:
     import h5py
 
@@ -93,24 +94,24 @@ class _OnDisk:
         self._packed = packed
         self._file: Any = None
 
-    def __getitem__(self, where: Any) -> Any:
+    def __getitem__(self, where: tuple[int | slice, ...]) -> npt.ArrayLike:
         import h5py
 
         if self._file is None:
             self._file = h5py.File(self.path, "r")
-        values = self._file[self.name][where]
+        values: npt.ArrayLike = self._file[self.name][where]
         if self._packed != (1.0, 0.0):
             values = np.asarray(values, dtype=np.float64) * self._packed[0] + self._packed[1]
-        ends = where if isinstance(where, tuple) else (where,)
-        if ends[self._along].stop >= self.shape[self._along]:
+        end = where[self._along]
+        if isinstance(end, slice) and end.stop >= self.shape[self._along]:
             self._file.close()
             self._file = None
         return values
 
 
-def _scalar(member: Any) -> Any:
+def _scalar(member: Any) -> object:
     """Return a small data set as a number, or as text, which MATLAB stores as 16-bit characters."""
-    value = member[()]
+    value: object = member[()]
     if isinstance(value, np.ndarray) and member.attrs.get("MATLAB_class") == b"char":
         return "".join(map(chr, value.reshape(-1).tolist()))
     return value

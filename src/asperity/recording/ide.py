@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy.typing as npt
+
 from asperity.recording.model import Channel, Contents
 from asperity.recording.reader import reject_as, sliced_blocks
 
@@ -47,11 +49,12 @@ def read(path: Path) -> Contents:
     return Contents(format="enDAQ ide", channels=channels, notes=notes)
 
 
-def _slice(events: Any, first: int, last: int) -> Any:
-    return events.arraySlice(first, last)[1]
+def _slice(events: Any, first: int, last: int) -> npt.ArrayLike:
+    samples: npt.ArrayLike = events.arraySlice(first, last)[1]
+    return samples
 
 
-def _utc(seconds: Any) -> datetime | None:
+def _utc(seconds: float | None) -> datetime | None:
     """Return the time; None for a recorder whose clock was never set and started at 1970."""
     return (
         datetime.fromtimestamp(float(seconds), UTC).replace(tzinfo=None)

@@ -5,12 +5,12 @@ A rate or unit in a struct applies to the arrays in it.
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
-from asperity.recording.model import Contents
+from asperity.recording.model import ChannelFacts, Contents
 from asperity.recording.reader import columns, numeric, reject_as, stated_facts
 
 _MAX_DEPTH = 8
@@ -43,16 +43,18 @@ def read(path: Path) -> Contents:
     return Contents(format="mat v5", channels=channels, notes=notes)
 
 
-Row = tuple[str, Any, dict[str, Any]]  # name, array, facts stated in the file
+Row = tuple[str, npt.NDArray[np.generic], ChannelFacts]  # name, array, facts stated in the file
 
 
 def _rows(
-    file: str, variables: dict[str, Any], name: str, inherited: dict[str, Any]
+    file: str, variables: dict[str, object], name: str, inherited: dict[str, object]
 ) -> Iterator[Row]:
     if name.count(".") > _MAX_DEPTH:
         return
     scalars = inherited | {
-        key: value for key, value in variables.items() if np.size(value) == 1 and not _fields(value)
+        key: value
+        for key, value in variables.items()
+        if np.asarray(value).size == 1 and not _fields(value)
     }
     for key, value in variables.items():
         full_name = f"{name}.{key}" if name else key
@@ -68,6 +70,6 @@ def _rows(
             yield full_name, value, stated_facts(file, scalars)
 
 
-def _fields(value: Any) -> dict[str, Any]:
+def _fields(value: object) -> dict[str, object]:
     names = getattr(value, "_fieldnames", None)
     return {name: getattr(value, name) for name in names} if names else {}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -29,6 +29,17 @@ class Fact:
 
     value: Any
     source: str
+
+
+class ChannelFacts(TypedDict, total=False):
+    """Facts about a channel that a file states, as fields of `Channel`."""
+
+    rate_hz: float
+    rate_doubt: float
+    rate_source: str
+    rate_hint: str
+    unit: str
+    started: datetime
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,9 +5,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO, TypeAlias
+from typing import IO, Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
@@ -17,7 +18,8 @@ from asperity.recording.reader import MOST_CHANNELS, REMEDY, columns, reject_as,
 
 _SMALL = 64  # samples: shorter arrays describe the others
 _LARGEST_HEADER = 1 << 16
-Header: TypeAlias = tuple[tuple[int, ...], bool, np.dtype[Any]]  # shape, Fortran order, type
+Type: TypeAlias = np.dtype[Any]
+Header: TypeAlias = tuple[tuple[int, ...], bool, Type]  # shape, Fortran order, type
 
 
 def is_npy(head: bytes) -> bool:
@@ -53,13 +55,13 @@ class _Stored:
     """Array in a file, mapped for each slice: pages that stay mapped would count as memory."""
 
     path: Path
-    dtype: np.dtype[Any]
+    dtype: Type
     offset: int
     shape: tuple[int, ...]
     fortran: bool
     name: str | None = None  # of a field
 
-    def __getitem__(self, where: Any) -> Any:
+    def __getitem__(self, where: tuple[int | slice, ...]) -> npt.NDArray[np.generic]:
         mapped = np.memmap(
             self.path, self.dtype, "r", self.offset, self.shape, "F" if self.fortran else "C"
         )
@@ -82,7 +84,7 @@ def _array_channels(path: Path, array: _Stored, notes: list[str]) -> Iterator[Ch
 def read_npz(path: Path) -> Contents:
     """Read each array as one channel or several; scalars named fs, dt, unit ... describe them."""
     notes: list[str] = []
-    scalars: dict[str, Any] = {}
+    scalars: dict[str, npt.NDArray[np.generic]] = {}
     arrays: list[tuple[str, Header]] = []
     with reject_as(path, "not a readable .npz file"), zipfile.ZipFile(path) as archive:
         for member in archive.namelist():
@@ -135,12 +137,7 @@ def _member_channels(
 
 
 def _unpacked(
-    path: Path,
-    member: str,
-    dtype: np.dtype[Any],
-    where: tuple[int, int, int],
-    notes: list[str],
-    size: int,
+    path: Path, member: str, dtype: Type, where: tuple[int, int, int], notes: list[str], size: int
 ) -> Iterator[Field]:
     first, stride, samples = where
     done = 0
@@ -168,7 +165,7 @@ def _unpacked(
         notes.append(f"damaged after sample {done} of {samples}; samples before that were read")
 
 
-def _header(file: BinaryIO | Any) -> Header:
+def _header(file: IO[bytes]) -> Header:
     version = np.lib.format.read_magic(file)
     read = (
         np.lib.format.read_array_header_1_0

@@ -10,7 +10,7 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.third_party import first_line
-from asperity.recording.model import Channel, Contents
+from asperity.recording.model import Channel, ChannelFacts, Contents
 from asperity.recording.reader import REMEDY, reject_as, stated_facts
 from asperity.recording.timing import Clock, GapFiller, fit_clock, is_time_column, rate_from_times
 from asperity.recording.units import name_and_unit
@@ -23,48 +23,54 @@ def is_parquet(head: bytes) -> bool:
 
 def read(path: Path) -> Contents:
     """Read channels named by column; a column of times gives the rate."""
-    import pyarrow
     import pyarrow.parquet
 
     notes: list[str] = []
     channels = []
     with reject_as(path, "not a readable parquet file"), pyarrow.parquet.ParquetFile(path) as file:
         schema, rows = file.schema_arrow, file.metadata.num_rows
-        table = {
-            k: v
-            for k, v in _decoded(schema.metadata).items()
-            if k not in ("pandas", "ARROW:schema")
-        }
-        types = pyarrow.types
-        numbers = [
-            entry.name
-            for entry in schema
-            if types.is_floating(entry.type)
-            or types.is_integer(entry.type)
-            or types.is_timestamp(entry.type)
-        ]
+        table = _decoded(schema.metadata)
+        numbers, dated = _numeric_columns(schema)
         labels = [(label, *name_and_unit(label)) for label in numbers]
-        dated = {entry.name for entry in schema if types.is_timestamp(entry.type)}
         clock, name, unit = next(
             (label for label in labels if is_time_column(label[1]) or label[0] in dated),
             ("", "", None),
         )
-        first = (
-            next(file.iter_batches(batch_size=1 << 16, columns=[clock]), None) if clock else None
-        )
-        times = None if first is None else _values(first)
-        rate = (
-            {} if times is None else rate_from_times(name, "s" if clock in dated else unit, times)
-        )
-        grid = None if times is None or "rate_hz" not in rate else fit_clock(times)
-        time_grid = (clock, grid) if grid is not None and grid.even else None
+        rate, grid = _clock(file, clock, name, "s" if clock in dated else unit)
+        time_grid = None if grid is None else (clock, grid)
         for label, name, unit in labels:
-            facts = stated_facts(path.name, table | _decoded(schema.field(label).metadata))
-            facts = ({"unit": unit} if unit else {}) | rate | facts
             if label != clock and label not in dated and not label.startswith("__index"):
+                facts = stated_facts(path.name, table | _decoded(schema.field(label).metadata))
+                known: ChannelFacts = {"unit": unit} if unit else {}
                 blocks = partial(_column, path, label, time_grid, notes)
-                channels.append(Channel(name=name, blocks=blocks, samples=rows, **facts))
+                channels.append(
+                    Channel(name=name, blocks=blocks, samples=rows, **(known | rate | facts))
+                )
     return Contents(format="parquet", channels=channels, notes=notes)
+
+
+def _numeric_columns(schema: Any) -> tuple[list[str], set[str]]:
+    """Return the names of the columns of numbers or dates, and those of dates."""
+    from pyarrow import types
+
+    dated = {entry.name for entry in schema if types.is_timestamp(entry.type)}
+    numbers = [
+        entry.name
+        for entry in schema
+        if types.is_floating(entry.type) or types.is_integer(entry.type) or entry.name in dated
+    ]
+    return numbers, dated
+
+
+def _clock(file: Any, label: str, name: str, unit: str | None) -> tuple[ChannelFacts, Clock | None]:
+    """Return the rate by a column of times, and its grid if it is even; nothing for no label."""
+    batch = next(file.iter_batches(batch_size=1 << 16, columns=[label]), None) if label else None
+    if batch is None:
+        return {}, None
+    times = _values(batch)
+    rate = rate_from_times(name, unit, times)
+    grid = fit_clock(times) if "rate_hz" in rate else None
+    return rate, grid if grid is not None and grid.even else None
 
 
 def _values(batch: Any, column: int = 0) -> Field:
@@ -110,7 +116,9 @@ def _column(
 
 
 def _decoded(metadata: dict[bytes, bytes] | None) -> dict[str, str]:
+    """Return what a file states besides its types."""
     return {
         k.decode("utf-8", "replace"): v.decode("utf-8", "replace")
         for k, v in (metadata or {}).items()
+        if k not in (b"pandas", b"ARROW:schema")
     }

@@ -156,34 +156,7 @@ def read_contents(path: Path) -> Contents:
     UnreadableFile
         for a file that is missing, damaged, in no known format or without a time record.
     """
-    if path.is_dir():
-        raise UnreadableFile(f"{path} is a folder; name the files in it")
-    require_file(path)
-    try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD_BYTES)
-    except OSError as error:
-        raise UnreadableFile(
-            f"{path} cannot be opened: {error.strerror}; check its permissions"
-        ) from None
-    if not head:
-        raise UnreadableFile(f"{path.name} is empty; {REMEDY}")
-    suffix = path.suffix[1:].lower()
-    if head.startswith((b"PK\x03\x04", b"PK\x05\x06")) and (archive := _zip_contents(path)):
-        raise UnreadableFile(f"{path.name} is {archive}")
-    chosen = next((form for form in FORMATS if form.recognises(head)), None)
-    if chosen is None:
-        if suffix == "mat" and not looks_like_text(head):
-            chosen = FORMATS[1]  # MATLAB 4 has no header
-        elif any(suffix in form.suffixes for form in FORMATS):
-            raise UnreadableFile(
-                f"{path.name} is named {suffix} but does not begin like one; {REMEDY}"
-            )
-        elif not looks_like_text(head):
-            raise UnreadableFile(
-                f"{path.name} is in no supported recording format; export it as wav or csv"
-            )
-    chosen = chosen or _TEXT
+    chosen = _recognised(path)
     try:
         contents = chosen.contents(path)
     except BadInput:
@@ -211,6 +184,42 @@ def read_contents(path: Path) -> Contents:
     return contents
 
 
+def _recognised(path: Path) -> _Format:
+    """Return the format of a file by its first bytes, or else its suffix."""
+    head = _first_bytes(path)
+    suffix = path.suffix[1:].lower()
+    if head.startswith((b"PK\x03\x04", b"PK\x05\x06")) and (archive := _zip_contents(path)):
+        raise UnreadableFile(f"{path.name} is {archive}")
+    chosen = next((form for form in FORMATS if form.recognises(head)), None)
+    if chosen is not None:
+        return chosen
+    if suffix == "mat" and not looks_like_text(head):
+        return FORMATS[1]  # MATLAB 4 has no header
+    if any(suffix in form.suffixes for form in FORMATS):
+        raise UnreadableFile(f"{path.name} is named {suffix} but does not begin like one; {REMEDY}")
+    if not looks_like_text(head):
+        raise UnreadableFile(
+            f"{path.name} is in no supported recording format; export it as wav or csv"
+        )
+    return _TEXT
+
+
+def _first_bytes(path: Path) -> bytes:
+    if path.is_dir():
+        raise UnreadableFile(f"{path} is a folder; name the files in it")
+    require_file(path)
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+    except OSError as error:
+        raise UnreadableFile(
+            f"{path} cannot be opened: {error.strerror}; check its permissions"
+        ) from None
+    if not head:
+        raise UnreadableFile(f"{path.name} is empty; {REMEDY}")
+    return head
+
+
 def _zip_contents(path: Path) -> str:
     """Describe a zip file that is not an npz, with a remedy; empty for npz or a damaged file."""
     with suppress(OSError, BadZipFile), ZipFile(path) as archive:
@@ -223,40 +232,31 @@ def _zip_contents(path: Path) -> str:
 
 
 def _open_chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRecording:
-    sidecar_facts, sidecar = read_sidecar(path)
-    stated = {key: Fact(value, sidecar) for key, value in sidecar_facts.items()}
-    given = {key: value for key, value in asdict(options).items() if value is not None}
-    stated |= {key: Fact(value, "command line") for key, value in given.items()}
-    selected = _channel(path, contents, stated["channel"].value if "channel" in stated else None)
-    source = stated["channel"].source if "channel" in stated else "file (its only one)"
-    facts = {"format": Fact(contents.format, "file"), "channel": Fact(selected.name, source)}
-    notes: list[str] = []
-    facts["rate"] = _rate(path, selected, stated.get("rate_hz"))
+    stated = _stated_facts(path, options)
+    requested = stated.get("channel", Fact(None, "file (its only one)"))
+    selected = _channel(path, contents, requested.value)
+    facts = {
+        "format": Fact(contents.format, "file"),
+        "channel": Fact(selected.name, requested.source),
+        "rate": _rate(path, selected, stated.get("rate_hz")),
+    }
+    notes: tuple[str, ...] = ()
     total = 1.0
-    if "scale" in stated:
-        total = float(stated["scale"].value)
-        if not 0.0 < abs(total) < math.inf:
-            raise BadInput(
-                f"scale must be finite and not 0, got {total:g}; give `scale`, the value of a "
-                f"stored 1"
-            )
-        facts["scale"] = Fact(total, stated["scale"].source)
-    facts["unit"] = _unit(path, selected, stated.get("unit"), scaled="scale" in stated)
+    if (scale := stated.get("scale")) is not None:
+        total = _scale(scale)
+        facts["scale"] = Fact(total, scale.source)
+    facts["unit"] = _unit(path, selected, stated.get("unit"), scaled=scale is not None)
     unit_text = str(facts["unit"].value)
     to_metres = None if _is_force(selected.name, unit_text) else acceleration_scale(unit_text)
     if to_metres is not None:
         total, unit_text = total * to_metres, ACCELERATION
     elif unit_text == "g":
         unit_text = "gram-force"
-        notes.append(f"g means grams of force, because the channel is called {selected.name}")
+        notes = (f"g means grams of force, because the channel is called {selected.name}",)
     facts |= {key: stated[key] for key in (*OPERATING_KEYS, *MACHINE_KEYS) if key in stated}
-    from_name = parse_time(path.name) or parse_time(path.stem)
-    if "started" in stated:
-        facts["started"] = stated["started"]
-    elif selected.started is not None or from_name is not None:
-        facts["started"] = Fact(
-            selected.started or from_name, "file" if selected.started is not None else "file name"
-        )
+    started = stated.get("started") or _start(path, selected)
+    if started is not None:
+        facts["started"] = started
     return OpenRecording(
         path=path,
         channel=selected,
@@ -264,9 +264,35 @@ def _open_chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRe
         unit=unit_text,
         scale=total,
         facts=facts,
-        first_notes=tuple(notes),
+        first_notes=notes,
         later_notes=contents.notes,
     )
+
+
+def _stated_facts(path: Path, options: ReadOptions) -> dict[str, Fact]:
+    """Return the facts of the sidecar and of the caller, which take precedence."""
+    sidecar_facts, sidecar = read_sidecar(path)
+    given = {key: value for key, value in asdict(options).items() if value is not None}
+    return {key: Fact(value, sidecar) for key, value in sidecar_facts.items()} | {
+        key: Fact(value, "command line") for key, value in given.items()
+    }
+
+
+def _scale(stated: Fact) -> float:
+    scale = float(stated.value)
+    if not 0.0 < abs(scale) < math.inf:
+        raise BadInput(
+            f"scale must be finite and not 0, got {scale:g}; give `scale`, the value of a stored 1"
+        )
+    return scale
+
+
+def _start(path: Path, channel: Channel) -> Fact | None:
+    """Return the start stated in the file or by its name, or None."""
+    if channel.started is not None:
+        return Fact(channel.started, "file")
+    from_name = parse_time(path.name) or parse_time(path.stem)
+    return None if from_name is None else Fact(from_name, "file name")
 
 
 def _channel(path: Path, contents: Contents, requested: str | None) -> Channel:
@@ -348,8 +374,7 @@ def _unit(path: Path, channel: Channel, stated: Fact | None, *, scaled: bool) ->
     if not _same_unit(channel.unit, stated.value):
         raise BadInput(
             f"{path.name} states its unit as {channel.unit}, the {stated.source} as "
-            f"{stated.value}; "
-            "remove the wrong one, or give its scale too"
+            f"{stated.value}; remove the wrong one, or give its scale too"
         )
     return Fact(stated.value, "file")
 

@@ -3,15 +3,17 @@
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, Unpack
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.third_party import first_line
-from asperity.recording.model import Channel
+from asperity.recording.model import Channel, ChannelFacts
 from asperity.recording.units import RATE_NAMES, START_NAMES, STEP_NAMES, UNIT_NAMES, stated
 
 MOST_CHANNELS = 512  # an array with more columns is not a recording
@@ -31,7 +33,7 @@ def reject_as(path: Path, description: str) -> Iterator[None]:
         ) from error
 
 
-def stated_facts(name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
+def stated_facts(name: str, attributes: Mapping[str, object]) -> ChannelFacts:
     """Return `rate_hz`, `rate_source`, `unit`, `started` of a channel, as far as stated.
 
     Raises
@@ -49,7 +51,7 @@ def stated_facts(name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
                 f"{name} states {key} = {number:g}, which is not a sampling rate or step; {REMEDY}"
             )
         rates[key] = number if stated([(key, value)], RATE_NAMES) else 1.0 / number
-    facts: dict[str, Any] = {}
+    facts: ChannelFacts = {}
     if rates:
         key, rate = next(iter(rates.items()))
         conflicting = next((k for k, r in rates.items() if abs(r / rate - 1.0) > 1e-4), None)
@@ -58,7 +60,7 @@ def stated_facts(name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
                 f"{name} states two sampling rates, {key} and {conflicting}; give it without "
                 f"one of them"
             )
-        facts |= {"rate_hz": rounded_rate(rate, 1e-9), "rate_source": f"file ({key})"}
+        facts = {"rate_hz": rounded_rate(rate, 1e-9), "rate_source": f"file ({key})"}
     for _, value in stated(attributes.items(), UNIT_NAMES):
         text = _text(value)
         if text:
@@ -76,7 +78,7 @@ def rounded_rate(rate: float, rounding: float) -> float:
     return whole if whole > 0.0 and abs(whole / rate - 1.0) <= rounding < 0.5 / rate else rate
 
 
-def parse_time(value: Any) -> datetime | None:
+def parse_time(value: object) -> datetime | None:
     """Return a time as written in files, in UTC if it states its zone; None if it is no time."""
     if isinstance(value, datetime):
         return _in_utc(value)
@@ -120,7 +122,7 @@ _TIMES = (
 )
 
 
-def _number(value: Any) -> float | None:
+def _number(value: object) -> float | None:
     try:
         array = np.asarray(value.decode() if isinstance(value, bytes) else value)
         return float(array.reshape(-1)[0]) if array.size == 1 else None
@@ -128,7 +130,7 @@ def _number(value: Any) -> float | None:
         return None
 
 
-def _text(value: Any) -> str | None:
+def _text(value: object) -> str | None:
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.reshape(-1)[0]
     if isinstance(value, bytes):
@@ -136,7 +138,7 @@ def _text(value: Any) -> str | None:
     return value.strip() if isinstance(value, str) and value.strip() else None
 
 
-Reader = Callable[[int, int], Any]  # first sample, one after the last -> those samples
+Reader = Callable[[int, int], npt.ArrayLike]  # first sample, one after the last -> those samples
 
 
 def sliced_blocks(
@@ -166,8 +168,21 @@ def sliced_blocks(
     return blocks
 
 
+class StoredArray(Protocol):
+    """Array whose samples are read by slices."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values along each axis."""
+        ...
+
+    def __getitem__(self, where: tuple[int | slice, ...], /) -> Any:
+        """Return some values."""
+        ...
+
+
 def columns(
-    name: str, array: Any, notes: list[str], *, labels: list[str] | None = None, **facts: Any
+    name: str, array: StoredArray, notes: list[str], **facts: Unpack[ChannelFacts]
 ) -> Iterator[Channel]:
     """Yield the channels of a sliceable array: one row, or several along its shorter axis.
 
@@ -179,38 +194,25 @@ def columns(
     shape = tuple(int(n) for n in array.shape if n != 1) or (int(np.prod(array.shape)),)
     if len(shape) > 2 or 0 in shape:
         return
-    along = int(np.argmax(array.shape))
-    if len(shape) == 1:
-
-        def read(i: int, j: int) -> Any:
-            return array[
-                tuple(slice(i, j) if axis == along else 0 for axis in range(len(array.shape)))
-            ]
-
-        yield Channel(
-            name=name, blocks=sliced_blocks(read, shape[0], notes, name), samples=shape[0], **facts
-        )
-        return
-    count = min(shape)
-    if count > MOST_CHANNELS or len(array.shape) != 2:
+    count, samples = 1 if len(shape) == 1 else min(shape), max(shape)
+    if count > MOST_CHANNELS or (len(shape) == 2 and len(array.shape) != 2):
         raise UnreadableFile(
             f"{name} is an array of {shape[0]} x {shape[1]}: not a recording; give one row per "
             f"channel"
         )
     for k in range(count):
-        label = labels[k] if labels and len(labels) == count else f"{name}[{k + 1}]"
-
-        def read_one(i: int, j: int, k: int = k) -> Any:
-            return array[i:j, k] if along == 0 else array[k, i:j]
-
-        yield Channel(
-            name=label,
-            blocks=sliced_blocks(read_one, max(shape), notes, label),
-            samples=max(shape),
-            **facts,
-        )
+        label = name if len(shape) == 1 else f"{name}[{k + 1}]"
+        blocks = sliced_blocks(partial(_row, array, k), samples, notes, label)
+        yield Channel(name=label, blocks=blocks, samples=samples, **facts)
 
 
-def numeric(array: Any) -> bool:
+def _row(array: StoredArray, k: int, first: int, last: int) -> Field:
+    """Return samples along the longest axis of an array, at `k` along any other."""
+    along = int(np.argmax(array.shape))
+    where = (slice(first, last) if axis == along else k for axis in range(len(array.shape)))
+    return np.asarray(array[tuple(where)])
+
+
+def numeric(array: object) -> bool:
     """Return whether an array holds real numbers."""
     return getattr(getattr(array, "dtype", None), "kind", "?") in "iuf"

@@ -10,7 +10,6 @@ from functools import partial
 from importlib import import_module
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -74,7 +73,7 @@ class _Opened:
         return None if block is None else np.asarray(block, dtype=np.float64)
 
 
-_opened: dict[tuple[Any, ...], _Opened] = {}  # least recently used first
+_opened: dict[tuple[Path, str, int, int], _Opened] = {}  # least recently used first
 
 
 def _open(path: Path, reader: str) -> _Opened:
@@ -87,7 +86,7 @@ def _open(path: Path, reader: str) -> _Opened:
     return opened
 
 
-def list_channels(path: Path, reader: str) -> tuple[str, list[str], list[dict[str, Any]]]:
+def list_channels(path: Path, reader: str) -> tuple[str, list[str], list[dict[str, object]]]:
     """Return format, notes and channels of a file, without the functions that read samples."""
     for key in [key for key in _opened if key[0] == path]:  # a new request reads the file again
         del _opened[key]

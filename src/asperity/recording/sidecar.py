@@ -4,10 +4,10 @@ recordings.toml applies to its whole folder.
 """
 
 import json
+import math
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
 
 from asperity.core.errors import BadInput
 from asperity.recording.reader import parse_time
@@ -54,7 +54,7 @@ def sidecar_names(name: str) -> list[str]:
     return [*own, *(f"{FOLDER_WIDE}{suffix}" for suffix in SUFFIXES)]
 
 
-def read_sidecar(path: Path) -> tuple[dict[str, Any], str]:
+def read_sidecar(path: Path) -> tuple[dict[str, object], str]:
     """Return the facts stated in the sidecar of `path`, and its name; empty if there is none.
 
     Raises
@@ -69,16 +69,8 @@ def read_sidecar(path: Path) -> tuple[dict[str, Any], str]:
     return {}, ""
 
 
-def _checked(path: Path) -> dict[str, Any]:
-    try:
-        text = path.read_text("utf-8-sig")
-        stated = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
-    except (OSError, ValueError, RecursionError) as error:
-        raise BadInput(
-            f"{path.name} cannot be read as {path.suffix[1:]} ({error}); correct it"
-        ) from None
-    if not isinstance(stated, dict):
-        raise BadInput(f"{path.name} must hold keys such as rate_hz, got {type(stated).__name__}")
+def _checked(path: Path) -> dict[str, object]:
+    stated = _read_keys(path)
     for key, value in stated.items():
         if key not in SIDECAR_KEYS:
             closest = get_close_matches(key, SIDECAR_KEYS, 1)
@@ -88,35 +80,9 @@ def _checked(path: Path) -> dict[str, Any]:
                 else (f"it may state {', '.join(SIDECAR_KEYS)}")
             )
             raise BadInput(f"{path.name} has an unknown key {key!r}; {hint}")
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if key in ("rate_hz", "scale") and not (
-            number and 0.0 < abs(value) < float("inf") and (value > 0 or key == "scale")
-        ):
-            raise BadInput(f"{path.name}: {key} must be a positive number, got {value!r}")
-        if key in OPERATING_KEYS and not (
-            number and -273.15 < value < float("inf") and (value > 0 or key == OPERATING_KEYS[2])
-        ):
-            expected = "a temperature in degC" if key == OPERATING_KEYS[2] else "a positive number"
-            raise BadInput(f"{path.name}: {key} must be {expected}, got {value!r}")
-        if key in FAULT_RATE_KEYS:
-            _require_rates(path, key, value)
-        if key == "bands_hz":
-            _require_bands(path, value)
-        if key == "condition_channels":
-            _require_channels(path, value)
-        if key == "pulses_per_turn" and not (number and 0.0 < value < float("inf")):
-            raise BadInput(f"{path.name}: pulses_per_turn must be a positive number, got {value!r}")
-        if key == "machine_class" and value not in MACHINE_CLASSES:
-            raise BadInput(
-                f"{path.name}: machine_class must be one of {', '.join(MACHINE_CLASSES)}, got "
-                f"{value!r}"
-            )
-        if (
-            key in ("unit", *TEXT_KEYS)
-            and not isinstance(value, str)
-            and not (key != "unit" and number)
-        ):
-            raise BadInput(f"{path.name}: {key} must be text, got {value!r}")
+        valid, requirement = _requirement(key, value)
+        if not valid:
+            raise BadInput(f"{path.name}: {key} must {requirement}, got {value!r}")
     if "started" in stated:
         started = parse_time(stated["started"])
         if started is None:
@@ -124,58 +90,65 @@ def _checked(path: Path) -> dict[str, Any]:
                 f"{path.name}: started must be a date and time such as 2025-01-31 12:00:00"
             )
         stated["started"] = started
-    for key in TEXT_KEYS:
-        if key in stated:
-            stated[key] = str(stated[key])
+    return stated | {key: str(stated[key]) for key in TEXT_KEYS if key in stated}
+
+
+def _read_keys(path: Path) -> dict[str, object]:
+    try:
+        text = path.read_text("utf-8-sig")
+        stated = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
+    except (OSError, ValueError, RecursionError) as error:
+        raise BadInput(
+            f"{path.name} cannot be read as {path.suffix[1:]} ({error}); correct it"
+        ) from None
+    if not isinstance(stated, dict):
+        raise BadInput(f"{path.name} must hold keys such as rate_hz, got {type(stated).__name__}")
     return stated
 
 
-def _require_bands(path: Path, value: Any) -> None:
-    """Require bands by name, such as housing = [2000, 5000]."""
-    valid = isinstance(value, dict) and value
-    for ends in value.values() if valid else ():
-        is_pair = isinstance(ends, list) and len(ends) == 2
-        valid = (
-            valid
-            and is_pair
-            and all(type(end) in (int, float) for end in ends)
-            and 0.0 <= ends[0] < ends[1]
-        )
-    if not valid:
-        raise BadInput(
-            f"{path.name}: bands_hz must be two frequencies by name, such as {{ housing = "
-            f"[2000, 5000] }}, "
-            f"got {value!r}"
-        )
+def _requirement(key: str, value: object) -> tuple[bool, str]:
+    """Return whether a key may have a value, and what it must be."""
+    number = _number(value)
+    size = 0.0 if number is None else number
+    if key == "scale":
+        return 0.0 < abs(size) < math.inf, "be a positive number"
+    if key == "temperature_degc":
+        return number is not None and -273.15 < number < math.inf, "be a temperature in degC"
+    if key in ("rate_hz", "pulses_per_turn", *OPERATING_KEYS):
+        return 0.0 < size < math.inf, "be a positive number"
+    if key == "machine_class":
+        return value in MACHINE_CLASSES, f"be one of {', '.join(MACHINE_CLASSES)}"
+    if key in ("unit", *TEXT_KEYS):
+        return isinstance(value, str) or (key != "unit" and number is not None), "be text"
+    return _table_requirement(key, value)
 
 
-def _require_channels(path: Path, value: Any) -> None:
-    """Require channels by the condition that they hold, such as temperature_degc = "oil"."""
-    known = (
-        isinstance(value, dict) and value and all(isinstance(name, str) for name in value.values())
+def _table_requirement(key: str, value: object) -> tuple[bool, str]:
+    """Return `_requirement` of a key that holds values by name."""
+    entries = value if isinstance(value, dict) else {}
+    if key in FAULT_RATE_KEYS:
+        rates = [_number(rate) or 0.0 for rate in entries.values()]
+        valid = entries and all(0.0 < rate < math.inf for rate in rates)
+        return bool(valid), f"be positive rates by name, such as {{ BPFO = {EXAMPLE_RATES[key]} }}"
+    if key == "bands_hz":
+        valid = entries and all(map(_is_band, entries.values()))
+        return bool(valid), ("be two frequencies by name, such as { housing = [2000, 5000] }")
+    if key == "condition_channels":
+        valid = entries and all(isinstance(name, str) for name in entries.values())
+        return bool(valid) and set(entries) <= set(OPERATING_KEYS), (
+            f'name channels by {", ".join(OPERATING_KEYS)}, such as {{ temperature_degc = "oil" }}'
+        )
+    return True, ""
+
+
+def _number(value: object) -> float | None:
+    return value if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def _is_band(ends: object) -> bool:
+    return (
+        isinstance(ends, list)
+        and len(ends) == 2
+        and all(type(end) in (int, float) for end in ends)
+        and bool(0.0 <= ends[0] < ends[1])
     )
-    if not known or not set(value) <= set(OPERATING_KEYS):
-        raise BadInput(
-            f"{path.name}: condition_channels must name channels by "
-            f"{', '.join(OPERATING_KEYS)}, such as "
-            f'{{ temperature_degc = "oil" }}, got {value!r}'
-        )
-
-
-def _require_rates(path: Path, key: str, value: Any) -> None:
-    """Require fault rates by name, such as BPFO = 87.3."""
-    valid = (
-        isinstance(value, dict)
-        and value
-        and all(
-            isinstance(rate, int | float)
-            and not isinstance(rate, bool)
-            and 0.0 < rate < float("inf")
-            for rate in value.values()
-        )
-    )
-    if not valid:
-        raise BadInput(
-            f"{path.name}: {key} must be positive rates by name, such as {{ BPFO = "
-            f"{EXAMPLE_RATES[key]} }}, got {value!r}"
-        )

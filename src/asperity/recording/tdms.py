@@ -2,7 +2,8 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Any
+
+import numpy.typing as npt
 
 from asperity.recording.model import Channel, Contents
 from asperity.recording.reader import numeric, reject_as, sliced_blocks, stated_facts
@@ -37,8 +38,9 @@ def read(path: Path) -> Contents:
     return Contents(format="tdms", channels=channels, notes=notes)
 
 
-def _slice(path: Path, group: str, channel: str, first: int, last: int) -> Any:
+def _slice(path: Path, group: str, channel: str, first: int, last: int) -> npt.ArrayLike:
     import nptdms
 
     with nptdms.TdmsFile.open(path) as opened:
-        return opened[group][channel].read_data(first, last - first)
+        samples: npt.ArrayLike = opened[group][channel].read_data(first, last - first)
+    return samples

@@ -8,14 +8,15 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.text_dialect import MISSING
-from asperity.recording.model import Channel, Contents
+from asperity.recording.model import Channel, ChannelFacts, Contents
 from asperity.recording.reader import parse_time, stated_facts
 from asperity.recording.text_header import TextTable, decode_line, read_header
 from asperity.recording.timing import GapFiller, fit_clock, is_time_column, rate_from_times
@@ -36,22 +37,7 @@ def read(path: Path) -> Contents:
     large = path.stat().st_size > _LARGE
     open_bytes = _opener(path)
     with open_bytes() as stream:
-        tables: list[TextTable] = []
-        start: int | None = 0
-        while start is not None and len(tables) < _MOST_BLOCKS:
-            table = read_header(stream, start)
-            if table is None:
-                break
-            if large:
-                table.rows = next(_tables(stream, table))  # for its clock
-                tables.append(table)
-                break
-            table.rows = np.concatenate([np.empty((0, table.columns)), *_tables(stream, table)])
-            while table.rows.shape[0] and np.isnan(table.rows[-1]).all():
-                table.rows = table.rows[:-1]
-            if table.rows.shape[0] >= _FEWEST_ROWS:
-                tables.append(table)
-            start = table.end
+        tables = list(_first_rows(stream) if large else _all_rows(stream))
     if not tables:
         raise UnreadableFile(
             f"{path.name} holds no rows of numbers; give a recording, or add its format's suffix"
@@ -62,6 +48,31 @@ def read(path: Path) -> Contents:
         channels += _channels(path, table, prefix, notes, open_bytes if large else None)
     blocks = f", {len(tables)} blocks" if len(tables) > 1 else ""
     return Contents(format=f"text{blocks}", channels=channels, notes=notes)
+
+
+def _first_rows(stream: BinaryIO) -> Iterator[TextTable]:
+    """Yield the first block with the first of its rows, for its clock."""
+    table = read_header(stream, 0)
+    if table is not None:
+        table.rows = next(_tables(stream, table))
+        yield table
+
+
+def _all_rows(stream: BinaryIO) -> Iterator[TextTable]:
+    """Yield the blocks of a recording with all their rows."""
+    start: int | None = 0
+    blocks = 0
+    while start is not None and blocks < _MOST_BLOCKS:
+        table = read_header(stream, start)
+        if table is None:
+            return
+        table.rows = np.concatenate([np.empty((0, table.columns)), *_tables(stream, table)])
+        while table.rows.shape[0] and np.isnan(table.rows[-1]).all():
+            table.rows = table.rows[:-1]
+        if table.rows.shape[0] >= _FEWEST_ROWS:
+            blocks += 1
+            yield table
+        start = table.end
 
 
 def _opener(path: Path) -> Callable[[], BinaryIO]:
@@ -88,7 +99,7 @@ def _parsed(
 
     if not chunk.strip():
         return np.empty((0, table.columns if selected is None else len(selected)))
-    used_columns: Any = range(table.columns) if selected is None else selected
+    used_columns = list(range(table.columns) if selected is None else selected)
     first = chunk.lstrip(b"\r\n").split(b"\n", 1)[0].rstrip(b" \r")
     ended = table.dialect.separator is not None and first.endswith(table.dialect.separator.encode())
     try:
@@ -107,7 +118,7 @@ def _parsed(
         )
     except (ValueError, pandas.errors.ParserError, OverflowError):
         return None
-    return frame[list(used_columns)].to_numpy()
+    return np.asarray(frame[used_columns].to_numpy(), dtype=np.float64)
 
 
 def _tables(
@@ -193,21 +204,42 @@ def _channels(
 ) -> Iterator[Channel]:
     rows = table.rows
     assert rows is not None
-    clock_at = (
-        0
-        if table.stamped
-        else next((k for k, name in enumerate(table.names) if is_time_column(name)), None)
-    )
-    clock: dict[str, Any] = {}
+    timed = [k for k, name in enumerate(table.names) if is_time_column(name)]
+    clock_at = 0 if table.stamped else next(iter(timed), None)
+    clock: ChannelFacts = {} if clock_at is None else _clock_facts(table, rows, clock_at)
     fill: Callable[[Field], Field] = _unchanged
-    if clock_at is not None:
-        name, unit = table.names[clock_at], table.units[clock_at]
-        times = rows[:, clock_at]
-        clock = rate_from_times(name, "s" if table.stamped else unit, times)
-        if open_bytes is None and "rate_hz" in clock and times.size == rows.shape[0]:
-            fill = _grid_filler(times, prefix, notes)
-        if table.stamps:
-            clock.setdefault("started", table.stamps[0])
+    if clock_at is not None and open_bytes is None and "rate_hz" in clock:
+        fill = _grid_filler(rows[:, clock_at], prefix, notes)
+    facts = _combined_facts(path, table, clock, prefix, notes)
+    names = _unique(table.names)
+    for k in range(table.columns):
+        if k == clock_at:
+            continue
+        unit = table.units[k]
+        known: ChannelFacts = facts | {"unit": unit} if unit else facts
+        if open_bytes is None:
+            values = fill(rows[:, k])
+            blocks, samples = partial(_pieces, values), values.size
+        else:
+            clock_column = None if "rate_hz" not in clock else clock_at
+            blocks = partial(_streamed, open_bytes, table, (k, clock_column), notes)
+            samples = None
+        yield Channel(name=prefix + names[k], blocks=blocks, samples=samples, **known)
+
+
+def _clock_facts(table: TextTable, rows: Field, column: int) -> ChannelFacts:
+    """Return rate and start from a column of times."""
+    unit = "s" if table.stamped else table.units[column]
+    clock = rate_from_times(table.names[column], unit, rows[:, column])
+    if table.stamps:
+        clock.setdefault("started", table.stamps[0])
+    return clock
+
+
+def _combined_facts(
+    path: Path, table: TextTable, clock: ChannelFacts, prefix: str, notes: list[str]
+) -> ChannelFacts:
+    """Return the facts of the header and of the times, which take precedence for the rate."""
     if table.bad_rows:
         notes.append(
             f"{prefix}{table.bad_rows} rows hold text instead of numbers and count as missing"
@@ -215,34 +247,14 @@ def _channels(
     facts = stated_facts(path.name, table.declared)
     if table.started is not None:
         facts["started"] = table.started
-    if (
-        "rate_hz" in clock
-        and "rate_hz" in facts
-        and abs(facts["rate_hz"] / clock["rate_hz"] - 1.0) > _SAME_RATE
-    ):
-        stated = (
-            f"its header states {facts['rate_hz']:g} Hz ({facts['rate_source']}), its "
-            f"times {clock['rate_hz']:g} Hz"
+    if "rate_hz" not in clock:
+        return clock | facts
+    if "rate_hz" in facts and abs(facts["rate_hz"] / clock["rate_hz"] - 1.0) > _SAME_RATE:
+        notes.append(
+            f"{prefix}its header states {facts['rate_hz']:g} Hz ({facts['rate_source']}), its "
+            f"times {clock['rate_hz']:g} Hz; the times are used"
         )
-        notes.append(f"{prefix}{stated}; the times are used")
-    facts = clock | facts if "rate_hz" not in clock else facts | clock
-    names = _unique(table.names)
-    for k in range(table.columns):
-        if k == clock_at:
-            continue
-        known = facts | ({"unit": table.units[k]} if table.units[k] else {})
-        if open_bytes is None:
-            values = fill(rows[:, k])
-            yield Channel(
-                name=prefix + names[k],
-                blocks=partial(_pieces, values),
-                samples=values.size,
-                **known,
-            )
-        else:
-            clock_column = None if "rate_hz" not in clock else clock_at
-            blocks = partial(_streamed, open_bytes, table, (k, clock_column), notes)
-            yield Channel(name=prefix + names[k], blocks=blocks, **known)
+    return facts | clock
 
 
 def _unique(names: list[str]) -> list[str]:
@@ -291,6 +303,11 @@ def _grid_filler(times: Field, prefix: str, notes: list[str]) -> Callable[[Field
         if filling.note:
             notes.append(prefix + filling.note)
         return lambda values: GapFiller(clock).fill(times, values)
+    return _nearest_places(times, prefix, notes)
+
+
+def _nearest_places(times: Field, prefix: str, notes: list[str]) -> Callable[[Field], Field]:
+    """Return `_grid_filler` for times that are uneven, or do not increase."""
     known = np.flatnonzero(np.isfinite(times))
     steps = np.diff(times[known])
     step = float(np.median(steps))
@@ -300,25 +317,28 @@ def _grid_filler(times: Field, prefix: str, notes: list[str]) -> Callable[[Field
         return _unchanged
     elapsed = (times[known] - times[known[0]]) / step
     position = np.round(elapsed)
-    deviation = float(np.max(np.abs(elapsed - position)))
     if gaps and np.all(np.diff(position) > 0) and position[-1] < 2 * times.size:
         missing = int(position[-1]) + 1 - known.size
         notes.append(f"{prefix}{gaps} gaps in its times: {missing} samples are missing")
-        index = position.astype(np.int64)
-
-        def fill(values: Field) -> Field:
-            filled = np.full(int(index[-1]) + 1, np.nan)
-            filled[index] = values[known]
-            return filled
-
-        return fill
+        return partial(_placed, known, position.astype(np.int64))
     if gaps:
         notes.append(
             f"{prefix}{gaps} gaps in its times, too many to fill; the spectrum is doubtful"
         )
-    elif deviation > 0.25 and float(np.max(np.abs(steps - step))) > 0.1 * step:
-        least, most = steps.min() / step, steps.max() / step
-        notes.append(
-            f"{prefix}its times are uneven: steps from {least:.2f} to {most:.2f} of the median"
-        )
+    elif float(np.max(np.abs(elapsed - position))) > 0.25:
+        notes += _uneven(steps, step, prefix)
     return _unchanged
+
+
+def _placed(known: npt.NDArray[np.intp], position: npt.NDArray[np.int64], values: Field) -> Field:
+    """Return known values at their positions on the grid, nan in gaps."""
+    filled = np.full(int(position[-1]) + 1, np.nan)
+    filled[position] = values[known]
+    return filled
+
+
+def _uneven(steps: Field, step: float, prefix: str) -> Iterator[str]:
+    """Yield a note if steps differ from their median."""
+    if float(np.max(np.abs(steps - step))) > 0.1 * step:
+        least, most = steps.min() / step, steps.max() / step
+        yield f"{prefix}its times are uneven: steps from {least:.2f} to {most:.2f} of the median"

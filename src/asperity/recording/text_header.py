@@ -66,15 +66,16 @@ def read_header(stream: BinaryIO, start: int) -> TextTable | None:
             raise UnreadableFile(
                 f"a row of {len(row)} numbers is not a row of samples; give one column per channel"
             )
-        names, units = _labels(texts[:number], len(row), dialect)
+        header = texts[:number]
+        names, units = _labels(header, len(row), dialect)
         return TextTable(
             offset=start + sum(map(len, lines[:number])),
             dialect=dialect,
             columns=len(row),
             names=names,
             units=units,
-            declared=_declared(texts[:number]),
-            started=_started(texts[:number]),
+            declared=_declared(header),
+            started=_started(header),
             stamped=stamped,
         )
     return None
@@ -106,6 +107,26 @@ def _row(fields: list[str], dialect: Dialect) -> tuple[list[float] | None, bool]
 
 def _labels(header: list[str], count: int, dialect: Dialect) -> tuple[list[str], list[str | None]]:
     """Return names and units of the columns, from the last header lines with as many fields."""
+    matching = _label_lines(header, count, dialect)
+    last = matching[-1] if matching else []
+    are_units = [known_unit(label) for label in last]
+    if (
+        len(matching) > 1
+        and any(are_units)
+        and all(known_unit(label) or len(label) < 9 for label in last)
+    ):
+        names = [name or str(k + 1) for k, name in enumerate(matching[-2])]
+        return names, [
+            label if known else None for label, known in zip(last, are_units, strict=True)
+        ]
+    if not last or any(dialect.number(label) is not None for label in last if label):
+        return [str(number + 1) for number in range(count)], [None] * count
+    pairs = [name_and_unit(label) for label in last]
+    return [name or str(k + 1) for k, (name, _) in enumerate(pairs)], [unit for _, unit in pairs]
+
+
+def _label_lines(header: list[str], count: int, dialect: Dialect) -> list[list[str]]:
+    """Return the fields of the last header lines with as many as there are columns."""
     matching = []
     for line in [line for line in header if line.strip()][-3:]:
         stripped = line.lstrip("#%/ ")
@@ -118,23 +139,7 @@ def _labels(header: list[str], count: int, dialect: Dialect) -> tuple[list[str],
         ]
         if len(fields) + (line.rstrip().endswith(dialect.separator or "\0")) in (count, count + 1):
             matching.append((fields + [""] * count)[:count])
-    if not matching:
-        return [str(number + 1) for number in range(count)], [None] * count
-    last: list[str] = matching[-1]
-    are_units = [known_unit(label) for label in last]
-    if (
-        len(matching) > 1
-        and any(are_units)
-        and all(known_unit(label) or len(label) < 9 for label in last)
-    ):
-        names = [name or str(k + 1) for k, name in enumerate(matching[-2])]
-        return names, [
-            label if known else None for label, known in zip(last, are_units, strict=True)
-        ]
-    if any(dialect.number(label) is not None for label in last if label):
-        return [str(number + 1) for number in range(count)], [None] * count
-    pairs = [name_and_unit(label) for label in last]
-    return [name or str(k + 1) for k, (name, _) in enumerate(pairs)], [unit for _, unit in pairs]
+    return matching
 
 
 def _declared(header: list[str]) -> dict[str, str]:
@@ -149,10 +154,8 @@ def _declared(header: list[str]) -> dict[str, str]:
         )
         if not pair:
             continue
-        key, value = (
-            re.sub(r"\s*[\[(]\s*(hz|s|sec)\s*[\])]\s*$", "", pair[1].strip(), flags=re.I),
-            pair[2].strip(),
-        )
+        key = re.sub(r"\s*[\[(]\s*(hz|s|sec)\s*[\])]\s*$", "", pair[1].strip(), flags=re.I)
+        value = pair[2].strip()
         several = {part.strip() for part in re.split(r"[\t;]", value) if part.strip()}
         if len(several) == 1:  # lvm repeats it for every channel
             (value,) = several

@@ -1,12 +1,12 @@
 """Columns of times: the sampling rate that they state, and missing samples."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
+from asperity.recording.model import ChannelFacts
 from asperity.recording.reader import rounded_rate
 from asperity.recording.units import time_scale
 
@@ -115,7 +115,7 @@ def _rounding(times: Field) -> float:
     return 0.0
 
 
-def rate_from_times(column: str, unit: str | None, times: Field) -> dict[str, Any]:
+def rate_from_times(column: str, unit: str | None, times: Field) -> ChannelFacts:
     """Return rate, doubt and source from a column of times; a hint if its unit is unknown."""
     if np.count_nonzero(np.isfinite(times)) < 3:
         return {}

@@ -76,6 +76,16 @@ def read(path: Path) -> Contents:
     return Contents(format="uff 58", channels=channels, notes=notes)
 
 
+def _name(record: dict[str, Any], taken: list[str]) -> str:
+    """Return the name of the response or else its node, unique among those taken."""
+    label = str(record.get("rsp_ent_name", "")).strip()
+    node = f"{record.get('rsp_node', '')}:{record.get('rsp_dir', '')}"
+    name = label if label and label != "NONE" else node
+    if name in taken:
+        name = f"{name} {node}" if f"{name} {node}" not in taken else f"{name} {len(taken) + 1}"
+    return name
+
+
 def _channel(path: Path, record: dict[str, Any], notes: list[str], taken: list[str]) -> Channel:
     values = record["data"]
     if values.dtype.kind == "c":
@@ -83,11 +93,7 @@ def _channel(path: Path, record: dict[str, Any], notes: list[str], taken: list[s
     if int(record["abscissa_spacing"]) != 1:
         raise UnreadableFile(f"{path.name} is sampled unevenly; export it at an even step")
     step = float(record["abscissa_inc"])
-    label = str(record.get("rsp_ent_name", "")).strip()
-    node = f"{record.get('rsp_node', '')}:{record.get('rsp_dir', '')}"
-    name = label if label and label != "NONE" else node
-    if name in taken:
-        name = f"{name} {node}" if f"{name} {node}" not in taken else f"{name} {len(taken) + 1}"
+    name = _name(record, taken)
     unit = str(record.get("ordinate_axis_units_lab", "")).strip()
     samples, promised = int(values.size), int(record["num_pts"])
     if samples < promised:

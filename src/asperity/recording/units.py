@@ -5,7 +5,6 @@ A table on purpose: to a general unit library, "g" is a gram.
 
 import re
 from collections.abc import Iterable
-from typing import Any
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, exact: 3rd General Conference on Weights and Measures (1901)
 
@@ -165,7 +164,7 @@ def name_and_unit(label: str) -> tuple[str, str | None]:
     return label, None
 
 
-def stated(attributes: Iterable[tuple[str, Any]], names: set[str]) -> list[tuple[str, Any]]:
+def stated(attributes: Iterable[tuple[str, object]], names: set[str]) -> list[tuple[str, object]]:
     """Return the attributes whose name is one of `names`, ignoring case and blanks."""
     return [
         (key, value)

@@ -26,12 +26,10 @@ def read(path: Path) -> Contents:
 
     notes: list[str] = []
     with reject_as(path, "not a readable sound file"), soundfile.SoundFile(path) as opened:
-        rate, count, frames, kind = (
-            opened.samplerate,
-            opened.channels,
-            opened.frames,
-            opened.subtype,
-        )
+        rate = opened.samplerate
+        count = opened.channels
+        frames = opened.frames
+        kind = opened.subtype
     if rate <= 0 or not 0 < count <= 64:
         raise UnreadableFile(
             f"{path.name} states {rate} Hz and {count} channels, which is impossible; {REMEDY}"

@@ -48,6 +48,10 @@ class BandData(NamedTuple):
         """BIC penalty of the three parameters of a line."""
         return 3.0 * float(np.log(max(self.data.weight * self.frequency.size, math.e)))
 
+    def evidence(self, fit: SpectrumFit, cost_without: float) -> float:
+        """Return the BIC gained by a line, from -ln likelihood without it."""
+        return 2.0 * (cost_without - fit.cost) - self.bic_penalty
+
     def floor_at_ends(self, floor: Field) -> tuple[float, float]:
         """Return the density of a fitted floor at both ends of the band."""
         return self.scale * float(floor[0]), self.scale * float(floor[1])
@@ -126,23 +130,12 @@ def fit_line(
 
 def fit_modes(band: BandData, band_hz: tuple[float, float], leakage: Field) -> SpectrumFit:
     """Add lines one by one at the largest excess and refit all of them, while BIC improves."""
-    low, high = band_hz
     best, model = band.floor_only, _lines_model(band.frequency, band.floors, leakage)
-    spacing = (band.frequency[-1] - band.frequency[0]) / (band.frequency.size - 1)
     for count in range(1, MAX_MODES + 1):
         expected = model(best.parameters)[0]
         trials = []
         for zeta in START_DAMPINGS:
-            width = min(
-                max(1, round(2.0 * zeta * 0.5 * (low + high) / spacing)), band.frequency.size // 4
-            )
-            excess = (
-                scipy.ndimage.uniform_filter1d(band.data.density / expected, width, mode="nearest")
-                - 1.0
-            )
-            highest = int(np.argmax(excess * np.sqrt(width)))
-            level = max(float(excess[highest] * expected[highest]), 1e-3)
-            added = np.array([np.log(level), np.log(band.frequency[highest]), np.log(zeta)])
+            added = _largest_excess(band, expected, 0.5 * sum(band_hz), zeta)
             start = np.concatenate([best.parameters[:-2], added, best.parameters[-2:]])
             trials.append(fit_spectrum(model, start, _bounds(count, band_hz), band.data))
         trial = min(trials, key=lambda fit: fit.cost)
@@ -150,6 +143,17 @@ def fit_modes(band: BandData, band_hz: tuple[float, float], leakage: Field) -> S
             break
         best = trial
     return best
+
+
+def _largest_excess(band: BandData, expected: Field, middle_hz: float, zeta: float) -> Field:
+    """Return the initial guess of a line where the density most exceeds the expected one."""
+    spacing = (band.frequency[-1] - band.frequency[0]) / (band.frequency.size - 1)
+    width = min(max(1, round(2.0 * zeta * middle_hz / spacing)), band.frequency.size // 4)
+    ratio = scipy.ndimage.uniform_filter1d(band.data.density / expected, width, mode="nearest")
+    excess = ratio - 1.0
+    highest = int(np.argmax(excess * np.sqrt(width)))
+    level = max(float(excess[highest] * expected[highest]), 1e-3)
+    return np.array([np.log(level), np.log(band.frequency[highest]), np.log(zeta)])
 
 
 def _starts(frequency: Field, density: Field) -> list[Field]:

@@ -6,22 +6,23 @@ paper's smoothed highest point is available too. The caller states the search ba
 """
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from asperity.core.arrays import Mask
+from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
 from asperity.core.signals import Spectrum, smooth
 from asperity.resonance.band_fit import (
     STRONG_EVIDENCE,
+    BandData,
     band_data,
     fit_floor,
     fit_line,
     fit_modes,
     window_leakage,
 )
-from asperity.resonance.likelihood_fit import whittle_cost
+from asperity.resonance.likelihood_fit import SpectrumFit, whittle_cost
 from asperity.resonance.resonance import (
     Resonance,
     SamplingFactor,
@@ -119,9 +120,7 @@ def _fit_highest_point(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, f
     highest = int(np.argmax(density))
     if highest in (0, density.size - 1):
         return no_resonance(
-            "the highest point is at the edge of the band: the peak lies outside",
-            band_hz,
-            "peak",
+            "the highest point is at the edge of the band: the peak lies outside", band_hz, "peak"
         )
     return Resonance(
         crf_hz=float(smoothed.frequency_hz[inside][highest]),
@@ -137,10 +136,11 @@ def _fit_highest_point(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, f
 
 
 def _objection(
-    f0: float, f0_std: float, zeta: float, spectrum: Spectrum, band_hz: tuple[float, float]
+    line: Field, std: Field, spectrum: Spectrum, band_hz: tuple[float, float]
 ) -> str | None:
     """Return the reason why a fitted line is not a resonance of this band, or None."""
-    low, high = band_hz
+    (low, high), f0_std = band_hz, float(std[1])
+    _, f0, zeta = (float(value) for value in line)
     width = 2.0 * zeta * f0
     if not low + 3.0 * f0_std < f0 < high - 3.0 * f0_std:
         return f"the line peaks at or beyond the edge of the band {low:.0f} to {high:.0f} Hz"
@@ -167,28 +167,23 @@ def _fit_most_likely_line(
     band = band_data(spectrum, inside, band_hz)
     if band is None:
         return no_resonance("the band holds no vibration", band_hz, "likelihood")
-    low, high = band_hz
     fit = fit_line(band, spectrum, band_hz, sampling_factor)
-    evidence = 2.0 * (band.floor_only.cost - fit.cost) - band.bic_penalty
+    evidence = band.evidence(fit, band.floor_only.cost)
     line = np.exp(fit.parameters[:3])
     std = fit.std[:3] * line
-    _, f0, zeta = (float(value) for value in line)
     if evidence < STRONG_EVIDENCE:
-        objection: str | None = (
-            f"no line stands out above the floor between {low:.0f} and {high:.0f} Hz "
-            f"(BIC {evidence:+.1f})"
-        )
+        objection: str | None = _below_floor(band_hz, evidence)
     elif not fit.converged:
         objection = "the fit did not converge"
     else:
-        objection = _objection(f0, float(std[1]), zeta, spectrum, band_hz)
+        objection = _objection(line, std, spectrum, band_hz)
     if objection is not None:
         floor = band.floor_at_ends(band.floor_only.parameters)
         return no_resonance(objection, band_hz, "likelihood", floor=floor, evidence=evidence)
     return fitted_resonance(
         line * band.scales,
         std * band.scales,
-        reason=f"a line {2.0 * zeta * f0:.0f} Hz wide stands out above the floor (BIC "
+        reason=f"a line {2.0 * line[2] * line[1]:.0f} Hz wide stands out above the floor (BIC "
         f"{evidence:+.0f})",
         band_hz=band_hz,
         method="likelihood",
@@ -198,69 +193,100 @@ def _fit_most_likely_line(
     )
 
 
+def _below_floor(band_hz: tuple[float, float], evidence: float) -> str:
+    low, high = band_hz
+    return (
+        f"no line stands out above the floor between {low:.0f} and {high:.0f} Hz "
+        f"(BIC {evidence:+.1f})"
+    )
+
+
+class _Modes(NamedTuple):
+    """Fitted lines with their standard deviations, (modes, 3), and the index of the strongest."""
+
+    lines: Field
+    std: Field
+    power: Field  # A ζ f0, proportional to the line's mean square
+    strongest: int
+
+    def background(
+        self, band: BandData, floor: tuple[float, float], band_hz: tuple[float, float]
+    ) -> Field:
+        """Return the density of the floor and of all lines but the strongest."""
+        low, high = band_hz
+        density = floor[0] + (floor[1] - floor[0]) * (band.frequency - low) / (high - low)
+        for height, *line in np.delete(self.lines, self.strongest, axis=0):
+            density = density + band.scale * height * line_shape(band.frequency, *line)
+        return density
+
+    @property
+    def description(self) -> str:
+        """The strongest line in words."""
+        count, (_, f0, zeta) = len(self.lines), self.lines[self.strongest]
+        rest = f"; {count - 1} weaker" if count > 1 else ""
+        return f"the strongest of {count} resonances, {2.0 * zeta * f0:.0f} Hz wide{rest}"
+
+    def ambiguity(self) -> str | None:
+        """Return why the strongest line may not be the contact's, or None."""
+        rivals = self.power > AMBIGUOUS_POWER_SHARE * self.power[self.strongest]
+        if np.count_nonzero(rivals) < 2:
+            return None
+        listed = ", ".join(f"{frequency:.0f}" for frequency in sorted(self.lines[rivals, 1]))
+        return (
+            f"lines at {listed} Hz have similar power: one spectrum cannot tell which is the "
+            f"contact's"
+        )
+
+
+def _fitted_modes(fit: SpectrumFit) -> _Modes:
+    lines = np.exp(fit.parameters[:-2]).reshape(-1, 3)
+    power = np.prod(lines, axis=1)
+    return _Modes(lines, fit.std[:-2].reshape(-1, 3) * lines, power, int(np.argmax(power)))
+
+
+def _mode_band(
+    spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]
+) -> tuple[BandData, Field] | None:
+    """Return the band in at most 600 blocks and its leakage; None without vibration."""
+    band = band_data(spectrum, inside, band_hz)
+    if band is None:
+        return None
+    size = -(-band.frequency.size // MAX_MODE_BLOCKS)
+    if size == 1:
+        return band, window_leakage(spectrum)
+    # blocks are far narrower than a line but wider than the window's leakage
+    band = band.block_averaged(size)
+    floor_only = fit_floor(band.floors, band.data, band.floor_only.parameters)
+    return band._replace(floor_only=floor_only), np.ones(1)
+
+
 def _fit_strongest_mode(
     spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]
 ) -> Resonance:
     """Fit as many lines as the spectrum needs and accept the strongest if it dominates."""
-    band = band_data(spectrum, inside, band_hz)
-    if band is None:
+    averaged = _mode_band(spectrum, inside, band_hz)
+    if averaged is None:
         return no_resonance("the band holds no vibration", band_hz, "modes")
-    low, high = band_hz
-    leakage = window_leakage(spectrum)
-    size = -(-band.frequency.size // MAX_MODE_BLOCKS)
-    if size > 1:  # blocks are far narrower than a line but wider than the window's leakage
-        band, leakage = band.block_averaged(size), np.ones(1)
-        band = band._replace(
-            floor_only=fit_floor(band.floors, band.data, band.floor_only.parameters)
-        )
+    band, leakage = averaged
     fit = fit_modes(band, band_hz, leakage)
-    count = (fit.parameters.size - 2) // 3
-    floor = band.floor_at_ends(fit.parameters[3 * count :])
-    if count == 0:
-        evidence = 2.0 * (band.floor_only.cost - fit.cost) - band.bic_penalty
-        reason = (
-            f"no line stands out above the floor between {low:.0f} and {high:.0f} Hz "
-            f"(BIC {evidence:+.1f})"
-        )
+    floor = band.floor_at_ends(fit.parameters[-2:])
+    if fit.parameters.size == 2:
+        evidence = band.evidence(fit, band.floor_only.cost)
+        reason = _below_floor(band_hz, evidence)
         return no_resonance(reason, band_hz, "modes", floor=floor, evidence=evidence)
-    lines = np.exp(fit.parameters[: 3 * count]).reshape(count, 3)
-    deviations = fit.std[: 3 * count].reshape(count, 3) * lines
-    power = np.prod(lines, axis=1)  # A ζ f0, proportional to the line's mean square
-    order = np.argsort(power)[::-1]
-    strongest = int(order[0])
-    _, f0, zeta = (float(value) for value in lines[strongest])
-    others = np.delete(np.arange(count), strongest)
-    background = floor[0] + (floor[1] - floor[0]) * (band.frequency - low) / (high - low)
-    for number in others:
-        background = background + band.scale * lines[number, 0] * line_shape(
-            band.frequency, *lines[number, 1:]
-        )
-    evidence = (
-        2.0 * (whittle_cost(background / band.scale, band.data) - fit.cost) - band.bic_penalty
-    )
-    objection = _objection(f0, float(deviations[strongest, 1]), zeta, spectrum, band_hz)
+    modes = _fitted_modes(fit)
+    line, std = modes.lines[modes.strongest], modes.std[modes.strongest]
+    background = modes.background(band, floor, band_hz)
+    evidence = band.evidence(fit, whittle_cost(background / band.scale, band.data))
+    objection = _objection(line, std, spectrum, band_hz) or modes.ambiguity()
     if not fit.converged:
         objection = "the fit did not converge"
-    if (
-        objection is None
-        and count > 1
-        and power[order[1]] > AMBIGUOUS_POWER_SHARE * power[strongest]
-    ):
-        rivals = [
-            number for number in order if power[number] > AMBIGUOUS_POWER_SHARE * power[strongest]
-        ]
-        listed = ", ".join(f"{frequency:.0f}" for frequency in sorted(lines[rivals, 1]))
-        objection = (
-            f"lines at {listed} Hz have similar power: one spectrum cannot tell which is the "
-            f"contact's"
-        )
     if objection is not None:
         return no_resonance(objection, band_hz, "modes", floor=floor, evidence=evidence)
-    rest = f"; {count - 1} weaker" if count > 1 else ""
     return fitted_resonance(
-        lines[strongest] * band.scales,
-        deviations[strongest] * band.scales,
-        reason=f"the strongest of {count} resonances, {2.0 * zeta * f0:.0f} Hz wide{rest}",
+        line * band.scales,
+        std * band.scales,
+        reason=modes.description,
         band_hz=band_hz,
         method="modes",
         floor=floor,
@@ -271,8 +297,4 @@ def _fit_strongest_mode(
 
 INDICATOR_METHODS: dict[
     IndicatorMethod, Callable[[Spectrum, Mask, tuple[float, float]], Resonance]
-] = {
-    "likelihood": _fit_most_likely_line,
-    "modes": _fit_strongest_mode,
-    "peak": _fit_highest_point,
-}
+] = {"likelihood": _fit_most_likely_line, "modes": _fit_strongest_mode, "peak": _fit_highest_point}

@@ -13,6 +13,8 @@ import numpy as np
 from asperity.core.arrays import Field, Mask
 
 State = TypeVar("State")
+# fits that a step improves, and the state with those steps taken; None: no step promises a gain
+Proposal = tuple[Mask, Callable[[Mask], State]] | None
 # parameters -> expected density (lines,), slopes (lines, parameters)
 DensityModel = Callable[[Field], tuple[Field, Field]]
 
@@ -23,7 +25,7 @@ SMALLEST_GAIN = 1e-8  # expected gain of ln likelihood below which the fit has c
 
 def fisher_scoring(
     start: State,
-    propose: Callable[[State, Field], tuple[Mask, Callable[[Mask], State]] | None],
+    propose: Callable[[State, Field], Proposal[State]],
     *,
     steps: int,
     least_damping: float,
@@ -36,8 +38,7 @@ def fisher_scoring(
 
     Parameters
     ----------
-    propose : from a state and dampings (fits,), the mask of the fits that a step improves and a
-        function that returns the state with those steps taken; None where no step promises a gain
+    propose : from a state and dampings (fits,), the proposed step
     steps : maximum number of steps
     least_damping, most_damping : bounds of the damping, which is divided by 5 after a successful
         step and multiplied by 4 after a rejected one
@@ -94,45 +95,59 @@ class _ScoringPoint(NamedTuple):
     diagonal: Field
 
 
-def fit_spectrum(
-    model: DensityModel, start: Field, bounds: ParameterBounds, data: Data
-) -> SpectrumFit:
-    """Minimise sum w (ln P + I/P) of exponential ordinates within bounds, F = sum w dP dPᵀ/P^2.
+@dataclass(frozen=True, slots=True)
+class _Likelihood:
+    """Likelihood of exponential ordinates by the parameters of a model, within bounds."""
 
-    A parameter whose score points beyond its bound is held there.
-    """
+    model: DensityModel
+    bounds: ParameterBounds
+    data: Data
 
-    def point(theta: Field, expected: Field, slopes: Field, cost: float) -> _ScoringPoint:
+    def scoring_point(
+        self, theta: Field, expected: Field, slopes: Field, cost: float
+    ) -> _ScoringPoint:
+        """Return score and information; a parameter whose score points beyond its bound is held."""
         relative = slopes / expected[:, None]
-        score = data.weight * relative.T @ (data.density / expected - 1.0)
-        information = data.weight * relative.T @ relative
+        score = self.data.weight * relative.T @ (self.data.density / expected - 1.0)
+        information = self.data.weight * relative.T @ relative
         free = ~(
-            ((theta <= bounds.lower) & (score <= 0.0)) | ((theta >= bounds.upper) & (score >= 0.0))
+            ((theta <= self.bounds.lower) & (score <= 0.0))
+            | ((theta >= self.bounds.upper) & (score >= 0.0))
         )
         inner = information[np.ix_(free, free)]
         return _ScoringPoint(
             theta, cost, score[free], free, inner, np.diag(inner) + 1e-12 * np.trace(inner)
         )
 
-    def propose(
-        current: _ScoringPoint, damping: Field
-    ) -> tuple[Mask, Callable[[Mask], _ScoringPoint]] | None:
+    def propose(self, current: _ScoringPoint, damping: Field) -> Proposal[_ScoringPoint]:
+        """Return the damped step from a scoring point."""
         if np.sum(current.score**2 / current.diagonal) < SMALLEST_GAIN:
             return None
         step = np.zeros_like(current.theta)
         step[current.free] = np.linalg.solve(
             current.information + damping * np.diag(current.diagonal), current.score
         )
-        trial = np.clip(current.theta + step, bounds.lower, bounds.upper)
-        expected, slopes = model(trial)
-        cost = whittle_cost(expected, data)
-        return np.array([cost < current.cost]), lambda _: point(trial, expected, slopes, cost)
+        trial = np.clip(current.theta + step, self.bounds.lower, self.bounds.upper)
+        expected, slopes = self.model(trial)
+        cost = whittle_cost(expected, self.data)
+        return np.array([cost < current.cost]), lambda _: self.scoring_point(
+            trial, expected, slopes, cost
+        )
 
+
+def fit_spectrum(
+    model: DensityModel, start: Field, bounds: ParameterBounds, data: Data
+) -> SpectrumFit:
+    """Minimise sum w (ln P + I/P) of exponential ordinates within bounds, F = sum w dP dPᵀ/P^2."""
+    likelihood = _Likelihood(model, bounds, data)
     first = np.clip(start, bounds.lower, bounds.upper)
     expected, slopes = model(first)
-    current = point(first, expected, slopes, whittle_cost(expected, data))
     current, converged = fisher_scoring(
-        current, propose, steps=MOST_STEPS, least_damping=1e-9, most_damping=1e8
+        likelihood.scoring_point(first, expected, slopes, whittle_cost(expected, data)),
+        likelihood.propose,
+        steps=MOST_STEPS,
+        least_damping=1e-9,
+        most_damping=1e8,
     )
     std = np.zeros_like(current.theta)
     std[current.free] = np.sqrt(

@@ -1,12 +1,13 @@
 """Fit of the lines of recordings, on one sensor or several, with base and transfer held."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from asperity.core.arrays import Field, Mask
-from asperity.resonance.likelihood_fit import fisher_scoring
+from asperity.core.arrays import Field
+from asperity.resonance.likelihood_fit import Proposal, fisher_scoring
 from asperity.resonance.spectrum_model import (
     PRIOR_DAMPING,
     PRIOR_DAMPING_STD,
@@ -67,70 +68,102 @@ def parameter_indices(sensor: int) -> list[int]:
     return [0, 1, 2, 3] if sensor == 0 else [2 + 2 * sensor, 1, 2, 3 + 2 * sensor]
 
 
-def fit_common_lines(sensors: Sequence[SensorData]) -> CommonLines:
-    """Fit every recording's own parameters by damped scoring, bases and transfers held."""
-    lower, upper = parameter_bounds(sensors[0].blocks)
-    count, size = len(sensors), 2 + 2 * len(sensors)
-    double_counted_prior = (count - 1.0) * PRIOR_DAMPING_STD**-2  # the prior counts once
+class _ScoringPoint(NamedTuple):
+    """Own parameters of all sensors, with the score and information of each recording."""
 
-    def cost_at(own: Field) -> Field:
+    own: Field  # (sensors, recordings, 4)
+    cost: Field  # (recordings,)
+    by_sensor: list[LineScoringPoint]
+    score: Field  # (recordings, n)
+    information: Field  # (recordings, n, n)
+
+
+@dataclass(frozen=True, slots=True)
+class _Likelihood:
+    """Likelihood of lines common to all sensors, bases and transfers held."""
+
+    sensors: Sequence[SensorData]
+    lower: Field
+    upper: Field
+
+    @property
+    def size(self) -> int:
+        """Number of parameters of a recording."""
+        return 2 + 2 * len(self.sensors)
+
+    @property
+    def repeated_prior(self) -> float:
+        """Information of the damping's prior beyond the one that counts."""
+        return float((len(self.sensors) - 1.0) * PRIOR_DAMPING_STD**-2)
+
+    def costs(self, own: Field) -> Field:
+        """Return -ln likelihood of each recording."""
         costs = [
             recording_costs(data.blocks, data.parameters._replace(own=own_values))
-            for data, own_values in zip(sensors, own, strict=True)
+            for data, own_values in zip(self.sensors, own, strict=True)
         ]
         return np.asarray(
             np.sum(costs, axis=0)
-            - 0.5 * double_counted_prior * (own[0, :, 2] - np.log(PRIOR_DAMPING)) ** 2
+            - 0.5 * self.repeated_prior * (own[0, :, 2] - np.log(PRIOR_DAMPING)) ** 2
         )
 
-    def evaluate(
-        own: Field, cost: Field
-    ) -> tuple[Field, Field, list[LineScoringPoint], Field, Field]:
+    def scoring_point(self, own: Field, cost: Field) -> _ScoringPoint:
+        """Return score and information, summed over the sensors."""
         points = [
             line_scoring_point(data.blocks, data.parameters._replace(own=own_values))
-            for data, own_values in zip(sensors, own, strict=True)
+            for data, own_values in zip(self.sensors, own, strict=True)
         ]
-        score, information = np.zeros((own.shape[1], size)), np.zeros((own.shape[1], size, size))
+        score = np.zeros((own.shape[1], self.size))
+        information = np.zeros((own.shape[1], self.size, self.size))
         for sensor, point in enumerate(points):
             indices = np.array(parameter_indices(sensor))
             score[:, indices] += point.score
             information[:, indices[:, None], indices] += point.information
-        score[:, 2] += double_counted_prior * (own[0, :, 2] - np.log(PRIOR_DAMPING))
-        information[:, 2, 2] -= double_counted_prior
-        return own, cost, points, score, information
+        score[:, 2] += self.repeated_prior * (own[0, :, 2] - np.log(PRIOR_DAMPING))
+        information[:, 2, 2] -= self.repeated_prior
+        return _ScoringPoint(own, cost, points, score, information)
 
-    def propose(
-        state: tuple[Field, Field, list[LineScoringPoint], Field, Field], damping: Field
-    ) -> (
-        tuple[Mask, Callable[[Mask], tuple[Field, Field, list[LineScoringPoint], Field, Field]]]
-        | None
-    ):
-        own, cost, _, score, information = state
-        diagonal = np.einsum("npp->np", information)
-        damped = information + (damping[:, None] * diagonal)[:, :, None] * np.eye(size)
-        step = np.linalg.solve(damped, score[..., None])[..., 0]
-        if np.max(np.sum(step * score, axis=1)) < 2.0 * SMALLEST_GAIN:
+    def propose(self, point: _ScoringPoint, damping: Field) -> Proposal[_ScoringPoint]:
+        """Return the damped steps of all recordings."""
+        diagonal = np.einsum("npp->np", point.information)
+        damped = point.information + (damping[:, None] * diagonal)[:, :, None] * np.eye(self.size)
+        step = np.linalg.solve(damped, point.score[..., None])[..., 0]
+        if np.max(np.sum(step * point.score, axis=1)) < 2.0 * SMALLEST_GAIN:
             return None
-        by_sensor = np.stack([step[:, parameter_indices(sensor)] for sensor in range(count)])
-        trial = np.clip(own + np.clip(by_sensor, -LARGEST_STEP, LARGEST_STEP), lower, upper)
-        trial_cost = cost_at(trial)
-        return trial_cost < cost, lambda better: evaluate(
-            np.where(better[:, None], trial, own), np.where(better, trial_cost, cost)
+        by_sensor = np.stack(
+            [step[:, parameter_indices(sensor)] for sensor in range(len(self.sensors))]
+        )
+        limited = np.clip(by_sensor, -LARGEST_STEP, LARGEST_STEP)
+        trial = np.clip(point.own + limited, self.lower, self.upper)
+        trial_cost = self.costs(trial)
+        return trial_cost < point.cost, lambda better: self.scoring_point(
+            np.where(better[:, None], trial, point.own), np.where(better, trial_cost, point.cost)
         )
 
-    own = np.stack([np.clip(data.parameters.own, lower, upper) for data in sensors])
-    state = evaluate(own, cost_at(own))
-    state, _ = fisher_scoring(
-        state, propose, steps=MOST_STEPS, least_damping=1e-7, most_damping=1e6, fits=own.shape[1]
+
+def fit_common_lines(sensors: Sequence[SensorData]) -> CommonLines:
+    """Fit every recording's own parameters by damped scoring, bases and transfers held."""
+    likelihood = _Likelihood(sensors, *parameter_bounds(sensors[0].blocks))
+    own = np.stack(
+        [np.clip(data.parameters.own, likelihood.lower, likelihood.upper) for data in sensors]
     )
-    own, cost, points, _, information = state
-    inverse = np.linalg.inv(information)
+    fitted, _ = fisher_scoring(
+        likelihood.scoring_point(own, likelihood.costs(own)),
+        likelihood.propose,
+        steps=MOST_STEPS,
+        least_damping=1e-7,
+        most_damping=1e6,
+        fits=own.shape[1],
+    )
+    inverse = np.linalg.inv(fitted.information)
     transfer_effect: list[Field] = [
         inverse[:, :, parameter_indices(sensor)]
         @ point.transfer_coupling(data.blocks.centre, data.parameters._replace(own=own_values))
-        for sensor, (point, data, own_values) in enumerate(zip(points, sensors, own, strict=True))
+        for sensor, (point, data, own_values) in enumerate(
+            zip(fitted.by_sensor, sensors, fitted.own, strict=True)
+        )
     ]
-    return CommonLines(own, cost, inverse, points, transfer_effect)
+    return CommonLines(fitted.own, fitted.cost, inverse, fitted.by_sensor, transfer_effect)
 
 
 def fit_lines(

@@ -80,42 +80,50 @@ def remove_lines(
     _require_removable(spectrum, shaft_hz)
     level = _level(spectrum)
     relative_density = spectrum.density / np.maximum(level, np.finfo(float).tiny)
-    bound = _threshold(spectrum, CHANCE / relative_density.size)
-    peaks = _find_peaks(relative_density, bound)
-    tones = _tone_frequencies(spectrum, relative_density, peaks)
-    combs = _find_combs(tones, spectrum, shaft_hz)
-    weak = _weak_harmonics(spectrum, relative_density, combs, peaks)
-    peaks = np.union1d(peaks, weak)
+    peaks, combs = _identify_tones(spectrum, relative_density, shaft_hz)
     low, high = band_hz if band_hz is not None else (0.0, np.inf)
-    inside = (spectrum.frequency_hz[peaks] >= low) & (spectrum.frequency_hz[peaks] <= high)
-    peaks = peaks[inside]
-    tones = _tone_frequencies(spectrum, relative_density, peaks)
+    frequency = spectrum.frequency_hz[peaks]
+    peaks = peaks[(frequency >= low) & (frequency <= high)]
 
     kept = np.ones(relative_density.size, dtype=bool)
     removed = []
-    for peak, tone in zip(peaks, tones, strict=True):
-        first, last = _tone_extent(
-            relative_density, int(peak), 1.0 + 2.0 / np.sqrt(_shape(spectrum))
-        )
-        kept[first : last + 1] = False
-        excess = spectrum.density[first : last + 1] - level[first : last + 1]
-        mean_square = float(np.sum(excess)) * spectrum.spacing_hz
+    upper = 1.0 + 2.0 / np.sqrt(_shape(spectrum))
+    for peak, tone in zip(peaks, _tone_frequencies(spectrum, relative_density, peaks), strict=True):
+        first, last = _tone_extent(relative_density, int(peak), upper)
+        lines = slice(first, last + 1)
+        kept[lines] = False
+        mean_square = float(np.sum(spectrum.density[lines] - level[lines])) * spectrum.spacing_hz
         source = _source(tone, combs, spectrum)
         removed.append(
             RemovedTone(frequency_hz=float(tone), mean_square=mean_square, source=source)
         )
-    density = spectrum.density.copy()
-    density[~kept] = (
-        np.interp(np.flatnonzero(~kept), np.flatnonzero(kept), level[kept])
-        if np.any(kept)
-        else level
-    )
     return CleanSpectrum(
-        spectrum=replace(spectrum, density=density),
+        spectrum=_with_level(spectrum, level, ~kept),
         kept=kept,
         removed=tuple(removed),
         speeds_hz=tuple(combs),
     )
+
+
+def _with_level(spectrum: Spectrum, level: Field, lines: Mask) -> Spectrum:
+    """Return the spectrum with the level of their neighbours in place of some lines."""
+    density = spectrum.density.copy()
+    density[lines] = (
+        level
+        if np.all(lines)
+        else np.interp(np.flatnonzero(lines), np.flatnonzero(~lines), level[~lines])
+    )
+    return replace(spectrum, density=density)
+
+
+def _identify_tones(
+    spectrum: Spectrum, relative_density: Field, shaft_hz: Sequence[float] | None
+) -> tuple[Field, list[float]]:
+    """Return the lines of all tones, weak harmonics included, and the speeds that explain them."""
+    peaks = _find_peaks(relative_density, _threshold(spectrum, CHANCE / relative_density.size))
+    combs = _find_combs(_tone_frequencies(spectrum, relative_density, peaks), spectrum, shaft_hz)
+    weak = _weak_harmonics(spectrum, relative_density, combs, peaks)
+    return np.union1d(peaks, weak), combs
 
 
 def _require_removable(spectrum: Spectrum, shaft_hz: Sequence[float] | None) -> None:
@@ -128,9 +136,8 @@ def _require_removable(spectrum: Spectrum, shaft_hz: Sequence[float] | None) -> 
         )
     if spectrum.density.size <= 2 * NEIGHBOURS + 10:
         raise BadInput(
-            f"a spectrum of {spectrum.density.size} lines is too short to detect tones; "
-            f"lengthen its "
-            "segment"
+            f"a spectrum of {spectrum.density.size} lines is too short to detect tones; lengthen "
+            "its segment"
         )
     if not np.isfinite(spectrum.density).all():
         raise BadInput("removing tones needs a finite spectrum; repair the record")
@@ -174,10 +181,8 @@ def _find_peaks(relative_density: Field, bound: float) -> Field:
     excess[:NEIGHBOURS] = excess[-NEIGHBOURS:] = False  # too few neighbours to one side
     peaks = []
     for index in map(int, np.flatnonzero(excess)):
-        first, last = (
-            max(index - TONE_HALF_WIDTH, 0),
-            min(index + TONE_HALF_WIDTH, relative_density.size - 1),
-        )
+        first = max(index - TONE_HALF_WIDTH, 0)
+        last = min(index + TONE_HALF_WIDTH, relative_density.size - 1)
         if relative_density[index] >= np.max(relative_density[first : last + 1]):
             surroundings = relative_density[
                 max(index - 2 * LARGEST_TONE_HALF_WIDTH, 0) : index
@@ -225,34 +230,31 @@ def _find_combs(tones: Field, spectrum: Spectrum, shaft_hz: Sequence[float] | No
         unexplained = unexplained[~_on_comb(unexplained, mains_hz, spectrum)]
     if shaft_hz is not None:
         return [_corrected_speed(tones, speed, spectrum) for speed in shaft_hz] + combs
-    lowest = max(SLOWEST_HZ, SMALLEST_SPACING * spectrum.spacing_hz)
-    while unexplained.size >= FEWEST_HARMONICS:
-        differences = np.abs(unexplained[:, None] - unexplained[None, :])[
-            np.triu_indices(unexplained.size, 1)
-        ]
-        candidates = np.unique(np.concatenate([unexplained, differences]).round(6))
-        candidates = candidates[(candidates >= lowest) & (candidates <= FASTEST_HZ)]
-        if candidates.size == 0:
-            break
-        score = np.array(
-            [np.count_nonzero(_on_comb(unexplained, speed, spectrum)) for speed in candidates]
-        )
-        score = score - unexplained.size * 1.5 * spectrum.spacing_hz / candidates
-        promising = candidates[np.argsort(score)[-CANDIDATES:]]
-        assessed = [
-            (
-                _evidence(unexplained, _corrected_speed(unexplained, speed, spectrum), spectrum),
-                speed,
-            )
-            for speed in promising
-        ]
-        evidence, speed = max(assessed)
-        if evidence - np.log(candidates.size) < -np.log(COMB_CHANCE):
-            break
-        speed = _corrected_speed(unexplained, speed, spectrum)
+    while (speed := _best_comb(unexplained, spectrum)) is not None:
         combs.insert(0, speed)
         unexplained = unexplained[~_on_comb(unexplained, speed, spectrum)]
     return combs
+
+
+def _best_comb(tones: Field, spectrum: Spectrum) -> float | None:
+    """Return the speed whose harmonics explain most tones; None if chance explains as many."""
+    if tones.size < FEWEST_HARMONICS:
+        return None
+    differences = np.abs(tones[:, None] - tones[None, :])[np.triu_indices(tones.size, 1)]
+    candidates = np.unique(np.concatenate([tones, differences]).round(6))
+    lowest = max(SLOWEST_HZ, SMALLEST_SPACING * spectrum.spacing_hz)
+    candidates = candidates[(candidates >= lowest) & (candidates <= FASTEST_HZ)]
+    if candidates.size == 0:
+        return None
+    score = np.array([np.count_nonzero(_on_comb(tones, speed, spectrum)) for speed in candidates])
+    score = score - tones.size * 1.5 * spectrum.spacing_hz / candidates
+    evidence, speed = max(
+        (_evidence(tones, _corrected_speed(tones, speed, spectrum), spectrum), speed)
+        for speed in candidates[np.argsort(score)[-CANDIDATES:]]
+    )
+    if evidence - np.log(candidates.size) < -np.log(COMB_CHANCE):
+        return None
+    return _corrected_speed(tones, speed, spectrum)
 
 
 def _on_comb(tones: Field, speed: float, spectrum: Spectrum) -> Mask:

@@ -107,13 +107,7 @@ def common_error_share(pair: tuple[str, str], fits: Sequence[SensorFit]) -> floa
     for fit in fits:
         if not set(pair) <= set(fit.names):
             continue
-        sensitivities, residuals = [], []
-        for name in pair:
-            sensor = fit.names.index(name)
-            blocks, joint = fit.sensors[sensor].blocks, fit.joint(sensor)
-            relative, expected = model_shares(blocks, joint.parameters)
-            sensitivities.append(np.sqrt(blocks.weight) * np.abs(relative[:, 1]))
-            residuals.append(np.sqrt(blocks.weight) * (blocks.density / expected - 1.0))
+        sensitivities, residuals = zip(*(_residuals(fit, name) for name in pair), strict=True)
         both = sensitivities[0] * sensitivities[1]
         product += float(np.sum(both * residuals[0] * residuals[1]))
         powers += [np.sum(both * residual**2) for residual in residuals]
@@ -122,3 +116,12 @@ def common_error_share(pair: tuple[str, str], fits: Sequence[SensorFit]) -> floa
     if not np.all(powers > 0.0):
         return np.nan
     return float(np.clip(product / np.sqrt(np.prod(powers)) + np.sqrt(squares) / weights, 0.0, 1.0))
+
+
+def _residuals(fit: SensorFit, name: str) -> tuple[Field, Field]:
+    """Return the sensitivity of one sensor's spectra to frequency, and their residuals."""
+    sensor = fit.names.index(name)
+    blocks = fit.sensors[sensor].blocks
+    relative, expected = model_shares(blocks, fit.joint(sensor).parameters)
+    weight = np.sqrt(blocks.weight)
+    return weight * np.abs(relative[:, 1]), weight * (blocks.density / expected - 1.0)

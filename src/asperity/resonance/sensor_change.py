@@ -4,6 +4,8 @@
 recording on is computed. docs/theory/indicators.md has the equations.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from asperity.core.arrays import Field
@@ -24,6 +26,35 @@ ASIDE, SHARP = 20, 0.12
 SIGNIFICANT_INFORMATION = 1e-6  # relative to the largest eigenvalue
 
 
+class _Changes(NamedTuple):
+    """Score and information of the transfer, by recording and with the common transfer held."""
+
+    score: Field  # (recordings, coefficients)
+    information: Field  # (recordings, coefficients, coefficients)
+    common_score: Field
+    common_covariance: Field
+    priors: list[Field]  # of the change
+
+    def evidence(self, course: Field) -> float:
+        """Return the ln evidence of a change proportional to `course` (recordings,)."""
+        total = np.einsum("n,ncd->cd", course, self.information)
+        covariance = self.common_covariance
+        score = course @ self.score - total @ covariance @ self.common_score
+        information = (
+            np.einsum("n,ncd->cd", course**2, self.information) - total @ covariance @ total
+        )
+        return max(_evidence(score, information, prior) for prior in self.priors)
+
+    def evidence_of_step(self, first: int) -> float:
+        """Return the ln evidence of a change from a recording on."""
+        return self.evidence(1.0 * (np.arange(len(self.score)) >= first))
+
+    def evidence_of_drift(self) -> float:
+        """Return the ln evidence of a linear or parabolic change, 0 for none."""
+        t = np.linspace(-1.0, 1.0, len(self.score))
+        return max(self.evidence(t), self.evidence(t**2), 0.0)
+
+
 def first_moved_recording(blocks: SpectrumBlocks, joint: JointFit) -> int | None:
     """Return the first recording after a change of the transfer, or None.
 
@@ -35,42 +66,37 @@ def first_moved_recording(blocks: SpectrumBlocks, joint: JointFit) -> int | None
     depends on the line's frequency.
     """
     count = blocks.density.shape[0]
-    transfer = joint.parameters.transfer
-    if count < 2 * FEWEST_RECORDINGS_PER_PART or not transfer.coefficients.size:
+    if count < 2 * FEWEST_RECORDINGS_PER_PART or not joint.parameters.transfer.coefficients.size:
         return None
+    changes = _changes(blocks, joint)
+    best = max(
+        range(FEWEST_RECORDINGS_PER_PART, count - FEWEST_RECORDINGS_PER_PART + 1),
+        key=changes.evidence_of_step,
+    )
+    offset = max(count // ASIDE, 1)
+    nearby = max(changes.evidence_of_step(best - offset), changes.evidence_of_step(best + offset))
+    evidence = changes.evidence_of_step(best)
+    significant = evidence > EVIDENCE_REQUIRED + changes.evidence_of_drift()
+    sharp = nearby < (1.0 - SHARP) * evidence
+    return best if significant and sharp else None
+
+
+def _changes(blocks: SpectrumBlocks, joint: JointFit) -> _Changes:
+    """Return score and information over the scatter beyond chance, and the common transfer."""
+    transfer = joint.parameters.transfer
     score, information = _by_recording(blocks, joint)
     dispersion = max(_dispersion(score, information), 1.0)
     score, information = score / dispersion, information / dispersion
     prior_information = transfer.stiffness(max(LEAST_STEP_STD, joint.step_std))
-    inverse = np.linalg.solve(
-        information.sum(axis=0) + prior_information, np.eye(transfer.coefficients.size)
+    return _Changes(
+        score,
+        information,
+        score.sum(axis=0) - prior_information @ transfer.coefficients,
+        np.linalg.solve(
+            information.sum(axis=0) + prior_information, np.eye(transfer.coefficients.size)
+        ),
+        [transfer.stiffness(step_std) for step_std in STEP_STDS],
     )
-    total_score = score.sum(axis=0) - prior_information @ transfer.coefficients
-    priors = [transfer.stiffness(step_std) for step_std in STEP_STDS]
-
-    def evidence(course: Field) -> float:
-        """Return the ln evidence of a change proportional to `course` (recordings,)."""
-        total = np.einsum("n,ncd->cd", course, information)
-        changed_score = course @ score - total @ inverse @ total_score
-        changed_information = (
-            np.einsum("n,ncd->cd", course**2, information) - total @ inverse @ total
-        )
-        return max(_evidence(changed_score, changed_information, prior) for prior in priors)
-
-    numbers = np.arange(count)
-
-    def step(first: int) -> float:
-        return evidence(1.0 * (numbers >= first))
-
-    best = max(range(FEWEST_RECORDINGS_PER_PART, count - FEWEST_RECORDINGS_PER_PART + 1), key=step)
-    t = np.linspace(-1.0, 1.0, count)
-    drift = max(evidence(t), evidence(t**2), 0.0)
-    offset = max(count // ASIDE, 1)
-    neighbours = max(step(best - offset), step(best + offset))
-    evidence_of_step = step(best)
-    significant = evidence_of_step > EVIDENCE_REQUIRED + drift
-    sharp = neighbours < (1.0 - SHARP) * evidence_of_step
-    return best if significant and sharp else None
 
 
 def _by_recording(blocks: SpectrumBlocks, joint: JointFit) -> tuple[Field, Field]:

@@ -73,23 +73,11 @@ class JointJudgement:
 
     def judge(self, agreement: Agreement | None = None) -> tuple[SensorLines, Agreement]:
         """Judge every recording; estimate the agreement of the sensors unless it is given."""
-        by_names: dict[tuple[str, ...], list[int]] = {}
-        for number in range(self.count):
-            names = tuple(name for name in self.by_sensor if number in self.rows[name])
-            by_names.setdefault(names, []).append(number)
-        fits = [
-            self._fit([*names], numbers) for names, numbers in by_names.items() if len(names) > 1
-        ]
+        fits = self._fits()
         common = self._common_shares(fits) if agreement is None else agreement.common
         widening = self._widening(common) if agreement is None else agreement.widening
         detected_on: list[tuple[str, ...]] = [()] * self.count
-        no_spectrum = no_resonance(
-            "no sensor has a spectrum of this recording", self.band_hz, "joint"
-        )
-        lines = [
-            next(filter(None, candidates), no_spectrum)
-            for candidates in zip(*self.alone.values(), strict=True)
-        ]
+        lines = self._first_lines()
         for fit in fits:
             for number, (line, names) in zip(
                 fit.numbers, self._common_lines(fit, common, widening), strict=True
@@ -109,6 +97,26 @@ class JointJudgement:
             common=float(np.mean(shares)) if shares else np.nan,
         )
         return judged, Agreement(common, widening, established)
+
+    def _fits(self) -> list[SensorFit]:
+        """Fit recordings of several sensors, those of the same sensors together."""
+        by_names: dict[tuple[str, ...], list[int]] = {}
+        for number in range(self.count):
+            names = tuple(name for name in self.by_sensor if number in self.rows[name])
+            by_names.setdefault(names, []).append(number)
+        return [
+            self._fit([*names], numbers) for names, numbers in by_names.items() if len(names) > 1
+        ]
+
+    def _first_lines(self) -> list[Resonance]:
+        """Return each recording's line on the first sensor that has a spectrum of it."""
+        no_spectrum = no_resonance(
+            "no sensor has a spectrum of this recording", self.band_hz, "joint"
+        )
+        return [
+            next(filter(None, candidates), no_spectrum)
+            for candidates in zip(*self.alone.values(), strict=True)
+        ]
 
     def disagreement(self, number: int) -> str:
         """Describe the different lines that two sensors detect in a recording; empty for none."""
@@ -221,20 +229,11 @@ class JointJudgement:
     ) -> _Evidence:
         shares = common_error_matrix(fit.names, common)
         effective = 1.0 + np.sum(shares, axis=1).mean()
-        gains, misfits, weights = [], [], []
-        for sensor, data in enumerate(fit.sensors):
-            joint = fit.joint(sensor)
-            gains.append(line_gain(data.blocks, joint)[0])
-            misfits.append(
-                relative_residual(data.blocks, expected_density(data.blocks, joint.parameters))
-            )
-            weights.append(data.blocks.weight.sum(axis=1))
-        detects = (np.array(gains) - np.log(weights) > STRONG_EVIDENCE) & (
-            np.array(misfits) <= LARGEST_MISFIT
-        )
+        gain, misfit, ordinates = _evidence_by_sensor(fit)
+        detects = (gain - np.log(ordinates) > STRONG_EVIDENCE) & (misfit <= LARGEST_MISFIT)
         detects &= ~np.array([self.by_sensor[name].fit.shaped for name in fit.names])[:, None]
-        bic = np.sum(gains, axis=0) / effective - (2.0 + len(fit.names)) * np.log(
-            np.sum(weights, axis=0)
+        bic = np.sum(gain, axis=0) / effective - (2.0 + len(fit.names)) * np.log(
+            np.sum(ordinates, axis=0)
         )
         errors = [
             systematic_errors(data.blocks, fit.joint(sensor), self.by_sensor[name].fit.statistics)
@@ -249,7 +248,7 @@ class JointJudgement:
         return _Evidence(
             detects=detects,
             bic=bic,
-            misfit=np.min(np.array(misfits), axis=0),
+            misfit=np.min(misfit, axis=0),
             effective_sensors=float(effective),
             std=std,
             shared_std=widening * np.asarray(of_structures),
@@ -261,46 +260,55 @@ class JointJudgement:
         """Return one recording's line and its sensors, if two sensors detect it."""
         if disagreement := self.disagreement(fit.numbers[row]):
             return no_resonance(disagreement, self.band_hz, "joint"), ()
-        names = [
+        names = tuple(
             name
             for name, detects in zip(fit.names, evidence.detects[:, row], strict=True)
             if detects
-        ]
-        bic = float(evidence.bic[row])
-        fitted = np.exp(fit.lines.own[0, row, :3])
-        deviations = evidence.std[0, row, :3] * fitted
-        f0, zeta = float(fitted[1]), float(fitted[2])
-        first_fit = self.by_sensor[fit.names[0]].fit
-        costs = fit.template_costs[row] / evidence.effective_sensors
-        rival = best_rival(f0, zeta, costs, first_fit.templates)
-        line = JudgedLine(f0, float(deviations[1]), zeta, bic, float(evidence.misfit[row]), *rival)
-        objection = line_objection(line, self.band_hz)
-        if objection is None and len(names) < 2:
-            objection = (
-                f"a line at {f0:.0f} Hz is detected on {names[0]} only"
-                if names
-                else "no two sensors detect a line"
-            )
-        if objection is not None:
-            return no_resonance(objection, self.band_hz, "joint", evidence=bic), ()
-        first = fit.sensors[0]
-        resonance = fitted_resonance(
-            fitted,
-            np.where([first_fit.stands, False, False], np.nan, deviations),
-            reason=f"a line {line.width:.0f} Hz wide on {' and '.join(names)} (BIC {bic:+.0f})",
-            band_hz=self.band_hz,
-            method="joint",
-            evidence=bic,
-            background=(
-                first.blocks.centre,
-                np.exp(fit.lines.own[0, row, 3] + first.parameters.base),
-            ),
-            crf_shared_std=float(evidence.shared_std[row]) * f0,
         )
+        line = self._judged_line(fit, row, evidence)
+        objection = line_objection(line, self.band_hz)
+        if objection is None and len(names) == 1:
+            objection = f"a line at {line.f0:.0f} Hz is detected on {names[0]} only"
+        elif objection is None and not names:
+            objection = "no two sensors detect a line"
+        if objection is not None:
+            return no_resonance(objection, self.band_hz, "joint", evidence=line.evidence), ()
+        reason = (
+            f"a line {line.width:.0f} Hz wide on {' and '.join(names)} (BIC {line.evidence:+.0f})"
+        )
+        resonance = self._joint_resonance(fit, row, evidence, reason)
         lead = next(iter(self.alone))
         if fit.names[0] != lead or lead not in names:
             resonance = replace(resonance, crfa=np.nan, crfa_std=np.nan)
-        return resonance, tuple(names)
+        return resonance, names
+
+    def _joint_resonance(
+        self, fit: SensorFit, row: int, evidence: _Evidence, reason: str
+    ) -> Resonance:
+        """Return one recording's line as fitted to all sensors, its height that on the first."""
+        fitted, first = np.exp(fit.lines.own[0, row, :3]), fit.sensors[0]
+        base = np.exp(fit.lines.own[0, row, 3] + first.parameters.base)
+        stands = self.by_sensor[fit.names[0]].fit.stands
+        return fitted_resonance(
+            fitted,
+            np.where([stands, False, False], np.nan, evidence.std[0, row, :3] * fitted),
+            reason=reason,
+            band_hz=self.band_hz,
+            method="joint",
+            evidence=float(evidence.bic[row]),
+            background=(first.blocks.centre, base),
+            crf_shared_std=float(evidence.shared_std[row]) * float(fitted[1]),
+        )
+
+    def _judged_line(self, fit: SensorFit, row: int, evidence: _Evidence) -> JudgedLine:
+        """Return the criteria of one recording's line, all sensors together."""
+        _, f0, zeta = (float(value) for value in np.exp(fit.lines.own[0, row, :3]))
+        costs = fit.template_costs[row] / evidence.effective_sensors
+        rival = best_rival(f0, zeta, costs, self.by_sensor[fit.names[0]].fit.templates)
+        f0_std = float(evidence.std[0, row, 1]) * f0
+        return JudgedLine(
+            f0, f0_std, zeta, float(evidence.bic[row]), float(evidence.misfit[row]), *rival
+        )
 
     def _line_of_one_sensor(
         self, number: int, line: Resonance, established: Sequence[str], widening: float
@@ -340,38 +348,27 @@ class JointJudgement:
         self, fit: SensorFit, shares: Field, errors: Sequence[SystematicErrors]
     ) -> Field:
         """Return standard deviations (sensors, recordings, 4): random, common and systematic."""
-        inverse, transfer_effect = fit.lines.inverse, fit.lines.transfer_effect
-        variance = np.einsum("npp->np", inverse).copy()
+        variance = np.einsum("npp->np", fit.lines.inverse).copy()
         relative = [
             model_shares(data.blocks, fit.joint(sensor).parameters)[0]
             for sensor, data in enumerate(fit.sensors)
         ]
-        weights = _frequency_weights(fit.lines)
-        systematic = np.zeros(inverse.shape[:2])
-        of_base = []
-        for sensor, data in enumerate(fit.sensors):
-            own = parameter_indices(sensor)
-            misfit = errors[sensor].std
-            systematic[:, [own[0], own[3]]] += misfit[:, [0, 3]]
-            systematic[:, [1, 2]] += weights[sensor][:, None] * misfit[:, [1, 2]]
+        weights, count = _frequency_weights(fit.lines), len(fit.sensors)
+        frequency_of_base = []
+        for sensor in range(count):
+            height, _, _, gain = parameter_indices(sensor)
             base = self._base_std(fit, sensor)
-            variance[:, [own[0], own[3]]] += base[:, [0, 3]] ** 2
-            of_base.append(weights[sensor][:, None] * base[:, [1, 2]])
-            for other in range(len(fit.sensors)):
+            variance[:, [height, gain]] += base[:, [0, 3]] ** 2
+            frequency_of_base.append(weights[sensor][:, None] * base[:, [1, 2]])
+            for other in range(count):
                 if other != sensor:
-                    weight = np.sqrt(data.blocks.weight * fit.sensors[other].blocks.weight)
-                    score = (relative[sensor] * weight[:, None]) @ relative[other].swapaxes(1, 2)
-                    both = inverse[:, :, own] @ score @ inverse[:, parameter_indices(other), :]
-                    variance += shares[sensor, other] * np.einsum("npp->np", both)
-        correlation = shares + np.eye(len(fit.sensors))
-        variance[:, [1, 2]] += np.einsum("snp,st,tnp->np", of_base, correlation, of_base)
-        of_transfer = [
-            np.sqrt(np.sum(effect @ data.transfer_covariance * effect, axis=2))
-            for effect, data in zip(transfer_effect, fit.sensors, strict=True)
-        ]
-        variance += np.einsum("snp,st,tnp->np", of_transfer, correlation, of_transfer)
-        std = np.hypot(np.sqrt(variance), systematic)
-        return np.stack([std[:, parameter_indices(sensor)] for sensor in range(len(fit.sensors))])
+                    chance = _common_chance(fit, (sensor, other), relative)
+                    variance += shares[sensor, other] * chance
+        correlation = shares + np.eye(count)
+        variance[:, [1, 2]] += _correlated_variance(frequency_of_base, correlation)
+        variance += _correlated_variance(_transfer_std(fit), correlation)
+        std = np.hypot(np.sqrt(variance), _systematic_std(weights, errors))
+        return np.stack([std[:, parameter_indices(sensor)] for sensor in range(count)])
 
     def _base_std(self, fit: SensorFit, sensor: int) -> Field:
         """Return the deviations (recordings, 4) caused by the uncertainty of the shared base."""
@@ -387,7 +384,53 @@ class JointJudgement:
         return np.asarray(np.sqrt(np.maximum(joint.std[rows] ** 2 - base_held**2, 0.0)))
 
 
+def _evidence_by_sensor(fit: SensorFit) -> tuple[Field, Field, Field]:
+    """Return the gain, misfit and number of ordinates of each line, (sensors, recordings) each."""
+    gains, misfits, ordinates = [], [], []
+    for sensor, data in enumerate(fit.sensors):
+        joint = fit.joint(sensor)
+        gains.append(line_gain(data.blocks, joint)[0])
+        expected = expected_density(data.blocks, joint.parameters)
+        misfits.append(relative_residual(data.blocks, expected))
+        ordinates.append(data.blocks.weight.sum(axis=1))
+    return np.array(gains), np.array(misfits), np.array(ordinates)
+
+
 def _frequency_weights(lines: CommonLines) -> Field:
     """Return the sensors' shares of the information on frequency, (sensors, recordings)."""
     information = np.array([point.information[:, 1, 1] for point in lines.points])
     return np.asarray(information / information.sum(axis=0))
+
+
+def _common_chance(fit: SensorFit, pair: tuple[int, int], relative: Sequence[Field]) -> Field:
+    """Return the covariance of the parameters by noise that is the same on two sensors."""
+    inverse, (sensor, other) = fit.lines.inverse, pair
+    weight = np.sqrt(fit.sensors[sensor].blocks.weight * fit.sensors[other].blocks.weight)
+    score = (relative[sensor] * weight[:, None]) @ relative[other].swapaxes(1, 2)
+    both = (
+        inverse[:, :, parameter_indices(sensor)] @ score @ inverse[:, parameter_indices(other), :]
+    )
+    return np.asarray(np.einsum("npp->np", both))
+
+
+def _transfer_std(fit: SensorFit) -> list[Field]:
+    """Return the deviations (recordings, n) caused by the uncertainty of each transfer."""
+    return [
+        np.sqrt(np.sum(effect @ data.transfer_covariance * effect, axis=2))
+        for effect, data in zip(fit.lines.transfer_effect, fit.sensors, strict=True)
+    ]
+
+
+def _correlated_variance(std: Sequence[Field], correlation: Field) -> Field:
+    """Return the variance of the sum of errors that are correlated between sensors."""
+    return np.asarray(np.einsum("snp,st,tnp->np", std, correlation, std))
+
+
+def _systematic_std(weights: Field, errors: Sequence[SystematicErrors]) -> Field:
+    """Return the systematic deviations (recordings, n) of all sensors together."""
+    systematic = np.zeros((weights.shape[1], 2 + 2 * len(errors)))
+    for sensor, error in enumerate(errors):
+        height, _, _, gain = parameter_indices(sensor)
+        systematic[:, [height, gain]] += error.std[:, [0, 3]]
+        systematic[:, [1, 2]] += weights[sensor][:, None] * error.std[:, [1, 2]]
+    return systematic

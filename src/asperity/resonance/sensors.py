@@ -31,10 +31,7 @@ from asperity.resonance.series import (
 
 
 def resonances_of_sensors(
-    spectra: SpectraBySensor,
-    *,
-    band_hz: tuple[float, float],
-    kept: MasksBySensor | None = None,
+    spectra: SpectraBySensor, *, band_hz: tuple[float, float], kept: MasksBySensor | None = None
 ) -> SensorLines:
     """Find the contact resonance that the sensors of one machine have in common, in each recording.
 
@@ -57,10 +54,7 @@ def resonances_of_sensors(
 
 
 def learn_sensors(
-    spectra: SpectraBySensor,
-    *,
-    band_hz: tuple[float, float],
-    kept: MasksBySensor | None = None,
+    spectra: SpectraBySensor, *, band_hz: tuple[float, float], kept: MasksBySensor | None = None
 ) -> tuple[SensorLines, "SharedBySensors"]:
     """Return the lines of `resonances_of_sensors`, and the shared spectra for judging further ones.
 

@@ -4,13 +4,14 @@ P_i(f) = g_i B(f) + A_i L(f; f_i, ζ_i) T(f)/T(f_i) is fitted to all spectra at 
 block of lines. docs/theory/indicators.md has the equations.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from asperity.core.arrays import Field, Mask
-from asperity.resonance.likelihood_fit import fisher_scoring
+from asperity.core.arrays import Field
+from asperity.resonance.likelihood_fit import Proposal, fisher_scoring
 from asperity.resonance.line_fit import (
     LARGEST_STEP,
     MOST_STEPS,
@@ -139,29 +140,8 @@ def _rows(blocks: SpectrumBlocks, reference_rows: list[int]) -> SpectrumBlocks:
 
 
 def _fit_shared(blocks: SpectrumBlocks, coarse: SpectrumBlocks, templates: Templates) -> JointFit:
-    """Return the most likely separation from several initial guesses of the base."""
-    best: JointFit | None = None
-    for quantile in BASE_QUANTILES:
-        base = _first_base(coarse, quantile)
-        for _ in range(8):
-            own = _best_lines(coarse, base, templates)
-            base = _fit_base(coarse, own, base)
-        joint = _fit_jointly(coarse, ModelParameters(own, np.log(base)))
-        if best is None or joint.cost < best.cost:
-            best = joint
-    assert best is not None  # there are starts
-    for _ in range(3):  # a recording in a local maximum is moved to its best template
-        own = _best_lines(coarse, np.exp(best.parameters.base), templates)
-        relocated = np.abs(own[:, 1] - best.parameters.own[:, 1]) > 0.01
-        joint = _fit_jointly(
-            coarse,
-            ModelParameters(
-                np.where(relocated[:, None], own, best.parameters.own), best.parameters.base
-            ),
-        )
-        if not np.any(relocated) or joint.cost >= best.cost - 1e-3:
-            break
-        best = joint
+    """Return the most likely separation, started from coarse blocks."""
+    best = _relocate_lines(coarse, _best_coarse_fit(coarse, templates), templates)
     base = np.exp(np.interp(blocks.centre, coarse.centre, best.parameters.base))
     base = _fit_base(blocks, best.parameters.own, base)
     low, high = parameter_bounds(blocks)
@@ -170,6 +150,34 @@ def _fit_shared(blocks: SpectrumBlocks, coarse: SpectrumBlocks, templates: Templ
         blocks,
         _with_positive_base(blocks, ModelParameters(best.parameters.own, np.log(base), passed)),
     )
+
+
+def _best_coarse_fit(coarse: SpectrumBlocks, templates: Templates) -> JointFit:
+    """Return the most likely fit from several initial guesses of the base."""
+    fits = []
+    for quantile in BASE_QUANTILES:
+        base = _first_base(coarse, quantile)
+        for _ in range(8):
+            own = _best_lines(coarse, base, templates)
+            base = _fit_base(coarse, own, base)
+        fits.append(_fit_jointly(coarse, ModelParameters(own, np.log(base))))
+    return min(fits, key=lambda joint: joint.cost)
+
+
+def _relocate_lines(coarse: SpectrumBlocks, best: JointFit, templates: Templates) -> JointFit:
+    """Move recordings in a local maximum to their best templates, while that improves the fit."""
+    for _ in range(3):
+        base = best.parameters.base
+        own = _best_lines(coarse, np.exp(base), templates)
+        relocated = np.abs(own[:, 1] - best.parameters.own[:, 1]) > 0.01
+        if not np.any(relocated):
+            break
+        start = ModelParameters(np.where(relocated[:, None], own, best.parameters.own), base)
+        joint = _fit_jointly(coarse, start)
+        if joint.cost >= best.cost - 1e-3:
+            break
+        best = joint
+    return best
 
 
 def _with_positive_base(blocks: SpectrumBlocks, parameters: ModelParameters) -> ModelParameters:
@@ -208,20 +216,49 @@ def _eliminate_base(point: JointScoringPoint, damping: Field | float) -> tuple[F
     return reduced, base_information, coupling
 
 
-def _fit_jointly(
-    blocks: SpectrumBlocks, start: ModelParameters, step_std: float = STEP_STDS[0]
-) -> JointFit:
-    """Fit all parameters by damped scoring; the base, whose blocks are uncoupled, is eliminated."""
-    lower, upper = parameter_bounds(blocks)
-    prior_information = start.transfer.stiffness(step_std)
+class _ScoringPoint(NamedTuple):
+    parameters: ModelParameters
+    joint: JointScoringPoint
 
-    def evaluate(parameters: ModelParameters) -> tuple[ModelParameters, JointScoringPoint]:
-        return parameters, joint_scoring_point(blocks, parameters, prior_information)
 
-    def propose(
-        state: tuple[ModelParameters, JointScoringPoint], damping: Field
-    ) -> tuple[Mask, Callable[[Mask], tuple[ModelParameters, JointScoringPoint]]] | None:
-        parameters, point = state
+@dataclass(frozen=True, slots=True)
+class _Likelihood:
+    """Likelihood of all parameters, with the prior information of the transfer."""
+
+    blocks: SpectrumBlocks
+    prior_information: Field
+    lower: Field
+    upper: Field
+
+    def scoring_point(self, parameters: ModelParameters) -> _ScoringPoint:
+        """Return cost, score and information at some parameters."""
+        return _ScoringPoint(
+            parameters, joint_scoring_point(self.blocks, parameters, self.prior_information)
+        )
+
+    def cost(self, parameters: ModelParameters) -> float:
+        """Return -ln likelihood, priors included."""
+        coefficients = parameters.transfer.coefficients
+        transfer_cost = 0.5 * float(coefficients @ self.prior_information @ coefficients)
+        return float(np.sum(recording_costs(self.blocks, parameters)) + transfer_cost)
+
+    def limited_step(
+        self, parameters: ModelParameters, step: Field, base_step: Field
+    ) -> ModelParameters:
+        """Return the parameters after a step of own and transfer parameters and of the base."""
+        size, transfer = parameters.own.size, parameters.transfer
+        own_step = step[:size].reshape(parameters.own.shape)
+        limited = np.clip(own_step, -LARGEST_STEP, LARGEST_STEP)
+        coefficients = transfer.coefficients + np.clip(step[size:], -1.0, 1.0)
+        return ModelParameters(
+            np.clip(parameters.own + limited, self.lower, self.upper),
+            parameters.base + np.clip(base_step, -2.0, 2.0),
+            transfer._replace(coefficients=coefficients),
+        )
+
+    def propose(self, state: _ScoringPoint, damping: Field) -> Proposal[_ScoringPoint]:
+        """Return the damped step; the base, whose blocks are uncoupled, is eliminated."""
+        point = state.joint
         reduced, base_information, coupling = _eliminate_base(point, damping)
         score = np.concatenate([point.own_score.ravel(), point.transfer_score])
         step = np.linalg.solve(reduced, score - coupling @ (point.base_score / base_information))
@@ -229,27 +266,22 @@ def _fit_jointly(
         promised = 0.5 * float(step @ score + base_step @ point.base_score)
         if promised < SMALLEST_GAIN:
             return None
-        own_step, coefficient_step = (
-            step[: parameters.own.size].reshape(parameters.own.shape),
-            step[parameters.own.size :],
-        )
-        trial = ModelParameters(
-            np.clip(parameters.own + np.clip(own_step, -LARGEST_STEP, LARGEST_STEP), lower, upper),
-            parameters.base + np.clip(base_step, -2.0, 2.0),
-            parameters.transfer._replace(
-                coefficients=parameters.transfer.coefficients + np.clip(coefficient_step, -1.0, 1.0)
-            ),
-        )
-        transfer_cost = 0.5 * float(
-            trial.transfer.coefficients @ prior_information @ trial.transfer.coefficients
-        )
-        return np.array(
-            [np.sum(recording_costs(blocks, trial)) + transfer_cost < point.cost]
-        ), lambda _: evaluate(trial)
+        trial = self.limited_step(state.parameters, step, base_step)
+        return np.array([self.cost(trial) < point.cost]), lambda _: self.scoring_point(trial)
 
-    start = start._replace(own=np.clip(start.own, lower, upper))
+
+def _fit_jointly(
+    blocks: SpectrumBlocks, start: ModelParameters, step_std: float = STEP_STDS[0]
+) -> JointFit:
+    """Fit all parameters by damped scoring."""
+    likelihood = _Likelihood(blocks, start.transfer.stiffness(step_std), *parameter_bounds(blocks))
+    start = start._replace(own=np.clip(start.own, likelihood.lower, likelihood.upper))
     (parameters, point), _ = fisher_scoring(
-        evaluate(start), propose, steps=MOST_STEPS, least_damping=1e-7, most_damping=1e6
+        likelihood.scoring_point(start),
+        likelihood.propose,
+        steps=MOST_STEPS,
+        least_damping=1e-7,
+        most_damping=1e6,
     )
     covariance = np.linalg.inv(_eliminate_base(point, 0.0)[0])
     own = parameters.own.size

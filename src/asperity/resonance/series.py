@@ -17,11 +17,7 @@ from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
 from asperity.core.signals import Spectrum
 from asperity.resonance.band_fit import STRONG_EVIDENCE
-from asperity.resonance.indicators import (
-    IndicatorMethod,
-    contact_resonance,
-    require_band,
-)
+from asperity.resonance.indicators import IndicatorMethod, contact_resonance, require_band
 from asperity.resonance.line_fit import JointFit
 from asperity.resonance.line_judgement import JudgedLine, best_rival, line_gain, line_objection
 from asperity.resonance.residuals import (
@@ -202,22 +198,8 @@ def separate_series(
             f"the joint separation needs at least {FEWEST_RECORDINGS} recordings, got "
             f"{len(spectra)}; use method likelihood or modes"
         )
-    first = spectra[0]
     for spectrum in spectra:
-        if (
-            spectrum.frequency_hz.shape != first.frequency_hz.shape
-            or spectrum.spacing_hz != first.spacing_hz
-        ):
-            raise BadInput(
-                "spectra of a series must have the same lines, got "
-                f"{spectrum.frequency_hz.size} every {spectrum.spacing_hz:g} Hz and "
-                f"{first.frequency_hz.size} every {first.spacing_hz:g} Hz; use one rate and one "
-                "segment length for all"
-            )
-        if spectrum.smoothing_passes:
-            raise BadInput(
-                "the joint separation needs unsmoothed spectra; pass the spectra themselves"
-            )
+        _require_same_lines(spectrum, spectra[0])
         inside = require_band(spectrum, band_hz)
     from threadpoolctl import threadpool_limits
 
@@ -232,35 +214,61 @@ def separate_series(
             f"{band_hz[1]:.0f} Hz; leave it out"
         )
     with threadpool_limits(1, "blas"):  # the matrices are too small for several threads
-        separation = separate(blocks)
-        joint = separation.joint
-        statistics = residual_statistics(blocks, joint, separation.reference_rows)
-        stands = _keeps_place(joint, _line_evidence(blocks, joint)[0] > STRONG_EVIDENCE)
-        fit = SeriesFit(
-            joint, separation.templates, separation.template_costs, statistics, stands, shaped=False
-        )
-        resonances = _judge_lines(blocks, fit, band_hz)
-        if _shaped_by_transfer(joint, np.array([resonance.found for resonance in resonances])):
-            fit = fit._replace(shaped=True)
-            resonances = _judge_lines(blocks, fit, band_hz)
+        fit, resonances = _fit_series(blocks, band_hz)
+    transfer = fit.joint.parameters.transfer
     shared = Shared(
         band_hz=band_hz,
         first=int(lines[0]),
         size=size,
-        spacing_hz=first.spacing_hz,
+        spacing_hz=spectra[0].spacing_hz,
         centre=blocks.centre,
-        base=joint.parameters.base,
-        reach=joint.parameters.transfer[:2],
-        transfer=joint.parameters.transfer.coefficients,
-        doubt=joint.transfer_covariance,
-        stands=stands,
+        base=fit.joint.parameters.base,
+        reach=transfer[:2],
+        transfer=transfer.coefficients,
+        doubt=fit.joint.transfer_covariance,
+        stands=fit.stands,
         shaped=fit.shaped,
-        counts=statistics.counted,
-        change=statistics.relative_change,
-        by_chance=statistics.chance_variance,
-        lacking=statistics.model_error,
+        counts=fit.statistics.counted,
+        change=fit.statistics.relative_change,
+        by_chance=fit.statistics.chance_variance,
+        lacking=fit.statistics.model_error,
     )
     return SeparatedSeries(blocks, fit, resonances, shared)
+
+
+def _require_same_lines(spectrum: Spectrum, first: Spectrum) -> None:
+    if (
+        spectrum.frequency_hz.shape != first.frequency_hz.shape
+        or spectrum.spacing_hz != first.spacing_hz
+    ):
+        raise BadInput(
+            f"spectra of a series must have the same lines, got {spectrum.frequency_hz.size} every "
+            f"{spectrum.spacing_hz:g} Hz and {first.frequency_hz.size} every {first.spacing_hz:g} "
+            "Hz; use one rate and one segment length for all"
+        )
+    if spectrum.smoothing_passes:
+        raise BadInput("the joint separation needs unsmoothed spectra; pass the spectra themselves")
+
+
+def _fit_series(
+    blocks: SpectrumBlocks, band_hz: tuple[float, float]
+) -> tuple["SeriesFit", tuple[Resonance, ...]]:
+    """Return the fit of a series and the line of each recording."""
+    separation = separate(blocks)
+    joint = separation.joint
+    fit = SeriesFit(
+        joint,
+        separation.templates,
+        separation.template_costs,
+        residual_statistics(blocks, joint, separation.reference_rows),
+        stands=_keeps_place(joint, _line_evidence(blocks, joint)[0] > STRONG_EVIDENCE),
+        shaped=False,
+    )
+    resonances = _judge_lines(blocks, fit, band_hz)
+    if _shaped_by_transfer(joint, np.array([resonance.found for resonance in resonances])):
+        fit = fit._replace(shaped=True)
+        resonances = _judge_lines(blocks, fit, band_hz)
+    return fit, resonances
 
 
 def has_no_vibration(spectrum: Spectrum, band_hz: tuple[float, float]) -> bool:
@@ -275,10 +283,9 @@ def separate_with_shared(
     for spectrum in spectra:
         if not shared.fits(spectrum):
             raise BadInput(
-                f"a spectrum of {spectrum.frequency_hz.size} lines every "
-                f"{spectrum.spacing_hz:g} Hz "
-                f"does not belong to this series, whose lines are {shared.spacing_hz:g} Hz apart; "
-                "judge it separately"
+                f"a spectrum of {spectrum.frequency_hz.size} lines every {spectrum.spacing_hz:g} "
+                f"Hz does not belong to this series, whose lines are {shared.spacing_hz:g} Hz "
+                "apart; judge it separately"
             )
     lines = shared.first + np.arange(shared.size * shared.centre.size)
     blocks = _block_average(spectra, lines, shared.size, kept)
@@ -349,7 +356,7 @@ def _keeps_place(joint: JointFit, significant: Mask) -> bool:
 def _shaped_by_transfer(joint: JointFit, found: Mask) -> bool:
     """Return whether a line that keeps its frequency is shaped by the transfer.
 
-    Any change of the machine's spectrum could then look like a line.
+    A change of the machine's spectrum could then look like a line.
     """
     transfer = joint.parameters.transfer
     if not found.any() or not transfer.coefficients.size:
@@ -366,48 +373,53 @@ def _judge_lines(
 ) -> tuple[Resonance, ...]:
     """Return each recording's line, or the reason why it is not accepted."""
     joint = fit.joint
-    own, base, _ = joint.parameters
     evidence, without_line = _line_evidence(blocks, joint)
-    shared_density, expected = np.exp(base), expected_density(blocks, joint.parameters)
     errors = systematic_errors(blocks, joint, fit.statistics)
-    shared, std = errors.model_error, np.hypot(joint.std, errors.std)
-    misfit = relative_residual(blocks, expected)
+    std = np.hypot(joint.std, errors.std)[:, :3]
     way = LINE_KEEPS_PLACE if fit.stands else LINE_MOVES
     resonances = []
-    for i in range(own.shape[0]):
-        fitted = np.exp(own[i])
-        deviations = std[i, :3] * fitted[:3]
-        _, f0, zeta, gain = (float(value) for value in fitted)
-        rival = best_rival(f0, zeta, fit.template_costs[i], fit.templates)
-        line = JudgedLine(
-            f0, float(deviations[1]), zeta, float(evidence[i]), float(misfit[i]), *rival
-        )
-        objection = line_objection(line, band_hz) or (_shape_objection(f0) if fit.shaped else None)
+    for i, line in enumerate(_judged_lines(blocks, fit, evidence, std)):
+        objection = line_objection(line, band_hz) or _shape_objection(fit, line)
         if objection is not None:
             background = (blocks.centre, without_line[i])
-            resonances.append(
-                no_resonance(
-                    objection, band_hz, "joint", evidence=line.evidence, background=background
-                )
+            resonance = no_resonance(
+                objection, band_hz, "joint", evidence=line.evidence, background=background
             )
-            continue
-        resonances.append(
-            fitted_resonance(
+        else:
+            fitted = np.exp(joint.parameters.own[i])
+            resonance = fitted_resonance(
                 fitted[:3],
-                np.where([fit.stands, False, False], np.nan, deviations),
+                np.where([fit.stands, False, False], np.nan, std[i] * fitted[:3]),
                 reason=f"a line {line.width:.0f} Hz wide {way} (BIC {line.evidence:+.0f})",
                 band_hz=band_hz,
                 method="joint",
                 evidence=line.evidence,
-                background=(blocks.centre, gain * shared_density),
-                crf_shared_std=float(shared[i, 1] * f0),
+                background=(blocks.centre, float(fitted[3]) * np.exp(joint.parameters.base)),
+                crf_shared_std=float(errors.model_error[i, 1] * line.f0),
             )
-        )
+        resonances.append(resonance)
     return tuple(resonances)
 
 
-def _shape_objection(f0: float) -> str:
+def _judged_lines(
+    blocks: SpectrumBlocks, fit: SeriesFit, evidence: Field, std: Field
+) -> list[JudgedLine]:
+    """Return the criteria of each recording's line."""
+    parameters = fit.joint.parameters
+    misfit = relative_residual(blocks, expected_density(blocks, parameters))
+    lines = []
+    for i, own in enumerate(parameters.own):
+        _, f0, zeta, _ = (float(value) for value in np.exp(own))
+        rival = best_rival(f0, zeta, fit.template_costs[i], fit.templates)
+        f0_std = float(std[i, 1]) * f0
+        lines.append(JudgedLine(f0, f0_std, zeta, float(evidence[i]), float(misfit[i]), *rival))
+    return lines
+
+
+def _shape_objection(fit: SeriesFit, line: JudgedLine) -> str | None:
+    if not fit.shaped:
+        return None
     return (
-        f"the peak at {f0:.0f} Hz keeps its frequency and is a line only if the transfer changes "
-        "tenfold across the band; the machine's own spectrum may change like that"
+        f"the peak at {line.f0:.0f} Hz keeps its frequency and is a line only if the transfer "
+        "changes tenfold across the band; the machine's own spectrum may change like that"
     )

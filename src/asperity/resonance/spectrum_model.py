@@ -176,10 +176,8 @@ def joint_scoring_point(
     weighted, shared_part = own.weighted, relative[:, 3]
     transfer_columns = relative[:, 0, :, None] * relative_columns(blocks.centre, parameters)
     coefficients = parameters.transfer.coefficients
-    columns, weights = (
-        transfer_columns.reshape(blocks.weight.size, coefficients.size),
-        blocks.weight.reshape(-1, 1),
-    )
+    columns = transfer_columns.reshape(blocks.weight.size, coefficients.size)
+    weights = blocks.weight.reshape(-1, 1)
     likelihood_cost = float(
         np.sum(blocks.weight * (np.log(expected) + blocks.density / expected))
         + np.sum(_prior(parameters.own))

@@ -66,6 +66,10 @@ def _nearest(centre: Field, templates: Templates) -> npt.NDArray[np.intp]:
     return np.searchsorted(centre, templates.f0).clip(0, centre.size - 1)
 
 
+def _damping_prior(templates: Templates) -> Field:
+    return np.asarray(0.5 * (np.log(templates.damping / PRIOR_DAMPING) / PRIOR_DAMPING_STD) ** 2)
+
+
 def search(
     blocks: SpectrumBlocks,
     base: Field,
@@ -79,27 +83,27 @@ def search(
     computed before.
     """
     local_base = base[_nearest(blocks.centre, templates)]
-    relative = blocks.weight * blocks.density / base
-    total = blocks.weight.sum(axis=1)[:, None]
-    constant = (blocks.weight @ np.log(base))[:, None]
+    weight = blocks.weight
+    relative = weight * blocks.density / base
+    total = weight.sum(axis=1)[:, None]
+    constant = (weight @ np.log(base))[:, None]
     lowest = np.full((blocks.density.shape[0], templates.f0.size), np.inf)
     values = np.zeros((*lowest.shape, 2))
-    prior = 0.5 * (np.log(templates.damping / PRIOR_DAMPING) / PRIOR_DAMPING_STD) ** 2
-    for height, model in zip(
-        LEVELS, prepared_models or template_models(base, templates, blocks.centre), strict=True
-    ):
+    prior = _damping_prior(templates)
+    models = prepared_models or template_models(base, templates, blocks.centre)
+    for height, model in zip(LEVELS, models, strict=True):
         precision = model.inverse.dtype  # mixed precisions would copy the larger matrix
-        gain = relative.astype(precision) @ model.inverse.T / total
+        log_gain = np.log(relative.astype(precision) @ model.inverse.T / total)
         cost = (
-            blocks.weight.astype(precision) @ model.logarithm.T
-            + total * (np.log(gain) + 1.0)
+            weight.astype(precision) @ model.logarithm.T
+            + total * (log_gain + 1.0)
             + constant
             + prior
         )
         better = cost < lowest
         lowest = np.where(better, cost, lowest)
-        logarithms = np.stack([np.log(height * local_base) + np.log(gain), np.log(gain)], axis=-1)
-        values = np.where(better[..., None], logarithms, values)
+        level = np.log(height * local_base) + log_gain
+        values = np.where(better[..., None], np.stack([level, log_gain], axis=-1), values)
     return lowest, values
 
 

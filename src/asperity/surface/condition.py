@@ -210,10 +210,7 @@ def _cylinder_heights(p: Field, x: Field, y: Field) -> Field:
 
 def _cylinder_guess(x: Field, y: Field, z: Field, uniform: int | None) -> Field:
     """Return parameters of the cylinder from the principal curvature of a quadratic fit."""
-    quadratic = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-    powers = [power for power in quadratic if uniform is None or power[uniform] == 0]
-    fitted, *_ = np.linalg.lstsq(np.stack([x**i * y**j for i, j in powers], axis=-1), z, rcond=None)
-    c = dict.fromkeys(quadratic, 0.0) | dict(zip(powers, fitted, strict=True))
+    c = _fit_quadratic(x, y, z, uniform)
     gradient = np.array([c[1, 0], c[0, 1]])
     bends, axes = np.linalg.eigh(np.array([[2.0 * c[2, 0], c[1, 1]], [c[1, 1], 2.0 * c[0, 2]]]))
     steep = int(np.argmax(np.abs(bends)))
@@ -221,6 +218,16 @@ def _cylinder_guess(x: Field, y: Field, z: Field, uniform: int | None) -> Field:
     angle = float(np.arctan2(direction[1], direction[0]))
     slope, tilt = gradient @ direction, gradient @ np.array([-direction[1], direction[0]])
     return np.array([c[0, 0], np.clip(slope, -0.9, 0.9), tilt, angle, -bends[steep]])
+
+
+def _fit_quadratic(
+    x: Field, y: Field, z: Field, uniform: int | None
+) -> dict[tuple[int, int], float]:
+    """Return the coefficients of z by the powers of x and y; 0 along a uniform axis."""
+    quadratic = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+    powers = [power for power in quadratic if uniform is None or power[uniform] == 0]
+    fitted, *_ = np.linalg.lstsq(np.stack([x**i * y**j for i, j in powers], axis=-1), z, rcond=None)
+    return dict.fromkeys(quadratic, 0.0) | dict(zip(powers, fitted, strict=True))
 
 
 def find_outliers(measured: MeasuredSurface) -> Mask:

@@ -8,6 +8,7 @@ centres of any grid that resolves it. `asperity.surface.machined` models cutting
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
@@ -305,24 +306,28 @@ def _filtered_noise(
     """Filter white noise, sampled as the spectrum needs, and evaluate it at the cell centres."""
     require_roughness(sq)
     # odd counts have no Nyquist wave, so every wave has a conjugate
-    sides = list(zip(largest_wavenumbers, grid.extent, strict=True))
-    highest = [int(np.ceil(k * extent / (2.0 * np.pi))) for k, extent in sides]
+    highest = _largest_modes(grid, largest_wavenumbers)
     noise = rng.standard_normal([2 * m + 1 for m in highest])
     modes = [np.fft.ifftshift(np.arange(-m, m + 1)) for m in highest]
-    wavenumbers: list[Field] = [
-        2.0 * np.pi / extent * m for m, extent in zip(modes, grid.extent, strict=True)
-    ]
-    # cell centres are half a cell from the corner, where the noise starts
-    phases = [
-        np.exp(0.5j * k * spacing) for k, spacing in zip(wavenumbers, grid.spacing, strict=True)
-    ]
-    waves = (
-        np.fft.fft2(noise)
-        * amplitude(wavenumbers[0][:, None], wavenumbers[1][None, :])
-        * np.outer(*phases)
-    )
+    kx, ky = (2.0 * np.pi / extent * m for m, extent in zip(modes, grid.extent, strict=True))
+    waves = np.fft.fft2(noise) * amplitude(*np.ix_(kx, ky)) * _cell_centre_phases(kx, ky, grid)
     waves[0, 0] = 0.0  # zero mean
     resolved = [np.abs(m) < cells / 2.0 for m, cells in zip(modes, grid.cells, strict=True)]
+    kept = np.ix_(*(m[inside] for m, inside in zip(modes, resolved, strict=True)))
     spectrum = np.zeros(grid.cells, dtype=complex)
-    spectrum[np.ix_(modes[0][resolved[0]], modes[1][resolved[1]])] = waves[np.ix_(*resolved)]
+    spectrum[kept] = waves[np.ix_(*resolved)]
     return Surface.scaled(np.fft.ifft2(spectrum).real, grid, sq)
+
+
+def _largest_modes(grid: Grid, largest_wavenumbers: tuple[float, float]) -> list[int]:
+    """Return the number of periods in the domain of the shortest wave along each axis."""
+    return [
+        int(np.ceil(k * extent / (2.0 * np.pi)))
+        for k, extent in zip(largest_wavenumbers, grid.extent, strict=True)
+    ]
+
+
+def _cell_centre_phases(kx: Field, ky: Field, grid: Grid) -> npt.NDArray[np.complex128]:
+    """Return the phases of waves half a cell from the corner, where the noise starts."""
+    dx, dy = grid.spacing
+    return np.outer(np.exp(0.5j * kx * dx), np.exp(0.5j * ky * dy))

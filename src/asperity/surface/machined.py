@@ -31,6 +31,27 @@ class _Grooves(NamedTuple):
     length: float
     direction: float
 
+    @property
+    def cosine(self) -> float:
+        """Cosine of the angle between the grooves and x."""
+        return float(abs(np.cos(self.direction)))
+
+    def depth(self, marks: npt.NDArray[np.intp], along: Field, across: Field) -> Field:
+        """Return the depth of some grooves at points along and across them."""
+        cut = (1.0 - (2.0 * across / self.widths[marks, None, None]) ** 2) * np.sqrt(
+            np.maximum(1.0 - (2.0 * along / self.length) ** 2, 0.0)
+        )
+        return np.asarray(self.root_depths[marks, None, None] ** 2 * np.maximum(cut, 0.0))
+
+    def half_columns(self, dx: float) -> int:
+        """Return the half-width of the widest groove along x in cells."""
+        across = self.widths.max() * abs(np.sin(self.direction))
+        return int(np.ceil((self.length * self.cosine + across) / 2.0 / dx)) + 1
+
+    def half_rows(self, groove: int, dy: float) -> int:
+        """Return the half-width of a groove along y in cells."""
+        return int(np.ceil(self.widths[groove] / 2.0 / self.cosine / dy)) + 1
+
 
 def ground_surface(
     grid: Grid,
@@ -133,72 +154,78 @@ def sandblasted_surface(
             f"crater_radius must lie between 2 cells, {length_text(least)}, and an eighth of the "
             f"domain, {length_text(most)}, got {length_text(crater_radius)}; change it or the grid"
         )
-    (nx, ny), (dx, dy) = grid.cells, grid.spacing
     count = max(
         1, round(_CRATERS_PER_POINT * grid.extent[0] * grid.extent[1] / (np.pi * crater_radius**2))
     )
     centres = rng.random((count, 2)) * grid.extent
     radii = crater_radius * np.clip(1.0 + 0.25 * rng.standard_normal(count), 0.25, 1.75)
 
-    def reach(radius: float) -> tuple[int, int]:
-        return int(np.ceil(2.0 * radius / dx)), int(np.ceil(2.0 * radius / dy))
+    def cells(mark: int) -> int:
+        return 4 * math.prod(half + 1 for half in _crater_cells(radii[mark], grid.spacing))
 
-    heights = np.zeros(nx * ny)
-    order = np.argsort(radii)
-    for marks in _batches(order, lambda widest: 4 * math.prod(r + 1 for r in reach(radii[widest]))):
-        half = reach(radii[marks[-1]])
-        i, j = (
-            np.floor(centres[marks, axis] / spacing).astype(np.intp)[:, None]
-            + np.arange(-far, far + 1)
-            for axis, (spacing, far) in enumerate(zip((dx, dy), half, strict=True))
-        )
-        u = ((i + 0.5) * dx - centres[marks, 0, None])[:, :, None] ** 2 + (
-            ((j + 0.5) * dy - centres[marks, 1, None])[:, None, :] ** 2
-        )
-        u = np.minimum(u / (2.0 * radii[marks, None, None]) ** 2, 1.0)
-        crater = -radii[marks, None, None] * (1.0 - u) ** 2 * (1.0 - 4.0 * u)
-        cells = np.mod(i, nx)[:, :, None] * ny + np.mod(j, ny)[:, None, :]
-        np.add.at(heights, cells.ravel(), crater.ravel())
-    return Surface.scaled(heights.reshape(nx, ny), grid, sq)
+    heights = np.zeros(math.prod(grid.cells))
+    for marks in _batches(np.argsort(radii), cells):
+        _add_craters(heights, grid, centres[marks], radii[marks])
+    return Surface.scaled(heights.reshape(grid.cells), grid, sq)
+
+
+def _crater_cells(radius: float, spacing: tuple[float, float]) -> tuple[int, int]:
+    """Return the half-widths of a crater with its rim in cells."""
+    dx, dy = spacing
+    return int(np.ceil(2.0 * radius / dx)), int(np.ceil(2.0 * radius / dy))
+
+
+def _cells_around(centres: Field, spacing: float, half: int) -> npt.NDArray[np.intp]:
+    """Return the cells up to `half` away from each centre along one axis, on the last axis."""
+    nearest = np.floor(centres / spacing).astype(np.intp)
+    return np.asarray(nearest[..., None] + np.arange(-half, half + 1))
+
+
+def _add_craters(heights: Field, grid: Grid, centres: Field, radii: Field) -> None:
+    """Add craters of ascending radius to flat heights in place."""
+    (nx, ny), (dx, dy) = grid.cells, grid.spacing
+    i, j = (
+        _cells_around(centres[:, axis], grid.spacing[axis], half)
+        for axis, half in enumerate(_crater_cells(radii[-1], grid.spacing))
+    )
+    u = ((i + 0.5) * dx - centres[:, 0, None])[:, :, None] ** 2 + (
+        ((j + 0.5) * dy - centres[:, 1, None])[:, None, :] ** 2
+    )
+    radius = radii[:, None, None]
+    u = np.minimum(u / (2.0 * radius) ** 2, 1.0)
+    crater = -radius * (1.0 - u) ** 2 * (1.0 - 4.0 * u)
+    cells = np.mod(i, nx)[:, :, None] * ny + np.mod(j, ny)[:, None, :]
+    np.add.at(heights, cells.ravel(), crater.ravel())
 
 
 def _cut_grooves(grid: Grid, grooves: _Grooves) -> Field:
     """Return the lower envelope of grooves that run mainly along x; zero where nothing is cut."""
-    centres, root_depths, widths, length, direction = grooves
-    (nx, ny), (dx, dy) = grid.cells, grid.spacing
-    tangent, cosine = float(np.tan(direction)), float(abs(np.cos(direction)))
-    half_columns = (
-        int(np.ceil((length * cosine + widths.max() * abs(np.sin(direction))) / 2.0 / dx)) + 1
-    )
+    (nx, ny), dy = grid.cells, grid.spacing[1]
+    columns = 2 * grooves.half_columns(grid.spacing[0]) + 1
     heights = np.zeros(nx * ny)
-    order = np.argsort(widths)
     for marks in _batches(
-        order, lambda widest: (2 * half_columns + 1) * 2 * _rows(widths[widest], cosine, dy)
+        np.argsort(grooves.widths), lambda widest: columns * 2 * grooves.half_rows(widest, dy)
     ):
-        half_rows = _rows(widths[marks[-1]], cosine, dy)
-        i = np.floor(centres[marks, 0] / dx).astype(np.intp)[:, None] + np.arange(
-            -half_columns, half_columns + 1
-        )
-        off_x = (i + 0.5) * dx - centres[marks, 0, None]
-        middle = centres[marks, 1, None] + tangent * off_x
-        j = np.floor(middle / dy).astype(np.intp)[:, :, None] + np.arange(-half_rows, half_rows + 1)
-        off_y = (j + 0.5) * dy - middle[:, :, None]  # along y, not perpendicular to the groove
-        along = (off_x / cosine)[:, :, None] + off_y * np.sin(direction) * np.sign(
-            np.cos(direction)
-        )
-        across = off_y * cosine
-        cut = (1.0 - (2.0 * across / widths[marks, None, None]) ** 2) * np.sqrt(
-            np.maximum(1.0 - (2.0 * along / length) ** 2, 0.0)
-        )
-        depth = -(root_depths[marks, None, None] ** 2) * np.maximum(cut, 0.0)
-        cells = np.mod(i, nx)[:, :, None] * ny + np.mod(j, ny)
-        np.minimum.at(heights, cells.ravel(), depth.ravel())
+        _cut_batch(heights, grid, grooves, marks)
     return heights.reshape(nx, ny)
 
 
-def _rows(width: float, cosine: float, dy: float) -> int:
-    """Return the half-width of a groove along y in cells."""
-    return int(np.ceil(width / 2.0 / cosine / dy)) + 1
+def _cut_batch(heights: Field, grid: Grid, grooves: _Grooves, marks: npt.NDArray[np.intp]) -> None:
+    """Cut grooves of ascending width into flat heights in place."""
+    (nx, ny), (dx, dy), cosine = grid.cells, grid.spacing, grooves.cosine
+    columns, rows = grooves.half_columns(dx), grooves.half_rows(marks[-1], dy)
+    x, y = grooves.centres[marks].T
+    i = _cells_around(x, dx, columns)
+    off_x = (i + 0.5) * dx - x[:, None]
+    middle = y[:, None] + float(np.tan(grooves.direction)) * off_x
+    j = _cells_around(middle, dy, rows)
+    off_y = (j + 0.5) * dy - middle[:, :, None]  # along y, not perpendicular to the groove
+    along = (off_x / cosine)[:, :, None] + off_y * np.sin(grooves.direction) * np.sign(
+        np.cos(grooves.direction)
+    )
+    depth = grooves.depth(marks, along, off_y * cosine)
+    cells = np.mod(i, nx)[:, :, None] * ny + np.mod(j, ny)
+    np.minimum.at(heights, cells.ravel(), -depth.ravel())
 
 
 def _batches(

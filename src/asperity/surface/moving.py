@@ -7,7 +7,7 @@ cells resolve, so that heights are not smeared over time.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ from asperity.core.errors import BadInput
 from asperity.surface.model import Surface, flat_surface
 from asperity.surface.prepare import CompositeSurface
 
-ComplexField: TypeAlias = npt.NDArray[np.complexfloating[Any, Any]]
+ComplexField: TypeAlias = npt.NDArray[np.complex128]
 
 WHOLE_CELL_TOLERANCE = 1e-9  # cells
 

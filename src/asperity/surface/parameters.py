@@ -10,13 +10,10 @@ import scipy
 
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 from asperity.core.quantities import Quantity, catalogue
 from asperity.surface.bearing import bearing_curve, core_heights
-from asperity.surface.condition import (
-    DEFAULT_CONDITIONING,
-    SurfaceConditioning,
-    condition_surface,
-)
+from asperity.surface.condition import DEFAULT_CONDITIONING, SurfaceConditioning, condition_surface
 from asperity.surface.model import MeasuredSurface, Surface
 from asperity.surface.profile import ProfileParameters, profile_parameters
 from asperity.surface.read import read_surface
@@ -82,11 +79,9 @@ class SurfaceDescription:
 
     def verdict(self) -> str:
         """Return one sentence: roughness, cells and missing data."""
-        measured, (nx, ny), (dx, dy) = (
-            self.measured,
-            self.measured.grid.cells,
-            self.measured.grid.spacing,
-        )
+        measured = self.measured
+        nx, ny = measured.grid.cells
+        dx, dy = measured.grid.spacing
         rms = f"{1e6 * self.parameters.sq:.3g} um"
         summary = f"Sq {rms}, {nx} x {ny} cells of {1e6 * dx:.4g} x {1e6 * dy:.4g} um"
         if measured.uniform is not None:
@@ -111,7 +106,7 @@ class SurfaceDescription:
         }
 
 
-def _by_key(parameters: SurfaceParameters | ProfileParameters) -> dict[str, object]:
+def _by_key(parameters: SurfaceParameters | ProfileParameters) -> JsonObject:
     """Return parameters by their keys in the catalogue, where lengths end in _m; None for nan."""
     known = catalogue()
     return {
@@ -359,10 +354,8 @@ def _decay(
     correlation: Field, middle: tuple[int, int], grid: Grid, angles: Field, threshold: float
 ) -> tuple[Field, Field]:
     """Return the distances at which rays fall below the threshold (or nan), and their lengths."""
-    cosines, sines = (
-        np.cos(angles)[:, None] / grid.spacing[0],
-        np.sin(angles)[:, None] / grid.spacing[1],
-    )
+    cosines = np.cos(angles)[:, None] / grid.spacing[0]
+    sines = np.sin(angles)[:, None] / grid.spacing[1]
     # a ray ends at the largest lag; its samples are at most half a cell apart
     ends = 1.0 / np.maximum(np.abs(cosines) / middle[0], np.abs(sines) / middle[1])
     radii = np.linspace(0.0, 1.0, 4 * max(middle) + 1) * ends
@@ -372,11 +365,16 @@ def _decay(
         order=3,
         mode="nearest",
     )
+    return _first_below(along, radii, threshold), ends[:, 0]
+
+
+def _first_below(along: Field, radii: Field, threshold: float) -> Field:
+    """Return the interpolated radius at which each ray falls below the threshold, or nan."""
     below = along < threshold
     ray = np.flatnonzero(below.any(axis=1))
     after = np.argmax(below[ray], axis=1)
     high, low = along[ray, after - 1], along[ray, after]
     inner, outer = radii[ray, after - 1], radii[ray, after]
-    distances = np.full(angles.size, np.nan)
+    distances = np.full(len(radii), np.nan)
     distances[ray] = inner + (outer - inner) * (high - threshold) / (high - low)
-    return distances, ends[:, 0]
+    return distances

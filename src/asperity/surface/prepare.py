@@ -12,11 +12,7 @@ import numpy.typing as npt
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_choice
-from asperity.surface.condition import (
-    DEFAULT_CONDITIONING,
-    SurfaceConditioning,
-    condition_surface,
-)
+from asperity.surface.condition import DEFAULT_CONDITIONING, SurfaceConditioning, condition_surface
 from asperity.surface.model import (
     MeasuredSurface,
     Surface,

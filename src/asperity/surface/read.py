@@ -6,14 +6,15 @@ SurfaceTopography reads most formats, x3pio and sdfio the x3p and SDF files that
 
 import warnings
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 from xml.etree import ElementTree
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.core.arrays import Field
@@ -82,12 +83,9 @@ def read_surface(
         require_positive("pixel", size, "m")
     require_file(path)
     stated = (unit, lateral_unit, sizes)
+    reader, library = "asperity.surface.read:load_surface", "SurfaceTopography"
     surface: MeasuredSurface = read_in_subprocess(
-        path.absolute(),
-        "asperity.surface.read:load_surface",
-        *stated,
-        remedy=_REMEDY,
-        library="SurfaceTopography",
+        path.absolute(), reader, *stated, remedy=_REMEDY, library=library
     )
     return surface
 
@@ -99,20 +97,8 @@ def load_surface(
     raw = _read(path, matrix=sizes is not None)
     height_scale, sizes = _sizes(path.name, raw, unit, lateral_unit, sizes)
     heights = np.where(np.isfinite(raw.heights), raw.heights, np.nan) * height_scale
-    if np.isnan(heights).all():
-        raise UnreadableFile(
-            f"{path.name} holds no valid height among its {heights.size}; measure it again"
-        )
-    if not all(_POSSIBLE_LENGTH[0] < size < _POSSIBLE_LENGTH[1] for size in sizes):
-        raise UnreadableFile(f"{path.name} has a pixel of {sizes[0]:g} x {sizes[1]:g} m; {_REMEDY}")
-    impossible = np.abs(heights - np.nanmedian(heights)) > _POSSIBLE_LENGTH[1]
-    notes = raw.notes
-    if impossible.any():
-        heights[impossible] = np.nan
-        count = int(np.count_nonzero(impossible))
-        notes += (
-            f"{count} heights, more than 1000 km from the median, count as missing; check the file",
-        )
+    _require_possible(path.name, heights, sizes)
+    notes = raw.notes + _drop_impossible(heights)
     uniform = 1 if heights.shape[1] == 1 else None
     if uniform:
         heights, sizes = np.repeat(heights, MIN_CELLS, axis=1), (sizes[0], sizes[0])
@@ -126,6 +112,27 @@ def load_surface(
     grid = Grid(cells=(nx, ny), lower=(-half[0], -half[1]), upper=half, periodic=(False, False))
     notes += tuple(_warnings(sizes, heights))
     return MeasuredSurface(heights, grid, path.name, raw.format, notes, uniform)
+
+
+def _require_possible(name: str, heights: Field, sizes: tuple[float, float]) -> None:
+    if np.isnan(heights).all():
+        raise UnreadableFile(
+            f"{name} holds no valid height among its {heights.size}; measure it again"
+        )
+    if not all(_POSSIBLE_LENGTH[0] < size < _POSSIBLE_LENGTH[1] for size in sizes):
+        raise UnreadableFile(f"{name} has a pixel of {sizes[0]:g} x {sizes[1]:g} m; {_REMEDY}")
+
+
+def _drop_impossible(heights: Field) -> tuple[str, ...]:
+    """Set impossible heights to nan in place; return a note of them, if any."""
+    impossible = np.abs(heights - np.nanmedian(heights)) > _POSSIBLE_LENGTH[1]
+    if not impossible.any():
+        return ()
+    heights[impossible] = np.nan
+    count = int(np.count_nonzero(impossible))
+    return (
+        f"{count} heights, more than 1000 km from the median, count as missing; check the file",
+    )
 
 
 def _sizes(
@@ -200,20 +207,8 @@ def _scales(
 
 def _read(path: Path, *, matrix: bool) -> RawMap:
     """Read a file with the readers of its suffix, or by its content if the suffix is unknown."""
+    _require_readable(path)
     name, suffix = path.name, path.suffix.lower().removeprefix(".")
-    try:
-        with path.open("rb") as file:
-            start = file.read(1)
-    except OSError as error:
-        raise UnreadableFile(
-            f"{path} cannot be opened ({error.strerror}); name a file that can be read"
-        ) from error
-    if not start:
-        raise UnreadableFile(f"{name} is empty; {_REMEDY}")
-
-    if zipfile.is_zipfile(path):
-        with zipfile.ZipFile(path) as archive:
-            require_unpacked(path, sum(part.file_size for part in archive.infolist()), _REMEDY)
     if suffix == "npy":
         return _array(path)
     if matrix and suffix in TABLES:
@@ -223,14 +218,53 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
     }
     formats = [form for form, known in suffixes.items() if suffix in known]
     if not formats and suffix not in TABLES:
-        try:
-            return _topography(path, None)
-        except UnreadableFile:
-            raise
-        except Exception as error:
-            raise UnreadableFile(f"{name} is in no format that can be read; {_REMEDY}") from error
+        result = _try_formats(path, [None])
+        if isinstance(result, RawMap):
+            return result
+        raise UnreadableFile(f"{name} is in no format that can be read; {_REMEDY}") from result
     if _TEXT.intersection(formats):
         formats = [form for form in suffixes if form in _TEXT.union(formats)]
+    result = _try_formats(path, formats, _LAST_RESORTS.get(suffix))
+    if isinstance(result, RawMap):
+        return result
+    actual = _format_of(path)
+    if actual is not None and actual not in formats:
+        remedy = f"rename it to .{min(suffixes[actual])} if that is correct"
+        raise UnreadableFile(
+            f"{name} has the suffix .{suffix} but its content looks like {actual}; {remedy}"
+        ) from result
+    raise UnreadableFile(
+        f"{name} is no readable .{suffix} file ({_cause(result)}); {_REMEDY}"
+    ) from result
+
+
+def _cause(reason: Exception | None) -> str:
+    # messages of a mismatch mention unexpected bytes
+    mismatch = surface_topography().Exceptions.FileFormatMismatch
+    return "its content has another format" if isinstance(reason, mismatch) else first_line(reason)
+
+
+def _require_readable(path: Path) -> None:
+    try:
+        with path.open("rb") as file:
+            start = file.read(1)
+    except OSError as error:
+        raise UnreadableFile(
+            f"{path} cannot be opened ({error.strerror}); name a file that can be read"
+        ) from error
+    if not start:
+        raise UnreadableFile(f"{path.name} is empty; {_REMEDY}")
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            require_unpacked(path, sum(part.file_size for part in archive.infolist()), _REMEDY)
+
+
+def _try_formats(
+    path: Path,
+    formats: Sequence[str | None],
+    last_resort: Callable[[Path], RawMap] | None = None,
+) -> RawMap | Exception | None:
+    """Return the map of the first format that can be read, or the error that explains why none."""
     reason: Exception | None = None
     for form in formats:
         try:
@@ -241,23 +275,14 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
             reason = reason or error
             if isinstance(error, surface_topography().Exceptions.CorruptFile):
                 break  # recognised but damaged: another reader would misread it
-    if suffix in _LAST_RESORTS:
+    if last_resort is not None:
         try:
-            return _LAST_RESORTS[suffix](path)
+            return last_resort(path)
         except UnreadableFile:
             raise
         except Exception as error:  # noqa: BLE001 - as above
             reason = error
-    actual = _format_of(path)
-    if actual is not None and actual not in formats:
-        remedy = f"rename it to .{min(suffixes[actual])} if that is correct"
-        raise UnreadableFile(
-            f"{name} has the suffix .{suffix} but its content looks like {actual}; {remedy}"
-        ) from reason
-    # messages of a mismatch mention unexpected bytes
-    mismatch = surface_topography().Exceptions.FileFormatMismatch
-    cause = "its content has another format" if isinstance(reason, mismatch) else first_line(reason)
-    raise UnreadableFile(f"{name} is no readable .{suffix} file ({cause}); {_REMEDY}") from reason
+    return reason
 
 
 def _format_of(path: Path) -> str | None:
@@ -347,7 +372,7 @@ def _x3p(path: Path) -> RawMap:
     import x3pio
 
     try:
-        content: Any = x3pio.read(path)
+        content = x3pio.read(path)
     except Exception:
         tolerant = _tolerant_x3p(path)
         if tolerant is None:
@@ -392,7 +417,7 @@ def _tolerant_x3p(path: Path) -> RawMap | None:
 def _sdf(path: Path) -> RawMap:
     import sdfio
 
-    content: Any = sdfio.read(path)
+    content = sdfio.read(path)
     return RawMap(
         _x_first(content.data),
         (float(content.header.x_scale), float(content.header.y_scale)),
@@ -408,14 +433,15 @@ _LAST_RESORTS: dict[str, Callable[[Path], RawMap]] = {
 }
 
 
-def _x_first(rows: Any) -> Field:
+def _x_first(rows: npt.ArrayLike) -> Field:
     """Transpose rows of constant y to shape (nx, ny)."""
     return np.ascontiguousarray(np.ma.filled(np.ma.asarray(rows, dtype=np.float64), np.nan).T)
 
 
-def surface_topography() -> Any:
+def surface_topography() -> ModuleType:
     """Import SurfaceTopography without its warning about missing MPI."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ImportWarning)
         import SurfaceTopography
-    return SurfaceTopography
+    module: ModuleType = SurfaceTopography
+    return module

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.surface.model import MeasuredSurface, Surface
 
@@ -53,35 +54,46 @@ def surface_spectrum(surface: Surface | MeasuredSurface) -> SurfaceSpectrum:
     '6283 rad/m'
     """
     grid = surface.grid
-    heights = np.nan_to_num(surface.heights - np.nanmean(surface.heights))
     if isinstance(surface, MeasuredSurface) and surface.uniform is not None:
         axis = 1 - surface.uniform
         return _profile_spectrum(
             np.nan_to_num(surface.profile - np.nanmean(surface.profile)), grid.spacing[axis]
         )
+    density = _map_density(surface)
+    kx, ky = _wavevectors(grid)
+    k = np.hypot(kx, ky)
+    inside = (k > 0.0) & (k < np.pi / max(grid.spacing))  # the same limit in all directions
+    wavenumber, radial = _binned(k[inside], density[inside])
+    crest = np.mod(np.arctan2(ky, kx) + np.pi / 2.0, np.pi)
+    sector = np.floor(crest[inside] / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
+    share: Field = np.bincount(sector, density[inside], minlength=_SECTORS).astype(np.float64)
+    total = share.sum()
+    lay = np.arange(_SECTORS) * np.pi / _SECTORS
+    return SurfaceSpectrum(wavenumber, radial, lay, share / total if total > 0.0 else share)
+
+
+def _wavevectors(grid: Grid) -> tuple[Field, Field]:
+    """Return kx and ky, (nx, ny) each."""
+    along = (
+        2.0 * np.pi * np.fft.fftfreq(cells, spacing)
+        for cells, spacing in zip(grid.cells, grid.spacing, strict=True)
+    )
+    kx, ky = np.meshgrid(*along, indexing="ij", copy=False)
+    return kx, ky
+
+
+def _map_density(surface: Surface | MeasuredSurface) -> Field:
+    """Return the two-dimensional power spectral density, (nx, ny)."""
+    grid = surface.grid
+    (nx, ny), (dx, dy) = grid.cells, grid.spacing
+    heights = np.nan_to_num(surface.heights - np.nanmean(surface.heights))
     windows = [
         np.ones(n) if periodic else _hann(n)
         for n, periodic in zip(grid.cells, grid.periodic, strict=True)
     ]
     window = np.outer(*windows)
     power = np.abs(np.fft.fft2(heights * window)) ** 2 / np.mean(window**2)  # |sum|^2
-    (nx, ny), (dx, dy) = grid.cells, grid.spacing
-    density = power * dx * dy / (nx * ny)
-    kx, ky = (
-        2.0 * np.pi * np.fft.fftfreq(nx, dx)[:, None],
-        2.0 * np.pi * np.fft.fftfreq(ny, dy)[None, :],
-    )
-    k = np.hypot(kx, ky)
-    inside = (k > 0.0) & (k < np.pi / max(dx, dy))  # the same limit in all directions
-    wavenumber, radial = _binned(k[inside], density[inside])
-    crest = np.mod(
-        np.arctan2(np.broadcast_to(ky, k.shape), np.broadcast_to(kx, k.shape)) + np.pi / 2.0, np.pi
-    )
-    sector = np.floor(crest[inside] / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
-    share: Field = np.bincount(sector, density[inside], minlength=_SECTORS).astype(np.float64)
-    total = share.sum()
-    lay = np.arange(_SECTORS) * np.pi / _SECTORS
-    return SurfaceSpectrum(wavenumber, radial, lay, share / total if total > 0.0 else share)
+    return np.asarray(power * dx * dy / (nx * ny))
 
 
 def _profile_spectrum(heights: Field, spacing: float) -> SurfaceSpectrum:

@@ -144,11 +144,7 @@ def sequential_alarm(
     BadInput
         for a false-alarm rate outside 0 to 0.1.
     """
-    if not 0.0 < false_alarm_rate < 0.1:
-        raise BadInput(
-            f"false-alarm rate must lie between 0 and 0.1 per recording, got {false_alarm_rate:g}; "
-            "0.001 means one in 1000 recordings"
-        )
+    _require_rate(false_alarm_rate)
     states: list[AlarmState] = ["none"] * acknowledged
     reason, raised_by = history.reason, history.raised_by
     for number in range(acknowledged, len(statuses)):
@@ -159,9 +155,8 @@ def sequential_alarm(
         if states and states[-1] == "alarm" and number > acknowledged:  # latched
             states.append("alarm")
             continue
-        assessed = [_assess(series, x, acknowledged, number) for series in monitored]
         state, reason, raised_by = _decide(
-            list(zip(monitored, assessed, strict=True)),
+            [(series, _assess(series, x, acknowledged, number)) for series in monitored],
             statuses[number],
             false_alarm_rate,
             unit,
@@ -176,18 +171,32 @@ def sequential_alarm(
     return Alarm(
         state=state,
         states=tuple(states),
-        since=None if state == "none" else _start_of_last_state(states, acknowledged),
+        since=_start_of_last_state(states, acknowledged),
         false_alarm_rate=false_alarm_rate,
         reason=reason,
         raised_by=raised_by,
-        explained="; ".join(
-            filter(None, (_explained_by_conditions(series, acknowledged) for series in monitored))
-        ),
+        explained=_explained_changes(monitored, acknowledged),
     )
 
 
-def _start_of_last_state(states: Sequence[AlarmState], acknowledged: int) -> int:
-    """Return the recording from which on all states equal the last one."""
+def _explained_changes(monitored: Sequence[MonitoredSeries], acknowledged: int) -> str:
+    """Describe the changes of all series that operating conditions explain."""
+    explained = (_explained_by_conditions(series, acknowledged) for series in monitored)
+    return "; ".join(filter(None, explained))
+
+
+def _require_rate(false_alarm_rate: float) -> None:
+    if not 0.0 < false_alarm_rate < 0.1:
+        raise BadInput(
+            f"false-alarm rate must lie between 0 and 0.1 per recording, got {false_alarm_rate:g}; "
+            "0.001 means one in 1000 recordings"
+        )
+
+
+def _start_of_last_state(states: Sequence[AlarmState], acknowledged: int) -> int | None:
+    """Return the recording from which on all states equal the last one; None without an alarm."""
+    if len(states) == acknowledged or states[-1] == "none":
+        return None
     since = len(states)
     while since > acknowledged and states[since - 1] == states[-1]:
         since -= 1
@@ -379,11 +388,9 @@ def _unexplained_step(
         if assessment.step.log_ratio >= threshold(share):
             return (
                 "cannot-tell",
-                f"{_describe_step(series, assessment, unit)} and has stayed there (load, gain, "
-                f"a moved "
-                "sensor or damage: the recordings do not show which; acknowledge it once the "
-                "cause is "
-                "known)",
+                f"{_describe_step(series, assessment, unit)} and has stayed there (load, gain, a "
+                "moved sensor or damage: the recordings do not show which; acknowledge it once the "
+                "cause is known)",
                 "",
             )
     return None

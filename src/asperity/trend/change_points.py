@@ -13,11 +13,9 @@ from asperity.core.arrays import Field
 
 FEWEST_STAGE_POINTS = 7  # distinct x: three on either side of a break, and one degree of freedom
 MOST_POINTS = 240  # longer series are averaged in groups of neighbours
-BREAK_POINTS, SCATTER_POINTS, CURVE_POINTS = (
-    161,
-    15,
-    48,
-)
+BREAK_POINTS = 161
+SCATTER_POINTS = 15
+CURVE_POINTS = 48
 SLOPE_ITERATIONS = 6  # of the weights, which depend on the slope where x has errors
 CORRELATIONS = (0.0, 0.4, 0.65, 0.85)  # between the scatter of neighbouring points
 CORRELATION_PRIOR = np.array([0.7, 0.1, 0.1, 0.1])
@@ -259,14 +257,7 @@ def _least_squares(precision: _Precision, products: Field, size: int) -> tuple[F
     Coefficients have shape (bends, scatters, linear). Eliminates all normal equations at once, y's
     row last: LAPACK would take thousands of such small systems one by one.
     """
-    equations = products @ np.swapaxes(
-        np.concatenate([precision.own, precision.next], axis=-1), -1, -2
-    )
-    rows = np.empty((size + 1, size + 1, equations.shape[0], equations.shape[2]))
-    for number, (first, second) in enumerate(zip(*np.triu_indices(size + 1), strict=True)):
-        rows[first, second] = rows[second, first] = equations[:, number]
-    diagonal = np.arange(size)
-    rows[diagonal, diagonal] += 1e-12 * np.sum(rows[diagonal, diagonal], axis=0)
+    rows = _normal_equations(precision, products, size)
     for i in range(size):
         for j in range(i + 1, size + 1):
             rows[j, i + 1 :] -= rows[j, i] / rows[i, i] * rows[i, i + 1 :]
@@ -277,7 +268,21 @@ def _least_squares(precision: _Precision, products: Field, size: int) -> tuple[F
             start=np.zeros(rows.shape[2:]),
         )
         linear[..., i] = (rows[i, size] - known) / rows[i, i]
+    diagonal = np.arange(size)
     return linear, rows[size, size], np.sum(np.log(rows[diagonal, diagonal]), axis=0)
+
+
+def _normal_equations(precision: _Precision, products: Field, size: int) -> Field:
+    """Return the symmetric equations of columns and y, (size + 1, size + 1, bends, scatters)."""
+    equations = products @ np.swapaxes(
+        np.concatenate([precision.own, precision.next], axis=-1), -1, -2
+    )
+    rows = np.empty((size + 1, size + 1, equations.shape[0], equations.shape[2]))
+    for number, (first, second) in enumerate(zip(*np.triu_indices(size + 1), strict=True)):
+        rows[first, second] = rows[second, first] = equations[:, number]
+    diagonal = np.arange(size)
+    rows[diagonal, diagonal] += 1e-12 * np.sum(rows[diagonal, diagonal], axis=0)
+    return rows
 
 
 def sudden_bend(x: Field, crfa: Field, x_std: Field, breaks: Field) -> Field:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, Mask
 
 BASELINE_RECORDINGS = 8  # conditions are relative to the median of these first recordings
 SMALLEST_SHARE = 0.1  # of the smallest change: a condition that cannot explain more is left out
@@ -35,6 +35,10 @@ class Condition:
     high: float
     shown: Field
     unit: str
+
+    def can_explain(self, known: Mask, change: float) -> bool:
+        """Return whether the condition may change the indicator by more than `change`."""
+        return bool(max(-self.low, self.high) * np.ptp(self.values[known]) > change)
 
 
 class ConditionEffect(NamedTuple):
@@ -78,12 +82,8 @@ def fit_conditions(
         known = known & np.isfinite(condition.values)
     if known.sum() < 3:
         return NO_CONDITION_EFFECT
-    relevant = [
-        condition
-        for condition in conditions
-        if max(-condition.low, condition.high) * np.ptp(condition.values[known])
-        > SMALLEST_SHARE * smallest_change
-    ]
+    smallest = SMALLEST_SHARE * smallest_change
+    relevant = [condition for condition in conditions if condition.can_explain(known, smallest)]
     if not relevant:
         return NO_CONDITION_EFFECT
     rows = np.array(
@@ -94,7 +94,15 @@ def fit_conditions(
     )
     low = np.array([condition.low for condition in relevant])
     high = np.array([condition.high for condition in relevant])
-    change, row_change = np.diff(values[known]), np.diff(rows[:, known], axis=1)
+    coefficients, scatter = _fit_differences(values[known], rows[:, known], low, high)
+    effect = coefficients @ rows  # nan where a condition is not stated
+    names = tuple(condition.name for condition in relevant)
+    return ConditionEffect(effect, rows, PRIOR_WIDTH * (high - low), coefficients, names, scatter)
+
+
+def _fit_differences(values: Field, rows: Field, low: Field, high: Field) -> tuple[Field, float]:
+    """Return the coefficients within bounds, and the standard deviation of one recording."""
+    change, row_change = np.diff(values), np.diff(rows, axis=1)
     change, row_change = change - change.mean(), row_change - row_change.mean(axis=1, keepdims=True)
     size = np.maximum(np.abs(row_change).max(axis=1), 1e-12)  # equal scales for the solver
     fitted = scipy.optimize.lsq_linear(
@@ -102,7 +110,5 @@ def fit_conditions(
     )
     coefficients = fitted.x / size
     residual = change - coefficients @ row_change
-    scatter = float(np.sqrt(np.mean(residual**2) / 2.0))  # a difference has twice the variance
-    effect = coefficients @ rows  # nan where a condition is not stated
-    names = tuple(condition.name for condition in relevant)
-    return ConditionEffect(effect, rows, PRIOR_WIDTH * (high - low), coefficients, names, scatter)
+    # a difference has twice the variance
+    return coefficients, float(np.sqrt(np.mean(residual**2) / 2.0))

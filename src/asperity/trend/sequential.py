@@ -116,9 +116,7 @@ def step_test(
     best = int(np.argmax(np.max(likelihoods, axis=0)))
     ratio = _corrected_ratio(float(np.max(likelihoods)) - against, t.size)
     return ChangeTest(
-        ratio,
-        scale.x_at(t[np.argmax(steps[allowed][best] > 0.0)]),
-        float(levels[allowed][best]),
+        ratio, scale.x_at(t[np.argmax(steps[allowed][best] > 0.0)]), float(levels[allowed][best])
     )
 
 
@@ -341,11 +339,9 @@ def _explained_by_row(rows: Field, z: Field) -> Field:
 
 def _explained_by_pair(first: Field, second: Field, z: Field) -> Field:
     """Return the sum of squares of z that each pair of rows explains."""
-    aa, bb, ab = (
-        np.sum(first**2, axis=-1),
-        np.sum(second**2, axis=-1),
-        np.sum(first * second, axis=-1),
-    )
+    aa = np.sum(first**2, axis=-1)
+    bb = np.sum(second**2, axis=-1)
+    ab = np.sum(first * second, axis=-1)
     p, q = first @ z, second @ z
     determinant = aa * bb - ab**2
     together = (bb * p**2 - 2.0 * ab * p * q + aa * q**2) / np.maximum(determinant, TINY)

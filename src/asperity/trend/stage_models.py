@@ -38,11 +38,24 @@ class Outcome(NamedTuple):
     separate: float
 
 
-def weigh_explanations(
-    comparisons: list[ModelComparison], crfa: Field | None, x: Field, x_std: Field
-) -> Outcome:
-    """Weigh all explanations: a common break in some series, the best own model in the others."""
-    breaks, count = comparisons[0].breaks, len(comparisons)
+class _Bics(NamedTuple):
+    """BIC of all explanations: by the series that break, and by the names of unbroken models."""
+
+    broken: dict[tuple[bool, ...], float]
+    unbroken: dict[tuple[str, ...], float]
+
+    @property
+    def constant(self) -> float:
+        """BIC of no change in any series."""
+        return next(bic for names, bic in self.unbroken.items() if set(names) == {CONSTANT})
+
+    @property
+    def smooth(self) -> float:
+        """BIC of the best change without a break."""
+        return min(bic for names, bic in self.unbroken.items() if set(names) != {CONSTANT})
+
+
+def _all_bics(comparisons: list[ModelComparison]) -> _Bics:
     unbroken_bics = [
         {name: value for name, value in comparison.bic.items() if name != STICK}
         for comparison in comparisons
@@ -51,15 +64,69 @@ def weigh_explanations(
         names: sum(bic[name] for bic, name in zip(unbroken_bics, names, strict=True))
         for names in product(*unbroken_bics)
     }
-    patterns = [pattern for pattern in product((True, False), repeat=count) if any(pattern)]
-    broken = {pattern: _break_bic(comparisons, unbroken_bics, pattern) for pattern in patterns}
-    constant = unbroken[(CONSTANT,) * count]
-    smooth = min(bic for names, bic in unbroken.items() if set(names) != {CONSTANT})
-    best = min(constant, smooth, *broken.values())
-    weights = {pattern: float(np.exp(-0.5 * (value - best))) for pattern, value in broken.items()}
-    unbroken_weight = float(np.sum(np.exp(-0.5 * (np.array([*unbroken.values()]) - best))))
+    patterns = product((True, False), repeat=len(comparisons))
+    return _Bics(
+        {
+            pattern: _break_bic(comparisons, unbroken_bics, pattern)
+            for pattern in patterns
+            if any(pattern)
+        },
+        unbroken,
+    )
+
+
+def weigh_explanations(
+    comparisons: list[ModelComparison], crfa: Field | None, x: Field, x_std: Field
+) -> Outcome:
+    """Weigh all explanations: a common break in some series, the best own model in the others."""
+    bics, breaks = _all_bics(comparisons), comparisons[0].breaks
+    best = min(bics.constant, bics.smooth, *bics.broken.values())
+    broken = {pattern: value - best for pattern, value in bics.broken.items()}
+    weights = {pattern: float(np.exp(-0.5 * value)) for pattern, value in broken.items()}
+    unbroken = np.array([*bics.unbroken.values()]) - best
+    unbroken_weight = float(np.sum(np.exp(-0.5 * unbroken)))
     log_bend = np.zeros(breaks.size) if crfa is None else sudden_bend(x, crfa, x_std, breaks)
-    density = np.zeros(breaks.size)
+    outcome = Outcome(
+        comparisons=comparisons,
+        density=_break_density(comparisons, weights, log_bend),
+        has_break=min(broken, key=lambda pattern: broken[pattern]),
+        break_probability=sum(weights.values()) / (sum(weights.values()) + unbroken_weight),
+        evidence=_relative(comparisons[0].bic),
+        broken=min(broken.values()),
+        smooth=bics.smooth - best,
+        constant=bics.constant - best,
+        separate=np.inf,
+    )
+    if len(comparisons) > 1:
+        outcome = _of_both_series(outcome, broken, best)
+    return outcome
+
+
+def _of_both_series(
+    outcome: Outcome, broken: dict[tuple[bool, ...], float], best: float
+) -> Outcome:
+    """Return the outcome with the evidence for breaks in both series, together or apart."""
+    separate = sum(comparison.bic[STICK] for comparison in outcome.comparisons) - best
+    names = ("break in both", "break in the CRF alone", "break in the damping alone")
+    evidence = dict(zip(names, broken.values(), strict=True)) | {
+        "breaks apart": separate,
+        "smooth curves": outcome.smooth,
+        CONSTANT: outcome.constant,
+    }
+    return outcome._replace(evidence=_relative(evidence), separate=separate)
+
+
+def _relative(bics: dict[str, float]) -> dict[str, float]:
+    """Return the BIC of each model relative to the best."""
+    best = min(bics.values())
+    return {name: value - best for name, value in bics.items()}
+
+
+def _break_density(
+    comparisons: list[ModelComparison], weights: dict[tuple[bool, ...], float], log_bend: Field
+) -> Field:
+    """Return the posterior density of the common break, over weighted patterns of broken series."""
+    density = np.zeros(log_bend.size)
     for pattern, weight in weights.items():
         log_break = log_bend + sum(
             log_sum(comparison.fits[STICK].marginal)
@@ -68,32 +135,7 @@ def weigh_explanations(
         )
         own = np.exp(log_break - np.max(log_break))
         density += weight * own / np.sum(own)
-    separate = np.inf
-    evidence = {name: value - best for name, value in comparisons[0].bic.items()}
-    if count > 1:
-        named = zip(
-            ("break in both", "break in the CRF alone", "break in the damping alone"),
-            patterns,
-            strict=True,
-        )
-        evidence = {name: broken[pattern] - best for name, pattern in named}
-        separate = sum(comparison.bic[STICK] for comparison in comparisons) - best
-        evidence |= {
-            "breaks apart": separate,
-            "smooth curves": smooth - best,
-            CONSTANT: constant - best,
-        }
-    return Outcome(
-        comparisons=comparisons,
-        density=density / np.sum(density),
-        has_break=min(patterns, key=lambda pattern: broken[pattern]),
-        break_probability=sum(weights.values()) / (sum(weights.values()) + unbroken_weight),
-        evidence={name: value - min(evidence.values()) for name, value in evidence.items()},
-        broken=min(broken.values()) - best,
-        smooth=smooth - best,
-        constant=constant - best,
-        separate=separate,
-    )
+    return density / np.sum(density)
 
 
 def _break_bic(

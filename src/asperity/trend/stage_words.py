@@ -36,6 +36,11 @@ class Axis(NamedTuple):
         """Return x for a scaled coordinate."""
         return self.start + self.extent * scaled
 
+    def range_text(self, points: SeriesPoints) -> str:
+        """Return the range of x in words."""
+        first, last = self.x_at(float(points.x[0])), self.x_at(float(points.x[-1]))
+        return f"{first:.4g} to {last:.4g} {self.unit}".rstrip()
+
 
 class NoStage(NamedTuple):
     """Reason why no stage is reported, and whether the probability of severe wear is known."""
@@ -53,9 +58,7 @@ def reason_for_no_stage(
     axis: Axis,
 ) -> NoStage | None:
     """Return the reason why the series shows no stage, or None where it shows one."""
-    source = "both" if len(series) > 1 else series[0].indicator
-    first, last = axis.x_at(float(points.x[0])), axis.x_at(float(points.x[-1]))
-    over = f"{first:.4g} to {last:.4g} {axis.unit}".rstrip()
+    over = axis.range_text(points)
     if outcome.constant - min(outcome.smooth, outcome.broken) < STRONG_EVIDENCE:
         means = " and ".join(course.mean for course in courses)
         return NoStage("no change", True, f"No change: {means} over {over}.")
@@ -64,24 +67,15 @@ def reason_for_no_stage(
             "disagree",
             False,
             f"CRF and damping disagree: {courses[0].way} and {courses[1].way} over {over}; load "
-            "transfer to asperities raises CRF and lowers damping, so one of them does not "
-            "belong to "
-            "the contact.",
+            "transfer to asperities raises CRF and lowers damping, so one of them does not belong "
+            "to the contact.",
         )
     if outcome.broken - outcome.separate >= STRONG_EVIDENCE:
-        places = " and ".join(
-            f"{SOURCE_NAMES[indicator.indicator]} at {axis.x_at(own_break(comparison)):.3g}"
-            for indicator, comparison in zip(series, outcome.comparisons, strict=True)
-        )
-        return NoStage(
-            "no distinct stage",
-            False,
-            f"No common stage over {over}: the breaks of {places} are not explained by a common "
-            f"one "
-            f"(ΔBIC {outcome.broken - outcome.separate:+.1f} against it).",
-        )
+        verdict = _no_common_stage(outcome, series, axis, over)
+        return NoStage("no distinct stage", False, verdict)
     if outcome.smooth - outcome.broken < STRONG_EVIDENCE:
-        changes = f"{SOURCE_NAMES[source]} {'change' if source == 'both' else 'changes'}"
+        source = SOURCE_NAMES["both" if len(series) > 1 else series[0].indicator]
+        changes = f"{source} {'change' if len(series) > 1 else 'changes'}"
         better = "better" if outcome.smooth < outcome.broken else "as well"
         return NoStage(
             "no distinct stage",
@@ -93,13 +87,25 @@ def reason_for_no_stage(
     return None
 
 
+def _no_common_stage(
+    outcome: Outcome, series: Sequence[IndicatorSeries], axis: Axis, over: str
+) -> str:
+    places = " and ".join(
+        f"{SOURCE_NAMES[indicator.indicator]} at {axis.x_at(own_break(comparison)):.3g}"
+        for indicator, comparison in zip(series, outcome.comparisons, strict=True)
+    )
+    return (
+        f"No common stage over {over}: the breaks of {places} are not explained by a common one "
+        f"(ΔBIC {outcome.broken - outcome.separate:+.1f} against it)."
+    )
+
+
 def too_few_points(indicator: Indicator, points: int) -> str:
     """Return the verdict where an indicator is known at too few points."""
     words = {"crf": "CRF", "damping": "damping ratios"}[indicator]
     return (
         f"Too few points: a stage by {SOURCE_NAMES[indicator]} needs {words} at "
-        f"{FEWEST_STAGE_POINTS} "
-        f"different x, got {points}."
+        f"{FEWEST_STAGE_POINTS} different x, got {points}."
     )
 
 
@@ -126,11 +132,7 @@ class IndicatorCourse(NamedTuple):
 
 
 def describe_course(
-    series: IndicatorSeries,
-    comparison: ModelComparison,
-    split: float,
-    has_break: bool,
-    axis: Axis,
+    series: IndicatorSeries, comparison: ModelComparison, split: float, has_break: bool, axis: Axis
 ) -> IndicatorCourse:
     """Describe a series by its stick at the break `split`."""
     points, fit = comparison.points, comparison.fits[STICK]

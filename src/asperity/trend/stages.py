@@ -7,7 +7,6 @@ a precise but false knee. Knows nothing of recordings; docs/theory/indicators.md
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -18,15 +17,18 @@ from asperity.core.coverage import QUANTILES
 from asperity.core.errors import BadInput, require_choice
 from asperity.trend.change_points import (
     FEWEST_STAGE_POINTS,
+    SeriesPoints,
     averaged_points,
     common_breaks,
     compare_models,
     probability_beyond_break,
     quantiles,
 )
-from asperity.trend.stage_models import IndicatorSeries, weigh_explanations
+from asperity.trend.stage_models import IndicatorSeries, Outcome, weigh_explanations
 from asperity.trend.stage_words import (
     Axis,
+    IndicatorCourse,
+    NoStage,
     StageKind,
     StageSource,
     describe_course,
@@ -143,16 +145,7 @@ def split_stages(
     require_choice("source of stages", source, get_args(StageSource))
     x, crf_hz = np.asarray(x, dtype=float), np.asarray(crf_hz, dtype=float)
     damping = None if damping_ratio is None else np.asarray(damping_ratio, dtype=float)
-    shapes = [np.shape(values) for values in (x, crf_hz, crfa, damping) if values is not None]
-    if x.ndim != 1 or len(set(shapes)) > 1:
-        raise BadInput(
-            "x, CRF, CRFA and damping must be one-dimensional and of one length, got shapes "
-            f"{', '.join(map(str, shapes))}"
-        )
-    if x.size == 0:
-        raise BadInput("stages need recordings, got none")
-    if not np.isfinite(x).all():
-        raise BadInput("x must be finite for every recording; leave out those where it is not")
+    _require_one_length(x, crf_hz, crfa, damping)
     crf_std = _deviations("CRF deviation", errors.crf_hz, x.size)
     x_std = _deviations("x deviation", errors.x, x.size)
     series = [] if source == "damping" else [IndicatorSeries("crf", crf_hz, crf_std)]
@@ -164,6 +157,19 @@ def split_stages(
         )
     second = None if crfa is None or source == "damping" else np.asarray(crfa, dtype=float)
     return STAGE_DETECTORS[detector](x, x_std, series, second, unit)
+
+
+def _require_one_length(x: Field, *series: ArrayLike | None) -> None:
+    shapes = [np.shape(values) for values in (x, *series) if values is not None]
+    if x.ndim != 1 or len(set(shapes)) > 1:
+        raise BadInput(
+            "x, CRF, CRFA and damping must be one-dimensional and of one length, got shapes "
+            f"{', '.join(map(str, shapes))}"
+        )
+    if x.size == 0:
+        raise BadInput("stages need recordings, got none")
+    if not np.isfinite(x).all():
+        raise BadInput("x must be finite for every recording; leave out those where it is not")
 
 
 def _deviations(name: str, value: ArrayLike | None, recordings: int) -> Field:
@@ -200,51 +206,85 @@ def _bayesian(
     source: StageSource = "both" if len(series) > 1 else series[0].indicator
     axis = Axis(float(np.min(x)), max(float(np.ptp(x)), np.finfo(float).tiny), unit)
     x, x_std = (x - axis.start) / axis.extent, x_std / axis.extent
-    without = partial(_without_stage, source)
     unknown = np.full(x.size, np.nan)
-    all_points = []
-    for one_series in series:
-        known = np.isfinite(one_series.values)
-        points = averaged_points(
-            x[known], one_series.values[known], one_series.std[known], x_std[known]
-        )
-        if points.x.size < FEWEST_STAGE_POINTS:
-            verdict = too_few_points(one_series.indicator, points.x.size)
-            return without("too few", verdict, {}, unknown, np.nan)
-        all_points.append(points)
-    breaks = common_breaks(all_points)
-    if not breaks[0] < breaks[-1]:
-        verdict = "Not determined: CRF and damping are known at different x."
-        return without("too few", verdict, {}, unknown, np.nan)
+    all_points = [_known_points(indicator, x, x_std) for indicator in series]
+    breaks, verdict = _possible_breaks(series, all_points)
+    if verdict:
+        return _without_stage(source, NoStage("too few", False, verdict), unknown, None)
     outcome = weigh_explanations(
         [compare_models(points, breaks) for points in all_points], crfa, x, x_std
     )
-    scatter = outcome.comparisons[0].scatter if source != "damping" else np.nan
+    position = quantiles(breaks, outcome.density, QUANTILES)
+    courses = _courses(outcome, series, position[1], axis)
     after = probability_beyond_break(x, x_std, breaks, outcome.density)
-    low, split, high = quantiles(breaks, outcome.density, QUANTILES)
+    severe = after * _severe_probability(outcome, courses)
+    no_stage = reason_for_no_stage(outcome, courses, series, all_points[0], axis)
+    if no_stage is not None:
+        probability = severe if no_stage.probability_known else unknown
+        return _without_stage(source, no_stage, probability, outcome)
+    return _with_stage(source, outcome, courses, axis, position, (after, severe))
+
+
+def _known_points(series: IndicatorSeries, x: Field, x_std: Field) -> SeriesPoints:
+    known = np.isfinite(series.values)
+    return averaged_points(x[known], series.values[known], series.std[known], x_std[known])
+
+
+def _possible_breaks(
+    series: Sequence[IndicatorSeries], all_points: Sequence[SeriesPoints]
+) -> tuple[Field, str]:
+    """Return the breaks that all series can have, or the verdict where there are too few points."""
+    for indicator, points in zip(series, all_points, strict=True):
+        if points.x.size < FEWEST_STAGE_POINTS:
+            return np.empty(0), too_few_points(indicator.indicator, points.x.size)
+    breaks = common_breaks(all_points)
+    if not breaks[0] < breaks[-1]:
+        return breaks, "Not determined: CRF and damping are known at different x."
+    return breaks, ""
+
+
+def _courses(
+    outcome: Outcome, series: Sequence[IndicatorSeries], split: float, axis: Axis
+) -> list[IndicatorCourse]:
+    """Return the course of each indicator, with a break where the best model has one."""
     any_break = outcome.broken < min(outcome.smooth, outcome.constant)
-    courses = [
+    return [
         describe_course(indicator, comparison, split, any_break and has_break, axis)
         for indicator, comparison, has_break in zip(
             series, outcome.comparisons, outcome.has_break, strict=True
         )
     ]
-    signs = {course.sign for course in courses} - {0}
-    flattens = all(
-        course.flattens
-        for course, has_break in zip(courses, outcome.has_break, strict=True)
-        if has_break
-    )
-    severe = after * (outcome.break_probability if 1 in signs and flattens else 0.0)
-    no_stage = reason_for_no_stage(outcome, courses, series, all_points[0], axis)
-    if no_stage is not None:
-        probability = severe if no_stage.probability_known else unknown
-        return without(no_stage.kind, no_stage.verdict, outcome.evidence, probability, scatter)
-    kind: StageKind = "running-in" if signs != {1} else "severe" if flattens else "steepening"
+
+
+def _severe_probability(outcome: Outcome, courses: Sequence[IndicatorCourse]) -> float:
+    """Return the probability of a break beyond which the severe stage may lie."""
+    rises = any(course.sign == 1 for course in courses)
+    flattens = _flattens(courses, outcome.has_break)
+    return outcome.break_probability if rises and flattens else 0.0
+
+
+def _flattens(courses: Sequence[IndicatorCourse], has_break: Sequence[bool]) -> bool:
+    """Return whether every indicator with a break changes more slowly after it."""
+    return all(course.flattens for course, breaks in zip(courses, has_break, strict=True) if breaks)
+
+
+def _with_stage(
+    source: StageSource,
+    outcome: Outcome,
+    courses: Sequence[IndicatorCourse],
+    axis: Axis,
+    position: tuple[float, float, float],
+    probabilities: tuple[Field, Field],
+) -> Stages:
+    """Return stages from the break's quantiles, and probabilities of being after it and severe."""
+    kind: StageKind = "running-in"
+    if {course.sign for course in courses} - {0} == {1}:
+        kind = "severe" if _flattens(courses, outcome.has_break) else "steepening"
     lead, names = _NAMES[kind]
-    low, split, high = (axis.x_at(scaled) for scaled in (low, split, high))
-    where = f"{split:.4g} {unit}".rstrip() + f" (90 % interval {low:.4g} to {high:.4g})"
+    low, split, high = (axis.x_at(scaled) for scaled in position)
+    where = f"{split:.4g} {axis.unit}".rstrip() + f" (90 % interval {low:.4g} to {high:.4g})"
     words = ", ".join(course.words for course in courses)
+    after, severe = probabilities
     return Stages(
         source=source,
         kind=kind,
@@ -254,7 +294,7 @@ def _bayesian(
         labels=tuple(names[int(p >= SEVERE_FROM)] for p in after),
         evidence=outcome.evidence,
         slopes=courses[0].slopes if source != "damping" else (np.nan, np.nan),
-        scatter_hz=scatter,
+        scatter_hz=_scatter(source, outcome),
         damping=courses[-1].levels if source != "crf" else (np.nan, np.nan, np.nan),
         verdict=f"{lead} {where}{name_indicators(source, outcome.has_break)}: {words}.",
     )
@@ -273,19 +313,19 @@ STAGE_DETECTORS: dict[
 
 
 def _without_stage(
-    source: StageSource,
-    kind: StageKind,
-    verdict: str,
-    evidence: dict[str, float],
-    probability: Field,
-    scatter: float,
+    source: StageSource, reason: NoStage, probability: Field, outcome: Outcome | None
 ) -> Stages:
     return Stages(
         source=source,
-        kind=kind,
+        kind=reason.kind,
         probability=probability,
         labels=("none",) * probability.size,
-        evidence=evidence,
-        scatter_hz=scatter,
-        verdict=verdict,
+        evidence={} if outcome is None else outcome.evidence,
+        scatter_hz=np.nan if outcome is None else _scatter(source, outcome),
+        verdict=reason.verdict,
     )
+
+
+def _scatter(source: StageSource, outcome: Outcome) -> float:
+    """Return the scatter of CRF [Hz]; nan without CRF."""
+    return outcome.comparisons[0].scatter if source != "damping" else np.nan

@@ -44,41 +44,52 @@ def warm_up(x: Field, crf: Field, level: Field) -> WarmUp | None:
     if t.size < FEWEST_POINTS or not t[-1] > t[0]:
         return None
     t = (t - t[0]) / (t[-1] - t[0])
-    constant = np.ones((1, t.size))
-    time_constants = np.geomspace(1.0 / t.size, 1.0 / TIME_CONSTANTS_COVERED, TIME_CONSTANTS)
-    decays = np.exp(-t / time_constants[:, None])
-    costs = np.array([_costs(constant, decays, values) for values in both])
-    best = int(np.argmin(costs.sum(axis=0)))
-    penalty = float(np.log(t.size))  # BIC per parameter
-    # an amplitude for each, and half of the common time constant
-    exponential = costs[:, best] + np.array([1.5, 1.5]) * penalty
-    rivals = []
-    for values in both:
-        sticks = (
-            _costs(np.vstack([constant, t]), np.maximum(t - t[2:-2, None], 0.0), values)
-            + 3.0 * penalty
-        )
-        straight = _cost(np.vstack([constant, t]), values) + penalty
-        rivals.append(min(_cost(constant, values), straight, float(sticks.min())))
-    unchanged = np.array([_cost(constant, values) for values in both])
-    significant = sum(rivals) - exponential.sum() > BIC_REQUIRED and bool(
-        np.all(unchanged - exponential > BIC_REQUIRED)
-    )
-    columns = np.vstack([constant, decays[best]])
+    time_constant, decay, costs = _best_exponential(t, both)
+    if not _is_significant(t, both, costs):
+        return None
+    columns = np.vstack([np.ones(t.size), decay])
     fits = [_fit(columns, values) for values in both]
     crf_change, level_change = -fits[0][1] / float(np.median(both[0])), -fits[1][1]
+    if not LEAST_CRF_CHANGE <= crf_change <= MOST_CRF_CHANGE:
+        return None
+    if abs(level_change) < LEAST_LEVEL_CHANGE:
+        return None
     residual = [
         float(np.median((values - fit @ columns)[-LATEST_RECORDINGS:]))
         for values, fit in zip(both, fits, strict=True)
     ]
-    plausible = LEAST_CRF_CHANGE <= crf_change <= MOST_CRF_CHANGE
-    if not significant or not plausible or abs(level_change) < LEAST_LEVEL_CHANGE:
-        return None
     return WarmUp(
         float(crf_change),
         float(level_change),
-        float(time_constants[best] * np.ptp(x[known])),
+        float(time_constant * np.ptp(x[known])),
         (residual[0], residual[1]),
+    )
+
+
+def _best_exponential(t: Field, both: tuple[Field, Field]) -> tuple[float, Field, Field]:
+    """Return time constant and decay that fit both indicators best, and the cost of each."""
+    time_constants = np.geomspace(1.0 / t.size, 1.0 / TIME_CONSTANTS_COVERED, TIME_CONSTANTS)
+    decays = np.exp(-t / time_constants[:, None])
+    costs = np.array([_costs(np.ones((1, t.size)), decays, values) for values in both])
+    best = int(np.argmin(costs.sum(axis=0)))
+    return float(time_constants[best]), decays[best], costs[:, best]
+
+
+def _is_significant(t: Field, both: tuple[Field, Field], costs: Field) -> bool:
+    """Return whether a common exponential of these costs beats all other models by BIC."""
+    penalty = float(np.log(t.size))  # BIC per parameter
+    # an amplitude for each, and half of the common time constant
+    exponential = costs + np.array([1.5, 1.5]) * penalty
+    constant = np.ones((1, t.size))
+    line = np.vstack([constant, t])
+    unchanged = np.array([_cost(constant, values) for values in both])
+    rivals = []
+    for values, flat in zip(both, unchanged, strict=True):
+        sticks = _costs(line, np.maximum(t - t[2:-2, None], 0.0), values) + 3.0 * penalty
+        straight = _cost(line, values) + penalty
+        rivals.append(min(float(flat), straight, float(sticks.min())))
+    return sum(rivals) - exponential.sum() > BIC_REQUIRED and bool(
+        np.all(unchanged - exponential > BIC_REQUIRED)
     )
 
 

@@ -83,10 +83,8 @@ class Envelope:
             return float("nan")
         power = 0.0
         for harmonic in range(1, HARMONICS + 1):
-            centre, reach = (
-                harmonic * rate_hz / self.spacing_hz,
-                max(SLIP * harmonic * rate_hz / self.spacing_hz, 1.0),
-            )
+            centre = harmonic * rate_hz / self.spacing_hz
+            reach = max(SLIP * harmonic * rate_hz / self.spacing_hz, 1.0)
             lines = self.total[max(int(np.ceil(centre - reach)), 2) : int(centre + reach) + 1]
             if harmonic == 1 and not lines.size:
                 return float("nan")

@@ -109,10 +109,8 @@ class FilteredNoise(NoiseFilter):
         frequency, cutoff = np.asarray(frequency_hz), self.cutoff_hz
         if self.filter == "bilinear":
             _require_below_half(cutoff, rate_hz)
-            warped, corner = (
-                np.tan(np.pi * np.minimum(frequency / rate_hz, 0.5)),
-                np.tan(np.pi * cutoff / rate_hz),
-            )
+            warped = np.tan(np.pi * np.minimum(frequency / rate_hz, 0.5))
+            corner = np.tan(np.pi * cutoff / rate_hz)
         else:
             warped, corner = frequency, cutoff
         return np.asarray(
@@ -324,10 +322,23 @@ def synthesise(source: Excitation, samples: int, rate_hz: float, seed: int) -> F
 def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Field:
     """Return samples of y'' + √2 ω y' + ω^2 y = white noise with standard deviation `rms`.
 
-    `cutoff` is in cycles per sample. State x = (y, y') obeys x⁺ = A x + e with cov e = Q (Van Loan
-    1978): y is an ARMA(2, 1) series of one white noise.
+    `cutoff` is in cycles per sample.
     """
     omega = 2.0 * np.pi * cutoff
+    numerator, denominator = _butterworth_recursion(omega)
+    # 12 time constants: the initial state has decayed to e^-12
+    settling = int(np.ceil(12.0 * np.sqrt(2.0) / omega))
+    white = white_noise(settling + samples, seed)
+    # unit white noise would give the variance 1 / (2 √2 ω^3)
+    to_rms = rms * np.sqrt(2.0 * np.sqrt(2.0) * omega**3)
+    return np.asarray(to_rms * recursion(numerator, denominator, white)[settling:])
+
+
+def _butterworth_recursion(omega: float) -> tuple[Field, Field]:
+    """Return the ARMA(2, 1) series of one white noise that samples y'' + √2 ω y' + ω^2 y.
+
+    State x = (y, y') obeys x⁺ = A x + e with cov e = Q (Van Loan 1978).
+    """
     drift = np.array([[0.0, 1.0], [-(omega**2), -np.sqrt(2.0) * omega]])
     exponential = scipy.linalg.expm(
         np.block([[-drift, np.diag([0.0, 1.0])], [np.zeros((2, 2)), drift.T]])
@@ -341,12 +352,6 @@ def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Fi
     neighbour = back @ noise[:, 0]
     # ... equal those of b0 w_n + b1 w_(n-1)
     plus, minus = np.sqrt(variance + 2.0 * neighbour), np.sqrt(variance - 2.0 * neighbour)
-    numerator = np.array([plus + minus, plus - minus]) / 2.0
-    denominator = np.array([1.0, -np.trace(step), np.linalg.det(step)])
-
-    # 12 time constants: the initial state has decayed to e^-12
-    settling = int(np.ceil(12.0 * np.sqrt(2.0) / omega))
-    white = white_noise(settling + samples, seed)
-    # unit white noise would give the variance 1 / (2 √2 ω^3)
-    to_rms = rms * np.sqrt(2.0 * np.sqrt(2.0) * omega**3)
-    return np.asarray(to_rms * recursion(numerator, denominator, white)[settling:])
+    return np.array([plus + minus, plus - minus]) / 2.0, np.array(
+        [1.0, -np.trace(step), np.linalg.det(step)]
+    )

@@ -265,18 +265,7 @@ def _runge_kutta(
     """Return compression beyond the static one, velocity, acceleration, and contact."""
     from asperity.kernels.oscillator import ContactSpring, integrate_contact
 
-    if substeps < 1:
-        raise BadInput(
-            f"Runge-Kutta needs at least 1 sub-step, got {substeps}; the default is {SUBSTEPS}"
-        )
-    phase_per_sample = oscillator.angular_frequency / rate_hz
-    if phase_per_sample / substeps > MAX_STEP:
-        raise BadInput(
-            f"Runge-Kutta steps must be at most {MAX_STEP:g} of 1/ω0, got "
-            f"{phase_per_sample / substeps:.2g} ({oscillator.natural_frequency_hz:.0f} Hz, "
-            f"sampling rate {rate_hz:g} Hz, {substeps} sub-steps); use at least "
-            f"{int(np.ceil(phase_per_sample / MAX_STEP))} sub-steps"
-        )
+    _require_stable(oscillator, rate_hz, substeps)
     nonlinear, mass = method == "nonlinear", oscillator.mass
     static_compression = oscillator.static_compression if nonlinear else 0.0
     load = (oscillator.load or 0.0) / mass if nonlinear else 0.0
@@ -314,6 +303,21 @@ def _runge_kutta(
         - load
     )
     return compression - static_compression, velocity, mass_acceleration, in_contact
+
+
+def _require_stable(oscillator: ContactOscillator, rate_hz: float, substeps: int) -> None:
+    if substeps < 1:
+        raise BadInput(
+            f"Runge-Kutta needs at least 1 sub-step, got {substeps}; the default is {SUBSTEPS}"
+        )
+    phase_per_sample = oscillator.angular_frequency / rate_hz
+    if phase_per_sample / substeps > MAX_STEP:
+        raise BadInput(
+            f"Runge-Kutta steps must be at most {MAX_STEP:g} of 1/ω0, got "
+            f"{phase_per_sample / substeps:.2g} ({oscillator.natural_frequency_hz:.0f} Hz, "
+            f"sampling rate {rate_hz:g} Hz, {substeps} sub-steps); use at least "
+            f"{int(np.ceil(phase_per_sample / MAX_STEP))} sub-steps"
+        )
 
 
 def _mean_of_both_sides(slopes: Field) -> Field:

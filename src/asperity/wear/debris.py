@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
@@ -123,42 +124,43 @@ class Ploughing(Parametric):
         """Return the marks of the jump."""
         film = passage.loaded_film
         track_cells = loaded_columns(passage)
-        lower, upper = track_bounds(passage.grid, track_cells)
-        expected = self.density(film) * passage.jump * float(np.prod(np.subtract(upper, lower)))
-        if expected > MAX_MARKS:
-            raise BadInput(
-                f"ploughing would make {expected:.3g} marks in one jump, got a concentration of "
-                f"{self.concentration:g} /m^3; use fewer or larger particles, or shorter jumps"
-            )
         dug, piled = np.zeros(passage.grid.cells), np.zeros(passage.grid.cells)
-        rng = passage.rng
-        count = int(rng.poisson(expected))
-        sizes = self.sizes(rng.uniform(size=count))
-        places = rng.uniform(lower, upper, size=(count, 2))
-        made = 0
-        for size, (x, y) in zip(sizes, places, strict=True):
-            if size > film:
-                add_mark(
-                    dug,
-                    piled,
-                    self.mark(float(size), film, passage),
-                    (float(x), float(y)),
-                    passage.grid,
-                )
-                made += 1
+        marks = self._drawn_marks(passage, film, track_bounds(passage.grid, track_cells))
+        for mark, at in marks:
+            add_mark(dug, piled, mark, at, passage.grid)
         cell = float(np.prod(passage.grid.spacing))
         loose, stays = float(piled.sum()), (1.0 - self.cutting) * float(dug.sum())
         if loose > 0.0:
             piled *= stays / loose  # the grid discretises ridges and grooves differently
         elif stays > 0.0:
             dug *= self.cutting
-        facts = {"marks": float(made), "volume_m3": float(dug.sum()) * cell}
+        facts = {"marks": float(len(marks)), "volume_m3": float(dug.sum()) * cell}
         change = piled - dug
         return Change(
             heights_change=change,
             facts=facts,
             longest=self._longest(passage, film, change[:, track_cells]),
         )
+
+    def _drawn_marks(
+        self, passage: Passage, film: float, track: tuple[tuple[float, float], tuple[float, float]]
+    ) -> list[tuple[WearMark, tuple[float, float]]]:
+        """Draw the marks of the jump and their centres [m] on a track from corner to corner."""
+        lower, upper = track
+        expected = self.density(film) * passage.jump * float(np.prod(np.subtract(upper, lower)))
+        if expected > MAX_MARKS:
+            raise BadInput(
+                f"ploughing would make {expected:.3g} marks in one jump, got a concentration of "
+                f"{self.concentration:g} /m^3; use fewer or larger particles, or shorter jumps"
+            )
+        count = int(passage.rng.poisson(expected))
+        sizes = self.sizes(passage.rng.uniform(size=count))
+        places = passage.rng.uniform(lower, upper, size=(count, 2))
+        return [
+            (self.mark(float(size), film, passage), (float(x), float(y)))
+            for size, (x, y) in zip(sizes, places, strict=True)
+            if size > film
+        ]
 
     def _longest(self, passage: Passage, film: float, change: Field) -> float:
         """Return the over-rollings for MAX_VARIANCE_RISE; at least one mark."""
@@ -232,31 +234,28 @@ def track_bounds(grid: Grid, track_cells: slice) -> tuple[tuple[float, float], t
 
 def add_mark(dug: Field, piled: Field, mark: WearMark, at: tuple[float, float], grid: Grid) -> None:
     """Add a mark at a point to the fields of grooves and ridges [m], in place, as cell means."""
-    divided = [
-        int(np.clip(np.ceil(MIN_POINTS * step / mark.width), 1, MAX_SUBDIVISION))
-        for step in grid.spacing
-    ]
-    spans = (0.5 * mark.length + mark.reach, mark.reach)
-    cells, places = [], []
-    for axis in (0, 1):
-        step, low = grid.spacing[axis], grid.lower[axis]
-        first, last = (
-            int(np.floor((at[axis] + sign * spans[axis] - low) / step)) for sign in (-1.0, 1.0)
-        )
-        last = min(last, first + grid.cells[axis] - 1)
-        index = np.arange(first, last + 1)
-        fine = (np.arange(index.size * divided[axis]) + 0.5) / divided[axis]
-        places.append(low + (first + fine) * step - at[axis])
-        cells.append(index)
-    keep = np.ones(cells[1].size, dtype=bool)
+    rows, x = _points_under(grid, 0, mark, at[0])
+    columns, y = _points_under(grid, 1, mark, at[1])
+    keep = np.ones(columns.size, dtype=bool)
     if not grid.periodic[1]:
-        keep = (cells[1] >= 0) & (cells[1] < grid.cells[1])
-    inside = np.ix_(cells[0] % grid.cells[0], cells[1][keep] % grid.cells[1])
-    shape = (cells[0].size, divided[0], cells[1].size, divided[1])
-    for field, heights in zip(
-        (dug, piled), mark.heights(places[0][:, None], places[1][None, :]), strict=True
-    ):
+        keep = (columns >= 0) & (columns < grid.cells[1])
+    inside = np.ix_(rows % grid.cells[0], columns[keep] % grid.cells[1])
+    shape = (rows.size, x.size // rows.size, columns.size, y.size // columns.size)
+    for field, heights in zip((dug, piled), mark.heights(x[:, None], y[None, :]), strict=True):
         field[inside] += heights.reshape(shape).mean(axis=(1, 3))[:, keep]
+
+
+def _points_under(
+    grid: Grid, axis: int, mark: WearMark, centre: float
+) -> tuple[npt.NDArray[np.intp], Field]:
+    """Return the cells under a mark along an axis, and points in them from the mark's centre."""
+    step, low = grid.spacing[axis], grid.lower[axis]
+    divided = int(np.clip(np.ceil(MIN_POINTS * step / mark.width), 1, MAX_SUBDIVISION))
+    span = 0.5 * mark.length + mark.reach if axis == 0 else mark.reach
+    first, last = (int(np.floor((centre + sign * span - low) / step)) for sign in (-1.0, 1.0))
+    cells = np.arange(first, min(last, first + grid.cells[axis] - 1) + 1)
+    fine = (np.arange(cells.size * divided) + 0.5) / divided
+    return cells, low + (first + fine) * step - centre
 
 
 PLOUGHING: dict[str, type[Ploughing]] = {"debris": Ploughing}

@@ -9,7 +9,7 @@ cells fail; material that comes up from below the deepest layer is undamaged.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, TypeAlias
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,7 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import Parameter, Parametric
 from asperity.wear.mechanism import Change, Passage, Patch
 
-Cells: TypeAlias = npt.NDArray[np.signedinteger[Any]]
+Cells: TypeAlias = npt.NDArray[np.intp]
 LAYERS = 8
 DEEPEST = 1.0  # Hertz half-widths
 # c/e = (31/3)/(10/9): exponent of life over shear stress, Lundberg and Palmgren (1947)
@@ -66,21 +66,7 @@ class Pits(Parametric):
         damage = np.asarray(state.get("damage", np.zeros((depths.size, *passage.grid.cells))))
         strength = np.asarray(state["strength"]) if "strength" in state else self._strength(passage)
         damage = shift_damage(damage, depths, passage.removed)
-        stressed, left = 0.0, np.full(damage.shape, np.inf)
-        for layer, depth in enumerate(depths):
-            path = stress_path(
-                passage.patches, passage.grid, float(depth), passage.material.poisson_ratio
-            )
-            measure = self.stress_measure(path).reshape(passage.grid.cells) / strength
-            stressed = max(stressed, float(measure.max()))
-            rate = self.damage(measure)
-            damage[layer] += passage.jump * rate
-            np.divide(
-                1.0 - damage[layer],
-                rate,
-                out=left[layer],
-                where=(rate > 0.0) & (damage[layer] < 1.0),
-            )
+        stressed, left = self._add_damage(damage, depths, strength, passage)
         fullest = float(damage.max())
         failed = damage >= 1.0
         pits, damage = break_out_pits(damage, depths, failed, passage.grid, self.aspect)
@@ -98,6 +84,23 @@ class Pits(Parametric):
             facts=facts,
             longest=overrollings_to_failures(left),
         )
+
+    def _add_damage(
+        self, damage: Field, depths: Field, strength: Field, passage: Passage
+    ) -> tuple[float, Field]:
+        """Add the damage of the jump in place; return the largest measure and remaining lives."""
+        stressed, left = 0.0, np.full(damage.shape, np.inf)
+        for layer, depth in enumerate(depths):
+            path = stress_path(
+                passage.patches, passage.grid, float(depth), passage.material.poisson_ratio
+            )
+            measure = self.stress_measure(path).reshape(passage.grid.cells) / strength
+            stressed = max(stressed, float(measure.max()))
+            rate = self.damage(measure)
+            damage[layer] += passage.jump * rate
+            unfailed = (rate > 0.0) & (damage[layer] < 1.0)
+            np.divide(1.0 - damage[layer], rate, out=left[layer], where=unfailed)
+        return stressed, left
 
     def stress_measure(self, path: Field) -> Field:
         """Return the measure [Pa] of stress paths (6, paths, positions); exact above the limit."""
@@ -237,10 +240,8 @@ def break_out_pits(
         here = deepest == layer
         bowl, (half_x, half_y) = _bowl(float(depths[layer]), grid, aspect)
         for i, j in np.argwhere(here):
-            rows, columns = (
-                _window(int(i), half_x, grid.cells[0], True),
-                _window(int(j), half_y, *_along_y(grid)),
-            )
+            rows = _window(int(i), half_x, grid.cells[0], True)
+            columns = _window(int(j), half_y, *_along_y(grid))
             inside = np.ix_(rows[0], columns[0])
             pits[inside] = np.maximum(pits[inside], bowl[np.ix_(rows[1], columns[1])])
         remaining[: layer + 1, here] = damage[layer + 1, here] if layer + 1 < depths.size else 0.0
@@ -254,22 +255,26 @@ def _along_y(grid: Grid) -> tuple[int, bool]:
 def _bowl(depth: float, grid: Grid, aspect: float) -> tuple[Field, tuple[int, int]]:
     """Return the cell means of a bowl about the middle cell, and the cells on either side."""
     radius = 0.5 * aspect * depth
-    halves, places = [], []
-    for step, count in zip(grid.spacing, grid.cells, strict=True):
-        half = min(int(np.ceil(radius / step - 0.5)), (count - 1) // 2)
-        divided = int(np.clip(np.ceil(MIN_POINTS * step / radius), 1, MAX_SUBDIVISION))
-        fine = (np.arange((2 * half + 1) * divided) + 0.5) / divided
-        places.append((fine - half - 0.5) * step)
-        halves.append((half, divided))
-    (half_x, divided_x), (half_y, divided_y) = halves
-    square = (places[0][:, None] ** 2 + places[1][None, :] ** 2) / radius**2
-    cells = (2 * half_x + 1, divided_x, 2 * half_y + 1, divided_y)
+    (half_x, x), (half_y, y) = (
+        _bowl_points(radius, step, count)
+        for step, count in zip(grid.spacing, grid.cells, strict=True)
+    )
+    square = (x[:, None] ** 2 + y[None, :] ** 2) / radius**2
+    cells = (2 * half_x + 1, -1, 2 * half_y + 1, y.size // (2 * half_y + 1))
     bowl = np.maximum(1.0 - square, 0.0).reshape(cells).mean(axis=(1, 3))
     if not bowl.any():  # much narrower than a cell
         bowl[half_x, half_y] = 1.0
     if all(2.0 * radius < extent for extent in grid.extent):
         bowl *= 0.5 * np.pi * radius**2 / float(bowl.sum() * np.prod(grid.spacing))
     return depth * bowl, (half_x, half_y)
+
+
+def _bowl_points(radius: float, step: float, count: int) -> tuple[int, Field]:
+    """Return the cells on either side of a bowl's middle along an axis, and points in all cells."""
+    half = min(int(np.ceil(radius / step - 0.5)), (count - 1) // 2)
+    divided = int(np.clip(np.ceil(MIN_POINTS * step / radius), 1, MAX_SUBDIVISION))
+    fine = (np.arange((2 * half + 1) * divided) + 0.5) / divided
+    return half, (fine - half - 0.5) * step
 
 
 def _window(at: int, half: int, count: int, repeats: bool) -> tuple[Cells, Cells]:

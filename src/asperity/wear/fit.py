@@ -9,12 +9,12 @@ gain material.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from asperity import recording, surface
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput, UnreadableFile, require_positive
 from asperity.core.quantities import quantity
 from asperity.wear.laws import SCATTER
@@ -91,7 +91,7 @@ class WearFit:
     second_distance: float
     notes: tuple[str, ...]
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> JsonObject:
         """Return the values of `asperity wear --json` for a fit."""
         trace, scar = self.trace, self.scar
         return {
@@ -119,11 +119,9 @@ class WearFit:
 
     def verdict(self) -> str:
         """Return one sentence: k with its interval, and the predicted loss in a second test."""
-        k, second, ends = (
-            quantity("wear_coefficient"),
-            quantity("second_volume_m3"),
-            self.second_volume,
-        )
+        k = quantity("wear_coefficient")
+        second = quantity("second_volume_m3")
+        ends = self.second_volume
         return (
             f"k is {k.text(self.k.median)} (90 % interval {k.number(self.k.low)} to "
             f"{k.text(self.k.high)}); predicted loss in a second test of "
@@ -152,12 +150,7 @@ def read_friction_trace(
     name, notes = Path(path).name, []
     mu, force = columns["coefficient"], columns["force"]
     if load is None:
-        if mu is None or force is None:
-            raise BadInput(
-                f"{name} lacks a column of coefficient or friction force; state the load"
-            )
-        known = np.abs(mu) > 0.01
-        load = float(np.median(force[known] / mu[known]))
+        load = _median_load(name, mu, force)
         notes.append(f"load {load:.4g} N: friction force over coefficient")
     require_positive("load", load, "N")
     if mu is None:
@@ -186,6 +179,13 @@ def read_friction_trace(
     )
 
 
+def _median_load(name: str, mu: Field | None, force: Field | None) -> float:
+    if mu is None or force is None:
+        raise BadInput(f"{name} lacks a column of coefficient or friction force; state the load")
+    known = np.abs(mu) > 0.01
+    return float(np.median(force[known] / mu[known]))
+
+
 def _column(opened: list[recording.OpenRecording], names: tuple[str, ...]) -> Field | None:
     """Return the values of the first column whose title matches one of the names."""
     for column in opened:
@@ -195,15 +195,19 @@ def _column(opened: list[recording.OpenRecording], names: tuple[str, ...]) -> Fi
     return None
 
 
+def _end(name: str, label: str, value: float | None) -> float | None:
+    if value is not None and not 0.0 < value < np.inf:
+        raise UnreadableFile(f"{name} ends with a {label} of {value:g}; it must be positive")
+    return value
+
+
 def _way(
     name: str, distance: Field | None, laps: Field | None, radius: float | None, notes: list[str]
 ) -> tuple[float, float, float, float]:
     """Return distance [m], laps, radius [m] and the relative mismatch of record and radius."""
-    length = None if distance is None else float(distance[-1])
-    turns = None if laps is None else float(laps[-1])
-    for label, value in (("distance", length), ("number of laps", turns), ("track radius", radius)):
-        if value is not None and not 0.0 < value < np.inf:
-            raise UnreadableFile(f"{name} ends with a {label} of {value:g}; it must be positive")
+    length = _end(name, "distance", None if distance is None else float(distance[-1]))
+    turns = _end(name, "number of laps", None if laps is None else float(laps[-1]))
+    radius = _end(name, "track radius", radius)
     if length is not None and turns is not None:
         recorded = length / turns / (2.0 * np.pi)
         if radius is None:
@@ -255,16 +259,7 @@ def fit_wear_coefficient(
         "second distance", trace.distance if second_distance is None else second_distance, "m"
     )
     rng = np.random.default_rng(seed)
-    missing, piled = _drawn_areas(scar, rng)
-    own = rng.uniform(0.0, np.minimum(1.0, missing / np.maximum(piled, np.finfo(float).tiny)))
-    lost = (missing - own * piled) * np.maximum(
-        1.0 + AREA_SCATTER * rng.standard_normal(DRAWS), 0.0
-    )
-    k = (
-        lost
-        / (trace.load * trace.laps)
-        * (1.0 + trace.distance_error * rng.uniform(-1.0, 1.0, DRAWS))
-    )
+    k = _drawn_coefficients(trace, scar, rng)
     volume = k * trace.load * trace.distance
     again = k * np.exp(
         np.sqrt(2.0) * SCATTER * rng.standard_normal(DRAWS)
@@ -283,6 +278,17 @@ def fit_wear_coefficient(
         second_distance=length,
         notes=_notes(trace, scar),
     )
+
+
+def _drawn_coefficients(trace: FrictionTrace, scar: Scar, rng: np.random.Generator) -> Field:
+    """Draw wear coefficients; an unknown share of the material piled up is the disc's own."""
+    missing, piled = _drawn_areas(scar, rng)
+    own = rng.uniform(0.0, np.minimum(1.0, missing / np.maximum(piled, np.finfo(float).tiny)))
+    lost = (missing - own * piled) * np.maximum(
+        1.0 + AREA_SCATTER * rng.standard_normal(DRAWS), 0.0
+    )
+    error = 1.0 + trace.distance_error * rng.uniform(-1.0, 1.0, DRAWS)
+    return np.asarray(lost / (trace.load * trace.laps) * error)
 
 
 def _drawn_areas(scar: Scar, rng: np.random.Generator) -> tuple[Field, Field]:

@@ -10,15 +10,14 @@ resumes with identical results.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 
-MechanismState = Mapping[str, npt.NDArray[Any]]
+MechanismState = Mapping[str, Field]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,10 +5,12 @@ choice, and from the waviness of the old surface, is measured on the profile its
 evaluation is repeated where nothing was worn.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
@@ -127,7 +129,15 @@ def _track(x: Field, off: Field, roughness: float, name: str) -> tuple[int, int]
             "track"
         )
     parts = np.split(outstanding, np.flatnonzero(np.diff(outstanding) > 1) + 1)
-    low = high = int(np.argmax([np.abs(off[part]).sum() for part in parts]))
+    first, last = _close_gaps(x, parts, int(np.argmax([np.abs(off[part]).sum() for part in parts])))
+    quiet = np.flatnonzero(np.abs(off) <= roughness)
+    before, after = quiet[quiet < first], quiet[quiet > last]
+    return int(before[-1]) if before.size else 0, int(after[0]) if after.size else x.size - 1
+
+
+def _close_gaps(x: Field, parts: Sequence[npt.NDArray[np.intp]], largest: int) -> tuple[int, int]:
+    """Return first and last point of the largest part and of those that narrow gaps separate."""
+    low = high = largest
     grown = True
     while grown:
         grown, first, last = False, int(parts[low][0]), int(parts[high][-1])
@@ -136,9 +146,7 @@ def _track(x: Field, off: Field, roughness: float, name: str) -> tuple[int, int]
             low, grown = low - 1, True
         if high < len(parts) - 1 and x[parts[high + 1][0]] - x[last] <= reach:
             high, grown = high + 1, True
-    quiet = np.flatnonzero(np.abs(off) <= roughness)
-    before, after = quiet[quiet < parts[low][0]], quiet[quiet > parts[high][-1]]
-    return int(before[-1]) if before.size else 0, int(after[0]) if after.size else x.size - 1
+    return first, last
 
 
 def _old_surface(
