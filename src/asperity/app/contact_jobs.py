@@ -8,11 +8,11 @@ import hashlib
 import itertools
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, MutableSequence, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -79,10 +79,11 @@ class CoarseResult:
     solution: ContactSolution | None
 
 
-_newest: Any = None  # latest job number of each slot, shared with the server process
+# latest job number of each slot, shared with the server process
+_newest: MutableSequence[int] | None = None
 
 
-def set_up(newest: Any) -> None:
+def set_up(newest: MutableSequence[int]) -> None:
     """Initialise a worker process: one thread, ends with its parent, shares the job numbers."""
     global _newest
     set_up_worker()
@@ -107,7 +108,7 @@ def _progress_hook(
     return check
 
 
-def run_job(work: Callable[..., Any], *arguments: Any) -> Any:
+def run_job(work: Callable[..., object], *arguments: object) -> object:
     """Run a job; return errors as `JobFailure`, because not every exception can be pickled."""
     try:
         return work(*arguments)

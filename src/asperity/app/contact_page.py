@@ -2,9 +2,8 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-from bokeh.models import Column
+from bokeh.models import Column, UIElement
 
 from asperity.app import export
 from asperity.app.contact_jobs import JobFailure, ReportWriter, make_report, open_surface
@@ -24,6 +23,8 @@ from asperity.app.widgets import (
     TILE_STYLES,
     Download,
     InputWidget,
+    Layout,
+    PageBlock,
     StaleMark,
     button,
     button_row,
@@ -68,12 +69,19 @@ class ContactView:
             settings, JobQueue(worker_pool, deliver), self.draw, JobQueue(worker_pool, deliver)
         )
         self._side_jobs = JobQueue(worker_pool, deliver)
+        self.inputs: dict[str, InputWidget] = {}
+        self._built: Case | None = None
+        self._more = False
+        self._drawn: tuple[ContactResult, ContactResult | None] | None = None
+        self._create_outputs()
+        self._create_controls()
+        self._build_knobs()
+
+    def _create_outputs(self) -> None:
+        """Create texts, and placeholders of the figures."""
         self.maps = MapImages()
-        self.spectrum, self.share, self.resonance = (
-            placeholder(SPECTRUM_HEIGHT),
-            placeholder(TRIALS_HEIGHT),
-            placeholder(TRIALS_HEIGHT),
-        )
+        self.spectrum = placeholder(SPECTRUM_HEIGHT)
+        self.share, self.resonance = placeholder(TRIALS_HEIGHT), placeholder(TRIALS_HEIGHT)
         self._spectrum: SpectrumFigure | None = None
         self._trials: TrialFigures | None = None
         self._pending_figures = [*self.maps.steps(), self._make_spectrum, self._make_trials]
@@ -81,11 +89,10 @@ class ContactView:
         self.tiles = text_block(TILE_STYLES)
         self.stale_mark = StaleMark(self.status)
         self.download = Download()
-        self.inputs: dict[str, InputWidget] = {}
-        self._built: Case | None = None
+
+    def _create_controls(self) -> None:
+        """Create the column of inputs, the file drop and the buttons."""
         self.input_column = Column(sizing_mode="stretch_width", stylesheets=[INHERIT])
-        self._more = False
-        self._drawn: tuple[ContactResult, ContactResult | None] | None = None
         self.drop = FileDrop(
             limit=SURFACE_LIMIT,
             on_file=self._surface_dropped,
@@ -105,7 +112,6 @@ class ContactView:
             button("Python script", self._give_script),
             self.report,
         )
-        self._build_knobs()
 
     def begin(self, query: str, result: ContactResult | None = None) -> None:
         """Show a stored result, or solve the contact that the address describes."""
@@ -216,7 +222,7 @@ class ContactView:
         if self.session.settings.opened is not self._built:
             self._built = self.session.settings.opened
             self.inputs.clear()
-        children: list[Any] = []
+        children: list[UIElement] = []
         group = ""
         for key, case_input in self.session.settings.inputs.items():
             if case_input.more and not self._more:
@@ -261,10 +267,11 @@ class ContactView:
         case = self.session.settings.case
         self._side_jobs.submit((open_surface, (case, path)), self._surface_read)
 
-    def _surface_read(self, result: Any) -> None:
+    def _surface_read(self, result: object) -> None:
         if isinstance(result, JobFailure):
             self._say(result.message)
             return
+        assert isinstance(result, tuple)
         case, held, steps = result
         self._surfaces.add(held, case)
         self.message.text = sentences((*steps, LINK_NOTE), "soft")
@@ -284,12 +291,12 @@ class ContactView:
             (make_report, (self.session.settings.case, self._write_report)), self._report_made
         )
 
-    def _report_made(self, result: Any) -> None:
+    def _report_made(self, result: object) -> None:
         self.report.disabled, self.report.label = False, "Report"
         if isinstance(result, JobFailure):
             self._say(result.message)
         else:
-            self.download.offer(export.REPORT, "text/html", result)
+            self.download.offer(export.REPORT, "text/html", str(result))
 
 
 def _spectrum_title(result: ContactResult) -> str:
@@ -306,7 +313,7 @@ def _spectrum_title(result: ContactResult) -> str:
     return f"{crf.named(spectrum.crf_hz)}{fitted}"
 
 
-def layout(view: ContactView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+def layout(view: ContactView) -> Layout:
     """Return the parts of the page by name, and the sections that contain them."""
     parts = {
         "inputs": view.input_column,
@@ -327,8 +334,8 @@ def layout(view: ContactView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         "notes": view.notes,
         "download": view.download.model,
     }
-    inputs: list[dict[str, Any]] = [{"names": [name]} for name in ("inputs", "more", "drop")]
-    results: list[dict[str, Any]] = [
+    inputs: list[PageBlock] = [{"names": [name]} for name in ("inputs", "more", "drop")]
+    results: list[PageBlock] = [
         {"names": ["status"], "live": True, "first": True},
         {"names": ["message"], "live": True, "first": True},
         {"names": ["tiles"], "first": True},

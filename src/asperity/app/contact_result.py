@@ -4,9 +4,11 @@ All values come from the run, its quantities or the closed forms of Hertz.
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import Grid
@@ -48,6 +50,9 @@ class ResultTile(NamedTuple):
         return f"{title[:1].upper()}{title[1:]}"
 
 
+Numbers: TypeAlias = dict[str, Any]  # by key of the catalogue, SI
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResonanceSpectrum:
     """Spectrum around the search band with the fitted resonance; `reason` if there is none.
@@ -79,7 +84,7 @@ class ContactMaps:
     extent: tuple[tuple[float, float], tuple[float, float]]
     gap: Field
     pressure: Field
-    cells: Any
+    cells: npt.NDArray[np.uint8]
     gap_top: float
     half_widths: tuple[float, float]
     hertz_pressure: float
@@ -110,7 +115,7 @@ class ContactResult(ContactMaps):
     verdict: str
     explained: str
     notes: tuple[str, ...]
-    row: dict[str, Any]
+    row: Numbers
     seconds: float
     spectrum: ResonanceSpectrum | None = None
 
@@ -146,7 +151,7 @@ class ContactResult(ContactMaps):
         return "" if entry.key in BY_FORMULA else NOT_DETERMINED
 
 
-def numbers_of(run: Run) -> dict[str, Any]:
+def numbers_of(run: Run) -> Numbers:
     """Return the numbers of a run that the page shows, with their uncertainties."""
     tiles = [quantity(key) for key in TILES]
     deviations = [quantity(entry.deviation) for entry in tiles if entry.deviation]
@@ -188,7 +193,7 @@ def coarse_result(solution: ContactSolution, text: str, seconds: float) -> Conta
 
 
 def _build_result(
-    solution: ContactSolution, text: str, row: dict[str, Any], **fields: Any
+    solution: ContactSolution, text: str, row: Numbers, **fields: Any
 ) -> ContactResult:
     maps = map_fields(
         solution.conditions,
@@ -242,14 +247,15 @@ def _resonance_spectrum(run: Run) -> ResonanceSpectrum | None:
     if vibration is None:
         return None
     (low, high), resonance = vibration.band_hz, vibration.resonance
-    band: dict[str, Any] = {
-        "band_hz": vibration.band_hz,
-        "full_load_crf_hz": vibration.full_load_crf_hz,
-    }
+    spectrum_in_band = partial(
+        ResonanceSpectrum,
+        band_hz=vibration.band_hz,
+        full_load_crf_hz=vibration.full_load_crf_hz,
+    )
     empty = np.empty(0)
     if vibration.spectrum is None:
-        return ResonanceSpectrum(
-            frequency=empty, density=empty, curve=empty, reason=resonance.reason, **band
+        return spectrum_in_band(
+            frequency=empty, density=empty, curve=empty, reason=resonance.reason
         )
     margin = 0.35 * (high - low)
     spectrum = vibration.spectrum
@@ -261,14 +267,13 @@ def _resonance_spectrum(run: Run) -> ResonanceSpectrum | None:
     )
     curve = resonance.curve(frequency) if np.isfinite(resonance.damping_ratio) else empty
     found = resonance.found
-    return ResonanceSpectrum(
+    return spectrum_in_band(
         frequency=frequency,
         density=density,
         curve=curve,
         crf_hz=resonance.crf_hz if found else None,
         crf_std_hz=resonance.crf_std if found and np.isfinite(resonance.crf_std) else None,
         reason=resonance.reason,
-        **band,
     )
 
 
@@ -277,7 +282,7 @@ def group_means(values: Field, size: int) -> Field:
     return np.asarray(values[: values.size // size * size].reshape(-1, size).mean(axis=1))
 
 
-def difference(key: str, value: Any, pinned: Any) -> str:
+def difference(key: str, value: float | None, pinned: float | None) -> str:
     """Return the difference of a number to the pinned contact's, with unit; a dash if unknown."""
     if value is None or pinned is None:
         return NO_VALUE

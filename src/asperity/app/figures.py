@@ -5,7 +5,7 @@ the style sheet, so that switching between light and dark redraws nothing.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from bokeh.events import Tap
@@ -15,12 +15,14 @@ from bokeh.models import (
     ColumnDataSource,
     CrosshairTool,
     HoverTool,
+    LegendItem,
     LinearColorMapper,
     Range1d,
     Span,
 )
 from bokeh.palettes import Inferno256, RdBu11, Viridis256, interp_palette
 from bokeh.plotting import figure
+from numpy.typing import ArrayLike
 
 from asperity.app.contact_result import CAVITATED, TOUCHING, ContactMaps, ResonanceSpectrum
 from asperity.app.session import Trial
@@ -33,18 +35,21 @@ CONTACT, CAVITY = (0xF7, 0xDC, 0x4A), (0x5B, 0x6B, 0x86)
 # text of legends and colour bars, which ignore the style sheet: legible on light and dark
 TYPE = "#74818f"
 HEIGHT, SECTION_HEIGHT, SPECTRUM_HEIGHT, TRIALS_HEIGHT = 300, 250, 480, 240
+Plot: TypeAlias = Any  # a figure of Bokeh, whose types lack the attributes that are set here
+Array: TypeAlias = Any  # numbers of any shape
+Source: TypeAlias = dict[str, Any]  # columns of a data source by name
 ASPECT_RANGE = (0.9, 2.0)  # of maps, width over height
 MAP_SHARE = 0.8  # of a figure's width, the rest being axes
 
 
-def to_display(key: str, values: Any) -> Any:
+def to_display(key: str, values: ArrayLike) -> Array:
     """Convert stored values of a quantity to its display unit."""
     return np.asarray(values) * quantity(key).factor
 
 
 def plain_figure(
-    x: str, y: str, *, label: str, height: int = HEIGHT, tapped: bool = False, **settings: Any
-) -> Any:
+    x: str, y: str, *, label: str, height: int = HEIGHT, tapped: bool = False, **settings: object
+) -> Plot:
     """Create an empty figure with axis labels from the catalogue.
 
     `label` is its name for screen readers; `tapped` makes its markers clickable.
@@ -65,7 +70,7 @@ def plain_figure(
     return plot
 
 
-def _key_above(plot: Any) -> Any:
+def _key_above(plot: Plot) -> LegendItem:
     """Move the legend above the figure; hide and return its last entry."""
     legend = plot.legend[0]
     plot.center.remove(legend)
@@ -93,10 +98,10 @@ class MapFigures:
         )
         self.film = self._map("Film thickness, contact and cavitation", FILMS, "gap")
         self.pressure = self._map("Pressure", Inferno256, "pressure")
-        self.change: Any = None  # created when a contact is pinned
+        self.change: Plot | None = None  # created when a contact is pinned
         self.compares = False
 
-    def _map(self, title: str, palette: Sequence[str], key: str) -> Any:
+    def _map(self, title: str, palette: Sequence[str], key: str) -> Plot:
         plot = plain_figure(
             "x_m",
             "y_m",
@@ -145,41 +150,37 @@ class MapFigures:
     def show(self, result: ContactMaps, pinned: ContactMaps | None) -> None:
         """Draw a result, and its film minus a pinned one on the same grid (`compares`)."""
         (x0, x1), (y0, y1) = ((to_display("x_m", end) for end in ends) for ends in result.extent)
-        self.x.update(start=x0, end=x1, reset_start=x0, reset_end=x1)
-        self.y.update(start=y0, end=y1, reset_start=y0, reset_end=y1)
         self.compares = pinned is not None and pinned.gap.shape == result.gap.shape
         if self.compares and self.change is None:
             self.change = self._map("Film minus pinned film", CHANGES, "gap")
-        low, high = ASPECT_RANGE
-        shape = MAP_SHARE * min(max(float((x1 - x0) / (y1 - y0)), low), high)
-        for plot in self._figures():
-            plot.aspect_ratio = shape
+        self._set_extent((x0, x1), (y0, y1))
         place = {"x": [x0], "y": [y0], "dw": [x1 - x0], "dh": [y1 - y0]}
-        marks = _state_colours(result)
-        self._fill(
-            self.film,
-            to_display("gap", result.gap),
-            (0.0, to_display("gap", result.gap_top) or 1.0),
-            place,
-            marks,
-        )
+        gap, top = to_display("gap", result.gap), to_display("gap", result.gap_top) or 1.0
+        self._fill(self.film, gap, (0.0, top), place, _state_colours(result))
         largest = max(float(result.pressure.max()), result.hertz_pressure)
-        self._fill(
-            self.pressure,
-            to_display("pressure", result.pressure),
-            (0.0, to_display("pressure", largest)),
-            place,
-            None,
-        )
+        pressure, top = to_display("pressure", result.pressure), to_display("pressure", largest)
+        self._fill(self.pressure, pressure, (0.0, top), place, None)
         zone = _hertz_outline(result, (y0, y1))
         for plot in self._figures():
             plot.tags[0]["zone"].data = zone
         if self.compares and pinned is not None:
-            change = to_display("gap", result.gap - pinned.gap)
-            limit = float(np.percentile(np.abs(change), 98.0)) or 1.0
-            self._fill(self.change, change, (-limit, limit), place, None)
+            self._fill_change(to_display("gap", result.gap - pinned.gap), place)
 
-    def _figures(self) -> list[Any]:
+    def _fill_change(self, change: Array, place: Source) -> None:
+        limit = float(np.percentile(np.abs(change), 98.0)) or 1.0
+        self._fill(self.change, change, (-limit, limit), place, None)
+
+    def _set_extent(self, x: tuple[float, float], y: tuple[float, float]) -> None:
+        """Set ends and shape of all maps, in the display unit."""
+        (x0, x1), (y0, y1) = x, y
+        self.x.update(start=x0, end=x1, reset_start=x0, reset_end=x1)
+        self.y.update(start=y0, end=y1, reset_start=y0, reset_end=y1)
+        low, high = ASPECT_RANGE
+        shape = MAP_SHARE * min(max(float((x1 - x0) / (y1 - y0)), low), high)
+        for plot in self._figures():
+            plot.aspect_ratio = shape
+
+    def _figures(self) -> list[Plot]:
         return [self.film, self.pressure, *([] if self.change is None else [self.change])]
 
     def cut(self, y: float) -> None:
@@ -189,7 +190,7 @@ class MapFigures:
 
     @staticmethod
     def _fill(
-        plot: Any, values: Any, ends: tuple[float, float], place: dict[str, Any], marks: Any
+        plot: Plot, values: Array, ends: tuple[float, float], place: Source, marks: Array | None
     ) -> None:
         parts = plot.tags[0]
         parts["mapper"].update(low=float(ends[0]), high=float(ends[1]))
@@ -198,19 +199,20 @@ class MapFigures:
             parts["overlay"].data = {"image": [marks], **place}
 
 
-def _state_colours(result: ContactMaps) -> Any:
+def _state_colours(result: ContactMaps) -> Array:
     """Return contact and cavitation as colours over the film, shape (ny, nx)."""
     colours = np.zeros((*result.cells.T.shape, 4), np.uint8)
     cells = result.cells.T
     colours[cells == TOUCHING] = (*CONTACT, 255)
     cavitated = cells == CAVITATED
-    i, j = np.indices(cells.shape, sparse=True)
+    rows, columns = cells.shape
+    i, j = np.indices((rows, columns), sparse=True)
     colours[cavitated] = (*CAVITY, 150)
     colours[cavitated & ((i + j) % 6 < 2)] = (*CAVITY, 235)
     return colours.view(np.uint32).reshape(cells.shape)
 
 
-def _hertz_outline(result: ContactMaps, ends: tuple[float, float]) -> dict[str, Any]:
+def _hertz_outline(result: ContactMaps, ends: tuple[float, float]) -> Source:
     """Return the outline of the smooth, dry contact in the display unit."""
     a, b = (to_display("x_m", half) for half in result.half_widths)
     if result.endless:
@@ -288,7 +290,7 @@ class SectionFigures:
         self.film.y_range.update(start=0.0, end=1.2 * float(to_display("gap", top)) or 1.0)
 
     @staticmethod
-    def _line(result: ContactMaps, row: int) -> dict[str, Any]:
+    def _line(result: ContactMaps, row: int) -> Source:
         touching = np.where(result.cells[:, row] == TOUCHING, 0.0, np.nan)
         return {
             "x": to_display("x_m", result.x),
@@ -321,8 +323,7 @@ class SpectrumFigure:
         )
         for mark in (self.band, self.deviation, self.crf, self.full_load):
             self.figure.add_layout(mark)
-        empty: dict[str, Any] = {"f": [], "s": []}
-        self.now, self.fit, self.then = (ColumnDataSource(dict(empty)) for _ in range(3))
+        self.now, self.fit, self.then = (ColumnDataSource({"f": [], "s": []}) for _ in range(3))
         self.figure.line("f", "s", source=self.now, color=GREY, legend_label="spectrum")
         self.figure.line(
             "f",
@@ -388,10 +389,10 @@ class TrialFigures:
             "indices", lambda _name, _old, new: chosen(new[0]) if new else None
         )
 
-    def _plane(self, x: str, y: str, x_column: str, y_column: str, label: str) -> Any:
+    def _plane(self, x: str, y: str, x_column: str, y_column: str, label: str) -> Plot:
         plot = plain_figure(x, y, label=label, title=label, height=TRIALS_HEIGHT, tapped=True)
         plot.scatter(x_column, y_column, source=self.source, size=10, color=BLUE, alpha="alpha")
-        highlight: dict[str, Any] = {"line_color": VERMILION, "fill_alpha": 0, "line_width": 2}
+        highlight: Source = {"line_color": VERMILION, "fill_alpha": 0, "line_width": 2}
         plot.scatter(x_column, y_column, source=self.last, size=15, **highlight)
         return plot
 

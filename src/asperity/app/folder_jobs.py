@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,7 +58,7 @@ class StudyData:
     outputs: dict[str, Field]
     numbers: tuple[int, ...]
     means: dict[tuple[str, str], tuple[Field, Field, Field, Field]]
-    changed: tuple[dict[str, Any], ...]  # overrides of each row's case, by key
+    changed: tuple[dict[str, object], ...]  # overrides of each row's case, by key
 
 
 def open_study(ticket: Ticket, folder: Path) -> StudyData:  # noqa: ARG001

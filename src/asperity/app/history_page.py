@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from bokeh.models import Column, ColumnDataSource, Range1d, Slider, Span
 
@@ -11,7 +10,7 @@ from asperity.app.figures import BLUE, VERMILION, plain_figure, to_display
 from asperity.app.folder_jobs import HistoryData, open_history
 from asperity.app.jobs import JobQueue, WorkerPool
 from asperity.app.map_images import MapImages
-from asperity.app.widgets import BAR, LOOK, button, notes, sentences, text_block
+from asperity.app.widgets import BAR, LOOK, Layout, PageBlock, button, notes, sentences, text_block
 from asperity.core.quantities import quantity
 
 
@@ -64,12 +63,12 @@ class HistoryView:
         self.playing = not self.playing
         self.play.label = "Stop" if self.playing else "Play"
 
-    def _read(self, result: Any) -> None:
+    def _read(self, result: object) -> None:
         if isinstance(result, JobFailure):
             self.status.text = sentences([result.message], "alarm")
             return
-        history: HistoryData = result
-        self.history = history
+        assert isinstance(result, HistoryData)
+        self.history = history = result
         self.verdict.text, self.notes.text = sentences([history.verdict]), notes(history.notes)
         self._draw_curves(history)
         if not history.maps:
@@ -119,7 +118,7 @@ class HistoryView:
         self.status.text = sentences([caption], "soft")
 
 
-def layout(view: HistoryView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+def layout(view: HistoryView) -> Layout:
     """Return the parts of the page by name, and the sections that contain them."""
     parts = {
         "step": view.step,
@@ -134,7 +133,7 @@ def layout(view: HistoryView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         "notes": view.notes,
     }
     key = (("touching", "asperity contact"), ("cavitated", "no pressure"), ("hertz", "Hertz zone"))
-    results = [
+    results: list[PageBlock] = [
         {"names": ["verdict"], "first": True},
         {"names": ["status"], "live": True, "first": True},
         {"names": ["film", "pressure"], "key": key, "first": True},

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from asperity.case import Case, split_amount
+from asperity.core.documents import Table
 from asperity.core.errors import BadInput
 from asperity.core.quantities import Quantity, quantity
 from asperity.coupling import CONTACT_PATCHES, DAMPING_LAWS, EXCITATIONS, STIFFNESS_LAWS
@@ -245,7 +246,7 @@ def case_inputs(case: Case) -> dict[str, CaseInput]:
     }
 
 
-def _names(tables: Mapping[str, Any], key: str) -> tuple[str, ...]:
+def _names(tables: Table, key: str) -> tuple[str, ...]:
     """Return the options of a choice; laws whose required parameters the case lacks are omitted."""
     spec, table = INPUT_SPECS[key], _lookup(tables, key.rpartition(".")[0])
     possible = [name for name, law in spec.laws.items() if _required_parameters(law) <= set(table)]
@@ -297,9 +298,9 @@ def _cells(text: str) -> str:
     )
 
 
-def _lookup(tables: Mapping[str, Any], key: str) -> Any:
+def _lookup(tables: Table, key: str) -> Any:
     """Return the value at a dotted key, or None."""
-    found: Any = tables
+    found: object = tables
     for name in key.split("."):
         if isinstance(found, list) and name.isdigit():
             found = found[int(name)] if int(name) < len(found) else None

@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from logging import getLogger
-from typing import Any
 
 from asperity.app.contact_jobs import JobFailure, Superseded, Ticket, run_job, set_up, warm_up
 from asperity.core.processes import cores
@@ -13,7 +12,9 @@ from asperity.core.processes import cores
 MAX_WORKERS = 4
 SLOTS = 4096  # largest number of queues, three per session
 
-Work = tuple[Callable[..., Any], tuple[Any, ...]]  # function and its arguments after the ticket
+Work = tuple[
+    Callable[..., object], tuple[object, ...]
+]  # function and its arguments after the ticket
 _log = getLogger(__name__)
 
 
@@ -28,7 +29,7 @@ class WorkerPool:
         self.workers = workers or max(1, min(MAX_WORKERS, cores()))
         self._pool = self._new_pool()
         self.warming: list[Future[float]] = []
-        self._running: set[Future[Any]] = set()
+        self._running: set[Future[object]] = set()
 
     def _new_pool(self) -> Executor:
         return ProcessPoolExecutor(self.workers, self._context, set_up, (self.newest,))
@@ -42,7 +43,7 @@ class WorkerPool:
         """True once a worker has warmed up."""
         return any(future.done() for future in self.warming)
 
-    def submit(self, work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+    def submit(self, work: Callable[..., object], *arguments: object) -> "Future[object]":
         """Run a job in a worker; its errors are returned as `JobFailure`."""
         try:
             future = self._pool.submit(run_job, work, *arguments)
@@ -91,7 +92,7 @@ class JobQueue:
         self._slot = worker_pool.acquire_slot()
         self._number = worker_pool.newest[self._slot] if self._slot >= 0 else 0
         self._running = False
-        self._waiting: tuple[Work, Callable[[Any], None]] | None = None
+        self._waiting: tuple[Work, Callable[[object], None]] | None = None
         self.closed = False
 
     @property
@@ -104,7 +105,7 @@ class JobQueue:
         """True if a new job starts at once or replaces the running one."""
         return self._running or self._worker_pool.has_room
 
-    def submit(self, work: Work, on_result: Callable[[Any], None]) -> None:
+    def submit(self, work: Work, on_result: Callable[[object], None]) -> None:
         """Submit a job; `on_result` is called with its outcome unless it is superseded."""
         if self.closed:
             return
@@ -132,7 +133,9 @@ class JobQueue:
             lambda done: self._deliver(lambda: self._finish(done, number, on_result))
         )
 
-    def _finish(self, done: "Future[Any]", number: int, on_result: Callable[[Any], None]) -> None:
+    def _finish(
+        self, done: "Future[object]", number: int, on_result: Callable[[object], None]
+    ) -> None:
         """Pass on the outcome of a job and start the next one."""
         self._running = False
         if self.closed:
@@ -144,7 +147,7 @@ class JobQueue:
             self._next()
 
 
-def job_outcome(done: "Future[Any]") -> Any:
+def job_outcome(done: "Future[object]") -> object:
     """Return the outcome of a job, a `JobFailure` if it failed or its process died."""
     try:
         return done.result()

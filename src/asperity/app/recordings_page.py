@@ -1,9 +1,8 @@
 """Page of recordings, from a watched folder or dropped files: verdict, spectra and trend."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 from bokeh.models import ColumnDataSource, LinearColorMapper, Range1d, Select, Span, TextInput
@@ -15,14 +14,27 @@ from asperity.app.figures import BLUE, GREY, VERMILION, plain_figure
 from asperity.app.jobs import JobQueue, WorkerPool
 from asperity.app.recording_jobs import RecordingInputs, RecordingSeries, track_files, track_folder
 from asperity.app.uploads import FileDrop
-from asperity.app.widgets import DROP, LOOK, TABLE, button, notes, sentences, text_block
+from asperity.app.widgets import (
+    DROP,
+    LOOK,
+    TABLE,
+    Layout,
+    Look,
+    PageBlock,
+    button,
+    notes,
+    sentences,
+    text_block,
+)
 from asperity.case import Case, read_amount
+from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 
 RECORDING_LIMIT = 400_000_000  # bytes of a recording
 NORMAL_90 = 1.6449  # half-width of a normal 90 % interval in standard deviations
 MAX_LEVEL = 30.0  # dB over the median, upper end of the waterfall's colours
+NO_LINE: dict[str, Sequence[float] | Field] = {"f": [], "s": []}
 COLUMNS = ("crf_hz", "crfa", "damping_ratio", "clr")
 
 
@@ -60,7 +72,7 @@ class RecordingsView:
             margin=0,
             stylesheets=[LOOK, DROP],
         )
-        look: dict[str, Any] = {
+        look: Look = {
             "sizing_mode": "stretch_width",
             "stylesheets": [LOOK],
             "margin": (0, 0, 6, 0),
@@ -81,6 +93,11 @@ class RecordingsView:
         self._build_figures()
 
     def _build_figures(self) -> None:
+        self._build_waterfall()
+        self._build_track()
+        self._build_spectrum()
+
+    def _build_waterfall(self) -> None:
         self.waterfall = plain_figure(
             "", "frequency_hz", label="Spectra over the series", title="Spectra", height=320
         )
@@ -98,6 +115,8 @@ class RecordingsView:
         for edge in self._edges:
             self.waterfall.add_layout(edge)
         self.waterfall.x_range, self.waterfall.y_range = Range1d(0, 1), Range1d(0, 1)
+
+    def _build_track(self) -> None:
         self.track = plain_figure(
             "",
             "crf_hz",
@@ -106,8 +125,7 @@ class RecordingsView:
             height=320,
             tapped=True,
         )
-        none: dict[str, Any] = {"x": [], "crf": [], "low": [], "high": [], "colour": []}
-        self._line = ColumnDataSource(none)
+        self._line = ColumnDataSource({name: [] for name in ("x", "crf", "low", "high", "colour")})
         self.track.segment("x", "low", "x", "high", source=self._line, color=GREY)
         self.track.scatter("x", "crf", source=self._line, size=9, color="colour")
         self._split = Span(
@@ -115,6 +133,8 @@ class RecordingsView:
         )
         self.track.add_layout(self._split)
         self._line.selected.on_change("indices", lambda _name, _old, new: self._pick(new))
+
+    def _build_spectrum(self) -> None:
         self.one = plain_figure(
             "frequency_hz",
             "",
@@ -200,12 +220,13 @@ class RecordingsView:
         self._dropped.append(path)
         self.look()
 
-    def _read(self, result: Any) -> None:
+    def _read(self, result: object) -> None:
         if isinstance(result, JobFailure):
             self._say(result.message)
         elif result is None:
             self._tell("No recording has arrived yet; the folder is being watched.")
         else:
+            assert isinstance(result, RecordingSeries)
             self.show(result)
         if len(self._dropped) > self._submitted:
             self.look()  # further files arrived in the meantime
@@ -283,8 +304,7 @@ class RecordingsView:
         self.one.title.text = (
             f"{row['file']}: CRF {crf}" if row["found"] else f"{row['file']}: {row['reason']}"
         )
-        density: dict[str, Any] = {"f": [], "s": []}
-        curve: dict[str, Any] = {"f": [], "s": []}
+        density = curve = NO_LINE
         if spectrum is not None:
             density = {"f": spectrum.frequency[1:], "s": spectrum.density[1:]}
             if spectrum.curve.size > 0:
@@ -311,7 +331,7 @@ def _table(series: RecordingSeries) -> Markup:
     ).format(head, body)
 
 
-def layout(view: RecordingsView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+def layout(view: RecordingsView) -> Layout:
     """Return the parts of the page by name, and the sections that contain them."""
     parts = {
         "drop": view.drop,
@@ -329,8 +349,9 @@ def layout(view: RecordingsView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         "table": view.table,
         "notes": view.notes,
     }
-    inputs = [{"names": [name]} for name in ("drop", "rate", "unit", "channel", "band", "again")]
-    results = [
+    names = ("drop", "rate", "unit", "channel", "band", "again")
+    inputs: list[PageBlock] = [{"names": [name]} for name in names]
+    results: list[PageBlock] = [
         {"names": ["status"], "live": True, "first": True},
         {"names": ["verdict"], "first": True},
         {"names": ["waterfall", "track"], "first": True},

@@ -28,6 +28,7 @@ from asperity.app.opening import OpenedPage
 from asperity.app.session_cleanup import CLEANUP_MS, SessionSweeper, freeze_objects
 from asperity.app.settings import Settings
 from asperity.app.surface_store import SurfaceStore
+from asperity.app.widgets import PageBlock, PageSection
 from asperity.core.errors import BadInput
 
 LOCALHOST = "127.0.0.1"
@@ -88,7 +89,7 @@ def require_free(address: str, port: int) -> int:
         raise BadInput(f"--port must be 0 to 65535, got {port}") from None
 
 
-_BLOCK: dict[str, Any] = {
+_BLOCK: PageBlock = {
     "heading": "",
     "live": False,
     "first": False,
@@ -174,7 +175,7 @@ class PageSite:
         return {name: creators[name] for name, _ in self.places}
 
     def _page(
-        self, here: str, heading: str, parts: dict[str, Any], sections: list[dict[str, Any]]
+        self, here: str, heading: str, parts: dict[str, object], sections: list[PageSection]
     ) -> Any:
         page, document = panel.Template(self.template, location=True), _document()
         with document.models.freeze():  # update the model list once, not after every part

@@ -6,7 +6,6 @@ full, at the same time if a worker is idle. A callback reports every change.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from asperity.app.contact_jobs import CoarseResult, JobFailure, solve_coarsely, solve_fully
 from asperity.app.contact_result import ContactResult
@@ -102,11 +101,11 @@ class ContactSession:
         self._full_submitted = True
         queue.submit((solve_fully, (self.settings.case,)), self._if_current(self._receive_full))
 
-    def _if_current(self, receive: Callable[[Any], None]) -> Callable[[Any], None]:
+    def _if_current(self, receive: Callable[[object], None]) -> Callable[[object], None]:
         """Return a callback that ignores results of settings that have changed since."""
         submitted = self.settings
 
-        def callback(result: Any) -> None:
+        def callback(result: object) -> None:
             if self.settings is submitted:
                 receive(result)
 
@@ -169,7 +168,7 @@ class ContactSession:
         self.result = self.pinned = self._start = None
         self.trials.clear()
 
-    def _receive_coarse(self, outcome: Any) -> None:
+    def _receive_coarse(self, outcome: object) -> None:
         if isinstance(outcome, JobFailure):
             self._fail(outcome)
             return
@@ -183,7 +182,7 @@ class ContactSession:
             self._solve_fully(self._full_queue or self._queue)
         self._changed()
 
-    def _receive_full(self, result: Any) -> None:
+    def _receive_full(self, result: object) -> None:
         if isinstance(result, JobFailure):
             self._fail(result)
             return

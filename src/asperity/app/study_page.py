@@ -1,8 +1,7 @@
 """Page of a study: outputs over the swept quantities; a click on a point solves its contact."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from bokeh.models import Band, BasicTicker, ColumnDataSource, Select
@@ -19,6 +18,9 @@ from asperity.app.widgets import (
     LOOK,
     MAP_KEY,
     TILE_STYLES,
+    Layout,
+    Look,
+    PageBlock,
     StaleMark,
     notes,
     sentences,
@@ -26,6 +28,7 @@ from asperity.app.widgets import (
     tiles,
 )
 from asperity.case import Case
+from asperity.core.arrays import Field
 from asperity.core.quantities import in_print, quantity
 from asperity.study import as_written
 
@@ -50,7 +53,12 @@ class StudyView:
         self.tiles = text_block(TILE_STYLES)
         self.stale_mark = StaleMark(self.chosen)
         self._answer: ContactResult | None = None
-        look: dict[str, Any] = {
+        self._create_choices()
+        self._create_figure()
+        self.maps = MapImages()
+
+    def _create_choices(self) -> None:
+        look: Look = {
             "sizing_mode": "stretch_width",
             "stylesheets": [LOOK],
             "margin": (0, 0, 6, 0),
@@ -61,6 +69,8 @@ class StudyView:
         for choice in (self.x_choice, self.y_choice):
             choice.on_change("value", lambda _name, _old, _new: self._draw())
         self.point.on_change("value", lambda _name, _old, new: self._solve(new))
+
+    def _create_figure(self) -> None:
         self.figure = plain_figure(
             "", "", label="Outputs of the study over a swept quantity", height=380, tapped=True
         )
@@ -68,17 +78,10 @@ class StudyView:
         self._means = ColumnDataSource({"x": [], "mean": [], "low": [], "high": []})
         self.figure.scatter("x", "y", source=self._points, size=9, color=BLUE, alpha=0.6)
         self.figure.line("x", "mean", source=self._means, color=VERMILION, line_width=2)
-        band = Band(
-            base="x",
-            lower="low",
-            upper="high",
-            source=self._means,
-            fill_color=VERMILION,
-            fill_alpha=0.18,
-        )
+        ends = {"base": "x", "lower": "low", "upper": "high"}
+        band = Band(**ends, source=self._means, fill_color=VERMILION, fill_alpha=0.18)
         self.figure.add_layout(band)
         self._points.selected.on_change("indices", lambda _name, _old, new: self._pick(new))
-        self.maps = MapImages()
 
     def begin(self) -> None:
         """Start reading the study."""
@@ -90,12 +93,12 @@ class StudyView:
         self._queue.close()
         self.study = self._answer = None
 
-    def _read(self, result: Any) -> None:
+    def _read(self, result: object) -> None:
         if isinstance(result, JobFailure):
             self.status.text = sentences([result.message], "alarm")
             return
-        study: StudyData = result
-        self.study = study
+        assert isinstance(result, StudyData)
+        self.study = study = result
         self.verdict.text, self.notes.text = sentences([study.verdict]), notes(study.notes)
         self._rows = list(range(len(study.numbers)))
         labels = [
@@ -134,13 +137,7 @@ class StudyView:
             "x": study.values[axis.key][known],
             "y": to_display(entry.key, column[known]),
         }
-        x, mean, low, high = study.means[axis.key, entry.key]
-        lows, highs = (np.where(np.isfinite(ends), ends, mean) for ends in (low, high))
-        parts: Mapping[str, Any] = {"mean": mean, "low": lows, "high": highs}
-        self._means.data = {
-            "x": x,
-            **{name: to_display(entry.key, values) for name, values in parts.items()},
-        }
+        self._draw_means(entry.key, *study.means[axis.key, entry.key])
         self.figure.xaxis.axis_label = (
             f"{axis.key} [{in_print(axis.unit)}]" if axis.unit else axis.key
         )
@@ -148,6 +145,13 @@ class StudyView:
         ticks = dict(enumerate(axis.names))
         self.figure.xaxis.ticker = list(ticks) if ticks else BasicTicker()
         self.figure.xaxis.major_label_overrides = ticks
+
+    def _draw_means(self, key: str, x: Field, mean: Field, low: Field, high: Field) -> None:
+        """Draw means with their intervals, of no width where one is not known."""
+        lows, highs = (np.where(np.isfinite(ends), ends, mean) for ends in (low, high))
+        parts = {"mean": mean, "low": lows, "high": highs}
+        displayed = {name: to_display(key, values) for name, values in parts.items()}
+        self._means.data = {"x": x, **displayed}
 
     def _pick(self, indices: list[int]) -> None:
         if indices and indices[0] < len(self._rows):
@@ -166,10 +170,11 @@ class StudyView:
             lambda result: self._solved(result, number),
         )
 
-    def _solved(self, result: Any, row: int) -> None:
-        if isinstance(result, JobFailure) or self.study is None:
+    def _solved(self, result: object, row: int) -> None:
+        if isinstance(result, JobFailure):
             self.chosen.text = sentences([result.message], "alarm")
             return
+        assert isinstance(result, ContactResult)
         self._answer = result
         self._mark(stale=False)
         self.maps.make()
@@ -210,7 +215,7 @@ class StudyView:
         )
 
 
-def layout(view: StudyView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+def layout(view: StudyView) -> Layout:
     """Return the parts of the page by name, and the sections that contain them."""
     parts = {
         "xchoice": view.x_choice,
@@ -228,8 +233,8 @@ def layout(view: StudyView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         "cutfilm": view.maps.cut_film,
         "notes": view.notes,
     }
-    choices = [{"names": [name]} for name in ("xchoice", "ychoice", "point")]
-    results = [
+    choices: list[PageBlock] = [{"names": [name]} for name in ("xchoice", "ychoice", "point")]
+    results: list[PageBlock] = [
         {"names": ["verdict"], "first": True},
         {"names": ["status"], "live": True, "first": True},
         {"names": ["curve"], "first": True},

@@ -33,7 +33,7 @@ class FileDrop(FileDropper):  # type: ignore[misc]
         on_file: Callable[[Path], None],
         on_error: Callable[[str], None],
         several: bool,
-        **settings: Any,
+        **settings: object,
     ) -> None:
         super().__init__(
             multiple=several,

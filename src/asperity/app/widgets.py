@@ -1,7 +1,7 @@
 """Widgets of the page: inputs, text and tiles as escaped HTML, downloads."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, TypeAlias, TypedDict
 
 from bokeh.models import (
     Button,
@@ -9,16 +9,42 @@ from bokeh.models import (
     ColumnDataSource,
     CustomJS,
     Div,
+    Model,
     Row,
     Select,
     Slider,
     TextInput,
+    UIElement,
 )
 from markupsafe import Markup
 
 from asperity.app.contact_result import ContactResult, ResultTile, difference
 from asperity.app.inputs import CaseInput
 from asperity.core.quantities import in_print
+
+Look: TypeAlias = dict[str, Any]  # properties of a widget
+
+
+class PageBlock(TypedDict, total=False):
+    """Parts of a page beside one another, by name; `live` announces changes to screen readers."""
+
+    names: list[str]
+    heading: str
+    live: bool
+    first: bool
+    key: Sequence[tuple[str, str]]
+
+
+class PageSection(TypedDict):
+    """Section of a page."""
+
+    kind: str
+    label: str
+    blocks: list[PageBlock]
+
+
+Layout: TypeAlias = tuple[dict[str, object], list[PageSection]]
+"""Parts of a page by name, and the sections that contain them."""
 
 LOOK = """
 :host { color: var(--ink); font: inherit; }
@@ -176,7 +202,7 @@ class InputWidget:
         )
 
     @staticmethod
-    def _look() -> dict[str, Any]:
+    def _look() -> Look:
         return {"sizing_mode": "stretch_width", "stylesheets": [LOOK], "margin": 0}
 
     def _place(self, text: str) -> int:
@@ -202,13 +228,13 @@ class InputWidget:
         self.error.text = sentences([f"{message.rstrip('.')}."] if message else [], "alarm")
         self.text.stylesheets = [LOOK, WRONG] if message else [LOOK]
 
-    def _typed(self, _name: str, _old: Any, new: Any) -> None:
+    def _typed(self, _name: str, _old: object, new: object) -> None:
         if not self._updating:
             self._on_change(self.case_input.key, str(new))
 
-    def _slid(self, _name: str, _old: Any, new: Any) -> None:
+    def _slid(self, _name: str, _old: object, new: object) -> None:
         if not self._updating:
-            self._on_change(self.case_input.key, self.case_input.value_text(int(new)))
+            self._on_change(self.case_input.key, self.case_input.value_text(int(str(new))))
 
 
 def button(label: str, on_click: Callable[[], None]) -> Button:
@@ -218,7 +244,7 @@ def button(label: str, on_click: Callable[[], None]) -> Button:
     return widget
 
 
-def button_row(*buttons: Any) -> Row:
+def button_row(*buttons: UIElement) -> Row:
     """Arrange buttons in a row that wraps."""
     return Row(
         *buttons, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"}, stylesheets=[INHERIT]
@@ -233,7 +259,7 @@ class StaleMark:
     carrier : a model of the page whose tags hold the data source
     """
 
-    def __init__(self, carrier: Any) -> None:
+    def __init__(self, carrier: Model) -> None:
         self._source = ColumnDataSource({"stale": [False]})
         self.update_page = CustomJS(args={"source": self._source}, code=_MARK)
         self._source.js_on_change("data", self.update_page)

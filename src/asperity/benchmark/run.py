@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from io import StringIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -65,7 +64,7 @@ class BenchmarkResult:
             f"{100.0 * max(errors):.2g} %; {len(self.left_out)} cases not solved."
         )
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> dict[str, object]:
         """Return the result for `--json`."""
         left = [{"case": case, "reason": reason} for case, reason in self.left_out]
         return {
@@ -103,7 +102,7 @@ def run_benchmark(
         raise BadInput(f"--cells must be at least 8, got {min(cells, default=0)}; use 64 and 128")
     rows: list[BenchmarkRow] = []
     left_out: list[tuple[str, str]] = []
-    warm: set[tuple[str, Any]] = set()
+    warm: set[tuple[str, object]] = set()
     for case in load_benchmark(folder):
         if progress is not None:
             progress(case.name)

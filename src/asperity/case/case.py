@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
 
 from asperity.case.lubricant import SheetSection
 from asperity.case.messages import parse_section
@@ -67,7 +66,7 @@ class Case:
                 getattr(self, name)
 
     # the sections of laws are created at run time, which pickle cannot import
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         again = partial(load_case, folder=self.folder, name=self.source, stored=self.stored)
         return again, (self.text,), {"stored_notes": self.stored_notes}
 
@@ -162,13 +161,9 @@ class Case:
                 y=y,
                 cells=None if section.cells == "auto" else section.cells,
             )
-        for axis, ends in [("x", section.x)] if line else [("x", section.x), ("y", section.y)]:
-            if ends is not None and not (ends[0] < -1.0 and ends[1] > 1.0):
-                raise BadInput(
-                    f"{axis} must reach beyond the contact on both sides, got {ends[0]:g} to "
-                    f"{ends[1]:g} half-widths; "
-                    f"use {'-4.5 to 1.9' if axis == 'x' else '-3 to 3'}, or leave it out"
-                )
+        _require_beyond_contact("x", section.x, "-4.5 to 1.9")
+        if not line:
+            _require_beyond_contact("y", section.y, "-3 to 3")
         _require_affordable(grid)
         return grid
 
@@ -322,6 +317,14 @@ class Case:
         case = Case(parse_section(CaseFile, tables, self.source), self.folder, self.source)
         same = case.grid == self.grid and case.contents.surface == self.contents.surface
         return replace(case, stored=self.stored, stored_notes=self.stored_notes) if same else case
+
+
+def _require_beyond_contact(axis: str, ends: tuple[float, float] | None, usual: str) -> None:
+    if ends is not None and not (ends[0] < -1.0 and ends[1] > 1.0):
+        raise BadInput(
+            f"{axis} must reach beyond the contact on both sides, got {ends[0]:g} to "
+            f"{ends[1]:g} half-widths; use {usual}, or leave it out"
+        )
 
 
 def _require_affordable(grid: Grid) -> None:

@@ -1,7 +1,7 @@
 """[infer] of a case file: priors of unknown quantities, and feasible operating points."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
@@ -16,10 +16,10 @@ _ENDS = {"from", "to", "value", "std"}
 class PriorSection(Section):
     """Prior of a quantity: `from` and `to`, or a `value` and its `std`."""
 
-    start: Any = Field(None, alias="from")
-    to: Any = None
-    value: Any = None
-    std: Any = None
+    start: object = Field(None, alias="from")
+    to: object = None
+    value: object = None
+    std: object = None
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:

@@ -7,7 +7,7 @@ tables of laws, so a new law needs nothing here.
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from functools import cache, partial
-from typing import Annotated, Any, NamedTuple, cast, get_type_hints
+from typing import Annotated, Any, NamedTuple, TypeAlias, cast, get_type_hints
 
 from pydantic import Field, PlainValidator, Strict, create_model
 
@@ -27,8 +27,10 @@ from asperity.lubricant import (
     make_lubricant,
 )
 
+FieldSpecs: TypeAlias = dict[str, Any]  # type and default of a section's fields by name
 
-def section_field(kind: Any, default: Any, unit: str) -> tuple[Any, Any]:
+
+def section_field(kind: Any, default: object, unit: str) -> tuple[object, object]:
     """Return a parameter as a section's field: a quantity if it has a unit; MISSING is required."""
     kind = Annotated[float, amount_in(unit)] if unit else Annotated[kind, Strict()]
     if default is None:
@@ -37,7 +39,7 @@ def section_field(kind: Any, default: Any, unit: str) -> tuple[Any, Any]:
     return kind, ... if default is MISSING else written
 
 
-def section_fields(law: type) -> dict[str, Any]:
+def section_fields(law: type) -> FieldSpecs:
     """Return the fields of a dataclass as fields of a section."""
     types, marks = get_type_hints(law), parameters(law)
     return {
@@ -65,7 +67,7 @@ def law_from_table(table: Mapping[str, type]) -> PlainValidator:
     return PlainValidator(partial(choose, "law", sections))
 
 
-def law_description(section: Section) -> dict[str, Any]:
+def law_description(section: Section) -> dict[str, object]:
     """Return a law's section as `make_law` takes it."""
     return {name: plain(getattr(section, name)) for name in type(section).model_fields}
 
@@ -87,12 +89,12 @@ class LubricantSection(Section):
         )
 
 
-def _both(kind: Any, default: Any) -> Any:
+def _both(kind: Any, default: object) -> tuple[Any, object]:
     return Annotated[tuple[kind, kind], PAIRED], (default, default)
 
 
 _THERMAL, _SOLID = section_fields(Thermal), section_fields(Solid)
-_NUMBERS: dict[str, Any] = {
+_NUMBERS: FieldSpecs = {
     "ambient": _THERMAL["ambient"],
     "bulk": (
         Annotated[_both(*_THERMAL["ambient"])[0] | None, PAIRED, OPTIONAL],

@@ -15,7 +15,7 @@ from asperity.case.case import Case
 from asperity.case.messages import Section, choose, parse_section
 from asperity.case.ratings import RatingSection
 from asperity.case.sections import CaseFile, MaterialSection
-from asperity.case.text import parse_toml, read_text, replaced
+from asperity.case.text import Tables, parse_toml, read_text, replaced
 from asperity.case.units import (
     OPTIONAL,
     PAIRED,
@@ -30,6 +30,7 @@ from asperity.case.units import (
     plain,
 )
 from asperity.contact.conditions import ElasticPair
+from asperity.core.documents import Table
 from asperity.core.errors import BadInput
 from asperity.machine import (
     BallBearing,
@@ -171,7 +172,7 @@ class MachineCase:
     messages. `rating` has further data for rating standards.
     """
 
-    tables: Mapping[str, Any]
+    tables: Table
     machine: Machine
     pair: ElasticPair
     rating: RatingSection
@@ -203,7 +204,7 @@ class MachineCase:
         """True if the case states all that a contact needs to be solved."""
         return {"lubricant", "surface"} <= set(self.tables)
 
-    def contact_table(self, contact: MachineContact) -> dict[str, Any]:
+    def contact_table(self, contact: MachineContact) -> dict[str, object]:
         """Return the [contact] table of one of the contacts; BadInput without entrainment."""
         stated = contact.conditions(self.pair)
         radii = [
@@ -260,7 +261,7 @@ def has_machine(path: str | Path) -> bool:
     return "machine" in parse_toml(read_text(path), str(path))
 
 
-def _machine_case(tables: dict[str, Any], folder: Path, source: str) -> MachineCase:
+def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
     if "machine" not in tables:
         raise BadInput(
             f"{source}: has no [machine]; add one, or use asperity solve for a single contact"

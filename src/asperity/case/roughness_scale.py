@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -47,11 +47,14 @@ def _of_body(section: SurfaceSection, folder: Path) -> Texture | None:
     return _measured(section, folder)
 
 
-def _correlated(arguments: dict[str, Any]) -> Texture:
+Arguments: TypeAlias = dict[str, Any]  # of a generator of surfaces, by name
+
+
+def _correlated(arguments: Arguments) -> Texture:
     return _turned(arguments["sq"], arguments["correlation_length"], arguments["direction"])
 
 
-def _ground(arguments: dict[str, Any]) -> Texture:
+def _ground(arguments: Arguments) -> Texture:
     grooves = arguments["groove_length"], arguments["groove_width"]
     return _turned(arguments["sq"], grooves, arguments["direction"], GROOVE)
 
@@ -76,7 +79,7 @@ def _turned(sq: float, sizes: Pair, direction: float, shares: Pair = (1.0, 1.0))
     )
 
 
-def _self_affine(arguments: dict[str, Any]) -> Texture:
+def _self_affine(arguments: Arguments) -> Texture:
     """Return half the shortest wavelength as correlation length: the scale to resolve."""
     shortest, longest = arguments["cutoffs"]
     return Texture(
@@ -84,14 +87,14 @@ def _self_affine(arguments: dict[str, Any]) -> Texture:
     )
 
 
-def _sandblasted(arguments: dict[str, Any]) -> Texture:
+def _sandblasted(arguments: Arguments) -> Texture:
     radius = arguments["crater_radius"]
     return Texture(
         sq=arguments["sq"], lengths=(CRATER * radius,) * 2, least=(8.0 * SIZE_MARGIN * radius,) * 2
     )
 
 
-_KINDS: dict[str, Callable[[dict[str, Any]], Texture | None]] = {
+_KINDS: dict[str, Callable[[Arguments], Texture | None]] = {
     "gaussian": _correlated,
     "non-gaussian": _correlated,
     "run-in": _correlated,

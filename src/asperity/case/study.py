@@ -1,7 +1,7 @@
 """[study] of a case file: its own keys, and the quantities to vary, each over a list or a range."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, PlainValidator
 
@@ -30,9 +30,9 @@ Seeding = Literal["independent", "common"]
 class RangeSection(Section):
     """Range in [study]: `step` or `count` of values; neither for sampled studies."""
 
-    start: Any = Field(alias="from")
-    to: Any
-    step: Any = None
+    start: object = Field(alias="from")
+    to: object
+    step: object = None
     count: Count | None = None
     scale: Literal["linear", "log"] = "linear"
 
@@ -41,7 +41,7 @@ class StudySection(Section):
     """[study]: quantities that a sweep varies; every other key names a quantity of the case."""
 
     kind: StudyKind = "solve"
-    axes: dict[str, tuple[Any, ...] | RangeSection]  # as written: key -> values
+    axes: dict[str, tuple[object, ...] | RangeSection]  # as written: key -> values
     samples: Count | None = None  # points of a Latin hypercube in place of the full product
     sample_seed: Seed = 0
     seeds: Annotated[int | tuple[int, ...], PlainValidator(_parse_seeds)] = (

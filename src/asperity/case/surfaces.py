@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field, PlainValidator, Strict, create_model
 
+from asperity.case.laws import FieldSpecs
 from asperity.case.messages import LocatedError, Section, choose, validated
 from asperity.case.units import OPTIONAL, PAIRED, Length, Number, Seed, plain
 from asperity.contact.grid import Grid
@@ -115,19 +116,19 @@ class SurfaceSection(Section, ABC):
         }
 
 
-_LENGTH: Any = (Length, ...)
-_LENGTHS: Any = (tuple[Length, Length], ...)
-_PAIR: Any = (Annotated[tuple[Length, Length], PAIRED], ...)
-_NUMBER: Any = (Number, ...)
-_DIRECTION: Any = (Number, 0.0)  # of the first correlation length, or of the lay, from x towards y
-_SEED: Any = (Seed, 0)
+_LENGTH = (Length, ...)
+_LENGTHS = (tuple[Length, Length], ...)
+_PAIR = (Annotated[tuple[Length, Length], PAIRED], ...)
+_NUMBER = (Number, ...)
+_DIRECTION = (Number, 0.0)  # of the first correlation length, or of the lay, from x towards y
+_SEED = (Seed, 0)
 
 
 class _Kind(NamedTuple):
     """Kind of generated surface: its generator, and the fields of the section."""
 
     generator: Callable[..., Surface]
-    fields: dict[str, Any]
+    fields: FieldSpecs
 
 
 KINDS: dict[str, _Kind] = {

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import tomli_w
 
@@ -22,6 +22,8 @@ from asperity.core.files import require_file
 from asperity.core.third_party import first_line
 
 MAX_BYTES = 4_000_000  # of a case file
+
+Tables: TypeAlias = dict[str, Any]  # of a TOML document
 
 
 def read_text(path: Path) -> str:
@@ -39,7 +41,7 @@ def read_text(path: Path) -> str:
         raise UnreadableFile(f"{path} cannot be read: {error.strerror}") from None
 
 
-def parse_toml(text: str, source: str) -> dict[str, Any]:
+def parse_toml(text: str, source: str) -> Tables:
     """Parse TOML text into tables; `UnreadableFile` if it is not valid."""
     try:
         return tomllib.loads(text)
@@ -70,9 +72,7 @@ def _as_text(contents: CaseFile) -> tuple[Callable[[str], CaseFile], tuple[str]]
 copyreg.pickle(CaseFile, _as_text)
 
 
-def replaced(
-    tables: dict[str, Any], overrides: Mapping[str, object], source: str
-) -> dict[str, Any]:
+def replaced(tables: Tables, overrides: Mapping[str, object], source: str) -> Tables:
     """Return the tables with values replaced by dotted keys; text is parsed as TOML if possible.
 
     `vibration.preset` replaces all keys that presets determine. Raises BadInput for an invalid key.
@@ -115,7 +115,7 @@ def _toml_value(text: str) -> object:
     return read["value"] if len(read) == 1 else text
 
 
-def _plain(section: Section) -> dict[str, Any]:
+def _plain(section: Section) -> Tables:
     """Return tables of plain values, quantities as written; omitted values stay omitted."""
     values = {
         entry.alias or name: getattr(section, name)

@@ -115,7 +115,7 @@ class Amount(float):
         return float(self), self.text
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Return floats without the text they were written in, also in pairs."""
     if isinstance(value, tuple):
         return tuple(map(plain, value))

@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import create_model
 
-from asperity.case.laws import section_field
+from asperity.case.laws import FieldSpecs, section_field
 from asperity.case.messages import Section, validated
 from asperity.case.units import default_amount, plain
 from asperity.coupling import PRESETS, VibrationModel, preset_choices, vibration_choices
@@ -17,14 +17,14 @@ def _vibration_key(name: str) -> str:
     return re.sub("_(hz|s)$", "", name)
 
 
-_FIELDS: dict[str, Any] = {
+_FIELDS: FieldSpecs = {
     _vibration_key(name): section_field(*choice) for name, choice in vibration_choices().items()
 }
 _FIELDS = {"preset": (Literal["sound", "paper"], "sound"), **_FIELDS}
 VibrationSection = create_model("vibration", __base__=Section, **_FIELDS)
 
 
-def parse_vibration(value: object) -> Any:
+def parse_vibration(value: object) -> Section | None:
     """Parse [vibration]: a preset's values, overridden by the case; None for "none"."""
     if value == "none":
         return None
@@ -45,7 +45,7 @@ def preset_keys() -> tuple[str, ...]:
     return tuple(map(_vibration_key, preset_choices("sound")))
 
 
-def vibration_model(section: Any) -> VibrationModel | None:
+def vibration_model(section: Section | None) -> VibrationModel | None:
     """Return the vibration model of a section; None without one."""
     if section is None:
         return None

@@ -1,10 +1,11 @@
 """[wear] of a case file: wear model for `asperity wear`."""
 
-from typing import Annotated, Any, cast
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, TypeVar, cast
 
 from pydantic import Field, PlainValidator, Strict, create_model
 
-from asperity.case.laws import law_description, law_from_table
+from asperity.case.laws import FieldSpecs, law_description, law_from_table
 from asperity.case.messages import Section, quoted
 from asperity.case.units import OPTIONAL, PAIRED, Count, amount_in, parse_amount, plain
 from asperity.contact.conditions import ContactConditions
@@ -14,13 +15,14 @@ from asperity.wear import (
     REMOVAL_LAWS,
     SCATTER,
     SEVERITIES,
-    RemovalLaw,
     WearCoefficient,
     WearModel,
 )
 
+Made = TypeVar("Made")
 
-def _parse_coefficient(value: object) -> Any:
+
+def _parse_coefficient(value: object) -> object:
     """Parse a coefficient in 1/Pa, 0 or more, or the name of a wear class."""
     if isinstance(value, str) and value in SEVERITIES:
         return value
@@ -33,8 +35,8 @@ def _parse_coefficient(value: object) -> Any:
 
 
 _FREQUENCY = Annotated[float, amount_in("Hz")]
-_COEFFICIENT = Annotated[Any, PlainValidator(_parse_coefficient)]
-_MECHANISMS: dict[str, Any] = {
+_COEFFICIENT = Annotated[object, PlainValidator(_parse_coefficient)]
+_MECHANISMS: FieldSpecs = {
     name: (Annotated[Section | None, law_from_table(table)], None)
     for name, table in MECHANISMS.items()
 }
@@ -60,9 +62,9 @@ class WearSection(_Mechanisms):  # type: ignore[misc]  # with the keys of MECHAN
 
     def model(self, conditions: ContactConditions, boundary_friction: float) -> WearModel:
         """Return the wear model of the bodies of a contact."""
-        law = cast(RemovalLaw, _made(self.law, REMOVAL_LAWS))
+        law = _made(self.law, REMOVAL_LAWS)
 
-        def coefficient(stated: Any) -> WearCoefficient:
+        def coefficient(stated: object) -> WearCoefficient:
             if not isinstance(stated, str):
                 known = WearCoefficient.from_value(plain(stated), self.scatter)
                 # refuses a law that cannot wear
@@ -105,6 +107,6 @@ def _require_circumference(
             )
 
 
-def _made(section: Section, table: Any) -> Any:
+def _made(section: Section, table: Mapping[str, Callable[..., Made]]) -> Made:
     described = law_description(section)
-    return table[described.pop("law")](**described)
+    return table[str(described.pop("law"))](**described)

@@ -1,6 +1,7 @@
 """`asperity stribeck` and `asperity traction`: friction over speed and slide-to-roll ratio."""
 
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -120,7 +121,7 @@ def _friction_command(
 
 def _points(curve: "FrictionCurve") -> Block:
     """Return a row per point, in the catalogue's units."""
-    rows = curve.scalars()["points"]
+    rows = [asdict(point) for point in curve.points]
     selected = [quantity(key) for key in rows[0] if key != "converged"]
     yield f"  Sq {text('sq_m', curve.sq)}{', with thermal feedback' if curve.feedback else ''}"
     yield from columns(

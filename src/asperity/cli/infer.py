@@ -1,6 +1,7 @@
 """`asperity infer`: posterior of a contact from recordings, and the next operating point."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -8,10 +9,29 @@ import typer
 
 from asperity import inference, report, simulation
 from asperity import surface as surfaces
-from asperity.cli import options
 from asperity.cli.app import app
 from asperity.cli.forecast import contacts_solved, emulated, require_forecast
-from asperity.cli.options import AsJson, Overrides, Page, Quiet, chosen_case, require_output
+from asperity.cli.options import (
+    AsJson,
+    Band,
+    Channel,
+    EmulatorFolder,
+    ForecastLimit,
+    Method,
+    Overrides,
+    Page,
+    Quiet,
+    Rate,
+    SampleSeed,
+    Scale,
+    Shaft,
+    SurfaceFile,
+    Unit,
+    Workers,
+    Worn,
+    chosen_case,
+    require_output,
+)
 from asperity.cli.output import Block, columns, progress, show, table, written
 from asperity.cli.recordings import EXIT_CODES
 from asperity.core import processes
@@ -20,7 +40,6 @@ from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
     from asperity.inference import (
-        Design,
         Emulator,
         Forecast,
         Inference,
@@ -75,23 +94,23 @@ def infer(
     paths: PathsArgument = None,
     case_file: CaseFileOption = None,
     overrides: Overrides = None,
-    surface: options.SurfaceFile = None,
+    surface: SurfaceFile = None,
     table_file: TableFileOption = None,
-    emulator: options.EmulatorFolder = None,
+    emulator: EmulatorFolder = None,
     extend: ExtendOption = 0,
     sampler: SamplerOption = "importance",
-    forecast: options.ForecastLimit = None,
-    worn: options.Worn = None,
+    forecast: ForecastLimit = None,
+    worn: Worn = None,
     design: DesignOption = None,
-    seed: options.SampleSeed = 0,
-    rate: options.Rate = None,
-    unit: options.Unit = None,
-    channel: options.Channel = None,
-    scale: options.Scale = None,
-    band: options.Band = None,
-    shaft: options.Shaft = None,
-    method: options.Method = None,
-    workers: options.Workers = None,
+    seed: SampleSeed = 0,
+    rate: Rate = None,
+    unit: Unit = None,
+    channel: Channel = None,
+    scale: Scale = None,
+    band: Band = None,
+    shaft: Shaft = None,
+    method: Method = None,
+    workers: Workers = None,
     page: Page = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -101,45 +120,85 @@ def infer(
         case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design
     )
     setting, known = _setting(case_file, overrides, surface)
-    limit = None if forecast is None else inference.read_limit(forecast, setting)
-    if limit is not None:
-        inference.require_limit(setting, limit, worn=worn is not None)
+    limit = _limit(forecast, setting, worn)
     history = None if worn is None else simulation.load_wear(worn)
     require_output(page, ".html", option="--report")
-    count, observations = workers or processes.cores(), inference.ObservedSeries()
-    if paths:
-        with progress("recordings", "reading recordings ...", quiet=quiet):
-            observations = inference.observe_recordings(
-                paths,
-                setting,
-                source=inference.RecordingInput(
-                    table=table_file,
-                    band_hz=band,
-                    rate_hz=rate,
-                    unit=unit,
-                    channel=channel,
-                    scale=scale,
-                    shaft_hz=shaft or None,
-                    method=cast("SeriesMethod | None", method),
-                ),
-                workers=count,
-            )
+    source = _source(table_file, band, rate, unit, channel, scale, shaft, method)
+    count = workers or processes.cores()
+    observations = _observe(paths, setting, source, count, quiet=quiet)
     answering = emulated(setting, emulator, count, quiet=quiet)
-    ahead = _forecast(setting, answering, observations, limit, history, seed)
-    latest = _latest(observations, ahead)
-    now = replace(latest, notes=(*latest.notes, *known))
-    by = cast("Sampler", sampler)
-    found = inference.infer_series(setting, answering, now, sampler=by, seed=seed)
-    with contacts_solved(quiet=quiet) as step:
-        found = inference.refine_emulator(found, extend, sampler=by, workers=count, progress=step)
+    forecaster = partial(_forecast, setting, observations, limit, history, seed)
+    ahead = forecaster(answering)
+    now = _latest(observations, ahead, known)
+    found = _infer(setting, answering, now, sampler, seed, extend, count, quiet=quiet)
     if found.emulator is not answering:
-        ahead = _forecast(setting, found.emulator, observations, limit, history, seed)
-    designed = None
-    if design is not None:
-        designed = inference.design_contact(found.forward, found.draws.z, clr=design)
-    if page is not None:
-        report.write_inference_report(found, page, forecast=ahead, design=designed)
-    _show(found, ahead, designed, page, as_json=as_json, quiet=quiet)
+        ahead = forecaster(found.emulator)
+    _show(found, ahead, design, page, as_json=as_json, quiet=quiet)
+
+
+def _infer(
+    setting: "Setting",
+    emulator: "Emulator",
+    observations: "ObservedSeries",
+    sampler: str,
+    seed: int,
+    extend: int,
+    workers: int,
+    *,
+    quiet: bool,
+) -> "Inference":
+    """Infer the state, and again after `extend` contacts were added where the posterior lies."""
+    by = cast("Sampler", sampler)
+    found = inference.infer_series(setting, emulator, observations, sampler=by, seed=seed)
+    with contacts_solved(quiet=quiet) as step:
+        return inference.refine_emulator(found, extend, sampler=by, workers=workers, progress=step)
+
+
+def _limit(forecast: str | None, setting: "Setting", worn: Path | None) -> "Limit | None":
+    """Return the limit whose crossing is forecast; None if none is requested."""
+    if forecast is None:
+        return None
+    limit = inference.read_limit(forecast, setting)
+    inference.require_limit(setting, limit, worn=worn is not None)
+    return limit
+
+
+def _source(
+    table: Path | None,
+    band: tuple[float, float] | None,
+    rate: float | None,
+    unit: str | None,
+    channel: str | None,
+    scale: float | None,
+    shaft: list[float] | None,
+    method: str | None,
+) -> "inference.RecordingInput":
+    """Return how the recordings are read, from the options."""
+    return inference.RecordingInput(
+        table=table,
+        band_hz=band,
+        rate_hz=rate,
+        unit=unit,
+        channel=channel,
+        scale=scale,
+        shaft_hz=shaft or None,
+        method=cast("SeriesMethod | None", method),
+    )
+
+
+def _observe(
+    paths: list[Path] | None,
+    setting: "Setting",
+    source: "inference.RecordingInput",
+    workers: int,
+    *,
+    quiet: bool,
+) -> "ObservedSeries":
+    """Return the resonances in the recordings, if any."""
+    if not paths:
+        return inference.ObservedSeries()
+    with progress("recordings", "reading recordings ...", quiet=quiet):
+        return inference.observe_recordings(paths, setting, source=source, workers=workers)
 
 
 def _required(
@@ -163,19 +222,22 @@ def _required(
     return case_file
 
 
-def _latest(observations: "ObservedSeries", ahead: "Forecast | None") -> "ObservedSeries":
-    """Return the last tenth of a series whose contact changes, otherwise all of it."""
+def _latest(
+    observations: "ObservedSeries", ahead: "Forecast | None", notes: tuple[str, ...]
+) -> "ObservedSeries":
+    """Return the last tenth of a series whose contact changes, otherwise all of it, with notes."""
     changes = ahead is not None and ahead.change_detected
-    return inference.latest_observations(observations) if changes else observations
+    latest = inference.latest_observations(observations) if changes else observations
+    return replace(latest, notes=(*latest.notes, *notes))
 
 
 def _forecast(
     setting: "Setting",
-    emulator: "Emulator",
     observations: "ObservedSeries",
     limit: "Limit | None",
     history: "WearHistory | None",
     seed: int,
+    emulator: "Emulator",
 ) -> "Forecast | None":
     """Forecast when the limit is crossed; None without a limit."""
     if limit is None:
@@ -199,13 +261,18 @@ def _setting(
 def _show(
     found: "Inference",
     ahead: "Forecast | None",
-    designed: "Design | None",
+    design: float | None,
     page: Path | None,
     *,
     as_json: bool,
     quiet: bool,
 ) -> None:
     """Print verdicts and tables, or all as JSON; exit with the alarm's code if there is one."""
+    designed = None
+    if design is not None:
+        designed = inference.design_contact(found.forward, found.draws.z, clr=design)
+    if page is not None:
+        report.write_inference_report(found, page, forecast=ahead, design=designed)
     verdicts = [result.sentence() for result in (ahead, designed) if result is not None]
     further = {
         "forecast": None if ahead is None else ahead.scalars(),

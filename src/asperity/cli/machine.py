@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,6 +13,7 @@ from asperity.cli.options import AsJson, OutFolder, Overrides, Quiet, Workers, r
 from asperity.cli.output import Block, Row, columns, progress, show, table
 from asperity.cli.study import study_progress
 from asperity.core import files
+from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
 from asperity.core.quantities import quantity
 
@@ -129,16 +130,15 @@ def _contacts(result: "MachineResult") -> Block:
     )
 
 
-def _number(row: dict[str, Any], key: str, entry: "Quantity") -> str:
+def _number(row: Table, key: str, entry: "Quantity") -> str:
     """Return the number, with its interval if the row has one."""
     return entry.number_in(row) if key == entry.key else entry.number(row[key])
 
 
 def _frequencies(result: "MachineResult") -> list[Row]:
-    found: dict[str, Any] = result.case.machine.frequencies
     return [
         (key.removesuffix("_hz").replace("_", " "), f"{value:.4g} Hz")
-        for key, value in found.items()
+        for key, value in result.case.machine.frequencies.items()
     ]
 
 

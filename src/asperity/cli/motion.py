@@ -1,5 +1,7 @@
 """`asperity run`: simulate the moving roughness of a case; resumable."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -76,15 +78,7 @@ def run(
         )
     failure = None
     try:
-        with progress(path.name, COMPILES, quiet=quiet) as display:
-
-            def step(taken: "HistoryProgress") -> None:
-                display(
-                    f"step {taken.number} of {taken.steps}, {_clr(taken)}",
-                    taken.number,
-                    taken.steps,
-                )
-
+        with _steps_shown(path.name, quiet=quiet) as step:
             moved = simulation.run_history(
                 chosen,
                 steps=steps,
@@ -115,9 +109,17 @@ def run(
         raise AsperityError(failure)
 
 
-def _clr(step: "HistoryProgress") -> str:
+@contextmanager
+def _steps_shown(label: str, *, quiet: bool) -> "Iterator[Callable[[HistoryProgress], None]]":
+    """Show completed steps and the load share on a terminal."""
     clr = quantity("clr")
-    return f"{clr.short} {clr.text(step.row['clr'])}"
+    with progress(label, COMPILES, quiet=quiet) as display:
+
+        def step(taken: "HistoryProgress") -> None:
+            share = f"{clr.short} {clr.text(taken.row['clr'])}"
+            display(f"step {taken.number} of {taken.steps}, {share}", taken.number, taken.steps)
+
+        yield step
 
 
 def _saved(moved: "History", page: Path | None) -> Block:

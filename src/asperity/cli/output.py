@@ -3,13 +3,14 @@
 import json
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from asperity.cli.options import with_options
+from asperity.core.documents import Table
 from asperity.core.quantities import catalogue, quantity, select
 from asperity.core.third_party import printable
 
@@ -25,7 +26,7 @@ Row = tuple[str, str]
 
 def show(
     verdict: str | Sequence[str],
-    values: Callable[[], Mapping[str, Any]],
+    values: Callable[[], Table],
     *blocks: Block,
     as_json: bool,
     quiet: bool,
@@ -76,7 +77,7 @@ def columns(titles: Sequence[str], rows: Iterable[Sequence[str]], *, left: int =
         yield f"  {'  '.join(aligned)}".rstrip()
 
 
-def known(values: Mapping[str, Any], *groups: str) -> list[Row]:
+def known(values: Table, *groups: str) -> list[Row]:
     """Return the numbers of `values` that the catalogue shows, of some of its groups or of all."""
     groups = groups or tuple({entry.group for entry in catalogue().values()})
     return [
@@ -84,7 +85,7 @@ def known(values: Mapping[str, Any], *groups: str) -> list[Row]:
     ]
 
 
-def text(key: str, value: Any) -> str:
+def text(key: str, value: object) -> str:
     """Return a value as the catalogue shows it, with its unit."""
     return quantity(key).text(value)
 

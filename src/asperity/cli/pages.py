@@ -1,7 +1,7 @@
 """`asperity report`: HTML pages of saved runs, studies, histories or wear."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -43,23 +43,31 @@ def report_command(
         raise BadInput(
             f"a folder's page has no other contents, got {len(paths)} paths; name {folders[0]} only"
         )
-    of_wear = bool(folders) and simulation.is_wear_folder(folders[0])
-    of_study = bool(folders) and not of_wear and not simulation.is_history_folder(folders[0])
-    if not of_study and (figures is not None or anchors is not None):
+    kind = _kind(folders)
+    if kind != "study" and (figures is not None or anchors is not None):
         option = "--figures" if figures is not None else "--anchors"
         raise BadInput(f"{option} applies to a study's folder, got {paths[0]}; name that folder")
     if out is None:
         alone = paths[0].with_suffix(".html") if len(paths) == 1 else Path("report.html")
         out = folders[0] / "report.html" if folders else alone
     require_output(out, ".html")
-    if of_study:
+    if kind == "study":
         _report_study(folders[0], out, figures, anchors, as_json=as_json, quiet=quiet)
-    elif of_wear:
+    elif kind == "wear":
         _report_wear(folders[0], out, as_json=as_json, quiet=quiet)
-    elif folders:
+    elif kind == "history":
         _report_history(folders[0], out, as_json=as_json, quiet=quiet)
     else:
         _report_runs(paths, out, as_json=as_json, quiet=quiet)
+
+
+def _kind(folders: list[Path]) -> Literal["runs", "study", "wear", "history"]:
+    """Return what a folder holds; "runs" without a folder."""
+    if not folders:
+        return "runs"
+    if simulation.is_wear_folder(folders[0]):
+        return "wear"
+    return "history" if simulation.is_history_folder(folders[0]) else "study"
 
 
 def _report_runs(paths: list[Path], out: Path, *, as_json: bool, quiet: bool) -> None:

@@ -3,27 +3,53 @@
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from asperity import monitoring, recording, report, trend
-from asperity.cli import options
 from asperity.cli.app import app
 from asperity.cli.forecast import series_forecaster
-from asperity.cli.options import AsJson, Quiet, contact_at, require_output
+from asperity.cli.options import (
+    Acknowledge,
+    AsJson,
+    Band,
+    Channel,
+    Contact,
+    EmulatorFolder,
+    FalseAlarms,
+    ForecastLimit,
+    Machine,
+    Method,
+    Mqtt,
+    OnAlarm,
+    Page,
+    Point,
+    Quiet,
+    Rate,
+    RecordingFiles,
+    Scale,
+    SensorName,
+    Shaft,
+    StagesFrom,
+    StoreFile,
+    Table,
+    Tell,
+    Unit,
+    WebHook,
+    Workers,
+    Worn,
+    contact_at,
+    require_output,
+)
 from asperity.cli.output import Block, Row, columns, progress, show, span, table, written
 from asperity.core import files, processes
 from asperity.core.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
-    from asperity.monitoring import (
-        Reading,
-        Track,
-        TrackSettings,
-        Update,
-    )
+    from asperity.monitoring import Reading, Track, TrackSettings, Update
     from asperity.recording import ReadOptions
     from asperity.resonance import SeriesMethod
     from asperity.trend import AlarmState, StageSource
@@ -42,15 +68,13 @@ WatchedFolder = Annotated[
     Path, typer.Argument(metavar="DIR", help="Folder where recordings arrive.")
 ]
 ResultFolder = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", help="Folder of results; default: DIR/asperity-watch."),
+    Path | None, typer.Option(metavar="DIR", help="Folder of results; default: DIR/asperity-watch.")
 ]
 Once = Annotated[
     bool, typer.Option("--once", help="Process the present recordings and end, for cron.")
 ]
 PollInterval = Annotated[
-    float,
-    typer.Option(metavar="SECONDS", min=0.05, help="Time between two looks into the folder."),
+    float, typer.Option(metavar="SECONDS", min=0.05, help="Time between two looks into the folder.")
 ]
 SettleTime = Annotated[
     float, typer.Option(metavar="SECONDS", min=0.0, help="Time for which a file must be unchanged.")
@@ -67,29 +91,29 @@ ExpectedInterval = Annotated[
 
 @app.command()
 def track(
-    paths: options.RecordingFiles,
-    rate: options.Rate = None,
-    unit: options.Unit = None,
-    channel: options.Channel = None,
-    scale: options.Scale = None,
-    case_file: options.Contact = None,
-    band: options.Band = None,
-    table_file: options.Table = None,
-    shaft: options.Shaft = None,
-    method: options.Method = None,
-    stages_from: options.StagesFrom = "crf",
-    false_alarms: options.FalseAlarms = 1e-3,
-    acknowledge: options.Acknowledge = None,
-    forecast: options.ForecastLimit = None,
-    worn: options.Worn = None,
-    emulator: options.EmulatorFolder = None,
-    store: options.StoreFile = None,
-    machine: options.Machine = None,
-    point: options.Point = None,
-    sensor: options.SensorName = None,
-    page: options.Page = None,
+    paths: RecordingFiles,
+    rate: Rate = None,
+    unit: Unit = None,
+    channel: Channel = None,
+    scale: Scale = None,
+    case_file: Contact = None,
+    band: Band = None,
+    table_file: Table = None,
+    shaft: Shaft = None,
+    method: Method = None,
+    stages_from: StagesFrom = "crf",
+    false_alarms: FalseAlarms = 1e-3,
+    acknowledge: Acknowledge = None,
+    forecast: ForecastLimit = None,
+    worn: Worn = None,
+    emulator: EmulatorFolder = None,
+    store: StoreFile = None,
+    machine: Machine = None,
+    point: Point = None,
+    sensor: SensorName = None,
+    page: Page = None,
     out: DataFiles = None,
-    workers: options.Workers = None,
+    workers: Workers = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -138,35 +162,35 @@ def watch(
     every: PollInterval = 5.0,
     settle: SettleTime = 2.0,
     expect: ExpectedInterval = None,
-    workers: options.Workers = None,
-    rate: options.Rate = None,
-    unit: options.Unit = None,
-    channel: options.Channel = None,
-    scale: options.Scale = None,
-    case_file: options.Contact = None,
-    band: options.Band = None,
-    table_file: options.Table = None,
-    shaft: options.Shaft = None,
-    method: options.Method = None,
-    stages_from: options.StagesFrom = "crf",
-    false_alarms: options.FalseAlarms = 1e-3,
-    acknowledge: options.Acknowledge = None,
-    forecast: options.ForecastLimit = None,
-    worn: options.Worn = None,
-    emulator: options.EmulatorFolder = None,
-    store: options.StoreFile = None,
-    machine: options.Machine = None,
-    point: options.Point = None,
-    sensor: options.SensorName = None,
-    on_alarm: options.OnAlarm = None,
-    webhook: options.WebHook = None,
-    mqtt: options.Mqtt = None,
-    tell: options.Tell = None,
+    workers: Workers = None,
+    rate: Rate = None,
+    unit: Unit = None,
+    channel: Channel = None,
+    scale: Scale = None,
+    case_file: Contact = None,
+    band: Band = None,
+    table_file: Table = None,
+    shaft: Shaft = None,
+    method: Method = None,
+    stages_from: StagesFrom = "crf",
+    false_alarms: FalseAlarms = 1e-3,
+    acknowledge: Acknowledge = None,
+    forecast: ForecastLimit = None,
+    worn: Worn = None,
+    emulator: EmulatorFolder = None,
+    store: StoreFile = None,
+    machine: Machine = None,
+    point: Point = None,
+    sensor: SensorName = None,
+    on_alarm: OnAlarm = None,
+    webhook: WebHook = None,
+    mqtt: Mqtt = None,
+    tell: Tell = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Track recordings as they arrive in a folder, until Ctrl-C; a later watch continues it."""
-    results = out if out is not None else folder / "asperity-watch"
+    results = out or folder / "asperity-watch"
     read = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
     settings = _track_settings(
         read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
@@ -187,19 +211,11 @@ def watch(
     forecaster = series_forecaster(
         forecast, case_file, worn, emulator, workers=settings.workers, quiet=quiet
     )
-    with _reading_progress("watching ...", quiet=quiet) as step:
-        updates = monitoring.watch_folder(
-            folder,
-            results,
-            settings,
-            watching,
-            case=contact_at(case_file),
-            table=table_file,
-            forecaster=forecaster,
-            progress=step,
-        )
-        state = _show_updates(updates, results, once=once, as_json=as_json, quiet=quiet)
-    _end(state)
+    watch_series = partial(monitoring.watch_folder, folder, results, settings, watching)
+    updates = partial(
+        watch_series, case=contact_at(case_file), table=table_file, forecaster=forecaster
+    )
+    _end(_show_updates(updates, results, once=once, as_json=as_json, quiet=quiet))
 
 
 def _track_settings(
@@ -251,17 +267,25 @@ def _show_track(
 
 
 def _show_updates(
-    updates: "Iterator[Update]", results: Path, *, once: bool, as_json: bool, quiet: bool
+    updates: "Callable[..., Iterator[Update]]",
+    results: Path,
+    *,
+    once: bool,
+    as_json: bool,
+    quiet: bool,
 ) -> str:
     """Write and show every update until Ctrl-C; return the state of the last."""
     state = "cannot-tell"
-    try:
-        for update in updates:
-            state = _show_update(update, results, as_json=as_json, quiet=quiet) or state
-    except KeyboardInterrupt:
-        if once:
-            raise
-        print(f"stopped; results are in {results}, and the next watch continues", file=sys.stderr)
+    with _reading_progress("watching ...", quiet=quiet) as step:
+        try:
+            for update in updates(progress=step):
+                state = _show_update(update, results, as_json=as_json, quiet=quiet) or state
+        except KeyboardInterrupt:
+            if once:
+                raise
+            print(
+                f"stopped; results are in {results}, and the next watch continues", file=sys.stderr
+            )
     return state
 
 
@@ -293,12 +317,7 @@ def _show_update(update: "Update", results: Path, *, as_json: bool, quiet: bool)
     arrived = [*dict.fromkeys(recording.file for recording in update.new)]
     show(
         verdict,
-        lambda: {
-            **values,
-            "new": arrived,
-            "waiting": update.waiting,
-            "results": str(results),
-        },
+        lambda: {**values, "new": arrived, "waiting": update.waiting, "results": str(results)},
         [] if judgement is None else _arrived(update.new, values["recordings"], results),
         as_json=as_json,
         quiet=quiet,

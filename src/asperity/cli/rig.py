@@ -1,5 +1,6 @@
 """`asperity rig`: recordings of a simulated wear test, with the true values."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -109,18 +110,23 @@ def rig(
                 f"{done} of {total} recordings written", done, total
             ),
         )
+    _show(simulated, out, paths, as_json=as_json, quiet=quiet)
+
+
+def _show(
+    simulated: "paper.Rig", out: Path, paths: Sequence[Path], *, as_json: bool, quiet: bool
+) -> None:
+    files = {"table": out / "table.csv", "truth": out / "truth.csv", "case": out / "rig.toml"}
     show(
         paper.rig_verdict(simulated),
         lambda: {
             **paper.rig_scalars(simulated),
             "folder": str(out),
             "recordings": [str(path) for path in paths],
-            "table": str(out / "table.csv"),
-            "truth": str(out / "truth.csv"),
-            "case": str(out / "rig.toml"),
+            **{name: str(path) for name, path in files.items()},
         },
         table(_rows(simulated, out)),
-        [f"Try next: asperity track {out} --table {out / 'table.csv'} --case {out / 'rig.toml'}"],
+        [f"Try next: asperity track {out} --table {files['table']} --case {files['case']}"],
         as_json=as_json,
         quiet=quiet,
     )

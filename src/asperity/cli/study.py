@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,41 +26,50 @@ from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from asperity.study import StudyCost, StudyPlan, StudyProgress, StudyResult, WearCurve
 
 SHOWN_FAILURES = 5
 CURVE = ("car", "car_domain", "clr", "crf_sound_hz", "crfa_sound")
 
 
+StudyArgument = Annotated[Path, typer.Argument(metavar="CASE.toml", help="Case with a [study].")]
+ExecutorOption = Annotated[
+    str | None,
+    typer.Option(metavar="dask:ADDRESS", help="Compute on the workers of a dask scheduler."),
+]
+ShardOption = Annotated[
+    str, typer.Option(metavar="k/N", help="Compute the k-th of N equal shares.")
+]
+RetryOption = Annotated[bool, typer.Option("--retry-failed", help="Repeat failed cases.")]
+MergeOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="DIR", help="Include the cases of another folder of this study (repeatable)."
+    ),
+]
+FieldsOption = Annotated[
+    str | None,
+    typer.Option(metavar="NAMES", help="Maps to save: pressure,gap,in_contact,surface_height."),
+]
+DryRunOption = Annotated[
+    bool, typer.Option("--dry-run", help="Estimate the cost without computing.")
+]
+
+
 @app.command("study")
 def study_command(
-    path: Annotated[Path, typer.Argument(metavar="CASE.toml", help="Case with a [study].")],
+    path: StudyArgument,
     out: OutFolder = None,
     workers: Workers = None,
-    executor: Annotated[
-        str | None,
-        typer.Option(metavar="dask:ADDRESS", help="Compute on the workers of a dask scheduler."),
-    ] = None,
-    shard: Annotated[
-        str, typer.Option(metavar="k/N", help="Compute the k-th of N equal shares.")
-    ] = "1/1",
-    retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Repeat failed cases.")
-    ] = False,
-    merge: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="DIR", help="Include the cases of another folder of this study (repeatable)."
-        ),
-    ] = None,
-    fields: Annotated[
-        str | None,
-        typer.Option(metavar="NAMES", help="Maps to save: pressure,gap,in_contact,surface_height."),
-    ] = None,
+    executor: ExecutorOption = None,
+    shard: ShardOption = "1/1",
+    retry_failed: RetryOption = False,
+    merge: MergeOption = None,
+    fields: FieldsOption = None,
     overrides: Overrides = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Estimate the cost without computing.")
-    ] = False,
+    dry_run: DryRunOption = False,
     page: Page = None,
     figures: StudyFigures = None,
     as_json: AsJson = False,
@@ -135,7 +144,7 @@ def study_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[StudyProgr
         yield step
 
 
-def _executor(name: str | None) -> AbstractContextManager[Any]:
+def _executor(name: str | None) -> AbstractContextManager["Executor | None"]:
     if name is None:
         return nullcontext()
     kind, _, address = name.partition(":")

@@ -1,7 +1,7 @@
 """`asperity surface`: contents and parameters of measured surfaces."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -66,29 +66,19 @@ def surface_command(
         raise BadInput(
             f"--out {out} holds one map, got {len(files)} surfaces; plot them one at a time"
         )
-    lengths = {"pixel": pixel, "s_filter": s_filter, "l_filter": l_filter}
-    given = {name: text for name, text in lengths.items() if text is not None}
-    metres: dict[str, Any] = {
-        name: case.read_length(f"--{name.replace('_', '-')}", text) for name, text in given.items()
-    }
-    options: dict[str, Any] = {
-        "unit": unit,
-        "lateral_unit": lateral_unit,
-        "pixel": metres.pop("pixel", None),
-        "conditioning": surface.SurfaceConditioning(
+    described, refused = _describe(
+        files,
+        unit=unit,
+        lateral_unit=lateral_unit,
+        pixel=_length("--pixel", pixel),
+        conditioning=surface.SurfaceConditioning(
             form=cast("surface.Form", form),
             turn=turn,
             outliers=cast("surface.Outliers", outliers),
-            **metres,
+            s_filter=_length("--s-filter", s_filter),
+            l_filter=_length("--l-filter", l_filter),
         ),
-    }
-    described: list[SurfaceDescription] = []
-    refused: list[tuple[Path, BadInput]] = []
-    for file in files:
-        try:
-            described.append(surface.describe_surface(file, **options))
-        except BadInput as error:
-            refused.append((file, error))
+    )
     if out is not None and described:
         report.surface_map(described[0], out)
     if described:
@@ -105,6 +95,37 @@ def surface_command(
         )
     if refused:
         raise BadInput("; ".join(dict.fromkeys(str(error) for _, error in refused)))
+
+
+def _length(option: str, text: str | None) -> float | None:
+    return None if text is None else case.read_length(option, text)
+
+
+def _describe(
+    files: list[Path],
+    *,
+    unit: str | None,
+    lateral_unit: str | None,
+    pixel: float | None,
+    conditioning: surface.SurfaceConditioning,
+) -> "tuple[list[SurfaceDescription], list[tuple[Path, BadInput]]]":
+    """Describe every file; return those that were refused with the reason."""
+    described: list[SurfaceDescription] = []
+    refused: list[tuple[Path, BadInput]] = []
+    for file in files:
+        try:
+            described.append(
+                surface.describe_surface(
+                    file,
+                    unit=unit,
+                    lateral_unit=lateral_unit,
+                    pixel=pixel,
+                    conditioning=conditioning,
+                )
+            )
+        except BadInput as error:
+            refused.append((file, error))
+    return described, refused
 
 
 def _parameters(description: "SurfaceDescription", *, named: bool) -> Block:

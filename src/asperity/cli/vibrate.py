@@ -109,7 +109,7 @@ def _vibrate(chosen: "Case", figures: Path | None, *, as_json: bool, quiet: bool
         (quantity("band_hz").title, span("band_hz", vibration.band_hz)),
     ]
     show(
-        scalars["verdict"],
+        vibrated.verdict(),
         lambda: scalars | {"figures": [str(figure) for figure in drawn]},
         table(rows),
         written("  Figure", *drawn),

@@ -136,6 +136,10 @@ def wear(
     worn = _simulate(chosen, path.name, hours, out, workers or cores(), quiet=quiet)
     if page is not None:
         report.write_wear_report(worn, page)
+    _show(worn, page, as_json=as_json, quiet=quiet)
+
+
+def _show(worn: "WearHistory", page: Path | None, *, as_json: bool, quiet: bool) -> None:
     show(
         worn.verdict(),
         lambda: {**worn.scalars(), "report": None if page is None else str(page)},

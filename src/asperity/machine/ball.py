@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import scipy
@@ -200,46 +200,30 @@ class BallBearing:
         The minimum is unique: approaches are distances less a constant, so that they and their
         power 5/2 are convex in the shifts. An imposed tilt is not an unknown.
         """
-        free = 3 if self.tilt is None else 2
-        imposed = np.array([0.0, 0.0, (self.tilt or 0.0) * self._arm / elastic])
-        applied = np.array([self.radial_load, self.axial_load, 0.0])[:free]
-        force = max(self.radial_load, self.axial_load)
-
-        def with_tilt(shifts: Field) -> Field:
-            return np.concatenate([shifts, imposed[free:]])
-
-        def energy(shifts: Field) -> float:
-            loads, _ = self._balls(elastic * with_tilt(shifts), stiffness)
-            approaches = (loads / stiffness) ** (1.0 / EXPONENT)
-            return float(0.4 * loads @ approaches / elastic - applied @ shifts) / force
-
-        def residual(shifts: Field) -> Field:
-            return np.asarray(
-                (self._forces(elastic * with_tilt(shifts), stiffness)[:free] - applied) / force
-            )
-
-        radial = (max(self.play, 0.0) / 2.0 + elastic) / elastic
-        axial = self.groove_distance * math.sqrt(1.0 - self._free_cosine**2) / elastic
-        options: Any = {
-            "jac": residual,
-            "hess": lambda shifts: self._stiffnesses(with_tilt(shifts), stiffness, elastic)[
-                :free, :free
-            ],
-            "method": "trust-exact",
-            "options": {"gtol": 1e-8, "maxiter": 2000},
-        }
+        balance = _Balance(self, stiffness, elastic)
         minimum = scipy.optimize.minimize(
-            energy, np.array([radial, axial, 0.0])[:free], **options
+            balance.energy,
+            self._initial_shifts(elastic)[: balance.free],
+            jac=balance.residual,
+            hess=balance.tangent,
+            method="trust-exact",
+            options={"gtol": 1e-8, "maxiter": 2000},
         ).x
-        polished = scipy.optimize.root(residual, minimum, options={"xtol": 1e-13}).x
-        best = min((minimum, polished), key=lambda shifts: float(np.max(np.abs(residual(shifts)))))
-        if np.max(np.abs(residual(best))) < 1e-8:
-            return with_tilt(np.asarray(best))
+        polished = scipy.optimize.root(balance.residual, minimum, options={"xtol": 1e-13}).x
+        errors = [float(np.max(np.abs(balance.residual(s)))) for s in (minimum, polished)]
+        if min(errors) < 1e-8:
+            return balance.with_tilt(np.asarray(polished if errors[1] < errors[0] else minimum))
         raise AsperityError(
             f"no equilibrium was found under a radial load of {self.radial_load:g} N and an axial "
             f"load of {self.axial_load:g} N; leave a small axial load out, or check ball_diameter "
             "and osculation"
         )
+
+    def _initial_shifts(self, elastic: float) -> Field:
+        """Return shifts over `elastic` at which the balls touch."""
+        radial = (max(self.play, 0.0) / 2.0 + elastic) / elastic
+        axial = self.groove_distance * math.sqrt(1.0 - self._free_cosine**2) / elastic
+        return np.array([radial, axial, 0.0])
 
     def _stiffnesses(self, shifts: Field, stiffness: float, elastic: float) -> Field:
         """Return the tangent stiffness, per `elastic` and the larger load, shape (3, 3)."""
@@ -413,3 +397,49 @@ class BallBearing:
             for f in self.osculation
         ]
         return (inner, across[0]), (outer, across[1])
+
+
+class _Balance(NamedTuple):
+    """Balance of a bearing's balls with both loads, over its free shifts per `elastic`."""
+
+    bearing: BallBearing
+    stiffness: float
+    elastic: float
+
+    @property
+    def free(self) -> int:
+        """Number of free shifts: an imposed tilt is not an unknown."""
+        return 3 if self.bearing.tilt is None else 2
+
+    @property
+    def applied(self) -> Field:
+        """Applied forces along the free shifts [N]."""
+        return np.array([self.bearing.radial_load, self.bearing.axial_load, 0.0])[: self.free]
+
+    @property
+    def force(self) -> float:
+        """The larger of both loads [N]."""
+        return max(self.bearing.radial_load, self.bearing.axial_load)
+
+    def with_tilt(self, shifts: Field) -> Field:
+        """Return all shifts, with an imposed tilt."""
+        tilt = (self.bearing.tilt or 0.0) * self.bearing._arm / self.elastic
+        return np.concatenate([shifts, np.array([0.0, 0.0, tilt])[self.free :]])
+
+    def energy(self, shifts: Field) -> float:
+        """Return the potential energy, per `elastic` and the larger load."""
+        loads, _ = self.bearing._balls(self.elastic * self.with_tilt(shifts), self.stiffness)
+        approaches = (loads / self.stiffness) ** (1.0 / EXPONENT)
+        return float(0.4 * loads @ approaches / self.elastic - self.applied @ shifts) / self.force
+
+    def residual(self, shifts: Field) -> Field:
+        """Return the unbalanced forces, per the larger load."""
+        forces = self.bearing._forces(self.elastic * self.with_tilt(shifts), self.stiffness)
+        return np.asarray((forces[: self.free] - self.applied) / self.force)
+
+    def tangent(self, shifts: Field) -> Field:
+        """Return the tangent stiffness of the free shifts."""
+        stiffnesses = self.bearing._stiffnesses(
+            self.with_tilt(shifts), self.stiffness, self.elastic
+        )
+        return stiffnesses[: self.free, : self.free]

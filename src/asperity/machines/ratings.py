@@ -6,10 +6,9 @@ of a solved contact and no roughness number.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from asperity import rating
 from asperity.case import Case, MachineCase, SheetSection
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.lubricant import ESTIMATORS, OilSheet
+from asperity.lubricant import ESTIMATORS, OilSheet, Solid
 from asperity.machine import BallBearing, CylindricalRollerBearing, MachineContact, SpurGear
 from asperity.machines.rating_facts import FACTS
 from asperity.results import Run
@@ -62,9 +61,9 @@ class Rating:
         """Value of the whole machine; None if it is by contact or missing."""
         return self.values.get("")
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the JSON output of the rating."""
-        value: dict[str, Any] = (
+        value: dict[str, object] = (
             {"value": self.machine_value}
             if set(self.values) <= {""}
             else {"values": dict(self.values)}
@@ -88,6 +87,10 @@ def machine_ratings(case: MachineCase) -> tuple[Rating, ...]:
     return ()
 
 
+def _missing(keys: Sequence[str], reason: str) -> tuple[Rating, ...]:
+    return tuple(_machine_rating(key, None, reason) for key in keys)
+
+
 def _machine_rating(key: str, value: float | None, reason: str = "") -> Rating:
     return Rating(key, {"": value}, reason if value is None else "")
 
@@ -99,42 +102,44 @@ def _machine_rating(key: str, value: float | None, reason: str = "") -> Rating:
 def _bearing_ratings(
     case: MachineCase, bearing: CylindricalRollerBearing | BallBearing, stated: Case
 ) -> tuple[Rating, ...]:
-    oil, given = stated.lubricant, case.rating
+    oil, capacity = stated.lubricant, case.rating.dynamic_load_rating
     assert oil is not None
     reference = rating.reference_viscosity(bearing.speed, bearing.pitch_diameter)
     kappa = oil.viscosity.eta0 / oil.density.rho0 / reference
-    ratings = [
+    if capacity is None:
+        keys = "reference_life", "life_factor", "modified_life_s"
+        lives = _missing(keys, "[rating] has no dynamic_load_rating")
+    else:
+        lives = _bearing_lives(case, bearing, float(capacity), kappa)
+    return (
         _machine_rating("reference_viscosity_m2_s", reference),
         _machine_rating("viscosity_ratio", kappa),
-    ]
-    if given.dynamic_load_rating is None:
-        reason = "[rating] has no dynamic_load_rating"
-        return (
-            *ratings,
-            *(
-                _machine_rating(key, None, reason)
-                for key in ("reference_life", "life_factor", "modified_life_s")
-            ),
-        )
-    capacity = float(given.dynamic_load_rating)
+        *lives,
+    )
+
+
+def _bearing_lives(
+    case: MachineCase,
+    bearing: CylindricalRollerBearing | BallBearing,
+    capacity: float,
+    kappa: float,
+) -> tuple[Rating, ...]:
+    """Return reference life, equivalent load and modified life of a bearing."""
+    given = case.rating
     element: rating.RollingElement = "ball" if isinstance(bearing, BallBearing) else "roller"
     life = _reference_life(case, bearing, capacity)
     power = 3.0 if element == "ball" else 10.0 / 3.0
     equivalent = capacity / (life / MILLION) ** (1.0 / power)
-    ratings += [
+    lives = (
         _machine_rating("reference_life", life),
         _machine_rating("equivalent_load_n", equivalent),
-    ]
+    )
     missing = [
         name for name in ("fatigue_load_limit", "contamination") if getattr(given, name) is None
     ]
     if missing:
         reason = f"[rating] has no {' and no '.join(missing)}"
-        return (
-            *ratings,
-            _machine_rating("life_factor", None, reason),
-            _machine_rating("modified_life_s", None, reason),
-        )
+        return (*lives, *_missing(("life_factor", "modified_life_s"), reason))
     assert given.fatigue_load_limit is not None
     assert given.contamination is not None
     # a_ISO depends on stress: slices and clearance may lengthen the life, but they do not reduce a
@@ -148,7 +153,7 @@ def _bearing_ratings(
     reason = "the viscosity ratio is below 0.1, outside ISO 281"
     seconds = None if factor is None else factor * life * math.tau / bearing.speed
     return (
-        *ratings,
+        *lives,
         _machine_rating("life_factor", factor, reason),
         _machine_rating("modified_life_s", seconds, reason),
     )
@@ -176,34 +181,39 @@ GEAR_KEYS = ("mesh_friction", "rated_bulk_k", "rated_flash_k", "rated_film")
 
 
 def _gear_ratings(case: MachineCase, gears: SpurGear, stated: Case) -> tuple[Rating, ...]:
-    def missing(reason: str) -> tuple[Rating, ...]:
-        return tuple(_machine_rating(key, None, reason) for key in GEAR_KEYS)
-
     section, given = stated.contents.lubricant, case.rating
     if not isinstance(section, SheetSection):
-        return missing("the oil is given by laws, not by a data sheet")
+        return _missing(GEAR_KEYS, "the oil is given by laws, not by a data sheet")
     if "C" not in gears.path:
-        return missing("the teeth do not meet at the pitch point")
-    supply = float(section.temperature)
+        return _missing(GEAR_KEYS, "the teeth do not meet at the pitch point")
     try:
         oil = _gear_oil(section.sheet)
     except BadInput as refusal:
-        return missing(str(refusal))
+        return _missing(GEAR_KEYS, str(refusal))
     roughness = _mean_ra(stated) if given.roughness_ra is None else float(given.roughness_ra)
     if roughness == 0.0:
-        return missing("the flanks are smooth")
-    pitch = gears.contact("C", gears.path["C"])
-    assert not isinstance(pitch.radius, tuple)
-    friction = rating.mesh_friction(
-        gears.normal_force / gears.face_width,
-        pitch.radius,
-        sum(pitch.surface_speeds),
-        roughness,
-        oil.viscosity(supply),
-        oil.factor,
+        return _missing(GEAR_KEYS, "the flanks are smooth")
+    ratings = _mesh_ratings(
+        case, gears, stated.thermal.solids, (oil, float(section.temperature)), roughness
     )
+    gear_scope = _outside_scope(gears)
+    return tuple(
+        replace(entry, beyond="; ".join(filter(None, (gear_scope, entry.beyond))))
+        for entry in ratings
+    )
+
+
+def _mesh_ratings(
+    case: MachineCase,
+    gears: SpurGear,
+    solids: tuple[Solid, Solid],
+    oil_supply: tuple[rating.GearOil, float],
+    roughness: float,
+) -> tuple[Rating, ...]:
+    """Return friction, temperatures and film of the mesh, with an oil at its supply temperature."""
+    oil, supply = oil_supply
+    friction = _mesh_friction(gears, oil, supply, roughness)
     bulk = _bulk(case, gears, friction, supply)
-    solids = stated.thermal.solids
     mesh = rating.Mesh(
         roughness, case.pair.effective_modulus, (solids[0].effusivity, solids[1].effusivity)
     )
@@ -214,28 +224,35 @@ def _gear_ratings(case: MachineCase, gears: SpurGear, stated: Case) -> tuple[Rat
     }
     rises = {name: rise for name, (_, rise) in films.items()}
     film = {name: value for name, (value, _) in films.items()}
-    reason = (
-        ""
-        if None not in film.values()
-        else "the flash heats the oil above 510 degC, the limit of the estimate of α"
-    )
-    peclet = min(
-        (
-            min(point.speeds) * point.half_width / (2.0 * solids[0].diffusivity)
-            for point in points.values()
-        ),
-    )
-    gear_scope = _outside_scope(gears)
-    heat_scope = "" if peclet >= SLOW_HEAT else f"a Peclet number of {peclet:.2g} (1 or more)"
-    both = "; ".join(filter(None, (gear_scope, heat_scope)))
-    ratings = (
+    too_hot = "the flash heats the oil above 510 degC, the limit of the estimate of α"
+    return (
         _machine_rating("mesh_friction", friction),
         _machine_rating("rated_bulk_k", bulk),
-        Rating("rated_flash_k", rises, beyond=both),
-        Rating("rated_film", film, reason),
+        Rating("rated_flash_k", rises, beyond=_heat_scope(points.values(), solids[0])),
+        Rating("rated_film", film, too_hot if None in film.values() else ""),
         *_limits(case, film, bulk + max(rises.values()), oil, supply),
     )
-    return tuple(replace(entry, beyond=entry.beyond or gear_scope) for entry in ratings)
+
+
+def _mesh_friction(gears: SpurGear, oil: rating.GearOil, supply: float, roughness: float) -> float:
+    pitch = gears.contact("C", gears.path["C"])
+    assert not isinstance(pitch.radius, tuple)
+    return rating.mesh_friction(
+        gears.normal_force / gears.face_width,
+        pitch.radius,
+        sum(pitch.surface_speeds),
+        roughness,
+        oil.viscosity(supply),
+        oil.factor,
+    )
+
+
+def _heat_scope(points: Iterable[rating.MeshPoint], solid: Solid) -> str:
+    """Return the smallest Peclet number if Blok's flash temperature does not hold there, or ""."""
+    peclet = min(
+        min(point.speeds) * point.half_width / (2.0 * solid.diffusivity) for point in points
+    )
+    return "" if peclet >= SLOW_HEAT else f"a Peclet number of {peclet:.2g} (1 or more)"
 
 
 def _mesh_point(case: MachineCase, contact: MachineContact) -> rating.MeshPoint:

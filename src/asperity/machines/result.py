@@ -1,10 +1,10 @@
 """Result of a machine: one row per contact, the worst contact, verdict, notes and ratings."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from asperity.case import MachineCase
 from asperity.core.quantities import quantity
@@ -14,6 +14,7 @@ from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW, Run
 
 STATIC_LIMIT = 4.2e9  # Hertz pressure of hardened bearing steel, ISO 76 [Pa]
 STEEL_FROM = 180e9  # Young's modulus of both bodies from which the limit applies [Pa]
+Row: TypeAlias = dict[str, Any]  # conditions and numbers of a contact by key
 VERDICT_RATINGS = ("viscosity_ratio", "life_factor", "rated_film", "scuffing_margin_k")
 
 
@@ -25,26 +26,26 @@ class MachineResult:
     """
 
     case: MachineCase
-    rows: tuple[dict[str, Any], ...]
+    rows: tuple[Row, ...]
     solved: bool
     seconds: float
     folder: Path | None = None
     run: Run | None = None
 
     @property
-    def failures(self) -> list[dict[str, Any]]:
+    def failures(self) -> list[Row]:
         """Rows of the contacts that were not solved, each with its `reason`."""
         return [row for row in self.rows if row.get("reason")]
 
     @property
-    def worst(self) -> dict[str, Any]:
+    def worst(self) -> Row:
         """Row of the most critical contact.
 
         The solved contact with the highest CLR; in full film the lowest film ratio, for smooth
         surfaces the thinnest film; if none was solved, the highest Hertz pressure.
         """
 
-        def severity(row: Mapping[str, Any]) -> tuple[float, ...]:
+        def severity(row: Row) -> tuple[float, ...]:
             if row.get("clr") is None:
                 return -1.0, 0.0, row["p_hertz_pa"]
             share = row["clr"] if row["clr"] >= FULL_FILM_BELOW else 0.0
@@ -88,7 +89,7 @@ class MachineResult:
                 "and the elastic solution does not apply."
             )
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> dict[str, object]:
         """Return the JSON output of `asperity machine`."""
         return {
             "verdict": self.verdict(),
@@ -104,10 +105,9 @@ class MachineResult:
         """Return one sentence on lubrication regime, worst contact, film and ratings."""
         worst, title = self.worst, self.case.machine.title()
         if not self.solved:
-            sliding = ""
+            sliding, slip = "", quantity("slide_to_roll")
             if worst["slide_to_roll"]:
-                ratio = quantity("slide_to_roll").text(worst["slide_to_roll"])
-                sliding = f", slide-to-roll ratio {ratio}"
+                sliding = f", slide-to-roll ratio {slip.text(worst['slide_to_roll'])}"
             pressure = quantity("hertz_pressure_pa").text(worst["p_hertz_pa"])
             return (
                 f"{title}: the highest Hertz pressure is {pressure} at {worst['name']}{sliding}; "
@@ -127,21 +127,9 @@ class MachineResult:
             else ""
         )
         doubt = "" if worst["determined"] else " (not determined on this grid)"
-        film = (
-            ""
-            if worst["lambda_ratio"] is None
-            else f", {quantity('lambda_ratio').named(worst['lambda_ratio'])}"
-        )
-        heat = quantity("flash_temperature_max_k")
-        flash = (
-            f", {heat.name} {heat.text(worst['flash_temperature_max_k'])}"
-            if worst["slide_to_roll"]
-            else ""
-        )
         return (
             f"{title}: {_regime(worst)}{part}; worst is {worst['name']}, where asperities carry "
-            f"{_share(worst)} of the load{doubt} on a film of "
-            f"{quantity('h_central_m').text(worst['h_central_m'])}{film}{flash}"
+            f"{_share(worst)} of the load{doubt} on a film of {_film(worst)}"
             f"{self._rated()}{failed}."
         )
 
@@ -157,7 +145,18 @@ class MachineResult:
         return f"; rated {', '.join(parts)}" if parts else ""
 
 
-def _share(row: Mapping[str, Any]) -> str:
+def _film(row: Row) -> str:
+    """Return film thickness and film ratio, and the flash temperature of a sliding contact."""
+    film, ratio, heat = map(quantity, ("h_central_m", "lambda_ratio", "flash_temperature_max_k"))
+    parts = [film.text(row[film.key])]
+    if row[ratio.key] is not None:
+        parts.append(ratio.named(row[ratio.key]))
+    if row["slide_to_roll"]:
+        parts.append(f"{heat.name} {heat.text(row[heat.key])}")
+    return ", ".join(parts)
+
+
+def _share(row: Row) -> str:
     """Return the load share with its interval, if it has one."""
     entry = quantity("clr")
     low, high = (row.get(end) for end in entry.ends)
@@ -165,7 +164,7 @@ def _share(row: Mapping[str, Any]) -> str:
     return f"{entry.text(row['clr'])}{whole}"
 
 
-def condition_row(contact: MachineContact, case: MachineCase) -> dict[str, Any]:
+def condition_row(contact: MachineContact, case: MachineCase) -> Row:
     """Return a contact's conditions, known before it is solved."""
     speeds = contact.surface_speeds
     return {
@@ -185,7 +184,7 @@ def condition_row(contact: MachineContact, case: MachineCase) -> dict[str, Any]:
     }
 
 
-def _regime(row: Mapping[str, Any]) -> str:
+def _regime(row: Row) -> str:
     if row["clr"] < FULL_FILM_BELOW:
         high = row.get("clr_high")
         return (

@@ -10,12 +10,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import pandas
 
 from asperity.case import Case, MachineCase
 from asperity.core.arrays import finite_or_none
+from asperity.core.documents import Json, JsonObject
 from asperity.core.errors import BadInput
 from asperity.core.processes import cores
 from asperity.machine import MachineContact
@@ -137,7 +138,7 @@ def _plan(
     ), point_numbers
 
 
-def _effort(case: Case, max_cells: int) -> dict[str, Any]:
+def _effort(case: Case, max_cells: int) -> JsonObject:
     """Return overrides for the cells and surfaces of a contact."""
     smaller = _smaller_grid(case, max_cells)
     coarse = case.with_overrides(smaller) if smaller else case
@@ -150,7 +151,7 @@ def _effort(case: Case, max_cells: int) -> dict[str, Any]:
     }
 
 
-def _smaller_grid(case: Case, max_cells: int) -> dict[str, Any]:
+def _smaller_grid(case: Case, max_cells: int) -> JsonObject:
     """Return an override that coarsens an automatic grid without a requested accuracy."""
     section, (nx, ny) = case.contents.grid, case.grid.cells
     if section.cells != "auto" or section.accuracy is not None or nx * ny <= max_cells:
@@ -159,26 +160,24 @@ def _smaller_grid(case: Case, max_cells: int) -> dict[str, Any]:
     return {"grid.cells": [max(FEWEST_CELLS, 8 * int(count * ratio / 8)) for count in (nx, ny)]}
 
 
-def _solved_row(table: pandas.DataFrame, point: int | None) -> dict[str, Any]:
+def _solved_row(table: pandas.DataFrame, point: int | None) -> JsonObject:
     """Return the solved quantities of a contact, or the reason why there are none."""
     empty = dict.fromkeys(SOLVED_KEYS)
     if point is None:
         return {**empty, "reason": "the surfaces entrain no oil: no steady film"}
     if point not in table.index:
         return {**empty, "reason": "not computed"}
-    row = table.loc[point]
+    row = table.loc[point].to_dict()
     if row["status"] != DONE:
         return {**empty, "reason": str(row["reason"])}
-    return {key: _json_value(row.get(key)) for key in SOLVED_KEYS} | {
-        "surfaces": int(_json_value(row["surfaces"])),
-        "reason": "",
-    }
+    values = {key: _json_value(row.get(key)) for key in SOLVED_KEYS}
+    return {**values, "surfaces": int(row["surfaces"]), "reason": ""}
 
 
-def _json_value(value: Any) -> Any:
+def _json_value(value: object) -> Json:
     """Convert a table's entry to JSON."""
-    if value is None or isinstance(value, bool):
+    value = value.item() if isinstance(value, np.generic) else value
+    if value is None or isinstance(value, bool | str):
         return value
-    if hasattr(value, "item"):
-        value = value.item()
-    return value if isinstance(value, bool | str) else finite_or_none(value)
+    assert isinstance(value, int | float)
+    return finite_or_none(value)

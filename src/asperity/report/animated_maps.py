@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from io import BytesIO
-from typing import Any, Literal, NamedTuple, Protocol, get_args
+from typing import Literal, NamedTuple, Protocol, get_args
 
 import matplotlib
 import numpy as np
@@ -90,7 +90,12 @@ def ranges(case: Case, frames: Sequence[Frame]) -> Ranges:
     return Ranges(gap or 1e-6, max(float(frame.pressure.max()) for frame in frames) or 1e9)
 
 
-def animated_map(case: Case, kind: Kind, scale: Ranges) -> AnimatedMap:
+def animated_maps(case: Case, scale: Ranges) -> list[AnimatedMap]:
+    """Draw the empty maps of all kinds."""
+    return [_animated_map(case, kind, scale) for kind in KINDS]
+
+
+def _animated_map(case: Case, kind: Kind, scale: Ranges) -> AnimatedMap:
     """Draw an empty map and compute the position of its frames."""
     exhibit = empty_map(case, kind, scale)
     figure = exhibit.figure()
@@ -105,7 +110,7 @@ def animated_map(case: Case, kind: Kind, scale: Ranges) -> AnimatedMap:
 
 
 def script_data(
-    frames: Sequence[Frame], captions: Sequence[str], scale: Ranges, **extra: Any
+    frames: Sequence[Frame], captions: Sequence[str], scale: Ranges, **extra: Sequence[float]
 ) -> str:
     """Return the data of the page's script as JSON: images and captions of the frames."""
     images = [encode_frame(frame, scale) for frame in frames]

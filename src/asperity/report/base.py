@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -99,6 +99,9 @@ def write_exhibits(
         )
 
 
+Numbers: TypeAlias = Mapping[str, Any]  # values by key
+
+
 class Tile(NamedTuple):
     """A highlighted number of a page; `detail` holds its uncertainty and unit in small type."""
 
@@ -107,7 +110,7 @@ class Tile(NamedTuple):
     detail: str
 
 
-def tile(quantity: Quantity, row: Mapping[str, Any]) -> Tile:
+def tile(quantity: Quantity, row: Numbers) -> Tile:
     """Return the tile of a quantity of a row, with its uncertainty and unit."""
     low, high = (row.get(end) for end in quantity.ends)
     if low is not None and high is not None:
@@ -140,7 +143,7 @@ def capitalised(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def render(template: str, *, script: str = "", **values: Any) -> str:
+def render(template: str, *, script: str = "", **values: object) -> str:
     """Render a template to an HTML page, with escaping.
 
     The content security policy forbids all loading and every script except `script`.

@@ -1,12 +1,13 @@
 """Building blocks of figures: axis labels from the catalogue, panels, error bars, legends."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
+from numpy.typing import ArrayLike
 
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
@@ -14,9 +15,10 @@ from asperity.report.style import SPLIT_COLOUR, SPLIT_STRIP, Medium
 from asperity.trend import Stages
 
 PANELS_PER_ROW = 4
+Value = TypeVar("Value", float, Field)
 
 
-def display(key: str, values: Any) -> Any:
+def display(key: str, values: Value) -> Value:
     """Convert stored values of a quantity to its display unit."""
     return values * quantity(key).factor
 
@@ -67,7 +69,9 @@ def group_values(values: Field, size: int) -> Field:
     return values[: values.size // size * size].reshape(-1, size)
 
 
-def draw_intervals(axes: Axes, x: Any, values: Any, bars: Any, marker: str, **style: Any) -> None:
+def draw_intervals(
+    axes: Axes, x: ArrayLike, values: ArrayLike, bars: ArrayLike | None, marker: str, **style: Any
+) -> None:
     """Draw values with error bars of these lengths; omit bars that are not finite."""
     bars = None if bars is None else np.where(np.isfinite(bars), bars, 0.0)
     axes.errorbar(x, values, bars, fmt=marker, **{"capsize": 2, "elinewidth": 0.9, **style})

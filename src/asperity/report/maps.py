@@ -4,7 +4,7 @@ All maps of a contact have the same position in their figures.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -27,6 +27,7 @@ from asperity.report.style import (
     GAP_COLOUR,
     OIL_COLOUR,
     Medium,
+    Style,
 )
 
 
@@ -46,7 +47,9 @@ def show_map(axes: Axes, values: Field, solution: ContactSolution, **style: Any)
     (x0, y0), (x1, y1) = solution.grid.lower, solution.grid.upper
     corners = (*display("x_m", np.array([x0, x1])), *display("y_m", np.array([y0, y1])))
     roller = solution.conditions.geometry == "roller"
-    aspect: Any = "auto" if roller else "equal"  # a roller is too long to scale
+    aspect: Literal["auto", "equal"] = (
+        "auto" if roller else "equal"
+    )  # a roller is too long to scale
     image = axes.imshow(
         np.swapaxes(values, 0, 1),
         origin="lower",
@@ -104,7 +107,7 @@ def colour_bar(
 def mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
     """Draw the outline of the smooth, dry contact as a dashed line."""
     a, b = (display("x_m", half_width) for half_width in solution.conditions.hertz.half_widths)
-    style: dict[str, Any] = {"color": colour, "linestyle": DASHED, "linewidth": 1.0}
+    style: Style = {"color": colour, "linestyle": DASHED, "linewidth": 1.0}
     if solution.conditions.endless:
         for side in (-a, a):
             axes.axvline(side, **style)

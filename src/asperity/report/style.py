@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import Any, TypeAlias
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -34,13 +34,14 @@ CONTACT_COLOUR, OIL_COLOUR, CAVITY_COLOUR, CAVITY_STRIPE = (
 )
 GAP_COLOUR = "#e5e7eb"  # open gap of a dry contact
 SPLIT_COLOUR, SPLIT_STRIP, BAND_COLOUR = "#8a5a00", "#f2e3c6", "#e8eef4"
-DASHED: Any = (0, (4, 3))
+Style: TypeAlias = dict[str, Any]  # keyword arguments of matplotlib
+DASHED = (0.0, (4.0, 3.0))
 FORMATS = (".png", ".pdf")
 _MIN_TITLE_SIZE = 8.0  # points
 _SAFE_WIDTH = 0.6  # of the column: titles up to this width need no fitting
 _MARGIN = 0.01  # of the figure width beside a title: the reader's font may be wider
 
-STYLE: Any = {
+STYLE: Style = {
     "svg.hashsalt": "asperity",  # the same run gives the same bytes
     "svg.fonttype": "none",  # keep text as text: smaller, and sharp at any zoom
     "pdf.fonttype": 42,  # searchable and editable text, as publishers require
@@ -66,7 +67,7 @@ class Medium:
     single: float
     double: float
     titled: bool
-    style: dict[str, Any] = field(default_factory=dict)
+    style: Style = field(default_factory=dict)
 
     def width(self, panels: int) -> float:
         """Return the width of a figure with this number of panels in a row [inches]."""
@@ -188,7 +189,7 @@ def write_figure(figure: Figure, path: Path, *, medium: Medium = ON_PAGE, dpi: i
     if path.suffix.lower() not in FORMATS:
         raise BadInput(f"a figure must end in {' or '.join(FORMATS)}, got {path}")
     kind = path.suffix.lower()[1:]
-    metadata: dict[str, Any] = {"Software": None} if kind == "png" else {"CreationDate": None}
+    metadata: dict[str, None] = {"Software": None} if kind == "png" else {"CreationDate": None}
     with atomic_write(path) as part, medium.drawing():
         fit_titles(figure)
         figure.savefig(part, format=kind, dpi=dpi, metadata=metadata)

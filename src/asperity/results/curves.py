@@ -5,7 +5,7 @@ Each point is a solved contact, warm-started from its neighbour; nothing is prin
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -57,7 +57,7 @@ class FrictionCurve:
     sq: float  # composite roughness [m]
     feedback: bool  # True if the viscosity is that at the film temperature
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> dict[str, object]:
         """Return the curve for `--json`."""
         return {
             "kind": self.kind,

@@ -6,7 +6,6 @@ Each frequency takes a third of the solution time at 128 x 128 cells and as long
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -43,7 +42,7 @@ class DynamicCurve:
     virgin: DynamicBranch
     failures: tuple[str, ...] = ()
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> dict[str, object]:
         """Return the curve for `solve --json`; None where it is not determined."""
         return {
             "frequency_hz": self.frequency_hz.tolist(),

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from asperity import ehl
 from asperity.case import Case
@@ -252,18 +252,15 @@ class Run:
         """True if CLR is converged and resolved, with an error bar below 15 %."""
         return self.solution.convergence.converged and self.undetermined is None
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """Return the content of `solve --json`: numbers, cells, regime card and notes.
 
         For an oil from a data sheet, its numbers are under `oil`, with the `origins` of each.
         """
         facts = self.case.oil_facts
         origins = {fact.key: ": ".join(filter(None, (fact.origin, fact.how))) for fact in facts}
-        oil = (
-            {"oil": {**{fact.key: fact.value for fact in facts}, "origins": origins}}
-            if facts
-            else {}
-        )
+        values: dict[str, object] = {fact.key: fact.value for fact in facts}
+        oil: dict[str, object] = {"oil": {**values, "origins": origins}} if facts else {}
         return {
             **self.scalars(),
             "cells": list(self.solution.grid.cells),

@@ -1,6 +1,6 @@
 """Variables, coordinates and attributes of a run as they are stored."""
 
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from asperity.results.dynamic import DynamicCurve
 from asperity.results.surface_spread import Scalar
 from asperity.solution import SubsurfaceStress
 
+Variable: TypeAlias = tuple[str, Field, dict[str, str]]  # dimension, values, attributes
 MAPS = (
     "von_mises",
     "von_mises_depth",
@@ -62,19 +63,22 @@ def run_contents(run: SolvedRun) -> ehl.FileContents:
         stress.von_mises[:, stress.row].astype(np.float32),
         section,
     )
-    curve = run.dynamic_curve
-    if curve is not None:
-        coordinates["dynamic_frequency"] = (
-            "dynamic_frequency",
-            curve.frequency_hz,
-            quantity("dynamic_frequency").attributes,
-        )
-        for suffix, branch in (("", curve.elastic), ("_virgin", curve.virgin)):
-            for name in ("dynamic_stiffness", "dynamic_damping"):
-                values = getattr(branch, name.removeprefix("dynamic_"))
-                key = f"{name}{suffix}"
-                variables[key] = ("dynamic_frequency", values, quantity(key).attributes)
+    if run.dynamic_curve is not None:
+        frequency, values = "dynamic_frequency", run.dynamic_curve.frequency_hz
+        coordinates[frequency] = (frequency, values, quantity(frequency).attributes)
+        variables |= _dynamic_variables(run.dynamic_curve)
     for key, value in run.scalars().items():
         if value is not None and not isinstance(value, bool):
             variables[key] = ((), value, quantity(key).attributes)
     return ehl.FileContents(variables, coordinates, attributes)
+
+
+def _dynamic_variables(curve: DynamicCurve) -> dict[str, Variable]:
+    """Return stiffness and damping of both branches over frequency."""
+    variables: dict[str, Variable] = {}
+    for suffix, branch in (("", curve.elastic), ("_virgin", curve.virgin)):
+        for name in ("stiffness", "damping"):
+            key = f"dynamic_{name}{suffix}"
+            values = getattr(branch, name)
+            variables[key] = ("dynamic_frequency", values, quantity(key).attributes)
+    return variables

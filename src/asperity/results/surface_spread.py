@@ -44,7 +44,7 @@ def mean_row(rows: Sequence[Row]) -> dict[str, Any]:
     None for numbers that were not computed on every surface.
     """
     first, *others = rows
-    means: dict[str, Any] = dict(first)
+    means = dict(first)
     for key in (entry.key for entry in lines(*AVERAGED)):
         if key not in first:
             continue

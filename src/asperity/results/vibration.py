@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from asperity.case import Case
 from asperity.core.errors import BadInput
@@ -29,7 +28,7 @@ class VibratedCase:
         """Contact resonance of the record, found or not."""
         return self.vibration.resonance
 
-    def scalars(self) -> dict[str, Any]:
+    def scalars(self) -> dict[str, object]:
         """Return the numbers of `asperity vibrate --json` by key, SI; None if not available."""
         numbers = read(self, (*map(quantity, KEYS), *lines("vibration")))
         result = {"found": self.resonance.found, "reason": self.resonance.reason}

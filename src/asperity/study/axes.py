@@ -5,7 +5,6 @@ Swept quantities keep the unit of the case file.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas
@@ -123,14 +122,14 @@ def _varies(values: Field) -> bool:
     return known.size > 0 and float(np.ptp(known)) > ROUNDING * float(np.abs(known).max())
 
 
-def _short(value: Any) -> str:
+def _short(value: object) -> str:
     """Return a short label: the choice of a table, the name of a file."""
     if isinstance(value, Mapping):
         value = next((value[key] for key in CHOICES if key in value), value)
     return as_written(value).rpartition("/")[2]
 
 
-def _numbers(written: Sequence[Any]) -> tuple[Field, str]:
+def _numbers(written: Sequence[object]) -> tuple[Field, str]:
     """Return values in the unit of the first; BadInput for a non-number or an uneven pair."""
     pairs = [list(value) if isinstance(value, list | tuple) else [value] for value in written]
     if any(entry != pair[0] for pair in pairs for entry in pair):

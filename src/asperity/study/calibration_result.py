@@ -11,6 +11,7 @@ from asperity.case import Case
 from asperity.core.arrays import Field
 from asperity.paper import Anchor
 from asperity.study.curve import WearCurve
+from asperity.study.evaluate import Row
 from asperity.study.ranges import ParameterRange
 
 LEARNT_FROM = 0.5  # fraction of prior variance removed from which on a quantity is identifiable
@@ -139,7 +140,7 @@ class Calibration:
     def scalars(self) -> dict[str, Any]:
         """Return the JSON output of `asperity calibrate`."""
 
-        def rows(table: pandas.DataFrame) -> list[dict[str, Any]]:
+        def rows(table: pandas.DataFrame) -> list[Row]:
             return [
                 {str(key): as_json(value) for key, value in row.items()}
                 for row in table.to_dict("records")
@@ -176,7 +177,7 @@ class Calibration:
         }
 
 
-def as_json(value: Any) -> Any:
+def as_json(value: object) -> Any:
     """Convert a table entry to JSON: None for nan and infinity."""
     if isinstance(value, np.generic):
         value = value.item()

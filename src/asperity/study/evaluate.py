@@ -7,7 +7,7 @@ instead of raising.
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Literal, get_args
 
@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
 from asperity.core.arrays import Field, finite_or_none
+from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
 from asperity.coupling import Vibration, contact_vibration
 from asperity.results import RUN_GROUPS, Run, solve_case, vibrate_case
@@ -29,12 +30,13 @@ QUICK = tuple(group for group in RUN_GROUPS if group not in ("own", "virgin"))
 STILL = tuple(group for group in RUN_GROUPS if group not in ("heat", "stress", "resonance"))
 
 Row = dict[str, Any]
+TimedBatch = tuple[list[tuple[Row, dict[str, Field]]], float]  # results, seconds
 # the solver has one set of work arrays per process, and an executor may use threads
 _solver_lock = threading.Lock()
 
 
 def evaluate_batch(
-    case: Case, kind: str, batch: Sequence[Mapping[str, Any]], fields: tuple[str, ...] = ()
+    case: Case, kind: str, batch: Sequence[Table], fields: tuple[str, ...] = ()
 ) -> list[tuple[Row, dict[str, Field]]]:
     """Return rows and requested fields of `case` with each of the batch's overrides.
 
@@ -45,14 +47,16 @@ def evaluate_batch(
         return [evaluate(case, kind, overrides, fields) for overrides in batch]
 
 
-def timed_batch(*job: Any) -> tuple[list[tuple[Row, dict[str, Field]]], float]:
+def timed_batch(
+    case: Case, kind: str, batch: Sequence[Table], fields: tuple[str, ...] = ()
+) -> TimedBatch:
     """Return the results of `evaluate_batch` and the seconds taken."""
     start = time.perf_counter()
-    return evaluate_batch(*job), time.perf_counter() - start
+    return evaluate_batch(case, kind, batch, fields), time.perf_counter() - start
 
 
 def evaluate(
-    case: Case, kind: str, overrides: Mapping[str, Any], fields: tuple[str, ...] = ()
+    case: Case, kind: str, overrides: Table, fields: tuple[str, ...] = ()
 ) -> tuple[Row, dict[str, Field]]:
     """Return the row of one case: `status`, `reason` and every scalar, and the requested fields."""
     try:

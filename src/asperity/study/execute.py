@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from itertools import chain, islice, takewhile
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import pandas
 
@@ -31,7 +30,7 @@ from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.core.files import versions
 from asperity.core.processes import cores, set_up_worker
-from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, timed_batch
+from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, TimedBatch, timed_batch
 from asperity.study.maps import require_zarr
 from asperity.study.plan import StudyCase, StudyPlan
 from asperity.study.store import (
@@ -356,7 +355,7 @@ def _compute(work: _Work, executor: Executor | None, workers: int | None) -> Non
 
 def _run_batches(work: _Work, executor: Executor, workers: int) -> None:
     """Submit batches until none are left or the executor is broken."""
-    pending: dict[Future[Any], list[StudyCase]] = {}
+    pending: dict[Future[TimedBatch], list[StudyCase]] = {}
     while work.waiting or pending:
         broken = not _submit(work, executor, workers, pending)
         lost: list[list[StudyCase]] = []
@@ -384,7 +383,10 @@ def _run_batches(work: _Work, executor: Executor, workers: int) -> None:
 
 
 def _submit(
-    work: _Work, executor: Executor, workers: int, pending: dict[Future[Any], list[StudyCase]]
+    work: _Work,
+    executor: Executor,
+    workers: int,
+    pending: dict[Future[TimedBatch], list[StudyCase]],
 ) -> bool:
     """Keep every worker supplied; return False if the executor is broken."""
     while work.waiting and len(pending) < BATCHES_AHEAD * workers:
@@ -401,7 +403,9 @@ def _submit(
     return True
 
 
-def _salvage(work: _Work, pending: dict[Future[Any], list[StudyCase]]) -> list[list[StudyCase]]:
+def _salvage(
+    work: _Work, pending: dict[Future[TimedBatch], list[StudyCase]]
+) -> list[list[StudyCase]]:
     """Store the batches that a broken executor finished; return those it did not."""
     lost = []
     for future, batch in pending.items():

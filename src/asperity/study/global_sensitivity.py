@@ -226,6 +226,28 @@ def _analyse(
         raise AsperityError(
             f"too many contacts failed to rank the factors{first}; narrow the ranges"
         )
+    return Sensitivity(
+        case=design.case,
+        method=sample.method,
+        ranges=design.ranges,
+        factors=factors,
+        outcomes=tuple(outcomes),
+        effects=_effects(sample, factors, outcomes, columns),
+        values=values,
+        left_out=int(np.count_nonzero(~whole.all(axis=0))) * sample.block,
+        distinct=_distinct(curves, curve),
+        full_film_share=full_film_share,
+        result=result,
+    )
+
+
+def _effects(
+    sample: SampleDesign,
+    factors: tuple[str, ...],
+    outcomes: Sequence[SensitivityOutcome],
+    columns: Sequence[Field],
+) -> pandas.DataFrame:
+    """Return the measures of each factor's effect on each outcome, and its share of their sum."""
     effects = []
     for outcome, column in zip(outcomes, columns, strict=True):
         measures = indices(sample, column)
@@ -241,19 +263,7 @@ def _analyse(
                     "share": float(ranked[i]) / total if total > 0.0 else 0.0,
                 }
             )
-    return Sensitivity(
-        case=design.case,
-        method=sample.method,
-        ranges=design.ranges,
-        factors=factors,
-        outcomes=tuple(outcomes),
-        effects=pandas.DataFrame(effects),
-        values=values,
-        left_out=int(np.count_nonzero(~whole.all(axis=0))) * sample.block,
-        distinct=_distinct(curves, curve),
-        full_film_share=full_film_share,
-        result=result,
-    )
+    return pandas.DataFrame(effects)
 
 
 def _curves(result: StudyResult, shape: tuple[int, int, int]) -> tuple[dict[str, Field], float]:

@@ -12,14 +12,25 @@ from decimal import Decimal
 from difflib import get_close_matches
 from functools import cached_property
 from itertools import permutations, product
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy
 
-from asperity.case import Case, RangeSection, Section, Seeding, StudyKind, split_amount, to_si
+from asperity.case import (
+    Case,
+    RangeSection,
+    Section,
+    Seeding,
+    StudyKind,
+    StudySection,
+    split_amount,
+    to_si,
+)
+from asperity.core.documents import Table
 from asperity.core.errors import BadInput, UnreadableFile
 
+Swept: TypeAlias = tuple[str, tuple[object, ...] | RangeSection]  # name and values of a key
 PlanKind: TypeAlias = StudyKind | Literal["surfaces", "still"]
 SEED_KEYS = ("surface.seed", "vibration.seed")
 MAX_CASES = 10_000_000
@@ -43,7 +54,7 @@ class StudyCase(NamedTuple):
     number: int
     point: int
     realisation: int
-    overrides: dict[str, Any]
+    overrides: dict[str, object]
     id: str
 
 
@@ -68,7 +79,7 @@ class StudyPlan:
 
     case: Case
     axes: tuple[str, ...]
-    points: tuple[Mapping[str, Any], ...]
+    points: tuple[Table, ...]
     realisations: int = 1
     kind: PlanKind = "solve"
     seeding: Seeding = "independent"
@@ -81,7 +92,7 @@ class StudyPlan:
         return tuple(self._cases())
 
     @cached_property
-    def _fixed(self) -> dict[str, Any]:
+    def _fixed(self) -> dict[str, object]:
         # [infer] does not change a contact
         stated = ((k, v) for k, v in _entries(self.case.contents) if k != "infer")
         values = {key: to_si(value) for key, value in stated if not isinstance(value, Section)}
@@ -106,7 +117,7 @@ class StudyPlan:
             seeded = [
                 key for key in SEED_KEYS if _has_seed(shaped, key) and not _states(point, key)
             ]
-            shared: dict[str, Any] = {}
+            shared: dict[str, object] = {}
             if self.ids is None:
                 file = self.surface_digest if shaped is self.case else _surface_digest(shaped)
                 shared = {**self._fixed, **plain, "surface file": file}
@@ -116,21 +127,20 @@ class StudyPlan:
                 else [int(_hash(plain)[i : i + 8], 16) for i in (0, 8)]
             )
             for realisation in range(self.realisations):
-                if self.seeds is None:
-                    drawn = np.random.SeedSequence([base, realisation, *words]).generate_state(2)
-                else:
-                    own = self.seeds[realisation]
-                    drawn = np.array(
-                        [own, np.random.SeedSequence([own, *words]).generate_state(1)[0]]
-                    )
-                chosen = {
-                    key: int(seed)
-                    for key, seed in zip(SEED_KEYS, drawn, strict=True)
-                    if key in seeded
-                }
+                drawn = self._seeds(base, realisation, words)
+                chosen = {key: drawn[key] for key in seeded}
                 name = _hash({**shared, **chosen})[:16] if self.ids is None else self.ids[number]
                 yield StudyCase(number, position, realisation, {**point, **chosen}, name)
                 number += 1
+
+    def _seeds(self, base: int, realisation: int, words: Sequence[int]) -> dict[str, int]:
+        """Return the seeds of surface and vibration of a realisation."""
+        if self.seeds is None:
+            drawn = np.random.SeedSequence([base, realisation, *words]).generate_state(2)
+        else:
+            own = self.seeds[realisation]
+            drawn = np.array([own, np.random.SeedSequence([own, *words]).generate_state(1)[0]])
+        return {key: int(seed) for key, seed in zip(SEED_KEYS, drawn, strict=True)}
 
 
 def plan_study(case: Case) -> StudyPlan:
@@ -150,18 +160,7 @@ def plan_study(case: Case) -> StudyPlan:
         )
     if not section.axes and section.seeds == 1:
         raise BadInput(f"{case.source}: study varies nothing; add a swept quantity or seeds")
-    keys = {full_key(case, name): (name, values) for name, values in section.axes.items()}
-    if len(keys) < len(section.axes):
-        raise BadInput(
-            f"{case.source}: study sweeps one quantity twice; "
-            f"the keys are {', '.join(section.axes)}"
-        )
-    for key, part in permutations(keys, 2):
-        if part.startswith(f"{key}."):
-            raise BadInput(
-                f"{case.source}: study sweeps {key} and {part}, a part of it; "
-                f"write {part} in its tables"
-            )
+    keys = _swept_keys(case, section)
     count = math.prod(
         len(values) if isinstance(values, tuple) else _range_size(case, name, values)
         for name, values in keys.values()
@@ -184,9 +183,26 @@ def plan_study(case: Case) -> StudyPlan:
     )
 
 
+def _swept_keys(case: Case, section: StudySection) -> dict[str, Swept]:
+    """Return name and values of each swept key; BadInput for a key that is swept twice."""
+    keys = {full_key(case, name): (name, values) for name, values in section.axes.items()}
+    if len(keys) < len(section.axes):
+        raise BadInput(
+            f"{case.source}: study sweeps one quantity twice; "
+            f"the keys are {', '.join(section.axes)}"
+        )
+    for key, part in permutations(keys, 2):
+        if part.startswith(f"{key}."):
+            raise BadInput(
+                f"{case.source}: study sweeps {key} and {part}, a part of it; "
+                f"write {part} in its tables"
+            )
+    return keys
+
+
 def plan_points(
     case: Case,
-    points: Sequence[Mapping[str, Any]],
+    points: Sequence[Table],
     *,
     axes: Sequence[str] | None = None,
     seeds: int | Sequence[int] = 1,
@@ -223,7 +239,7 @@ def plan_points(
     return StudyPlan(base, tuple(axes), tuple(points), realisations, kind, seeding, given)
 
 
-def _require_values(case: Case, axes: Sequence[str], points: Sequence[Mapping[str, Any]]) -> None:
+def _require_values(case: Case, axes: Sequence[str], points: Sequence[Table]) -> None:
     """Raise BadInput for an invalid value; of many values of a quantity, check the extremes."""
     for key in axes:
         values = {json.dumps(to_si(point[key])): point[key] for point in points if key in point}
@@ -234,7 +250,7 @@ def _require_values(case: Case, axes: Sequence[str], points: Sequence[Mapping[st
             case.with_overrides({key: value})
 
 
-def _require_distinct(case: Case, points: Sequence[Mapping[str, Any]]) -> None:
+def _require_distinct(case: Case, points: Sequence[Table]) -> None:
     """Raise BadInput for a duplicate point, whose cases would count as independent ones."""
     seen = set()
     for point in points:
@@ -282,7 +298,7 @@ def full_key(case: Case, name: str, section: str = "study") -> str:
     raise BadInput(f"{case.source}: {section}.{name} is not a key of the case; {remedy}")
 
 
-def _entries(section: Section, parents: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
+def _entries(section: Section, parents: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
     """Yield every key of a case with its value, tables and their entries."""
     for name, entry in type(section).model_fields.items():
         keys, value = (*parents, entry.alias or name), getattr(section, name)
@@ -291,7 +307,7 @@ def _entries(section: Section, parents: tuple[str, ...] = ()) -> Iterator[tuple[
             yield from _entries(value, keys)
 
 
-def as_written(value: Any) -> str:
+def as_written(value: object) -> str:
     """Return a value of a case file as text."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key} = {as_written(entry)}" for key, entry in value.items()) + "}"
@@ -382,11 +398,11 @@ def _between(span: _Span, share: float, scale: str) -> Decimal:
 
 
 def _sampled(
-    case: Case, keys: Mapping[str, tuple[str, Any]], samples: int, sample_seed: int
-) -> list[dict[str, Any]]:
+    case: Case, keys: Mapping[str, Swept], samples: int, sample_seed: int
+) -> list[dict[str, object]]:
     """Return points of a Latin hypercube over ranges and lists."""
     shares = scipy.stats.qmc.LatinHypercube(len(keys), rng=sample_seed).random(samples)
-    points: list[dict[str, Any]] = [{} for _ in range(samples)]
+    points: list[dict[str, object]] = [{} for _ in range(samples)]
     # sorted, since the order of keys may differ in an equivalent case
     for column, (key, (name, values)) in enumerate(sorted(keys.items())):
         for point, share in zip(points, shares[:, column], strict=True):
@@ -398,17 +414,13 @@ def _sampled(
     return points
 
 
-# Identity
-# ----------------------------------------------------------------------
-
-
 def _has_seed(case: Case, key: str) -> bool:
     section, name = key.split(".")
     table = getattr(case.contents, section)
     return table is not None and name in type(table).model_fields
 
 
-def _states(point: Mapping[str, Any], key: str) -> bool:
+def _states(point: Table, key: str) -> bool:
     """Return True if a point sets the seed, by its key or in a whole table."""
     section, name = key.split(".")
     table = point.get(section)
@@ -431,5 +443,5 @@ def _surface_digest(case: Case) -> str | None:
     return digest.hexdigest() if any(files) else None
 
 
-def _hash(values: Mapping[str, Any]) -> str:
+def _hash(values: Table) -> str:
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()

@@ -159,7 +159,7 @@ def open_ranges(
 
 
 def _has(case: Case, key: str) -> bool:
-    section: Any = case.contents
+    section: object = case.contents
     for name in entry_of(key)[0].split("."):
         if name not in getattr(type(section), "model_fields", {}):
             return False
@@ -209,7 +209,7 @@ def entry_of(key: str) -> tuple[str, int | None]:
 def stated_value(case: Case, key: str) -> Any:
     """Return the value that the case states for a dotted key, or None."""
     name, index = entry_of(key)
-    value: Any = tomllib.loads(case.text)
+    value: object = tomllib.loads(case.text)
     for part in name.split("."):
         value = value.get(part) if isinstance(value, Mapping) else None
     if index is None or value is None:
@@ -219,7 +219,7 @@ def stated_value(case: Case, key: str) -> Any:
 
 def overrides_at(
     case: Case, ranges: Sequence[ParameterRange], shares: Iterable[float]
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return the case's overrides at a share of each range.
 
     If the domain changes along x or y, the number of cells changes with it, so that their size

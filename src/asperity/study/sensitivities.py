@@ -31,21 +31,10 @@ class MisfitSlopes:
     @classmethod
     def from_differences(cls, solver: MisfitSolver, best: Field, seeds: int) -> "MisfitSlopes":
         """Take central differences over STEP either side, on more surfaces than the fit."""
-        pairs = neighbours(best)
+        pairs, aimed = neighbours(best), solver.aimed
         tables = solver.solve([best, *itertools.chain(*pairs)], seeds)
-
-        def values(table: pandas.DataFrame) -> Field:
-            """Return the anchored quantities of each surface, shape (seeds, anchors)."""
-            by_seed = np.full((seeds, len(solver.aimed)), np.nan)
-            for seed in range(seeds):
-                rows = table[(table["realisation"] == seed) & (table["status"] == DONE)]
-                if len(rows) == len(solver.sq):
-                    curve = WearCurve(np.array(solver.sq), rows)
-                    by_seed[seed] = [anchor.evaluate(curve)[0] for anchor in solver.aimed]
-            return by_seed
-
-        centre, *around = (values(table) for table in tables)
-        tolerances = np.array([anchor.tolerance for anchor in solver.aimed])
+        centre, *around = (_anchored_values(solver, table, seeds) for table in tables)
+        tolerances = np.array([anchor.tolerance for anchor in aimed])
         slopes = np.stack(
             [
                 (around[2 * i + 1] - around[2 * i]) / (high[i] - low[i]) / tolerances
@@ -53,22 +42,17 @@ class MisfitSlopes:
             ],
             axis=2,
         )
-        whole = np.isfinite(centre).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2))
-        if not whole.any():
+        solved = np.isfinite(centre).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2))
+        if not solved.any():
             raise AsperityError(
                 "no surface could be solved at all neighbours of the best set; give more seeds"
             )
-        mean = centre[whole].mean(axis=0)
-        miss = np.array(
-            [anchor.miss(value) for anchor, value in zip(solver.aimed, mean, strict=True)]
-        )
-        active = np.array(
-            [a.sense == "about" or m != 0.0 for a, m in zip(solver.aimed, miss, strict=True)]
-        )
-        residuals = (centre[whole] - mean + miss) / tolerances
-        return cls(
-            np.where(active, residuals, 0.0), np.where(active[None, :, None], slopes[whole], 0.0)
-        )
+        centre, slopes = centre[solved], slopes[solved]
+        mean = centre.mean(axis=0)
+        miss = _misses(aimed, mean)
+        active = np.array([anchor.sense == "about" for anchor in aimed]) | (miss != 0.0)
+        residuals = np.where(active, (centre - mean + miss) / tolerances, 0.0)
+        return cls(residuals, np.where(active[None, :, None], slopes, 0.0))
 
     @property
     def mean_residuals(self) -> Field:
@@ -157,3 +141,18 @@ class MisfitSlopes:
                 )
             )
         return sorted(trade_offs, key=lambda trade: trade.without - trade.misfit)
+
+
+def _misses(anchors: Sequence[Anchor], values: Field) -> Field:
+    return np.array([anchor.miss(value) for anchor, value in zip(anchors, values, strict=True)])
+
+
+def _anchored_values(solver: MisfitSolver, table: pandas.DataFrame, seeds: int) -> Field:
+    """Return the anchored quantities of each surface, shape (seeds, anchors)."""
+    by_seed = np.full((seeds, len(solver.aimed)), np.nan)
+    for seed in range(seeds):
+        rows = table[(table["realisation"] == seed) & (table["status"] == DONE)]
+        if len(rows) == len(solver.sq):
+            curve = WearCurve(np.array(solver.sq), rows)
+            by_seed[seed] = [anchor.evaluate(curve)[0] for anchor in solver.aimed]
+    return by_seed

@@ -1,7 +1,7 @@
 """Sampling designs and sensitivity indices from SALib: Morris' effects, Sobol's variances."""
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -93,7 +93,7 @@ def indices(design: SampleDesign, outcome: Field) -> dict[str, Field]:
     return {name: np.asarray(analysed[salib], dtype=float) for name, salib in names.items()}
 
 
-def _problem(factors: int) -> dict[str, Any]:
+def _problem(factors: int) -> dict[str, object]:
     return {
         "num_vars": factors,
         "names": [f"x{i}" for i in range(factors)],

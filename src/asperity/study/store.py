@@ -198,7 +198,7 @@ def study_manifest(folder: Path) -> dict[str, Any]:
     return read_manifest(folder, of="study", layout=FORMAT)
 
 
-def _manifest(plan: StudyPlan, folder: Path) -> dict[str, Any]:
+def _manifest(plan: StudyPlan, folder: Path) -> dict[str, object]:
     stated = ("surface_digest", "kind", "seeding", "seeds", "realisations", "axes", "points")
     return {
         "of": "study",
@@ -235,6 +235,18 @@ def rows_table(rows: Iterable[Row]) -> pyarrow.Table:
 
 def ordered_table(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFrame:
     """Return finished rows by case number, the plan's columns first; the last attempt counts."""
+    if parts:
+        finished = _last_attempts(parts)
+    else:
+        finished = pandas.DataFrame({"case_id": [], "status": [], "reason": []}, dtype=str)
+    merged = _planned_table(plan).merge(finished, on="case_id", how="inner")
+    merged = merged.sort_values("number", ignore_index=True)
+    rest = [name for name in merged.columns if name not in _LEADING]
+    return merged[[*_LEADING, *rest]]
+
+
+def _planned_table(plan: StudyPlan) -> pandas.DataFrame:
+    """Return the numbers, swept quantities and seeds of all cases of a plan."""
     planned = pandas.DataFrame(
         [(case.id, case.number, case.point, case.realisation) for case in plan.cases],
         columns=list(_LEADING[:4]),
@@ -248,29 +260,25 @@ def ordered_table(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.Dat
             planned[seed] = planned[seed].astype(
                 "int64" if planned[seed].notna().all() else "Int64"
             )
-    if parts:
-        fewest_last = sorted(parts, key=lambda part: part.num_columns, reverse=True)
-        table = pyarrow.concat_tables(fewest_last, promote_options="permissive")
-        for place, column in enumerate(table.schema):
-            if pyarrow.types.is_null(column.type):  # no case has this number
-                table = table.set_column(place, column.name, table.column(place).cast("float64"))
-        runs = table.select(["case_id", "attempt"]).to_pandas()
-        last = (
-            runs.sort_values("attempt", kind="stable").drop_duplicates("case_id", keep="last").index
-        )
-        finished = table.take(sorted(last)).drop_columns("attempt").to_pandas()
-        if "converged" in finished:  # a case that failed before the solver did not converge
-            finished["converged"] = finished["converged"].eq(True)
-    else:
-        finished = pandas.DataFrame({"case_id": [], "status": [], "reason": []}, dtype=str)
-    merged = planned.merge(finished, on="case_id", how="inner").sort_values(
-        "number", ignore_index=True
-    )
-    rest = [name for name in merged.columns if name not in _LEADING]
-    return merged[[*_LEADING, *rest]]
+    return planned
 
 
-def _uniform_type(values: Sequence[Any]) -> list[Any]:
+def _last_attempts(parts: Sequence[pyarrow.Table]) -> pandas.DataFrame:
+    """Return the last attempt at each finished case."""
+    fewest_last = sorted(parts, key=lambda part: part.num_columns, reverse=True)
+    table = pyarrow.concat_tables(fewest_last, promote_options="permissive")
+    for place, column in enumerate(table.schema):
+        if pyarrow.types.is_null(column.type):  # no case has this number
+            table = table.set_column(place, column.name, table.column(place).cast("float64"))
+    runs = table.select(["case_id", "attempt"]).to_pandas()
+    last = runs.sort_values("attempt", kind="stable").drop_duplicates("case_id", keep="last").index
+    finished = table.take(sorted(last)).drop_columns("attempt").to_pandas()
+    if "converged" in finished:  # a case that failed before the solver did not converge
+        finished["converged"] = finished["converged"].eq(True)
+    return pandas.DataFrame(finished)
+
+
+def _uniform_type(values: Sequence[object]) -> list[Any]:
     """Return a swept quantity as numbers, or as text (JSON for pairs and tables) if any is not."""
     if any(isinstance(value, list) for value in values):  # a pair of equal values became one number
         values = [[value, value] if isinstance(value, int | float) else value for value in values]

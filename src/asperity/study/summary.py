@@ -1,7 +1,5 @@
 """Verdict and JSON output of a study and of its cost estimate."""
 
-from typing import Any
-
 from asperity.study.cost import StudyCost
 from asperity.study.curve import WearCurve, curve_from_study, is_wear_study
 from asperity.study.execute import StudyResult
@@ -20,9 +18,9 @@ def study_verdict(result: StudyResult) -> str:
     return f"{sentence.rstrip('.')}."
 
 
-def study_scalars(result: StudyResult) -> dict[str, Any]:
+def study_scalars(result: StudyResult) -> dict[str, object]:
     """Return the JSON output of `asperity study`."""
-    scalars: dict[str, Any] = {
+    scalars: dict[str, object] = {
         "verdict": study_verdict(result),
         "cases": len(result.table),
         "planned": len(result.plan.cases),
@@ -64,7 +62,7 @@ def estimate_verdict(cost: StudyCost) -> str:
     return f"{finished}: about {time} on {cost.workers} {workers}."
 
 
-def estimate_scalars(plan: StudyPlan, cost: StudyCost) -> dict[str, Any]:
+def estimate_scalars(plan: StudyPlan, cost: StudyCost) -> dict[str, object]:
     """Return the JSON output of `asperity study --dry-run`."""
     return {
         "verdict": estimate_verdict(cost),

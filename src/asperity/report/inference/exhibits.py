@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
-from asperity.inference import KEY_QUANTITIES, Design, Inference
+from asperity.inference import KEY_QUANTITIES, Design, Inference, ObservationPoint
 from asperity.report.base import Exhibit
 from asperity.report.drawing import legend_below, panels_in_rows
-from asperity.report.style import BLUE, GREY, VERMILION, Medium
+from asperity.report.style import BLUE, GREY, VERMILION, Medium, Style
 
 BINS = 30
 MAX_DRAWS = 700  # in a scatter plot
@@ -127,31 +127,15 @@ def predicted(inference: Inference) -> Exhibit:
 
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(3.4)
-        x = np.arange(len(observed))
         for number, (place, _) in enumerate(observed):
             low, middle, high = np.quantile(predictions[:, place], (0.05, 0.5, 0.95))
-            axes.plot(
-                [number, number],
-                [low, high],
-                color=BLUE,
-                linewidth=7,
-                alpha=0.35,
-                solid_capstyle="butt",
-                label=None if number else "predicted, 90 %",
-            )
+            style: Style = {"linewidth": 7, "alpha": 0.35, "solid_capstyle": "butt"}
+            label = None if number else "predicted, 90 %"
+            axes.plot([number, number], [low, high], color=BLUE, label=label, **style)
             axes.plot(number, middle, "_", color=BLUE, markersize=12)
-        values = np.array([np.exp(point.crf.value) for _, point in observed])
-        stds = np.array([point.crf.std for _, point in observed]) * values
-        axes.errorbar(
-            x,
-            values,
-            1.645 * stds,
-            fmt="o",
-            color=VERMILION,
-            markersize=4,
-            capsize=3,
-            label="observed",
-        )
+        x, (values, stds) = np.arange(len(observed)), _observed_crf(observed)
+        style = {"color": VERMILION, "markersize": 4, "capsize": 3, "label": "observed"}
+        axes.errorbar(x, values, 1.645 * stds, fmt="o", **style)
         names = [f"{point.load_n:.4g} N\n{point.entrainment_m_s:.3g} m/s" for _, point in observed]
         axes.set_xticks(x, names, fontsize=7.5)
         axes.set(ylabel=quantity("crf_hz").label, xlim=(-0.6, len(observed) - 0.4))
@@ -165,6 +149,12 @@ def predicted(inference: Inference) -> Exhibit:
         "the posterior of all recordings. The model does not explain points outside their bar.",
         "Contact resonance frequency at each operating point, observed and predicted",
     )
+
+
+def _observed_crf(observed: Sequence[tuple[int, ObservationPoint]]) -> tuple[Field, Field]:
+    """Return the observed CRF [Hz] at each operating point and its standard deviation."""
+    values = np.array([np.exp(point.crf.value) for _, point in observed])
+    return values, np.array([point.crf.std for _, point in observed]) * values
 
 
 def next_recording(inference: Inference) -> Exhibit:

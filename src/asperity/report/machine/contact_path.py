@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,9 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from asperity.core.arrays import Field
-from asperity.core.quantities import quantity
-from asperity.machines import DangVan, MachineResult
-from asperity.report.base import Exhibit
+from asperity.core.quantities import Quantity, quantity
+from asperity.machines import DangVan, MachineResult, Rating
+from asperity.report.base import Exhibit, Numbers
 from asperity.report.drawing import display, legend_below, name_axes, panels_in_rows
 from asperity.report.style import BLUE, DASHED, GREY, VERMILION, Medium
 
@@ -47,46 +46,53 @@ def along_path(result: MachineResult) -> Exhibit:
         for key, name in quantities
         if any(row.get(key) or key == "clr" for row in result.rows)
     ]
-    series = _series(result)
     rated = any(
-        rating.key in RATED.values() and "" not in rating.values for rating in result.ratings
+        rating.key in RATED.values() and _is_by_contact(rating) for rating in result.ratings
     )
 
     def draw(medium: Medium) -> Figure:
         rows = -(-len(keys) // 4)
         figure = Figure(figsize=(medium.double, 2.3 * rows + 0.5), layout="constrained")
-        for (key, name), axes in zip(
-            keys, panels_in_rows(figure, len(keys), sharex=True), strict=True
-        ):
-            _panel(axes, result, series, key, name)
-        handles, labels = figure.axes[0].get_legend_handles_labels()
-        if rated:
-            handles.append(Line2D([], [], color=GREY, linestyle=":"))
-            labels.append(RATING)
-        if len(labels) > 1:
-            legend_below(figure, 3, handles=handles, labels=labels)
+        panels = panels_in_rows(figure, len(keys), sharex=True)
+        for (key, name), axes in zip(keys, panels, strict=True):
+            _panel(axes, result, key, name)
+        _add_legend(figure, rated=rated)
         return figure
 
     place = quantity(result.case.machine.place)
-    low, high = quantity("clr").ends
-    has_intervals = any(
-        row.get(low) is not None and row.get(high) is not None for row in result.rows
-    )
-    bars = " Bars: 90 % intervals from surfaces, grid and iteration." if has_intervals else ""
     subject = "Solved quantities" if result.solved else "Conditions of the contacts"
     dotted = " Dotted: rating of the standard, with its own roughness factor." if rated else ""
     return Exhibit(
         "path",
         draw,
-        f"{subject} over the {place.name}, {place.meaning}.{bars}{dotted}",
+        f"{subject} over the {place.name}, {place.meaning}.{_bars_note(result)}{dotted}",
         f"{len(keys)} panels over the {place.name}: "
         f"{', '.join(quantity(name).name for _, name in keys)}.",
     )
 
 
-def _series(result: MachineResult) -> dict[str, list[dict[str, Any]]]:
+def _add_legend(figure: Figure, *, rated: bool) -> None:
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    if rated:
+        handles.append(Line2D([], [], color=GREY, linestyle=":"))
+        labels.append(RATING)
+    if len(labels) > 1:
+        legend_below(figure, 3, handles=handles, labels=labels)
+
+
+def _is_by_contact(rating: Rating) -> bool:
+    return "" not in rating.values
+
+
+def _bars_note(result: MachineResult) -> str:
+    low, high = quantity("clr").ends
+    known = any(row.get(low) is not None and row.get(high) is not None for row in result.rows)
+    return " Bars: 90 % intervals from surfaces, grid and iteration." if known else ""
+
+
+def _series(result: MachineResult) -> dict[str, list[Numbers]]:
     """Group the rows by series, sorted by position: each ring of a bearing is one series."""
-    series: dict[str, list[dict[str, Any]]] = {}
+    series: dict[str, list[Numbers]] = {}
     rings = result.rows[0]["name"].endswith("ring")
     for row in result.rows:
         series.setdefault(row["bodies"][0] if rings else "contact", []).append(row)
@@ -95,53 +101,57 @@ def _series(result: MachineResult) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def _position(result: MachineResult, row: dict[str, Any]) -> float:
+def _position(result: MachineResult, row: Numbers) -> float:
     """Return the position of a contact; angles from -180 to 180 degrees keep a load zone whole."""
     position = float(row["position"])
     is_angle = result.case.machine.place == "cycle_angle"
     return position - math.tau if is_angle and position > math.pi else position
 
 
-def _panel(
-    axes: Axes, result: MachineResult, series: dict[str, list[dict[str, Any]]], key: str, name: str
-) -> None:
-    entry, place = quantity(name), result.case.machine.place
+def _panel(axes: Axes, result: MachineResult, key: str, name: str) -> None:
+    """Draw a quantity of every series over the position, with intervals and rating."""
+    entry, place, series = quantity(name), result.case.machine.place, _series(result)
     for (label, rows), (colour, stroke, marker) in zip(series.items(), STROKES, strict=False):
-        x = display(place, np.array([_position(result, row) for row in rows]))
-        y = display(name, _numbers(rows, key))
+        x, y = _positions(result, rows), display(name, _numbers(rows, key))
         axes.plot(x, y, stroke, color=colour, marker=marker, markersize=4, label=label)
-        low, high = (display(name, _numbers(rows, end)) for end in entry.ends)
-        known = np.isfinite(low) & np.isfinite(high)
-        if known.any():
-            axes.vlines(x[known], low[known], high[known], color=colour, linewidth=1.0)
+        _draw_bars(axes, x, rows, entry, colour)
     _draw_rating(axes, result, key)
     axes.tick_params(labelbottom=True)
     axes.set_title(entry.label, fontweight="normal", fontsize="small")
     if len(series) == 1 and 1 < len(result.rows) <= MAX_NAMED and place == "path_position_m":
         rows = next(iter(series.values()))
-        x = display(place, np.array([_position(result, row) for row in rows]))
-        axes.set_xticks(x, [row["name"] for row in rows], fontsize="small")
+        names = [row["name"] for row in rows]
+        axes.set_xticks(_positions(result, rows), names, fontsize="small")
     else:
         name_axes(axes, place)
     low, high = axes.get_ylim()
     axes.set_ylim(min(0.0, low), high + 0.05 * (high - min(0.0, low)))
 
 
+def _draw_bars(axes: Axes, x: Field, rows: Sequence[Numbers], entry: Quantity, colour: str) -> None:
+    """Draw the intervals of a quantity that the rows have."""
+    low, high = (display(entry.key, _numbers(rows, end)) for end in entry.ends)
+    known = np.isfinite(low) & np.isfinite(high)
+    if known.any():
+        axes.vlines(x[known], low[known], high[known], color=colour, linewidth=1.0)
+
+
 def _draw_rating(axes: Axes, result: MachineResult, key: str) -> None:
     """Draw the rating of this panel's quantity, if there is one."""
     for rating in result.ratings:
-        if rating.key == RATED.get(key) and "" not in rating.values:
+        if rating.key == RATED.get(key) and _is_by_contact(rating):
             rows = [row for row in result.rows if row["name"] in rating.values]
-            x = display(
-                result.case.machine.place, np.array([_position(result, row) for row in rows])
-            )
-            y = display(
-                rating.key, np.array([rating.values[row["name"]] for row in rows], dtype=float)
-            )
-            axes.plot(x, y, ":", color=GREY)
+            values = np.array([rating.values[row["name"]] for row in rows], dtype=float)
+            axes.plot(_positions(result, rows), display(rating.key, values), ":", color=GREY)
 
 
-def _numbers(rows: Sequence[dict[str, Any]], key: str) -> Field:
+def _positions(result: MachineResult, rows: Sequence[Numbers]) -> Field:
+    """Return the positions of contacts in the display unit."""
+    positions = np.array([_position(result, row) for row in rows])
+    return np.asarray(display(result.case.machine.place, positions))
+
+
+def _numbers(rows: Sequence[Numbers], key: str) -> Field:
     return np.array([np.nan if row.get(key) is None else row[key] for row in rows], dtype=float)
 
 

@@ -1,7 +1,7 @@
 """Scale drawing of a machine with its contacts and their loads."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
@@ -23,10 +23,10 @@ from asperity.machine import (
 )
 from asperity.machines import MachineResult
 from asperity.report.base import Exhibit
-from asperity.report.style import BLUE, GREY, VERMILION, Medium
+from asperity.report.style import BLUE, GREY, VERMILION, Medium, Style
 
 MM = 1e3
-METAL, EDGE, IDLE = "#e5e7eb", "#556070", "#ffffff"
+METAL, MATE, EDGE, IDLE = "#e5e7eb", "#d7dde5", "#556070", "#ffffff"
 HEIGHT = 4.3  # inches
 Polyline = tuple[Field, Field]
 
@@ -40,9 +40,8 @@ def machine_sketch(result: MachineResult) -> Exhibit:
             partial(_gears, machine, result),
             (
                 "Gear pair in mesh, to scale: the pinion (below) drives. Contact runs along the "
-                "line "
-                "of action from A to E; between B and D a single pair of teeth carries the load. "
-                "Fillets are not shown."
+                "line of action from A to E; between B and D a single pair of teeth carries the "
+                "load. Fillets are not shown."
             ),
         )
     elif isinstance(machine, CylindricalRollerBearing | BallBearing):
@@ -82,6 +81,19 @@ def _line(axes: Axes, line: Polyline, **style: Any) -> None:
     axes.plot(MM * line[0], MM * line[1], **{"color": EDGE, "linewidth": 1.0, **style})
 
 
+def _note(
+    axes: Axes, text: str, place: tuple[float, float], shift: tuple[float, float], **style: Any
+) -> None:
+    """Write a note beside a place [m]; `shift` in points."""
+    axes.annotate(
+        text,
+        (MM * place[0], MM * place[1]),
+        shift,
+        textcoords="offset points",
+        **{"ha": "center", "color": VERMILION, "fontsize": "small", **style},
+    )
+
+
 def _frame(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
     axes.set(xlim=(MM * x[0], MM * x[1]), ylim=(MM * y[0], MM * y[1]))
 
@@ -93,64 +105,60 @@ def _frame(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
 def _bearing(
     bearing: CylindricalRollerBearing | BallBearing, result: MachineResult, axes: Axes
 ) -> None:
-    if isinstance(bearing, BallBearing):
-        diameter, loads = bearing.ball_diameter, bearing.loads(result.case.pair)[0]
-    else:
-        diameter, loads = bearing.roller_diameter, bearing.loads
-    middle, radius = bearing.pitch_diameter / 2.0, diameter / 2.0
-    inner, outer, wall = middle - radius, middle + radius, 0.35 * diameter
-    _circle(axes, 0.0, 0.0, outer + wall, facecolor=METAL)
-    _circle(axes, 0.0, 0.0, outer, facecolor="white")
-    _circle(axes, 0.0, 0.0, inner, facecolor=METAL)
-    _circle(axes, 0.0, 0.0, inner - wall, facecolor="white")
-    largest, room = float(loads.max()), 1.1 * diameter
+    diameter, loads = _loaded_elements(bearing, result)
+    middle, radius, wall = bearing.pitch_diameter / 2.0, diameter / 2.0, 0.35 * diameter
+    inner, outer = middle - radius, middle + radius
+    rim, bore, room = outer + wall, inner - wall, 1.1 * diameter
+    _draw_rings(axes, rim, outer, inner, bore)
+    largest = float(loads.max())
     for number, (angle, load) in enumerate(zip(bearing.angles, loads, strict=True)):
-        direction = np.array([math.sin(angle), -math.cos(angle)])
-        x, y = middle * direction
-        share = load / largest
-        _circle(
-            axes,
-            x,
-            y,
-            radius,
-            facecolor=BLUE if load > 0.0 else IDLE,
-            alpha=0.25 + 0.6 * share,
-            zorder=2,
-        )
-        axes.text(
-            MM * x, MM * y, str(number), ha="center", va="center", fontsize="x-small", zorder=3
-        )
+        _rolling_element(axes, number, middle * _direction(angle), radius, load / largest)
         if load > 0.0:
-            start, end = outer + wall, outer + wall + room * share
-            axes.plot(
-                *(MM * np.outer(direction, [start, end])),
-                color=VERMILION,
-                linewidth=4.0,
-                solid_capstyle="butt",
-            )
-    most_loaded = int(np.argmax(loads))
-    angle = bearing.angles[most_loaded]
-    place = (outer + wall + room) * np.array([math.sin(angle), -math.cos(angle)])
-    axes.annotate(
-        quantity("load_n").text(largest),
-        (MM * place[0], MM * place[1]),
-        (0, -3),
-        textcoords="offset points",
-        ha="center",
-        va="top",
-        color=VERMILION,
-        fontsize="small",
-    )
-    _draw_load(axes, bearing, inner - wall)
-    size = outer + wall + 0.3 * diameter
+            _load_bar(axes, _direction(angle), rim, room * (load / largest))
+    x, y = (rim + room) * _direction(bearing.angles[int(np.argmax(loads))])
+    _note(axes, quantity("load_n").text(largest), (x, y), (0, -3), va="top")
+    _draw_load(axes, bearing, bore)
+    size = rim + 0.3 * diameter
     _frame(axes, (-size - room, size + room), (-size - 1.2 * room, size))
+
+
+def _draw_rings(axes: Axes, rim: float, outer: float, inner: float, bore: float) -> None:
+    for radius, colour in ((rim, METAL), (outer, "white"), (inner, METAL), (bore, "white")):
+        _circle(axes, 0.0, 0.0, radius, facecolor=colour)
+
+
+def _loaded_elements(
+    bearing: CylindricalRollerBearing | BallBearing, result: MachineResult
+) -> tuple[float, Field]:
+    """Return the diameter of the rolling elements [m] and their loads [N]."""
+    if isinstance(bearing, BallBearing):
+        return bearing.ball_diameter, bearing.loads(result.case.pair)[0]
+    return bearing.roller_diameter, bearing.loads
+
+
+def _load_bar(axes: Axes, direction: Field, rim: float, length: float) -> None:
+    bar = MM * np.outer(direction, [rim, rim + length])
+    axes.plot(*bar, color=VERMILION, linewidth=4.0, solid_capstyle="butt")
+
+
+def _direction(angle: float) -> Field:
+    """Return the unit vector at an angle from the bottom of a bearing."""
+    return np.array([math.sin(angle), -math.cos(angle)])
+
+
+def _rolling_element(axes: Axes, number: int, place: Field, radius: float, share: float) -> None:
+    """Draw a numbered rolling element, shaded by its share of the largest load."""
+    x, y = place
+    colour, opacity = BLUE if share > 0.0 else IDLE, 0.25 + 0.6 * share
+    _circle(axes, x, y, radius, facecolor=colour, alpha=opacity, zorder=2)
+    axes.text(MM * x, MM * y, str(number), ha="center", va="center", fontsize="x-small", zorder=3)
 
 
 def _draw_load(axes: Axes, bearing: CylindricalRollerBearing | BallBearing, bore: float) -> None:
     """Draw the load on the shaft and the direction of rotation of the inner ring."""
     labels = []
     if bearing.radial_load > 0.0:
-        style: Any = {"arrowstyle": "-|>", "color": VERMILION, "linewidth": 2.0}
+        style: Style = {"arrowstyle": "-|>", "color": VERMILION, "linewidth": 2.0}
         axes.annotate("", (0.0, -MM * 0.55 * bore), (0.0, MM * 0.3 * bore), arrowprops=style)
         labels.append(quantity("load_n").text(bearing.radial_load))
     axial = getattr(bearing, "axial_load", 0.0)
@@ -182,46 +190,40 @@ def _draw_load(axes: Axes, bearing: CylindricalRollerBearing | BallBearing, bore
 
 def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
     """Draw the pinion below and the wheel above, in contact at the worst point."""
-    (base_1, _), centres, angle = gears.base_radii, gears.centres, gears.working_angle
-    foot = base_1 * np.array([math.sin(angle), math.cos(angle)])
-    along = np.array([-math.cos(angle), math.sin(angle)])
-    touching = foot + result.worst["position"] * along
-    pinion = _flanks(gears, 0, touching)
-    wheel = _flanks(
-        gears, 1, np.array([0.0, centres]) - touching
-    )  # in the wheel's frame, rotated by 180 degrees
+    foot, along = _line_of_action(gears)
+    pinion, wheel = _mesh(gears, foot + result.worst["position"] * along)
     axes.fill(MM * pinion[0], MM * pinion[1], facecolor=METAL, edgecolor=EDGE, linewidth=0.9)
-    axes.fill(
-        -MM * wheel[0],
-        MM * (centres - wheel[1]),
-        facecolor="#d7dde5",
-        edgecolor=EDGE,
-        linewidth=0.9,
-    )
+    axes.fill(MM * wheel[0], MM * wheel[1], facecolor=MATE, edgecolor=EDGE, linewidth=0.9)
     places = np.array([foot + s * along for s in gears.path.values()])
     _line(axes, (places[[0, -1], 0], places[[0, -1], 1]), color=VERMILION, linewidth=1.6)
-    for side, (name, (x, y)) in enumerate(zip(gears.path, places, strict=True)):
-        is_worst = name == result.worst["name"]
+    _mark_path(axes, gears.path, places, result.worst["name"])
+    size = 0.62 * float(np.ptp(places[:, 0])) + 1.2 * gears.module
+    x, y = places.mean(axis=0)
+    _frame(axes, (x - size, x + size), (y - 0.8 * size, y + 0.8 * size))
+
+
+def _line_of_action(gears: SpurGear) -> tuple[Field, Field]:
+    """Return the start of the line of action on the pinion's base circle, and its direction."""
+    sine, cosine = math.sin(gears.working_angle), math.cos(gears.working_angle)
+    return gears.base_radii[0] * np.array([sine, cosine]), np.array([-cosine, sine])
+
+
+def _mesh(gears: SpurGear, touching: Field) -> tuple[Polyline, Polyline]:
+    """Return the outlines of pinion and wheel in contact at a point."""
+    centres = gears.centres
+    # in the wheel's frame, rotated by 180 degrees
+    wheel = _flanks(gears, 1, np.array([0.0, centres]) - touching)
+    return _flanks(gears, 0, touching), (-wheel[0], centres - wheel[1])
+
+
+def _mark_path(axes: Axes, names: Iterable[str], places: Field, worst: str) -> None:
+    """Mark and name the points of the path of contact, the worst in bold."""
+    for side, (name, (x, y)) in enumerate(zip(names, places, strict=True)):
+        is_worst = name == worst
         size = 6.0 if is_worst else 3.5
         axes.plot(MM * x, MM * y, "o", color=VERMILION, markersize=size)
-        shift = (0, 8) if side % 2 else (0, -9)
-        axes.annotate(
-            name,
-            (MM * x, MM * y),
-            shift,
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize="small",
-            fontweight="bold" if is_worst else "normal",
-        )
-    size = 0.62 * float(np.ptp(places[:, 0])) + 1.2 * gears.module
-    middle = places.mean(axis=0)
-    _frame(
-        axes,
-        (middle[0] - size, middle[0] + size),
-        (middle[1] - 0.8 * size, middle[1] + 0.8 * size),
-    )
+        style = {"color": "black", "fontweight": "bold" if is_worst else "normal"}
+        _note(axes, name, (x, y), (0, 8) if side % 2 else (0, -9), va="center", **style)
 
 
 def _flanks(gears: SpurGear, body: int, contact_point: Field) -> Polyline:
@@ -229,6 +231,18 @@ def _flanks(gears: SpurGear, body: int, contact_point: Field) -> Polyline:
 
     The y axis points towards the mesh.
     """
+    teeth = gears.teeth[body]
+    half, tooth_angles, tooth_radii = _tooth(gears, body)
+    base = gears.base_radii[body]
+    contact_angle = math.acos(min(base / float(np.hypot(*contact_point)), 1.0))
+    first = math.atan2(contact_point[0], contact_point[1]) + half - _involute(contact_angle)
+    angles = (first + math.tau * np.arange(teeth)[:, None] / teeth + tooth_angles).ravel()
+    radius = np.tile(tooth_radii, teeth)
+    return radius * np.sin(angles), radius * np.cos(angles)
+
+
+def _tooth(gears: SpurGear, body: int) -> tuple[float, Field, Field]:
+    """Return half the angle of a tooth at the base circle, and its outline in polar coordinates."""
     teeth, shift = gears.teeth[body], gears.profile_shift[body]
     base, tip = gears.base_radii[body], gears.tip_radii[body]
     half = (0.5 * math.pi + 2.0 * shift * math.tan(gears.pressure_angle)) / teeth + _involute(
@@ -239,13 +253,8 @@ def _flanks(gears: SpurGear, body: int, contact_point: Field) -> Polyline:
     pressure_angles = np.arccos(np.clip(base / radii, -1.0, 1.0))
     # angle of a flank from the middle of its tooth, at each radius
     flank = half - (np.tan(pressure_angles) - pressure_angles)
-    tooth_angles = np.concatenate([[-half], -flank, flank[::-1], [half]])
-    tooth_radii = np.concatenate([[root], radii, radii[::-1], [root]])
-    contact_angle = math.acos(min(base / float(np.hypot(*contact_point)), 1.0))
-    first = math.atan2(contact_point[0], contact_point[1]) + half - _involute(contact_angle)
-    angles = (first + math.tau * np.arange(teeth)[:, None] / teeth + tooth_angles).ravel()
-    radius = np.tile(tooth_radii, teeth)
-    return radius * np.sin(angles), radius * np.cos(angles)
+    angles = np.concatenate([[-half], -flank, flank[::-1], [half]])
+    return half, angles, np.concatenate([[root], radii, radii[::-1], [root]])
 
 
 def _involute(angle: float) -> float:
@@ -265,15 +274,7 @@ def _discs(discs: TwinDisc, axes: Axes) -> None:
         turning = f"disc {number}\n{speed * 30.0 / math.pi:.4g} r/min"
         axes.text(MM * x, 0.0, turning, ha="center", va="center", fontsize="small")
     axes.plot(0.0, 0.0, "o", color=VERMILION, markersize=6)
-    axes.annotate(
-        quantity("load_n").text(discs.load),
-        (0.0, 0.0),
-        (0, 12),
-        textcoords="offset points",
-        ha="center",
-        color=VERMILION,
-        fontsize="small",
-    )
+    _note(axes, quantity("load_n").text(discs.load), (0.0, 0.0), (0, 12))
     tallest = 1.05 * max(first, second)
     _frame(axes, (-2.1 * first, 2.1 * second), (-tallest, tallest))
 
@@ -291,27 +292,24 @@ def _cam(cam: Cam, result: MachineResult, axes: Axes) -> None:
     axes.plot(0.0, 0.0, "+", color=EDGE)
     dots = np.array([_on_cam(cam, angle) for angle in cam.angles]) @ matrix.T
     axes.plot(MM * dots[:, 0], MM * dots[:, 1], "o", color=GREY, markersize=3)
-    contact_point = matrix @ _on_cam(cam, rotation)
-    top = cam.base_radius + cam.lift
+    height = _follower(axes, cam, rotation)
+    axes.plot(*(MM * (matrix @ _on_cam(cam, rotation))), "o", color=VERMILION, markersize=6)
+    size = 1.1 * (cam.base_radius + cam.lift)
+    _frame(axes, (-size, size), (-size, 1.05 * (cam.base_radius + cam.lift + height)))
+
+
+def _follower(axes: Axes, cam: Cam, rotation: float) -> float:
+    """Draw the follower of a rotated cam; return its height [m]."""
+    lift = cam.base_radius + cam.lift_at(rotation)
     if isinstance(cam, RollerCam):
         middle = cam.base_radius + cam.roller_radius + cam.lift_at(rotation)
-        _circle(axes, 0.0, middle, cam.roller_radius, facecolor="#d7dde5")
+        _circle(axes, 0.0, middle, cam.roller_radius, facecolor=MATE)
         axes.plot(0.0, MM * middle, "+", color=EDGE)
-        top += 2.0 * cam.roller_radius
-    else:
-        lift = cam.base_radius + cam.lift_at(rotation)
-        half = 1.1 * cam.base_radius
-        axes.fill(
-            MM * np.array([-half, half, half, -half]),
-            MM * (lift + np.array([0.0, 0.0, 0.2, 0.2]) * cam.base_radius),
-            facecolor="#d7dde5",
-            edgecolor=EDGE,
-            linewidth=1.0,
-        )
-        top += 0.4 * cam.base_radius
-    axes.plot(*(MM * contact_point), "o", color=VERMILION, markersize=6)
-    size = 1.1 * (cam.base_radius + cam.lift)
-    _frame(axes, (-size, size), (-size, 1.05 * top))
+        return 2.0 * cam.roller_radius
+    x = 1.1 * cam.base_radius * np.array([-1.0, 1.0, 1.0, -1.0])
+    y = lift + np.array([0.0, 0.0, 0.2, 0.2]) * cam.base_radius
+    axes.fill(MM * x, MM * y, facecolor=MATE, edgecolor=EDGE, linewidth=1.0)
+    return 0.4 * cam.base_radius
 
 
 def _on_cam(cam: Cam, angle: float) -> Field:

@@ -1,9 +1,9 @@
 """Exhibits of a history: curves over time and over passes."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
+import pandas
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -35,7 +35,7 @@ PASSES = (
 
 
 def _known(
-    panels: Sequence[tuple[str, tuple[str, ...]]], table: Any
+    panels: Sequence[tuple[str, tuple[str, ...]]], table: pandas.DataFrame
 ) -> list[tuple[str, tuple[str, ...]]]:
     """Return the panels that have values."""
     return [panel for panel in panels if bool(table[panel[1][0]].notna().any())]
@@ -69,8 +69,7 @@ def curves(history: History) -> Exhibit:
         "over-time",
         draw,
         "History over time. Means and standard deviations are taken over the shaded steps. "
-        "Vertical "
-        "line: the step shown in the maps.",
+        "Vertical line: the step shown in the maps.",
         "Load and area shares, film, friction, power and resonance over time",
     )
 
@@ -116,8 +115,7 @@ def running_in(history: History) -> Exhibit:
         "passes",
         draw,
         "Running-in, one point per pass of the rough surface: means of shares and resonance over "
-        "the "
-        "pass, Sq and flattening at its end. Flattened volume is distributed uniformly: the mean "
-        "plane rises and, at constant load, separates the bodies by the same distance.",
+        "the pass, Sq and flattening at its end. Flattened volume is distributed uniformly: the "
+        "mean plane rises and, at constant load, separates the bodies by the same distance.",
         "Load and area shares, Sq, flattening and resonance over passes",
     )

@@ -70,9 +70,7 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
             for key in TILES
             if values[key] is not None
         ],
-        maps=[
-            animated_maps.animated_map(history.case, kind, scale) for kind in animated_maps.KINDS
-        ],
+        maps=animated_maps.animated_maps(history.case, scale),
         curves=over_time.embed(figure),
         running_in=exhibits.running_in(history).picture() if pass_by_pass else None,
         motion=motion,

@@ -3,9 +3,9 @@
 import math
 import tomllib
 from collections.abc import Sequence
-from typing import Any
 
 from asperity.contact.conditions import ContactConditions
+from asperity.core.documents import Table
 from asperity.core.quantities import NO_VALUE, parameters, quantity, with_deviation
 from asperity.coupling import VibrationModel
 from asperity.ehl import ContactSolution
@@ -28,6 +28,7 @@ def _conditions(run: Run) -> dict[str, str]:
     solution = run.solution
     return {
         **_contact_rows(solution.conditions),
+        **_solid_rows(solution.conditions),
         **{f"{name[0].upper()}{name[1:]}": value for name, value in run.card.rows()[1:]},
         **_lubricant_rows(solution.lubricant),
         **_oil_rows(run),
@@ -56,7 +57,7 @@ def _both(texts: Sequence[str]) -> str:
 
 
 def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
-    pair, hertz, radius = conditions.pair, conditions.hertz, quantity("radius_m")
+    radius = quantity("radius_m")
     radius_along = radius.text(conditions.radius_along_rolling)
     contact = f"{conditions.geometry} contact, effective radius {radius_along}"
     if conditions.geometry == "elliptic":
@@ -65,12 +66,8 @@ def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
     if conditions.length is not None:
         contact += f", length {quantity('length_m').text(conditions.length)}"
         load += f" ({quantity('line_load_n_per_m').text(conditions.line_load)})"
-    half_widths = [quantity("half_width_m").text(half_width) for half_width in hertz.half_widths]
-    across = "" if conditions.long else f", across rolling b = {half_widths[1]}"
     speeds = " and ".join(map(quantity("surface_speed_m_s").text, conditions.surface_speeds))
-    mean, slip, modulus = map(
-        quantity, ("entrainment_speed_m_s", "slide_to_roll", "reduced_modulus_pa")
-    )
+    mean, slip = quantity("entrainment_speed_m_s"), quantity("slide_to_roll")
     shape = (
         {"Shape along the roller": _shape(conditions)} if conditions.geometry == "roller" else {}
     )
@@ -80,6 +77,15 @@ def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
         "Load": load,
         "Speeds": f"{speeds}: {mean.name} {mean.text(conditions.entrainment_speed)}, "
         f"{slip.name} {slip.text(conditions.slide_to_roll)}",
+    }
+
+
+def _solid_rows(conditions: ContactConditions) -> dict[str, str]:
+    """Return elastic constants, hardness, and the smooth, dry contact that follows from them."""
+    pair, hertz, modulus = conditions.pair, conditions.hertz, quantity("reduced_modulus_pa")
+    half_widths = [quantity("half_width_m").text(half_width) for half_width in hertz.half_widths]
+    across = "" if conditions.long else f", across rolling b = {half_widths[1]}"
+    return {
         "Young's moduli": _both(
             [quantity("youngs_modulus_pa").text(modulus_pa) for modulus_pa in pair.youngs_moduli]
         ),
@@ -209,8 +215,7 @@ def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
     )
     return {
         "Oscillator": f"{quantity('mass_kg').name} {quantity('mass_kg').text(model.mass)}, "
-        f"{damping}, "
-        f"stiffness law {model.stiffness_law.name}",
+        f"{damping}, stiffness law {model.stiffness_law.name}",
         "Excitation": f"{model.excitation.summary}{model.patch.summary}, seed {model.seed}",
         "Record": f"{duration} at {rate}; resonance by {model.method}"
         + ("" if model.response == "exact" else f"; response {model.response}"),
@@ -225,7 +230,7 @@ def _roughness(case_text: str) -> str:
     return f"{_table_in_words(surface)}{other}"
 
 
-def _table_in_words(table: dict[str, Any]) -> str:
+def _table_in_words(table: Table) -> str:
     stated = {key: value for key, value in table.items() if OMITTED_DEFAULTS.get(key) != value}
     texts = {
         key: " and ".join(map(str, value)) if isinstance(value, list) else value

@@ -1,7 +1,5 @@
 """Exhibits of a solved contact: maps, section along rolling, height distribution, convergence."""
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,7 +7,7 @@ from matplotlib.figure import Figure
 from asperity.contact.hertz import line_pressure
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
-from asperity.ehl import ContactSolution, hertz_zone
+from asperity.ehl import ContactSolution, Convergence, hertz_zone
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, legend_below, name_axes, one_panel
 from asperity.report.maps import (
@@ -20,7 +18,7 @@ from asperity.report.maps import (
     mark_hertz_zone,
     show_map,
 )
-from asperity.report.style import BLUE, CONTACT_COLOUR, GREEN, GREY, VERMILION, Medium
+from asperity.report.style import BLUE, CONTACT_COLOUR, GREEN, GREY, VERMILION, Medium, Style
 from asperity.results import Run
 
 
@@ -161,7 +159,7 @@ def roughness_map(run: Run) -> Exhibit:
         f"Composite roughness, {sq.named(solution.surface.sq)}",
     )
     limit = display("surface_height", float(np.percentile(np.abs(heights), 99.5))) or 1.0
-    colours: Any = {"extend": "both", "cmap": "cividis", "vmin": -limit, "vmax": limit}
+    colours: Style = {"extend": "both", "cmap": "cividis", "vmin": -limit, "vmax": limit}
     return Exhibit(
         "roughness",
         map_drawer(solution, "surface_height", heights, title, **colours),
@@ -210,49 +208,14 @@ def draw_height_distribution(axes: Axes, heights: Field, rms: str = "Sq") -> Non
 def convergence_history(run: Run) -> Exhibit:
     """Draw residual, load error and change of each Newton step against the tolerance."""
     convergence = run.solution.convergence
-    history = convergence.history
 
     @one_panel(3.1, legend_columns=4)
     def draw(axes: Axes) -> None:
-        steps, sparse = np.arange(1, len(history) + 1), max(len(history) // 60, 1)
-        for name, stroke, colour in (
-            ("residual", "-o", BLUE),
-            ("load_error", "--s", VERMILION),
-            ("change", ":^", GREEN),
-        ):
-            values = np.array([getattr(step, name) for step in history])
-            positive = np.where(
-                values > 0.0, values, np.nan
-            )  # a logarithmic axis cannot show exact zeros
-            style = {"color": colour, "markersize": 3, "markevery": sparse, "linewidth": 1.0}
-            axes.semilogy(steps, positive, stroke, label=name.replace("_", " "), **style)
-        axes.axhline(
-            convergence.tolerance,
-            color="black",
-            linewidth=0.8,
-            linestyle=(0, (6, 2)),
-            label="tolerance",
-        )
-        starts = [
-            i for i, step in enumerate(history) if i == 0 or step.cells != history[i - 1].cells
-        ]
-        crowded = min(np.diff([*starts, len(history)])) < 0.16 * len(history)
-        for start in starts:
-            nx, ny = history[start].cells
-            axes.axvline(start + 0.5, color=GREY, linewidth=0.6)
-            axes.annotate(
-                f"{nx} × {ny}",
-                (start + 0.5, 0.0),
-                (3, 3),
-                xycoords=("data", "axes fraction"),
-                textcoords="offset points",
-                fontsize=8,
-                color="#374151",
-                rotation=90 if crowded else 0,
-            )
+        _draw_residuals(axes, convergence)
+        _mark_grids(axes, convergence)
         outcome = "converged" if convergence.converged else f"NOT CONVERGED ({convergence.status})"
         axes.set(xlabel="Newton step", ylabel="relative size [-]", title=f"Convergence: {outcome}")
-        axes.set_xlim(0.5, len(history) + 0.5)
+        axes.set_xlim(0.5, len(convergence.history) + 0.5)
 
     return Exhibit(
         "convergence",
@@ -260,3 +223,39 @@ def convergence_history(run: Run) -> Exhibit:
         f"Convergence of the solver: {convergence.explain()}.",
         f"Residual, load error and change against the Newton step: {convergence.explain()}.",
     )
+
+
+def _draw_residuals(axes: Axes, convergence: Convergence) -> None:
+    history = convergence.history
+    steps, sparse = np.arange(1, len(history) + 1), max(len(history) // 60, 1)
+    for name, stroke, colour in (
+        ("residual", "-o", BLUE),
+        ("load_error", "--s", VERMILION),
+        ("change", ":^", GREEN),
+    ):
+        values = np.array([getattr(step, name) for step in history])
+        positive = np.where(values > 0.0, values, np.nan)  # a log axis cannot show exact zeros
+        style: Style = {"color": colour, "markersize": 3, "markevery": sparse, "linewidth": 1.0}
+        axes.semilogy(steps, positive, stroke, label=name.replace("_", " "), **style)
+    style = {"color": "black", "linewidth": 0.8, "linestyle": (0, (6, 2))}
+    axes.axhline(convergence.tolerance, label="tolerance", **style)
+
+
+def _mark_grids(axes: Axes, convergence: Convergence) -> None:
+    """Mark the first step on each grid."""
+    history = convergence.history
+    starts = [i for i, step in enumerate(history) if i == 0 or step.cells != history[i - 1].cells]
+    crowded = min(np.diff([*starts, len(history)])) < 0.16 * len(history)
+    for start in starts:
+        nx, ny = history[start].cells
+        axes.axvline(start + 0.5, color=GREY, linewidth=0.6)
+        axes.annotate(
+            f"{nx} × {ny}",
+            (start + 0.5, 0.0),
+            (3, 3),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            fontsize=8,
+            color="#374151",
+            rotation=90 if crowded else 0,
+        )

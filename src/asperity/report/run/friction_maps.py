@@ -1,17 +1,18 @@
 """Exhibits of friction, flash temperature and subsurface stress."""
 
-from typing import Any
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
+from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, name_axes, one_panel
 from asperity.report.maps import colour_bar, map_drawer, map_figure
-from asperity.report.style import BLUE, DASHED, GREEN, VERMILION, Medium
+from asperity.report.style import BLUE, DASHED, GREEN, VERMILION, Medium, Style
 from asperity.results import Run
 from asperity.solution import FlashTemperature, Friction, hertz_stress
 
@@ -118,46 +119,23 @@ def stress_map(run: Run) -> Exhibit:
 
 def stress_section(run: Run) -> Exhibit:
     """Draw the von Mises stress in the plane along rolling that contains its maximum."""
-    stress, peak = run.stress, run.stress.peak
+    peak = run.stress.peak
 
     def draw(medium: Medium) -> Figure:
-        x, dx, size = (
-            stress.grid.x,
-            stress.grid.spacing[0],
-            SECTION_DEPTH * run.solution.conditions.hertz.half_widths[0],
-        )
-        shown = (x >= min(-size, peak.x - size / 4.0)) & (x <= max(size, peak.x + size / 4.0))
-        left, right, bottom = (
-            x[shown][0] - dx / 2.0,
-            x[shown][-1] + dx / 2.0,
-            min(size, float(stress.depths[-1])),
-        )
-        depths = (np.arange(SECTION_ROWS) + 0.5) * bottom / SECTION_ROWS
-        values = np.stack(
-            [
-                np.interp(depths, stress.depths, column)
-                for column in stress.von_mises[shown, stress.row]
-            ]
-        )
+        values, (left, right, bottom, top) = _section(run)
+        x = partial(display, "x_m")
         figure, axes = map_figure(medium, (right - left, bottom))
         image = axes.imshow(
             display("von_mises_stress_pa", values.T),
-            extent=display("x_m", np.array([left, right, bottom, 0.0])),
+            extent=(x(left), x(right), x(bottom), x(top)),
             cmap="viridis",
             vmin=0.0,
             interpolation="none",
             aspect="equal",
             origin="upper",
         )
-        axes.plot(
-            display("x_m", peak.x),
-            display("depth_m", peak.depth),
-            "o",
-            color="white",
-            markerfacecolor="none",
-            markersize=9,
-            clip_on=False,
-        )
+        circle: Style = {"color": "white", "markerfacecolor": "none", "markersize": 9}
+        axes.plot(x(peak.x), display("depth_m", peak.depth), "o", clip_on=False, **circle)
         name_axes(axes, "x_m", "depth_m")
         axes.spines[:].set_visible(False)
         depth = quantity("von_mises_depth_m").text(peak.depth)
@@ -172,6 +150,25 @@ def stress_section(run: Run) -> Exhibit:
         f"(circle): {_peak(run)}.",
         f"Section of the von Mises stress along rolling and depth: maximum {_peak(run)}.",
     )
+
+
+def _section(run: Run) -> tuple[Field, tuple[float, float, float, float]]:
+    """Return the von Mises stress [Pa] of the section around its peak, shape (x, depth).
+
+    Its ends are left, right, bottom and top [m].
+    """
+    stress, peak, x = run.stress, run.stress.peak, run.stress.grid.x
+    dx, size = (
+        stress.grid.spacing[0],
+        SECTION_DEPTH * run.solution.conditions.hertz.half_widths[0],
+    )
+    shown = (x >= min(-size, peak.x - size / 4.0)) & (x <= max(size, peak.x + size / 4.0))
+    left, right = x[shown][0] - dx / 2.0, x[shown][-1] + dx / 2.0
+    bottom = min(size, float(stress.depths[-1]))
+    depths = (np.arange(SECTION_ROWS) + 0.5) * bottom / SECTION_ROWS
+    columns = stress.von_mises[shown, stress.row]
+    values = np.stack([np.interp(depths, stress.depths, column) for column in columns])
+    return values, (left, right, bottom, 0.0)
 
 
 def stress_over_depth(run: Run) -> Exhibit:
@@ -205,7 +202,7 @@ def stress_over_depth(run: Run) -> Exhibit:
             display("depth_m", stress.peak.depth),
             display("von_mises_stress_pa", stress.peak.value),
         )
-        circle: Any = {
+        circle: Style = {
             "color": VERMILION,
             "markerfacecolor": "none",
             "markersize": 9,
@@ -226,8 +223,7 @@ def stress_over_depth(run: Run) -> Exhibit:
         draw,
         "Maximum von Mises stress at each depth. Asperities raise it near the surface, where it "
         f"grows with grid refinement (here {dx} × {dy} {quantity('cell_m').display}); below a "
-        "tenth "
-        "of the half-width it does not depend on the grid.",
+        "tenth of the half-width it does not depend on the grid.",
         f"Curve of the maximum von Mises stress over depth, with the Hertz contact: {_peak(run)}.",
     )
 

@@ -1,5 +1,6 @@
 """Exhibit of a roller along its length: load, pressure and film."""
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from asperity.core.quantities import quantity
@@ -19,47 +20,15 @@ def end_value_text(key: str, end: EndValue | None) -> str:
 
 def along_length(run: Run, along: AxialDistribution) -> Exhibit:
     """Draw line load, maximum pressure and minimum gap along a roller."""
-    hertz = run.solution.conditions.hertz.p_max
-    y, lubricated = display("y_m", along.y), run.solution.lubricant is not None
+    hertz, lubricated = run.solution.conditions.hertz.p_max, run.solution.lubricant is not None
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.single, 4.6), layout="constrained")
         load, pressure, gap = figure.subplots(3, 1, sharex=True)
         load.set_title("Along the roller")
-        load.plot(
-            y,
-            display("line_load_n_per_m", along.line_load),
-            color=VERMILION,
-            label="line load",
-        )
-        load.axhline(
-            display("line_load_n_per_m", along.load / along.length), color="black", linestyle="--"
-        )
-        load.set(ylabel=quantity("line_load_n_per_m").label, ylim=(0.0, None))
-        pressure.plot(y, display("pressure", along.pressure), color=BLUE, label="maximum pressure")
-        if lubricated:
-            pressure.plot(
-                y,
-                display("pressure", along.dome),
-                color=GREY,
-                linestyle=":",
-                label="before the spike",
-            )
-        pressure.axhline(
-            display("pressure", hertz),
-            color="black",
-            linestyle="--",
-            label="Hertz, uniform load",
-        )
-        pressure.set(ylabel=quantity("pressure").label, ylim=(0.0, None))
-        minimum_gap = display("gap", along.gap)
-        gap.plot(y, minimum_gap, color=GREEN, linestyle="-.", label="minimum gap")
-        name_axes(
-            gap,
-            "y_m",
-            ylabel=quantity("gap").label,
-            ylim=(0.0, 1.6 * float(minimum_gap[minimum_gap.size // 2]) or 1.0),
-        )
+        _draw_line_load(load, along)
+        _draw_pressure(pressure, along, hertz, spike=lubricated)
+        _draw_gap(gap, along)
         keys = [
             key for axes in (load, pressure, gap) for key in axes.get_legend_handles_labels()[0]
         ]
@@ -85,3 +54,35 @@ def along_length(run: Run, along: AxialDistribution) -> Exhibit:
         "Curves along the roller: line load and pressure, with those of a uniform load dashed, and "
         f"below them the minimum gap. Edge pressure {edge}.",
     )
+
+
+def _draw_line_load(axes: Axes, along: AxialDistribution) -> None:
+    y, load = display("y_m", along.y), display("line_load_n_per_m", along.line_load)
+    axes.plot(y, load, color=VERMILION, label="line load")
+    mean = display("line_load_n_per_m", along.load / along.length)
+    axes.axhline(mean, color="black", linestyle="--")
+    axes.set(ylabel=quantity("line_load_n_per_m").label, ylim=(0.0, None))
+
+
+def _draw_pressure(axes: Axes, along: AxialDistribution, hertz: float, *, spike: bool) -> None:
+    y, pressure, dome = (
+        display(key, values)
+        for key, values in (
+            ("y_m", along.y),
+            ("pressure", along.pressure),
+            ("pressure", along.dome),
+        )
+    )
+    axes.plot(y, pressure, color=BLUE, label="maximum pressure")
+    if spike:
+        axes.plot(y, dome, color=GREY, linestyle=":", label="before the spike")
+    uniform = display("pressure", hertz)
+    axes.axhline(uniform, color="black", linestyle="--", label="Hertz, uniform load")
+    axes.set(ylabel=quantity("pressure").label, ylim=(0.0, None))
+
+
+def _draw_gap(axes: Axes, along: AxialDistribution) -> None:
+    gap = display("gap", along.gap)
+    axes.plot(display("y_m", along.y), gap, color=GREEN, linestyle="-.", label="minimum gap")
+    top = 1.6 * float(gap[gap.size // 2]) or 1.0
+    name_axes(axes, "y_m", ylabel=quantity("gap").label, ylim=(0.0, top))

@@ -1,16 +1,15 @@
 """Exhibits of several runs: load and area shares, resonance and friction over roughness."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 
 from asperity.core.quantities import quantity
-from asperity.report.base import Exhibit, capitalised
+from asperity.report.base import Exhibit, Numbers, capitalised
 from asperity.report.drawing import display, name_axes, one_panel
 from asperity.report.style import BLUE, VERMILION
 
-Points = Sequence[Mapping[str, Any]]  # the scalars of each run
+Points = Sequence[Numbers]  # the scalars of each run
 
 
 def shares_against_roughness(points: Points) -> Exhibit:

@@ -10,6 +10,7 @@ from asperity.report.base import Exhibit
 from asperity.report.drawing import display, legend_below, name_axes
 from asperity.report.style import BLUE, GREY, VERMILION, Medium
 from asperity.results import DynamicCurve, Run
+from asperity.solution import DynamicStiffness
 
 
 def stiffness_over_frequency(run: Run) -> Exhibit:
@@ -41,17 +42,8 @@ def stiffness_over_frequency(run: Run) -> Exhibit:
             label="quasi-static limit",
         )
         if own is not None:
-            style = {"marker": "D", "color": VERMILION, "linestyle": "none", "markersize": 5}
-            for axes, key, value in (
-                (upper, "dynamic_stiffness", own.elastic.stiffness),
-                (lower, "dynamic_damping", own.elastic.damping),
-            ):
-                axes.plot(
-                    own.elastic.frequency_hz,
-                    display(key, value),
-                    label="resonance of the mass",
-                    **style,
-                )
+            _mark_resonance(upper, own.elastic, "dynamic_stiffness")
+            _mark_resonance(lower, own.elastic, "dynamic_damping")
         upper.set_title("Stiffness and damping of the solved contact")
         name_axes(lower, "dynamic_frequency")
         lower.set_xscale("log")
@@ -97,3 +89,15 @@ def _draw(axes: Axes, curve: DynamicCurve, key: str) -> None:
             label=label,
         )
     axes.set_ylabel(quantity(key).axis)
+
+
+def _mark_resonance(axes: Axes, resonance: DynamicStiffness, key: str) -> None:
+    axes.plot(
+        resonance.frequency_hz,
+        display(key, getattr(resonance, key.removeprefix("dynamic_"))),
+        marker="D",
+        color=VERMILION,
+        linestyle="none",
+        markersize=5,
+        label="resonance of the mass",
+    )

@@ -1,7 +1,6 @@
 """Figure of a measured surface: map, profile, bearing curve, radial and directional spectrum."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -39,28 +38,33 @@ def surface_map(description: SurfaceDescription, path: Path) -> Path:
 def _surface_figure(description: SurfaceDescription) -> Figure:
     levelled, spectrum = description.levelled, surface_spectrum(description.levelled)
     figure = Figure(figsize=(11.0, 7.4), layout="constrained")
-    places = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
-    sq, pixel = quantity("sq_m").text(description.parameters.sq), quantity("cell_m")
-    dx, dy = levelled.grid.spacing
-    if levelled.uniform is None:
+    places, is_map = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0)), levelled.uniform is None
+    if is_map:
         _draw_levelled_map(figure, figure.add_subplot(places[0, :2]), levelled)
         _draw_lay(figure.add_subplot(places[0, 2], projection="polar"), spectrum)
-        _draw_profile(
-            figure.add_subplot(places[1, 0]), levelled, "Profile through the middle, along x"
-        )
-        nx, ny = levelled.grid.cells
-        size = f"Sq {sq}, {nx} × {ny} pixels of {pixel.number(dx)} × {pixel.text(dy)}"
+        left, title = figure.add_subplot(places[1, 0]), "Profile through the middle, along x"
+        _draw_profile(left, levelled, title)
     else:
         _draw_profile(figure.add_subplot(places[0, :]), levelled, "Levelled profile")
-        rms = f"{description.profile_letter}q"
-        draw_height_distribution(figure.add_subplot(places[1, 0]), levelled.profile, rms)
-        size = (
-            f"profile, {rms} {sq}, {levelled.profile.size} points every {pixel.text(min(dx, dy))}"
-        )
-    _draw_bearing_curve(figure.add_subplot(places[1, 1]), description)
-    _draw_radial_spectrum(figure.add_subplot(places[1, 2]), spectrum, levelled.uniform is not None)
-    figure.suptitle(f"{description.path.name}: {size}", x=0.01, ha="left", parse_math=False)
+        left, rms = figure.add_subplot(places[1, 0]), f"{description.profile_letter}q"
+        draw_height_distribution(left, levelled.profile, rms)
+    curve, radial = (figure.add_subplot(places[1, column]) for column in (1, 2))
+    _draw_bearing_curve(curve, description)
+    _draw_radial_spectrum(radial, spectrum, profile=not is_map)
+    title = f"{description.path.name}: {_size(description)}"
+    figure.suptitle(title, x=0.01, ha="left", parse_math=False)
     return figure
+
+
+def _size(description: SurfaceDescription) -> str:
+    """Return Sq or Rq, the number of pixels or points and their spacing as text."""
+    levelled, pixel = description.levelled, quantity("cell_m")
+    sq, (dx, dy) = quantity("sq_m").text(description.parameters.sq), levelled.grid.spacing
+    if levelled.uniform is None:
+        nx, ny = levelled.grid.cells
+        return f"Sq {sq}, {nx} × {ny} pixels of {pixel.number(dx)} × {pixel.text(dy)}"
+    points = f"{levelled.profile.size} points every {pixel.text(min(dx, dy))}"
+    return f"profile, {description.profile_letter}q {sq}, {points}"
 
 
 def _draw_levelled_map(figure: Figure, axes: Axes, levelled: MeasuredSurface) -> None:
@@ -132,7 +136,7 @@ def _draw_bearing_curve(axes: Axes, description: SurfaceDescription) -> None:
     axes.set_xlim(0.0, 100.0)
 
 
-def _draw_radial_spectrum(axes: Axes, spectrum: SurfaceSpectrum, profile: bool) -> None:
+def _draw_radial_spectrum(axes: Axes, spectrum: SurfaceSpectrum, *, profile: bool) -> None:
     positive = spectrum.density > 0.0
     if not positive.any():
         axes.text(0.5, 0.5, "perfectly smooth", transform=axes.transAxes, ha="center")
@@ -151,10 +155,9 @@ def _draw_radial_spectrum(axes: Axes, spectrum: SurfaceSpectrum, profile: bool) 
 
 
 def _draw_lay(axes: Axes, spectrum: SurfaceSpectrum) -> None:
-    polar: Any = axes
     angles = np.concatenate([spectrum.lay, spectrum.lay + np.pi, spectrum.lay[:1]])
     share = display("share", np.concatenate([spectrum.share, spectrum.share, spectrum.share[:1]]))
-    polar.plot(angles, share, color=GREEN)
-    polar.fill(angles, share, color=GREEN, alpha=0.2)
-    polar.set_title("Lay: share of Sq² in ridges\nalong this direction [% per 5°]")
-    polar.tick_params(labelsize=8)
+    axes.plot(angles, share, color=GREEN)
+    axes.fill(angles, share, color=GREEN, alpha=0.2)
+    axes.set_title("Lay: share of Sq² in ridges\nalong this direction [% per 5°]")
+    axes.tick_params(labelsize=8)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,6 +22,7 @@ from asperity.vibration import mass_motion, white_noise
 RATES = (10e3, 20e3, 50e3, 200e3)  # Hz
 MAX_DURATION = 0.5  # seconds of a record that are drawn: more is a black bar
 LOADS = (100.0, 200.0, 300.0, 400.0)
+MOTION = {"displacement": BLUE, "velocity": GREEN, "acceleration": VERMILION}
 HEIGHT, CUTOFF = 2e-6, 30.0  # of the first four rows of Table 1
 
 
@@ -151,42 +151,35 @@ def response_figure(vibration: Vibration, model: VibrationModel) -> Figure:
     if profile is None or oscillator is None or density is None or vibration.expected is None:
         raise BadInput(f"no response to draw: {vibration.resonance.reason}")
     motion = mass_motion(oscillator, profile, method=model.response, substeps=model.substeps)
-    figure, (a, b, c, d) = _four_panels()
-    for axes, letter, key, colour in (
-        (a, "a", "displacement", BLUE),
-        (b, "b", "velocity", GREEN),
-        (c, "c", "acceleration", VERMILION),
-    ):
+    figure, (*records, d) = _four_panels()
+    for axes, letter, (key, colour) in zip(records, "abc", MOTION.items(), strict=True):
         record = Signal(getattr(motion, key), profile.rate_hz, quantity(key).unit)
         _draw_record(axes, record, key, f"({letter}) {quantity(key).name}", colour)
     f0, resonance = oscillator.natural_frequency_hz, vibration.resonance
     inside = np.abs(density.frequency_hz / f0 - 1.0) < 0.1
-    f = density.frequency_hz[inside]
+    f, expected = density.frequency_hz[inside], vibration.expected.density[inside]
     d.plot(f, density.density[inside], color=GREY, linewidth=0.7, label="raw periodogram")
-    d.plot(f, vibration.expected.density[inside], color="black", linewidth=1.2, label="closed form")
-    if resonance.found:
-        crf, crfa = (
-            quantity("crf_hz").named(resonance.crf_hz),
-            quantity("crfa").number(resonance.crfa),
-        )
-        label = f"{crf}, CRFA {crfa}"
-        d.plot(resonance.crf_hz, resonance.crfa, "o", color=VERMILION, label=label)
-    d.axvline(
-        f0,
-        color=BLUE,
-        linestyle=":",
-        linewidth=1.2,
-        label=f"f0 {quantity('frequency_hz').text(f0)}",
-    )
+    d.plot(f, expected, color="black", linewidth=1.2, label="closed form")
+    _mark_frequencies(d, resonance, f0)
     name_axes(d, "frequency_hz", "acceleration_density", title="(d) spectrum of the acceleration")
     d.set_ylim(0.0, None)
     d.legend(loc="upper right" if resonance.found and resonance.crf_hz < f0 else "upper left")
     return figure
 
 
-def _four_panels() -> tuple[Figure, Sequence[Any]]:
+def _mark_frequencies(axes: Axes, resonance: Resonance, f0: float) -> None:
+    """Mark the fitted resonance, if found, and the natural frequency [Hz]."""
+    if resonance.found:
+        crf = quantity("crf_hz").named(resonance.crf_hz)
+        label = f"{crf}, CRFA {quantity('crfa').number(resonance.crfa)}"
+        axes.plot(resonance.crf_hz, resonance.crfa, "o", color=VERMILION, label=label)
+    label = f"f0 {quantity('frequency_hz').text(f0)}"
+    axes.axvline(f0, color=BLUE, linestyle=":", linewidth=1.2, label=label)
+
+
+def _four_panels() -> tuple[Figure, Sequence[Axes]]:
     figure = Figure(figsize=(ON_PAGE.double, 5.6), layout="constrained")
-    return figure, figure.subplots(2, 2).ravel()
+    return figure, list(figure.subplots(2, 2).flat)
 
 
 def _draw_record(axes: Axes, record: Signal, key: str, title: str, colour: str) -> None:

@@ -1,7 +1,6 @@
 """Exhibits of selected contacts of a wear study (Figs 5 and 6 of the paper)."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +10,7 @@ from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import PANELS_PER_ROW, display, legend_below, panels_in_rows
 from asperity.report.maps import contact_colours, contact_keys, mark_hertz_zone, show_map
-from asperity.report.style import Medium
+from asperity.report.style import Medium, Style
 from asperity.results import Run
 
 SHARES = ("clr", "car", "car_domain")
@@ -61,7 +60,7 @@ def surfaces(runs: Sequence[Run]) -> Exhibit:
             image = show_map(axes, field, run.solution, cmap="cividis", vmin=-limit, vmax=limit)
             axes.set_title(f"({letter}) {_sq(run)}", fontweight="normal")
         _label_outer(panels)
-        style: Any = {"location": "bottom", "shrink": 0.5, "aspect": 40, "extend": "both"}
+        style: Style = {"location": "bottom", "shrink": 0.5, "aspect": 40, "extend": "both"}
         figure.colorbar(image, ax=panels, label=quantity(key).axis, **style)
         return figure
 

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import cycle
-from typing import Any
 
 import numpy as np
+import pandas
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -22,11 +23,11 @@ from asperity.paper import (
 )
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, draw_intervals, legend_below, mark_split, name_axes
-from asperity.report.style import BLUE, GREEN, GREY, SPLIT_COLOUR, VERMILION, Medium
+from asperity.report.style import BLUE, GREEN, GREY, SPLIT_COLOUR, VERMILION, Medium, Style
 from asperity.study import StudyOverview, WearCurve
 from asperity.trend import Stages
 
-SPLIT_STROKES: tuple[Any, ...] = ("-.", (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 1)))
+SPLIT_STROKES = ("-.", (0.0, (6.0, 1.5, 1.0, 1.5, 1.0, 1.5)), (0.0, (1.0, 1.0)))
 MAX_MARKERS = 20  # on a curve
 SHARES = (("clr", "-o", VERMILION), ("car", "--s", BLUE), ("car_domain", "-.^", GREEN))
 
@@ -77,8 +78,7 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
         "shares",
         draw,
         "Asperity load share (CLR), contact area ratio in the Hertz zone (CAR), and contact area "
-        "of "
-        f"the domain over the Hertz area (CAR of the domain). {legend_note(study)}{anchor_note}",
+        f"of the domain over the Hertz area (CAR of the domain). {legend_note(study)}{anchor_note}",
         f"CLR and CAR over Sq from {first_to_last('sq_m', curve.sq)}: {', '.join(ends)}.",
     )
 
@@ -113,14 +113,7 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
             medium.title(lower, "", f"({letters[1]}) preset {preset}")
         grid[0, 0].set_ylabel(quantity("crf_hz").label)
         grid[1, 0].set_ylabel(quantity("crfa").label)
-        known = [anchor.value for anchor in anchors if anchor.quantity in _CRF]
-        limit_to_data(
-            grid[0, 0],
-            np.concatenate([known, *(curve.by_case(f"crf_{preset}_hz")[1] for preset in presets)]),
-        )
-        limit_to_data(
-            grid[1, 0], np.concatenate([curve.by_case(f"crfa_{preset}")[1] for preset in presets])
-        )
+        _limit_rows(grid[0, 0], grid[1, 0], curve, anchors)
         grid[1, 0].set_ylim(bottom=0.0)
         legend_of_panels(figure, *grid.flat, columns=4)
         return figure
@@ -133,10 +126,20 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
         draw,
         "Contact resonance frequency (CRF) and amplitude (CRFA) of the same contacts with both "
         "vibration presets: sound, and as printed in the paper. Shaded: 90 % interval of the "
-        "split. "
-        f"{legend_note(study)} {stages}",
+        f"split. {legend_note(study)} {stages}",
         f"CRF and CRFA over Sq. {stages}",
     )
+
+
+def _limit_rows(upper: Axes, lower: Axes, curve: WearCurve, anchors: Sequence[Anchor]) -> None:
+    """Limit the axes of CRF and CRFA to their values with all presets, and to the anchors."""
+    known = [anchor.value for anchor in anchors if anchor.quantity in _CRF]
+    crf, crfa = (
+        [curve.by_case(key.format(preset))[1] for preset in curve.stages]
+        for key in ("crf_{}_hz", "crfa_{}")
+    )
+    limit_to_data(upper, np.concatenate([known, *crf]))
+    limit_to_data(lower, np.concatenate(crfa))
 
 
 _CRF = ("crf_sound_hz", "crf_paper_hz")
@@ -165,36 +168,18 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
 
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(0.9 * medium.single)
-        first, *others = list(curve.stages)
         axes.axvspan(*RIG_SPLIT_UM, color="#dfe3e8", linewidth=0, zorder=0, label="printed split")
+        first, *others = list(curve.stages)
         label = f"study, preset {first}"
         draw_mean(axes, curve, f"crf_{first}_hz", "-", BLUE, label, seeds=False)
         for other in others:
-            sq, label = display("sq_m", curve.sq), f"study, preset {other}"
-            axes.plot(
-                sq, curve.mean(f"crf_{other}_hz"), "--", color=GREEN, linewidth=1.0, label=label
-            )
-        rings = rig_prediction(curve, f"crf_{first}_hz")
-        sq, predicted, low, std = (
-            rings[column].to_numpy() for column in ("sq_um", "crf_hz", "low", "sq_std_um")
-        )
-        ring: Any = {
-            "color": BLUE,
-            "markerfacecolor": "white",
-            "markersize": 4,
-            "label": "study at a ring's Sq",
-        }
-        draw_intervals(axes, sq, predicted, predicted - low, "o", xerr=std, **ring)
-        known = rings[rings["printed_hz"].notna()]
-        ring = {"color": "black", "markersize": 4.5, "label": "rings, CRF printed", "zorder": 4}
-        draw_intervals(
-            axes, known["sq_um"], known["printed_hz"], None, "D", xerr=known["sq_std_um"], **ring
-        )
+            sq, crf = display("sq_m", curve.sq), curve.mean(f"crf_{other}_hz")
+            label = f"study, preset {other}"
+            axes.plot(sq, crf, "--", color=GREEN, linewidth=1.0, label=label)
+        printed = _draw_rings(axes, rig_prediction(curve, f"crf_{first}_hz"))
         _draw_full_load(axes, curve)
         name_axes(axes, "sq_m", ylabel=quantity("crf_hz").label)
-        limit_to_data(
-            axes, np.concatenate([curve.by_case(f"crf_{first}_hz")[1], known["printed_hz"]])
-        )
+        limit_to_data(axes, np.concatenate([curve.by_case(f"crf_{first}_hz")[1], printed]))
         medium.title(axes, "Rings of the rig, measured and predicted")
         legend_of_panels(figure, axes, columns=2, seeds=False)
         return figure
@@ -203,13 +188,26 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
         "rig",
         draw,
         "The twelve rings of the rig. Filled: printed CRF of the smoothest and the roughest ring; "
-        "the "
-        "paper draws the other ten without numbers. Hollow: the study's CRF at each ring's Sq, "
-        "with "
-        "the interval over seeds and the printed error of Sq. Strip: onset of severe wear in the "
-        f"paper. {_deviations(rig_deviation(curve, key))}",
+        "the paper draws the other ten without numbers. Hollow: the study's CRF at each ring's "
+        "Sq, with the interval over seeds and the printed error of Sq. Strip: onset of severe "
+        f"wear in the paper. {_deviations(rig_deviation(curve, key))}",
         "Printed CRF of the rig's rings, and the study's prediction at their Sq.",
     )
+
+
+def _draw_rings(axes: Axes, rings: pandas.DataFrame) -> Field:
+    """Draw predicted and printed CRF of the rings; return the printed values [Hz]."""
+    sq, predicted, low, std = (
+        rings[column].to_numpy() for column in ("sq_um", "crf_hz", "low", "sq_std_um")
+    )
+    style: Style = {"color": BLUE, "markerfacecolor": "white", "markersize": 4, "xerr": std}
+    label = "study at a ring's Sq"
+    draw_intervals(axes, sq, predicted, predicted - low, "o", label=label, **style)
+    known = rings[rings["printed_hz"].notna()]
+    style = {"color": "black", "markersize": 4.5, "zorder": 4, "xerr": known["sq_std_um"]}
+    label, printed = "rings, CRF printed", known["printed_hz"].to_numpy()
+    draw_intervals(axes, known["sq_um"], printed, None, "D", label=label, **style)
+    return np.asarray(printed)
 
 
 def _deviations(rms_hz: dict[str, float]) -> str:
@@ -236,7 +234,7 @@ def draw_mean(
     sq = display("sq_m", curve.sq)
     if seeds:
         case_sq, values = curve.by_case(key)
-        style: Any = {"alpha": 0.5, "markersize": 4.5, "markeredgewidth": 0, "zorder": 1}
+        style: Style = {"alpha": 0.5, "markersize": 4.5, "markeredgewidth": 0, "zorder": 1}
         axes.plot(display("sq_m", case_sq), display(key, values), ".", color=colour, **style)
     axes.update_datalim(
         [(end, 0.0) for end in sq[[0, -1]]], updatey=False
@@ -269,7 +267,7 @@ def _draw_anchors(
         value, tolerance = (
             display(anchor.quantity, value) for value in (anchor.value, anchor.tolerance)
         )
-        style: Any = {"color": "black", "markersize": 5, "markerfacecolor": "white", "zorder": 4}
+        style: Style = {"color": "black", "markersize": 5, "markerfacecolor": "white", "zorder": 4}
         style["label"] = "_" if number else label
         draw_intervals(axes, display("sq_m", anchor.sq), value, tolerance, marker, **style)
 
@@ -307,7 +305,7 @@ def _mark_stages(axes: Axes, curve: WearCurve, preset: str, *, named: bool) -> N
     """Mark the split with its interval and name the stages, or state that there is none."""
     stages = curve.stages[preset]
     low, high = display("sq_m", curve.sq[[0, -1]])
-    names: dict[str, Any] = {stages.kind: 0.5 * (low + high)}
+    names: dict[str, float] = {stages.kind: 0.5 * (low + high)}
     mark_split(axes, stages, "split, 90 %")
     if stages.found:
         before, after = stage_names(stages)
@@ -328,7 +326,7 @@ def _mark_stages(axes: Axes, curve: WearCurve, preset: str, *, named: bool) -> N
 
 def legend_of_panels(figure: Figure, *panels: Axes, columns: int, seeds: bool = True) -> None:
     """Add one legend for all panels below them, with entries for bands and dots."""
-    keys: dict[str, Any] = {}
+    keys: dict[str, Artist] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             keys.setdefault(label, handle)

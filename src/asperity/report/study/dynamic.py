@@ -1,10 +1,11 @@
 """Exhibits of dynamic stiffness and damping in a wear study, and their correlation with CLR."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pandas
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 from asperity.core.quantities import quantity, with_deviation
@@ -17,7 +18,7 @@ from asperity.report.study.curve import (
     legend_of_panels,
     limit_to_data,
 )
-from asperity.report.style import BLUE, GREEN, GREY, Medium
+from asperity.report.style import BLUE, GREEN, GREY, Medium, Style
 from asperity.study import StudyOverview, WearCurve
 
 ELASTIC, VIRGIN, STIFFNESS = (
@@ -65,34 +66,24 @@ def damping_over_roughness(study: StudyOverview, curve: WearCurve) -> Exhibit:
         draw,
         "Damping ratio of the contact and its stiffness k at resonance, both computed from the "
         "solved contact without the laws of the paper. Yielded cells elastic: surfaces that have "
-        "run "
-        f"in; flowing: virgin roughness. {legend_note(study)}",
+        f"run in; flowing: virgin roughness. {legend_note(study)}",
         f"Damping ratio of the contact over Sq, {ends}, and its dynamic stiffness.",
     )
 
 
 def clr_correlations(study: StudyOverview, curve: WearCurve) -> Exhibit:
     """Draw CLR of every contact over CRF by law, dynamic stiffness and damping."""
-    keys = [key for key in (BY_LAW, STIFFNESS, ELASTIC) if key in curve.table]
     rows = study.used
+    keys = [key for key in (BY_LAW, STIFFNESS, ELASTIC) if key in curve.table]
     ranks = {key: rank_correlation(rows, key) for key in keys}
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.double, 0.42 * medium.double), layout="constrained")
         panels = panels_in_rows(figure, len(keys), sharey=True)
-        style: Any = {"cmap": "cividis", "s": 14, "edgecolors": "white", "linewidths": 0.3}
         for axes, key, letter in zip(panels, keys, "abc", strict=False):
-            x, y = (
-                display(key, rows[key].to_numpy(dtype=float)),
-                display("clr", rows["clr"].to_numpy(dtype=float)),
-            )
-            known = np.isfinite(x)
-            sq = display("sq_m", rows["surface.sq"].to_numpy(dtype=float))[known]
-            dots = axes.scatter(x[known], y[known], c=sq, vmin=sq.min(initial=0.0), **style)
-            axes.set_xlabel(quantity(key).label)
-            if key == ELASTIC and np.all(x[known] > 0.0):
-                axes.set_xscale("log")
-            medium.title(axes, _title(ranks[key]), f"({letter}) {_title(ranks[key])}")
+            dots = _draw_correlation(axes, rows, key)
+            title = _title(ranks[key])
+            medium.title(axes, title, f"({letter}) {title}")
         panels[0].set_ylabel(quantity("clr").label)
         figure.colorbar(dots, ax=panels, label=quantity("sq_m").label, pad=0.01)
         return figure
@@ -102,13 +93,28 @@ def clr_correlations(study: StudyOverview, curve: WearCurve) -> Exhibit:
         "load-share-correlations",
         draw,
         "Asperity load share of each contact over quantities that a recording can show; colour: "
-        "Sq. "
-        f"Rank correlation: {in_words}. CRF is computed from CLR by the empirical law of the "
-        "paper, "
-        "so its correlation tests nothing; stiffness and damping come from the solved contacts.",
+        f"Sq. Rank correlation: {in_words}. CRF is computed from CLR by the empirical law of the "
+        "paper, so its correlation tests nothing; stiffness and damping come from the solved "
+        "contacts.",
         "Asperity load share over CRF by law, dynamic stiffness and damping. Rank correlations: "
         f"{in_words}.",
     )
+
+
+def _draw_correlation(axes: Axes, rows: pandas.DataFrame, key: str) -> PathCollection:
+    """Draw CLR over a quantity of each contact, coloured by Sq."""
+    x, clr, sq = (
+        display(name, rows[column].to_numpy(dtype=float))
+        for name, column in ((key, key), ("clr", "clr"), ("sq_m", "surface.sq"))
+    )
+    known = np.isfinite(x)
+    style: Style = {"cmap": "cividis", "s": 14, "edgecolors": "white", "linewidths": 0.3}
+    colour = sq[known]
+    dots = axes.scatter(x[known], clr[known], c=colour, vmin=colour.min(initial=0.0), **style)
+    axes.set_xlabel(quantity(key).label)
+    if key == ELASTIC and np.all(x[known] > 0.0):
+        axes.set_xscale("log")
+    return dots
 
 
 def rank_correlation(rows: pandas.DataFrame, key: str) -> float:

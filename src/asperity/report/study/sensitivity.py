@@ -1,16 +1,15 @@
 """Figures of a sensitivity study and of a calibration."""
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from asperity.core.arrays import Field
 from asperity.core.quantities import in_print, quantity
 from asperity.report.drawing import display, name_axes
 from asperity.report.study.quantity_names import NAMES
-from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, STYLE, VERMILION
+from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, STYLE, VERMILION, Style
 from asperity.study import CalibratedParameter, Calibration, Sensitivity, SensitivityOutcome
 
 DARK = 0.55  # share above which a cell's number is white
@@ -38,38 +37,22 @@ def sensitivity_figure(result: Sensitivity) -> Figure:
     side.set(xlabel=f"mean {quantity('share').label}")
     morris = result.method == "morris"
     measure = "mean effect over the range (Morris' μ*)" if morris else "total Sobol index"
-    title: Any = {"fontsize": STYLE["axes.titlesize"], "fontweight": "bold"}
+    title: Style = {"fontsize": STYLE["axes.titlesize"], "fontweight": "bold"}
     figure.suptitle(f"Sensitivity of the curves: {measure}", x=0.01, ha="left", **title)
     return figure
 
 
 def _draw_effects(axes: Axes, result: Sensitivity, order: list[str]) -> None:
     outcomes = result.outcomes
-    rows: dict[tuple[str, str], Any] = {
-        (row["factor"], row["outcome"]): row for row in result.effects.to_dict("records")
-    }
-    share = np.array(
-        [[rows[factor, outcome.name]["share"] for outcome in outcomes] for factor in order]
-    )
+    share, measure = (_effects(result, order, column) for column in ("share", result.measure))
     top = max(0.7, float(share.max()))
     axes.imshow(share, cmap="Blues", vmin=0.0, vmax=top, aspect="auto")
     for (row, column), dark in np.ndenumerate(share > DARK * top):
-        outcome = outcomes[column]
-        effect = rows[order[row], outcome.name][result.measure]
-        text = (
-            f"{effect:.2f}"
-            if result.method == "sobol"
-            else quantity(outcome.quantity).number(effect)
-        )
-        axes.text(
-            column,
-            row,
-            text,
-            ha="center",
-            va="center",
-            fontsize=8,
-            color="white" if dark else "black",
-        )
+        effect = measure[row, column]
+        number = quantity(outcomes[column].quantity).number
+        text = f"{effect:.2f}" if result.method == "sobol" else number(effect)
+        style: Style = {"fontsize": 8, "color": "white" if dark else "black"}
+        axes.text(column, row, text, ha="center", va="center", **style)
     axes.set_yticks(range(len(order)), [NAMES.get(name, name) for name in order])
     levels = [display("sq_m", outcome.sq) for outcome in outcomes]
     axes.set_xticks(range(len(outcomes)), [f"{sq:g}" if np.isfinite(sq) else "" for sq in levels])
@@ -77,6 +60,14 @@ def _draw_effects(axes: Axes, result: Sensitivity, order: list[str]) -> None:
     axes.spines[:].set_visible(False)
     axes.set_xlabel(quantity("sq_m").label)
     _draw_column_heads(axes, outcomes)
+
+
+def _effects(result: Sensitivity, order: list[str], column: str) -> Field:
+    """Return a column of the effects as an array, shape (factors, outcomes)."""
+    effects = result.effects
+    labels = zip(effects["factor"], effects["outcome"], strict=True)
+    values = dict(zip(labels, effects[column], strict=True))
+    return np.array([[values[name, outcome.name] for outcome in result.outcomes] for name in order])
 
 
 def _draw_column_heads(axes: Axes, outcomes: tuple[SensitivityOutcome, ...]) -> None:
@@ -118,33 +109,11 @@ def _draw_deviations(axes: Axes, result: Calibration) -> None:
         ("validated", result.check, VERMILION, "s"),
     )
     for number, (_, table, colour, marker) in enumerate(tables):
-        rows: dict[str, Any] = {row["anchor"]: row for row in table.to_dict("records")}
+        deviations = dict(zip(table["anchor"], table["miss"] / table["tolerance"], strict=True))
         for place, name in enumerate(names):
-            deviation = rows[name]["miss"] / rows[name]["tolerance"]
             y = place + 0.2 * (number - 1)
-            if not np.isfinite(deviation):
-                continue
-            beyond = abs(deviation) > MAX_DEVIATION
-            side = float(np.sign(deviation))
-            symbol = (">" if side > 0 else "<") if beyond else marker
-            axes.plot(
-                side * MAX_DEVIATION if beyond else deviation,
-                y,
-                symbol,
-                color=colour,
-                markersize=5,
-            )
-            if beyond:
-                axes.annotate(
-                    f"{deviation:.0f}",
-                    (side * MAX_DEVIATION, y),
-                    xytext=(-7 * side, 0),
-                    textcoords="offset points",
-                    ha="right" if side > 0 else "left",
-                    va="center",
-                    fontsize=7.5,
-                    color=colour,
-                )
+            if np.isfinite(deviations[name]):
+                _mark_deviation(axes, deviations[name], y, colour, marker)
     axes.axvline(0.0, color="black", linewidth=0.8)
     axes.set(xlim=(-1.1 * MAX_DEVIATION, 1.1 * MAX_DEVIATION), ylim=(len(names) - 0.5, -0.5))
     axes.set(xlabel="deviation [tolerances]", title="Anchors")
@@ -156,6 +125,25 @@ def _draw_deviations(axes: Axes, result: Calibration) -> None:
     axes.legend(
         handles=handles, loc="lower center", bbox_to_anchor=(0.3, -0.34), ncols=3, columnspacing=1.0
     )
+
+
+def _mark_deviation(axes: Axes, deviation: float, y: float, colour: str, marker: str) -> None:
+    """Mark a deviation; one beyond the axis becomes an arrow at its end, with its value."""
+    beyond, side = abs(deviation) > MAX_DEVIATION, float(np.sign(deviation))
+    symbol = (">" if side > 0 else "<") if beyond else marker
+    x = side * MAX_DEVIATION if beyond else deviation
+    axes.plot(x, y, symbol, color=colour, markersize=5)
+    if beyond:
+        axes.annotate(
+            f"{deviation:.0f}",
+            (x, y),
+            xytext=(-7 * side, 0),
+            textcoords="offset points",
+            ha="right" if side > 0 else "left",
+            va="center",
+            fontsize=7.5,
+            color=colour,
+        )
 
 
 def _draw_ranges(axes: Axes, result: Calibration) -> None:
@@ -217,7 +205,7 @@ def _draw_curves(axes: Axes, result: Calibration) -> None:
         ("car_domain", BLUE, "-", "o"),
         ("clr", VERMILION, "--", "s"),
     ):
-        style: Any = {
+        style: Style = {
             "color": colour,
             "marker": marker,
             "markersize": 4,

@@ -4,10 +4,10 @@ Swept quantities are shown in the unit in which they were given.
 """
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
@@ -24,7 +24,7 @@ from asperity.report.drawing import (
 )
 from asperity.report.study.curve import limit_to_data
 from asperity.report.study.quantity_names import axis_label, value_label
-from asperity.report.style import BLUE, GREY, Medium
+from asperity.report.style import BLUE, GREY, Medium, Style
 from asperity.study import (
     GROUPS,
     MEAN_CONFIDENCE,
@@ -58,7 +58,7 @@ def output_curves(study: StudyOverview, axis: SweptAxis) -> Exhibit:
             axes.set_title(quantity(key).label, fontweight="normal", fontsize="small")
         for axes in panels[-min(PANELS_PER_ROW, len(panels)) :]:
             axes.set_xlabel(axis_label(axis))
-        mean: Any = {"color": BLUE, "marker": "o", "markersize": 3.5}
+        mean: Style = {"color": BLUE, "marker": "o", "markersize": 3.5}
         interval = f"mean, {100 * MEAN_CONFIDENCE:.0f} % interval"
         keys = [
             Line2D([], [], color=GREY, marker=".", linestyle="none", alpha=0.7, label="case"),
@@ -84,12 +84,12 @@ def _file_name(axis: SweptAxis) -> str:
 
 def _draw_output(axes: Axes, axis: SweptAxis, values: Field) -> None:
     known = np.isfinite(values)
-    dots: Any = {"color": GREY, "alpha": 0.6, "markersize": 4.5, "markeredgewidth": 0}
+    dots: Style = {"color": GREY, "alpha": 0.6, "markersize": 4.5, "markeredgewidth": 0}
     axes.plot(
         axis.values[known], values[known], ".", rasterized=values.size > MAX_VECTOR_DOTS, **dots
     )
     x, mean, low, high = group_means(axis.values[known], values[known], binned=axis.binned)
-    style: Any = {"linestyle": "none" if axis.names else "-", "color": BLUE, "markersize": 3.5}
+    style: Style = {"linestyle": "none" if axis.names else "-", "color": BLUE, "markersize": 3.5}
     draw_intervals(axes, x, mean, [mean - low, high - mean], "o", **style)
     limit_to_data(axes, values[known])
     _scale(axes, axis)
@@ -132,7 +132,7 @@ def output_maps(study: StudyOverview, x_axis: SweptAxis, y_axis: SweptAxis) -> E
                 cells, origin="lower", cmap="cividis", aspect="auto", interpolation="none"
             )
             if max(cells.shape) <= MAX_LABELLED_CELLS:
-                _label_cells(axes, cells, image.norm(cells))
+                _label_cells(axes, cells, np.asarray(image.norm(cells)))
             _tick(axes.xaxis, x_axis)
             _tick(axes.yaxis, y_axis)
             axes.spines[:].set_visible(False)
@@ -150,7 +150,7 @@ def output_maps(study: StudyOverview, x_axis: SweptAxis, y_axis: SweptAxis) -> E
     )
 
 
-def _label_cells(axes: Axes, cells: Field, shade: Any) -> None:
+def _label_cells(axes: Axes, cells: Field, shade: Field) -> None:
     spread = float(np.nanmax(cells) - np.nanmin(cells))
     decimals = max(0, 1 - int(np.floor(np.log10(spread)))) if spread > 0.0 else 0
     for (j, i), value in np.ndenumerate(cells):
@@ -166,7 +166,7 @@ def _label_cells(axes: Axes, cells: Field, shade: Any) -> None:
             )
 
 
-def _tick(side: Any, axis: SweptAxis) -> None:
+def _tick(side: Axis, axis: SweptAxis) -> None:
     """Set tick labels at cell centres, at most about six."""
     values = axis.distinct
     step = -(-values.size // 6)

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from asperity.core.quantities import NO_VALUE, Quantity, in_print, quantity
 from asperity.report.study.curve import stage_names, surface_count
 from asperity.report.study.quantity_names import axis_label, value_label
-from asperity.study import StudyOverview, as_written
+from asperity.study import StudyOverview, StudyPlan, as_written
 
 MAX_POINTS = 60  # rows of a table in the page; the csv has all points
 MAX_OUTPUTS = 8  # columns of that table
@@ -162,7 +162,7 @@ def facts(study: StudyOverview) -> list[tuple[str, str]]:
     return rows
 
 
-def _range(plan: Any, key: str) -> str:
+def _range(plan: StudyPlan, key: str) -> str:
     """Return the values of a swept key as text."""
     values = list(dict.fromkeys(as_written(point[key]) for point in plan.points if key in point))
     few = len(values) <= 8

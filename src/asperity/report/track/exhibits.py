@@ -1,5 +1,6 @@
 """Exhibits of a tracked series over x: trend, amplitude, damping, levels and load share."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from asperity.report.drawing import (
     one_panel,
     plain_log_labels,
 )
-from asperity.report.style import BLUE, DASHED, GREEN, GREY, VERMILION, Medium
+from asperity.report.style import BLUE, DASHED, GREEN, GREY, VERMILION, Medium, Style
 from asperity.trend import INTERVAL_FACTOR, Stages
 
 MIN_CORRECTION = 1e-3  # of the CRF; smaller corrections for operating conditions are not drawn
@@ -81,41 +82,38 @@ def _draw_crf(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> Non
     crf, crf_std = np.array(
         [(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in resonant]
     ).T
-    x_bars: Any = {"xerr": INTERVAL_FACTOR * x_std} if x_std.any() else {}
-    style: Any = {"ecolor": GREY, "zorder": 1, "label": "90 % interval"}
+    x_bars: Style = {"xerr": INTERVAL_FACTOR * x_std} if x_std.any() else {}
+    style: Style = {"ecolor": GREY, "zorder": 1, "label": "90 % interval"}
     draw_intervals(axes, x, crf, INTERVAL_FACTOR * crf_std, "none", **x_bars, **style)
     colours = SEVERITY(np.nan_to_num([recording.severe_probability for recording in resonant]))
     label = quantity("crf_hz").short
     axes.scatter(x, crf, c=colours, s=22, zorder=2, edgecolors="white", linewidths=0.4, label=label)
+    _draw_references(axes, track, resonant)
+    missing = [recording.x for recording in track.recordings if not recording.resonance.found]
+    _mark_missing(axes, missing, "not found or not usable")
+    axes.set(ylabel=quantity("crf_hz").label, title="Contact resonance frequency")
+
+
+def _draw_references(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> None:
+    """Draw the CRF at reference conditions, where it differs, and the CRF at full load."""
+    x, crf = np.array([(recording.x, recording.resonance.crf_hz) for recording in resonant]).T
     corrected = np.array([recording.crf_reference_hz for recording in resonant])
     differs = np.abs(corrected - crf) > MIN_CORRECTION * crf
     if differs.any():
-        axes.plot(
-            x[differs],
-            corrected[differs],
-            "o",
-            markersize=5,
-            markerfacecolor="none",
-            color=GREEN,
-            zorder=3,
-            label="corrected to reference conditions",
-        )
+        style: Style = {"markersize": 5, "markerfacecolor": "none", "color": GREEN, "zorder": 3}
+        label = "corrected to reference conditions"
+        axes.plot(x[differs], corrected[differs], "o", label=label, **style)
     full_load = track.target.full_load_crf_hz
     if full_load is not None:
-        axes.axhline(
-            full_load, color="black", linestyle=":", linewidth=1.0, label="CRF at full load"
-        )
-    missing = [recording.x for recording in track.recordings if not recording.resonance.found]
-    if missing:
-        axes.plot(
-            missing,
-            np.full(len(missing), 0.02),
-            "x",
-            color=GREY,
-            transform=axes.get_xaxis_transform(),
-            label="not found or not usable",
-        )
-    axes.set(ylabel=quantity("crf_hz").label, title="Contact resonance frequency")
+        style = {"color": "black", "linestyle": ":", "linewidth": 1.0}
+        axes.axhline(full_load, label="CRF at full load", **style)
+
+
+def _mark_missing(axes: Axes, places: list[float], label: str) -> None:
+    """Mark recordings without a value along the lower edge."""
+    if places:
+        along_edge, height = axes.get_xaxis_transform(), np.full(len(places), 0.02)
+        axes.plot(places, height, "x", color=GREY, transform=along_edge, label=label)
 
 
 def _draw_severity(axes: Axes, track: Track) -> None:
@@ -177,7 +175,7 @@ def damping(track: Track) -> Exhibit:
         factor = np.exp(INTERVAL_FACTOR * std / ratio)
         bars = [ratio - ratio / factor, ratio * factor - ratio]
         x = [recording.x for recording in known]
-        style: dict[str, Any] = {
+        style: Style = {
             "marker": "^",
             "color": GREEN,
             "label": "damping ratio with 90 % interval",
@@ -188,15 +186,7 @@ def damping(track: Track) -> Exhibit:
             for recording in track.recordings
             if recording.resonance.found and recording.damping_reason
         ]
-        if unknown:
-            axes.plot(
-                unknown,
-                np.full(len(unknown), 0.02),
-                "x",
-                color=GREY,
-                transform=axes.get_xaxis_transform(),
-                label="not determined",
-            )
+        _mark_missing(axes, unknown, "not determined")
         axes.set(
             yscale="log",
             ylabel=quantity("damping_ratio").axis,
@@ -244,10 +234,9 @@ def levels(track: Track) -> Exhibit | None:
     return Exhibit(
         "levels",
         draw,
-        f"Each relative to its baseline, the median of the first {BASELINE} values. Line: rms at a "
-        "fault frequency and two harmonics; envelope: depth of modulation there. These levels "
-        "alone "
-        "do not indicate the state of the contact.",
+        f"Each relative to its baseline, the median of the first {BASELINE} values. Line: rms at "
+        "a fault frequency and two harmonics; envelope: depth of modulation there. These levels "
+        "alone do not indicate the state of the contact.",
         f"Levels over {x_label(track)}, relative to the baseline.",
     )
 
@@ -289,7 +278,7 @@ def asperity_load_share(track: Track) -> Exhibit:
             "clr", np.array([recording.clr_interval for recording in known]).reshape(-1, 2)
         ).T
         x = [recording.x for recording in known]
-        style: dict[str, Any] = {
+        style: Style = {
             "marker": "o",
             "color": VERMILION,
             "label": f"{quantity('clr').short} from the contact model",
@@ -311,7 +300,7 @@ def _draw_trend(
     axes: Axes,
     track: Track,
     x: list[float],
-    values_and_bars: tuple[Field, list[Field]],
+    values_and_bars: tuple[Field, Sequence[Field]],
     stages: Stages | None = None,
     *,
     marker: str,

@@ -1,13 +1,14 @@
 """HTML report of a tracked series: verdict, trend, spectra, numbers, quality, method, limits."""
 
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from asperity.core.quantities import NO_VALUE, in_print, quantity
-from asperity.monitoring import FORECAST, Track, TrackedRecording
+from asperity.monitoring import FORECAST, Reading, Track, TrackedRecording
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, render, write_page
 from asperity.report.forecast import forecast_exhibit
 from asperity.report.track import exhibits, spectra
@@ -23,8 +24,7 @@ METHODS = {
     "which may be the "
     "contact's.",
     "likelihood": "Each spectrum is fitted separately: a single resonance above a sloping noise "
-    "floor (maximum "
-    "Whittle likelihood), compared with the floor alone by BIC.",
+    "floor (maximum Whittle likelihood), compared with the floor alone by BIC.",
     "peak": "The method of the paper: each spectrum is smoothed three times by a five-point cubic, "
     "and the highest "
     "point in the band is used. It has no significance test and may select a structural mode or a "
@@ -65,6 +65,7 @@ NO_BREAK = (
     "smooth curves",
     "no change",
 )
+FACTS = ("rate", "unit", "channel", "scale", "format")
 MAX_LINES = 20  # removed lines that are listed by name
 
 
@@ -202,21 +203,7 @@ def _tiles(track: Track) -> list[Tile]:
         (recording for recording in reversed(track.recordings) if recording.resonance.found), None
     )
     if last is not None:
-        crf, clr = quantity("crf_hz"), quantity("clr")
-        value, _, deviation = crf.text(last.resonance.crf_hz, last.resonance.crf_std).partition(" ")
-        tiles.append(Tile(f"Last {crf.short}", value, deviation))
-        if np.isfinite(last.severe_probability):
-            tiles.append(
-                Tile(
-                    "Severe, last recording",
-                    _probability_text(last.severe_probability),
-                    "probability",
-                )
-            )
-        if np.isfinite(last.clr):
-            low, high = last.clr_interval
-            interval = f"90 %: {clr.number(low)} to {clr.number(high)}"
-            tiles.append(Tile("Asperity load share, last", clr.text(last.clr), interval))
+        tiles.extend(_resonance_tiles(last))
     zone = track.recordings[-1].zone
     if zone is not None:
         velocity = quantity("velocity_rms").text(track.recordings[-1].reading.velocity)
@@ -224,6 +211,20 @@ def _tiles(track: Track) -> list[Tile]:
     unusable = sum(not recording.reading.usable for recording in track.recordings)
     tiles.append(Tile("Not usable", f"{unusable}", f"of {total}"))
     return tiles
+
+
+def _resonance_tiles(recording: TrackedRecording) -> Iterator[Tile]:
+    """Yield CRF, probability of the severe stage and load share of a recording."""
+    crf, clr, resonance = quantity("crf_hz"), quantity("clr"), recording.resonance
+    value, _, deviation = crf.text(resonance.crf_hz, resonance.crf_std).partition(" ")
+    yield Tile(f"Last {crf.short}", value, deviation)
+    if np.isfinite(recording.severe_probability):
+        probability = _probability_text(recording.severe_probability)
+        yield Tile("Severe, last recording", probability, "probability")
+    if np.isfinite(recording.clr):
+        low, high = recording.clr_interval
+        interval = f"90 %: {clr.number(low)} to {clr.number(high)}"
+        yield Tile("Asperity load share, last", clr.text(recording.clr), interval)
 
 
 def _details(track: Track) -> list[Exhibit]:
@@ -319,33 +320,32 @@ def _remarks(track: Track) -> list[tuple[str, str]]:
 
 def _facts(track: Track) -> list[tuple[str, str, str]]:
     """Return name, most common value and source of each fact about the recordings."""
-    readings, rows = [recording.reading for recording in track.recordings], []
-    for name in ("rate", "unit", "channel", "scale", "format"):
-        counts = Counter(reading.facts[name] for reading in readings if name in reading.facts)
-        if counts:
-            ((value, source), count), *others = counts.most_common()
-            rest = f"; others in {counts.total() - count} recordings" if others else ""
-            rows.append(
-                (name.capitalize(), f"{value} Hz{rest}" if name == "rate" else value + rest, source)
-            )
+    readings = [recording.reading for recording in track.recordings]
+    rows = [row for name in FACTS if (row := _fact(readings, name)) is not None]
     lengths = [reading.quality.duration_s for reading in readings if reading.quality is not None]
     if lengths:
-        shortest, longest = (
-            quantity("duration_s").text(length) for length in (min(lengths), max(lengths))
-        )
-        rows.append(
-            (
-                "Length",
-                shortest if shortest == longest else f"{shortest} to {longest}",
-                "number of samples",
-            )
-        )
+        ends = (quantity("duration_s").text(length) for length in (min(lengths), max(lengths)))
+        rows.append(("Length", _span(*ends), "number of samples"))
     started = sorted(reading.started for reading in readings if reading.started)
     if started:
-        first, last = started[0].replace("T", " "), started[-1].replace("T", " ")
+        ends = (time.replace("T", " ") for time in (started[0], started[-1]))
         source = next(reading.facts["started"][1] for reading in readings if reading.started)
-        rows.append(("Started", first if first == last else f"{first} to {last}", source))
+        rows.append(("Started", _span(*ends), source))
     return rows
+
+
+def _fact(readings: Sequence[Reading], name: str) -> tuple[str, str, str] | None:
+    """Return name, most common value and source of a fact; None if no recording has it."""
+    counts = Counter(reading.facts[name] for reading in readings if name in reading.facts)
+    if not counts:
+        return None
+    ((value, source), count), *others = counts.most_common()
+    rest = f"; others in {counts.total() - count} recordings" if others else ""
+    return name.capitalize(), f"{value}{' Hz' if name == 'rate' else ''}{rest}", source
+
+
+def _span(first: str, last: str) -> str:
+    return first if first == last else f"{first} to {last}"
 
 
 def _lines(track: Track) -> list[str]:
@@ -411,6 +411,5 @@ def _resolution(track: Track) -> str:
     )
     return (
         f"{spectrum.window} window, segments of {spectrum.segment} samples, line spacing "
-        f"{spacing}, "
-        f"noise bandwidth {resolution}"
+        f"{spacing}, noise bandwidth {resolution}"
     )

@@ -1,19 +1,20 @@
 """Spectra of a tracked series: the waterfall, and a typical recording with its fit."""
 
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 from asperity.monitoring import Track, TrackedRecording
 from asperity.report.base import Exhibit
 from asperity.report.drawing import group_values, name_axes, one_panel
-from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREY, VERMILION
+from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREY, VERMILION, Style
 from asperity.report.track.exhibits import x_label
+from asperity.resonance import CleanSpectrum
 
 MAX_ROWS = 400  # of a waterfall; more recordings are thinned out
 
@@ -31,58 +32,55 @@ def waterfall(track: Track) -> Exhibit:
         raise BadInput("no waterfall to draw: no recording is usable")
     rows = usable[:: -(-len(usable) // MAX_ROWS)]
 
-    @one_panel(4.4, legend_columns=0)
-    def draw(axes: Axes) -> None:
-        frequency, levels = _waterfall_levels(track, rows)
-        limit = float(np.quantile(np.abs(levels), 0.995)) or 1.0
-        image = axes.imshow(
-            levels,
-            aspect="auto",
-            origin="lower",
-            cmap="cividis",
-            vmin=-0.6 * limit,
-            vmax=limit,
-            interpolation="none",
-            extent=(frequency[0], frequency[-1], 0.5, len(rows) + 0.5),
-        )
-        resonant = [
-            (recording.resonance.crf_hz, number)
-            for number, recording in enumerate(rows, 1)
-            if recording.resonance.found
-        ]
-        axes.plot(
-            [crf for crf, _ in resonant],
-            [number for _, number in resonant],
-            "o",
-            markerfacecolor="none",
-            color="white",
-            markersize=4.5,
-            markeredgewidth=0.9,
-            label=quantity("crf_hz").short,
-        )
-        for end in track.target.band_hz:
-            axes.axvline(end, color="white", linewidth=0.9, linestyle=DASHED)
-        name_axes(
-            axes,
-            "frequency_hz",
-            title="Spectra of the series",
-            ylabel=f"recording at {x_label(track)}",
-        )
-        axes.set_xlim(frequency[0], frequency[-1])
-        places = sorted({0, len(rows) // 4, len(rows) // 2, 3 * len(rows) // 4, len(rows) - 1})
-        axes.set_yticks(
-            [place + 1 for place in places], [f"{rows[place].x:.3g}" for place in places]
-        )
-        axes.spines[:].set_visible(False)
-        style: Any = {"location": "bottom", "shrink": 0.8}
-        axes.figure.colorbar(image, ax=axes, label=quantity("level_db").axis, **style)
-
+    draw = one_panel(4.4, legend_columns=0)(partial(_draw_waterfall, track=track, rows=rows))
     return Exhibit(
         "waterfall",
         draw,
         "One spectrum per row, without lines of shafts and mains. Dashed: search band. Vertical "
         "ridges are structural modes of the machine.",
         "Waterfall of the spectra of all recordings around the band.",
+    )
+
+
+def _draw_waterfall(axes: Axes, track: Track, rows: list[TrackedRecording]) -> None:
+    frequency, levels = _waterfall_levels(track, rows)
+    limit = float(np.quantile(np.abs(levels), 0.995)) or 1.0
+    image = axes.imshow(
+        levels,
+        aspect="auto",
+        origin="lower",
+        cmap="cividis",
+        vmin=-0.6 * limit,
+        vmax=limit,
+        interpolation="none",
+        extent=(frequency[0], frequency[-1], 0.5, len(rows) + 0.5),
+    )
+    _mark_resonances(axes, rows)
+    for end in track.target.band_hz:
+        axes.axvline(end, color="white", linewidth=0.9, linestyle=DASHED)
+    label = f"recording at {x_label(track)}"
+    name_axes(axes, "frequency_hz", title="Spectra of the series", ylabel=label)
+    axes.set_xlim(frequency[0], frequency[-1])
+    places = sorted({*(part * len(rows) // 4 for part in range(4)), len(rows) - 1})
+    labels = [f"{rows[place].x:.3g}" for place in places]
+    axes.set_yticks([place + 1 for place in places], labels)
+    axes.spines[:].set_visible(False)
+    style: Style = {"location": "bottom", "shrink": 0.8}
+    axes.figure.colorbar(image, ax=axes, label=quantity("level_db").axis, **style)
+
+
+def _mark_resonances(axes: Axes, rows: list[TrackedRecording]) -> None:
+    resonant = [
+        (row.resonance.crf_hz, number) for number, row in enumerate(rows, 1) if row.resonance.found
+    ]
+    style: Style = {"markerfacecolor": "none", "markersize": 4.5, "markeredgewidth": 0.9}
+    axes.plot(
+        [crf for crf, _ in resonant],
+        [number for _, number in resonant],
+        "o",
+        color="white",
+        label=quantity("crf_hz").short,
+        **style,
     )
 
 
@@ -128,40 +126,7 @@ def spectrum_with_fit(track: Track, recording: TrackedRecording) -> Exhibit:
     )
     if recording.clean is None or spectrum is None:
         raise BadInput(f"no spectrum of {recording.file} to draw: {resonance.reason}")
-    clean = recording.clean
-
-    @one_panel(4.4)
-    def draw(axes: Axes) -> None:
-        frequency, inside = _band_frequencies(track)
-        group_size = max(1, int(np.count_nonzero(inside)) // 700)
-        f = group_values(frequency[inside], group_size).mean(axis=1)
-        recorded = group_values(spectrum.density[inside], group_size).max(axis=1)
-        cleaned = group_values(clean.spectrum.density[inside], group_size).mean(axis=1)
-        axes.axvspan(
-            *track.target.band_hz,
-            facecolor=BAND_COLOUR,
-            edgecolor=GREY,
-            linewidth=0.7,
-            label="search band",
-        )
-        axes.semilogy(f, recorded, color="#e3b9a0", linewidth=0.6, label="recorded (maximum)")
-        axes.semilogy(f, cleaned, color=GREY, linewidth=0.8, label="lines removed (mean)")
-        lines = [line.frequency_hz for line in clean.removed if f[0] <= line.frequency_hz <= f[-1]]
-        axes.plot(
-            lines,
-            np.full(len(lines), 0.985),
-            "|",
-            color=VERMILION,
-            markersize=5,
-            markeredgewidth=0.6,
-            transform=axes.get_xaxis_transform(),
-            label=f"{len(lines)} removed lines (shafts, mains)",
-        )
-        _draw_fit(axes, track, recording, f)
-        unit = quantity("acceleration_density").display if track.comparable else spectrum.unit
-        name_axes(axes, "frequency_hz", ylabel=f"density [{unit}]")
-        axes.set_xlim(f[0], f[-1])
-
+    draw = one_panel(4.4)(partial(_draw_spectrum, track=track, recording=recording))
     return Exhibit(
         "spectrum",
         draw,
@@ -169,6 +134,44 @@ def spectrum_with_fit(track: Track, recording: TrackedRecording) -> Exhibit:
         if resonance.found
         else f"{name}: {resonance.reason}.",
         f"Spectrum of {name} with its fit and the removed lines.",
+    )
+
+
+def _draw_spectrum(axes: Axes, track: Track, recording: TrackedRecording) -> None:
+    spectrum, clean = recording.reading.spectrum, recording.clean
+    assert spectrum is not None
+    assert clean is not None
+    frequency, inside = _band_frequencies(track)
+    group_size = max(1, int(np.count_nonzero(inside)) // 700)
+    f, recorded, cleaned = (
+        group_values(values[inside], group_size)
+        for values in (frequency, spectrum.density, clean.spectrum.density)
+    )
+    f, recorded, cleaned = f.mean(axis=1), recorded.max(axis=1), cleaned.mean(axis=1)
+    style: Style = {"facecolor": BAND_COLOUR, "edgecolor": GREY, "linewidth": 0.7}
+    axes.axvspan(*track.target.band_hz, label="search band", **style)
+    axes.semilogy(f, recorded, color="#e3b9a0", linewidth=0.6, label="recorded (maximum)")
+    axes.semilogy(f, cleaned, color=GREY, linewidth=0.8, label="lines removed (mean)")
+    _mark_lines(axes, clean, (f[0], f[-1]))
+    _draw_fit(axes, track, recording, f)
+    unit = quantity("acceleration_density").display if track.comparable else spectrum.unit
+    name_axes(axes, "frequency_hz", ylabel=f"density [{unit}]")
+    axes.set_xlim(f[0], f[-1])
+
+
+def _mark_lines(axes: Axes, clean: CleanSpectrum, ends: tuple[float, float]) -> None:
+    """Mark the removed lines between two frequencies along the top edge."""
+    low, high = ends
+    lines = [line.frequency_hz for line in clean.removed if low <= line.frequency_hz <= high]
+    axes.plot(
+        lines,
+        np.full(len(lines), 0.985),
+        "|",
+        color=VERMILION,
+        markersize=5,
+        markeredgewidth=0.6,
+        transform=axes.get_xaxis_transform(),
+        label=f"{len(lines)} removed lines (shafts, mains)",
     )
 
 
@@ -190,7 +193,7 @@ def _draw_fit(axes: Axes, track: Track, recording: TrackedRecording, frequency: 
     )
 
 
-def _band_frequencies(track: Track) -> tuple[Field, Any]:
+def _band_frequencies(track: Track) -> tuple[Field, Mask]:
     """Return the frequencies of the series and a mask of those in and around the band."""
     first = next(
         recording.reading.spectrum for recording in track.recordings if recording.clean is not None

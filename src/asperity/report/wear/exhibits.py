@@ -1,18 +1,19 @@
 """Exhibits of a wear history: curves over hours, resonance, surfaces before and after."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
 from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, legend_below, name_axes, panels_in_rows
-from asperity.report.style import BLUE, DASHED, GREEN, GREY, VERMILION, Medium
+from asperity.report.style import BLUE, DASHED, GREEN, GREY, VERMILION, Medium, Style
 from asperity.simulation import WearHistory
 from asperity.surface import Surface, bearing_curve
 
@@ -165,7 +166,7 @@ def _draw_crf(axes: Axes, x: Field, key: str, history: WearHistory) -> None:
             "crf_mean_high_hz",
         )
     )
-    style: Any = {"color": BLUE, "linewidth": 0}
+    style: Style = {"color": BLUE, "linewidth": 0}
     axes.fill_between(x, mean_low, mean_high, alpha=0.3, label="mean over positions, 90 %", **style)
     if np.isfinite(low).any():
         axes.fill_between(x, low, high, alpha=0.1, label="with scatter and grid, 90 %", **style)
@@ -200,38 +201,20 @@ def surfaces(track: WornTrack) -> Exhibit:
     """Map a track before and after wear, and the depth lost."""
 
     def draw(medium: Medium) -> Figure:
-        grid = track.before.grid
         figure = Figure(figsize=(medium.double, 3.3), layout="constrained")
-        panels = panels_in_rows(figure, 3, sharey=True)
-        height = quantity("height_m")
-        lost = track.before.heights - track.after.heights
-        after = track.after.heights + lost.mean()
-        heights_shown = np.stack([track.before.heights, after])
-        limit = height.factor * float(np.percentile(np.abs(heights_shown), 99.5)) or 1.0
-        extent = (0.0, display("surface_x_m", grid.extent[0]), 0.0, display("y_m", grid.extent[1]))
-        maps: list[tuple[str, Field, dict[str, Any]]] = [
-            ("new", track.before.heights, {"cmap": "cividis", "vmin": -limit, "vmax": limit}),
-            ("after", after, {"cmap": "cividis", "vmin": -limit, "vmax": limit}),
-            (
-                "lost",
-                lost,
-                {"cmap": "inferno", "vmin": min(0.0, height.factor * float(lost.min()))},
-            ),
-        ]
-        for axes, (name, heights, style) in zip(panels, maps, strict=True):
-            image = axes.imshow(
-                height.factor * heights.T,
-                origin="lower",
-                extent=extent,
-                aspect="auto",
-                interpolation="none",
-                **style,
-            )
-            axes.set(title=f"{track.name}, {name}", xlabel=quantity("surface_x_m").axis)
-            if name != "new":
-                title = quantity("worn_depth_m").label if name == "lost" else height.label
-                figure.colorbar(image, ax=axes, label=title, extend="both")
-        panels[0].set_ylabel(quantity("y_m").axis)
+        new, after, lost = panels_in_rows(figure, 3, sharey=True)
+        depth = track.before.heights - track.after.heights
+        heights = track.before.heights, track.after.heights + depth.mean()
+        factor = quantity("height_m").factor
+        limit = factor * float(np.percentile(np.abs(np.stack(heights)), 99.5)) or 1.0
+        scale: Style = {"cmap": "cividis", "vmin": -limit, "vmax": limit}
+        _draw_heights(new, track, "new", heights[0], scale)
+        image = _draw_heights(after, track, "after", heights[1], scale)
+        figure.colorbar(image, ax=after, label=quantity("height_m").label, extend="both")
+        scale = {"cmap": "inferno", "vmin": min(0.0, factor * float(depth.min()))}
+        image = _draw_heights(lost, track, "lost", depth, scale)
+        figure.colorbar(image, ax=lost, label=quantity("worn_depth_m").label, extend="both")
+        new.set_ylabel(quantity("y_m").axis)
         return figure
 
     return Exhibit(
@@ -241,6 +224,22 @@ def surfaces(track: WornTrack) -> Exhibit:
         "lost.",
         f"Maps of the {track.name.lower()}'s heights before and after, and of the depth lost",
     )
+
+
+def _draw_heights(
+    axes: Axes, track: WornTrack, name: str, heights: Field, scale: Style
+) -> AxesImage:
+    extent = track.before.grid.extent
+    image = axes.imshow(
+        display("height_m", heights).T,
+        origin="lower",
+        extent=(0.0, display("surface_x_m", extent[0]), 0.0, display("y_m", extent[1])),
+        aspect="auto",
+        interpolation="none",
+        **scale,
+    )
+    axes.set(title=f"{track.name}, {name}", xlabel=quantity("surface_x_m").axis)
+    return image
 
 
 def profiles(tracks: Sequence[WornTrack]) -> Exhibit:

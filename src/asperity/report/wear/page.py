@@ -3,10 +3,12 @@
 from pathlib import Path
 from typing import NamedTuple
 
+import pandas
+
 from asperity.core.quantities import in_print, quantity
 from asperity.paper import is_papers_contact
 from asperity.report import animated_maps
-from asperity.report.base import heading, render, tile, write_page
+from asperity.report.base import Picture, heading, render, tile, write_page
 from asperity.report.wear import exhibits
 from asperity.simulation import WearFrame, WearHistory, body_column
 
@@ -63,39 +65,44 @@ def write_wear_report(history: WearHistory, path: str | Path) -> Path:
 
 def render_wear_page(history: WearHistory) -> str:
     """Render the page as HTML text."""
-    first, last = history.table.iloc[0], history.table.iloc[-1]
-    at_end = history.final_values
-    tracks = exhibits.worn_tracks(history)
-    resonant = bool(history.table["crf_hz"].notna().any())
-    papers = is_papers_contact(history.case)
+    table, model = history.table, history.contact.model
+    last, tracks = table.iloc[-1], exhibits.worn_tracks(history)
     scale = animated_maps.ranges(history.case, history.frames)
+    captions = [_caption(history, frame) for frame in history.frames]
     return render(
         "wear/page.html.j2",
         title="Wear of a contact",
         history=history,
-        tiles=[tile(quantity(key), at_end) for key in TILES if last[key] == last[key]],
-        resonance=exhibits.resonance(history, papers=papers).picture() if resonant else None,
-        maps=[
-            animated_maps.animated_map(history.case, kind, scale) for kind in animated_maps.KINDS
+        tiles=[
+            tile(quantity(key), history.final_values) for key in TILES if last[key] == last[key]
         ],
+        resonance=_resonance(history),
+        maps=animated_maps.animated_maps(history.case, scale),
         curves=exhibits.curves(history).picture(),
         surfaces=[exhibits.surfaces(track).picture() for track in tracks],
         profiles=exhibits.profiles(tracks).picture() if tracks else None,
-        contact=[_row(key, first[key], last[key]) for key in CONTACT],
-        bodies=[
-            _row(key, last[body_column(key, 0)], last[body_column(key, 1)]) for key in OF_BODIES
-        ],
+        contact=[_row(key, table[key].iloc[0], last[key]) for key in CONTACT],
+        bodies=_bodies(last),
         volumes=_volumes(history),
-        law=(type(history.contact.model.law).__doc__ or "").split("\n")[0],
-        coefficients=[f"{coefficient.k:.3g}" for coefficient in history.contact.model.coefficients],
+        law=(type(model.law).__doc__ or "").split("\n")[0],
+        coefficients=[f"{coefficient.k:.3g}" for coefficient in model.coefficients],
         stages=None if history.stages is None else in_print(history.stages.verdict),
         jump_error=quantity("jump_error").text(history.worn.error),
         case_text=history.case.text,
         script=animated_maps.SCRIPT,
-        script_data=animated_maps.script_data(
-            history.frames, [_caption(history, frame) for frame in history.frames], scale
-        ),
+        script_data=animated_maps.script_data(history.frames, captions, scale),
     )
+
+
+def _bodies(last: pandas.Series) -> list[ComparisonRow]:
+    return [_row(key, *(last[body_column(key, body)] for body in (0, 1))) for key in OF_BODIES]
+
+
+def _resonance(history: WearHistory) -> Picture | None:
+    """Draw the resonance; None without one."""
+    if not history.table["crf_hz"].notna().any():
+        return None
+    return exhibits.resonance(history, papers=is_papers_contact(history.case)).picture()
 
 
 def _caption(history: WearHistory, frame: WearFrame) -> str:
