@@ -259,7 +259,6 @@ class RoughChannel:
         flow, by_left, by_right = self._inner_faces(cells)
         entering, d_entering, leaving, d_leaving = self._end_faces(cells)
         along = np.concatenate([entering[None], flow, leaving[None]])
-        outflow = np.diff(along, axis=0)
         own = np.concatenate([by_left, d_leaving[None]])
         own[0] -= d_entering
         own[1:] -= by_right
@@ -269,14 +268,8 @@ class RoughChannel:
             (index[:-1], index[1:], by_right),
             (index[1:], index[:-1], -by_left),
         ]
-        outflow += self._flow_across(
-            cells.pressure,
-            cells.conductance,
-            cells.d_conductance,
-            cells.d_pressure,
-            index,
-            entries,
-        )
+        outflow = np.diff(along, axis=0)
+        outflow += self._flow_across(cells, index, entries)
         rows, columns = (
             np.concatenate([entry[place].ravel() for entry in entries]) for place in (0, 1)
         )
@@ -285,54 +278,65 @@ class RoughChannel:
         return Flows(along, outflow, through, rows, columns, slopes)
 
     def _inner_faces(self, cells: Cells) -> tuple[Field, Field, Field]:
-        """Return the flow through each inner face and its derivatives in the left and right cell.
+        """Return the flow through each inner face, rupturing or not, and both derivatives."""
+        left, right = (Cells(*(part[cut] for part in cells)) for cut in (np.s_[:-1], np.s_[1:]))
+        flow, by_left, by_right = self._full_faces(left, right)
+        to_rupture, d_to_rupture = self._rupturing_faces(left)
+        ruptures = to_rupture < flow
+        return (
+            np.where(ruptures, to_rupture, flow),
+            np.where(ruptures, d_to_rupture, by_left),
+            np.where(ruptures, 0.0, by_right),
+        )
 
-        A face joins two half cells of constant gap, which is exact where the gap steps. Its
-        pressure follows from equal flow on both sides; where that would be negative the film
-        ruptures at the face.
+    def _full_faces(self, left: Cells, right: Cells) -> tuple[Field, Field, Field]:
+        """Return the flow through faces with a full film and its derivatives in both cells.
+
+        A face joins two half cells of constant gap (exact at steps), with equal flow on both sides.
         """
-        dx, u = self.spacing[0], self.speed
-        pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance = cells
-        half, d_half = 2.0 * conductance / dx, 2.0 * d_conductance / dx
-        left, right = np.s_[:-1], np.s_[1:]
-        both = half[left] + half[right]
-        share = half[right] / both  # weight of the left cell's oil in the face's
-        face_oil = share * oil[left] + (1.0 - share) * oil[right]
-        joint = share * half[left]
-        step = (oil[right] - oil[left]) / both
-        drop = pressure[left] - pressure[right]
-        flow = u * content[left] * face_oil + joint * drop
+        u, (half_left, d_half_left) = self.speed, self._half_cells(left)
+        half_right, d_half_right = self._half_cells(right)
+        both = half_left + half_right
+        share = half_right / both  # weight of the left cell's oil in the face's
+        face_oil = share * left.oil + (1.0 - share) * right.oil
+        joint = share * half_left
+        step = (right.oil - left.oil) / both
+        drop = left.pressure - right.pressure
+        flow = u * left.content * face_oil + joint * drop
         by_left = (
-            u * d_content[left] * face_oil
-            + u * content[left] * (share * d_oil[left] + share * step * d_half[left])
-            + share**2 * d_half[left] * drop
-            + joint * d_pressure[left]
+            u * left.d_content * face_oil
+            + u * left.content * (share * left.d_oil + share * step * d_half_left)
+            + share**2 * d_half_left * drop
+            + joint * left.d_pressure
         )
         by_right = (
-            u
-            * content[left]
-            * ((1.0 - share) * d_oil[right] - (1.0 - share) * step * d_half[right])
-            + (1.0 - share) ** 2 * d_half[right] * drop
-            - joint * d_pressure[right]
+            u * left.content * ((1.0 - share) * right.d_oil - (1.0 - share) * step * d_half_right)
+            + (1.0 - share) ** 2 * d_half_right * drop
+            - joint * right.d_pressure
         )
-        to_rupture = u * content[left] * oil[left] + half[left] * pressure[left]
-        ruptures = to_rupture < flow
-        d_to_rupture = (
-            u * d_content[left] * oil[left]
-            + u * content[left] * d_oil[left]
-            + d_half[left] * pressure[left]
-            + half[left] * d_pressure[left]
-        )
-        flow = np.where(ruptures, to_rupture, flow)
-        by_left = np.where(ruptures, d_to_rupture, by_left)
-        by_right = np.where(ruptures, 0.0, by_right)
         return flow, by_left, by_right
+
+    def _rupturing_faces(self, left: Cells) -> tuple[Field, Field]:
+        """Return the flow through faces without pressure and its derivative in the left cell."""
+        u, (half, d_half) = self.speed, self._half_cells(left)
+        flow = u * left.content * left.oil + half * left.pressure
+        slope = (
+            u * left.d_content * left.oil
+            + u * left.content * left.d_oil
+            + d_half * left.pressure
+            + half * left.d_pressure
+        )
+        return flow, slope
+
+    def _half_cells(self, cells: Cells) -> tuple[Field, Field]:
+        """Return the conductance of half a cell along x and its derivative."""
+        dx = self.spacing[0]
+        return 2.0 * cells.conductance / dx, 2.0 * cells.d_conductance / dx
 
     def _end_faces(self, cells: Cells) -> tuple[Field, Field, Field, Field]:
         """Return the flows through inlet and outlet, each with its derivative in the end cell."""
-        dx, u = self.spacing[0], self.speed
-        pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance = cells
-        half, d_half = 2.0 * conductance / dx, 2.0 * d_conductance / dx
+        u, (half, d_half) = self.speed, self._half_cells(cells)
+        pressure, d_pressure, content, d_content, oil, d_oil, *_ = cells
         inlet, outlet = self.boundary.ends
         entering = (
             u
@@ -352,40 +356,23 @@ class RoughChannel:
         return entering, d_entering, leaving, d_leaving
 
     def _flow_across(
-        self,
-        pressure: Field,
-        conductance: Field,
-        d_conductance: Field,
-        d_pressure: Field,
-        index: Index,
-        entries: list[tuple[Index, Index, Field]],
+        self, cells: Cells, index: Index, entries: list[tuple[Index, Index, Field]]
     ) -> Field:
         """Return the outflow of each cell across, and append its derivatives to `entries`.
 
         Rows are scaled as those along x.
         """
-        dx, dy = self.spacing
-        ratio = dx / dy
-        half, d_half = 2.0 * ratio * conductance / dy, 2.0 * ratio * d_conductance / dy
-        outflow = np.zeros_like(pressure)
-        a, b = half, np.roll(half, -1, 1)
-        joint = a * b / (a + b)
-        drop = pressure - np.roll(pressure, -1, 1)
-        flow = joint * drop  # through the northern face
-        by_own = (b / (a + b)) ** 2 * d_half * drop + joint * d_pressure
-        by_next = (a / (a + b)) ** 2 * np.roll(d_half, -1, 1) * drop - joint * np.roll(
-            d_pressure, -1, 1
-        )
+        flow, by_own, by_next = self._northern_faces(cells)
+        outflow = np.zeros_like(flow)
         if self.boundary.sides is not None:
             for part in (flow, by_own, by_next):
                 part[:, -1] = 0.0
-            for column, outside in ((0, self.boundary.sides[0]), (-1, self.boundary.sides[1])):
-                outflow[:, column] += half[:, column] * (pressure[:, column] - outside)
-                slope = (
-                    d_half[:, column] * (pressure[:, column] - outside)
-                    + half[:, column] * d_pressure[:, column]
-                )
-                entries.append((index[:, column], index[:, column], slope))
+            half, d_half = self._half_cells_across(cells)
+            for column, outside in zip((0, -1), self.boundary.sides, strict=True):
+                excess, line = cells.pressure[:, column] - outside, index[:, column]
+                outflow[:, column] += half[:, column] * excess
+                by_pressure = half[:, column] * cells.d_pressure[:, column]
+                entries.append((line, line, d_half[:, column] * excess + by_pressure))
         north = np.roll(index, -1, 1)
         entries += [
             (index, index, by_own),
@@ -394,6 +381,22 @@ class RoughChannel:
             (north, north, -by_next),
         ]
         return outflow + flow - np.roll(flow, 1, 1)
+
+    def _northern_faces(self, cells: Cells) -> tuple[Field, Field, Field]:
+        """Return the flow through each northern face and its derivatives in both its cells."""
+        half, d_half = self._half_cells_across(cells)
+        beyond, d_beyond = np.roll(half, -1, 1), np.roll(d_half, -1, 1)
+        joint = half * beyond / (half + beyond)
+        drop = cells.pressure - np.roll(cells.pressure, -1, 1)
+        by_own = (beyond / (half + beyond)) ** 2 * d_half * drop + joint * cells.d_pressure
+        by_next = (half / (half + beyond)) ** 2 * d_beyond * drop
+        by_next -= joint * np.roll(cells.d_pressure, -1, 1)
+        return joint * drop, by_own, by_next
+
+    def _half_cells_across(self, cells: Cells) -> tuple[Field, Field]:
+        """Return the scaled conductance of half a cell along y and its derivative."""
+        dy, ratio = self.spacing[1], self.spacing[0] / self.spacing[1]
+        return 2.0 * ratio * cells.conductance / dy, 2.0 * ratio * cells.d_conductance / dy
 
 
 def _newton_step(flows: Flows) -> Field:
@@ -436,8 +439,7 @@ def _check(channel: RoughChannel, *, line: bool, field_spacing: bool) -> None:
     if not 0.0 < channel.boundary.inflow_content <= 1.0:
         raise BadInput(
             f"inflow content must lie between 0 and 1, got {channel.boundary.inflow_content:g}; 1 "
-            "is a full "
-            "gap"
+            "is a full gap"
         )
     if channel.boundary.inflow_content < 1.0 and channel.boundary.ends[0] > 0.0:
         raise BadInput(

@@ -97,6 +97,12 @@ class Deflection:
         )
 
     @property
+    def next_compliance(self) -> float:
+        """Compliance of a cell to the next one along x, less that to a far one."""
+        _, following, _, far = self.local_compliance
+        return float(following - far)
+
+    @property
     def local_compliance(self) -> Field:
         """Compliance of cells 0, 1, 2 along x and of the first far one, for preconditioning."""
         return self.row[[0, 1, 2, min(FAR_CELLS, self.row.size - 1)]].copy()
@@ -111,37 +117,57 @@ def deflection(
     mirror: int = 0,
 ) -> Deflection:
     """Return the influence of a grid, up to a mirror if any; spacing in Hertz half-widths."""
-    nx, ny = cells
-    # zero padded to at least twice the length: circular convolution would couple both ends
-    padded = (
-        scipy.fft.next_fast_len(2 * nx - 1),
-        ny if periodic else scipy.fft.next_fast_len(2 * ny - 1, real=True),
-    )
     if mirror:
-        lines = 2 * ny + 1 - mirror
-        padded = (
-            scipy.fft.next_fast_len(2 * nx - 1, real=True),
-            scipy.fft.next_fast_len(lines, real=True),
-        )
-        kernel = compliance * _love_kernel((nx, lines), spacing)
-        row = kernel[:, 0].copy()
-        spectrum = scipy.fft.rfft(
-            _even_extension(_cosine_waves(kernel, padded[1], mirror), padded[0]), axis=0
-        ).real
-    elif periodic:
-        kernel = 2.0 * compliance * _line_kernel(cells, spacing)
-        row = scipy.fft.irfft(kernel, n=ny, axis=1)[:, 0]
-        spectrum = scipy.fft.fft(_even_extension(kernel, padded[0]), axis=0).real
+        padded, row, spectrum = _mirrored_kernel(cells, spacing, compliance, mirror)
     else:
-        kernel = compliance * _love_kernel(cells, spacing)
-        row = kernel[:, 0].copy()
-        spectrum = scipy.fft.rfft2(
-            _even_extension(_even_extension(kernel, padded[0]).T, padded[1]).T
-        ).real
+        kernel_of = _periodic_kernel if periodic else _bounded_kernel
+        padded, row, spectrum = kernel_of(cells, spacing, compliance)
     both = np.ascontiguousarray(spectrum), spectrum.astype(np.float32)
     for array in (*both, row):
         array.flags.writeable = False
     return Deflection(cells, padded, both, row, mirror)
+
+
+# Transform lengths, compliance along one line, and transformed kernel. Aperiodic axes are padded to
+# at least twice the length: circular convolution would couple both ends.
+_Kernel = tuple[tuple[int, int], Field, Field]
+
+
+def _mirrored_kernel(
+    cells: tuple[int, int], spacing: tuple[float, float], compliance: float, mirror: int
+) -> _Kernel:
+    """Return the kernel of a grid that ends at a mirror."""
+    lines = 2 * cells[1] + 1 - mirror
+    padded = (
+        scipy.fft.next_fast_len(2 * cells[0] - 1, real=True),
+        scipy.fft.next_fast_len(lines, real=True),
+    )
+    kernel = compliance * _love_kernel((cells[0], lines), spacing)
+    waves = _even_extension(_cosine_waves(kernel, padded[1], mirror), padded[0])
+    return padded, kernel[:, 0].copy(), scipy.fft.rfft(waves, axis=0).real
+
+
+def _periodic_kernel(
+    cells: tuple[int, int], spacing: tuple[float, float], compliance: float
+) -> _Kernel:
+    """Return the kernel of a grid that repeats along y."""
+    padded = scipy.fft.next_fast_len(2 * cells[0] - 1), cells[1]
+    kernel = 2.0 * compliance * _line_kernel(cells, spacing)
+    row = scipy.fft.irfft(kernel, n=cells[1], axis=1)[:, 0]
+    return padded, row, scipy.fft.fft(_even_extension(kernel, padded[0]), axis=0).real
+
+
+def _bounded_kernel(
+    cells: tuple[int, int], spacing: tuple[float, float], compliance: float
+) -> _Kernel:
+    """Return the kernel of a grid without periodic axes."""
+    padded = (
+        scipy.fft.next_fast_len(2 * cells[0] - 1),
+        scipy.fft.next_fast_len(2 * cells[1] - 1, real=True),
+    )
+    kernel = compliance * _love_kernel(cells, spacing)
+    extended = _even_extension(_even_extension(kernel, padded[0]).T, padded[1]).T
+    return padded, kernel[:, 0].copy(), scipy.fft.rfft2(extended).real
 
 
 def _cosine_waves(kernel: Field, count: int, mirror: int) -> Field:
@@ -169,20 +195,25 @@ def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
     edges = (np.arange(nx + 1) - 0.5) * dx
     kernel[:, 0] = -np.diff(edges * np.log(np.abs(edges)) - edges)
     wave = np.arange(1, ny // 2 + 1) / ny  # waves per cell
-    # integral beyond the centre of the first cell, then beyond each cell's far edge
-    beyond = np.zeros((nx + 1, wave.size))
-    for alias, weight in _aliases(wave):
-        beyond[0] += (np.pi / 2.0) * weight
-        wavenumber = alias * (2.0 * np.pi / dy)
-        reached = 1 + int(K0_CUTOFF / (wavenumber.min(initial=np.inf) * dx) + 0.5)
-        if reached > 1:
-            argument = np.outer(edges[1:reached], wavenumber)
-            row, column = np.nonzero(argument < K0_CUTOFF)
-            beyond[row + 1, column] += weight[column] * _k0_integral(argument[row, column])
+    beyond = _integral_beyond(wave, edges[1:], dx, dy)
     beyond *= np.sin(np.pi * wave) * dy / (2.0 * np.pi**2)
     kernel[:, 1:] = -np.diff(beyond, axis=0)
     kernel[0, 1:] *= 2.0  # its other half
     return kernel
+
+
+def _integral_beyond(wave: Field, edges: Field, dx: float, dy: float) -> Field:
+    """Return the integral of all aliases beyond the centre of the first cell and beyond edges."""
+    beyond = np.zeros((edges.size + 1, wave.size))
+    for alias, weight in _aliases(wave):
+        beyond[0] += (np.pi / 2.0) * weight
+        wavenumber = alias * (2.0 * np.pi / dy)
+        reached = int(K0_CUTOFF / (wavenumber.min(initial=np.inf) * dx) + 0.5)
+        if reached > 0:
+            argument = np.outer(edges[:reached], wavenumber)
+            row, column = np.nonzero(argument < K0_CUTOFF)
+            beyond[row + 1, column] += weight[column] * _k0_integral(argument[row, column])
+    return beyond
 
 
 def _aliases(wave: Field) -> Iterator[tuple[Field, Field]]:

@@ -132,20 +132,28 @@ def least_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
 def least_films(conditions: ContactConditions, lubricant: Lubricant) -> dict[Regime, FilmFit]:
     """Return the fit of the minimum film in each regime."""
     numbers, radius = film_numbers(conditions, lubricant), conditions.radius_along_rolling
+    films = (_line_films if conditions.long else _point_films)(conditions, numbers)
+    return {
+        regime: FilmFit(source, "least", film * radius) for regime, (source, film) in films.items()
+    }
+
+
+def _line_films(_: ContactConditions, numbers: FilmNumbers) -> dict[Regime, tuple[str, float]]:
+    """Return sources and minimum films h/R of a line contact."""
     u, w, g = numbers.speed, numbers.load, numbers.material
-    if conditions.long:
-        return {
-            "isoviscous-rigid": FilmFit("Martin (1916)", "least", 4.898 * u / w * radius),
-            "isoviscous-elastic": FilmFit(
-                "Herrebrugh (1968)", "least", 3.10 * u**0.6 * w**-0.2 * radius
-            ),
-            "piezoviscous-rigid": FilmFit(
-                "Blok (1952)", "least", 1.664 * (g * u) ** (2.0 / 3.0) * radius
-            ),
-            "piezoviscous-elastic": FilmFit(
-                "Dowson (1968)", "least", 2.65 * g**0.54 * u**0.7 * w**-0.13 * radius
-            ),
-        }
+    return {
+        "isoviscous-rigid": ("Martin (1916)", 4.898 * u / w),
+        "isoviscous-elastic": ("Herrebrugh (1968)", 3.10 * u**0.6 * w**-0.2),
+        "piezoviscous-rigid": ("Blok (1952)", 1.664 * (g * u) ** (2.0 / 3.0)),
+        "piezoviscous-elastic": ("Dowson (1968)", 2.65 * g**0.54 * u**0.7 * w**-0.13),
+    }
+
+
+def _point_films(
+    conditions: ContactConditions, numbers: FilmNumbers
+) -> dict[Regime, tuple[str, float]]:
+    """Return sources and minimum films h/R of a point or elliptic contact."""
+    u, w, g = numbers.speed, numbers.load, numbers.material
     side, axes = 1.0 / _ratio(conditions), _axes(conditions)
     across = 1.0 / (1.0 + 2.0 / (3.0 * side))
     rigid = 128.0 * side * (across * (0.131 * np.arctan(side / 2.0) + 1.683) * u / w) ** 2
@@ -153,16 +161,10 @@ def least_films(conditions: ContactConditions, lubricant: Lubricant) -> dict[Reg
     hard = 3.63 * u**0.68 * g**0.49 * w**-0.073 * (1.0 - np.exp(-0.68 * axes))
     stiff = _asymptotes(conditions, numbers).piezoviscous_rigid * (2.0 * u) ** 0.5
     return {
-        "isoviscous-rigid": FilmFit(
-            "Brewe, Hamrock and Taylor (1979)", "least", float(rigid) * radius
-        ),
-        "isoviscous-elastic": FilmFit(
-            "Hamrock and Dowson, soft (1978)", "least", float(soft) * radius
-        ),
-        "piezoviscous-rigid": FilmFit(
-            "Nijenbanning, Venner and Moes (1994), rigid", "least", stiff * radius
-        ),
-        "piezoviscous-elastic": FilmFit("Hamrock and Dowson (1977)", "least", float(hard) * radius),
+        "isoviscous-rigid": ("Brewe, Hamrock and Taylor (1979)", float(rigid)),
+        "isoviscous-elastic": ("Hamrock and Dowson, soft (1978)", float(soft)),
+        "piezoviscous-rigid": ("Nijenbanning, Venner and Moes (1994), rigid", stiff),
+        "piezoviscous-elastic": ("Hamrock and Dowson (1977)", float(hard)),
     }
 
 

@@ -361,14 +361,21 @@ def _cells(
     most = MAX_CELLS * max(1.0, ACCURACY / accuracy)
     if texture is not None and target[0] * target[1] > most:
         fewest = _counts(_spacing(conditions, lubricant, texture, 0.0), extent)
-        for _ in range(2):  # if one axis is at its minimum, the other takes the rest
-            fewer = math.sqrt(target[0] * target[1] / most)
-            target = max(target[0] / fewer, fewest[0]), max(target[1] / fewer, fewest[1])
-        too_many = max(1.0, math.sqrt(target[0] * target[1] / (1.15 * most)))
-        target = target[0] / too_many, target[1] / too_many
+        target = _reduced(target, fewest, most)
     if texture is not None:  # a coarser grid must be possible for the error estimate
         target = max(target[0], 2.0 * MIN_COARSE_CELLS), max(target[1], 2.0 * MIN_CELLS_SHORT_AXIS)
     return _even(target[0]), _even(target[1])
+
+
+def _reduced(
+    target: tuple[float, float], fewest: tuple[float, float], most: float
+) -> tuple[float, float]:
+    """Reduce cells along x and y to a product of about `most`, if possible not below `fewest`."""
+    for _ in range(2):  # if one axis is at its minimum, the other takes the rest
+        fewer = math.sqrt(target[0] * target[1] / most)
+        target = max(target[0] / fewer, fewest[0]), max(target[1] / fewer, fewest[1])
+    too_many = max(1.0, math.sqrt(target[0] * target[1] / (1.15 * most)))
+    return target[0] / too_many, target[1] / too_many
 
 
 def _counts(spacing: tuple[float, float], extent: tuple[float, float]) -> tuple[float, float]:

@@ -1,12 +1,16 @@
 """Transfer of cell-centred fields between grids: averaging, linear and cubic interpolation."""
 
 from functools import lru_cache
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, Mask
+
+AnyField = TypeVar("AnyField", Field, Mask)
+Index = npt.NDArray[np.intp]
 
 
 def average(field: Field, cells: tuple[int, int]) -> Field:
@@ -17,7 +21,7 @@ def average(field: Field, cells: tuple[int, int]) -> Field:
     )
 
 
-def mirror_field(field: Any, lines: int) -> Any:
+def mirror_field(field: AnyField, lines: int) -> AnyField:
     """Return a field extended to `lines` lines of cells by its mirror image."""
     missing = lines - field.shape[1]
     return np.concatenate([field, field[:, :missing][:, ::-1]], axis=1)
@@ -35,13 +39,13 @@ def interpolate(field: Field, cells: tuple[int, int], *, cubic: bool = False) ->
     )
 
 
-def _apply(field: Field, along: Any, across: Any) -> Field:
+def _apply(field: Field, along: scipy.sparse.csr_array, across: scipy.sparse.csr_array) -> Field:
     """Apply matrices along both axes."""
     return np.asarray((across @ (along @ field).T).T, order="C")
 
 
 @lru_cache(maxsize=64)
-def _averaging_matrix(fine: int, coarse: int) -> Any:
+def _averaging_matrix(fine: int, coarse: int) -> scipy.sparse.csr_array:
     """Return the share of each fine cell in each coarse one, shape (coarse, fine)."""
     edges = np.union1d(np.arange(fine + 1) / fine, np.arange(coarse + 1) / coarse)
     middles = (edges[1:] + edges[:-1]) / 2.0
@@ -52,14 +56,14 @@ def _averaging_matrix(fine: int, coarse: int) -> Any:
 
 
 @lru_cache(maxsize=64)
-def _linear_weights(coarse: int, fine: int, *, periodic: bool) -> Any:
+def _linear_weights(coarse: int, fine: int, *, periodic: bool) -> scipy.sparse.csr_array:
     """Return the weights of the coarse centres beside each fine one, shape (fine, coarse)."""
     left, offset = _left_centre(coarse, fine)
     return _weight_matrix(np.stack([1.0 - offset, offset]), left, coarse, periodic=periodic)
 
 
 @lru_cache(maxsize=64)
-def _cubic_weights(coarse: int, fine: int, *, periodic: bool) -> Any:
+def _cubic_weights(coarse: int, fine: int, *, periodic: bool) -> scipy.sparse.csr_array:
     """Return the Lagrange weights of four coarse centres for each fine one, (fine, coarse)."""
     left, t = _left_centre(coarse, fine)
     weights = [
@@ -71,14 +75,16 @@ def _cubic_weights(coarse: int, fine: int, *, periodic: bool) -> Any:
     return _weight_matrix(np.stack(weights), left - 1, coarse, periodic=periodic)
 
 
-def _left_centre(coarse: int, fine: int) -> tuple[Any, Field]:
+def _left_centre(coarse: int, fine: int) -> tuple[Index, Field]:
     """Return the coarse centre left of each fine one, and the offset from it in coarse cells."""
     place = (np.arange(fine) + 0.5) * (coarse / fine) - 0.5
     left = np.floor(place).astype(int)
     return left, np.asarray(place - left)
 
 
-def _weight_matrix(weights: Field, first: Any, coarse: int, *, periodic: bool) -> Any:
+def _weight_matrix(
+    weights: Field, first: Index, coarse: int, *, periodic: bool
+) -> scipy.sparse.csr_array:
     """Return weights, (points, fine), of consecutive coarse centres as a matrix, (fine, coarse).
 
     `first` is the first of those centres.

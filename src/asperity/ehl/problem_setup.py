@@ -32,17 +32,8 @@ def contact_problem(
     grid, line = surface.grid, conditions.endless
     (dx, dy), (left, front) = grid.spacing, grid.lower
     load = conditions.line_load * grid.extent[1] if line else conditions.load
-    radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
     return Problem(
-        form=BodyShape(
-            flatness=radius / conditions.radius_across_rolling,
-            compliance=2.0 * scales.pressure * radius / (np.pi * modulus * scales.length),
-            aspect=np.inf if line else conditions.hertz.half_widths[1] / scales.length,
-            periodic=line,
-            roller=RollerProfile(conditions, scales.length, scales.gap)
-            if conditions.geometry == "roller"
-            else None,
-        ),
+        form=_body_shape(conditions, scales),
         roughness=surface.heights / scales.gap,
         lower=(left / scales.length, front / scales.length),
         spacing=(dx / scales.length, dy / scales.length),
@@ -58,6 +49,21 @@ def contact_problem(
         and not np.any(surface.heights)
         and options.model != CONSERVING,
         conserve=options.model == CONSERVING and lubricant is not None,
+    )
+
+
+def _body_shape(conditions: ContactConditions, scales: Scales) -> BodyShape:
+    """Return the dimensionless smooth shape of both bodies."""
+    radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
+    half_width = np.inf if conditions.endless else conditions.hertz.half_widths[1]
+    return BodyShape(
+        flatness=radius / conditions.radius_across_rolling,
+        compliance=2.0 * scales.pressure * radius / (np.pi * modulus * scales.length),
+        aspect=half_width / scales.length,
+        periodic=conditions.endless,
+        roller=RollerProfile(conditions, scales.length, scales.gap)
+        if conditions.geometry == "roller"
+        else None,
     )
 
 

@@ -216,11 +216,7 @@ class ElasticSearch(Search):
         )
         for problem in reversed(levels):
             finest = problem is levels[0]
-            tolerance = (
-                options.tolerance
-                if finest
-                else max(CONTINUATION.coarse_tolerance, options.tolerance)
-            )
+            tolerance = self.level_tolerance(finest=finest)
             if problem.cells != pressure.shape:
                 pressure = problem.interpolate(pressure)
             pressure, dry_approach, converged = elastic_contact(

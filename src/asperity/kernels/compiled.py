@@ -15,11 +15,13 @@ from contextlib import suppress
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.runtime.nrt import rtsys
+
+Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 _DIGEST = 32  # bytes appended to each file; pickle ignores trailing bytes
 
@@ -27,26 +29,26 @@ _DIGEST = 32  # bytes appended to each file; pickle ignores trailing bytes
 class _CheckedFile(IndexDataCacheFile):
     """Disk cache of one function."""
 
-    def save(self, key: Any, data: Any) -> None:
+    def save(self, key: object, data: object) -> None:
         """Store compiled code with its source stamp and its key."""
         super().save(key, (self._source_stamp, key, data))
 
-    def load(self, key: Any) -> Any:
+    def load(self, key: object) -> object:
         """Return the compiled code of a key; None where the entry is missing or another one."""
         stamp, known, data = super().load(key) or (None, None, None)
         return data if (stamp, known) == (self._source_stamp, key) else None
 
-    def _dump(self, obj: Any) -> bytes:
+    def _dump(self, obj: object) -> bytes:
         body: bytes = super()._dump(obj)
         return body + sha256(body).digest()
 
-    def _load_index(self) -> dict[Any, str]:
-        index: dict[Any, str] = (
+    def _load_index(self) -> dict[object, str]:
+        index: dict[object, str] = (
             self._checked(Path(self._index_path), super()._load_index, versioned=True) or {}
         )
         return index
 
-    def _load_data(self, name: str) -> Any:
+    def _load_data(self, name: str) -> object:
         return self._checked(
             Path(self._data_path(name)), lambda: super(_CheckedFile, self)._load_data(name)
         )
@@ -81,13 +83,13 @@ def _sources(folder: Path) -> str:
 class _Cache(FunctionCache):
     """Cache of one function; disabled where the folder is not writable."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., object]) -> None:
         super().__init__(function)
         default = self._cache_file
         stamp = (default._source_stamp, _sources(Path(function.__code__.co_filename).parent))
         self._cache_file = _CheckedFile(default._cache_path, self._impl.filename_base, stamp)
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
+    def load_overload(self, sig: object, target_context: object) -> object:
         """Load compiled code without importing the compiler.
 
         numba loads the whole compiler first, which takes longer than a solve.
@@ -96,23 +98,24 @@ class _Cache(FunctionCache):
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
-    def save_overload(self, sig: Any, data: Any) -> None:
+    def save_overload(self, sig: object, data: object) -> None:
         """Store compiled code if the disk allows it."""
         with suppress(OSError):
             super().save_overload(sig, data)
 
 
-def njit(*, cache: bool, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+def njit(*, cache: bool, **options: Any) -> Callable[[Kernel], Kernel]:
     """Compile like njit of numba, with a verified cache.
 
     The kernel is compiled without a cache where no folder for it is writable.
     """
 
-    def compiled(function: Callable[..., Any]) -> Any:
-        kernel = numba.njit(**options)(function)
+    def compiled(function: Kernel) -> Kernel:
+        kernel: Any = numba.njit(**options)(function)
         if cache:
             with suppress(RuntimeError):  # no writable folder: every process compiles anew
                 kernel._cache = _Cache(function)
-        return kernel
+        typed: Kernel = kernel
+        return typed
 
     return compiled

@@ -101,7 +101,7 @@ def restrict_scaled(residual: Field, weight: Field, inverse_scale: Field, out: F
             for cj in range(ny // 2):
                 out[ci, cj] = (line[2 * cj] + line[2 * cj + 1]) * inverse_scale[ci, cj]
             if ny % 2 == 1:
-                out[ci, cy - 1] = line[ny - 1] * inverse_scale[ci, cy - 1]
+                out[ci, -1] = line[-1] * inverse_scale[ci, -1]
         else:
             for cj in range(cy):
                 out[ci, cj] = line[cj] * inverse_scale[ci, cj]
@@ -140,13 +140,8 @@ def build_hierarchy(
     last, finer, rows = len(hierarchy.places) - 1, stencil, weight
     for k in range(last + 1):
         nx, ny = hierarchy.places[k, 0], hierarchy.places[k, 1]
-        coarse = Stencil(
-            np.empty((nx, ny)),
-            np.empty((nx, ny)),
-            np.empty((nx, ny)),
-            np.empty((nx, ny)),
-            np.empty((nx, ny)),
-        )
+        parts = np.empty((5, nx, ny))
+        coarse = Stencil(parts[0], parts[1], parts[2], parts[3], parts[4])
         fx, fy = rows.shape
         aggregate_stencil(finer, rows, (2 if nx < fx else 1, 2 if ny < fy else 1), coarse)
         scaled, inverse_scale, kept = (
@@ -184,11 +179,10 @@ def _scale(coarse: Stencil, scaled: Stencil, inverse_scale: Field, weight: Field
 
 
 @njit(cache=True)
-def invert(stencil: Stencil, out: Field) -> bool:
-    """Invert a stencil's matrix by Gauss-Jordan elimination; return False if it is singular."""
+def _dense(stencil: Stencil) -> Field:
+    """Return a stencil's matrix."""
     nx, ny = stencil.centre.shape
-    count = nx * ny
-    matrix, order = np.zeros((count, count)), np.arange(count)
+    matrix = np.zeros((nx * ny, nx * ny))
     for i in range(nx):
         for j in range(ny):
             row = i * ny + j
@@ -199,6 +193,31 @@ def invert(stencil: Stencil, out: Field) -> bool:
                 matrix[row, row + ny] += stencil.east[i, j]
             matrix[row, i * ny + (j + 1) % ny] += stencil.north[i, j]
             matrix[row, i * ny + (j + ny - 1) % ny] += stencil.south[i, j]
+    return matrix
+
+
+@njit(cache=True)
+def _eliminate(matrix: Field, k: int) -> None:
+    """Scale row `k` by its pivot and subtract it from all others, in place."""
+    count = len(matrix)
+    own = 1.0 / matrix[k, k]
+    matrix[k, k] = 1.0
+    for column in range(count):
+        matrix[k, column] *= own
+    for row in range(count):
+        factor = matrix[row, k]
+        if row != k and factor != 0.0:
+            matrix[row, k] = 0.0
+            for column in range(count):
+                matrix[row, column] -= factor * matrix[k, column]
+
+
+@njit(cache=True)
+def invert(stencil: Stencil, out: Field) -> bool:
+    """Invert a stencil's matrix by Gauss-Jordan elimination; return False if it is singular."""
+    matrix = _dense(stencil)
+    count = len(matrix)
+    order = np.arange(count)
     for k in range(count):
         pivot = k
         for row in range(k + 1, count):
@@ -210,16 +229,7 @@ def invert(stencil: Stencil, out: Field) -> bool:
             order[k], order[pivot] = order[pivot], order[k]
             for column in range(count):
                 matrix[k, column], matrix[pivot, column] = matrix[pivot, column], matrix[k, column]
-        own = 1.0 / matrix[k, k]
-        matrix[k, k] = 1.0
-        for column in range(count):
-            matrix[k, column] *= own
-        for row in range(count):
-            factor = matrix[row, k]
-            if row != k and factor != 0.0:
-                matrix[row, k] = 0.0
-                for column in range(count):
-                    matrix[row, column] -= factor * matrix[k, column]
+        _eliminate(matrix, k)
     for k in range(count):  # undo the row permutation in the columns of the inverse
         for row in range(count):
             out[row, order[k]] = matrix[row, k]

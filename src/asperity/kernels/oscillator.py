@@ -41,6 +41,12 @@ def mass_acceleration(contact: ContactSpring, compression: float, rate: float) -
 
 
 @njit(cache=True, inline="always")
+def _third_stage(k1: float, k2: float) -> float:
+    """Return the mean slope that leads to the third stage."""
+    return (3 / 40) * k1 + (9 / 40) * k2
+
+
+@njit(cache=True, inline="always")
 def _fourth_stage(k1: float, k2: float, k3: float) -> float:
     """Return the mean slope that leads to the fourth stage."""
     return (44 / 45) * k1 - (56 / 15) * k2 + (32 / 9) * k3
@@ -72,6 +78,34 @@ def _fifth_order(k1: float, k3: float, k4: float, k5: float, k6: float) -> float
     )
 
 
+@njit(cache=True, inline="always")
+def _slopes(contact: ContactSpring, s: float, c: float, v: float) -> tuple[float, float]:
+    """Return the slopes of compression and velocity."""
+    rate = s - v
+    return rate, mass_acceleration(contact, c, rate)
+
+
+@njit(cache=True, inline="always")
+def _step(contact: ContactSpring, s: float, h: float, c: float, v: float) -> tuple[float, float]:
+    """Return compression and velocity after a step of length `h` on a slope `s`."""
+    c1, v1 = _slopes(contact, s, c, v)
+    c2, v2 = _slopes(contact, s, c + h * (1 / 5) * c1, v + h * (1 / 5) * v1)
+    c3, v3 = _slopes(contact, s, c + h * _third_stage(c1, c2), v + h * _third_stage(v1, v2))
+    c4, v4 = _slopes(
+        contact, s, c + h * _fourth_stage(c1, c2, c3), v + h * _fourth_stage(v1, v2, v3)
+    )
+    c5, v5 = _slopes(
+        contact, s, c + h * _fifth_stage(c1, c2, c3, c4), v + h * _fifth_stage(v1, v2, v3, v4)
+    )
+    c6, v6 = _slopes(
+        contact,
+        s,
+        c + h * _sixth_stage(c1, c2, c3, c4, c5),
+        v + h * _sixth_stage(v1, v2, v3, v4, v5),
+    )
+    return c + h * _fifth_order(c1, c3, c4, c5, c6), v + h * _fifth_order(v1, v3, v4, v5, v6)
+
+
 @njit(cache=True, fastmath={"contract", "nsz"}, error_model="numpy")
 def integrate_contact(
     contact: ContactSpring,
@@ -88,21 +122,7 @@ def integrate_contact(
     c, v = compression[0], velocity[0]
     h = step / substeps
     for n in range(slopes.size):
-        s = slopes[n]
         for _ in range(substeps):
-            c1 = s - v
-            v1 = mass_acceleration(contact, c, c1)
-            c2 = s - (v + h * (1 / 5) * v1)
-            v2 = mass_acceleration(contact, c + h * (1 / 5) * c1, c2)
-            c3 = s - (v + h * ((3 / 40) * v1 + (9 / 40) * v2))
-            v3 = mass_acceleration(contact, c + h * ((3 / 40) * c1 + (9 / 40) * c2), c3)
-            c4 = s - (v + h * _fourth_stage(v1, v2, v3))
-            v4 = mass_acceleration(contact, c + h * _fourth_stage(c1, c2, c3), c4)
-            c5 = s - (v + h * _fifth_stage(v1, v2, v3, v4))
-            v5 = mass_acceleration(contact, c + h * _fifth_stage(c1, c2, c3, c4), c5)
-            c6 = s - (v + h * _sixth_stage(v1, v2, v3, v4, v5))
-            v6 = mass_acceleration(contact, c + h * _sixth_stage(c1, c2, c3, c4, c5), c6)
-            c += h * _fifth_order(c1, c3, c4, c5, c6)
-            v += h * _fifth_order(v1, v3, v4, v5, v6)
+            c, v = _step(contact, slopes[n], h, c, v)
         compression[n + 1] = c
         velocity[n + 1] = v

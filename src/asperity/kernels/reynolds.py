@@ -296,7 +296,7 @@ def _add_flow_across(
     d_pressure: Field,
     d_log: Field,
     i: int,
-    over_dy2: float,
+    over_dy2: np.floating,
     out: Field,
 ) -> None:
     """Add the linearised flow through the y faces: outflow of a line enters the next one."""
@@ -311,7 +311,9 @@ def _add_flow_across(
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"}, inline="always")
-def _scale_row(rows: Rows, change: PressureChange, i: int, touching: float, out: Field) -> None:
+def _scale_row(
+    rows: Rows, change: PressureChange, i: int, touching: np.floating, out: Field
+) -> None:
     """Scale the lubricated cells of row `i`, and fill its other cells with their own equations."""
     for j in range(out.shape[1]):
         if rows.state[i, j] == LUBRICATED:

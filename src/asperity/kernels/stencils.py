@@ -97,7 +97,7 @@ def _fill_north_slopes(
     pressure: Field,
     slope: Field,
     i: int,
-    over_dy2: float,
+    over_dy2: np.floating,
     across: Field,
     over: Field,
 ) -> None:
@@ -118,7 +118,7 @@ def _add_south_faces(
     rows: Rows,
     faces: Faces,
     i: int,
-    over_dy2: float,
+    over_dy2: np.floating,
     across: Field,
     over: Field,
     out: Stencil,
@@ -205,7 +205,7 @@ def own_stencil(
 
 
 @njit(cache=True)
-def _first_line(faces: Faces, i: int, over_dy2: float) -> tuple[float, float]:
+def _first_line(faces: Faces, i: int, over_dy2: np.floating) -> tuple[np.floating, np.floating]:
     """Return derivatives of the flow into the first line where y is not periodic.
 
     No Reynolds equation holds in that line.
@@ -233,7 +233,6 @@ def wedge_stencil(
     """
     nx, ny = pressure.shape
     real = out.centre.dtype.type
-    zero, unity = real(0.0), real(1.0)
     n0, n1, over_dx, over_dy2 = (
         real(compliance[0]),
         real(compliance[1]),
@@ -246,7 +245,12 @@ def wedge_stencil(
     by_gap, by_pressure = np.zeros((3, ny), out.centre.dtype), np.zeros((3, ny), out.centre.dtype)
     flow, before = np.zeros((5, ny), out.centre.dtype), np.zeros((5, ny), out.centre.dtype)
     for i in range(-1, nx):
-        _flow_slopes(film, faces, pressure, over_dx, i, by_gap, by_pressure)
+        if i < 0:
+            _fill_inlet_slopes(film, faces, pressure, over_dx, by_gap, by_pressure)
+        elif i == nx - 1:
+            _fill_outlet_slopes(film, faces, pressure, over_dx, by_gap, by_pressure)
+        else:
+            _fill_east_slopes(film, faces, pressure, over_dx, i, by_gap, by_pressure)
         for j in range(ny):
             flow[0, j] = n1 * by_gap[0, j]
             flow[1, j] = n0 * by_gap[0, j] + n1 * by_gap[1, j] + by_pressure[0, j]
@@ -254,38 +258,71 @@ def wedge_stencil(
             flow[3, j] = n1 * by_gap[1, j] + n0 * by_gap[2, j] + by_pressure[2, j]
             flow[4, j] = n1 * by_gap[2, j]
         if i >= 0:
-            first, second = real(i > 0) * over_dx, real(i > 1) * over_dx
-            last, last_but_one = real(i < nx - 1) * over_dx, real(i < nx - 2) * over_dx
-            for j in range(ny):
-                wet = rows.state[i, j] == LUBRICATED
-                scale = rows.fluid_scale[i, j] if wet else zero
-                far.west[i, j] = second * scale * (flow[0, j] - before[1, j])
-                out.west[i, j] = first * scale * (flow[1, j] - before[2, j])
-                out.centre[i, j] = over_dx * scale * (flow[2, j] - before[3, j]) if wet else unity
-                out.east[i, j] = last * scale * (flow[3, j] - before[4, j])
-                far.east[i, j] = last_but_one * scale * flow[4, j]
-                out.north[i, j], out.south[i, j] = zero, zero
-            if ny > 1:
-                _add_across(rows, film, faces, pressure, n0, over_dy2, i, out)
+            _fill_wedge_row(rows, flow, before, over_dx, i, out, far)
+        if i >= 0 and ny > 1:
+            _add_across(rows, film, faces, pressure, n0, over_dy2, i, out)
         flow, before = before, flow
 
 
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"}, inline="always")
+def _fill_wedge_row(
+    rows: Rows,
+    flow: Field,
+    before: Field,
+    over_dx: np.floating,
+    i: int,
+    out: Stencil,
+    far: OuterNeighbours,
+) -> None:
+    """Fill row `i` of a stencil from derivatives of the flows through its east and west faces."""
+    nx, ny = out.centre.shape
+    real = out.centre.dtype.type
+    zero, unity = real(0.0), real(1.0)
+    first, second = real(i > 0) * over_dx, real(i > 1) * over_dx
+    last, last_but_one = real(i < nx - 1) * over_dx, real(i < nx - 2) * over_dx
+    for j in range(ny):
+        wet = rows.state[i, j] == LUBRICATED
+        scale = rows.fluid_scale[i, j] if wet else zero
+        far.west[i, j] = second * scale * (flow[0, j] - before[1, j])
+        out.west[i, j] = first * scale * (flow[1, j] - before[2, j])
+        out.centre[i, j] = over_dx * scale * (flow[2, j] - before[3, j]) if wet else unity
+        out.east[i, j] = last * scale * (flow[3, j] - before[4, j])
+        far.east[i, j] = last_but_one * scale * flow[4, j]
+        out.north[i, j], out.south[i, j] = zero, zero
+
+
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
-def _flow_slopes(
+def _fill_inlet_slopes(
     film: Film,
     faces: Faces,
     pressure: Field,
-    over_dx: float,
-    i: int,
+    over_dx: np.floating,
     by_gap: Field,
     by_pressure: Field,
 ) -> None:
-    """Fill derivatives of the flow through east faces in the upstream, own and next cell.
+    """Fill derivatives of the flow through the inlet faces in the next cell."""
+    two, log_p = pressure.dtype.type(2.0), film.log_mobility_by_pressure
+    for j in range(pressure.shape[1]):
+        end_gradient = over_dx * pressure[0, j]
+        by_gap[2, j] = film.content_by_gap[0, j] - end_gradient * (
+            film.mobility[0, j] * film.log_mobility_by_gap[0, j] + film.ambient_by_gap[0, j]
+        )
+        by_pressure[2, j] = (
+            -two * over_dx * faces.inlet[j] - end_gradient * film.mobility[0, j] * log_p[0, j]
+        )
 
-    `i` = -1 stands for the inlet faces. Includes the ambient mobility at both ends.
-    """
-    nx, ny = pressure.shape
-    real = pressure.dtype.type
+
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
+def _fill_outlet_slopes(
+    film: Film,
+    faces: Faces,
+    pressure: Field,
+    over_dx: np.floating,
+    by_gap: Field,
+    by_pressure: Field,
+) -> None:
+    """Fill derivatives of the flow through the outlet faces in the upstream and own cell."""
+    i, real = pressure.shape[0] - 1, pressure.dtype.type
     half, unity, two = real(0.5), real(1.0), real(2.0)
     m_h, m_p, log_h, log_p = (
         film.content_by_gap,
@@ -293,46 +330,55 @@ def _flow_slopes(
         film.log_mobility_by_gap,
         film.log_mobility_by_pressure,
     )
-    if i < 0:
-        for j in range(ny):
-            end_gradient = over_dx * pressure[0, j]
-            by_gap[2, j] = m_h[0, j] - end_gradient * (
-                film.mobility[0, j] * log_h[0, j] + film.ambient_by_gap[0, j]
-            )
-            by_pressure[2, j] = (
-                -two * over_dx * faces.inlet[j] - end_gradient * film.mobility[0, j] * log_p[0, j]
-            )
-    elif i == nx - 1:
-        for j in range(ny):
-            end_gradient = two * over_dx * pressure[i, j]
-            own = end_gradient * faces.east_by_own[i, j]
-            by_gap[0, j], by_pressure[0, j] = -half * m_h[i - 1, j], -half * m_p[i - 1, j]
-            by_gap[1, j] = (
-                (unity + half) * m_h[i, j]
-                + own * log_h[i, j]
-                + end_gradient * half * film.ambient_by_gap[1, j]
-            )
-            by_pressure[1, j] = (
-                (unity + half) * m_p[i, j] + own * log_p[i, j] + two * over_dx * faces.east[i, j]
-            )
-            by_gap[2, j], by_pressure[2, j] = real(0.0), real(0.0)
-    else:
-        inner = real(i > 0)
-        ahead, back, upstream = inner * faces.wedge[0], inner * faces.wedge[1], max(i - 1, 0)
-        for j in range(ny):
-            pressure_gradient, through = (
-                over_dx * (pressure[i, j] - pressure[i + 1, j]),
-                over_dx * faces.east[i, j],
-            )
-            own, following = (
-                pressure_gradient * faces.east_by_own[i, j],
-                pressure_gradient * faces.east_by_next[i, j],
-            )
-            by_gap[0, j], by_pressure[0, j] = -back * m_h[upstream, j], -back * m_p[upstream, j]
-            by_gap[1, j] = (unity - ahead + back) * m_h[i, j] + own * log_h[i, j]
-            by_pressure[1, j] = (unity - ahead + back) * m_p[i, j] + own * log_p[i, j] + through
-            by_gap[2, j] = ahead * m_h[i + 1, j] + following * log_h[i + 1, j]
-            by_pressure[2, j] = ahead * m_p[i + 1, j] + following * log_p[i + 1, j] - through
+    for j in range(pressure.shape[1]):
+        end_gradient = two * over_dx * pressure[i, j]
+        own = end_gradient * faces.east_by_own[i, j]
+        by_gap[0, j], by_pressure[0, j] = -half * m_h[i - 1, j], -half * m_p[i - 1, j]
+        by_gap[1, j] = (
+            (unity + half) * m_h[i, j]
+            + own * log_h[i, j]
+            + end_gradient * half * film.ambient_by_gap[1, j]
+        )
+        by_pressure[1, j] = (
+            (unity + half) * m_p[i, j] + own * log_p[i, j] + two * over_dx * faces.east[i, j]
+        )
+        by_gap[2, j], by_pressure[2, j] = real(0.0), real(0.0)
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
+def _fill_east_slopes(
+    film: Film,
+    faces: Faces,
+    pressure: Field,
+    over_dx: np.floating,
+    i: int,
+    by_gap: Field,
+    by_pressure: Field,
+) -> None:
+    """Fill derivatives of the flow through inner east faces in the upstream, own and next cell."""
+    real = pressure.dtype.type
+    unity, inner = real(1.0), real(i > 0)
+    m_h, m_p, log_h, log_p = (
+        film.content_by_gap,
+        film.content_by_pressure,
+        film.log_mobility_by_gap,
+        film.log_mobility_by_pressure,
+    )
+    ahead, back, upstream = inner * faces.wedge[0], inner * faces.wedge[1], max(i - 1, 0)
+    for j in range(pressure.shape[1]):
+        pressure_gradient, through = (
+            over_dx * (pressure[i, j] - pressure[i + 1, j]),
+            over_dx * faces.east[i, j],
+        )
+        own, following = (
+            pressure_gradient * faces.east_by_own[i, j],
+            pressure_gradient * faces.east_by_next[i, j],
+        )
+        by_gap[0, j], by_pressure[0, j] = -back * m_h[upstream, j], -back * m_p[upstream, j]
+        by_gap[1, j] = (unity - ahead + back) * m_h[i, j] + own * log_h[i, j]
+        by_pressure[1, j] = (unity - ahead + back) * m_p[i, j] + own * log_p[i, j] + through
+        by_gap[2, j] = ahead * m_h[i + 1, j] + following * log_h[i + 1, j]
+        by_pressure[2, j] = ahead * m_p[i + 1, j] + following * log_p[i + 1, j] - through
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
@@ -341,8 +387,8 @@ def _add_across(
     film: Film,
     faces: Faces,
     pressure: Field,
-    own: float,
-    over_dy2: float,
+    own: np.floating,
+    over_dy2: np.floating,
     i: int,
     out: Stencil,
 ) -> None:

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
+from asperity.core.documents import Table
 from asperity.lubricant.density import DensityLaw
 from asperity.lubricant.friction import BairWiner, FrictionLaw
 from asperity.lubricant.laws import LawFamily, describe_law, make_law
@@ -24,12 +24,12 @@ class Lubricant:
 _FAMILIES: tuple[LawFamily, ...] = ("viscosity", "density", "rheology", "friction")
 
 
-def describe_lubricant(lubricant: Lubricant) -> dict[str, dict[str, Any]]:
+def describe_lubricant(lubricant: Lubricant) -> dict[str, dict[str, object]]:
     """Return name and parameters [SI] of each law, for run files; BadInput for unknown laws."""
     return {family: describe_law(family, getattr(lubricant, family)) for family in _FAMILIES}
 
 
-def make_lubricant(description: Mapping[str, Mapping[str, Any]]) -> Lubricant:
+def make_lubricant(description: Mapping[str, Table]) -> Lubricant:
     """Create an oil from the result of `describe_lubricant`."""
     return Lubricant(
         **{

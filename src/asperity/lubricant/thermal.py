@@ -115,6 +115,12 @@ class Thermal(Parametric):
     solids: tuple[Solid, Solid] = (Solid(), Solid())
     feedback: bool = False
 
+    @property
+    def bulk_rise(self) -> tuple[float, float]:
+        """Temperatures of the two bodies away from the contact, above ambient [K]."""
+        bulk_1, bulk_2 = self.bulk or (self.ambient, self.ambient)
+        return bulk_1 - self.ambient, bulk_2 - self.ambient
+
     def __post_init__(self) -> None:
         Parametric.__post_init__(self)
         for temperature in (self.ambient, *(self.bulk or ())):

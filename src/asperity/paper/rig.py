@@ -4,7 +4,7 @@ The contact is asperity's own oscillator on its own rough profile. The disturban
 accelerometer signal are drawn anew for each rig: structural modes, shaft and mains lines, noise.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -31,6 +31,7 @@ from asperity.paper.numbers import (
 )
 from asperity.paper.rig_recording import (
     GRID_HZ,
+    ContactLine,
     Disturbance,
     RigRecording,
     RigTest,
@@ -178,47 +179,83 @@ def simulate_rig(
     settings = settings or RigSettings()
     if moments:
         settings = replace(settings, samples=len(moments))
-    samples, rate_hz, trend = settings.samples, settings.rate_hz, settings.trend
     conditions, model = _contact(case)
-    band_hz = _band(conditions, model, rate_hz)
-    sq, sq_std = _measured(samples, moments, settings.seed)
+    band_hz = _band(conditions, model, settings.rate_hz)
+    sq, sq_std = _measured(settings.samples, moments, settings.seed)
     full_load_crf_hz = _full_load_crf_hz(conditions, model, float(sq[0]))
     disturbance = disturbance or Disturbance()
-    background_seed, *draws = np.random.SeedSequence(settings.seed).spawn(1 + samples)
-    frequency = np.arange(0.0, rate_hz / 2.0 + GRID_HZ, GRID_HZ)
-    background = draw_background(
-        frequency, band_hz, disturbance, np.random.default_rng(background_seed)
-    )
-    recordings: list[RigRecording] = []
-    for index, draw in enumerate(draws):
-        rng = np.random.default_rng(draw)
-        measured_sq, measured_std = float(sq[index]), float(sq_std[index])
-        true_sq = max(measured_sq + measured_std * float(rng.standard_normal()), 0.1 * measured_sq)
-        if case is None:
-            sample = _on_trend(trend, true_sq, conditions, full_load_crf_hz), model
-        elif moments:
-            sample = _touching(moments[index], model)
-        else:
-            sample = _solved(case, true_sq, model)
-        for repeat in range(1, settings.repeats + 1):
-            test = RigTest(
-                index + 1, repeat, measured_sq, measured_std, rate_hz, settings.duration_s
-            )
-            shift = settings.repeat_std_hz * rng.standard_normal() / full_load_crf_hz
-            state, sample_model = _shifted(sample[0], shift), sample[1]
-            line = contact_line(state, conditions, sample_model, frequency, rate_hz)
-            recordings.append(background.recording(test, line, disturbance, rng))
+    rings = _Rings(settings, case, moments, conditions, model, full_load_crf_hz)
+    readings = list(zip(sq.tolist(), sq_std.tolist(), strict=True))
     return Rig(
-        recordings=tuple(recordings),
+        recordings=tuple(rings.recordings(readings, band_hz, disturbance)),
         band_hz=band_hz,
         full_load_crf_hz=full_load_crf_hz,
-        split_sq_m=KNEE_UM * 1e-6 if trend == "knee" and case is None else None,
+        split_sq_m=KNEE_UM * 1e-6 if settings.trend == "knee" and case is None else None,
         disturbance=disturbance,
         load_n=conditions.load,
         shaft_hz=SHAFT_HZ,
         case_text=(case or rig_case()).text,
         hours=None if moments is None else tuple(moment.hours for moment in moments),
     )
+
+
+class _Rings(NamedTuple):
+    """Contacts of the rings of a test."""
+
+    settings: RigSettings
+    case: Case | None
+    moments: Sequence[Moment] | None
+    conditions: ContactConditions
+    model: VibrationModel
+    full_load_crf_hz: float
+
+    @property
+    def frequency(self) -> Field:
+        """Frequency grid of densities [Hz]."""
+        return np.arange(0.0, self.settings.rate_hz / 2.0 + GRID_HZ, GRID_HZ)
+
+    def recordings(
+        self,
+        readings: Sequence[tuple[float, float]],
+        band_hz: tuple[float, float],
+        disturbance: Disturbance,
+    ) -> Iterator[RigRecording]:
+        """Yield all recordings, from the profilometer's Sq and its standard deviations [m]."""
+        seeds = np.random.SeedSequence(self.settings.seed).spawn(1 + len(readings))
+        background_rng, *draws = (np.random.default_rng(seed) for seed in seeds)
+        background = draw_background(self.frequency, band_hz, disturbance, background_rng)
+        for number, (rng, reading) in enumerate(zip(draws, readings, strict=True), 1):
+            for test, line in self._tests(number, reading, rng):
+                yield background.recording(test, line, disturbance, rng)
+
+    def _tests(
+        self, number: int, reading: tuple[float, float], rng: np.random.Generator
+    ) -> Iterator[tuple[RigTest, ContactLine]]:
+        """Yield the tests of a ring."""
+        (sq, std), settings = reading, self.settings
+        true_sq = max(sq + std * float(rng.standard_normal()), 0.1 * sq)
+        state, model = self._contact(number - 1, true_sq)
+        for repeat in range(1, settings.repeats + 1):
+            test = RigTest(number, repeat, sq, std, settings.rate_hz, settings.duration_s)
+            yield test, self._line(state, model, rng)
+
+    def _contact(self, index: int, true_sq: float) -> tuple[ContactState, VibrationModel]:
+        """Return a sample's contact and its vibration model."""
+        if self.case is None:
+            trend = self.settings.trend
+            return _on_trend(trend, true_sq, self.conditions, self.full_load_crf_hz), self.model
+        if self.moments:
+            return _touching(self.moments[index]), self.model
+        return _solved(self.case, true_sq, self.model)
+
+    def _line(
+        self, state: ContactState, model: VibrationModel, rng: np.random.Generator
+    ) -> ContactLine:
+        """Return the line of a test, shifted at random."""
+        shift = self.settings.repeat_std_hz * rng.standard_normal() / self.full_load_crf_hz
+        shifted = _shifted(state, shift)
+        rate_hz = self.settings.rate_hz
+        return contact_line(shifted, self.conditions, model, self.frequency, rate_hz)
 
 
 def _full_load_crf_hz(conditions: ContactConditions, model: VibrationModel, sq: float) -> float:
@@ -262,14 +299,14 @@ def _measured(samples: int, moments: Sequence[Moment] | None, seed: int) -> tupl
     return np.maximum(true + off, 0.1 * true), np.full(samples, PROFILOMETER_STD)
 
 
-def _touching(moment: Moment, model: VibrationModel) -> tuple[ContactState, VibrationModel]:
-    """Return the state of a moment, and the model unchanged."""
+def _touching(moment: Moment) -> ContactState:
+    """Return the state of a moment with asperity contact."""
     if moment.state.clr <= 0.0 or moment.state.car <= 0.0:
         raise BadInput(
             f"no asperity touches after {moment.hours:g} h, but the simulated rig needs asperity "
             "contact; record earlier"
         )
-    return moment.state, model
+    return moment.state
 
 
 def _band(

@@ -5,6 +5,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from asperity.contact.conditions import ContactConditions
@@ -137,21 +138,9 @@ class RigRecording:
         smooth = np.interp(frequency, self.frequency_hz, self.contact_density + self.other_density)
         averages = _averages_of(segment, samples)
         rng = np.random.default_rng(self.seed)
-        # weights (1/6, 2/3, 1/6) over independent gammas: neighbours correlate by 4/9, as with a
-        # Hann taper
-        drawn = rng.gamma(averages, 1.0 / averages, frequency.size + 2)
-        scatter = (drawn[:-2] + 4.0 * drawn[1:-1] + drawn[2:]) / 6.0
+        scatter = _draw_scatter(averages, frequency.size, rng)
         mean_square = 2.0 / (self.rate_hz * float(np.sum(weights**2)))
-        tonal = np.zeros(frequency.size)
-        nearest = np.rint(self.tones.frequency_hz / spacing).astype(int)
-        for shift in range(-3, 4):
-            at = nearest + shift
-            inside = (at >= 0) & (at < frequency.size)
-            offset = (at - self.tones.frequency_hz / spacing)[inside]
-            amplitude = (
-                0.5 * self.tones.amplitude[inside] * segment * np.abs(_hann_transform(offset))
-            )
-            np.add.at(tonal, at[inside], mean_square * amplitude**2)
+        tonal = self._tonal_density(frequency.size, spacing, segment, mean_square)
         mixed = 2.0 * np.sqrt(np.maximum(tonal * smooth, 0.0)) * rng.standard_normal(frequency.size)
         density = np.abs(smooth * scatter + tonal + mixed / np.sqrt(2.0 * averages))
         density[0] = 0.0
@@ -165,6 +154,30 @@ class RigRecording:
             resolution_hz=float(self.rate_hz * np.sum(weights**2) / np.sum(weights) ** 2),
             averages=averages,
         )
+
+    def _tonal_density(self, size: int, spacing: float, segment: int, mean_square: float) -> Field:
+        """Return the density of the tones, spread over lines by the Hann taper."""
+        tonal = np.zeros(size)
+        nearest = np.rint(self.tones.frequency_hz / spacing).astype(int)
+        for shift in range(-3, 4):
+            at = nearest + shift
+            inside = (at >= 0) & (at < size)
+            offset = (at - self.tones.frequency_hz / spacing)[inside]
+            amplitude = (
+                0.5 * self.tones.amplitude[inside] * segment * np.abs(_hann_transform(offset))
+            )
+            np.add.at(tonal, at[inside], mean_square * amplitude**2)
+        return tonal
+
+
+def _draw_scatter(averages: float, size: int, rng: np.random.Generator) -> Field:
+    """Draw the scatter of averaged lines about 1.
+
+    Weights (1/6, 2/3, 1/6) over independent gammas: neighbours correlate by 4/9, as with a Hann
+    taper.
+    """
+    drawn = rng.gamma(averages, 1.0 / averages, size + 2)
+    return np.asarray((drawn[:-2] + 4.0 * drawn[1:-1] + drawn[2:]) / 6.0)
 
 
 def _hann_transform(offset: Field) -> Field:
@@ -246,7 +259,7 @@ class Background(NamedTuple):
     mode_power: Field
     floor: Field  # on the grid
     order: Field  # tones: multiples of their source's frequency,
-    source: Field  # 0 roller, 1 ring, 2 mains,
+    source: npt.NDArray[np.intp]  # 0 roller, 1 ring, 2 mains,
     power: Field  # and mean squares
 
     def recording(
@@ -267,23 +280,8 @@ class Background(NamedTuple):
         level = target * 10.0 ** (disturbance.gain_db * rng.standard_normal() / 10.0)
         gains = 10.0 ** (disturbance.mode_gain_db * rng.standard_normal(self.mode_hz.size) / 10.0)
         mode_hz = self.mode_hz * (1.0 + disturbance.mode_drift * rng.standard_normal())
-        other = self.floor.copy()
-        for f0, damping, mode_power in zip(
-            mode_hz, self.mode_damping, self.mode_power * gains, strict=True
-        ):
-            # inertance of a mode under a white force; ∫ = π f0/(4ζ) near the peak
-            x2 = (self.frequency / f0) ** 2
-            other += (
-                mode_power
-                * 4.0
-                * damping
-                / (np.pi * f0)
-                * x2**2
-                / ((1.0 - x2) ** 2 + 4.0 * damping**2 * x2)
-            )
-        sources = np.array([*SHAFT_HZ, MAINS_HZ])
-        sources[:2] *= 1.0 + disturbance.speed_drift * rng.standard_normal(2)
-        at = self.order * sources[self.source]
+        other = self._floor_and_modes(mode_hz, self.mode_power * gains)
+        at = self._tone_hz(disturbance, rng)
         response = _accelerometer(at, test.rate_hz)
         measured_other = level * other * _accelerometer(self.frequency, test.rate_hz)
         tonal = level * float(np.sum((self.power * response)[self._in_band(at)]))
@@ -299,6 +297,28 @@ class Background(NamedTuple):
             seed=int(rng.integers(2**63)),
         )
 
+    def _tone_hz(self, disturbance: Disturbance, rng: np.random.Generator) -> Field:
+        """Draw the frequencies of the tones [Hz]."""
+        sources = np.array([*SHAFT_HZ, MAINS_HZ])
+        sources[:2] *= 1.0 + disturbance.speed_drift * rng.standard_normal(2)
+        return np.asarray(self.order * sources[self.source])
+
+    def _floor_and_modes(self, mode_hz: Field, mode_power: Field) -> Field:
+        """Return the density of noise and modes at these frequencies and powers."""
+        density = self.floor.copy()
+        for f0, damping, power in zip(mode_hz, self.mode_damping, mode_power, strict=True):
+            # inertance of a mode under a white force; ∫ = π f0/(4ζ) near the peak
+            x2 = (self.frequency / f0) ** 2
+            density += (
+                power
+                * 4.0
+                * damping
+                / (np.pi * f0)
+                * x2**2
+                / ((1.0 - x2) ** 2 + 4.0 * damping**2 * x2)
+            )
+        return density
+
     def _in_band(self, frequency: Field) -> Mask:
         return (frequency >= self.band_hz[0]) & (frequency <= self.band_hz[1])
 
@@ -312,11 +332,8 @@ def draw_background(
     """Draw modes, noise and tones, with mean power shares in the band of 0.6, 0.3 and 0.1."""
     low, high = band_hz
     # as many modes below and above the band as within it
-    spans = (
-        (low, high),
-        (0.2 * low, 0.95 * low),
-        (1.05 * high, max(0.9 * float(frequency[-1]), 1.1 * high)),
-    )
+    highest = max(0.9 * float(frequency[-1]), 1.1 * high)
+    spans = (low, high), (0.2 * low, 0.95 * low), (1.05 * high, highest)
     mode_hz = np.concatenate([rng.uniform(start, end, disturbance.modes) for start, end in spans])
     damping = np.exp(rng.uniform(np.log(0.004), np.log(0.03), mode_hz.size))
     shares = rng.gamma([6.0 if disturbance.modes else 1e-9, 3.0, 1.0])
@@ -324,17 +341,31 @@ def draw_background(
     heights = 10.0 ** rng.uniform(-1.2, 0.0, mode_hz.size)  # of the peaks, within 12 dB
     power = heights * damping * mode_hz
     power *= shares[0] / max(float(np.sum(power[: disturbance.modes])), np.finfo(float).tiny)
-    inside = (frequency >= low) & (frequency <= high)
-    floor = (1.0 + (frequency / FLAT_BELOW_HZ) ** 2) ** (-0.5 * rng.uniform(0.0, 1.5))
-    floor *= shares[1] / (float(np.sum(floor[inside])) * GRID_HZ)
+    floor = _draw_floor(frequency, band_hz, shares[1], rng)
+    tones = _draw_tones(frequency, band_hz, shares[2], rng)
+    return Background(band_hz, frequency, mode_hz, damping, power, floor, *tones)
 
-    roller_hz = SHAFT_HZ[0]
+
+def _draw_floor(
+    frequency: Field, band_hz: tuple[float, float], share: float, rng: np.random.Generator
+) -> Field:
+    """Draw the density of noise, with a power of `share` within the band."""
+    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    floor = (1.0 + (frequency / FLAT_BELOW_HZ) ** 2) ** (-0.5 * rng.uniform(0.0, 1.5))
+    return np.asarray(floor * (share / (float(np.sum(floor[inside])) * GRID_HZ)))
+
+
+def _draw_tones(
+    frequency: Field, band_hz: tuple[float, float], share: float, rng: np.random.Generator
+) -> tuple[Field, npt.NDArray[np.intp], Field]:
+    """Draw the harmonics of shafts and mains: order, source and power, `share` within the band."""
+    (low, high), roller_hz = band_hz, SHAFT_HZ[0]
     roller = np.arange(1.0, np.floor(0.8 * frequency[-1] / roller_hz))
     order = np.concatenate(
         [roller, np.arange(1.0, RING_HARMONICS), np.arange(1.0, MAINS_HARMONICS)]
     )
     source = np.repeat([0, 1, 2], [roller.size, RING_HARMONICS - 1, MAINS_HARMONICS - 1])
-    tone_power = rng.exponential(1.0, order.size) / order
+    power = rng.exponential(1.0, order.size) / order
     in_band = (source == 0) & (order * roller_hz > low) & (order * roller_hz < high)
-    tone_power *= shares[2] / float(np.sum(tone_power[in_band]))
-    return Background(band_hz, frequency, mode_hz, damping, power, floor, order, source, tone_power)
+    power *= share / float(np.sum(power[in_band]))
+    return order, source, power

@@ -17,7 +17,6 @@ in Solids (1959), section 10.7.
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +29,7 @@ from asperity.ehl.linear_solvers.gmres import gmres
 from asperity.lubricant import Solid, Thermal
 from asperity.solution.traction import Friction, friction
 
-Waves = npt.NDArray[np.complexfloating[Any, Any]]
+Waves = npt.NDArray[np.complexfloating]
 
 NODES = 6  # Gauss-Legendre nodes per panel
 PANEL_RATIO = 1.25  # largest ratio of s at the two ends of a panel
@@ -87,31 +86,46 @@ def moving_source(
     `spacing` of the cells [m]; `length` of a line contact [m], periodic in y; None for heat that is
     bounded in both directions.
     """
-    (nx, ny), (dx, dy) = cells, spacing
-    drift = speed / solid.diffusivity
-    s, weight = _times(nx, dx, dy, drift, max(nx * dx, ny * dy, length or 0.0))
-    index = np.arange(2 * nx)
-    # downstream, then upstream of the source
-    x = np.where(index < nx, index, index - 2.0 * nx) * dx
-    edges = np.append(np.sort(x) - dx / 2.0, (nx - 0.5) * dx)
-    kernel = np.zeros((2 * nx, ny if length is not None else ny + 1))
-    for first in range(0, s.size, BATCH):
-        s_batch, weight_batch = s[first : first + BATCH], weight[first : first + BATCH]
-        share_x = (
-            np.diff(_gaussian(edges[:, None] - drift * s_batch**2, s_batch), axis=0) * weight_batch
-        )
-        if length is None:
-            kernel += share_x @ _shares(ny + 1, dy, s_batch).T
-        else:
-            kernel += _over_line(share_x, ny, dy, length, s_batch)
+    kernel = _moving_kernel(cells, spacing, speed, solid, length)
     kernel *= 2.0 / (solid.conductivity * np.sqrt(np.pi))
-    kernel = np.roll(kernel, nx, axis=0)
+    kernel = np.roll(kernel, cells[0], axis=0)
     mirrored = np.concatenate([kernel, kernel[:, -2:0:-1]], axis=1) if length is None else kernel
     spectrum = scipy.fft.fft(scipy.fft.rfft(mirrored, axis=1), axis=0)
     combined = spectrum, spectrum.astype(np.complex64)
     for array in combined:
         array.flags.writeable = False
     return MovingSource(cells, combined, float(kernel[0, 0]), length is not None)
+
+
+def _moving_kernel(
+    cells: tuple[int, int],
+    spacing: tuple[float, float],
+    speed: float,
+    solid: Solid,
+    length: float | None,
+) -> Field:
+    """Return the integral over time of the shares of heat in cells, upstream to downstream."""
+    (nx, ny), (dx, dy) = cells, spacing
+    drift = speed / solid.diffusivity
+    s, weight = _times(nx, dx, dy, drift, max(nx * dx, ny * dy, length or 0.0))
+    kernel = np.zeros((2 * nx, ny if length is not None else ny + 1))
+    for first in range(0, s.size, BATCH):
+        batch = s[first : first + BATCH]
+        share_x = _shares_downstream(nx, dx, drift, batch) * weight[first : first + BATCH]
+        if length is None:
+            kernel += share_x @ _shares(ny + 1, dy, batch).T
+        else:
+            kernel += _over_line(share_x, ny, dy, length, batch)
+    return kernel
+
+
+def _shares_downstream(nx: int, dx: float, drift: float, s: Field) -> Field:
+    """Return the shares in cells along x of heat released in cell 0 of a moving body, (2 nx, s)."""
+    index = np.arange(2 * nx)
+    # downstream, then upstream of the source
+    x = np.where(index < nx, index, index - 2.0 * nx) * dx
+    edges = np.append(np.sort(x) - dx / 2.0, (nx - 0.5) * dx)
+    return np.diff(_gaussian(edges[:, None] - drift * s**2, s), axis=0)
 
 
 def _times(nx: int, dx: float, dy: float, drift: float, reach: float) -> tuple[Field, Field]:
@@ -213,29 +227,19 @@ def flash_temperature(
     conditions, grid = solution.conditions, solution.grid
     friction_result = friction_result or friction(solution, thermal=thermal)
     heat = np.abs(friction_result.shear) * conditions.sliding_speed
-    length = conditions.length
-    body_1, body_2 = (
-        moving_source(grid.cells, grid.spacing, speed, solid, length=length)
+    bodies = tuple(
+        moving_source(grid.cells, grid.spacing, speed, solid, length=conditions.length)
         for speed, solid in zip(conditions.surface_speeds, thermal.solids, strict=True)
     )
-    bulk = tuple(
-        temperature - thermal.ambient
-        for temperature in thermal.bulk or (thermal.ambient, thermal.ambient)
-    )
-    resistance, exchanging = (
-        solution.gap / thermal.oil_conductivity,
-        np.ones(grid.cells, dtype=bool),
-    )
-    if solution.lubricant is None:  # no film, and no heat flow outside the contact
-        resistance, exchanging = 0.0 * resistance, solution.in_contact
-    passed = _heat_across_film(body_1, body_2, heat, resistance, exchanging, bulk[1] - bulk[0])
+    resistance, exchanging = _film_resistance(solution, thermal)
+    bulk_1, bulk_2 = thermal.bulk_rise
+    passed = _heat_across_film(bodies, heat, resistance, exchanging, bulk_2 - bulk_1)
     into_1, into_2 = 0.5 * heat + passed, 0.5 * heat - passed
-    rise_1, rise_2 = body_1(into_1), body_2(into_2)
-    surface_1, surface_2 = bulk[0] + rise_1, bulk[1] + rise_2
+    rise_1, rise_2 = bodies[0](into_1), bodies[1](into_2)
+    surface_1, surface_2 = bulk_1 + rise_1, bulk_2 + rise_2
     # parabolic temperature profile across the film
     film = 0.5 * (surface_1 + surface_2) + heat * resistance / 12.0
-    dx, dy = grid.spacing
-    area = dx * dy * (length / grid.extent[1] if length is not None else 1.0)
+    area = _cell_area(solution)
     return FlashTemperature(
         surface_1=surface_1,
         surface_2=surface_2,
@@ -249,9 +253,47 @@ def flash_temperature(
     )
 
 
+def _film_resistance(solution: ContactSolution, thermal: Thermal) -> tuple[Field, Mask]:
+    """Return the film's thermal resistance [m^2 K/W], and the cells that exchange heat."""
+    resistance = solution.gap / thermal.oil_conductivity
+    if solution.lubricant is None:  # no film, and no heat flow outside the contact
+        return 0.0 * resistance, solution.in_contact
+    return resistance, np.ones(solution.grid.cells, dtype=bool)
+
+
+def _cell_area(solution: ContactSolution) -> float:
+    """Return the area [m^2] of a cell, that of a line contact in proportion to its length."""
+    grid, length = solution.grid, solution.conditions.length
+    dx, dy = grid.spacing
+    return dx * dy * (length / grid.extent[1] if length is not None else 1.0)
+
+
+class _FilmExchange:
+    """Temperature difference that a scaled heat flux across the film needs, per cell."""
+
+    def __init__(
+        self, bodies: tuple[MovingSource, ...], resistance: Field, exchanging: Mask
+    ) -> None:
+        body_1, body_2 = bodies
+        summed = body_1.spectrum[0] + body_2.spectrum[0], body_1.spectrum[1] + body_2.spectrum[1]
+        self.combined = MovingSource(body_1.cells, summed, body_1.own + body_2.own, body_1.periodic)
+        self.scale, self.exchanging = 1.0 / (resistance + self.combined.own), exchanging
+        self.parts: dict[np.dtype, tuple[Field, Field]] = {
+            np.dtype(kind): (resistance.astype(kind), self.scale.astype(kind))
+            for kind in (np.float32, np.float64)
+        }
+
+    def __call__(self, vector: Field) -> Field:
+        """Return the difference, in the precision of the flux; both flat."""
+        resistance, scale = self.parts[vector.dtype]
+        field = vector.reshape(scale.shape)
+        crossing = field * scale
+        response = resistance * crossing + self.combined(crossing)
+        return np.where(self.exchanging, response, field).ravel()
+
+
 def _heat_across_film(
-    body_1: MovingSource,
-    body_2: MovingSource,
+    bodies: tuple[MovingSource, ...],
     heat: Field,
     resistance: Field,
     exchanging: Mask,
@@ -262,29 +304,17 @@ def _heat_across_film(
     The flux times `resistance` equals the temperature difference of the surfaces. `bulk_difference`
     [K] is the bulk temperature of body 2 less that of body 1.
     """
-    half = 0.5 * heat
+    half, (body_1, body_2) = 0.5 * heat, bodies
     target = np.asarray(np.where(exchanging, bulk_difference + body_2(half) - body_1(half), 0.0))
     if not np.any(target):
         return target
-    summed = body_1.spectrum[0] + body_2.spectrum[0], body_1.spectrum[1] + body_2.spectrum[1]
-    combined = MovingSource(body_1.cells, summed, body_1.own + body_2.own, body_1.periodic)
-    scale = 1.0 / (resistance + combined.own)
-    parts: dict[Any, tuple[Field, Field]] = {
-        np.dtype(kind): (resistance.astype(kind), scale.astype(kind))
-        for kind in (np.float32, np.float64)
-    }
-
-    def operator(vector: Field) -> Field:
-        resisted, scaled = parts[vector.dtype]
-        crossing = vector.reshape(heat.shape) * scaled
-        response = resisted * crossing + combined(crossing)
-        return np.where(exchanging, response, vector.reshape(heat.shape)).ravel()
-
+    operator = _FilmExchange(bodies, resistance, exchanging)
     scaled_flux, residual, size = np.zeros(heat.size), target.ravel(), float(np.linalg.norm(target))
     for rounds in range(MAX_ROUNDS + 1):
         residual_norm = float(np.linalg.norm(residual))
         if residual_norm <= SHARING_TOLERANCE * size:
-            return np.asarray(np.where(exchanging, scaled_flux.reshape(heat.shape) * scale, 0.0))
+            flux = scaled_flux.reshape(heat.shape) * operator.scale
+            return np.asarray(np.where(exchanging, flux, 0.0))
         if rounds < MAX_ROUNDS:
             tolerance = max(ROUND_TOLERANCE, SAFETY * SHARING_TOLERANCE * size / residual_norm)
             right_side = (residual / residual_norm).astype(np.float32)

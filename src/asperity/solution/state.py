@@ -4,7 +4,7 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import Grid
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, Mask
 from asperity.ehl import (
     ContactError,
     ContactSolution,
@@ -19,7 +19,7 @@ from asperity.ehl.models.single_pressure import Balance
 from asperity.ehl.outcome import TWO_PRESSURES
 from asperity.ehl.problem_setup import contact_problem, on_one_line
 from asperity.ehl.strategies.oil_state import pressures_of
-from asperity.kernels.reynolds import CAPPED, LUBRICATED
+from asperity.kernels.reynolds import LUBRICATED
 
 
 def contact_state(solution: ContactSolution) -> ContactState:
@@ -72,19 +72,12 @@ def state_of(solution: ContactSolution, balance: Balance | MixedBalance) -> Cont
     zone, centre = problem.zone(), problem.zone(CENTRE)
     dx, dy = problem.spacing
     width = grid.cells[1] * dy if problem.form.periodic else 2.0 * problem.form.aspect
-    counted = balance.rows.state != LUBRICATED
-    if isinstance(balance, MixedBalance):
-        capped, carried_oil = balance.yielded, balance.content[zone].mean()
-        counted[:] = True  # residuals of all cells count: at low speed they equal the refilled oil
-    else:
-        capped = balance.rows.state == CAPPED
-        carried_oil = balance.film.content[zone].mean() if balance.film else np.inf
-    unbalanced = np.abs(balance.outflow[zone & counted]).sum()
+    unbalanced, carried_oil = _unbalanced_oil(balance, zone)
     return ContactState(
         car=area_share(in_contact, zone),
         car_domain=float(in_contact.mean() * _hertz_areas(solution.conditions, grid)),
         clr=carried_share(solution.pressure, in_contact),
-        capped_oil_load_ratio=carried_share(solution.pressure, capped & ~in_contact),
+        capped_oil_load_ratio=carried_share(solution.pressure, balance.yielded & ~in_contact),
         sq=sq,
         h_min=float(solution.gap.min()),
         h_central=float(solution.gap[centre].mean()),
@@ -97,6 +90,16 @@ def state_of(solution: ContactSolution, balance: Balance | MixedBalance) -> Cont
         contact_slope=_contact_slope(solution),
         error=_error(solution),
     )
+
+
+def _unbalanced_oil(balance: Balance | MixedBalance, zone: Mask) -> tuple[float, float]:
+    """Return the oil lost and gained by cells, and the mean oil content of a zone."""
+    if isinstance(balance, MixedBalance):
+        # residuals of all cells count: at low speed they equal the refilled oil
+        return np.abs(balance.outflow[zone]).sum(), balance.content[zone].mean()
+    counted = balance.rows.state != LUBRICATED
+    content = balance.film.content[zone].mean() if balance.film else np.inf
+    return np.abs(balance.outflow[zone & counted]).sum(), content
 
 
 def _error(solution: ContactSolution) -> ContactError:

@@ -52,24 +52,12 @@ def load_solution(path: str | Path) -> ContactSolution:
 
 def _solution(dataset: "xarray.Dataset") -> ContactSolution:
     described = {name: json.loads(dataset.attrs[name]) for name in DESCRIBED}
-    conditions, lubricant, grid = described["conditions"], described["lubricant"], described["grid"]
-    pair = ElasticPair(**{name: tuple(value) for name, value in conditions.pop("pair").items()})
-    if conditions.get("shape"):
-        conditions["shape"] = RollerShape(**conditions["shape"])
-    conditions = {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in conditions.items()
-    }
-    steps = [dataset[name].values.tolist() for name in STEPS]
-    history = tuple(
-        Iteration((nx, ny), number, residual, load_error, change)
-        for number, nx, ny, residual, load_error, change in zip(*steps, strict=True)
-    )
+    lubricant, grid = described["lubricant"], described["grid"]
     pressure, gap, heights = (
         dataset[name].values for name in ("pressure", "gap", "surface_height")
     )
     return ContactSolution(
-        conditions=ContactConditions(pair=pair, **conditions),
+        conditions=_conditions(described["conditions"]),
         lubricant=None if lubricant is None else make_lubricant(lubricant),
         surface=Surface(heights, Grid(**{name: tuple(value) for name, value in grid.items()})),
         options=Options(**described["options"]),
@@ -77,7 +65,7 @@ def _solution(dataset: "xarray.Dataset") -> ContactSolution:
         gap=gap,
         in_contact=dataset["in_contact"].values.astype(bool),
         rigid_approach=float(dataset["rigid_approach"].values),
-        convergence=_convergence(described["convergence"], history),
+        convergence=_convergence(described["convergence"], _history(dataset)),
         viscosity_factor=dataset["viscosity_factor"].values
         if "viscosity_factor" in dataset
         else None,
@@ -88,6 +76,25 @@ def _solution(dataset: "xarray.Dataset") -> ContactSolution:
             for name, value in dataset.attrs.items()
             if name not in (*HEADINGS, *DESCRIBED)
         },
+    )
+
+
+def _conditions(described: dict[str, Any]) -> ContactConditions:
+    described = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in described.items()
+    }
+    pair = {name: tuple(value) for name, value in described.pop("pair").items()}
+    if described.get("shape"):
+        described["shape"] = RollerShape(**described["shape"])
+    return ContactConditions(pair=ElasticPair(**pair), **described)
+
+
+def _history(dataset: "xarray.Dataset") -> tuple[Iteration, ...]:
+    steps = [dataset[name].values.tolist() for name in STEPS]
+    return tuple(
+        Iteration((nx, ny), number, residual, load_error, change)
+        for number, nx, ny, residual, load_error, change in zip(*steps, strict=True)
     )
 
 

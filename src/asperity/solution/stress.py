@@ -329,18 +329,26 @@ def _largest_from(
         if not 0 < top < len(depths) - 1 or depths[top + 1] - depths[top - 1] < cell:
             break
         around = slice(top - 1, top + 2)
-        # the logarithm makes geometric depths equidistant; the surface needs a shift
-        shift = depths[top]
-        a, b, c = np.log(np.array(depths[around]) + shift)
-        fa, fb, fc = values[around]
-        left, right = (b - a) * (fb - fc), (b - c) * (fb - fa)
-        if left == right:  # level
+        depth = _peak_depth(depths[around], values[around])
+        if depth is None:
             break
-        vertex = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
-        if min(abs(vertex - a), abs(vertex - b), abs(vertex - c)) < MIN_DISTANCE:
-            break
-        evaluate(float(np.exp(vertex) - shift))
+        evaluate(depth)
     return max(
         (level[measure] for depth, level in levels.items() if depth >= min_depth),
         key=lambda peak: peak.value,
     )
+
+
+def _peak_depth(depths: list[float], values: list[float]) -> float | None:
+    """Return the depth of a parabola's vertex; None if level or beside one of its three depths."""
+    # the logarithm makes geometric depths equidistant; the surface needs a shift
+    shift = depths[1]
+    a, b, c = np.log(np.array(depths) + shift)
+    fa, fb, fc = values
+    left, right = (b - a) * (fb - fc), (b - c) * (fb - fa)
+    if left == right:
+        return None
+    vertex = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+    if min(abs(vertex - a), abs(vertex - b), abs(vertex - c)) < MIN_DISTANCE:
+        return None
+    return float(np.exp(vertex) - shift)

@@ -14,7 +14,7 @@ Love, Phil. Trans. A 228 (1929) 377; S. Liu, Q. Wang, J. Tribol. 124 (2002) 36, 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,7 @@ import scipy
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 
-Waves = npt.NDArray[np.complexfloating[Any, Any]]
+Waves = npt.NDArray[np.complexfloating]
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 # Components that are odd in x (y), under pressure and under traction along x.
@@ -146,30 +146,64 @@ def _rectangles(
     the expression in its comment; terms that depend on x or y alone are dropped, because they
     cancel between the corners of the rectangle.
     """
-    z = depth
     x, y = ((np.arange(count + 2) - 0.5) * step for count, step in zip(cells, spacing, strict=True))
-    x, y = x[:, None], y[None, :]
-    xx, yy, zz, xy = x * x, y * y, z * z, x * y
-    r = np.sqrt(xx + yy + zz)
-    in_xz, in_yz, sunk = xx + zz, yy + zz, r + z
-    turned = xy * (xx + yy) / sunk
-    angle_x = np.arctan2(turned, xx * r + yy * z)  # -2π ∂xx χ
-    angle_y = np.arctan2(turned, yy * r + xx * z)  # -2π ∂yy χ
-    angle_z = angle_x + angle_y  # -2π ∂z φ
-    log_x, log_y = (
-        np.arcsinh(x / np.sqrt(in_yz)),
-        np.arcsinh(y / np.sqrt(in_xz)),
-    )  # 2π ∂y φ, 2π ∂x φ
+    corners = _Corners.at_depth(x[:, None], y[None, :], depth)
+    differences = np.empty((12, cells[0] + 1, cells[1] + 1))
+    integrals = *_under_pressure(corners, nu), *_under_shear(corners, nu)
+    for integral, out in zip(integrals, differences, strict=True):
+        along = np.diff(integral, axis=1)
+        np.subtract(along[1:], along[:-1], out=out)
+    differences /= 2.0 * np.pi
+    return differences.reshape(2, 6, cells[0] + 1, cells[1] + 1)
+
+
+class _Corners(NamedTuple):
+    """Integrals of the harmonic functions at distances (x, y) from the corners of a rectangle."""
+
+    x: Field
+    y: Field
+    z: float
+    r: Field
+    in_xz: Field  # x² + z²
+    in_yz: Field  # y² + z²
+    angle_x: Field  # -2π ∂xx χ
+    angle_y: Field  # -2π ∂yy χ
+    log_x: Field  # 2π ∂y φ
+    log_y: Field  # 2π ∂x φ
+
+    @classmethod
+    def at_depth(cls, x: Field, y: Field, z: float) -> "_Corners":
+        """Return the integrals at a depth z."""
+        xx, yy, zz, xy = x * x, y * y, z * z, x * y
+        r = np.sqrt(xx + yy + zz)
+        in_xz, in_yz = xx + zz, yy + zz
+        turned = xy * (xx + yy) / (r + z)
+        angle_x = np.arctan2(turned, xx * r + yy * z)
+        angle_y = np.arctan2(turned, yy * r + xx * z)
+        log_x, log_y = np.arcsinh(x / np.sqrt(in_yz)), np.arcsinh(y / np.sqrt(in_xz))
+        return cls(x, y, z, r, in_xz, in_yz, angle_x, angle_y, log_x, log_y)
+
+
+def _under_pressure(at: _Corners, nu: float) -> tuple[Field, ...]:
+    """Return the components at corners under pressure."""
+    x, y, z, r, in_xz, in_yz, angle_x, angle_y, *_ = at
+    zz, xy = z * z, x * y
     across_x, across_y = z * xy / (r * in_xz), z * xy / (r * in_yz)  # -2π z ∂xx φ, -2π z ∂yy φ
-    corners = (
-        # pressure
+    return (
         -angle_x - 2.0 * nu * angle_y + across_x,  # ∂xx χ - z ∂xx φ + 2ν ∂yy χ
         -angle_y - 2.0 * nu * angle_x + across_y,  # ∂yy χ - z ∂yy φ + 2ν ∂xx χ
-        -angle_z - across_x - across_y,  # ∂z φ - z ∂zz φ
-        -(1.0 - 2.0 * nu) * np.log(sunk) - z / r,  # (1 - 2ν) ∂xy χ - z ∂xy φ
+        -(angle_x + angle_y) - across_x - across_y,  # ∂z φ - z ∂zz φ
+        -(1.0 - 2.0 * nu) * np.log(r + z) - z / r,  # (1 - 2ν) ∂xy χ - z ∂xy φ
         zz * x / (r * in_yz),  # -z ∂yz φ
         zz * y / (r * in_xz),  # -z ∂xz φ
-        # traction along x
+    )
+
+
+def _under_shear(at: _Corners, nu: float) -> tuple[Field, ...]:
+    """Return the components at corners under a traction along x."""
+    x, y, z, r, in_xz, _, angle_x, angle_y, log_x, log_y = at
+    xx, zz, xy, sunk = x * x, z * z, x * y, r + z
+    return (
         2.0 * log_y
         + z * y * (xx - r * z) / (r * sunk * in_xz)
         + 2.0 * nu * y / sunk,  # 2∂x φ + z∂xxx χ - 2ν∂xyy ψ
@@ -177,14 +211,8 @@ def _rectangles(
         zz * y / (r * in_xz),  # -z ∂xz φ
         log_x - x * (2.0 * nu + z / r) / sunk,  # ∂y φ + 2ν ∂xxy ψ + z ∂xxy χ
         -z / r,  # -z ∂xy φ
-        -angle_z + across_x,  # ∂z φ - z ∂xx φ
+        -(angle_x + angle_y) + z * xy / (r * in_xz),  # ∂z φ - z ∂xx φ
     )
-    differences = np.empty((12, cells[0] + 1, cells[1] + 1))
-    for corner, out in zip(corners, differences, strict=True):
-        along = np.diff(corner, axis=1)
-        np.subtract(along[1:], along[:-1], out=out)
-    differences /= 2.0 * np.pi
-    return differences.reshape(2, 6, cells[0] + 1, cells[1] + 1)
 
 
 def _strips(count: int, dx: float, depth: float, nu: float) -> Field:
@@ -289,39 +317,50 @@ def _aliased(
 
     Shape (traction, component, wavenumbers along x, along y).
     """
-    (dx, dy), z = spacing, depth
-    aliases = [(0, 0)]
-    if depth < DEEP * max(spacing):
-        aliases = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     total = np.zeros((12, along.size, across.size))
-    for i, j in aliases:
-        m, n = along[:, None] + 2.0 * np.pi * i / dx, across[None, :] + 2.0 * np.pi * j / dy
-        if max(np.abs(m).min(), np.abs(n).min()) * z > -np.log(NEGLIGIBLE):
-            continue
-        alpha = np.hypot(m, n)
-        c, s = m / alpha, n / alpha
-        cc, ss, cs, deep = c * c, s * s, c * s, alpha * z
+    for m, n in _alias_waves(along, across, spacing, depth):
+        (dx, dy), alpha = spacing, np.hypot(m, n)
+        c, s, deep = m / alpha, n / alpha, alpha * depth
         wave = np.exp(-deep) * np.sinc(m * dx / (2.0 * np.pi)) * np.sinc(n * dy / (2.0 * np.pi))
-        slow = wave * (1.0 - deep)
-        waves = (
-            # pressure
-            -cc * slow - 2.0 * nu * ss * wave,
-            -ss * slow - 2.0 * nu * cc * wave,
-            -(1.0 + deep) * wave,
-            cs * (slow - 2.0 * nu * wave),
-            deep * s * wave,
-            deep * c * wave,
-            # traction along x
-            c * (2.0 - deep * cc + 2.0 * nu * ss) * wave,
-            c * (2.0 * nu * cc - deep * ss) * wave,
-            deep * c * wave,
-            s * (1.0 - (2.0 * nu + deep) * cc) * wave,
-            -deep * cs * wave,
-            (deep * cc - 1.0) * wave,
-        )
+        waves = *_pressure_waves(c, s, deep, wave, nu), *_shear_waves(c, s, deep, wave, nu)
         for out, term in zip(total, waves, strict=True):
             out += term
     return total.reshape(2, 6, along.size, across.size)
+
+
+def _alias_waves(
+    along: Field, across: Field, spacing: tuple[float, float], depth: float
+) -> Iterator[tuple[Field, Field]]:
+    """Yield the wavenumbers along x and y of the aliases that reach a depth."""
+    (dx, dy), aliases = spacing, [(0, 0)]
+    if depth < DEEP * max(spacing):
+        aliases = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    for i, j in aliases:
+        m, n = along[:, None] + 2.0 * np.pi * i / dx, across[None, :] + 2.0 * np.pi * j / dy
+        if max(np.abs(m).min(), np.abs(n).min()) * depth <= -np.log(NEGLIGIBLE):
+            yield m, n
+
+
+def _pressure_waves(c: Field, s: Field, deep: Field, wave: Field, nu: float) -> Iterator[Field]:
+    """Yield the components under a wave of pressure; its direction is (c, s)."""
+    cc, ss, cs, slow = c * c, s * s, c * s, wave * (1.0 - deep)
+    yield -cc * slow - 2.0 * nu * ss * wave
+    yield -ss * slow - 2.0 * nu * cc * wave
+    yield -(1.0 + deep) * wave
+    yield cs * (slow - 2.0 * nu * wave)
+    yield deep * s * wave
+    yield deep * c * wave
+
+
+def _shear_waves(c: Field, s: Field, deep: Field, wave: Field, nu: float) -> Iterator[Field]:
+    """Yield the components under a wave of traction along x; its direction is (c, s)."""
+    cc, ss, cs = c * c, s * s, c * s
+    yield c * (2.0 - deep * cc + 2.0 * nu * ss) * wave
+    yield c * (2.0 * nu * cc - deep * ss) * wave
+    yield deep * c * wave
+    yield s * (1.0 - (2.0 * nu + deep) * cc) * wave
+    yield -deep * cs * wave
+    yield (deep * cc - 1.0) * wave
 
 
 def _to_waves(kernels: Field, axis: int) -> Field:

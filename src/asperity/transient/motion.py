@@ -12,7 +12,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any
 
 import numpy as np
 
@@ -41,7 +40,7 @@ from asperity.lubricant import Lubricant
 from asperity.solution.state import state_of
 from asperity.surface import MovingSurfaces, Surface
 
-Memory = Mapping[str, "np.ndarray[Any, Any]"]
+Memory = Mapping[str, np.ndarray]
 
 HELD_APPROACH = ATTEMPTS[2]
 _LOWERED = ("lowered_first", "lowered_second")
@@ -291,11 +290,12 @@ class _TransientContact:
         solution: ContactSolution,
         balance: Balance | MixedBalance,
         approach: float,
-        carried_memory: dict[str, Any],
+        carried_memory: Memory,
         surfaces: MovingSurfaces,
     ) -> Snapshot:
         time_s = number * self.seconds
-        memory = carried_memory | {
+        memory = {
+            **carried_memory,
             "number": np.array(number),
             "pressure": balance.pressure,
             "oil": _oil(balance),
@@ -310,14 +310,12 @@ class _TransientContact:
             1.0 if conditions.length is None else conditions.length / grid.extent[1]
         )
         energy = self.scales.pressure * self.scales.gap * area
-        flattened, track_sq = 0.0, float(np.hypot(surfaces.first.sq, surfaces.second.sq))
+        flattened = 0.0
         if self.flattening:
             overlap = _overlap(balance) * self.scales.gap * solution.convergence.converged
-            for index, name in enumerate(_LOWERED):
-                share = self.shares[index] * overlap
-                previous = carried_memory.get(name, 0.0)
-                memory[name] = previous + self.surfaces.project_on_track(index, share, time_s)
-                flattened += float(memory[name].mean())
+            tracks = self._lowered(overlap, carried_memory, time_s)
+            flattened = sum(float(track.mean()) for track in tracks.values())
+            memory |= tracks
         return Snapshot(
             number=number,
             time=time_s,
@@ -326,9 +324,17 @@ class _TransientContact:
             flow_power=flow * energy * conditions.entrainment_speed / self.scales.length,
             elastic_energy=elastic * energy,
             flattened=flattened,
-            track_sq=track_sq,
+            track_sq=float(np.hypot(surfaces.first.sq, surfaces.second.sq)),
             memory=memory,
         )
+
+    def _lowered(self, overlap: Field, before: Memory, time_s: float) -> dict[str, Field]:
+        """Return how far both tracks are lowered, after another overlap [m] in the contact."""
+        return {
+            name: before.get(name, 0.0)
+            + self.surfaces.project_on_track(index, self.shares[index] * overlap, time_s)
+            for index, name in enumerate(_LOWERED)
+        }
 
 
 def _cells_moved(surfaces: MovingSurfaces, seconds: float) -> int:

@@ -6,15 +6,15 @@ vector by vector; at 65 000 unknowns and a few dozen steps that costs as much as
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 import scipy
 
 from asperity.ehl.controls import KRYLOV
 
-Vector = np.ndarray[Any, Any]
-Operator = Callable[[Any], Vector]
+Vector: TypeAlias = np.ndarray
+Operator = Callable[[Vector], Vector]
 
 ADJOINT = 2  # BLAS code of the conjugate transpose
 
@@ -53,54 +53,79 @@ def gmres(
 
     At most `max_steps` steps. Successive solves may share one `workspace`.
     """
-    exact = np.result_type(rhs.dtype, float)
     norm = _norm(rhs)
     if norm == 0.0:
         return np.zeros_like(rhs)
     workspace = workspace or Workspace()
     basis, corrections = workspace.rows(min(KRYLOV.initial_vectors, max_steps) + 1, rhs)
-    triangle = np.zeros((max_steps, max_steps), exact)
-    rotations = np.zeros((max_steps, 2), exact)  # Givens rotations, cosine and sine
-    target = np.zeros(max_steps + 1, exact)
-    target[0] = norm
+    projection, count = _Projection(norm, max_steps, np.result_type(rhs.dtype, float)), 0
     np.divide(rhs, norm, out=basis[0])
-    for step in range(max_steps):
-        if step + 1 == len(basis):
+    while count < max_steps:
+        if count + 1 == len(basis):
             basis, corrections = workspace.rows(2 * len(basis), rhs)
-        corrections[step] = precondition(basis[step])
-        new = product(corrections[step])
-        known = basis[: step + 1]
+        corrections[count] = precondition(basis[count])
+        new = product(corrections[count])
         before = _norm(new)
-        overlaps = (known @ new.conj()).conj()
-        new -= overlaps @ known
-        column, length = overlaps.astype(exact), _norm(new)
+        column, length = _orthogonalise(new, before, basis[: count + 1])
         if not np.isfinite(length):  # overflow: use the corrections so far
-            step -= 1
             break
-        if length < KRYLOV.reorthogonalise * before:
-            overlaps = (known @ new.conj()).conj()
-            new -= overlaps @ known
-            column, length = column + overlaps, _norm(new)
-        for i, (cosine, sine) in enumerate(rotations[:step]):
+        count += 1
+        residual = projection.append(column, length)
+        if residual < tolerance * norm or length < np.finfo(rhs.dtype).eps * before:
+            break
+        np.divide(new, length, out=basis[count])
+    return projection.combine(corrections[:count])
+
+
+def _orthogonalise(vector: Vector, norm: float, basis: Vector) -> tuple[Vector, float]:
+    """Make a vector orthogonal to a basis in place; return its overlaps and its new length.
+
+    Twice if most of its `norm` cancels.
+    """
+    overlaps = (basis @ vector.conj()).conj()
+    vector -= overlaps @ basis
+    column, length = overlaps.astype(np.result_type(vector.dtype, float)), _norm(vector)
+    if length < KRYLOV.reorthogonalise * norm:
+        overlaps = (basis @ vector.conj()).conj()
+        vector -= overlaps @ basis
+        column, length = column + overlaps, _norm(vector)
+    return column, length
+
+
+class _Projection:
+    """Least-squares problem in the basis: a Hessenberg matrix, made triangular by rotations."""
+
+    def __init__(self, norm: float, max_steps: int, dtype: np.dtype) -> None:
+        self.triangle = np.zeros((max_steps, max_steps), dtype)
+        self.rotations = np.zeros((max_steps, 2), dtype)  # Givens rotations, cosine and sine
+        self.target = np.zeros(max_steps + 1, dtype)
+        self.target[0] = norm
+
+    def append(self, column: Vector, length: float) -> float:
+        """Append a column of overlaps and the length below it; return the residual."""
+        step = column.size - 1
+        for i, (cosine, sine) in enumerate(self.rotations[:step]):
             column[i : i + 2] = (
                 cosine.conj() * column[i] + sine * column[i + 1],
                 cosine * column[i + 1] - sine * column[i],
             )
         slant = float(np.hypot(abs(column[step]), length))
-        cosine, sine = rotations[step] = (
+        cosine, sine = self.rotations[step] = (
             (column[step] / slant, length / slant) if slant else (1.0, 0.0)
         )
         column[step] = slant
-        triangle[: step + 1, step] = column
-        target[step : step + 2] = np.conj(cosine) * target[step], -sine * target[step]
-        if abs(target[step + 1]) < tolerance * norm or length < np.finfo(rhs.dtype).eps * before:
-            break
-        np.divide(new, length, out=basis[step + 1])
-    count = step + 1
-    if count == 0:
-        return np.full_like(rhs, np.nan)
-    weights = np.linalg.lstsq(triangle[:count, :count], target[:count], rcond=None)[0]
-    return np.asarray(weights.astype(rhs.dtype) @ corrections[:count])
+        self.triangle[: step + 1, step] = column
+        start = self.target[step]
+        self.target[step : step + 2] = np.conj(cosine) * start, -sine * start
+        return float(abs(self.target[step + 1]))
+
+    def combine(self, corrections: Vector) -> Vector:
+        """Return the best combination of corrections; NaN if there are none."""
+        count, size = corrections.shape
+        if count == 0:
+            return np.full(size, np.nan, corrections.dtype)
+        weights = np.linalg.lstsq(self.triangle[:count, :count], self.target[:count], rcond=None)[0]
+        return np.asarray(weights.astype(corrections.dtype) @ corrections)
 
 
 def _norm(vector: Vector) -> float:
@@ -127,7 +152,7 @@ class Shifted:
 
     def __init__(
         self,
-        product: Callable[[Any], tuple[Vector, Vector]],
+        product: Callable[[Vector], tuple[Vector, Vector]],
         precondition: Operator,
         rhs: tuple[Vector, Vector],
         bearing: Vector,

@@ -13,12 +13,12 @@ varies so strongly from cell to cell that this outweighs the mobilities themselv
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.controls import MIXED_SOLVER
+from asperity.ehl.grid_transfer import Index
 from asperity.ehl.linear_solvers.gmres import Workspace, gmres
 from asperity.ehl.linear_solvers.single_pressure import (
     BlockSolver,
@@ -28,14 +28,21 @@ from asperity.ehl.linear_solvers.single_pressure import (
     fold_at_mirror,
     single_faces,
 )
-from asperity.ehl.models.mixed import MixedBalance, Pressures, limiter_slopes, opening_slopes
+from asperity.ehl.models.mixed import (
+    ConservedOil,
+    MixedBalance,
+    Pressures,
+    limiter_slopes,
+    opening_slopes,
+)
 from asperity.ehl.models.oil_advection import (
     OPENING_RANGE,
     advected_outflow,
+    is_lagrangian,
     limiter_outflow,
     upwind_at_outlet,
 )
-from asperity.ehl.models.single_pressure import CLOSED_WITHIN, TransientTerm
+from asperity.ehl.models.single_pressure import CLOSED_WITHIN, Precision
 from asperity.kernels import load_sharing, reynolds, stencils
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
@@ -52,7 +59,7 @@ class MixedLinear:
     def __init__(
         self,
         balance: MixedBalance,
-        dtype: Any = np.float32,
+        dtype: Precision = np.float32,
         settled: Mask | None = None,
         *,
         with_limiter: bool = False,
@@ -63,40 +70,48 @@ class MixedLinear:
         self.lubricated = balance.solved
         self.free, self.touching = balance.solid == FREE, balance.solid == TOUCHING
         self.oil = balance.oil_pressure.astype(self.real)
-        self.conserves = balance.surplus is not None
         # on one line the stencil of own pressures works better
         self.follows_wedge = problem.accurate and problem.cells[1] > 1
-        if balance.surplus is not None and balance.surplus_by_oil is not None:
-            self.surplus_by_oil = balance.surplus_by_oil.astype(self.real)
-            missing = np.minimum(balance.unknowns.oil, 0.0)
-            self.missing_by_oil = np.where(
-                balance.unknowns.oil < 0.0, self.surplus_by_oil, self.real(0.0)
-            )
-            pressed = (balance.unknowns.oil > problem.p_cap) & self.lubricated
-            self.growth_by_oil = np.where(pressed, self.real(problem.softness), self.real(0.0))
-            self.surplus_by_gap = (missing * balance.film.content_by_gap).astype(self.real)
-        self.has_limiter = bool(np.any(balance.limiter))
-        if self.has_limiter:
-            self.limiter_own, self.limiter_upstream = limiter_slopes(balance, dtype)
         state = np.where(self.lubricated, np.int8(LUBRICATED), balance.rows.state)
         self.rows = Rows(
             state, balance.rows.fluid_scale.astype(self.real), balance.rows.contact_scale
         )
         self.scale = np.where(self.lubricated, self.rows.fluid_scale, self.real(0.0))
-        self.film = Film(*(part.astype(self.real) for part in balance.film))
+        self.full_film = Film(*(part.astype(self.real) for part in balance.film))
         self.faces = single_faces(balance.faces, dtype)
-        self.content_by_gap, self.content_by_pressure = (
-            self.film.content_by_gap,
-            self.film.content_by_pressure,
-        )
-        self.storage = self._storage(problem.past)
-        self.lagrangian = problem.past is not None and problem.past.lagrangian
-        self.opening = None
-        if self.has_limiter and settled is not None and not self.lagrangian:
-            self.opening = opening_slopes(balance, settled)
-        if self.lagrangian:
-            self.film = self.film.without_wedge
-        self.with_limiter = with_limiter and self.has_limiter
+        self.lagrangian, self.settled = is_lagrangian(problem), settled
+        self.film = self.full_film.without_wedge if self.lagrangian else self.full_film
+        self.with_limiter = with_limiter and self.limiter is not None
+
+    @cached_property
+    def conserved(self) -> ConservedOil | None:
+        """Derivatives of conserved oil."""
+        return ConservedOil.of_balance(self.balance, self.real)
+
+    @cached_property
+    def limiter(self) -> tuple[Field, Field] | None:
+        """Derivatives of the limited correction in the own and in the upstream content."""
+        limited = np.any(self.balance.limiter)
+        return limiter_slopes(self.balance, self.real) if limited else None
+
+    @cached_property
+    def opening(self) -> tuple[Index, Index, Field] | None:
+        """Faces, cells and slopes of the opening of the wedge."""
+        if self.limiter is None or self.settled is None or self.lagrangian:
+            return None
+        return opening_slopes(self.balance, self.settled)
+
+    @cached_property
+    def storage(self) -> StoredOil | None:
+        """Storage of oil; see `asperity.ehl.linear_solvers.single_pressure`.
+
+        Neglects the wedge in the first rows of Lagrangian oil.
+        """
+        past, film = self.balance.problem.past, self.full_film
+        if past is None:
+            return None
+        scaled = self.scale * self.real(past.rate)
+        return StoredOil(scaled * film.content_by_gap, scaled * film.content_by_pressure)
 
     @cached_property
     def inverse(self) -> tuple[BlockSolver | MultigridSolver, LineRelaxation]:
@@ -109,9 +124,9 @@ class MixedLinear:
             and (self.with_limiter or is_firm(self.balance))
         )
         blocks = (MultigridSolver if alike else BlockSolver)(stencil, weight)
-        return blocks, LineRelaxation(
-            *self._with_limiter(stencil)
-        ) if self.with_limiter else LineRelaxation(stencil, far)
+        if self.with_limiter and self.limiter:
+            return blocks, LineRelaxation(*self._with_limiter(stencil, *self.limiter))
+        return blocks, LineRelaxation(stencil, far)
 
     def _stencil(self) -> tuple[Stencil, OuterNeighbours | None]:
         """Return the stencil, with outer neighbours if it includes the wedge."""
@@ -119,34 +134,25 @@ class MixedLinear:
         state = np.where(self.lubricated, np.int8(LUBRICATED), np.int8(RUPTURED))
         rows, film = self.rows._replace(state=state), self.film.with_fixed_gap(~self.free)
         own, far = 1.0 / self.rows.contact_scale, None
+        equations = rows, film, self.faces, self.oil
         if self.follows_wedge:
-            far, compliance = (
-                OuterNeighbours(*np.empty((2, *self.cells), self.real)),
-                problem.deflection.local_compliance,
-            )
-            stencils.wedge_stencil(
-                rows,
-                film,
-                self.faces,
-                self.oil,
-                (own, compliance[1] - compliance[3]),
-                problem.spacing,
-                stencil,
-                far,
-            )
+            far = OuterNeighbours(*np.empty((2, *self.cells), self.real))
+            compliances = own, problem.deflection.next_compliance
+            stencils.wedge_stencil(*equations, compliances, problem.spacing, stencil, far)
         else:
-            stencils.own_stencil(rows, film, self.faces, self.oil, own, problem.spacing, stencil)
+            stencils.own_stencil(*equations, own, problem.spacing, stencil)
         if self.storage is not None:
             by_gap = np.where(self.free, self.storage.by_gap, self.real(0.0))
-            stencil.centre[:] += np.where(
-                self.lubricated, by_gap * self.real(own) + self.storage.by_pressure, 0.0
-            )
+            by_pressure = by_gap * self.real(own) + self.storage.by_pressure
+            stencil.centre[:] += np.where(self.lubricated, by_pressure, 0.0)
         fold_at_mirror(stencil, problem.mirror)
-        if self.conserves:
-            self._advect_surplus(stencil)
+        if self.conserved is not None:
+            self._advect_surplus(stencil, self.conserved.surplus_by_oil)
         return stencil, far
 
-    def _with_limiter(self, stencil: Stencil) -> tuple[Stencil, OuterNeighbours]:
+    def _with_limiter(
+        self, stencil: Stencil, by_own: Field, by_upstream: Field
+    ) -> tuple[Stencil, OuterNeighbours]:
         """Return the stencil and its outer neighbours with the limited correction of the wedge.
 
         Beside closed cells films thin many times over from one cell to the next; the correction
@@ -158,37 +164,27 @@ class MixedLinear:
             + film.content_by_pressure
         )
         own, upstream = np.zeros_like(content), np.zeros_like(content)  # limited flow, east faces
-        own[1:-1] = (self.limiter_own * content)[1:-1] / dx
-        upstream[1:-1] = self.limiter_upstream[1:-1] * content[:-2] / dx
+        own[1:-1] = (by_own * content)[1:-1] / dx
+        upstream[1:-1] = by_upstream[1:-1] * content[:-2] / dx
         far = OuterNeighbours(*np.zeros((2, *self.cells), self.real))
         stencil.centre[:] += self.scale * own
         stencil.west[1:] -= self.scale[1:] * (upstream[1:] + own[:-1])
         far.west[2:] += self.scale[2:] * upstream[1:-1]
         return stencil, far
 
-    def _advect_surplus(self, stencil: Stencil) -> None:
+    def _advect_surplus(self, stencil: Stencil, by_oil: Field) -> None:
         """Couple cells whose unknown is not a pressure to the next one downstream only."""
         past, real, scale = self.balance.problem.past, self.real, self.rows.fluid_scale
         loose = self.lubricated & ~self.full
         lagrangian = past is not None and past.lagrangian
         wedge = real(0.0 if lagrangian else 1.0 / self.balance.problem.spacing[0])
         own = wedge + real(0.0 if past is None else past.rate)
-        stencil.centre[loose] = (self.surplus_by_oil * own * scale)[loose]
-        stencil.west[1:][loose[:-1]] = (-wedge * self.surplus_by_oil[:-1] * scale[1:])[loose[:-1]]
+        stencil.centre[loose] = (by_oil * own * scale)[loose]
+        stencil.west[1:][loose[:-1]] = (-wedge * by_oil[:-1] * scale[1:])[loose[:-1]]
         stencil.west[1:][loose[:-1] & ~self.lubricated[1:]] = 0.0
         stencil.east[:-1][loose[1:]] = 0.0
         stencil.north[np.roll(loose, -1, axis=1)] = 0.0
         stencil.south[np.roll(loose, 1, axis=1)] = 0.0
-
-    def _storage(self, past: TransientTerm | None) -> StoredOil | None:
-        """Return the storage of oil; see `asperity.ehl.linear_solvers.single_pressure`.
-
-        Neglects the wedge in the first rows of Lagrangian oil.
-        """
-        if past is None:
-            return None
-        scaled = self.scale * self.real(past.rate)
-        return StoredOil(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
 
     def product(self, d_oil: Field, d_total: Field, d_approach: float) -> tuple[Field, Field]:
         """Return changes of the oil's equations and of touching cells' equations.
@@ -203,42 +199,51 @@ class MixedLinear:
 
     def of_gap(self, d_oil: Field, d_gap: Field) -> tuple[Field, Field]:
         """Return the same for a change of the oil's unknown and of the gap."""
-        problem = self.balance.problem
-        wet = np.empty(self.cells, self.real)
-        spacing, d_pressure, d_height = (
-            problem.spacing,
-            self.pressure_of(d_oil),
-            problem.filmed(d_gap),
-        )
-        if self.conserves:
-            d_height = (
-                np.where(self.balance.sealed, self.real(0.0), d_gap) + self.growth_by_oil * d_oil
-            )
+        problem, wet = self.balance.problem, np.empty(self.cells, self.real)
+        d_pressure, d_height = self.pressure_of(d_oil), problem.filmed(d_gap)
+        if self.conserved is not None:
+            d_height = np.where(self.balance.sealed, self.real(0.0), d_gap)
+            d_height = d_height + self.conserved.growth_by_oil * d_oil
         change = reynolds.PressureChange(d_pressure, d_height)
         reynolds.jacobian_product(
-            self.rows, self.film, self.faces, self.oil, change, spacing, 0.0, wet
+            self.rows, self.film, self.faces, self.oil, change, problem.spacing, 0.0, wet
         )
         if self.storage is not None:
             wet += self.storage.by_gap * d_height + self.storage.by_pressure * d_pressure
-        if self.conserves:
-            rest = advected_outflow(
-                problem, self.missing_by_oil * d_oil + self.surplus_by_gap * d_height
-            )
-            d_content = self.content_by_gap * d_height + self.content_by_pressure * d_pressure
-            upwind_at_outlet(problem, d_content, rest)
-            wet += rest * self.scale
-        elif self.has_limiter:
-            d_content = self.content_by_gap * d_gap + self.content_by_pressure * d_pressure
-            wet += (
-                limiter_outflow(problem, d_content, self.limiter_own, self.limiter_upstream)
-                * self.scale
-            )
-        if self.opening is not None:
-            faces, cells, slopes = self.opening
-            through = (slopes / spacing[0]).astype(self.real) * d_gap.ravel()[cells]
-            for row, sign in ((faces, 1.0), (faces + self.cells[1], -1.0)):
-                np.add.at(wet.ravel(), row, self.real(sign) * through * self.scale.ravel()[row])
+        correction = self._content_outflow(d_oil, d_gap, d_height)
+        if correction is not None:
+            wet += correction * self.scale
+        self._add_opening(d_gap, wet)
         return wet, d_gap * self.real(self.rows.contact_scale)
+
+    def _add_opening(self, d_gap: Field, wet: Field) -> None:
+        """Add the outflow due to the opening of the wedge, in place."""
+        if self.opening is None:
+            return
+        faces, cells, slopes = self.opening
+        through = (slopes / self.balance.problem.spacing[0]).astype(self.real)
+        through = through * d_gap.ravel()[cells]
+        for row, sign in ((faces, 1.0), (faces + self.cells[1], -1.0)):
+            np.add.at(wet.ravel(), row, self.real(sign) * through * self.scale.ravel()[row])
+
+    def _content_outflow(self, d_oil: Field, d_gap: Field, d_height: Field) -> Field | None:
+        """Return the outflow due to surplus or to the second order of the wedge; None without."""
+        problem, d_pressure = self.balance.problem, self.pressure_of(d_oil)
+        if self.conserved is not None:
+            d_surplus = (
+                self.conserved.missing_by_oil * d_oil + self.conserved.surplus_by_gap * d_height
+            )
+            outflow = advected_outflow(problem, d_surplus)
+            upwind_at_outlet(problem, self._content(d_height, d_pressure), outflow)
+            return outflow
+        if self.limiter is None:
+            return None
+        return limiter_outflow(problem, self._content(d_gap, d_pressure), *self.limiter)
+
+    def _content(self, d_gap: Field, d_pressure: Field) -> Field:
+        """Return the change of a full film's content."""
+        film = self.full_film
+        return film.content_by_gap * d_gap + film.content_by_pressure * d_pressure
 
     def answer(self, wet: Field) -> Field:
         """Return an approximate change of the oil's pressure for a residual of its rows."""
@@ -257,7 +262,7 @@ class MixedLinear:
 
     def pressure_of(self, d_oil: Field) -> Field:
         """Return the change of the oil's pressure: zero where its unknown is not a pressure."""
-        return np.where(self.full, d_oil, d_oil.dtype.type(0.0)) if self.conserves else d_oil
+        return np.where(self.full, d_oil, d_oil.dtype.type(0.0)) if self.conserved else d_oil
 
 
 class _Step:
@@ -271,7 +276,7 @@ class _Step:
         self.count, self.touching = linear.balance.gap.size, np.flatnonzero(linear.touching)
         self.approach_is_free = self.problem.fixed is None
         self.weight = linear.real(1.0 / np.sqrt(self.count))
-        self.load_weights = (linear.free & linear.full if linear.conserves else linear.free).astype(
+        self.load_weights = (linear.free & linear.full if linear.conserved else linear.free).astype(
             linear.real
         )
         by_approach = linear.of_gap(
@@ -324,6 +329,24 @@ class _Step:
             change -= d_approach * self.response
             change[-1] = d_approach
         return change
+
+    def load_missing(self, known: Field) -> np.floating:
+        """Return the load that known changes of the total pressure leave to the unknown ones."""
+        if not self.approach_is_free:
+            return np.float64(0.0)
+        (dx, dy), balance = self.problem.spacing, self.linear.balance
+        missing = -balance.load_error * self.problem.load / (dx * dy)
+        return missing - self.problem.sum_over_cells(known)
+
+    def right_side(self, known_oil: Field, known: Field, missing: np.floating) -> Field:
+        """Return the negative residuals after known changes, and the missing load."""
+        linear, balance = self.linear, self.linear.balance
+        wet, closed = -balance.oil_residual, -balance.solid_residual
+        if np.any(known_oil) or np.any(known):
+            by_known = linear.product(known_oil.astype(linear.real), known.astype(linear.real), 0.0)
+            wet, closed = wet - by_known[0], closed - by_known[1]
+        wet = np.where(linear.lubricated, wet, linear.real(0.0))
+        return self.joined(wet, closed, float(self.weight * missing))
 
     def _answered(self, rows: Field) -> Field:
         """Apply the approximate inverse to the oil's rows."""
@@ -383,57 +406,42 @@ def newton_step(
     `workspace`.
     """
     problem = balance.problem
-    steady = (
-        settled is not None
-        and not problem.conserve
-        and problem.past is None
-        and problem.fixed is None
-    )
-    if steady:
+    steady = not problem.conserve and problem.past is None and problem.fixed is None
+    if settled is not None and steady:
         balance = extend_streaks(balance)
-    settled = settled if steady and is_firm(balance) else None
-    linear = MixedLinear(balance, settled=settled)
-    real, zero = linear.real, linear.real(0.0)
-    known_oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
-    known = np.where(balance.solid == CAPPED, -balance.solid_residual, 0.0)
-    known = np.where(linear.free, linear.pressure_of(known_oil) - balance.solid_residual, known)
-    wet, closed = -balance.oil_residual, -balance.solid_residual
-    if np.any(known_oil) or np.any(known):
-        by_known = linear.product(known_oil.astype(real), known.astype(real), 0.0)
-        wet, closed = wet - by_known[0], closed - by_known[1]
-    dx, dy = problem.spacing
+    linear = MixedLinear(balance, settled=settled if steady and is_firm(balance) else None)
+    known_oil, known = _known_changes(linear)
     step = _Step(linear)
-    missing = (
-        -balance.load_error * problem.load / (dx * dy) - problem.sum_over_cells(known)
-        if step.approach_is_free
-        else 0.0
-    )
+    missing = step.load_missing(known)
     # all cells ruptured or capped: only the approach can change the load
     if step.load_response == 0.0:
-        return Pressures(
-            known_oil,
-            known,
-            -MIXED_SOLVER.uncoupled_approach_step
-            * float(np.sign(missing))
-            / balance.rows.contact_scale,
-        )
-    rhs = step.joined(np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing))
-    tolerance = MIXED_SOLVER.tolerance_smooth if linear.follows_wedge else MIXED_SOLVER.tolerance
-    if (
-        problem.conserve
-        and linear.lagrangian
-        and balance.residual_rms < MIXED_SOLVER.conserving_residual
-    ):
-        tolerance = MIXED_SOLVER.tolerance_conserving
+        d_approach = -MIXED_SOLVER.uncoupled_approach_step * float(np.sign(missing))
+        return Pressures(known_oil, known, d_approach / balance.rows.contact_scale)
     solved = gmres(
         step.product,
         step.precondition,
-        rhs,
-        tolerance=tolerance,
+        step.right_side(known_oil, known, missing),
+        tolerance=_linear_tolerance(linear),
         max_steps=MIXED_SOLVER.max_krylov_steps,
         workspace=workspace,
     )
-    d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), zero)
+    d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), linear.real(0.0))
     d_total = np.where(linear.free, linear.pressure_of(d_oil) - balance.solid_residual, known)
     d_total.ravel()[step.touching] = solved[step.count : -1]
     return Pressures(d_oil, d_total, float(solved[-1]))
+
+
+def _known_changes(linear: MixedLinear) -> tuple[Field, Field]:
+    """Return changes of oil pressure and total pressure in cells where they are known."""
+    balance = linear.balance
+    oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
+    total = np.where(balance.solid == CAPPED, -balance.solid_residual, 0.0)
+    return oil, np.where(linear.free, linear.pressure_of(oil) - balance.solid_residual, total)
+
+
+def _linear_tolerance(linear: MixedLinear) -> float:
+    """Return the tolerance of GMRES."""
+    closely = linear.balance.residual_rms < MIXED_SOLVER.conserving_residual
+    if linear.balance.problem.conserve and linear.lagrangian and closely:
+        return MIXED_SOLVER.tolerance_conserving
+    return MIXED_SOLVER.tolerance_smooth if linear.follows_wedge else MIXED_SOLVER.tolerance

@@ -11,9 +11,10 @@ roughness does not move.
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.controls import OSCILLATION
@@ -22,11 +23,11 @@ from asperity.ehl.linear_solvers.gmres import Shifted, gmres
 from asperity.ehl.linear_solvers.mixed import MixedLinear
 from asperity.ehl.linear_solvers.single_pressure import Linear
 from asperity.ehl.models.mixed import MixedBalance
-from asperity.ehl.models.single_pressure import Balance
+from asperity.ehl.models.single_pressure import Balance, Precision
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
 
-Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
+Waves: TypeAlias = npt.NDArray[np.complexfloating]
 
 
 class OscillationResponse(NamedTuple):
@@ -46,7 +47,7 @@ class _Equations(Protocol):
     """Linearised equations of a model over one vector of unknowns."""
 
     size: int
-    real: Any  # the precision of all
+    real: Precision  # the precision of all
 
     def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
         """Return the rows of J and of S for a change of the unknowns and of the approach."""
@@ -64,7 +65,7 @@ class _Equations(Protocol):
 class _OnePressure:
     """Equations of the single-pressure model."""
 
-    def __init__(self, balance: Balance, real: Any) -> None:
+    def __init__(self, balance: Balance, real: Precision) -> None:
         self.real, self.linear = real, Linear(balance, dtype=real)
         self.unknown, self.cells, self.size = (
             balance.unknown,
@@ -101,7 +102,7 @@ class _OnePressure:
 class _TwoPressures:
     """Equations of the mixed model: oil pressure of every cell, total pressure of touching ones."""
 
-    def __init__(self, balance: MixedBalance, real: Any) -> None:
+    def __init__(self, balance: MixedBalance, real: Precision) -> None:
         self.real, self.linear = real, (linear := MixedLinear(balance, real, with_limiter=True))
         self.cells, self.count = linear.cells, balance.gap.size
         self.touching = np.flatnonzero(linear.touching)
@@ -119,7 +120,7 @@ class _TwoPressures:
         """Lines whose cells are solved together, built on first use."""
         return self._patch()
 
-    def _split(self, vector: Any) -> tuple[Any, Any]:
+    def _split(self, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         closed = np.zeros(self.count, vector.dtype)
         closed[self.touching] = vector[self.count :]
         return vector[: self.count].reshape(self.cells), closed.reshape(self.cells)
@@ -193,7 +194,7 @@ class _TwoPressures:
         wet = np.where(closed, np.minimum(1.0, wide / np.where(closed, scale, 1.0)), 1.0)
         return self._joined(wet.astype(self.real), np.ones(self.cells, self.real))
 
-    def pressures(self, vector: Waves) -> tuple[Any, Any]:
+    def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
         oil, closed = self._split(vector)
         return oil, np.where(self.linear.free, oil, closed)
 
@@ -287,7 +288,7 @@ class Oscillating:
         return left, float(np.linalg.norm(left)) / size
 
 
-def _equations(balance: Balance | MixedBalance, real: Any) -> _Equations:
+def _equations(balance: Balance | MixedBalance, real: Precision) -> _Equations:
     """Return the equations of a balance in a precision."""
     return (
         _TwoPressures(balance, real)
@@ -328,7 +329,7 @@ def _product(equations: _Equations, vector: Waves, frequency: float) -> Waves:
     return np.asarray(rows + vector.dtype.type(1j * frequency) * stored)
 
 
-def _each_part(operator: Callable[[Field], Any], vector: Waves) -> Any:
+def _each_part(operator: Callable[[Field], Field], vector: Waves) -> Waves:
     """Apply a real linear operator to a complex vector."""
     real, imaginary = (
         operator(np.ascontiguousarray(vector.real)),

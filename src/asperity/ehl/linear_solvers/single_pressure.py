@@ -5,15 +5,17 @@ precision changes neither the solution nor the number of steps, and halves the m
 """
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from asperity.core.arrays import Field
 from asperity.ehl.controls import PRECONDITIONER
 from asperity.ehl.deflection import MIRROR_BETWEEN
-from asperity.ehl.models.single_pressure import Balance, TransientTerm
+from asperity.ehl.grid_transfer import Index
+from asperity.ehl.models.single_pressure import Balance, Precision, TransientTerm
 from asperity.kernels import line_relaxation, multigrid, reynolds, stencils
 from asperity.kernels.multigrid import GridHierarchy
 from asperity.kernels.reynolds import LUBRICATED, Faces, Film
@@ -38,7 +40,9 @@ class Linear:
     valleys); zebra line relaxation along x removes the rest.
     """
 
-    def __init__(self, balance: Balance, *, storing: float = 0.0, dtype: Any = np.float32) -> None:
+    def __init__(
+        self, balance: Balance, *, storing: float = 0.0, dtype: Precision = np.float32
+    ) -> None:
         self.balance, self.dtype = balance, dtype
         self.cells = balance.problem.cells
         self.unknown = balance.unknown
@@ -224,7 +228,7 @@ class MultigridSolver:
         return change
 
 
-def _allocate_hierarchy(cells: tuple[int, int], dtype: Any) -> GridHierarchy:
+def _allocate_hierarchy(cells: tuple[int, int], dtype: np.dtype) -> GridHierarchy:
     """Allocate the levels of nested blocks."""
     grids = [(-(-cells[0] // 2), -(-cells[1] // 2))]
     while max(grids[-1]) >= PRECONDITIONER.min_halved_cells:
@@ -246,7 +250,7 @@ def _block_size(cells: int) -> int:
     return max(smallest, -(-cells // PRECONDITIONER.max_coarse_cells))
 
 
-def single_faces(faces: Faces, dtype: Any = np.float32) -> Faces:
+def single_faces(faces: Faces, dtype: Precision = np.float32) -> Faces:
     """Convert faces to another precision, with values that would be denormal set to zero."""
     least = PRECONDITIONER.min_mobility * float(max(faces.east.max(), faces.north.max()))
     *parts, inlet, wedge, behind = faces
@@ -262,12 +266,12 @@ class _Pattern(NamedTuple):
     """Sparsity pattern of a five-point matrix on `cells`, in an order of little fill."""
 
     cells: tuple[int, int]
-    order: Any
-    position: Any
-    rows: Any
-    columns: Any
+    order: Index
+    position: Index
+    rows: npt.NDArray[np.int32]
+    columns: npt.NDArray[np.int32]
 
-    def factored(self, stencil: Stencil) -> Any:
+    def factored(self, stencil: Stencil) -> scipy.sparse.linalg.SuperLU:
         """Return LU factors of the stencil's matrix."""
         count = self.order.size
         entries = np.stack([part.ravel() for part in stencil]).ravel()
@@ -286,7 +290,7 @@ class _Pattern(NamedTuple):
         except RuntimeError as error:
             raise SingularFactor(str(error)) from None
 
-    def solve(self, factors: Any, rhs: Field) -> Field:
+    def solve(self, factors: scipy.sparse.linalg.SuperLU, rhs: Field) -> Field:
         """Solve the factored matrix for `rhs`, (cx, cy)."""
         solved = np.empty(self.order.size)
         solved[self.order] = factors.solve(rhs.ravel()[self.order])
@@ -296,6 +300,28 @@ class _Pattern(NamedTuple):
 @lru_cache(maxsize=16)
 def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
     """Return the pattern of a grid; cached."""
+    columns, rows = _couplings(cells)
+    there, size = columns >= 0, cells[0] * cells[1]
+    model = scipy.sparse.csc_array(
+        (np.where(columns == rows, 5.0, -1.0)[there], (rows[there], columns[there])),
+        shape=(size, size),
+    )
+    fill = scipy.sparse.linalg.splu(
+        model, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    order = np.argsort(fill.perm_c)
+    place = np.empty(size, int)
+    place[order] = np.arange(size)
+    keys = np.where(there, place[columns] * size + place[rows], -1).ravel()
+    entries, position = np.unique(keys[there.ravel()], return_inverse=True)
+    full = np.full(keys.size, entries.size)  # couplings across the ends are dropped
+    full[there.ravel()] = position
+    starts = np.searchsorted(entries, np.arange(size + 1) * size)
+    return _Pattern(cells, order, full, (entries % size).astype(np.int32), starts.astype(np.int32))
+
+
+def _couplings(cells: tuple[int, int]) -> tuple[Index, Index]:
+    """Return columns and rows of a five-point matrix, (5, cells); columns across ends are -1."""
     index = np.arange(cells[0] * cells[1]).reshape(cells)
     nowhere = np.full((1, cells[1]), -1)
     columns = np.stack(
@@ -307,23 +333,4 @@ def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
             np.roll(index, 1, 1),
         ]
     ).reshape(5, -1)
-    rows = np.broadcast_to(index.ravel(), columns.shape)
-    there = columns >= 0
-    shape = (index.size, index.size)
-    model = scipy.sparse.csc_array(
-        (np.where(columns == rows, 5.0, -1.0)[there], (rows[there], columns[there])), shape=shape
-    )
-    fill = scipy.sparse.linalg.splu(
-        model, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
-    order = np.argsort(fill.perm_c)
-    place = np.empty(index.size, int)
-    place[order] = np.arange(index.size)
-    keys = np.where(there, place[columns] * index.size + place[rows], -1).ravel()
-    entries, position = np.unique(keys[there.ravel()], return_inverse=True)
-    full = np.full(keys.size, entries.size)  # couplings across the ends are dropped
-    full[there.ravel()] = position
-    starts = np.searchsorted(entries, np.arange(index.size + 1) * index.size)
-    return _Pattern(
-        cells, order, full, (entries % index.size).astype(np.int32), starts.astype(np.int32)
-    )
+    return columns, np.broadcast_to(index.ravel(), columns.shape)

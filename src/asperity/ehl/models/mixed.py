@@ -21,12 +21,13 @@ Where oil is conserved, R = 0 in every cell, and one signed unknown represents q
 of the film, and the permanent opening of the gap by oil at the cap.
 """
 
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from asperity.core.arrays import Codes, Field, Mask
+from asperity.ehl.grid_transfer import Index
 from asperity.ehl.models.oil_advection import (
     OPENING_RANGE,
     advected_outflow,
@@ -38,7 +39,13 @@ from asperity.ehl.models.oil_advection import (
     upwind_at_outlet,
     uses_limiter,
 )
-from asperity.ehl.models.single_pressure import CLOSED_WITHIN, FIRST_ORDER, THIRD_ORDER, Problem
+from asperity.ehl.models.single_pressure import (
+    CLOSED_WITHIN,
+    FIRST_ORDER,
+    THIRD_ORDER,
+    Precision,
+    Problem,
+)
 from asperity.kernels import load_sharing
 from asperity.kernels.load_sharing import FREE, CellState, ContactBounds
 from asperity.kernels.reynolds import (
@@ -50,7 +57,6 @@ from asperity.kernels.reynolds import (
     Film,
     Rows,
 )
-from asperity.lubricant import Lubricant
 
 
 class Pressures(NamedTuple):
@@ -189,108 +195,147 @@ def evaluate(
     """
     gap = problem.undeformed + problem.deflection(unknowns.total)
     gap += unknowns.approach
-    return _evaluate(problem, unknowns, gap, second_order, freed, may_open=True)
+    flow, opening = _flow(problem, unknowns, gap, second_order), np.empty(gap.shape, dtype=bool)
+    freed = np.zeros(gap.shape, dtype=bool) if freed is None else freed
+    if load_sharing.mark_opening(flow.cells, _bounds(problem), opening):
+        oil, total = flow.cells.oil, unknowns.total
+        unknowns = unknowns._replace(oil=np.where(opening & (total > oil), total, unknowns.oil))
+        freed = freed | opening
+        flow = _flow(problem, unknowns, gap, second_order)
+        load_sharing.mark_opening(flow.cells, _bounds(problem), opening)
+    return _balance(problem, unknowns, flow, opening, freed)
 
 
-def _evaluate(
-    problem: Problem,
-    unknowns: Pressures,
-    gap: Field,
-    second_order: bool,
-    freed: Mask | None,
-    *,
-    may_open: bool,
-) -> MixedBalance:
-    """Evaluate at a given gap; again after opening cells, unless `may_open` is False."""
-    signed, pressure, approach = unknowns
-    assert problem.lubricant is not None
-    closed, scale = problem.contact_gap, 1.0 / problem.softness
-    bounds = ContactBounds(closed, scale, (1.0 + CLOSED_WITHIN) * closed, problem.p_cap)
-    oil = np.clip(signed, 0.0, problem.p_cap)
-    height = np.maximum(gap, closed) + _growth(problem, signed) if problem.conserve else gap
-    film, faces, outflow, fluid_scale = _flow(problem, oil, height, problem.lubricant)
-    limiter = (
-        slope_limiter(problem, film.content, gap)
-        if second_order and uses_limiter(problem)
-        else np.zeros_like(gap)
+class _Flow(NamedTuple):
+    """Flow of the oil at a known gap, and the state of each cell that decides how it is closed.
+
+    The surplus and its derivative are None where oil is not conserved.
+    """
+
+    cells: CellState
+    height: Field
+    film: Film
+    faces: Faces
+    scale: Field
+    limiter: Field
+    surplus: Field | None
+    surplus_by_oil: Field | None
+
+
+def _bounds(problem: Problem) -> ContactBounds:
+    """Return the bounds of gap and pressure."""
+    closed = problem.contact_gap
+    return ContactBounds(
+        closed, 1.0 / problem.softness, (1.0 + CLOSED_WITHIN) * closed, problem.p_cap
     )
-    surplus, surplus_by_oil = _surplus(problem, film, signed) if problem.conserve else (None, None)
+
+
+def _flow(problem: Problem, unknowns: Pressures, gap: Field, second_order: bool) -> _Flow:
+    """Return the flow of the oil at a given gap."""
+    assert problem.lubricant is not None
+    signed, surplus, surplus_by_oil = unknowns.oil, None, None
+    oil, height, limiter = np.clip(signed, 0.0, problem.p_cap), gap, np.zeros_like(gap)
+    if problem.conserve:
+        height = np.maximum(gap, problem.contact_gap) + _growth(problem, signed)
+    film, faces, outflow, scale = problem.flow(
+        oil,
+        height,
+        problem.lubricant,
+        THIRD_ORDER if problem.accurate else FIRST_ORDER,
+        least_mobility=problem.contact_gap**3 / problem.speed,
+    )
+    if second_order and uses_limiter(problem):
+        limiter = slope_limiter(problem, film.content, gap)
     outflow += second_order_outflow(problem, film.content, limiter, second_order=second_order)
-    if surplus is not None:
+    if problem.conserve:
+        surplus, surplus_by_oil = _surplus(problem, film, signed)
         outflow += advected_outflow(problem, surplus)
         upwind_at_outlet(problem, film.content, outflow)
-
-    cells = CellState(signed, oil, pressure, gap, outflow, np.empty_like(gap))
+    cells = CellState(signed, oil, unknowns.total, gap, outflow, np.empty_like(gap))
     load_sharing.outflow_by_pressure(
         film, faces, outflow_by_content(problem), *problem.spacing, cells.own_outflow
     )
-    freed = np.zeros(gap.shape, dtype=bool) if freed is None else freed
-    opening_cells, sunk, sealed = np.empty((3, *gap.shape), dtype=bool)
-    if load_sharing.mark_opening(cells, bounds, opening_cells) and may_open:
-        unknowns = Pressures(
-            np.where(opening_cells & (pressure > oil), pressure, signed), pressure, approach
-        )
-        return _evaluate(
-            problem, unknowns, gap, second_order, freed | opening_cells, may_open=False
-        )
-    solid, solid_residual = np.empty(gap.shape, dtype=np.int8), np.empty_like(gap)
-    if load_sharing.fill_contact_rows(
-        cells, bounds, opening_cells, freed, solid, solid_residual, sunk
-    ):
-        lacking = np.where(sunk, film.content_by_gap * (gap - closed), 0.0)
-        outflow += advected_outflow(problem, lacking) + limiter_outflow(
-            problem, lacking, limiter, limiter
-        )
-    load_sharing.mark_sealed(cells, bounds, solid, sunk, fluid_scale, sealed)
-    oil_residual, state = np.empty_like(gap), np.empty(gap.shape, dtype=np.int8)
-    if surplus_by_oil is None:
-        load_sharing.fill_oil_rows(cells, bounds, fluid_scale, oil_residual, state)
+    return _Flow(cells, height, film, faces, scale, limiter, surplus, surplus_by_oil)
+
+
+def _balance(
+    problem: Problem, unknowns: Pressures, flow: _Flow, opening: Mask, freed: Mask
+) -> MixedBalance:
+    """Return the equations of every cell; those of `opening` and `freed` cells are free."""
+    cells, film, scale, bounds = flow.cells, flow.film, flow.scale, _bounds(problem)
+    sealed = np.empty(freed.shape, dtype=bool)
+    solid, solid_residual, sunk = _contact_rows(problem, flow, opening, freed)
+    load_sharing.mark_sealed(cells, bounds, solid, sunk, scale, sealed)
+    if flow.surplus_by_oil is None:
+        oil_residual, state = np.empty_like(cells.gap), np.empty_like(solid)
+        load_sharing.fill_oil_rows(cells, bounds, scale, oil_residual, state)
         load_sharing.fix_film_gap(sealed, film)
     else:
-        film, fluid_scale, oil_residual, state = _conserving_rows(
-            problem, film, signed, height, outflow, fluid_scale, surplus_by_oil, sealed
+        film, scale, oil_residual, state = _conserving_rows(
+            problem, flow, flow.surplus_by_oil, sealed
         )
     _fix_rows(problem, cells, state, solid, oil_residual, solid_residual)
-    rows, left = Rows(state, fluid_scale, scale), (oil_residual, solid_residual)
-    balance = MixedBalance(
-        problem, unknowns, gap, *left, rows, solid, film, faces, limiter, outflow, sealed
+    return MixedBalance(
+        problem,
+        unknowns,
+        cells.gap,
+        oil_residual,
+        solid_residual,
+        Rows(state, scale, bounds.contact_scale),
+        solid,
+        film,
+        flow.faces,
+        flow.limiter,
+        cells.outflow,
+        sealed,
+        flow.surplus,
+        flow.surplus_by_oil,
     )
-    return (
-        replace(balance, surplus=surplus, surplus_by_oil=surplus_by_oil)
-        if problem.conserve
-        else balance
-    )
+
+
+def _contact_rows(
+    problem: Problem, flow: _Flow, opening: Mask, freed: Mask
+) -> tuple[Codes, Field, Mask]:
+    """Return state and residual of the total pressure, and free cells below the contact film.
+
+    The gap missing in these counts as missing oil in the outflow.
+    """
+    gap, outflow = flow.cells.gap, flow.cells.outflow
+    solid, residual = np.empty(gap.shape, dtype=np.int8), np.empty_like(gap)
+    sunk = np.empty(gap.shape, dtype=bool)
+    if load_sharing.fill_contact_rows(
+        flow.cells, _bounds(problem), opening, freed, solid, residual, sunk
+    ):
+        lacking = np.where(sunk, flow.film.content_by_gap * (gap - problem.contact_gap), 0.0)
+        outflow += advected_outflow(problem, lacking) + limiter_outflow(
+            problem, lacking, flow.limiter, flow.limiter
+        )
+    return solid, residual, sunk
 
 
 def _conserving_rows(
-    problem: Problem,
-    film: Film,
-    signed: Field,
-    height: Field,
-    outflow: Field,
-    fluid_scale: Field,
-    surplus_by_oil: Field,
-    sealed: Mask,
+    problem: Problem, flow: _Flow, surplus_by_oil: Field, sealed: Mask
 ) -> tuple[Film, Field, Field, Codes]:
     """Return film, scale, residual and state of the oil's equations where oil is conserved.
 
     The film of `sealed` cells is fixed, except where oil at the cap has opened it.
     """
+    signed, film = flow.cells.signed, flow.film
     # a closed cell holds hardly any oil: its missing oil counts as the gap that would open it
     loose, lacks = (
         surplus_by_oil > 0.0,
         np.maximum(surplus_by_oil, problem.softness) * outflow_by_content(problem),
     )
-    fluid_scale = np.where(loose, 1.0 / lacks, fluid_scale)
-    oil_residual = outflow * fluid_scale
+    scale = np.where(loose, 1.0 / lacks, flow.scale)
+    oil_residual = flow.cells.outflow * scale
     state = np.where(signed < 0.0, RUPTURED, np.where(loose, CAPPED, LUBRICATED)).astype(np.int8)
     pressed = signed > problem.p_cap  # opened by the oil, not by the approach
     load_sharing.fix_film_gap(sealed & ~pressed, film)
     stiff = pressed & (film.log_mobility_by_gap == 0.0)
     film = film._replace(
-        log_mobility_by_gap=np.where(stiff, -3.0 / height, film.log_mobility_by_gap)
+        log_mobility_by_gap=np.where(stiff, -3.0 / flow.height, film.log_mobility_by_gap)
     )
-    return film, fluid_scale, oil_residual, state
+    return film, scale, oil_residual, state
 
 
 def _fix_rows(
@@ -333,17 +378,7 @@ def _growth(problem: Problem, signed: Field) -> Field:
     return beyond * problem.softness
 
 
-def _flow(
-    problem: Problem, oil: Field, gap: Field, lubricant: Lubricant
-) -> tuple[Film, Faces, Field, Field]:
-    """Return the flow with the wedge and the minimum mobility of this model."""
-    wedge = THIRD_ORDER if problem.accurate else FIRST_ORDER
-    return problem.flow(
-        oil, gap, lubricant, wedge, least_mobility=problem.contact_gap**3 / problem.speed
-    )
-
-
-def limiter_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
+def limiter_slopes(balance: MixedBalance, dtype: Precision) -> tuple[Field, Field]:
     """Return derivatives of the limited correction in the own and, negative, the upstream content.
 
     The opening of cells is held constant; see `opening_slopes`. Both (nx, ny).
@@ -356,7 +391,7 @@ def limiter_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
     return own, by_upstream
 
 
-def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Any, Any, Field]:
+def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Index, Index, Field]:
     """Return derivatives of the limited correction at eastern faces in the gap of opening cells.
 
     Faces, cells and slopes of the `moved` cells; faces and cells as flat indices, a cell once for
@@ -376,3 +411,31 @@ def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Any, Any, Field]
     )
     leaning = upstream * here / (upstream**2 + here**2) * (here - upstream)
     return faces, cells, leaning * other / (OPENING_RANGE * closed)
+
+
+class ConservedOil(NamedTuple):
+    """Derivatives of the surplus and of the gap where oil is conserved.
+
+    Of the surplus in the signed unknown, everywhere and in cavities; of the permanent opening in
+    the signed unknown; of the surplus in the gap.
+    """
+
+    surplus_by_oil: Field
+    missing_by_oil: Field
+    growth_by_oil: Field
+    surplus_by_gap: Field
+
+    @classmethod
+    def of_balance(cls, balance: MixedBalance, real: Precision) -> "ConservedOil | None":
+        """Return the derivatives in a precision; None where oil is not conserved."""
+        if balance.surplus_by_oil is None:
+            return None
+        signed, problem = balance.unknowns.oil, balance.problem
+        single, zero = balance.surplus_by_oil.astype(real), real(0.0)
+        pressed = (signed > problem.p_cap) & balance.solved
+        return cls(
+            single,
+            np.where(signed < 0.0, single, zero),
+            np.where(pressed, real(problem.softness), zero),
+            (np.minimum(signed, 0.0) * balance.film.content_by_gap).astype(real),
+        )

@@ -8,12 +8,50 @@ Hintermüller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002) 865; I. A. Polonsky,
 (1999) 206, with the upper bound treated like the lower.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.controls import PLASTIC_DRY, STEP_LIMITS
+from asperity.ehl.deflection import Deflection
 from asperity.ehl.models.elastic_dry import level_gaps
 from asperity.ehl.models.single_pressure import Problem
+
+
+class _Sets(NamedTuple):
+    """Dry contact in single precision: the bodies, and the pressures between 0 and the cap."""
+
+    deflection: Deflection
+    undeformed: Field
+    inside: Mask
+    cap: np.float32
+    stiffness: np.float32
+    load: float  # sum of the pressures
+
+    @classmethod
+    def from_problem(cls, problem: Problem) -> "_Sets":
+        """Return the contact of a problem."""
+        (dx, dy), real = problem.spacing, np.float32
+        return cls(
+            problem.deflection,
+            problem.undeformed.astype(real),
+            np.broadcast_to(~problem.rim, problem.cells),
+            real(problem.p_cap),
+            real(1.0 / problem.softness),
+            problem.load / (dx * dy),
+        )
+
+    def solve_free(self, pressure: Field, capped: Mask, free: Mask) -> tuple[Field, float]:
+        """Return the pressure at which free cells have one gap, and that gap at approach 0."""
+        zero = np.float32(0.0)
+        bound = np.where(capped, self.cap, np.where(free, pressure, zero))
+        bound[free] += np.float32((self.load - bound.sum(dtype=float)) / np.count_nonzero(free))
+        gap = self.undeformed + self.deflection(bound)
+        change, level, _ = level_gaps(
+            self.deflection, free, gap, PLASTIC_DRY.linear_tolerance, PLASTIC_DRY.max_krylov_steps
+        )
+        return np.clip(bound + change.astype(np.float32), zero, self.cap), level
 
 
 def active_set_dry(
@@ -23,36 +61,30 @@ def active_set_dry(
 
     Returns pressure (nx, ny), approach, and whether residual and load error met the tolerance.
     """
-    real, deflection, (dx, dy) = np.float32, problem.deflection, problem.spacing
-    undeformed, cap, stiffness = (
-        problem.undeformed.astype(real),
-        real(problem.p_cap),
-        real(1.0 / problem.softness),
-    )
-    inside, load = np.broadcast_to(~problem.rim, problem.cells), problem.load / (dx * dy)
+    sets = _Sets.from_problem(problem)
+    inside, cap = sets.inside, sets.cap
     furthest = STEP_LIMITS.max_approach_step * max(1.0, float(np.std(problem.roughness)))
-    pressure = np.where(inside, np.clip(pressure, 0.0, cap), 0.0).astype(real)
+    pressure = np.where(inside, np.clip(pressure, 0.0, cap), 0.0).astype(np.float32)
     for number in range(PLASTIC_DRY.max_active_sets + 1):
-        touching = (undeformed + deflection(pressure) + real(approach)) * stiffness
-        residual = np.where(
-            inside, np.maximum(np.minimum(pressure, touching), pressure - cap), real(0.0)
-        )
-        load_missing = abs(float(pressure.sum(dtype=float)) / load - 1.0)
-        converged = max(float(np.sqrt(np.mean(residual**2))), load_missing) < tolerance
+        gap = sets.undeformed + sets.deflection(pressure) + np.float32(approach)
+        touching = gap * sets.stiffness
+        load_missing = abs(float(pressure.sum(dtype=float)) / sets.load - 1.0)
+        converged = max(_residual(pressure, touching, cap, inside), load_missing) < tolerance
         capped = inside & (pressure - cap > touching)
         free = inside & (pressure > touching) & ~capped
-        count = np.count_nonzero(free)
-        if converged or number == PLASTIC_DRY.max_active_sets or count == 0:
+        if converged or number == PLASTIC_DRY.max_active_sets or not free.any():
             break
-        bound = np.where(capped, cap, np.where(free, pressure, real(0.0)))
-        bound[free] += real((load - bound.sum(dtype=float)) / count)
-        gap = undeformed + deflection(bound)
-        change, level, _ = level_gaps(
-            deflection, free, gap, PLASTIC_DRY.linear_tolerance, PLASTIC_DRY.max_krylov_steps
-        )
-        pressure = np.clip(bound + change.astype(real), real(0.0), cap)
+        pressure, level = sets.solve_free(pressure, capped, free)
         approach += float(np.clip(-level - approach, -furthest, furthest))
     return np.where(pressure < cap, pressure.astype(float), problem.p_cap), approach, converged
+
+
+def _residual(pressure: Field, touching: Field, cap: float | np.float32, inside: Mask) -> float:
+    """Return the root mean square residual; `touching` is the gap times the stiffness of a cell."""
+    residual = np.where(
+        inside, np.maximum(np.minimum(pressure, touching), pressure - cap), pressure.dtype.type(0.0)
+    )
+    return float(np.sqrt(np.mean(residual**2)))
 
 
 def dry_contact(
@@ -62,43 +94,56 @@ def dry_contact(
 
     Returns pressure (nx, ny), approach, and whether the residual met the tolerance.
     """
-    deflection, cap = problem.deflection, problem.p_cap
+    cap, stiffness = problem.p_cap, 1.0 / problem.softness
     inside = np.broadcast_to(~problem.rim, problem.cells)
-    stiffness = 1.0 / problem.softness
-    pressure = _scale_to_load(problem, np.where(inside, np.clip(pressure, 0.0, cap), 0.0), inside)
-    direction, size, keep = np.zeros_like(pressure), 1.0, 0.0
+    pressure = _scale_to_load(problem, pressure)
+    direction, size, keep = np.zeros_like(pressure), 1.0, False
     for step in range(max_steps + 1):
-        gap = problem.undeformed + deflection(pressure)
-        free = (pressure > 0.0) & (pressure < cap) & inside
-        approach = -float(gap[free].mean()) if free.any() else -float(gap.min())
-        gap += approach
-        residual = np.where(
-            inside, np.maximum(np.minimum(pressure, gap * stiffness), pressure - cap), 0.0
-        )
-        converged = float(np.sqrt(np.mean(residual**2))) < PLASTIC_DRY.tolerance
+        gap, approach, free = _level_gap(problem, pressure, inside)
+        converged = _residual(pressure, gap * stiffness, cap, inside) < PLASTIC_DRY.tolerance
         if converged or step == max_steps:
             break
         steepest = np.where(free, gap, 0.0)
         before, size = size, float((steepest**2).sum())
-        direction = np.where(
-            free, steepest + (keep * size / before if before > 0.0 else 0.0) * direction, 0.0
-        )
-        answer = deflection(direction)
-        answer -= answer[free].mean() if free.any() else 0.0
-        curvature = float((answer * direction).sum())
-        length = float((steepest * direction).sum()) / curvature if curvature > 0.0 else stiffness
+        share = size / before if keep and before > 0.0 else 0.0
+        direction = np.where(free, steepest + share * direction, 0.0)
+        length = _step_length(problem, steepest, direction, free)
         pressure = np.clip(pressure - length * direction, 0.0, cap)
-        wrong = inside & (((pressure <= 0.0) & (gap < 0.0)) | ((pressure >= cap) & (gap > 0.0)))
-        keep = 0.0 if wrong.any() else 1.0
-        pressure = _scale_to_load(
-            problem, np.where(wrong, np.clip(pressure - length * gap, 0.0, cap), pressure), inside
-        )
+        wrong = inside & _leaves_bound(pressure, gap, cap)
+        keep = not wrong.any()
+        pressure = _scale_to_load(problem, np.where(wrong, pressure - length * gap, pressure))
     return pressure, approach, converged
 
 
-def _scale_to_load(problem: Problem, pressure: Field, inside: Mask) -> Field:
-    """Scale the pressure between its bounds until it carries the load."""
+def _level_gap(problem: Problem, pressure: Field, inside: Mask) -> tuple[Field, float, Mask]:
+    """Return the gap, the approach that makes its mean over free cells zero, and these cells."""
+    free = (pressure > 0.0) & (pressure < problem.p_cap) & inside
+    gap = problem.undeformed + problem.deflection(pressure)
+    approach = -float(gap[free].mean()) if free.any() else -float(gap.min())
+    gap += approach
+    return gap, approach, free
+
+
+def _leaves_bound(pressure: Field, gap: Field, cap: float) -> Mask:
+    """Return the cells whose pressure is at a bound that their gap contradicts."""
+    return ((pressure <= 0.0) & (gap < 0.0)) | ((pressure >= cap) & (gap > 0.0))
+
+
+def _step_length(problem: Problem, steepest: Field, direction: Field, free: Mask) -> float:
+    """Return the step along a direction that minimises the energy at constant load."""
+    answer = problem.deflection(direction)
+    answer -= answer[free].mean() if free.any() else 0.0
+    curvature = float((answer * direction).sum())
+    if not curvature > 0.0:
+        return 1.0 / problem.softness
+    return float((steepest * direction).sum()) / curvature
+
+
+def _scale_to_load(problem: Problem, pressure: Field) -> Field:
+    """Clip the pressure to its bounds and scale it between them until it carries the load."""
     (dx, dy), cap = problem.spacing, problem.p_cap
+    inside = np.broadcast_to(~problem.rim, problem.cells)
+    pressure = np.where(inside, np.clip(pressure, 0.0, cap), 0.0)
     target = problem.load / (dx * dy)
     for _ in range(PLASTIC_DRY.max_load_corrections):
         load_missing = target - float(pressure.sum())

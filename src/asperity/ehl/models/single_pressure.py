@@ -8,13 +8,13 @@ cells, H_c the contact film.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
-from asperity.core.arrays import Field, Mask
+from asperity.core.arrays import Codes, Field, Mask
 from asperity.ehl.deflection import MIRROR_THROUGH, Deflection, deflection
-from asperity.ehl.grid_transfer import average, interpolate, mirror_field
+from asperity.ehl.grid_transfer import AnyField, average, interpolate, mirror_field
 from asperity.ehl.load_shares import within_ellipse
 from asperity.ehl.roller_profile import BodyShape
 from asperity.kernels import reynolds
@@ -29,6 +29,8 @@ from asperity.kernels.reynolds import (
     Rows,
 )
 from asperity.lubricant import Lubricant
+
+Precision: TypeAlias = type[np.floating]  # of a linearisation
 
 CLOSED_WITHIN = 0.01  # of the contact film, above which a gap still counts as closed
 SYMMETRY_TOLERANCE = 1e-6  # relative, about Y = 0: far below the solver's tolerance
@@ -110,7 +112,7 @@ class Problem:
         nx, ny = self.cells
         return nx, 2 * ny + 1 - self.mirror if self.mirror else ny
 
-    def unfold(self, field: Any) -> Any:
+    def unfold(self, field: AnyField) -> AnyField:
         """Return a field, (nx', ny'), with its mirror image, of this grid or a coarser one."""
         return mirror_field(field, 2 * field.shape[1] + 1 - self.mirror) if self.mirror else field
 
@@ -119,14 +121,11 @@ class Problem:
         finer = interpolate(self.unfold(field), self.all_cells, cubic=cubic)
         return np.ascontiguousarray(finer[:, : self.cells[1]])
 
-    def sum_over_cells(self, field: Field) -> Any:
+    def sum_over_cells(self, field: Field) -> np.floating:
         """Sum a field, (nx, ny), over all cells, including those behind a mirror."""
-        total = field.sum()
-        return (
-            total
-            if not self.mirror
-            else 2.0 * total - (field[:, -1].sum() if self.mirror == MIRROR_THROUGH else 0.0)
-        )
+        total: np.floating = (2.0 if self.mirror else 1.0) * field.sum()
+        middle: np.floating = field[:, -1].sum()
+        return total - middle if self.mirror == MIRROR_THROUGH else total
 
     @property
     def mean_pressure(self) -> float:
@@ -267,30 +266,35 @@ class Problem:
         gap += approach
         contact_scale = 1.0 / self.softness
         touching = (gap - self.contact_gap) * contact_scale
-        if self.lubricant is None:
-            film, faces = None, None
-            outflow, fluid_scale = np.zeros_like(pressure), np.ones_like(pressure)
+        film, faces, fluid = None, None, None
+        outflow, fluid_scale = np.zeros_like(pressure), np.ones_like(pressure)
+        if self.lubricant is not None:
+            wedge = THIRD_ORDER if self.accurate else SECOND_ORDER
+            film, faces, outflow, fluid_scale = self.flow(pressure, gap, self.lubricant, wedge)
+            fluid = outflow * fluid_scale
+        residual, state = self._equations(pressure, touching, fluid)
+        if film is not None:  # the film between overlapping bodies does not depend on the approach
+            film = film.with_fixed_gap((touching <= 0.0) & (state != LUBRICATED))
+        rows = Rows(state, fluid_scale, contact_scale)
+        return Balance(self, pressure, gap, residual, rows, film, faces, outflow)
+
+    def _equations(
+        self, pressure: Field, touching: Field, fluid: Field | None
+    ) -> tuple[Field, Codes]:
+        """Return residual and state of each cell from its contact and Reynolds residuals."""
+        if fluid is None:
             residual, state = touching.copy(), np.full(pressure.shape, TOUCHING, dtype=np.int8)
         else:
-            film, faces, outflow, fluid_scale = self.flow(
-                pressure, gap, self.lubricant, THIRD_ORDER if self.accurate else SECOND_ORDER
-            )
-            fluid = outflow * fluid_scale
-            wet = fluid < touching
             residual = np.minimum(fluid, touching)
-            state = np.where(wet, np.int8(LUBRICATED), np.int8(TOUCHING))
+            state = np.where(fluid < touching, np.int8(LUBRICATED), np.int8(TOUCHING))
         ruptured = pressure < residual
         residual[ruptured] = pressure[ruptured]
         state[ruptured] = RUPTURED
         capped = pressure - self.p_cap > residual
         residual[capped] = pressure[capped] - self.p_cap
         state[capped] = CAPPED
-        rim = self.rim
-        residual[:, rim], state[:, rim] = pressure[:, rim], RUPTURED
-        if film is not None:  # the film between overlapping bodies does not depend on the approach
-            film = film.with_fixed_gap((touching <= 0.0) & (state != LUBRICATED))
-        rows = Rows(state, fluid_scale, contact_scale)
-        return Balance(self, pressure, gap, residual, rows, film, faces, outflow)
+        residual[:, self.rim], state[:, self.rim] = pressure[:, self.rim], RUPTURED
+        return residual, state
 
     def flow(
         self,
@@ -304,12 +308,28 @@ class Problem:
 
         Film, faces, net outflow of each cell, and the inverse of its derivative.
         """
-        pascals = pressure * self.p_scale
         gap = self.filmed(gap)
         height = np.maximum(gap, self.contact_gap)
+        film = self._film(pressure, height, oil, least_mobility)
+        behind = self.cells[1] - self.mirror if self.mirror else 0
+        parts = [*np.empty((6, *self.cells)), np.empty(self.cells[1]), np.array(wedge), behind]
+        faces, log_mobility = Faces._make(parts), film.mobility
+        if self.accurate:
+            log_mobility = np.log(np.maximum(film.mobility, np.finfo(float).tiny))
+        reynolds.face_mobilities(film, log_mobility, self.accurate, self._ends, faces)
+        outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
+        entering = self.entering(gap)
+        self._fill_outflow(pressure, film, faces, entering, outflow, diagonal)
+        return film, faces, outflow, 1.0 / diagonal
+
+    def _film(self, pressure: Field, height: Field, oil: Lubricant, least_mobility: float) -> Film:
+        """Return the oil content and the mobility of every cell."""
+        pascals = pressure * self.p_scale
         viscosity = oil.viscosity(pascals)
+        ambient = height[[0, -1]] ** 3 / self.speed
         if self.viscosity_factor is not None:
             viscosity = viscosity * self.viscosity_factor
+            ambient /= self.viscosity_factor[[0, -1]]
         liquid = Liquid(
             oil.density(pascals) / oil.density.rho0,
             oil.density.slope(pascals) * (self.p_scale / oil.density.rho0),
@@ -317,30 +337,10 @@ class Problem:
             oil.viscosity.log_slope(pascals) * self.p_scale,
             *oil.rheology.thinning(viscosity * self.sliding / height),
         )
-        ambient = height[[0, -1]] ** 3 / self.speed
-        if self.viscosity_factor is not None:
-            ambient /= self.viscosity_factor[[0, -1]]
         film = Film._make([*np.empty((6, *self.cells)), ambient, 3.0 * ambient / height[[0, -1]]])
         least = least_mobility * self.contact_gap**3
         reynolds.fill_film(liquid, height, oil.viscosity.eta0 / self.speed, least, film)
-        behind = self.cells[1] - self.mirror if self.mirror else 0
-        parts = [*np.empty((6, *self.cells)), np.empty(self.cells[1]), np.array(wedge), behind]
-        faces = Faces._make(parts)
-        mobility = film.mobility
-        log_mobility = (
-            np.log(np.maximum(mobility, np.finfo(float).tiny)) if self.accurate else mobility
-        )
-        reynolds.face_mobilities(film, log_mobility, self.accurate, self._ends, faces)
-        dx, dy = self.spacing
-        outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
-        entering = self.entering(gap)
-        compliance = self.deflection.local_compliance
-        if self.past is None:
-            reynolds.net_outflow(pressure, film.content, faces, entering, dx, dy, outflow)
-            reynolds.fluid_diagonal(film, faces, compliance, dx, dy, diagonal)
-        else:
-            self._move(self.past, pressure, film, faces, entering, outflow, diagonal)
-        return film, faces, outflow, 1.0 / diagonal
+        return film
 
     def entering(self, gap: Field) -> Field:
         """Return the content that the surfaces carry in, shape (ny,).
@@ -354,9 +354,8 @@ class Problem:
             return np.asarray(ahead)
         return np.asarray(0.5 * (ahead + np.maximum(gap[0], self.contact_gap)))
 
-    def _move(
+    def _fill_outflow(
         self,
-        past: TransientTerm,
         pressure: Field,
         film: Film,
         faces: Faces,
@@ -364,9 +363,10 @@ class Problem:
         outflow: Field,
         diagonal: Field,
     ) -> None:
-        """Fill the net outflow and its diagonal of an unsteady contact."""
-        (dx, dy), compliance, content = self.spacing, self.deflection.local_compliance, film.content
-        if past.lagrangian:
+        """Fill the net outflow and its diagonal."""
+        (dx, dy), past, content = self.spacing, self.past, film.content
+        compliance = self.deflection.local_compliance
+        if past is not None and past.lagrangian:
             nothing = np.zeros_like(content)
             reynolds.net_outflow(pressure, nothing, faces, nothing[0], dx, dy, outflow)
             reynolds.fluid_diagonal(film.without_wedge, faces, compliance, dx, dy, diagonal)
@@ -377,6 +377,8 @@ class Problem:
         else:
             reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
             reynolds.fluid_diagonal(film, faces, compliance, dx, dy, diagonal)
+        if past is None:
+            return
         outflow += past.rate * content + past.source
         # compliance less that of far cells, as in a touching cell: stored oil is as stiff
         diagonal += past.rate * (film.content_by_gap * self.softness + film.content_by_pressure)

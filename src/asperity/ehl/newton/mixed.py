@@ -55,43 +55,52 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     A closed cell whose oil pressure would exceed the total takes the total as its oil pressure and
     is free in the next step: the oil separates the bodies. Cells at the cap are exempt.
     """
-    mean_pressure = problem.mean_pressure
-    oil_limit, limit = (StepLimit(unknowns.total) for _ in range(2))
-    approach_limit, change = ApproachLimit(problem.roughness), np.inf
-    lowest, stagnation, share, stagnated, workspace = np.inf, 0, 1.0, False, Workspace()
-    balance, settled_cells = (
-        evaluate(problem, unknowns, second_order=second_order),
-        np.zeros(problem.cells, dtype=bool),
-    )
+    mean_pressure, change = problem.mean_pressure, np.inf
+    limits, workspace = _StepLimits(problem, unknowns), Workspace()
+    lowest, stagnation, share, stagnated = np.inf, 0, 1.0, False
+    balance = evaluate(problem, unknowns, second_order=second_order)
+    settled_cells = np.zeros(problem.cells, dtype=bool)
     for number in count():
-        unknowns = balance.unknowns
-        yield Step(number, balance, unknowns.approach, change)
+        approach, gap = balance.unknowns.approach, balance.gap
+        yield Step(number, balance, approach, change)
         try:
             step = newton_step(balance, None if stagnated else settled_cells, workspace)
         except SingularFactor:  # diverged
-            yield Step(number + 1, balance, unknowns.approach, np.inf)
+            yield Step(number + 1, balance, approach, np.inf)
             return
-        change, gap = float(np.mean(np.abs(step.total)) / mean_pressure), balance.gap
+        change = float(np.mean(np.abs(step.total)) / mean_pressure)
         stagnation += 1
         if balance.residual_rms < MIXED_NEWTON.required_decrease * lowest:
             lowest, stagnation = balance.residual_rms, 0
         elif stagnation == MIXED_NEWTON.stagnation_iterations:
             lowest, stagnation, share, stagnated = balance.residual_rms, 0, 1.5 - share, True
-        closed = (
-            (balance.solid != FREE)
-            & (balance.gap <= problem.contact_gap)
-            & (balance.oil_pressure == unknowns.oil)
-        )
-        d_oil = np.where(
-            closed | (unknowns.oil < 0.0),
-            step.oil,
-            oil_limit(step.oil, np.abs(unknowns.oil)),
-        )
-        d_total = limit(step.total, unknowns.total)
-        step = Pressures(d_oil, d_total, approach_limit(step.approach))
-        balance = _line_search(_StepProposal(balance, step, share), second_order=second_order)
+        proposal = _StepProposal(balance, limits(step, balance), share)
+        balance = _line_search(proposal, second_order=second_order)
         settled_cells = (
             np.abs(balance.gap - gap) < MIXED_NEWTON.settled_gap_change * problem.contact_gap
+        )
+
+
+class _StepLimits:
+    """Step limits of oil pressure, total pressure and approach; the oil of closed cells is free."""
+
+    def __init__(self, problem: Problem, unknowns: Pressures) -> None:
+        self.oil, self.total = (StepLimit(unknowns.total) for _ in range(2))
+        self.approach = ApproachLimit(problem.roughness)
+
+    def __call__(self, step: Pressures, balance: MixedBalance) -> Pressures:
+        """Return the limited step."""
+        unknowns = balance.unknowns
+        closed = (
+            (balance.solid != FREE)
+            & (balance.gap <= balance.problem.contact_gap)
+            & (balance.oil_pressure == unknowns.oil)
+        )
+        limited = self.oil(step.oil, np.abs(unknowns.oil))
+        return Pressures(
+            np.where(closed | (unknowns.oil < 0.0), step.oil, limited),
+            self.total(step.total, unknowns.total),
+            self.approach(step.approach),
         )
 
 

@@ -90,46 +90,59 @@ def newton_step(
 
     Includes the load, unless the approach is `fixed`.
     """
-    problem, unknown = balance.problem, balance.unknown
-    linear = Linear(balance, storing=storing)
-    cells, real = linear.cells, linear.dtype
+    unknown, linear = balance.unknown, Linear(balance, storing=storing)
     known_change = np.where(unknown, 0.0, -balance.residual)
-    rows = -balance.residual - linear.product(known_change.astype(real), 0.0)
-    rhs = np.where(unknown, rows, 0.0).astype(real).ravel()
+    rows = -balance.residual - linear.product(known_change.astype(linear.dtype), 0.0)
+    rhs = np.where(unknown, rows, 0.0).astype(linear.dtype)
     if fixed:
         d_pressure = _solved(
-            lambda vector: linear.product(vector.reshape(cells), 0.0).ravel(),
-            lambda vector: linear(vector.reshape(cells)).ravel(),
-            rhs,
+            lambda vector: linear.product(vector.reshape(linear.cells), 0.0).ravel(),
+            lambda vector: linear(vector.reshape(linear.cells)).ravel(),
+            rhs.ravel(),
         )
-        return known_change + d_pressure.reshape(cells), 0.0
+        return known_change + d_pressure.reshape(linear.cells), 0.0
+    system = _LoadedEquations(linear)
+    missing = system.load_missing(known_change)
+    if system.load_response == 0.0:  # all cells ruptured or capped: only the approach can change it
+        d_approach = -STEP_LIMITS.max_pressure_step * float(np.sign(missing))
+        return known_change, d_approach / balance.rows.contact_scale
+    last = linear.dtype(system.weight * missing)
+    solved = _solved(system.product, system.precondition, np.append(rhs.ravel(), last))
+    return known_change + solved[:-1].reshape(linear.cells), float(solved[-1])
 
-    # the last unknown is the approach, the last equation the load
-    weight = 1.0 / np.sqrt(unknown.size)
-    dx, dy = problem.spacing
-    missing = -balance.load_error * problem.load / (dx * dy) - problem.sum_over_cells(known_change)
-    response = np.where(unknown, linear.product(np.zeros(cells, real), 1.0), real(0.0))
-    answer = linear(response)
-    total = float(problem.sum_over_cells(answer))
-    if total == 0.0:  # all cells ruptured or capped: only the approach can change the load
-        return known_change, -STEP_LIMITS.max_pressure_step * float(
-            np.sign(missing)
-        ) / balance.rows.contact_scale
 
-    def product(vector: Field) -> Field:
-        d_pressure, d_approach = vector[:-1].reshape(cells), float(vector[-1])
-        left = linear.product(d_pressure, 0.0)
+class _LoadedEquations:
+    """Linearised equations, and last the load, in the pressures and last the approach."""
+
+    def __init__(self, linear: Linear) -> None:
+        self.linear, self.problem, self.cells = linear, linear.balance.problem, linear.cells
+        self.weight = 1.0 / np.sqrt(linear.unknown.size)
+        zero = linear.dtype(0.0)
+        by_approach = linear.product(np.zeros(self.cells, linear.dtype), 1.0)
+        self.by_approach = np.where(linear.unknown, by_approach, zero)
+        self.response = linear(self.by_approach)
+        self.load_response = float(self.problem.sum_over_cells(self.response))
+
+    def load_missing(self, known_change: Field) -> np.floating:
+        """Return the load that known changes of pressure leave to the unknown ones."""
+        problem, (dx, dy) = self.problem, self.problem.spacing
+        missing = -self.linear.balance.load_error * problem.load / (dx * dy)
+        return missing - problem.sum_over_cells(known_change)
+
+    def product(self, vector: Field) -> Field:
+        """Apply the equations."""
+        d_pressure, d_approach = vector[:-1].reshape(self.cells), float(vector[-1])
+        rows, real = self.linear.product(d_pressure, 0.0), self.linear.dtype
         if d_approach:
-            left += real(d_approach) * response
-        return np.append(left.ravel(), real(weight * problem.sum_over_cells(d_pressure)))
+            rows += real(d_approach) * self.by_approach
+        return np.append(rows.ravel(), real(self.weight * self.problem.sum_over_cells(d_pressure)))
 
-    def precondition(vector: Field) -> Field:
-        d_pressure = linear(vector[:-1].reshape(cells))
-        d_approach = real((problem.sum_over_cells(d_pressure) - vector[-1] / weight) / total)
-        return np.append((d_pressure - d_approach * answer).ravel(), d_approach)
-
-    solved = _solved(product, precondition, np.append(rhs, real(weight * missing)))
-    return known_change + solved[:-1].reshape(cells), float(solved[-1])
+    def precondition(self, rows: Field) -> Field:
+        """Apply the approximate inverse."""
+        d_pressure = self.linear(rows[:-1].reshape(self.cells))
+        excess = self.problem.sum_over_cells(d_pressure) - rows[-1] / self.weight
+        d_approach = self.linear.dtype(excess / self.load_response)
+        return np.append((d_pressure - d_approach * self.response).ravel(), d_approach)
 
 
 def _solved(product: Operator, precondition: Operator, rhs: Field) -> Field:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.contact_solution import ContactSolution
 from asperity.ehl.controls import CONTINUATION, ERROR_ESTIMATE
+from asperity.ehl.grid_transfer import AnyField
 from asperity.ehl.load_shares import CENTRE, area_share, carried_share
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
@@ -76,15 +76,11 @@ class Search:
         self, levels: Sequence[Problem], pressure: Field, approach: float, *, fixed: bool
     ) -> Step:
         """Solve on successive grids, from the last, coarsest one to the first."""
-        options, self.figures, self.smooth = self.options, [], not np.any(levels[0].roughness)
+        self.figures, self.smooth = [], not np.any(levels[0].roughness)
         self.cell = levels[0].spacing[0]
         for problem in reversed(levels):
             coarsest, finest = problem is levels[-1], problem is levels[0]
-            tolerance = (
-                options.tolerance
-                if finest
-                else max(CONTINUATION.coarse_tolerance, options.tolerance)
-            )
+            tolerance = self.level_tolerance(finest=finest)
             if problem.cells != pressure.shape:
                 pressure = problem.interpolate(pressure)
             if fixed:
@@ -92,35 +88,49 @@ class Search:
                     problem, pressure, approach, tolerance, from_outside=coarsest
                 )
             else:
-                most = (
-                    options.max_iterations
-                    if finest
-                    else min(options.max_iterations, CONTINUATION.max_coarse_iterations)
+                most = self.options.max_iterations
+                if not finest:
+                    most = min(most, CONTINUATION.max_coarse_iterations)
+                bracket = coarsest and not finest
+                step = self._solve_level(
+                    problem, pressure, approach, tolerance, most, bracket=bracket
                 )
-                steps = newton(problem, pressure, approach)
-                step = self.run(
-                    problem,
-                    steps,
-                    tolerance,
-                    most,
-                    divergence=CONTINUATION.divergence if problem.accurate else np.inf,
-                )
-                if (
-                    problem.accurate
-                    and step.number < most
-                    and not (self.converged(tolerance) or self.failed)
-                ):  # diverged
-                    pressure, approach = self.robust_start(problem, pressure, approach)
-                    step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
-                if coarsest and not finest and not self.converged(CONTINUATION.failed_residual):
-                    # the load of a capped contact is too nonlinear in the approach for Newton
-                    found = self.bracket_approach(
-                        problem, pressure, approach, tolerance, from_outside=True
-                    )
-                    step = found if self.converged(CONTINUATION.failed_residual) else step
             pressure, approach = step.balance.pressure, step.approach
             if coarser_in_all_axes(problem, levels[0]):
                 self.figures.append(self._figures(step))
+        return step
+
+    def level_tolerance(self, *, finest: bool) -> float:
+        """Return the tolerance on the finest or a coarser grid."""
+        tolerance = self.options.tolerance
+        return tolerance if finest else max(CONTINUATION.coarse_tolerance, tolerance)
+
+    def _solve_level(
+        self,
+        problem: Problem,
+        pressure: Field,
+        approach: float,
+        tolerance: float,
+        most: int,
+        *,
+        bracket: bool,
+    ) -> Step:
+        """Solve on one grid by Newton's method.
+
+        Where the third-order wedge diverges, retry from a second-order start; with `bracket`, where
+        that fails too, at fixed approach.
+        """
+        steps = newton(problem, pressure, approach)
+        divergence = CONTINUATION.divergence if problem.accurate else np.inf
+        step = self.run(problem, steps, tolerance, most, divergence=divergence)
+        diverged = step.number < most and not (self.converged(tolerance) or self.failed)
+        if problem.accurate and diverged:
+            pressure, approach = self.robust_start(problem, pressure, approach)
+            step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
+        if bracket and not self.converged(CONTINUATION.failed_residual):
+            # the load of a capped contact is too nonlinear in the approach for Newton
+            found = self.bracket_approach(problem, pressure, approach, tolerance, from_outside=True)
+            step = found if self.converged(CONTINUATION.failed_residual) else step
         return step
 
     def robust_start(
@@ -189,40 +199,25 @@ class Search:
     ) -> Step:
         """Solve at fixed approach, and search the approach that carries the load.
 
-        Slower, but each problem is simpler. The load falls with the approach, which is bracketed
-        and then found by the Illinois variant of false position.
+        Slower, but each problem is simpler.
         """
         roughness = float(np.std(problem.roughness))
         stride = max(0.5, 0.5 * roughness) if from_outside else max(0.05, 0.05 * roughness)
         approach += 2.0 * roughness if from_outside else 0.0
-        # approach and load error, by whether the load is too large
-        bracket: dict[bool, tuple[float, float]] = {}
-        last_side, left = None, self.options.max_iterations
+        bracket, left = _Bracket(stride), self.options.max_iterations
         while True:
-            most = min(left, CONTINUATION.max_fixed_iterations)
             step = self.run(
                 problem,
                 newton(problem, pressure, approach, fixed=True),
                 tolerance,
-                most,
+                min(left, CONTINUATION.max_fixed_iterations),
                 check_load=False,
             )
             left -= max(step.number, 1)
-            pressure, error = step.balance.pressure, step.balance.load_error
+            pressure = step.balance.pressure
             if left <= 0 or self.failed or self.converged(tolerance):
                 return step
-            side = error > 0.0
-            bracket[side] = approach, error
-            if len(bracket) < 2:
-                approach += stride if side else -stride
-                stride *= 1.5
-                continue
-            if side == last_side:  # Illinois: halve the weight of the end that does not move
-                bracket[not side] = bracket[not side][0], 0.5 * bracket[not side][1]
-            last_side = side
-            (closer, too_much), (apart, too_little) = bracket[True], bracket[False]
-            share = min(max(too_much / (too_much - too_little), 0.02), 0.98)
-            approach = closer + share * (apart - closer)
+            approach = bracket.next_approach(approach, step.balance.load_error)
 
     def solution(
         self,
@@ -261,9 +256,9 @@ class Search:
         )
         stopped = SolveStatus.STALLED if self.failed else SolveStatus.OUT_OF_ITERATIONS
         touching = balance.in_contact & (balance.pressure > 0.0)
-        pressure, height, in_contact = (
+        pressure, height = (
             on_all_lines(balance.problem, part, lines)
-            for part in (balance.pressure, balance.height, touching)
+            for part in (balance.pressure, balance.height)
         )
         return ContactSolution(
             conditions=conditions,
@@ -272,7 +267,7 @@ class Search:
             options=self.options,
             pressure=pressure * scales.pressure,
             gap=height * scales.gap,
-            in_contact=in_contact,
+            in_contact=on_all_lines(balance.problem, touching, lines),
             rigid_approach=step.approach * scales.gap,
             convergence=Convergence(
                 status=SolveStatus.CONVERGED if self.converged(self.options.tolerance) else stopped,
@@ -303,7 +298,31 @@ class Search:
             self.progress(iteration)
 
 
-def on_all_lines(problem: Problem, field: Any, lines: int) -> Any:
+class _Bracket:
+    """Bracket of the approach for a load, by strides, then Illinois' false position."""
+
+    def __init__(self, stride: float) -> None:
+        self.stride = stride
+        # approach and load error, by whether the load is too large
+        self.ends: dict[bool, tuple[float, float]] = {}
+        self.last_side: bool | None = None
+
+    def next_approach(self, approach: float, error: float) -> float:
+        """Add an approach with its load error; return the next one."""
+        side = error > 0.0
+        self.ends[side] = approach, error
+        if len(self.ends) < 2:
+            stride, self.stride = self.stride, 1.5 * self.stride
+            return approach + (stride if side else -stride)
+        if side == self.last_side:  # Illinois: halve the weight of the end that does not move
+            self.ends[not side] = self.ends[not side][0], 0.5 * self.ends[not side][1]
+        self.last_side = side
+        (closer, too_much), (apart, too_little) = self.ends[True], self.ends[False]
+        share = min(max(too_much / (too_much - too_little), 0.02), 0.98)
+        return closer + share * (apart - closer)
+
+
+def on_all_lines(problem: Problem, field: AnyField, lines: int) -> AnyField:
     """Expand a field, (nx', ny'), of a reduced problem to so many lines of cells."""
     whole = problem.unfold(field)
     return np.repeat(whole, lines // whole.shape[1], axis=1)
@@ -345,27 +364,32 @@ def grid_error(
             coarse.abs_difference(before[-1]).scale(ERROR_ESTIMATE.min_difference)
         )
     if smooth:
-        return GridError(
-            **asdict(replace(apart if order > 1 else apart.scale(3.0), **ends)), lean=nothing
-        )
-    share = 1.0
+        half, lean = apart if order > 1 else apart.scale(3.0), nothing
+    else:
+        half, lean = _rough_interval(on_grids, apart, cell, by_first_order)
+        lean = replace(lean, **dict.fromkeys(ends, 0.0))
+    return GridError(**asdict(replace(half, **ends)), lean=lean)
+
+
+def _rough_interval(
+    on_grids: Sequence[Figures], apart: Figures, cell: float, by_first_order: Figures | None
+) -> tuple[Figures, Figures]:
+    """Return half the width and the lean of a rough solution's intervals; see `grid_error`."""
+    coarse, fine = on_grids[-2:]
+    nothing, share = fine.abs_difference(fine), 1.0
     if by_first_order is not None:
-        apart, share = (
-            apart.maximum(fine.abs_difference(by_first_order)),
-            ERROR_ESTIMATE.two_order_share,
-        )
+        apart = apart.maximum(fine.abs_difference(by_first_order))
+        share = ERROR_ESTIMATE.two_order_share
     half = apart.scale(0.5 * share * (ERROR_ESTIMATE.forward + ERROR_ESTIMATE.backward)).add(
         replace(nothing, clr=share * ERROR_ESTIMATE.load_share_per_cell * cell**2)
     )
     lean = apart.scale(0.5 * share * (ERROR_ESTIMATE.forward - ERROR_ESTIMATE.backward)).copysign(
         fine.difference(coarse)
     )
-    if by_first_order is not None and before:
+    if by_first_order is not None and len(on_grids) > 2:
         half_clr, lean_clr = _load_share_error(apart.clr, fine.clr - coarse.clr, cell)
         half, lean = replace(half, clr=half_clr), replace(lean, clr=lean_clr)
-    return GridError(
-        **asdict(replace(half, **ends)), lean=replace(lean, **dict.fromkeys(ends, 0.0))
-    )
+    return half, lean
 
 
 def _load_share_error(apart: float, change: float, cell: float) -> tuple[float, float]:

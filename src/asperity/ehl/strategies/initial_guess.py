@@ -40,16 +40,11 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
         whole = None if coarser is None else coarser._replace(total=problem.unfold(coarser.total))
         pressure, approach = dry_start(problem.unfolded, whole)
         return np.ascontiguousarray(pressure[:, : problem.cells[1]]), approach
-    dry, guess = (
-        replace(problem, lubricant=None, contact_gap=0.0),
-        problem.form.hertz(problem.x, problem.y),
-    )
-    if coarser is not None:
-        guess = problem.interpolate(coarser.total)
-    if np.all(guess < problem.p_cap):
-        pressure, approach, converged = elastic_contact(dry, guess, CONTINUATION.coarse_tolerance)
-        if converged and np.all(pressure < problem.p_cap):
-            return pressure, approach
+    dry = replace(problem, lubricant=None, contact_gap=0.0)
+    hertz = problem.form.hertz(problem.x, problem.y)
+    guess = hertz if coarser is None else problem.interpolate(coarser.total)
+    if (elastic := _elastic_start(dry, guess)) is not None:
+        return elastic
     approach_guess = (
         _first_contact(dry, guess) if coarser is None else coarser.approach - problem.contact_gap
     )
@@ -60,12 +55,19 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
         step, converged = _by_newton(dry, guess, approach_guess)
         if converged:
             return step.balance.pressure, step.approach
-        guess = problem.form.hertz(problem.x, problem.y)
-    pressure, approach, converged = dry_contact(dry, guess, max_steps=GUESS.max_gradient_steps)
+    pressure, approach, converged = dry_contact(dry, hertz, max_steps=GUESS.max_gradient_steps)
     if not converged:
         step, _ = _by_newton(dry, pressure, approach)
         pressure, approach = step.balance.pressure, step.approach
     return pressure, approach
+
+
+def _elastic_start(dry: Problem, guess: Field) -> tuple[Field, float] | None:
+    """Return pressure and approach of elastic bodies; None if they reach the cap."""
+    if np.any(guess >= dry.p_cap):
+        return None
+    pressure, approach, converged = elastic_contact(dry, guess, CONTINUATION.coarse_tolerance)
+    return (pressure, approach) if converged and np.all(pressure < dry.p_cap) else None
 
 
 def _first_contact(dry: Problem, pressure: Field) -> float:

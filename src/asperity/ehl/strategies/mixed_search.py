@@ -212,33 +212,28 @@ class MixedSearch(Search):
             most = min(most, SEARCH.max_roller_iterations)
         if not uses_limiter(problem):
             return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
-        roughly = max(SEARCH.first_order_tolerance, tolerance)
-        steps = newton(problem, unknowns, second_order=False)
-        step = self.run(
-            problem,
-            steps,
-            roughly,
-            min(most, SEARCH.max_first_order_iterations),
-            divergence=SEARCH.divergence,
+        step = self._solve_first_order(
+            problem, unknowns, length, min(most, SEARCH.max_first_order_iterations), tolerance
         )
-        if not self.converged(roughly):  # the last time step was too inaccurate
-            unknowns = unknowns_of(
-                self.march_in_time(
-                    problem, unknowns, length, tolerance=SEARCH.first_order_tolerance
-                )
-            )
-            step = self.run(
-                problem,
-                newton(problem, unknowns, second_order=False),
-                roughly,
-                min(most, SEARCH.max_first_order_iterations),
-            )
         if not self.converged(CONTINUATION.failed_residual):
             return step
         self.by_first_order = self._figures(step)
         return self.run(
             problem, newton(problem, unknowns_of(step), second_order=True), tolerance, most
         )
+
+    def _solve_first_order(
+        self, problem: Problem, unknowns: Pressures, length: float, most: int, tolerance: float
+    ) -> Step:
+        """Solve roughly with the first-order wedge; retry from more accurate time steps."""
+        roughly = max(SEARCH.first_order_tolerance, tolerance)
+        steps = newton(problem, unknowns, second_order=False)
+        step = self.run(problem, steps, roughly, most, divergence=SEARCH.divergence)
+        if self.converged(roughly):
+            return step
+        step = self.march_in_time(problem, unknowns, length, tolerance=SEARCH.first_order_tolerance)
+        steps = newton(problem, unknowns_of(step), second_order=False)
+        return self.run(problem, steps, roughly, most)
 
     def march_in_time(
         self,
@@ -308,11 +303,8 @@ class MixedSearch(Search):
         for problem in reversed(levels):
             if roller:
                 dry, unknowns = roller_start(problem, coarser, *guess(problem))
-            elif unknowns is None:
-                pressure, approach = guess(problem)
-                unknowns = Pressures(pressure, pressure, approach)
-            elif problem.cells != unknowns.total.shape:
-                unknowns = interpolate_unknowns(problem, unknowns)
+            else:
+                unknowns = _level_guess(problem, unknowns, guess)
             if problem is levels[0]:
                 step = (
                     self.solve_from_coarse(problem, unknowns)
@@ -404,6 +396,20 @@ class MixedSearch(Search):
         self.history = [*coarse_search.history, *self.history]
         if coarse_search.converged(self.options.tolerance):
             self.figures = [*coarse_search.figures, *self.figures]
+
+
+def _level_guess(
+    problem: Problem,
+    coarser: Pressures | None,
+    guess: Callable[[Problem], tuple[Field, float]],
+) -> Pressures:
+    """Return the unknowns of the next coarser grid on this one; without these, those guessed."""
+    if coarser is None:
+        pressure, approach = guess(problem)
+        return Pressures(pressure, pressure, approach)
+    if problem.cells == coarser.total.shape:
+        return coarser
+    return interpolate_unknowns(problem, coarser)
 
 
 def _implicit_step(problem: Problem, length: float, content: Field) -> TransientTerm:
