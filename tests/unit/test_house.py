@@ -23,10 +23,10 @@ MOST_NODES = 350  # syntax nodes of a function
 MOST_PARAMETERS = 8  # library only; a command has one parameter per option
 DEEPEST = 3  # folders below src
 IMPORTS_INSIDE_FUNCTIONS = 80  # upper limit; allowed only where they save start-up time
-LARGE_FUNCTIONS = 206  # ratchet: functions above MOST_NODES; aim 0
-MOST_ANY = 810  # ratchet; aim 300
-MOST_LINES = 74_500  # ratchet; aim 57 000
-NODES_PER_LINE = 9.55  # ratchet; aim 9.5
+LARGE_KERNELS = 17  # ratchet: compiled kernels above MOST_NODES; their split costs time
+MOST_ANY = 230  # ratchet
+MOST_LINES = 76_700  # ratchet; aim 57 000
+NODES_PER_LINE = 9.5
 
 
 def test_no_file_is_too_long():
@@ -53,14 +53,16 @@ def test_no_function_is_too_long():
     assert not long, "\n".join(long)
 
 
-def test_the_number_of_large_functions_decreases():
+def test_only_compiled_kernels_have_many_nodes():
     sizes = {
         f"{name} {function.name}": sum(1 for _ in ast.walk(function))
         for name, tree in modules()
         for function in functions(tree)
     }
-    large = {name: size for name, size in sizes.items() if size > MOST_NODES}
-    assert len(large) <= LARGE_FUNCTIONS, "\n".join(sorted(large, key=large.get, reverse=True)[:20])
+    large = {name for name, size in sizes.items() if size > MOST_NODES}
+    kernels = {name for name in large if name.startswith("kernels/")}
+    assert large == kernels, "\n".join(sorted(large - kernels))
+    assert len(kernels) <= LARGE_KERNELS, "\n".join(sorted(kernels))
 
 
 def test_argument_lists_are_short():

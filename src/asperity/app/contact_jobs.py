@@ -34,7 +34,10 @@ ReportWriter = Callable[
 
 COARSE_CELLS = 64 * 64  # largest number of cells of a coarse solution
 COARSEST_CELLS = 32 * 32  # the same, if that one does not converge within its steps
-COARSE_TOLERANCE, WARM_STEPS, COLD_STEPS, COARSEST_STEPS = 1e-2, 14, 40, 150
+COARSE_TOLERANCE = 1e-2
+WARM_STEPS = 14
+COLD_STEPS = 40
+COARSEST_STEPS = 150
 MIN_CORRELATION = 0.9  # of two roughnesses for a warm start
 TIME_LIMIT_S = 60.0  # for one contact
 
@@ -95,7 +98,8 @@ def _progress_hook(
     ticket: Ticket, seconds: float, steps: float = math.inf
 ) -> Callable[[Iteration], None]:
     """Return a callback for the solver that stops it at a limit or when superseded."""
-    end, step_numbers = time.monotonic() + seconds, itertools.count(1)
+    end = time.monotonic() + seconds
+    step_numbers = itertools.count(1)
 
     def check(step: Iteration) -> None:  # noqa: ARG001 - only its occurrence matters
         if next(step_numbers) > steps:
@@ -153,7 +157,8 @@ def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) ->
     began = time.perf_counter()
     limit_cells(case.source, case.grid.cells)
     fine = case.surface()
-    coarse, coarsest = _coarsen(fine, COARSE_CELLS), _coarsen(fine, COARSEST_CELLS)
+    coarse = _coarsen(fine, COARSE_CELLS)
+    coarsest = _coarsen(fine, COARSEST_CELLS)
     attempts: list[tuple[Surface | None, ContactSolution | None, int]]
     attempts = [(coarse, None, COLD_STEPS), (coarsest, None, COARSEST_STEPS)]
     if start is not None and coarse is not None and _are_similar(start.surface, coarse):

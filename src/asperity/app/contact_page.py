@@ -199,7 +199,8 @@ class ContactView:
         self._draw_trials()
 
     def _draw_spectrum(self) -> None:
-        result, pinned = self.session.result, self.session.pinned
+        result = self.session.result
+        pinned = self.session.pinned
         if self._spectrum is not None and result is not None and not result.coarse:
             self._spectrum.show(
                 result.spectrum,

@@ -246,7 +246,8 @@ def _resonance_spectrum(run: Run) -> ResonanceSpectrum | None:
     vibration = run.vibration
     if vibration is None:
         return None
-    (low, high), resonance = vibration.band_hz, vibration.resonance
+    (low, high) = vibration.band_hz
+    resonance = vibration.resonance
     spectrum_in_band = partial(
         ResonanceSpectrum,
         band_hz=vibration.band_hz,

@@ -2,7 +2,9 @@
 
 from asperity.case import Case
 
-CASE_FILE, SCRIPT, REPORT = "contact.toml", "contact.py", "contact.html"
+CASE_FILE = "contact.toml"
+SCRIPT = "contact.py"
+REPORT = "contact.html"
 
 
 def case_text(case: Case) -> str:

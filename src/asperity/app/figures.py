@@ -31,10 +31,14 @@ from asperity.core.quantities import quantity
 BLUE, VERMILION, GREEN, GREY = "#2b8fd0", "#d55e00", "#00a577", "#808893"
 FILMS = Viridis256[:208]  # without yellow, the colour of contact
 CHANGES = interp_palette(RdBu11, 256)  # thinner: blue, thicker: red
-CONTACT, CAVITY = (0xF7, 0xDC, 0x4A), (0x5B, 0x6B, 0x86)
+CONTACT = (0xF7, 0xDC, 0x4A)
+CAVITY = (0x5B, 0x6B, 0x86)
 # text of legends and colour bars, which ignore the style sheet: legible on light and dark
 TYPE = "#74818f"
-HEIGHT, SECTION_HEIGHT, SPECTRUM_HEIGHT, TRIALS_HEIGHT = 300, 250, 480, 240
+HEIGHT = 300
+SECTION_HEIGHT = 250
+SPECTRUM_HEIGHT = 480
+TRIALS_HEIGHT = 240
 Plot: TypeAlias = Any  # a figure of Bokeh, whose types lack the attributes that are set here
 Array: TypeAlias = Any  # numbers of any shape
 Source: TypeAlias = dict[str, Any]  # columns of a data source by name
@@ -155,10 +159,12 @@ class MapFigures:
             self.change = self._map("Film minus pinned film", CHANGES, "gap")
         self._set_extent((x0, x1), (y0, y1))
         place = {"x": [x0], "y": [y0], "dw": [x1 - x0], "dh": [y1 - y0]}
-        gap, top = to_display("gap", result.gap), to_display("gap", result.gap_top) or 1.0
+        gap = to_display("gap", result.gap)
+        top = to_display("gap", result.gap_top) or 1.0
         self._fill(self.film, gap, (0.0, top), place, _state_colours(result))
         largest = max(float(result.pressure.max()), result.hertz_pressure)
-        pressure, top = to_display("pressure", result.pressure), to_display("pressure", largest)
+        pressure = to_display("pressure", result.pressure)
+        top = to_display("pressure", largest)
         self._fill(self.pressure, pressure, (0.0, top), place, None)
         zone = _hertz_outline(result, (y0, y1))
         for plot in self._figures():

@@ -46,15 +46,14 @@ def _law(title: str, group: str, laws: Mapping[str, type]) -> InputSpec:
     return InputSpec("", group, more=True, title=title, laws=laws)
 
 
-MOTION, OIL, ROUGHNESS, BODIES, VIBRATION, GRID = (
-    "Load and motion",
-    "Oil",
-    "Roughness",
-    "Bodies",
-    "Vibration",
-    "Grid",
-)
-MODEL, SECOND = "Model", "Roughness of the second body"
+MOTION = "Load and motion"
+OIL = "Oil"
+ROUGHNESS = "Roughness"
+BODIES = "Bodies"
+VIBRATION = "Vibration"
+GRID = "Grid"
+MODEL = "Model"
+SECOND = "Roughness of the second body"
 PRESETS = ("sound", "paper")
 _SURFACE: dict[str, InputSpec] = {
     "sq": InputSpec("sq_m", ROUGHNESS),
@@ -248,7 +247,8 @@ def case_inputs(case: Case) -> dict[str, CaseInput]:
 
 def _names(tables: Table, key: str) -> tuple[str, ...]:
     """Return the options of a choice; laws whose required parameters the case lacks are omitted."""
-    spec, table = INPUT_SPECS[key], _lookup(tables, key.rpartition(".")[0])
+    spec = INPUT_SPECS[key]
+    table = _lookup(tables, key.rpartition(".")[0])
     possible = [name for name, law in spec.laws.items() if _required_parameters(law) <= set(table)]
     return (*spec.names, *possible)
 
@@ -267,7 +267,8 @@ def overrides(case: Case, changes: Mapping[str, str]) -> dict[str, object]:
 
     Pairs are given whole, cells as a list, and laws with their own parameters only.
     """
-    tables, merged = tomllib.loads(case.text), dict[str, object]()
+    tables = tomllib.loads(case.text)
+    merged = dict[str, object]()
     for key, text in sorted(
         changes.items(), key=lambda change: change[0].rpartition(".")[2] != "law"
     ):

@@ -262,8 +262,10 @@ class RecordingsView:
         if not series.levels.size:
             self._water.data = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
             return
-        count, (low, high) = len(series.rows), series.band_hz
-        low_hz, high_hz = float(series.frequency[0]), float(series.frequency[-1])
+        count = len(series.rows)
+        (low, high) = series.band_hz
+        low_hz = float(series.frequency[0])
+        high_hz = float(series.frequency[-1])
         place = {"x": [0.5], "y": [low_hz], "dw": [count], "dh": [high_hz - low_hz]}
         self._water.data = {"image": [np.ascontiguousarray(series.levels.T)], **place}
         self.waterfall.x_range.update(start=0.5, end=count + 0.5)
@@ -299,7 +301,8 @@ class RecordingsView:
         if series is None or not name.partition(":")[0].isdigit():
             return
         number = int(name.partition(":")[0]) - 1
-        row, spectrum = series.rows[number], series.spectra[number]
+        row = series.rows[number]
+        spectrum = series.spectra[number]
         crf = quantity("crf_hz").text(row["crf_hz"], row["crf_std_hz"])
         self.one.title.text = (
             f"{row['file']}: CRF {crf}" if row["found"] else f"{row['file']}: {row['reason']}"

@@ -177,7 +177,8 @@ class PageSite:
     def _page(
         self, here: str, heading: str, parts: dict[str, object], sections: list[PageSection]
     ) -> Any:
-        page, document = panel.Template(self.template, location=True), _document()
+        page = panel.Template(self.template, location=True)
+        document = _document()
         with document.models.freeze():  # update the model list once, not after every part
             for name, part in parts.items():
                 if isinstance(part, UIElement):

@@ -66,9 +66,11 @@ class FileDrop(FileDropper):  # type: ignore[misc]
         if event.event_name != "upload_event":
             return
         chunk = event.data
-        name, data = str(chunk.get("name", "")), chunk.get("data", b"")
+        name = str(chunk.get("name", ""))
+        data = chunk.get("data", b"")
         try:
-            number, total = int(chunk["chunk"]), int(chunk["total_chunks"])
+            number = int(chunk["chunk"])
+            total = int(chunk["total_chunks"])
             data = data.encode() if isinstance(data, str) else bytes(data)
         except (KeyError, TypeError, ValueError):
             self._on_error("A chunk of the file was damaged. Drop the file again.")

@@ -122,7 +122,8 @@ def _half_width(x: Field, pressure: Field) -> float:
 def _wave(given: CaseTable, cells: int) -> dict[str, float]:
     """Solve waves across a wide line contact, whose middle approximates an infinite contact."""
     pair = ElasticPair(tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"]))
-    length, amplitude = given["wavelength_m"], given["amplitude_m"]
+    length = given["wavelength_m"]
+    amplitude = given["amplitude_m"]
     p_mean = given["pressure_over_full"] * np.pi * pair.reduced_modulus * amplitude / length
     a = 30.0 * length
     wide = {
@@ -161,7 +162,8 @@ def _oil(given: CaseTable) -> Lubricant:
 
 
 def _ehl_grid(given: CaseTable, a: float, cells: int) -> Grid:
-    low, high = given["inlet_half_widths"] * a, given["outlet_half_widths"] * a
+    low = given["inlet_half_widths"] * a
+    high = given["outlet_half_widths"] * a
     if given["geometry"] == "point":
         side = given["side_half_widths"] * a
         return Grid((cells, cells), (low, -side), (high, side), periodic=(False, False))
@@ -176,7 +178,8 @@ def _oiled_waves(given: CaseTable, grid: Grid) -> Surface:
     Each wave is (amplitude [m], waves per metre along x, waves over the width along y, phase
     [rad]).
     """
-    x, y = grid.x[:, None], grid.y[None, :] / given.get("width_m", 1.0)
+    x = grid.x[:, None]
+    y = grid.y[None, :] / given.get("width_m", 1.0)
     heights = [
         a * np.cos(2.0 * np.pi * (wavenumber * x + across * y) + phase)
         for a, wavenumber, across, phase in given["waves"]
@@ -197,7 +200,9 @@ def _ehl(given: CaseTable, cells: int) -> dict[str, float]:
 
 
 def _films(given: CaseTable, solution: ContactSolution) -> dict[str, float]:
-    grid, gap, pressure = solution.grid, solution.gap, solution.pressure
+    grid = solution.grid
+    gap = solution.gap
+    pressure = solution.pressure
     if given["geometry"] == "point":
         state = contact_state(solution)
         return {"h_central_m": state.h_central, "h_min_m": state.h_min}
@@ -227,7 +232,8 @@ def _moving(given: CaseTable, cells: int) -> dict[str, float]:
     grid = _ehl_grid(given, a, cells)
     surfaces = MovingSurfaces.one_rough(_oiled_waves(given, grid), speeds)
     ((amplitude, wavenumber, _, _),) = given["waves"]
-    step, rough = grid.spacing[0], speeds[0] / float(np.mean(speeds))
+    step = grid.spacing[0]
+    rough = speeds[0] / float(np.mean(speeds))
     period = round(1.0 / (wavenumber * rough * step))
     last = round(given["settles_half_widths"] * a / step) + period
     films = []

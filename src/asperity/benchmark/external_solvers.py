@@ -29,7 +29,8 @@ class DryContactSolver(ABC):
         return {} if given["geometry"] == "line" else self._bounded(given, cells, modulus)
 
     def _bounded(self, given: CaseTable, cells: int, modulus: float) -> dict[str, float]:
-        load, radius = given["load_n"], given["radius_m"]
+        load = given["load_n"]
+        radius = given["radius_m"]
         radii = tuple(radius) if isinstance(radius, list) else (radius, radius)
         hertz = (
             elliptic_contact(load, radii, modulus)
@@ -50,7 +51,8 @@ class DryContactSolver(ABC):
         return pressures(pressure * modulus, grid.spacing[0] * grid.spacing[1])
 
     def _wave(self, given: CaseTable, cells: int, modulus: float) -> dict[str, float]:
-        length, amplitude = given["wavelength_m"], given["amplitude_m"]
+        length = given["wavelength_m"]
+        amplitude = given["amplitude_m"]
         mean = given["pressure_over_full"] * np.pi * amplitude / length
         wave = amplitude / length * np.cos(2.0 * np.pi * (np.arange(cells) + 0.5) / cells)
         pressure, gap = self.pressed(np.tile(wave, (cells, 1)), (1.0, 1.0), mean, images=True)

@@ -82,7 +82,8 @@ class Case:
     @cached_property
     def conditions(self) -> ContactConditions:
         """Bodies, load and motion."""
-        contact, material = self.contents.contact, self.contents.material
+        contact = self.contents.contact
+        material = self.contents.material
         speed = plain(contact.entrainment_speed)
         pair = ElasticPair(plain(material.youngs_modulus), material.poisson_ratio)
         shape = None
@@ -138,8 +139,10 @@ class Case:
         Half-widths are converted to metres, also along the length of a line contact. Stored
         roughness brings its own grid.
         """
-        section, conditions = self.contents.grid, self.conditions
-        line, (a, b) = conditions.endless, conditions.hertz.half_widths
+        section = self.contents.grid
+        conditions = self.conditions
+        line = conditions.endless
+        (a, b) = conditions.hertz.half_widths
         if section.chosen and self.stored is not None:
             return self.stored.grid
         x, y = (
@@ -217,11 +220,9 @@ class Case:
         are joined. Raises BadInput for one measured surface on both bodies, a track that it does
         not cover, or the roughness of a run, which does not extend along the track.
         """
-        section, rough, speeds = (
-            self.contents.surface,
-            self.motion.rough,
-            self.conditions.surface_speeds,
-        )
+        section = self.contents.surface
+        rough = self.motion.rough
+        speeds = self.conditions.surface_speeds
         track = track_grid(self.grid, self.motion.track)
         _require_affordable(track)
         with self.naming("surface"):
@@ -293,7 +294,8 @@ class Case:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on the case for a reader of the results, one sentence each."""
-        conditions, oil = self.conditions, self.lubricant
+        conditions = self.conditions
+        oil = self.lubricant
         of_oil = () if self._sheet is None else self._sheet.notes()
         return (
             *of_oil,

@@ -41,7 +41,8 @@ def section_field(kind: Any, default: object, unit: str) -> tuple[object, object
 
 def section_fields(law: type) -> FieldSpecs:
     """Return the fields of a dataclass as fields of a section."""
-    types, marks = get_type_hints(law), parameters(law)
+    types = get_type_hints(law)
+    marks = parameters(law)
     return {
         entry.name: section_field(types[entry.name], entry.default, marks[entry.name].unit)
         for entry in fields(law)
@@ -93,7 +94,8 @@ def _both(kind: Any, default: object) -> tuple[Any, object]:
     return Annotated[tuple[kind, kind], PAIRED], (default, default)
 
 
-_THERMAL, _SOLID = section_fields(Thermal), section_fields(Solid)
+_THERMAL = section_fields(Thermal)
+_SOLID = section_fields(Solid)
 _NUMBERS: FieldSpecs = {
     "ambient": _THERMAL["ambient"],
     "bulk": (
@@ -137,7 +139,8 @@ class ThermalSection(_Numbers):  # type: ignore[misc]  # fields of `Thermal` and
         Raises BadInput for an ambient temperature that is neither the default nor the oil's.
         """
         defaulted = () if oil is None else self.defaulted
-        ambient, warmth = plain(self.ambient), make_law("warmth", law_description(self.warmth))
+        ambient = plain(self.ambient)
+        warmth = make_law("warmth", law_description(self.warmth))
         if oil is not None:
             if "ambient" not in defaulted and ambient != oil.temperature:
                 raise BadInput(

@@ -270,7 +270,8 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
         raise BadInput(f"{source}: has a [machine] and a [contact]; leave one of them out")
     known = {key: tables[key] for key in _MachineTables.model_fields if key in tables}
     stated = parse_section(_MachineTables, {"material": STEEL, **known}, source)
-    section, material = stated.machine, stated.material
+    section = stated.machine
+    material = stated.material
     pair = ElasticPair(plain(material.youngs_modulus), material.poisson_ratio)
     given = {
         name: plain(getattr(section, name)) for name in type(section).model_fields if name != "kind"

@@ -137,7 +137,9 @@ def _first_error(model: type[Section], error: ValidationError) -> LocatedError:
     """Return the error to fix first: a mistyped key explains a missing one."""
     errors = error.errors(include_url=False)
     entry = next((m for m in errors if m["type"] == "extra_forbidden"), errors[0])
-    keys, kind, given = entry["loc"], entry["type"], entry["input"]
+    keys = entry["loc"]
+    kind = entry["type"]
+    given = entry["input"]
     cause = entry.get("ctx", {}).get("error")
     if isinstance(cause, LocatedError):
         return LocatedError(keys + cause.keys, cause.message)

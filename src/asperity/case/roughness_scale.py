@@ -64,8 +64,10 @@ def _turned(sq: float, sizes: Pair, direction: float, shares: Pair = (1.0, 1.0))
 
     The domain holds at least two of each size.
     """
-    cosine, sine = abs(math.cos(direction)), abs(math.sin(direction))
-    first, second = sizes[0] * shares[0], sizes[1] * shares[1]
+    cosine = abs(math.cos(direction))
+    sine = abs(math.sin(direction))
+    first = sizes[0] * shares[0]
+    second = sizes[1] * shares[1]
     return Texture(
         sq=sq,
         lengths=(

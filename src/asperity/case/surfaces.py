@@ -220,10 +220,8 @@ class GeneratedSection(SurfaceSection):
         if self.kind not in ("gaussian", "non-gaussian"):
             return ()
         arguments = self.arguments()
-        stated, lengths = (
-            arguments["correlation_length"],
-            correlation_lengths(surface, arguments["direction"]),
-        )
+        stated = arguments["correlation_length"]
+        lengths = correlation_lengths(surface, arguments["direction"])
         if all(
             abs(sample / mean - 1.0) <= SAMPLE_DEVIATION
             for sample, mean in zip(lengths, stated, strict=True)

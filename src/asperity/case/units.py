@@ -144,7 +144,8 @@ def _common(unit_text: str) -> tuple[str, str] | None:
 @lru_cache(4096)  # a case has forty quantities, and a study repeats most of them a thousand times
 def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
     """Convert a number of `unit_text` to `unit`; None is the SI unit of its kind."""
-    own, target = _common(unit_text), _common(unit_text if unit is None else unit)
+    own = _common(unit_text)
+    target = _common(unit_text if unit is None else unit)
     if own is not None and target is not None and own[0] == target[0]:
         return Decimal(number) * Decimal(own[1]) / (1 if unit is None else Decimal(target[1]))
     import pint

@@ -93,7 +93,8 @@ def _show_set(folder: Path, *, as_json: bool, quiet: bool) -> None:
 def _details(checked: "CheckedRecording") -> Block:
     """Yield every fact of a recording with its source."""
     recording, quality = checked
-    facts, state = recording.facts, "usable" if quality.usable else "NOT USABLE"
+    facts = recording.facts
+    state = "usable" if quality.usable else "NOT USABLE"
     values = checked.scalars()
     level = ", ".join(quantity(key).number_in(values) for key in ("rms", "peak", "offset"))
     rows = [
@@ -124,7 +125,9 @@ def _summary(checks: "RecordingChecks") -> Block:
     rows: list[list[str]] = []
     holders: dict[str, list[str]] = {}
     for checked in checks.checked:
-        values, recording, quality = checked.scalars(), checked.recording, checked.quality
+        values = checked.scalars()
+        recording = checked.recording
+        quality = checked.quality
         name = f"{recording.path.name}, {values['channel']}"
         state = "usable" if quality.usable else "NOT USABLE"
         rows.append([name, *(entry.number_in(values) for entry in selected), recording.unit, state])

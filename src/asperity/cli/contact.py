@@ -39,7 +39,8 @@ def demo(
 ) -> None:
     """Solve the paper's contact at a few roughness levels, from case file to report."""
     files.make_folder(out)
-    case_file, page = out / "paper.toml", out / "report.html"
+    case_file = out / "paper.toml"
+    page = out / "report.html"
     files.write_text(case_file, paper.papers_text())
     chosen = case.load_case(case_file)
     runs = {}

@@ -299,7 +299,8 @@ def _show(
 
 def _posterior(found: "Inference") -> Block:
     """Return a row per quantity: median, interval with and without the law's error, information."""
-    exact, rows = found.posterior(discrepancy=False), []
+    exact = found.posterior(discrepancy=False)
+    rows = []
     for key, estimate in found.posterior().items():
         entry = quantity(key)
         rows.append(

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from asperity.core.quantities import Quantity
     from asperity.machines import MachineResult
 
-RESULT, PAGE, WORST_PAGE = "machine.json", "machine.html", "worst.html"
+RESULT = "machine.json"
+PAGE = "machine.html"
+WORST_PAGE = "worst.html"
 CONDITIONS = (  # key of a row, and of the quantity that formats it
     ("load_n", "load_n"),
     ("line_load_n_m", "line_load_n_per_m"),

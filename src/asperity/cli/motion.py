@@ -91,7 +91,8 @@ def run(
     except NotConverged as unfinished:
         if not isinstance(unfinished.solution, simulation.History):  # the start failed
             raise
-        moved, failure = unfinished.solution, str(unfinished)
+        moved = unfinished.solution
+        failure = str(unfinished)
     vibration = simulation.history_vibration(moved) if listen and failure is None else None
     if page is not None:
         report.write_motion_report(moved, page, vibration=vibration)
@@ -130,7 +131,8 @@ def _saved(moved: "History", page: Path | None) -> Block:
 
 def _history_table(moved: "History") -> Block:
     """Return means over the settled steps with their deviations, and initial values."""
-    values, motion = moved.scalars(), moved.case.motion
+    values = moved.scalars()
+    motion = moved.case.motion
     rows: list[Row] = [
         (
             "steps, computed now",

@@ -85,7 +85,7 @@ def known(values: Table, *groups: str) -> list[Row]:
     ]
 
 
-def text(key: str, value: object) -> str:
+def text(key: str, value: float | str | None) -> str:
     """Return a value as the catalogue shows it, with its unit."""
     return quantity(key).text(value)
 

@@ -188,7 +188,8 @@ def _curve(curve: "WearCurve | None") -> Block:
     """Return a row per level: means over its surfaces, with their deviations."""
     if curve is None:
         return
-    sq, selected = quantity("sq_m"), [quantity(key) for key in CURVE if key in curve.table]
+    sq = quantity("sq_m")
+    selected = [quantity(key) for key in CURVE if key in curve.table]
     means = [(entry, curve.mean(entry.key), curve.std(entry.key)) for entry in selected]
     yield from columns(
         [entry.label for entry in (sq, *selected)],

@@ -132,11 +132,9 @@ def _parameters(description: "SurfaceDescription", *, named: bool) -> Block:
     """Return the parameters of a map or profile, and its processing steps."""
     if named:
         yield str(description.path)
-    values, measured, of_map = (
-        description.scalars(),
-        description.measured,
-        description.profile is None,
-    )
+    values = description.scalars()
+    measured = description.measured
+    of_map = description.profile is None
     size = (
         surface.area_text(measured.grid.extent)
         if of_map

@@ -92,7 +92,8 @@ def vibrate(
 def _vibrate(chosen: "Case", figures: Path | None, *, as_json: bool, quiet: bool) -> None:
     with solver_progress(chosen.source, quiet=quiet) as step:
         vibrated = results.vibrate_case(chosen, progress=step)
-    vibration, scalars = vibrated.vibration, vibrated.scalars()
+    vibration = vibrated.vibration
+    scalars = vibrated.scalars()
     drawn: list[Path] = []
     if figures is not None and vibration.oscillator is not None and chosen.vibration is not None:
         drawn = [

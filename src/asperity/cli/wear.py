@@ -229,7 +229,8 @@ def _fitted(fitted: "WearFit") -> Block:
 
 def _contact(worn: "WearHistory") -> Block:
     """Return the initial and final values of the composite surface and the contact."""
-    first, last = worn.table.iloc[0], worn.final_values
+    first = worn.table.iloc[0]
+    last = worn.final_values
     rows = [
         (
             quantity(key).title,

@@ -201,7 +201,8 @@ class ContactConditions:
         """Load distribution along a roller by the slice model."""
         if self.length is None:
             raise BadInput(f"{with_article(self.geometry)} contact has no slices; use a roller")
-        radius, modulus = self.radius_along_rolling, self.pair.reduced_modulus
+        radius = self.radius_along_rolling
+        modulus = self.pair.reduced_modulus
         return sliced_load(self.roller, self.length, self.load, radius, modulus)
 
     @cached_property

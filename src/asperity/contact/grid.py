@@ -54,7 +54,9 @@ class Grid:
     @property
     def spacing(self) -> tuple[float, float]:
         """Cell sizes (dx, dy) [m]."""
-        (nx, ny), (x0, y0), (x1, y1) = self.cells, self.lower, self.upper
+        (nx, ny) = self.cells
+        (x0, y0) = self.lower
+        (x1, y1) = self.upper
         return (x1 - x0) / nx, (y1 - y0) / ny
 
     @property

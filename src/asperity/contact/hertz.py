@@ -80,7 +80,8 @@ def elliptic_contact(
     >>> f"{hertz.half_widths[0] * 1e6:.0f} by {hertz.half_widths[1] * 1e6:.0f} um"
     '71 by 320 um'
     """
-    ellipe, ellipk = scipy.special.ellipe, scipy.special.ellipk
+    ellipe = scipy.special.ellipe
+    ellipk = scipy.special.ellipk
     r_large, r_small = max(radii), min(radii)
     if np.isclose(r_large, r_small, rtol=3e-9, atol=0.0):  # no bracket, or a root without digits
         return point_contact(load, r_small, reduced_modulus)
@@ -103,7 +104,8 @@ def elliptic_contact(
 
 def _axis_ratio(radius_ratio: float) -> float:
     """Return the ratio of short to long semi-axis for a ratio of large to small radius."""
-    ellipe, ellipk = scipy.special.ellipe, scipy.special.ellipk
+    ellipe = scipy.special.ellipe
+    ellipk = scipy.special.ellipk
 
     def residual(log_k: float) -> float:
         k = np.exp(log_k)

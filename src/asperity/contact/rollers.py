@@ -165,7 +165,8 @@ class SlicedLoad(NamedTuple):
     @property
     def ends(self) -> tuple[float, float]:
         """Ends of the loaded length [m]."""
-        loaded, half = self.y[self.line_load > 0.0], 0.5 * (self.y[1] - self.y[0])
+        loaded = self.y[self.line_load > 0.0]
+        half = 0.5 * (self.y[1] - self.y[0])
         return float(loaded[0] - half), float(loaded[-1] + half)
 
 
@@ -191,7 +192,8 @@ def sliced_load(
     drop = shape.drop(y, length)
     stiffness = math.pi * reduced_modulus
     loaded_length, mean = between, load / between
-    low, high = float(drop.min()), float(drop.min()) + 1e4 * mean / stiffness
+    low = float(drop.min())
+    high = float(drop.min()) + 1e4 * mean / stiffness
     for _ in range(BISECTIONS):
         approach = 0.5 * (low + high)
         deflection = np.maximum(approach - drop, 0.0)

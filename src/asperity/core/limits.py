@@ -10,7 +10,8 @@ from pathlib import Path
 
 from asperity.core.errors import BadInput, UnreadableFile
 
-MEMORY, DAYS = "ASPERITY_MEMORY_GB", "ASPERITY_DAYS"
+MEMORY = "ASPERITY_MEMORY_GB"
+DAYS = "ASPERITY_DAYS"
 UNPACKED_BYTES = 256e6  # any file may unpack to this size
 UNPACKING_RATIO = 50.0  # largest expansion of a larger file; measured data compress less
 READING_RATIO = 12.0  # memory of a reader over the file's size, for text that becomes numbers
@@ -63,7 +64,8 @@ def require_affordable(task: str, *, memory: float = 0.0, seconds: float = 0.0) 
     task : subject of the message, with its value
     memory, seconds : estimates [bytes, s]; infinite and nan exceed every limit
     """
-    limit, days = memory_limit(), _environment_value(DAYS) or DEFAULT_DAYS
+    limit = memory_limit()
+    days = _environment_value(DAYS) or DEFAULT_DAYS
     if not memory <= limit:
         raise BadInput(
             f"{task} would take about {memory / GIGABYTE:.2g} GB of memory, more than the limit of "

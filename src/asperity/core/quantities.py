@@ -158,7 +158,8 @@ class Quantity:
         uncertainty. A share or film thickness whose deviation exceeds the physical range shows the
         clipped interval: "0.2 (0.0 to 7.1)".
         """
-        value, (low, high) = values.get(self.key), (_as_float(values.get(end)) for end in self.ends)
+        value = values.get(self.key)
+        (low, high) = (_as_float(values.get(end)) for end in self.ends)
         if self.ends[0] not in values:
             deviation = _as_float(values.get(self.deviation))
             clipped = self.clipped_interval(_as_float(value), deviation)
@@ -183,7 +184,8 @@ class Quantity:
         ):
             return None
         most = 1.0 if (self.unit, self.display) == ("1", "%") and value <= 1.0 else math.inf
-        low, high = max(0.0, value - deviation), min(most, value + deviation)
+        low = max(0.0, value - deviation)
+        high = min(most, value + deviation)
         return None if (low, high) == (value - deviation, value + deviation) else (low, high)
 
     def text_in(self, values: Table) -> str:
@@ -276,7 +278,8 @@ def quantity(key: str) -> Quantity:
             return replace(
                 base, key=key, symbol=f"{base.short}, {preset}", deviation=deviation, source=""
             )
-    plain, body = re.sub(r"_[12](?=_m3?$|$)", "", key), re.search(r"_([12])(?=_m3?$|$)", key)
+    plain = re.sub(r"_[12](?=_m3?$|$)", "", key)
+    body = re.search(r"_([12])(?=_m3?$|$)", key)
     if body is not None and plain in known:
         base = known[plain]
         return replace(

@@ -53,7 +53,8 @@ def read_in_subprocess(
         The reader failed, crashed, or exceeded its time or memory.
     """
     stored = stored_size(path)
-    memory, seconds = reading_limit(stored), BASE_SECONDS + SECONDS_PER_MEGABYTE * stored / 1e6
+    memory = reading_limit(stored)
+    seconds = BASE_SECONDS + SECONDS_PER_MEGABYTE * stored / 1e6
     limits = (memory, seconds)
     server = _current_server()
     if library:  # outside the time limit of the read
@@ -100,7 +101,8 @@ class _Server:
                     stdout=subprocess.PIPE,
                     stderr=subprocess.DEVNULL,
                 )
-            process, late = self.process, threading.Event()
+            process = self.process
+            late = threading.Event()
             assert process.stdin is not None
             assert process.stdout is not None
 

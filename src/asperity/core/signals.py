@@ -306,7 +306,8 @@ def smooth(spectrum: Spectrum, passes: int) -> Spectrum:
             f"five-point smoothing needs at least 5 lines, got {spectrum.density.size}; use a "
             "longer record"
         )
-    density, response = spectrum.density, np.ones(1)
+    density = spectrum.density
+    response = np.ones(1)
     for _ in range(passes):
         density = scipy.signal.savgol_filter(density, 5, 3, mode="interp")
         response = np.convolve(response, scipy.signal.savgol_coeffs(5, 3))

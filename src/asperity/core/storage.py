@@ -232,7 +232,8 @@ def read_manifest(folder: Path, *, of: str, layout: int) -> dict[str, Any]:
 
 def require_same_version(manifest: Mapping[str, Any], folder: Path) -> None:
     """Raise BadInput if another version of asperity began the folder, so that results never mix."""
-    found, current = manifest["versions"]["asperity"], asperity.__version__
+    found = manifest["versions"]["asperity"]
+    current = asperity.__version__
     if found != current:
         raise BadInput(
             f"{folder} was computed by asperity {found}, this is {current}; choose another folder"
@@ -241,7 +242,8 @@ def require_same_version(manifest: Mapping[str, Any], folder: Path) -> None:
 
 def version_notes(versions: Table) -> tuple[str, ...]:
     """Return a note if the results are from another version of asperity."""
-    found, current = versions.get("asperity"), asperity.__version__
+    found = versions.get("asperity")
+    current = asperity.__version__
     if found == current:
         return ()
     return (f"Computed by asperity {found}, read by {current}: recomputed values may differ.",)

@@ -200,7 +200,8 @@ class LinePatch(_Passing, PatchLaw):
 
     def __call__(self, source: Excitation, contact: LoadedContact) -> Excitation:
         """Return the average over the line; raise BadInput if the speed is zero."""
-        half_width, speed = contact.conditions.hertz.half_widths[0], self.speed(contact.conditions)
+        half_width = contact.conditions.hertz.half_widths[0]
+        speed = self.speed(contact.conditions)
         return PatchAverage(source=source, shape="line", half_width=half_width, speed=speed)
 
 
@@ -212,7 +213,8 @@ class PointPatch(_Passing, PatchLaw):
 
     def __call__(self, source: Excitation, contact: LoadedContact) -> Excitation:
         """Return the average over the circle; raise BadInput without speed or asperity load."""
-        conditions, speed = contact.conditions, self.speed(contact.conditions)
+        conditions = contact.conditions
+        speed = self.speed(contact.conditions)
         load = require_positive("load share of the asperities (CLR)", contact.clr) * conditions.load
         point = point_contact(
             load, conditions.radius_along_rolling, conditions.pair.reduced_modulus

@@ -229,7 +229,8 @@ def vibration_choices() -> Mapping[str, Choice]:
 
 @cache
 def _choices(law: type) -> tuple[tuple[str, Choice], ...]:
-    kinds, marks = get_type_hints(law), parameters(law)
+    kinds = get_type_hints(law)
+    marks = parameters(law)
     return tuple(
         (
             entry.name,
@@ -257,11 +258,9 @@ def _by_name(choices: Mapping[str, Any]) -> dict[str, Any]:
 
 def _law(slot: str, stated: Mapping[str, Any]) -> Any:
     """Return the law of a slot; parameters of its alternatives are checked too."""
-    default, label, laws = (
-        getattr(VibrationModel, slot).name,
-        _NAMES.get(slot, slot.replace("_", " ")),
-        LAWS[slot],
-    )
+    default = getattr(VibrationModel, slot).name
+    label = _NAMES.get(slot, slot.replace("_", " "))
+    laws = LAWS[slot]
     chosen = stated.get(slot, default)
     require_choice(label, chosen, laws)
     instances = {}

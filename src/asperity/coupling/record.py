@@ -145,7 +145,8 @@ def contact_vibration(
         `oscillator` and `excitation`.
     """
     full_load_crf_hz = require_sampling(conditions, model, state.sq)
-    objection, spring = _objection(state, model), None
+    objection = _objection(state, model)
+    spring = None
     if objection is None:
         try:
             spring = oscillator(state, conditions, model, solution=solution)

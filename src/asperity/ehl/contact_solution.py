@@ -79,10 +79,8 @@ class FileContents(NamedTuple):
                 **self.coordinates,
                 **self.variables,
             }.items():
-                along, values = (
-                    (dimensions,) if isinstance(dimensions, str) else dimensions,
-                    np.asarray(given),
-                )
+                along = (dimensions,) if isinstance(dimensions, str) else dimensions
+                values = np.asarray(given)
                 for dimension, length in zip(along, values.shape, strict=True):
                     if dimension not in file.dimensions:
                         file.dimensions[dimension] = length
@@ -230,7 +228,8 @@ class ContactSolution:
         }
 
     def _described(self) -> dict[str, Any]:
-        convergence, conditions = self.convergence, asdict(self.conditions)
+        convergence = self.convergence
+        conditions = asdict(self.conditions)
         if conditions["shape"] is None:
             del conditions["shape"]  # rollers only; unknown to readers older than rollers
         return {

@@ -74,7 +74,8 @@ class Deflection:
 
     def _field(self, waves: np.ndarray) -> Field:
         """Return the field of a transform, (nx, ny)."""
-        (nx, ny), (long, wide) = self.cells, self.padded
+        (nx, ny) = self.cells
+        (long, wide) = self.padded
         if self.mirror:
             cosines = scipy.fft.irfft(waves, n=long, axis=0, overwrite_x=True)[:nx]
             return np.ascontiguousarray(
@@ -88,7 +89,8 @@ class Deflection:
 
     def restrict_to(self, lines: int) -> "Deflection":
         """Return the deflection on that many adjacent lines along x, at most the whole grid."""
-        (_, ny), (_, wide) = self.cells, self.padded
+        (_, ny) = self.cells
+        (_, wide) = self.padded
         kernel = scipy.fft.ifft(self.spectrum[0], axis=0)[:lines].real
         long = scipy.fft.next_fast_len(2 * lines - 1)
         spectrum = np.ascontiguousarray(scipy.fft.fft(_even_extension(kernel, long), axis=0).real)
@@ -257,10 +259,8 @@ def _k0_polynomial() -> tuple[float, float, Field]:
     Returns centre, reach and coefficients; interpolates (to 3e-14 of the integral from 0) ∫ exp(z -
     z cosh t)/cosh t dt over t > 0, by the trapezoidal rule.
     """
-    centre, reach = (
-        0.5 * (1.0 / POLYNOMIAL_FROM + 1.0 / K0_CUTOFF),
-        0.5 * (1.0 / POLYNOMIAL_FROM - 1.0 / K0_CUTOFF),
-    )
+    centre = 0.5 * (1.0 / POLYNOMIAL_FROM + 1.0 / K0_CUTOFF)
+    reach = 0.5 * (1.0 / POLYNOMIAL_FROM - 1.0 / K0_CUTOFF)
     cosh = np.cosh(0.125 * np.arange(40))
 
     def scaled(place: Any) -> Any:

@@ -69,7 +69,8 @@ def film_numbers(conditions: ContactConditions, lubricant: Lubricant) -> FilmNum
     >>> f"M {numbers.moes_load:.0f}, L {numbers.moes_oil:.1f}"
     'M 2, L 15.6'
     """
-    radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
+    radius = conditions.radius_along_rolling
+    modulus = conditions.pair.effective_modulus
     line = conditions.long
     material = float(lubricant.viscosity.log_slope(np.zeros(1))[0]) * modulus
     speed = lubricant.viscosity.eta0 * conditions.entrainment_speed / (modulus * radius)
@@ -131,7 +132,8 @@ def least_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
 
 def least_films(conditions: ContactConditions, lubricant: Lubricant) -> dict[Regime, FilmFit]:
     """Return the fit of the minimum film in each regime."""
-    numbers, radius = film_numbers(conditions, lubricant), conditions.radius_along_rolling
+    numbers = film_numbers(conditions, lubricant)
+    radius = conditions.radius_along_rolling
     films = (_line_films if conditions.long else _point_films)(conditions, numbers)
     return {
         regime: FilmFit(source, "least", film * radius) for regime, (source, film) in films.items()
@@ -140,7 +142,9 @@ def least_films(conditions: ContactConditions, lubricant: Lubricant) -> dict[Reg
 
 def _line_films(_: ContactConditions, numbers: FilmNumbers) -> dict[Regime, tuple[str, float]]:
     """Return sources and minimum films h/R of a line contact."""
-    u, w, g = numbers.speed, numbers.load, numbers.material
+    u = numbers.speed
+    w = numbers.load
+    g = numbers.material
     return {
         "isoviscous-rigid": ("Martin (1916)", 4.898 * u / w),
         "isoviscous-elastic": ("Herrebrugh (1968)", 3.10 * u**0.6 * w**-0.2),
@@ -153,8 +157,11 @@ def _point_films(
     conditions: ContactConditions, numbers: FilmNumbers
 ) -> dict[Regime, tuple[str, float]]:
     """Return sources and minimum films h/R of a point or elliptic contact."""
-    u, w, g = numbers.speed, numbers.load, numbers.material
-    side, axes = 1.0 / _ratio(conditions), _axes(conditions)
+    u = numbers.speed
+    w = numbers.load
+    g = numbers.material
+    side = 1.0 / _ratio(conditions)
+    axes = _axes(conditions)
     across = 1.0 / (1.0 + 2.0 / (3.0 * side))
     rigid = 128.0 * side * (across * (0.131 * np.arctan(side / 2.0) + 1.683) * u / w) ** 2
     soft = 7.43 * u**0.65 * w**-0.21 * (1.0 - 0.85 * np.exp(-0.31 * axes))
@@ -175,14 +182,18 @@ def film_fits(conditions: ContactConditions, lubricant: Lubricant) -> tuple[Film
     """
     if _ratio(conditions) > 1.0:
         return ()
-    regime, numbers = lubrication_regime(conditions, lubricant), film_numbers(conditions, lubricant)
-    line, radius = conditions.long, conditions.radius_along_rolling
+    regime = lubrication_regime(conditions, lubricant)
+    numbers = film_numbers(conditions, lubricant)
+    line = conditions.long
+    radius = conditions.radius_along_rolling
     spanning = "Moes" if line else "Nijenbanning, Venner and Moes (1994)"
     fits = [
         FilmFit(spanning, "central", central_film(conditions, lubricant), incompressible=True),
         least_films(conditions, lubricant)[regime],
     ]
-    u, w, g = numbers.speed, numbers.load, numbers.material
+    u = numbers.speed
+    w = numbers.load
+    g = numbers.material
     axes = _axes(conditions)
     if not line and regime == "piezoviscous-elastic":
         film = 2.69 * u**0.67 * g**0.53 * w**-0.067 * (1.0 - 0.61 * np.exp(-0.73 * axes))

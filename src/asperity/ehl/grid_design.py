@@ -147,7 +147,8 @@ def grid_shortfalls(
     nothing; or fewer than 4 along a correlation length of the surface.
     """
     shortfalls = []
-    sq, (dx, dy) = surface.sq, surface.grid.spacing
+    sq = surface.sq
+    (dx, dy) = surface.grid.spacing
     if lubricant is not None and least_film(conditions, lubricant) > DRY_FILM_RATIO * sq:
         across = inlet_length(conditions, lubricant, sq) / dx
         if across < MIN_CELLS_IN_INLET:
@@ -201,7 +202,8 @@ def _range_x(
     """Return the ends of the grid along rolling [m]."""
     a = conditions.hertz.half_widths[0] * _max_half_width(conditions)
     touching = _contact_extent(conditions, texture, a**2 / conditions.radius_along_rolling)
-    inlet, outlet = max(1.4, touching), max(1.3, touching)
+    inlet = max(1.4, touching)
+    outlet = max(1.3, touching)
     if lubricant is not None:
         film = _film(conditions, lubricant)
         inlet = max(inlet, 1.6, _flooded_length(film, _missing_share(texture, accuracy)))
@@ -253,7 +255,8 @@ def _roller_range(
     accuracy: float,
 ) -> tuple[float, float]:
     """Return the ends of a roller, or of its loaded length if a crown unloads its ends."""
-    (low, high), end = conditions.sliced_load.ends, conditions.end
+    (low, high) = conditions.sliced_load.ends
+    end = conditions.end
     spare = ROLLER_MARGIN * (high - low) - _range_x(conditions, lubricant, texture, accuracy)[0]
     return max(low - spare, -end), min(high + spare, end)
 
@@ -317,7 +320,8 @@ def _spacing(
 
     A refinement of 0 gives the coarsest acceptable cells.
     """
-    (a, b), line = conditions.hertz.half_widths, conditions.endless
+    (a, b) = conditions.hertz.half_widths
+    line = conditions.endless
     dx = dy = 2.0 / max(CELLS_IN_CONTACT * refinement, MIN_CELLS_IN_CONTACT)
     if lubricant is not None:
         inlet = inlet_length(conditions, lubricant, 0.0 if texture is None else texture.sq) / a
@@ -340,7 +344,8 @@ def _line_distance(conditions: ContactConditions, refinement: float) -> float:
 
     A share of the half-width, the scale of pressure changes at its ends.
     """
-    (low, high), a = conditions.sliced_load.ends, conditions.hertz.half_widths[0]
+    (low, high) = conditions.sliced_load.ends
+    a = conditions.hertz.half_widths[0]
     fewest, most = (count * max(refinement, 0.5) for count in ROLLER_LINES)
     return min(max(END_CELL * a / max(refinement, 0.5), (high - low) / most), (high - low) / fewest)
 

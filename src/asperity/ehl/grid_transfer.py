@@ -32,7 +32,8 @@ def interpolate(field: Field, cells: tuple[int, int], *, cubic: bool = False) ->
 
     y is periodic; x extends as a constant. A cubic overshoots where the field bends sharply.
     """
-    (coarse_x, coarse_y), (nx, ny) = field.shape, cells
+    (coarse_x, coarse_y) = field.shape
+    (nx, ny) = cells
     weights = _cubic_weights if cubic else _linear_weights
     return _apply(
         field, weights(coarse_x, nx, periodic=False), weights(coarse_y, ny, periodic=True)
@@ -49,7 +50,8 @@ def _averaging_matrix(fine: int, coarse: int) -> scipy.sparse.csr_array:
     """Return the share of each fine cell in each coarse one, shape (coarse, fine)."""
     edges = np.union1d(np.arange(fine + 1) / fine, np.arange(coarse + 1) / coarse)
     middles = (edges[1:] + edges[:-1]) / 2.0
-    rows, columns = (middles * coarse).astype(int), (middles * fine).astype(int)
+    rows = (middles * coarse).astype(int)
+    columns = (middles * fine).astype(int)
     return scipy.sparse.coo_array(
         (np.diff(edges) * coarse, (rows, columns)), shape=(coarse, fine)
     ).tocsr()

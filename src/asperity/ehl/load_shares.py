@@ -15,7 +15,8 @@ def within_ellipse(
 ) -> Mask:
     """Return the cells within an ellipse about the origin, at least the central ones, (nx, ny)."""
     (a, b), (dx, dy) = half_widths, spacing
-    along, across = x / max(a, dx), y / max(b, dy)
+    along = x / max(a, dx)
+    across = y / max(b, dy)
     return np.asarray((along**2)[:, None] + across**2 <= 1.0)
 
 
@@ -24,7 +25,8 @@ def hertz_zone(conditions: ContactConditions, grid: Grid, share: float = 1.0) ->
 
     At least the central ones.
     """
-    (a, b), (dx, dy) = conditions.hertz.half_widths, grid.spacing
+    (a, b) = conditions.hertz.half_widths
+    (dx, dy) = grid.spacing
     if conditions.geometry == "roller":
         along = RollerProfile(conditions, a, a**2 / conditions.radius_along_rolling)
         return along.zone(grid.x / a, grid.y / a, share, (dx / a, dy / a))

@@ -140,7 +140,8 @@ class GridError(Figures):
 
     def sides(self, name: str) -> tuple[float, float]:
         """Return the error below and above a value, each at least 0."""
-        half, lean = getattr(self, name), getattr(self.lean, name)
+        half = getattr(self, name)
+        lean = getattr(self.lean, name)
         return max(0.0, half - lean), max(0.0, half + lean)
 
 

@@ -30,7 +30,8 @@ def contact_problem(
     """Return the dimensionless problem of an attempt on the surface's grid."""
     scales = Scales.from_conditions(conditions, lubricant)
     grid, line = surface.grid, conditions.endless
-    (dx, dy), (left, front) = grid.spacing, grid.lower
+    (dx, dy) = grid.spacing
+    (left, front) = grid.lower
     load = conditions.line_load * grid.extent[1] if line else conditions.load
     return Problem(
         form=_body_shape(conditions, scales),
@@ -54,7 +55,8 @@ def contact_problem(
 
 def _body_shape(conditions: ContactConditions, scales: Scales) -> BodyShape:
     """Return the dimensionless smooth shape of both bodies."""
-    radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
+    radius = conditions.radius_along_rolling
+    modulus = conditions.pair.effective_modulus
     half_width = np.inf if conditions.endless else conditions.hertz.half_widths[1]
     return BodyShape(
         flatness=radius / conditions.radius_across_rolling,
@@ -147,7 +149,8 @@ def reduced_problem(problem: Problem) -> Problem:
 
 def half_domain(problem: Problem) -> Problem:
     """Return a symmetric problem on the cells up to its mirror plane Y = 0."""
-    factor, lines = problem.viscosity_factor, problem.cells[1]
+    factor = problem.viscosity_factor
+    lines = problem.cells[1]
     half = -(-lines // 2)
     return replace(
         problem,
@@ -159,7 +162,8 @@ def half_domain(problem: Problem) -> Problem:
 
 def on_one_line(problem: Problem) -> Problem:
     """Return a problem uniform along y on one line of cells of the full width."""
-    factor, (dx, dy) = problem.viscosity_factor, problem.spacing
+    factor = problem.viscosity_factor
+    (dx, dy) = problem.spacing
     return replace(
         problem,
         roughness=problem.roughness[:, :1],

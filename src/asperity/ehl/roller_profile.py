@@ -42,7 +42,8 @@ class RollerProfile:
 
         At least the central ones.
         """
-        (dx, dy), (low, high) = spacing, self.conditions.sliced_load.ends
+        (dx, dy) = spacing
+        (low, high) = self.conditions.sliced_load.ends
         half = np.where(self.outside(y), 0.0, np.sqrt(self.load(y)))
         within = np.abs(y - 0.5 * (low + high) / self.length) <= max(
             0.5 * share * (high - low) / self.length, dy
@@ -67,10 +68,8 @@ class RollerProfile:
 
     def end_values(self, y: Field, values: Field) -> Field:
         """Return values of lines on the outer twentieth at either end, with its inner border."""
-        begins, inside = (
-            (0.5 - END_SHARE) * self.conditions.line_length / self.length,
-            self.inside(y),
-        )
+        begins = (0.5 - END_SHARE) * self.conditions.line_length / self.length
+        inside = self.inside(y)
         y, values = y[inside], values[inside]
         borders = [
             np.interp(place, y, values) for place in (-begins, begins) if y[0] <= place <= y[-1]

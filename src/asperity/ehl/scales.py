@@ -23,11 +23,9 @@ class Scales:
         cls, conditions: ContactConditions, lubricant: Lubricant | None
     ) -> "Scales":
         """Return the scales of a contact; a and R are those along rolling."""
-        a, p_h, radius = (
-            conditions.hertz.half_widths[0],
-            conditions.hertz.p_max,
-            conditions.radius_along_rolling,
-        )
+        a = conditions.hertz.half_widths[0]
+        p_h = conditions.hertz.p_max
+        radius = conditions.radius_along_rolling
         eta0 = lubricant.viscosity.eta0 if lubricant else 0.0
         return cls(
             a,

@@ -150,10 +150,8 @@ def solve_mixed(
     if conditions.geometry == "roller":
         search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
     if start is not None:
-        strategy, step = (
-            COARSE_TO_FINE,
-            search.continue_from(finest, pressures_of(start, finest, scales)),
-        )
+        strategy = COARSE_TO_FINE
+        step = search.continue_from(finest, pressures_of(start, finest, scales))
     else:
         for strategy in _strategies(
             surface, smooth_film(conditions, lubricant), options.contact_film
@@ -243,7 +241,8 @@ SOLVERS = {
 
 
 def _warm_start(start: ContactSolution, problem: Problem, scales: Scales) -> tuple[Field, float]:
-    pressure, cells = start.pressure / scales.pressure, problem.all_cells
+    pressure = start.pressure / scales.pressure
+    cells = problem.all_cells
     if cells[1] == 1:
         pressure = pressure.mean(axis=1, keepdims=True)
     if pressure.shape != cells:
@@ -277,7 +276,9 @@ def _check_grid(
             _check_weight(conditions, lubricant)
         _check_ends(conditions, grid)
     for axis, index, half in [("x", 0, a)] if conditions.long else [("x", 0, a), ("y", 1, b)]:
-        low, high, spacing = grid.lower[index], grid.upper[index], grid.spacing[index]
+        low = grid.lower[index]
+        high = grid.upper[index]
+        spacing = grid.spacing[index]
         if low > -1.2 * half or high < 1.2 * half:
             raise BadInput(
                 f"grid from {low * 1e6:.4g} to {high * 1e6:.4g} um along {axis} must reach at "
@@ -327,7 +328,8 @@ def _check_weight(conditions: ContactConditions, lubricant: Lubricant) -> None:
 
 def _check_ends(conditions: ContactConditions, grid: Grid) -> None:
     """Raise BadInput unless the grid holds a roller's loaded length."""
-    half, (low, high) = conditions.end, conditions.sliced_load.ends
+    half = conditions.end
+    (low, high) = conditions.sliced_load.ends
     if (wide := 2.0 * conditions.hertz.half_widths[0]) > conditions.line_length:
         raise BadInput(
             f"the roller of {conditions.line_length * 1e3:.3g} mm is shorter than its contact is "
@@ -335,7 +337,8 @@ def _check_ends(conditions: ContactConditions, grid: Grid) -> None:
             f"{wide * 1e3:.3g} mm under {conditions.load:.4g} N; lower the load, or use "
             'geometry = "elliptic"'
         )
-    middle, reach = 0.5 * (low + high), 0.55 * (high - low)
+    middle = 0.5 * (low + high)
+    reach = 0.55 * (high - low)
     loaded = max(middle - reach, -half), min(middle + reach, half)
     if grid.y[0] > loaded[0] or grid.y[-1] < loaded[1]:
         raise BadInput(

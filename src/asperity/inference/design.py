@@ -147,10 +147,12 @@ def _design_variable(
     bound = None
     if enough[0] and not enough.all():
         last = int(np.argmin(enough)) - 1  # end of the sufficient values from the low end
-        way, bound = "at most", _crossing(values, chances, last)
+        way = "at most"
+        bound = _crossing(values, chances, last)
     elif enough[-1] and not enough.all():
         last = VALUES - 1 - int(np.argmin(enough[::-1]))
-        way, bound = "at least", _crossing(values, chances, last)
+        way = "at least"
+        bound = _crossing(values, chances, last)
     return DesignVariable(unknown.key, way, bound, values, chances)
 
 

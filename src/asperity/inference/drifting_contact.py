@@ -119,7 +119,8 @@ class DriftModel:
     ) -> tuple[tuple[SeriesMeasurement, ...], Mapping[tuple[str, int], Field]]:
         offsets = np.array([entry.offset for entry in self.series.measurements])
         z = np.random.default_rng(0).standard_normal((SLOPE_DRAWS, self.forward.dims))
-        base, slopes = self.forward.predict(z, self.law, deviations=False), {}
+        base = self.forward.predict(z, self.law, deviations=False)
+        slopes = {}
         for axis in np.flatnonzero(np.any(offsets != 0.0, axis=0)):
             forward, steps = _stepped(self.forward, int(axis))
             stepped = forward.predict(z, self.law, deviations=False)
@@ -182,7 +183,9 @@ class DriftModel:
 
 def _channel_table(model: DriftModel, z: Field) -> ChannelTable:
     """Tabulate the emulator's means; its deviations are those at the initial share."""
-    forward, column, unknown = model.forward, model.column, model.unknown
+    forward = model.forward
+    column = model.column
+    unknown = model.unknown
     contacts = z[:, : forward.dims]
     initial = forward.predict(contacts, model.law)
     along = along_range(contacts, column, unknown.at_share(np.linspace(0.0, 1.0, KNOTS)))
@@ -220,7 +223,8 @@ def _stepped(forward: ForwardModel, axis: int) -> tuple[ForwardModel, Field]:
     entry = next(entry for entry in forward.setting.operating if entry.key == key)
     low, high = (si(end, entry.unit) for end in (entry.low, entry.high))
     name = ("load_n", "entrainment_m_s", "temperature_k")[axis]
-    steps, points = np.empty(len(forward.points)), []
+    steps = np.empty(len(forward.points))
+    points = []
     for number, point in enumerate(forward.points):
         value = getattr(point, name)
         steps[number] = SLOPE_STEPS[axis] if value < 0.5 * (low + high) else -SLOPE_STEPS[axis]

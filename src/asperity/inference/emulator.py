@@ -125,7 +125,8 @@ class Emulator:
 
     def sentence(self) -> str:
         """Return a summary of the emulator's size and accuracy."""
-        clr, grid = self.quality[CLR], self.grid.get(CLR, EmulatorGridError())
+        clr = self.quality[CLR]
+        grid = self.grid.get(CLR, EmulatorGridError())
         refined = OUTPUTS[CLR].back(np.array([0.0, grid.shift]))
         finer = (
             f" On twice the cells CLR 50 % becomes {100 * refined[1]:.0f} %; this is corrected."
@@ -286,7 +287,9 @@ def _with_further(
     run: partial[StudyResult],
 ) -> tuple[Field, pandas.DataFrame, int]:
     """Return shares and rows of all points, added ones last, and the number of failed contacts."""
-    shares, tables, failed = [sobol], [result.table], result.failed
+    shares = [sobol]
+    tables = [result.table]
+    failed = result.failed
     for folder in _further(home):
         own = np.array(read_json(folder / SHARES, f"delete {folder}")["shares"], dtype=float)
         more = run(_plan(setting, own), out=folder / "study")
@@ -413,7 +416,8 @@ def _smoothed(output: Output, mean: Field, variance: Field) -> Field:
     Linear interpolation of ln variance between bins of a tenth of the points, on the output's
     scale.
     """
-    scaled, spread = output.forward(mean), variance * output.slope(mean) ** 2
+    scaled = output.forward(mean)
+    spread = variance * output.slope(mean) ** 2
     order = np.argsort(scaled)
     bins = np.array_split(order, min(10, max(1, len(order) // 8)))
     centres = np.array([scaled[part].mean() for part in bins])
@@ -425,7 +429,8 @@ def _held_out(means: _Means, output: Output, whole: GaussianProcess) -> Emulator
     """Cross-validate a process: predict each point from a fit to the other folds."""
     y, noise = means.scaled(output)
     fold = np.arange(y.size) % FOLDS
-    predicted, std = np.empty(y.size), np.empty(y.size)
+    predicted = np.empty(y.size)
+    std = np.empty(y.size)
     for number in range(FOLDS):
         out = fold == number
         process = fit_process(whole.x[~out], y[~out], noise[~out], start=whole)

@@ -32,7 +32,8 @@ class EmulatorFeatures:
         def log(key: str) -> Field:
             if key not in index:
                 return np.zeros(len(shares))
-            entry, share = self.ranges[index[key]], shares[:, index[key]]
+            entry = self.ranges[index[key]]
+            share = shares[:, index[key]]
             ratio = np.log(entry.high / entry.low)
             return np.asarray(share * ratio if entry.log else np.log1p(share * np.expm1(ratio)))
 

@@ -184,7 +184,8 @@ class ForwardModel:
         else:
             spring = _emulated_spring(emulated, loads, machine_damping)
         crf = 0.5 * (spring.stiffness - np.log(mass)) - math.log(2.0 * math.pi)
-        crfa, crfa_std = np.full(crf.shape, np.nan), np.full(crf.shape, np.nan)
+        crfa = np.full(crf.shape, np.nan)
+        crfa_std = np.full(crf.shape, np.nan)
         if heights and self._noise_excited:
             crfa, crfa_std = self._log_crfa(z, crf, spring.damping, emulated[CAR])
         return ChannelPrediction(

@@ -68,7 +68,8 @@ class GaussianProcess:
         return whitener.astype(np.float32), weights.astype(np.float32)
 
     def _kernel(self, x: Field, precision: type = np.float32) -> Field:
-        scaled, centres = x / self.lengths, self.x / self.lengths
+        scaled = x / self.lengths
+        centres = self.x / self.lengths
         square = scaled @ (-2.0 * centres.T)
         square += np.sum(scaled**2, axis=1)[:, None]
         square += np.sum(centres**2, axis=1)
@@ -157,7 +158,9 @@ def fit_process(
     lengths: Field = np.ones(x.shape[1])
     level, rough = 1.0, 0.01
     if start is not None:
-        lengths, level, rough = start.lengths, start.level, start.rough
+        lengths = start.lengths
+        level = start.level
+        rough = start.rough
     plain = GaussianProcess(x, y, noise, lengths, level, rough)
     kernel = ConstantKernel(level, LEVELS) * Matern(lengths, LENGTHS, nu=2.5) + WhiteKernel(
         rough, WHITE_NOISE
@@ -169,7 +172,8 @@ def fit_process(
         # a length at its upper bound means that the axis has no effect
         warnings.simplefilter("ignore", ConvergenceWarning)
         learner.fit(x, (y - _basis(x) @ plain._trend) / plain._scale)
-    product, white = learner.kernel_.k1, learner.kernel_.k2
+    product = learner.kernel_.k1
+    white = learner.kernel_.k2
     return GaussianProcess(
         x,
         y,

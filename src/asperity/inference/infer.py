@@ -306,7 +306,8 @@ def with_observation(inference: Inference, observation: Observation) -> Inferenc
     observations = (*inference.observations, observation)
     previous = inference.forward
     points = (previous.points[0], *operating_points(observations))
-    forward, pools = replace(previous, points=points), dict(inference.pools)
+    forward = replace(previous, points=points)
+    pools = dict(inference.pools)
     if not inference.observations:
         pools = new_pools(forward, inference.seed)
     elif len(points) > len(previous.points):

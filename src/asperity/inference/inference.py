@@ -48,7 +48,8 @@ class PointEstimates:
 
     def cells(self) -> list[str]:
         """Return a table row with the columns `HEADS`."""
-        clr, film = self.state[CLR], self.state[FILM]
+        clr = self.state[CLR]
+        film = self.state[FILM]
         stage, probability = max(self.stages.items(), key=lambda entry: entry[1])
         return [
             quantity("load_n").text(self.point.load_n),
@@ -139,7 +140,8 @@ class Inference:
         for index, point in enumerate(self.forward.points):
             if np.isnan(point.crf.value):
                 continue
-            after, before = self.values(self.draws, index), self.values(self.prior, index)
+            after = self.values(self.draws, index)
+            before = self.values(self.prior, index)
             keys = [*self.draws.states, *(["lambda_ratio"] if "lambda_ratio" in after else [])]
             state = quantity_estimates(
                 {key: after[key] for key in keys},
@@ -189,7 +191,8 @@ class Inference:
         """Reason why CLR or Sq is not identified; empty if both are."""
         if not self.observations:
             return f"no recording shows a contact resonance ({_most_frequent(self.excluded)})"
-        unidentified, known = self._unidentified(), self.posterior()
+        unidentified = self._unidentified()
+        known = self.posterior()
         if not unidentified:
             return ""
         points = len({point.names for point in self.forward.points if point.names})
@@ -222,7 +225,8 @@ class Inference:
     @property
     def grid_effect(self) -> tuple[float, float]:
         """Grid error of CLR at its median, and half the width of its interval (load shares)."""
-        estimate, scale = self.posterior()[CLR], OUTPUTS[CLR]
+        estimate = self.posterior()[CLR]
+        scale = OUTPUTS[CLR]
         change = self.emulator.grid[CLR].rms if CLR in self.emulator.grid else 0.0
         median = scale.forward(np.array(estimate.median))
         effect = float(abs(scale.back(median + change) - scale.back(median - change)) / 2.0)
@@ -263,11 +267,13 @@ class Inference:
         """Return CLR and Sq with intervals, or why they are not identified; and the next point."""
         if not self.observations:
             return f"Not identified: {self.reason}. The stated values are the prior."
-        known, following = self.posterior(), self.next_point
+        known = self.posterior()
+        following = self.next_point
         parts = []
         for key in KEY_QUANTITIES:
             if key in known:
-                estimate, entry = known[key], quantity(key)
+                estimate = known[key]
+                entry = quantity(key)
                 interval = entry.interval(estimate.low, estimate.high)
                 value = (
                     f"{entry.text(estimate.median)} ({interval}, 90 %)"
@@ -316,7 +322,8 @@ class Inference:
 
 def stage_probabilities(clr: Field) -> dict[str, float]:
     """Return the probability of each lubrication regime from draws of CLR."""
-    full, boundary = float(np.mean(clr < FULL_FILM_BELOW)), float(np.mean(clr >= BOUNDARY_FROM))
+    full = float(np.mean(clr < FULL_FILM_BELOW))
+    boundary = float(np.mean(clr >= BOUNDARY_FROM))
     return dict(zip(STAGES, (full, 1.0 - full - boundary, boundary), strict=True))
 
 

@@ -73,7 +73,8 @@ def between_knots(table: Field, share: Field) -> tuple[Field, Field]:
     position = np.clip(share, 0.0, 1.0) * last
     index = np.minimum(position.astype(int), last - 1)
     rows = np.arange(len(table)).reshape(-1, *[1] * (share.ndim - 1))
-    low, high = table[rows, index], table[rows, index + 1]
+    low = table[rows, index]
+    high = table[rows, index + 1]
     inside = (share >= 0.0) & (share <= 1.0)
     return low + (position - index) * (high - low), np.where(inside, last * (high - low), 0.0)
 
@@ -159,7 +160,8 @@ class KalmanState:
         slope_scatter: Mapping[tuple[str, int], Field],
     ) -> "KalmanState":
         """Return the prior state: the share is the contact's, all else is uncertain."""
-        count, points = len(table.share), len(similarity)
+        count = len(table.share)
+        points = len(similarity)
         states = FIRST_ERROR + len(CHANNELS) * points + len(slope_scatter)
         mean = np.zeros((count, states))
         mean[:, SHARE], mean[:, DRIFT] = table.share, drift[0]
@@ -217,7 +219,8 @@ class KalmanState:
         self, entry: SeriesMeasurement, table: ChannelTable, points: int
     ) -> "_MeasuredStates":
         """Return the states besides the share on which a measurement depends."""
-        channel, parameters = entry.channel, table.parameters
+        channel = entry.channel
+        parameters = table.parameters
         noise = entry.measured.std**2 + (WEIGHTS[channel] * parameters.scatter) ** 2
         if channel == "crf":  # correlated scatter is in the state
             noise = np.where(parameters.correlation > 0.0, entry.measured.std**2, noise)

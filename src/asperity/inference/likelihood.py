@@ -46,7 +46,8 @@ def log_at_sizes(
 ) -> Field:
     """Return the log-likelihood of one channel for each size of the law's error, (sizes, n)."""
     value, std = measured_channel(points, channel)
-    mean, log_force = getattr(prediction, channel), prediction.log_force
+    mean = getattr(prediction, channel)
+    log_force = prediction.log_force
     here = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
     logs = np.zeros((len(sizes), len(mean)))
     if not here.any():
@@ -100,11 +101,13 @@ def predictive_mixture(
     conditional on the measurements.
     """
     value, measured = measured_channel(points, channel)
-    mean, similarity = getattr(prediction, channel), point_similarity(points)
+    mean = getattr(prediction, channel)
+    similarity = point_similarity(points)
     here = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
     logs = log_at_sizes(prediction, points, channel, sizes)
     share = logs - np.logaddexp.reduce(logs, axis=0)
-    expected, std = np.tile(mean, (len(sizes), 1, 1)), np.empty((len(sizes), *mean.shape))
+    expected = np.tile(mean, (len(sizes), 1, 1))
+    std = np.empty((len(sizes), *mean.shape))
     for rows in _row_blocks(len(mean), len(points)):
         covariances = _block_errors(prediction, channel, rows, similarity, here, sizes)
         for number, errors in enumerate(covariances):

@@ -40,7 +40,9 @@ def with_measured_surface(setting: Setting, measured: MeasuredSurface) -> tuple[
     unknown = setting.contact[index]
     zero, mean = (float(unknown.from_si(value)) for value in (0.0, sq))
     spread = float(unknown.from_si(std)) - zero
-    entry, low, high = quantity("sq_m"), unknown.range.low, unknown.range.high
+    entry = quantity("sq_m")
+    low = unknown.range.low
+    high = unknown.range.high
     if not low < mean < high:
         raise BadInput(
             f"Sq of {measured.name} is {entry.text(sq)}, outside the emulator's range of {low:g} "

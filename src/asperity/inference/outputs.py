@@ -52,14 +52,12 @@ def _signed(key: str, floor: float) -> Output:
     )
 
 
-CLR, CAR, FILM, FRICTION, STIFFNESS, DAMPING = (
-    "clr",
-    "car",
-    "h_mean_m",
-    "friction_coefficient",
-    "contact_stiffness_n_m",
-    "contact_damping_ratio",
-)
+CLR = "clr"
+CAR = "car"
+FILM = "h_mean_m"
+FRICTION = "friction_coefficient"
+STIFFNESS = "contact_stiffness_n_m"
+DAMPING = "contact_damping_ratio"
 OUTPUTS: Mapping[str, Output] = {
     output.key: output
     for output in (

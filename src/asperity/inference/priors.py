@@ -39,10 +39,12 @@ class Unknown:
     ) -> "Unknown":
         """Return an unknown with a stated value and standard deviation."""
         if mean - REACH * std > 0.0 or mean <= 0.0:
-            low, high = mean - REACH * std, mean + REACH * std
+            low = mean - REACH * std
+            high = mean + REACH * std
         else:
             width = REACH * math.sqrt(math.log1p((std / mean) ** 2))
-            low, high = mean * math.exp(-width), mean * math.exp(width)
+            low = mean * math.exp(-width)
+            high = mean * math.exp(width)
         return cls(key, ParameterRange(case_key, low, high, unit, reason), mean, std)
 
     @property
@@ -52,7 +54,8 @@ class Unknown:
 
     def in_unit(self, z: Field) -> Field:
         """Return the values at z in the range's unit; any shape."""
-        low, high = self.range.low, self.range.high
+        low = self.range.low
+        high = self.range.high
         if self.bounded:
             share = ndtr(z)
             return np.asarray(
@@ -69,7 +72,8 @@ class Unknown:
         share = np.clip(share, END, 1.0 - END)
         if self.bounded:
             return np.asarray(ndtri(share))
-        low, high = self.range.low, self.range.high
+        low = self.range.low
+        high = self.range.high
         value = low * (high / low) ** share if self.range.log else low + share * (high - low)
         if self.mean - REACH * self.std > 0.0 or self.mean <= 0.0:
             return np.asarray((value - self.mean) / self.std)

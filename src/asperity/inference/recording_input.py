@@ -137,7 +137,9 @@ def observations_from_rows(
 
     CRFA is used only if it is `comparable` between recordings.
     """
-    observations, excluded, assumed = [], [], set()
+    observations = []
+    excluded = []
+    assumed = set()
     for row in rows:
         name = Path(str(row["file"])).name
         if not row["found"]:
@@ -187,5 +189,6 @@ def _number(row: Table, key: str) -> float | None:
 
 def _with_deviation(row: Table, key: str, std: str) -> tuple[float, float]:
     """Return a value of a row and its standard deviation; nan if either is missing."""
-    value, deviation = _number(row, key), _number(row, std)
+    value = _number(row, key)
+    deviation = _number(row, std)
     return (value, deviation) if value is not None and deviation else (nan, nan)

@@ -10,8 +10,11 @@ from asperity.core.errors import BadInput
 from asperity.inference.priors import Unknown
 from asperity.study import ParameterRange, full_key, overrides_at, require_ranges, stated_value
 
-LOAD, SPEED, TEMPERATURE = "contact.load", "contact.entrainment_speed", "lubricant.temperature"
-OFFSET, GRID_ERROR = "temperature_offset_k", "grid_error"
+LOAD = "contact.load"
+SPEED = "contact.entrainment_speed"
+TEMPERATURE = "lubricant.temperature"
+OFFSET = "temperature_offset_k"
+GRID_ERROR = "grid_error"
 # default ranges of load and speed, as factors on the case's values
 OPERATING: Mapping[str, tuple[float, float]] = {LOAD: (0.4, 2.0), SPEED: (0.25, 2.0)}
 TEMPERATURE_SPAN_K = 25.0  # either side of the case's temperature

@@ -44,7 +44,8 @@ GRADES = {  # ISO 3448: mid-point viscosity of a grade at 40 °C [mm^2/s]
 GRADE_WIDTH = 0.1  # relative, to either side of the mid-point
 MINERAL_INDEX = 95.0  # default for mineral oils
 INDEX_TOLERANCE = 5.0  # between the stated index and that of both viscosities
-COLDEST, HOTTEST = ZERO_CELSIUS - 20.0, ZERO_CELSIUS + 150.0
+COLDEST = ZERO_CELSIUS - 20.0
+HOTTEST = ZERO_CELSIUS + 150.0
 AT_15 = ZERO_CELSIUS + 15.0
 EXPANSION = 0.7  # [kg/m^3/K]
 

@@ -34,7 +34,8 @@ class MeasuredOil:
         """
         celsius = temperature - ZERO_CELSIUS
         for low in (0, 1):
-            first, last = self.alphas[low], self.alphas[low + 1]
+            first = self.alphas[low]
+            last = self.alphas[low + 1]
             if (
                 first is None
                 or last is None

@@ -57,7 +57,8 @@ def _roelands(oil: OilProperties, temperature: float) -> float:
 
 
 def _so_klaus(oil: OilProperties, temperature: float) -> float:
-    log, b = math.log10(oil.walther(temperature) / MM2), oil.walther.b
+    log = math.log10(oil.walther(temperature) / MM2)
+    b = oil.walther.b
     rho = oil.density(temperature) / 1e3  # g/cm^3
     tail = 3.999 * log**3.0975 * rho**0.1162
     return float(1e-8 * (1.216 + 4.143 * log**3.0627 + 2.848e-4 * b**5.1903 * log**1.5976 - tail))

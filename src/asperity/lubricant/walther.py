@@ -73,7 +73,8 @@ class Walther:
 
     def thinning(self, temperature: float) -> float:
         """Return -d(ln ν)/dT [1/K]."""
-        z, nu = self._z(temperature), self(temperature) / MM2
+        z = self._z(temperature)
+        nu = self(temperature) / MM2
         slope = 1.0 - (1.84 + 1.02 * nu) * _thin_oil_term(nu)  # dZ/dν
         return self.b * z * math.log(z) / (nu * temperature * slope)
 
@@ -100,7 +101,8 @@ def viscosity_index(viscosity_40: float, viscosity_100: float) -> float:
     >>> f"{viscosity_index(viscosity_40=46e-6, viscosity_100=6.8e-6):.0f}"
     '102'
     """
-    warm, hot = viscosity_40 / MM2, viscosity_100 / MM2
+    warm = viscosity_40 / MM2
+    hot = viscosity_100 / MM2
     if viscosity_100 < MIN_VISCOSITY_OF_INDEX:
         raise BadInput(
             f"a viscosity index is defined above 2 mm^2/s at 100 degC, got {hot:.4g} mm^2/s; "
@@ -126,7 +128,8 @@ def viscosity_100_of(viscosity_40: float, index: float) -> float:
     """
     from scipy.optimize import brentq  # slow import, rarely needed
 
-    lowest, highest = MIN_VISCOSITY_OF_INDEX, viscosity_40
+    lowest = MIN_VISCOSITY_OF_INDEX
+    highest = viscosity_40
     if not (
         highest > lowest
         and viscosity_index(viscosity_40, lowest) <= index <= viscosity_index(viscosity_40, highest)

@@ -229,7 +229,9 @@ class BallBearing:
         """Return the tangent stiffness, per `elastic` and the larger load, shape (3, 3)."""
         loads, angles = self._balls(elastic * shifts, stiffness)
         approaches = (loads / stiffness) ** (1.0 / EXPONENT)
-        place, across, along = np.cos(self.angles), np.cos(angles), np.sin(angles)
+        place = np.cos(self.angles)
+        across = np.cos(angles)
+        along = np.sin(angles)
         normal = np.stack([across * place, along, along * place])
         tangential = np.stack([-along * place, across, across * place])
         stiffnesses = (
@@ -279,7 +281,8 @@ class BallBearing:
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:
         """Return both contacts of each loaded ball."""
-        contacts, (loads, contact_angles) = [], self.loads(pair)
+        contacts = []
+        (loads, contact_angles) = self.loads(pair)
         for number, (place, load, angle) in enumerate(
             zip(self.angles, loads, contact_angles, strict=True)
         ):
@@ -377,7 +380,8 @@ class BallBearing:
     def _forces(self, shifts: Field, stiffness: float) -> Field:
         """Return radial force, axial force and moment over `_arm` [N]."""
         loads, angles = self._balls(shifts, stiffness)
-        axial, place = loads * np.sin(angles), np.cos(self.angles)
+        axial = loads * np.sin(angles)
+        place = np.cos(self.angles)
         return np.array([(loads * np.cos(angles)) @ place, axial.sum(), axial @ place])
 
     def _kinematics(self, angle: float) -> RollingKinematics:

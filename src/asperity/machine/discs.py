@@ -66,7 +66,8 @@ class TwinDisc:
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (one contact, all the load)
         """Return the contact."""
-        (first, second), (slow, fast) = self.radii, self.turning
+        (first, second) = self.radii
+        (slow, fast) = self.turning
         radius = first * second / (first + second)
         contact = MachineContact(
             name="discs",

@@ -182,7 +182,8 @@ class SpurGear:
     def share(self, distance: float) -> float:
         """Return the load share of the pair at a distance [m] from the pinion's base circle."""
         start, end = self._ends
-        first, last = end - self.base_pitch, start + self.base_pitch
+        first = end - self.base_pitch
+        last = start + self.base_pitch
         tolerance = 1e-9 * self.base_pitch
         if distance < first - tolerance:
             return 1.0 / 3.0 + (distance - start) / (first - start) / 3.0
@@ -199,7 +200,8 @@ class SpurGear:
 
         u1 = ω1 s, u2 = ω2 (T - s), R = s (T - s)/T.
         """
-        length, slower = self.line_of_action, self.speed * self.teeth[0] / self.teeth[1]
+        length = self.line_of_action
+        slower = self.speed * self.teeth[0] / self.teeth[1]
         return MachineContact(
             name=name,
             bodies=("pinion", "wheel"),
@@ -247,13 +249,15 @@ class SpurGear:
 
     @cached_property
     def _ends(self) -> tuple[float, float]:
-        (tip_1, tip_2), (base_1, base_2) = self.tip_radii, self.base_radii
+        (tip_1, tip_2) = self.tip_radii
+        (base_1, base_2) = self.base_radii
         return self.line_of_action - math.sqrt(tip_2**2 - base_2**2), math.sqrt(
             tip_1**2 - base_1**2
         )
 
     def _require_mesh(self) -> None:
-        millimetres, bases = 1e3, sum(self.base_radii)
+        millimetres = 1e3
+        bases = sum(self.base_radii)
         if self.centres <= bases:
             raise BadInput(
                 f"at centre_distance {self.centres * millimetres:g} mm the base circles overlap "
@@ -314,8 +318,11 @@ class SpurGear:
                 )
 
     def _require_sound_teeth(self, body: int) -> None:
-        name, tip, base = ("pinion", "wheel")[body], self.tip_radii[body], self.base_radii[body]
-        count, shift = self.teeth[body], self.profile_shift[body]
+        name = ("pinion", "wheel")[body]
+        tip = self.tip_radii[body]
+        base = self.base_radii[body]
+        count = self.teeth[body]
+        shift = self.profile_shift[body]
         half = (
             math.pi / (2.0 * count)
             + 2.0 * shift * math.tan(self.pressure_angle) / count
@@ -350,13 +357,15 @@ def _undercut_radius(count: int, shift: float, module: float, angle: float) -> f
     intersects the involute.
     """
     pitch = 0.5 * module * count
-    base, depth = pitch * math.cos(angle), (ADDENDUM - shift) * module
+    base = pitch * math.cos(angle)
+    depth = (ADDENDUM - shift) * module
     if depth <= pitch * math.sin(angle) ** 2:
         return 0.0
     # travel of the rack from the position with the flank at the pitch point; the gear turns by
     # travel/pitch; the flank forms the tooth down to the base circle, at -pitch tan(angle)
     travel = np.linspace(-2.0 * pitch, -pitch * math.tan(angle), 4000)
-    across, up = travel + depth * math.tan(angle), pitch - depth
+    across = travel + depth * math.tan(angle)
+    up = pitch - depth
     radius = np.hypot(across, up)
     corner = np.arctan2(across, up) - travel / pitch  # polar angles on the gear
     at_radius = np.arccos(np.minimum(base / radius, 1.0))

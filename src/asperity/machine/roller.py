@@ -147,7 +147,9 @@ class CylindricalRollerBearing:
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (ISO's stiffness of steel)
         """Return both contacts of each loaded roller."""
-        contacts, kinematics, per_length = [], self.kinematics, self.slices / self.roller_length
+        contacts = []
+        kinematics = self.kinematics
+        per_length = self.slices / self.roller_length
         for number, (angle, slices) in enumerate(zip(self.angles, self.slice_loads, strict=True)):
             for ring, radius, passages in zip(
                 ("inner ring", "outer ring"),

@@ -103,9 +103,11 @@ class MachineResult:
 
     def verdict(self) -> str:
         """Return one sentence on lubrication regime, worst contact, film and ratings."""
-        worst, title = self.worst, self.case.machine.title()
+        worst = self.worst
+        title = self.case.machine.title()
         if not self.solved:
-            sliding, slip = "", quantity("slide_to_roll")
+            sliding = ""
+            slip = quantity("slide_to_roll")
             if worst["slide_to_roll"]:
                 sliding = f", slide-to-roll ratio {slip.text(worst['slide_to_roll'])}"
             pressure = quantity("hertz_pressure_pa").text(worst["p_hertz_pa"])

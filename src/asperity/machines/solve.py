@@ -27,7 +27,9 @@ from asperity.study import DONE, StudyPlan, StudyProgress, plan_points, run_stud
 ALL_CELLS = 1_000_000  # of all automatic grids together: about two minutes on two processors
 FEWEST_CELLS = 48  # along an axis
 # default number of surfaces per contact: few on grids above FINE_GRID cells
-MANY_SURFACES, FEW_SURFACES, FINE_GRID = 5, 3, 128 * 128
+MANY_SURFACES = 5
+FEW_SURFACES = 3
+FINE_GRID = 128 * 128
 WORST = "worst.nc"
 SOLVED_KEYS = (  # quantities of a solved contact
     *(
@@ -153,7 +155,8 @@ def _effort(case: Case, max_cells: int) -> JsonObject:
 
 def _smaller_grid(case: Case, max_cells: int) -> JsonObject:
     """Return an override that coarsens an automatic grid without a requested accuracy."""
-    section, (nx, ny) = case.contents.grid, case.grid.cells
+    section = case.contents.grid
+    (nx, ny) = case.grid.cells
     if section.cells != "auto" or section.accuracy is not None or nx * ny <= max_cells:
         return {}
     ratio = math.sqrt(max_cells / (nx * ny))

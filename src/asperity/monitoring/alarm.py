@@ -46,7 +46,9 @@ LEVEL_LEAST = float(np.log(2.0))  # 6 dB, a significant change according to ISO 
 BASELINE = 8  # recordings whose median CRF is the reference
 UNSEEN = 3  # consecutive recordings without a resonance from which the contact is not observed
 LAST = "last"
-KURTOSIS, CRF, RMS = "kurtosis", "CRF", "the level (rms)"
+KURTOSIS = "kurtosis"
+CRF = "CRF"
+RMS = "the level (rms)"
 MAX_RESIDUAL = 0.4  # of the least change, that a warm-up may leave unexplained
 
 
@@ -75,12 +77,11 @@ def raise_alarm(
     BadInput
         if the acknowledged recording does not exist, or the rate is invalid.
     """
-    source, acknowledge = settings.stages_from, settings.acknowledge
+    source = settings.stages_from
+    acknowledge = settings.acknowledge
     false_alarm_rate = settings.false_alarm_rate
-    contact, levels = (
-        _contact_indicators(tracked, source, response),
-        _level_indicators(tracked, response),
-    )
+    contact = _contact_indicators(tracked, source, response)
+    levels = _level_indicators(tracked, response)
     x = np.array([recording.x for recording in tracked])
     warming = Warming(x, contact, levels, unit)
     alarm = sequential_alarm(
@@ -165,7 +166,8 @@ def _severe(stages: Stages | None) -> bool:
 
 def at_reference(tracked: Sequence[TrackedRecording], response: Response) -> list[TrackedRecording]:
     """Reduce CRF and damping ratio to load, speed and temperature of the first recordings."""
-    crf, damping = _crf(tracked, response), _damping(tracked, response)
+    crf = _crf(tracked, response)
+    damping = _damping(tracked, response)
     frequency = (
         np.full(len(tracked), np.nan)
         if crf is None
@@ -235,7 +237,8 @@ def _damping(tracked: Sequence[TrackedRecording], response: Response) -> Monitor
 def _contact_indicators(
     tracked: Sequence[TrackedRecording], source: StageSource, response: Response
 ) -> list[MonitoredSeries]:
-    crf, damping = _crf(tracked, response), _damping(tracked, response)
+    crf = _crf(tracked, response)
+    damping = _damping(tracked, response)
     if source == "both" and (crf is None or damping is None):
         return []
     return [

@@ -64,7 +64,8 @@ class AuxiliaryData:
 
 def read_auxiliary(opened: OpenRecording, place: RecordingPlace | None) -> AuxiliaryData:
     """Read the channels that a sidecar names for load, speed, temperature and tacho."""
-    conditions, tacho = _condition_channels(opened), _tacho(opened)
+    conditions = _condition_channels(opened)
+    tacho = _tacho(opened)
     stated = {
         key: (f"{value:.10g}", "table")
         for key in OPERATING_KEYS
@@ -178,7 +179,8 @@ def lines(frequency_hz: Field, density: Field, rates_hz: Mapping[str, float]) ->
 def bands(opened: OpenRecording, frequency_hz: Field, density: Field) -> dict[str, float]:
     """Return the rms in the bands of the sidecar, or three default bands, within the sampling."""
     stated = opened.facts["bands_hz"].value if "bands_hz" in opened.facts else DEFAULT_BANDS
-    spacing, highest = float(frequency_hz[1]), USABLE_BANDWIDTH * opened.rate_hz
+    spacing = float(frequency_hz[1])
+    highest = USABLE_BANDWIDTH * opened.rate_hz
     found = {}
     for name, (low, high) in stated.items():
         high = min(high, highest) if high == np.inf else high

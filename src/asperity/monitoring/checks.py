@@ -110,10 +110,8 @@ def check_recordings(
         as `search_target`, or for a folder without recordings.
     """
     target = search_target(case, band_hz)
-    present, absent = (
-        [file for file in files if file.exists()],
-        [file for file in files if not file.exists()],
-    )
+    present = [file for file in files if file.exists()]
+    absent = [file for file in files if not file.exists()]
     checked: list[CheckedRecording] = []
     refused: list[tuple[Path, str]] = []
     for path in [*(recordings_in(present) if present else []), *absent]:

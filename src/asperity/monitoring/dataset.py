@@ -210,7 +210,8 @@ def _map_faults(folder: Path, name: str, case: Case | None) -> Iterator[str]:
     if case is None:
         return
     width = 2.0 * case.conditions.hertz.half_widths[0]
-    pixel, size = max(measured.grid.spacing), min(measured.grid.extent)
+    pixel = max(measured.grid.spacing)
+    size = min(measured.grid.extent)
     if pixel > width / MIN_PIXELS:
         yield (
             f"{name}: pixels of {1e6 * pixel:.3g} um, coarser than a tenth of the contact's "

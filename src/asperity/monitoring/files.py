@@ -131,7 +131,8 @@ def x_by_time(
         x = iter([(time - first).total_seconds() / 3600.0 for time in stated])
         x_name = "time_h"
     else:
-        x, x_name = iter([float(number) for number in range(1, len(known) + 1)]), "recording"
+        x = iter([float(number) for number in range(1, len(known) + 1)])
+        x_name = "recording"
     place = 0.0 if x_name == "time_h" else 1.0
     places = []
     for usable in readable:
@@ -260,7 +261,8 @@ def _place_in(
         for column in (x_name, f"{x_name}_std", *OPERATING_KEYS)
     }
     _require_possible(values, location)
-    x, x_std = values.pop(x_name), values.pop(f"{x_name}_std")
+    x = values.pop(x_name)
+    x_std = values.pop(f"{x_name}_std")
     if not x_name:
         x = float(number - 1)
     if x is None:
@@ -307,7 +309,8 @@ def _require_units(path: Path, columns: Sequence[str]) -> None:
 def _require_possible(values: Mapping[str, float | None], location: str) -> None:
     """Raise BadInput for a load or speed not above 0, or a temperature below absolute zero."""
     for column in OPERATING_KEYS:
-        value, least = values[column], ABSOLUTE_ZERO if column == "temperature_degc" else 0.0
+        value = values[column]
+        least = ABSOLUTE_ZERO if column == "temperature_degc" else 0.0
         if value is not None and value <= least:
             raise BadInput(
                 f"{location}: {column} must be above {least:g}, got {value:g}; "

@@ -69,7 +69,8 @@ def on_common_grid(series: list[Reading]) -> tuple[list[Reading], list[str]]:
 
 def _on_grid(reading: Reading, grid: Spectrum, rate_hz: int) -> Reading:
     """Bring a usable spectrum to a grid, or exclude it with the reason."""
-    spectrum, lines = spectrum_of(reading), grid.frequency_hz
+    spectrum = spectrum_of(reading)
+    lines = grid.frequency_hz
     if spectrum.frequency_hz.shape == lines.shape:
         if np.array_equal(spectrum.frequency_hz, lines):
             return reading  # as nearly all are

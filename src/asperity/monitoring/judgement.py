@@ -118,7 +118,8 @@ def _single_sensor(
     memory: SeriesMemory | None,
 ) -> _Series:
     """Find the resonances in the recordings of a single sensor."""
-    names, times = [reading.file for reading in readings], [reading.time for reading in readings]
+    names = [reading.file for reading in readings]
+    times = [reading.time for reading in readings]
     places, x_name = locate_recordings(
         names, times, [not reading.refused for reading in readings], places, x_name
     )
@@ -175,7 +176,8 @@ def _group_count(recordings: int, method: SeriesMethod) -> int:
 
 def _method_notes(count: int, requested: SeriesMethod | None, method: SeriesMethod) -> list[str]:
     """Return notes on the method for `count` usable recordings."""
-    notes, groups = [], _group_count(count, method)
+    notes = []
+    groups = _group_count(count, method)
     if requested is None and method != "joint" and count:
         notes.append(
             f"The joint separation of contact and structure needs {FEWEST_RECORDINGS} recordings "
@@ -200,7 +202,8 @@ def _staged(
     tracked = at_reference(tracked, response)
     remounted = _remounted(tracked)
     heights = units == {ACCELERATION} and not remounted
-    source, unit = settings.stages_from, _unit_of(x_name)
+    source = settings.stages_from
+    unit = _unit_of(x_name)
     stages_by = _StagesBySource(tracked, settings.detector, unit, heights)
     stages = stages_by.get(source)
     alarm = raise_alarm(
@@ -245,7 +248,8 @@ def _with_states(
     alarm: Alarm,
 ) -> list[TrackedRecording]:
     """Add probability of severe wear (nan if unknown), stage label and alarm state."""
-    severe, labels = np.full(len(tracked), np.nan), ("none",) * len(tracked)
+    severe = np.full(len(tracked), np.nan)
+    labels = ("none",) * len(tracked)
     if stages is not None:
         known = [
             np.isfinite(
@@ -254,7 +258,8 @@ def _with_states(
             for recording in tracked
         ]
         weight = severe_stage_weight(tracked, source, response)
-        severe, labels = np.where(known, stages.probability * weight, np.nan), stages.labels
+        severe = np.where(known, stages.probability * weight, np.nan)
+        labels = stages.labels
     return [
         replace(recording, severe_probability=float(probability), label=label, state=state)
         for recording, probability, label, state in zip(
@@ -397,7 +402,8 @@ def _resonances(
     groups = _group_count(len(cleaned), method)
     for first in range(min(groups, len(cleaned))):
         group = cleaned[first::groups]
-        spectra, kept = [clean.spectrum for clean in group], [clean.kept for clean in group]
+        spectra = [clean.spectrum for clean in group]
+        kept = [clean.kept for clean in group]
         if method == "joint":
             found, _, changes = learn_series(spectra, band_hz=target.band_hz, kept=kept)
             moved += [first + groups * number for number in changes]

@@ -105,7 +105,8 @@ class Webhook:
             def redirect_request(self, *_: object) -> None:
                 return None  # a redirected post becomes a get without content
 
-        parts, headers = urlsplit(self.url), {"Content-Type": "application/json"}
+        parts = urlsplit(self.url)
+        headers = {"Content-Type": "application/json"}
         if parts.username:
             credentials = f"{unquote(parts.username)}:{unquote(parts.password or '')}".encode()
             headers["Authorization"] = f"Basic {b64encode(credentials).decode()}"

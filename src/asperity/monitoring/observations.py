@@ -351,7 +351,8 @@ def _match_numbers(
         )
     keys: _Keys = {}
     located: dict[str, RecordingPlace] = {}
-    numbers, lead = dict.fromkeys(by_sensor, 0), next(iter(by_sensor))
+    numbers = dict.fromkeys(by_sensor, 0)
+    lead = next(iter(by_sensor))
     for place, reading in enumerate(readings, 1):
         if reading.sensor:
             numbers[reading.sensor] += 1
@@ -414,7 +415,8 @@ def _without_copies(
 def _equal(spectrum: Spectrum, other: Spectrum) -> bool:
     if spectrum.density.shape != other.density.shape:
         return False
-    last, of_other = float(spectrum.density[-1]), float(other.density[-1])
+    last = float(spectrum.density[-1])
+    of_other = float(other.density[-1])
     if abs(last - of_other) > COPY_TOLERANCE * of_other:  # a single value excludes nearly all
         return False
     difference = np.abs(spectrum.density - other.density)

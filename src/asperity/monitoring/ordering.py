@@ -82,7 +82,8 @@ def _named_sensors(
     series: Sequence[FileVersion], sensors: Sensors
 ) -> tuple[set[str], list[FileVersion]]:
     """Return the names of sensors, and recordings that lack a name while others have one."""
-    names, common_name = sensors.readable_names(series), sensors.address.sensor
+    names = sensors.readable_names(series)
+    common_name = sensors.address.sensor
     if len(names) <= sensors.channels or common_name not in names:
         return names, []
     unnamed = [key for key in series if _belongs_to(common_name, sensors.stored(key))]
@@ -190,7 +191,8 @@ def judged_window(order: Order, end: int, sensors: Sensors) -> list[FileVersion]
     instants = order.instants[:end]
     chosen = {*range(end)}
     if end > max_window():
-        acknowledged, standing = sensors.acknowledged, sensors.standing
+        acknowledged = sensors.acknowledged
+        standing = sensors.standing
         start = 0
         if acknowledged is not None:
             numbers = (

@@ -116,7 +116,8 @@ def read_spectrum(
     known = _with_facts(path, opened, place)
     auxiliary = read_auxiliary(opened, place)
     rates_hz = fault_rates(opened, auxiliary, target)
-    gauge, envelope = SampleStatistics(), Envelope(opened.rate_hz)
+    gauge = SampleStatistics()
+    envelope = Envelope(opened.rate_hz)
     blocks = gauge.without_stuck(gauge.pass_through(opened.blocks()))
     spectrum, failed = None, ""
     try:
@@ -162,7 +163,8 @@ def _with_levels(
     reading: Reading, spectrum: Spectrum, opened: OpenRecording, rates_hz: Mapping[str, float]
 ) -> Reading:
     """Add the levels in bands, of lines and, if it is known, of velocity."""
-    frequency_hz, density = spectrum.frequency_hz, spectrum.density
+    frequency_hz = spectrum.frequency_hz
+    density = spectrum.density
     return replace(
         reading,
         bands=bands(opened, frequency_hz, density),
@@ -250,7 +252,8 @@ def read_channels(
 
     The order of files is kept. Large series are read in parallel processes.
     """
-    channels, report = channels_in(options.channel), progress or (lambda _: None)
+    channels = channels_in(options.channel)
+    report = progress or (lambda _: None)
     workers = workers if sum(_size(path) for path in paths) >= MIN_POOL_BYTES else 1
     for channel in channels:
         of_channel = replace(options, channel=channel)
@@ -308,7 +311,8 @@ def unpack_reading(packed: bytes, name: str) -> Reading:
     body = BytesIO(strip_digest(packed, name, remedy))
     try:
         with np.load(body, allow_pickle=False) as stored:
-            density, content = stored["density"], json.loads(str(stored["told"]))
+            density = stored["density"]
+            content = json.loads(str(stored["told"]))
         quality = content.pop("quality")
         spectrum = content.pop("spectrum")
         content["facts"] = {

@@ -35,7 +35,8 @@ class OnSensor:
 
     def row(self) -> JsonObject:
         """Return its part of the recording's row."""
-        quality, alone = self.reading.quality, self.alone
+        quality = self.reading.quality
+        alone = self.alone
         return {
             "file": self.reading.file,
             "hears": self.detects,
@@ -134,7 +135,8 @@ class TrackedRecording:
 
     def severity(self) -> str:
         """Return velocity and zone as text, or why they are not determined."""
-        reading, zone = self._most_severe, self.zone
+        reading = self._most_severe
+        zone = self.zone
         velocity = reading.velocity
         if not np.isfinite(velocity):
             return (
@@ -152,7 +154,9 @@ class TrackedRecording:
 
     def row(self) -> JsonObject:
         """Return its row of the table, as in `asperity track --json`; None for missing values."""
-        resonance, damping, read = self.resonance, self.damping, self._reading_row(self.reading)
+        resonance = self.resonance
+        damping = self.damping
+        read = self._reading_row(self.reading)
         return {
             "file": read["file"],
             "x": read["x"],

@@ -113,7 +113,8 @@ class SeriesMemory:
         self, keys: Sequence[Key], cleaned: Sequence[CleanSpectrum], band_hz: tuple[float, float]
     ) -> None:
         """Learn the shared part of one sensor and the resonance of each recording."""
-        spectra, kept = [clean.spectrum for clean in cleaned], [clean.kept for clean in cleaned]
+        spectra = [clean.spectrum for clean in cleaned]
+        kept = [clean.kept for clean in cleaned]
         lines, self.shared, moved = learn_series(spectra, band_hz=band_hz, kept=kept)
         self.since, self.found = 0, dict(zip(keys, lines, strict=True))
         self.moved = tuple(keys[number] for number in moved)

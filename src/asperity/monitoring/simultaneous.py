@@ -58,7 +58,8 @@ def match_times(recordings: Sequence[TimedRecording]) -> list[Slot]:
     for time, place, recording in timed:
         duration_s = recording.duration_s if isfinite(recording.duration_s) else 0.0
         end = time + timedelta(seconds=duration_s)
-        overlap, shorter = min(until, end) - time, min(until - began, end - time)
+        overlap = min(until, end) - time
+        shorter = min(until - began, end - time)
         together = time == began or (time < until and 2 * overlap >= shorter)
         if number < 0 or not together or recording.sensor in taken:
             began, until, taken, number = time, end, set(), number + 1
@@ -76,7 +77,9 @@ def match_places(recordings: Sequence[PlacedRecording], x_name: str) -> list[Slo
     Two x are equal within a recording's duration if `x_name` ends in a unit of time, otherwise
     within rounding. A recording of an unknown sensor stands alone.
     """
-    tolerance, common_x, began = _tolerance(recordings, x_name), dict[float, float](), -inf
+    tolerance = _tolerance(recordings, x_name)
+    common_x = dict[float, float]()
+    began = -inf
     for x in sorted({recording.x for recording in recordings}):
         began = began if x - began <= tolerance else x
         common_x[x] = began

@@ -28,7 +28,8 @@ from asperity.monitoring.target import search_target
 from asperity.monitoring.watch_state import Update, WatchState
 from asperity.trend import ALARM_STATES
 
-TRACK_DEFAULTS, WATCH_DEFAULTS = TrackSettings(), WatchSettings()
+TRACK_DEFAULTS = TrackSettings()
+WATCH_DEFAULTS = WatchSettings()
 
 
 def watch_folder(
@@ -90,7 +91,8 @@ def _updates(
     progress: Callable[[Reading], None] | None,
 ) -> Iterator[Update]:
     """Yield an update at the start and whenever recordings have arrived or are overdue."""
-    sensors, watching = state.sensors, state.watching
+    sensors = state.sensors
+    watching = state.watching
     with closing(sensors.store):
         first, overdue_before = True, ""
         while True:
@@ -116,7 +118,8 @@ def _updates(
                 yield replace(update, waiting=waiting)
             if watching.once:
                 return
-            first, overdue_before = False, overdue
+            first = False
+            overdue_before = overdue
             sleep(watching.poll_interval_s)
 
 

@@ -168,7 +168,8 @@ class WatchState:
         """Read files and store each reading at once."""
         if not keys:
             return ()
-        paths, options = [Path(key.file) for key in keys], self.settings.read_options
+        paths = [Path(key.file) for key in keys]
+        options = self.settings.read_options
         if self.sensors.spacing_hz is None:
             self.sensors.set_spacing(common_spacing(paths, options, self.target))
         assert self.sensors.spacing_hz is not None  # just set
@@ -197,7 +198,8 @@ class WatchState:
         first: bool,
     ) -> Update:
         """Judge the series, or take the stored judgement if it is up to date, and notify."""
-        notifiers, acknowledge = self.watching.notifiers, self.settings.acknowledge
+        notifiers = self.watching.notifiers
+        acknowledge = self.settings.acknowledge
         question = _digest(
             {**self.settings.judgement(), **self.schedule.question}, table, series, self.target
         )
@@ -228,7 +230,8 @@ class WatchState:
         Many new recordings are judged in steps of `STRIDE`.
         """
         self.sensors.refresh()
-        afresh, count = acknowledge is not None, len(order.instants)
+        afresh = acknowledge is not None
+        count = len(order.instants)
         if not count:
             return None
         if acknowledge is not None:

@@ -145,7 +145,8 @@ def rig_deviation(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> dict[st
     ours.
     """
     predicted = rig_prediction(curve, quantity)
-    our_value, sq = predicted["crf_hz"].to_numpy(dtype=float), 1e-6 * np.array(SAMPLES_SQ_UM)
+    our_value = predicted["crf_hz"].to_numpy(dtype=float)
+    sq = 1e-6 * np.array(SAMPLES_SQ_UM)
     ends = our_value[[0, -1]] - np.array(CRF_ENDS_HZ)
     shapes = {name: our_value - TRENDS[name](sq) for name in ("knee", "smooth")}
     return {

@@ -116,7 +116,8 @@ class RigSettings:
             raise BadInput(f"rig seed must be 0 or more, got {self.seed}")
         require_positive("rig recording's duration", self.duration_s, "s")
         require_positive("rig sampling rate", self.rate_hz, "Hz")
-        length, tests = self.duration_s * self.rate_hz, self.samples * self.repeats
+        length = self.duration_s * self.rate_hz
+        tests = self.samples * self.repeats
         record = f"{self.duration_s:g} s at {self.rate_hz:g} Hz"
         require_affordable(
             f"a wear test of {self.samples} samples x {self.repeats} recordings of {record}",
@@ -232,7 +233,8 @@ class _Rings(NamedTuple):
         self, number: int, reading: tuple[float, float], rng: np.random.Generator
     ) -> Iterator[tuple[RigTest, ContactLine]]:
         """Yield the tests of a ring."""
-        (sq, std), settings = reading, self.settings
+        (sq, std) = reading
+        settings = self.settings
         true_sq = max(sq + std * float(rng.standard_normal()), 0.1 * sq)
         state, model = self._contact(number - 1, true_sq)
         for repeat in range(1, settings.repeats + 1):

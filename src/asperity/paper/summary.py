@@ -9,7 +9,8 @@ from asperity.paper.table1 import Table1Row
 
 def rig_verdict(rig: Rig) -> str:
     """Return one sentence: number of recordings and range of the true CRF."""
-    first, last = rig.recordings[0], rig.recordings[-1]
+    first = rig.recordings[0]
+    last = rig.recordings[-1]
     knee = "" if rig.split_sq_m is None else f", with a knee at Sq {rig.split_sq_m * 1e6:g} um"
     ends = " to ".join(
         f"{test.crf_hz:.0f} Hz at Sq {test.sq_m * 1e6:.2f} um" for test in (first, last)
@@ -31,7 +32,8 @@ def rig_scalars(rig: Rig) -> dict[str, Any]:
 
 def table1_verdict(rows: Sequence[Table1Row], preset: str) -> str:
     """Return one sentence: deviation from the printed CRFs, and printed CRFAs within our range."""
-    inside, largest = sum(row.within for row in rows), max(abs(row.crf_deviation) for row in rows)
+    inside = sum(row.within for row in rows)
+    largest = max(abs(row.crf_deviation) for row in rows)
     return (
         f"Table 1, preset {preset}: CRF within {100 * largest:.2f} % of the printed values, "
         f"{inside} of {len(rows)} printed CRFAs inside our 5 to 95 % range."

@@ -54,7 +54,8 @@ def reference_viscosity(speed: float, pitch_diameter: float) -> float:
     >>> f"{reference_viscosity(speed=314.16, pitch_diameter=0.039) * 1e6:.1f} mm2/s"
     '13.2 mm2/s'
     """
-    rpm, diameter = speed * 30.0 / math.pi, 1e3 * pitch_diameter
+    rpm = speed * 30.0 / math.pi
+    diameter = 1e3 * pitch_diameter
     law = 45000.0 * rpm**-0.83 if rpm < BRANCH_SPEED else 4500.0 * rpm**-0.5
     return float(1e-6 * law / math.sqrt(diameter))
 

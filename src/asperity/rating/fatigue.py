@@ -120,7 +120,8 @@ def _centres(points: Field) -> Field:
 def _furthest(points: Field, squares: Field, centre: Field) -> tuple[Field, Field]:
     """Return each path's point that is furthest from its centre, and the squared distance."""
     distances = squares - 2.0 * np.matmul(points, centre[:, :, None])[:, :, 0]
-    furthest, paths = distances.argmax(axis=1), np.arange(len(points))
+    furthest = distances.argmax(axis=1)
+    paths = np.arange(len(points))
     return points[paths, furthest], distances[paths, furthest] + np.square(centre).sum(axis=1)
 
 
@@ -173,7 +174,8 @@ def smallest_sphere(points: Field) -> tuple[Field, float]:
 
 def _circumcentre(support: Field, centre: Field) -> tuple[Field, Field]:
     """Return the point of the support's affine hull nearest to `centre`, and its weights."""
-    base, edges = support[0], support[1:] - support[0]
+    base = support[0]
+    edges = support[1:] - support[0]
     if edges.size == 0:
         return base, np.ones(1)
     parts, *_ = np.linalg.lstsq(edges.T, centre - base, rcond=None)

@@ -138,7 +138,8 @@ def specific_film(
         shape=UNIFORM_HEAT,
     )
     contact = bulk + rise
-    viscosity, alpha = oil.viscosity(bulk), oil.alpha(bulk)
+    viscosity = oil.viscosity(bulk)
+    alpha = oil.alpha(bulk)
     if oil.alpha(contact) <= 0.0:
         return None, rise
     material = alpha * mesh.modulus

@@ -131,7 +131,8 @@ class SampleStatistics:
         """Merge the block's central moments (Pébay, Sandia report SAND2008-6212)."""
         squares, cubes, fourths = _central_sums(values, mean)
         before, added = self.finite, values.size
-        total, distance = before + added, mean - self.mean
+        total = before + added
+        distance = mean - self.mean
         self.fourths += (
             fourths
             + distance**4 * before * added * (before**2 - before * added + added**2) / total**3
@@ -148,7 +149,8 @@ class SampleStatistics:
         self.finite = total
 
     def _update_extremes(self, values: Field) -> None:
-        low, high = float(values.min()), float(values.max())
+        low = float(values.min())
+        high = float(values.max())
         if low < self.low:
             self.low, self.clipped_low = low, 0
         if high > self.high:
@@ -332,8 +334,10 @@ def _is_piled(heights: NDArray[np.int64]) -> bool:
     if not occupied.size:
         return False
     edge = int(occupied[-1]) + 1
-    top, below = round(TOP_FROM * edge), round(COMPARED_FROM * edge)
-    at_top, beneath = int(heights[top:edge].sum()), int(heights[below:top].sum())
+    top = round(TOP_FROM * edge)
+    below = round(COMPARED_FROM * edge)
+    at_top = int(heights[top:edge].sum())
+    beneath = int(heights[below:top].sum())
     if at_top < FEWEST_TOP_SAMPLES or not below < top < edge:
         return False
     return at_top / (edge - top) > PILED_DENSITY_RATIO * beneath / (top - below)
@@ -367,7 +371,8 @@ def _stuck_samples(values: Field) -> Mask | None:
     ):
         return None
     edges = np.diff(np.concatenate([[False], np.diff(values) == 0.0, [False]]).astype(np.int8))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    starts = np.flatnonzero(edges == 1)
+    ends = np.flatnonzero(edges == -1)
     stuck_mask = np.zeros(values.size, dtype=bool)
     for start, end in zip(starts, ends, strict=True):
         if end - start >= STUCK_RUN:

@@ -35,7 +35,8 @@ def read(path: Path) -> Contents:
                 events = sub.getSession()
                 if len(events) < 2:
                     continue
-                name, samples = f"{channel.id}.{sub.id} {sub.name}", len(events)
+                name = f"{channel.id}.{sub.id} {sub.name}"
+                samples = len(events)
                 entry = Channel(
                     name=name,
                     blocks=sliced_blocks(partial(_slice, events), samples, notes, name),

@@ -120,7 +120,8 @@ def _member_channels(
     long_axes = [n for n in shape if n != 1]
     if len(long_axes) > 2 or not long_axes:
         return
-    samples, count = max(long_axes), min(long_axes) if len(long_axes) == 2 else 1
+    samples = max(long_axes)
+    count = min(long_axes) if len(long_axes) == 2 else 1
     rows_last = (len(long_axes) == 2) and (
         (long_axes[0] == samples) == fortran
     )  # each channel lies in one piece

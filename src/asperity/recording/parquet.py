@@ -28,7 +28,8 @@ def read(path: Path) -> Contents:
     notes: list[str] = []
     channels = []
     with reject_as(path, "not a readable parquet file"), pyarrow.parquet.ParquetFile(path) as file:
-        schema, rows = file.schema_arrow, file.metadata.num_rows
+        schema = file.schema_arrow
+        rows = file.metadata.num_rows
         table = _decoded(schema.metadata)
         numbers, dated = _numeric_columns(schema)
         labels = [(label, *name_and_unit(label)) for label in numbers]

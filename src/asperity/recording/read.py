@@ -380,7 +380,8 @@ def _unit(path: Path, channel: Channel, stated: Fact | None, *, scaled: bool) ->
 
 
 def _same_unit(unit: str, other: str) -> bool:
-    first, second = acceleration_scale(unit), acceleration_scale(other)
+    first = acceleration_scale(unit)
+    second = acceleration_scale(other)
     return unit.strip().lower() == other.strip().lower() or (first is not None and first == second)
 
 

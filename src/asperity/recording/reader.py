@@ -194,7 +194,8 @@ def columns(
     shape = tuple(int(n) for n in array.shape if n != 1) or (int(np.prod(array.shape)),)
     if len(shape) > 2 or 0 in shape:
         return
-    count, samples = 1 if len(shape) == 1 else min(shape), max(shape)
+    count = 1 if len(shape) == 1 else min(shape)
+    samples = max(shape)
     if count > MOST_CHANNELS or (len(shape) == 2 and len(array.shape) != 2):
         raise UnreadableFile(
             f"{name} is an array of {shape[0]} x {shape[1]}: not a recording; give one row per "

@@ -30,7 +30,8 @@ def read(path: Path) -> Contents:
                 facts = stated_facts(
                     path.name, {**opened.properties, **group.properties, **channel.properties}
                 )
-                name, samples = f"{group.name}/{channel.name}", len(channel)
+                name = f"{group.name}/{channel.name}"
+                samples = len(channel)
                 blocks = sliced_blocks(
                     partial(_slice, path, group.name, channel.name), samples, notes, name
                 )

@@ -219,7 +219,8 @@ def _channels(
         known: ChannelFacts = facts | {"unit": unit} if unit else facts
         if open_bytes is None:
             values = fill(rows[:, k])
-            blocks, samples = partial(_pieces, values), values.size
+            blocks = partial(_pieces, values)
+            samples = values.size
         else:
             clock_column = None if "rate_hz" not in clock else clock_at
             blocks = partial(_streamed, open_bytes, table, (k, clock_column), notes)
@@ -340,5 +341,6 @@ def _placed(known: npt.NDArray[np.intp], position: npt.NDArray[np.int64], values
 def _uneven(steps: Field, step: float, prefix: str) -> Iterator[str]:
     """Yield a note if steps differ from their median."""
     if float(np.max(np.abs(steps - step))) > 0.1 * step:
-        least, most = steps.min() / step, steps.max() / step
+        least = steps.min() / step
+        most = steps.max() / step
         yield f"{prefix}its times are uneven: steps from {least:.2f} to {most:.2f} of the median"

@@ -95,7 +95,8 @@ def _channel(path: Path, record: dict[str, Any], notes: list[str], taken: list[s
     step = float(record["abscissa_inc"])
     name = _name(record, taken)
     unit = str(record.get("ordinate_axis_units_lab", "")).strip()
-    samples, promised = int(values.size), int(record["num_pts"])
+    samples = int(values.size)
+    promised = int(record["num_pts"])
     if samples < promised:
         notes.append(f"cut short: {samples} of {promised} samples present")
     started = next(

@@ -103,7 +103,8 @@ def _animated_map(case: Case, kind: Kind, scale: Ranges) -> AnimatedMap:
     left, top, width, height = (
         100.0 * share for share in (box.x0, 1.0 - box.y1, box.width, box.height)
     )
-    grid, a = case.grid, case.conditions.hertz.half_widths[0]
+    grid = case.grid
+    a = case.conditions.hertz.half_widths[0]
     sides = (-a, a) if case.conditions.endless else ()
     zone = tuple(left + width * (side - grid.lower[0]) / grid.extent[0] for side in sides)
     return AnimatedMap(exhibit.embed(figure), left, top, width, height, zone)
@@ -124,7 +125,8 @@ def script_data(
 
 def empty_map(case: Case, kind: Kind, scale: Ranges) -> Exhibit:
     """Draw axes and legend of a map without data; oil enters from the left."""
-    grid, (title, caption) = case.grid, TEXTS[kind]
+    grid = case.grid
+    (title, caption) = TEXTS[kind]
 
     def draw(medium: Medium) -> Figure:
         figure, axes = map_figure(medium, grid.extent)

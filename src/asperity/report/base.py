@@ -134,7 +134,8 @@ def heading(quantity: Quantity) -> str:
 
 def range_text(quantity: Quantity, values: Collection[float]) -> str:
     """Return the range of the values as text, such as "20.0 to 69.4 %"."""
-    low, high = quantity.number(min(values)), quantity.text(max(values))
+    low = quantity.number(min(values))
+    high = quantity.text(max(values))
     return high if quantity.text(min(values)) == high else f"{low} to {high}"
 
 

@@ -33,7 +33,9 @@ from asperity.report.style import (
 
 def map_figure(medium: Medium, extent: tuple[float, float]) -> tuple[Figure, Axes]:
     """Create a figure for a map of this extent, with room for a legend below."""
-    width, below, above = medium.single - 0.85, 1.0, 0.32
+    width = medium.single - 0.85
+    below = 1.0
+    above = 0.32
     height = width * min(max(extent[1] / extent[0], 0.15), 1.4)
     total = below + height + above
     figure = Figure(figsize=(medium.single, total))
@@ -44,7 +46,8 @@ def map_figure(medium: Medium, extent: tuple[float, float]) -> tuple[Figure, Axe
 
 def show_map(axes: Axes, values: Field, solution: ContactSolution, **style: Any) -> AxesImage:
     """Draw values (nx, ny) or colours (nx, ny, 3) over the contact; oil enters from the left."""
-    (x0, y0), (x1, y1) = solution.grid.lower, solution.grid.upper
+    (x0, y0) = solution.grid.lower
+    (x1, y1) = solution.grid.upper
     corners = (*display("x_m", np.array([x0, x1])), *display("y_m", np.array([y0, y1])))
     roller = solution.conditions.geometry == "roller"
     aspect: Literal["auto", "equal"] = (
@@ -97,7 +100,8 @@ def colour_bar(
     figure: Figure, axes: Axes, image: ScalarMappable, key: str, **settings: Any
 ) -> None:
     """Add the colour bar of a quantity below its map."""
-    box, total = axes.get_position(), figure.get_size_inches()[1]
+    box = axes.get_position()
+    total = figure.get_size_inches()[1]
     place = figure.add_axes((box.x0, 0.42 / total, box.width, 0.11 / total))
     figure.colorbar(
         image, cax=place, orientation="horizontal", label=quantity(key).axis, **settings

@@ -161,7 +161,8 @@ def _is_beside(box: Bbox, title: Bbox) -> bool:
 
 
 def _fit_title(axes: Axes, title: Text, left: float, right: float) -> None:
-    text, size = title.get_text(), float(title.get_fontsize())
+    text = title.get_text()
+    size = float(title.get_fontsize())
     while title.get_window_extent().width > right - left and size > _MIN_TITLE_SIZE:
         size -= 0.5
         title.set_fontsize(size)

@@ -130,7 +130,8 @@ def fit_line(
 
 def fit_modes(band: BandData, band_hz: tuple[float, float], leakage: Field) -> SpectrumFit:
     """Add lines one by one at the largest excess and refit all of them, while BIC improves."""
-    best, model = band.floor_only, _lines_model(band.frequency, band.floors, leakage)
+    best = band.floor_only
+    model = _lines_model(band.frequency, band.floors, leakage)
     for count in range(1, MAX_MODES + 1):
         expected = model(best.parameters)[0]
         trials = []

@@ -222,7 +222,8 @@ class _Modes(NamedTuple):
     @property
     def description(self) -> str:
         """The strongest line in words."""
-        count, (_, f0, zeta) = len(self.lines), self.lines[self.strongest]
+        count = len(self.lines)
+        (_, f0, zeta) = self.lines[self.strongest]
         rest = f"; {count - 1} weaker" if count > 1 else ""
         return f"the strongest of {count} resonances, {2.0 * zeta * f0:.0f} Hz wide{rest}"
 
@@ -275,7 +276,8 @@ def _fit_strongest_mode(
         reason = _below_floor(band_hz, evidence)
         return no_resonance(reason, band_hz, "modes", floor=floor, evidence=evidence)
     modes = _fitted_modes(fit)
-    line, std = modes.lines[modes.strongest], modes.std[modes.strongest]
+    line = modes.lines[modes.strongest]
+    std = modes.std[modes.strongest]
     background = modes.background(band, floor, band_hz)
     evidence = band.evidence(fit, whittle_cost(background / band.scale, band.data))
     objection = _objection(line, std, spectrum, band_hz) or modes.ambiguity()

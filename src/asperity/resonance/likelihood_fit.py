@@ -44,7 +44,8 @@ def fisher_scoring(
         step and multiplied by 4 after a rejected one
     fits : number of independent fits
     """
-    state, damping = start, np.full(fits, FIRST_DAMPING)
+    state = start
+    damping = np.full(fits, FIRST_DAMPING)
     for _ in range(steps):
         proposal = propose(state, damping)
         if proposal is None:

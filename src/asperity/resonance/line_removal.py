@@ -146,7 +146,8 @@ def _require_removable(spectrum: Spectrum, shaft_hz: Sequence[float] | None) -> 
 def _tone_extent(relative_density: Field, peak: int, upper: float) -> tuple[int, int]:
     """Return the first and last line of a tone: its core, and neighbours that exceed `upper`."""
     end = relative_density.size - 1
-    first, last = max(peak - TONE_HALF_WIDTH, 0), min(peak + TONE_HALF_WIDTH, end)
+    first = max(peak - TONE_HALF_WIDTH, 0)
+    last = min(peak + TONE_HALF_WIDTH, end)
     while first > max(peak - LARGEST_TONE_HALF_WIDTH, 0) and relative_density[first - 1] > upper:
         first -= 1
     while last < min(peak + LARGEST_TONE_HALF_WIDTH, end) and relative_density[last + 1] > upper:
@@ -205,7 +206,9 @@ def _tone_frequencies(spectrum: Spectrum, relative_density: Field, peaks: Field)
     if peaks.size == 0:
         return np.zeros(0)
     excess = np.sqrt(np.maximum(np.pad(relative_density, 1) - 1.0, 1e-12))
-    unexplained, top, right = excess[peaks], excess[peaks + 1], excess[peaks + 2]
+    unexplained = excess[peaks]
+    top = excess[peaks + 1]
+    right = excess[peaks + 2]
     ratio = np.maximum(unexplained, right) / top
     offset = (
         ratio / (1.0 + ratio)
@@ -274,7 +277,8 @@ def _corrected_speed(tones: Field, speed: float, spectrum: Spectrum) -> float:
         if not np.any(matching):
             return speed
         lowest = np.argsort(order[matching])[: 2 + int(1.5 * FEWEST_HARMONICS)]
-        used_orders, used_tones = order[matching], tones[matching]
+        used_orders = order[matching]
+        used_tones = tones[matching]
         if tolerance == SPEED_ERROR:
             used_orders, used_tones = used_orders[lowest], used_tones[lowest]
         speed = float(np.sum(used_orders * used_tones) / np.sum(used_orders**2))

@@ -91,7 +91,8 @@ def damping_objection(
     """
     if not resonance.found:
         return resonance.reason
-    ratio, std = resonance.damping_ratio, resonance.damping_ratio_std
+    ratio = resonance.damping_ratio
+    std = resonance.damping_ratio_std
     if not np.isfinite(ratio):
         return f"the method {resonance.method} fits no width"
     if not np.isfinite(std):
@@ -146,7 +147,8 @@ def _line_and_parts(
     """Return the line L, (f/f0)^2, (2ζ)^2, and L's numerator and denominator."""
     x2 = (frequency_hz / f0_hz) ** 2
     squared = 4.0 * damping_ratio**2
-    top, bottom = 1.0 + squared * x2, (1.0 - x2) ** 2 + squared * x2
+    top = 1.0 + squared * x2
+    bottom = (1.0 - x2) ** 2 + squared * x2
     return squared / (1.0 + squared) * top / bottom, x2, squared, top, bottom
 
 

@@ -15,7 +15,8 @@ from asperity.resonance.series import has_no_vibration
 from asperity.resonance.spectrum_model import model_shares
 
 # two lines differ if their distance exceeds both so many standard deviations and so many widths
-DIFFERENT_DEVIATIONS, DIFFERENT_WIDTHS = 3.0, 0.25
+DIFFERENT_DEVIATIONS = 3.0
+DIFFERENT_WIDTHS = 0.25
 
 SpectraBySensor = Mapping[str, Sequence[Spectrum | None]]  # one per recording, None if missing
 MasksBySensor = Mapping[str, Sequence[Mask | None]]
@@ -103,7 +104,10 @@ def common_error_matrix(names: Sequence[str], common: Mapping[tuple[str, str], f
 
 def common_error_share(pair: tuple[str, str], fits: Sequence[SensorFit]) -> float:
     """Return the correlation of two sensors' residuals near their line, plus its standard error."""
-    product, weights, squares, powers = 0.0, 0.0, 0.0, np.zeros(2)
+    product = 0.0
+    weights = 0.0
+    squares = 0.0
+    powers = np.zeros(2)
     for fit in fits:
         if not set(pair) <= set(fit.names):
             continue

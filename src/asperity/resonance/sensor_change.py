@@ -106,7 +106,8 @@ def _by_recording(blocks: SpectrumBlocks, joint: JointFit) -> tuple[Field, Field
     weighted_residual = blocks.weight * (blocks.density / expected - 1.0)
     size = parameters.transfer.coefficients.size
     recordings = weighted_residual.shape[0]
-    score, information = np.zeros((recordings, size)), np.zeros((recordings, size, size))
+    score = np.zeros((recordings, size))
+    information = np.zeros((recordings, size, size))
     for row, (shares, weight) in enumerate(zip(relative, blocks.weight, strict=True)):
         single = parameters._replace(own=parameters.own[[row]])
         transfer = shares[0][:, None] * relative_columns(blocks.centre, single)[0]

@@ -176,14 +176,16 @@ class JointJudgement:
 
     def _fit(self, names: list[str], numbers: list[int]) -> SensorFit:
         """Fit one line per recording to all sensors, their shared spectra held."""
-        sensors, templates = [], self.by_sensor[names[0]].fit.templates
+        sensors = []
+        templates = self.by_sensor[names[0]].fit.templates
         rows = {name: [self.rows[name].index(number) for number in numbers] for name in names}
         total = np.sum(
             [self.by_sensor[name].fit.template_costs[rows[name]] for name in names], axis=0
         )
         best = np.argmin(total, axis=1)
         for name in names:
-            series, joint = self.by_sensor[name], self.by_sensor[name].fit.joint
+            series = self.by_sensor[name]
+            joint = self.by_sensor[name].fit.joint
             blocks = SpectrumBlocks(
                 series.blocks.centre,
                 series.blocks.density[rows[name]],
@@ -286,7 +288,8 @@ class JointJudgement:
         self, fit: SensorFit, row: int, evidence: _Evidence, reason: str
     ) -> Resonance:
         """Return one recording's line as fitted to all sensors, its height that on the first."""
-        fitted, first = np.exp(fit.lines.own[0, row, :3]), fit.sensors[0]
+        fitted = np.exp(fit.lines.own[0, row, :3])
+        first = fit.sensors[0]
         base = np.exp(fit.lines.own[0, row, 3] + first.parameters.base)
         stands = self.by_sensor[fit.names[0]].fit.stands
         return fitted_resonance(
@@ -353,7 +356,8 @@ class JointJudgement:
             model_shares(data.blocks, fit.joint(sensor).parameters)[0]
             for sensor, data in enumerate(fit.sensors)
         ]
-        weights, count = _frequency_weights(fit.lines), len(fit.sensors)
+        weights = _frequency_weights(fit.lines)
+        count = len(fit.sensors)
         frequency_of_base = []
         for sensor in range(count):
             height, _, _, gain = parameter_indices(sensor)
@@ -372,7 +376,8 @@ class JointJudgement:
 
     def _base_std(self, fit: SensorFit, sensor: int) -> Field:
         """Return the deviations (recordings, 4) caused by the uncertainty of the shared base."""
-        name, data = fit.names[sensor], fit.sensors[sensor]
+        name = fit.names[sensor]
+        data = fit.sensors[sensor]
         rows = [self.rows[name].index(number) for number in fit.numbers]
         joint = self.by_sensor[name].fit.joint
         if self.by_sensor[name].uses_shared:  # their deviations exclude that of the base
@@ -404,7 +409,8 @@ def _frequency_weights(lines: CommonLines) -> Field:
 
 def _common_chance(fit: SensorFit, pair: tuple[int, int], relative: Sequence[Field]) -> Field:
     """Return the covariance of the parameters by noise that is the same on two sensors."""
-    inverse, (sensor, other) = fit.lines.inverse, pair
+    inverse = fit.lines.inverse
+    (sensor, other) = pair
     weight = np.sqrt(fit.sensors[sensor].blocks.weight * fit.sensors[other].blocks.weight)
     score = (relative[sensor] * weight[:, None]) @ relative[other].swapaxes(1, 2)
     both = (

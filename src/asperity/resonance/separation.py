@@ -246,7 +246,8 @@ class _Likelihood:
         self, parameters: ModelParameters, step: Field, base_step: Field
     ) -> ModelParameters:
         """Return the parameters after a step of own and transfer parameters and of the base."""
-        size, transfer = parameters.own.size, parameters.transfer
+        size = parameters.own.size
+        transfer = parameters.transfer
         own_step = step[:size].reshape(parameters.own.shape)
         limited = np.clip(own_step, -LARGEST_STEP, LARGEST_STEP)
         coefficients = transfer.coefficients + np.clip(step[size:], -1.0, 1.0)

@@ -347,7 +347,8 @@ def _line_evidence(blocks: SpectrumBlocks, joint: JointFit) -> tuple[Field, Fiel
 def _keeps_place(joint: JointFit, significant: Mask) -> bool:
     """Return whether the line keeps its frequency; the base can then absorb part of its height."""
     own = joint.parameters.own
-    frequencies, widths = own[significant, 1], 2.0 * np.exp(own[significant, 2])
+    frequencies = own[significant, 1]
+    widths = 2.0 * np.exp(own[significant, 2])
     return frequencies.size > 0 and float(np.std(frequencies)) < PLACE_SPREAD * float(
         np.median(widths)
     )

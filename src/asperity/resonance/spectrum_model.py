@@ -173,7 +173,8 @@ def joint_scoring_point(
     """Return cost, score and information; `prior_information` is that of the transfer."""
     relative, expected = model_shares(blocks, parameters)
     own, weighted_residual = _line_scoring(blocks, parameters, relative, expected)
-    weighted, shared_part = own.weighted, relative[:, 3]
+    weighted = own.weighted
+    shared_part = relative[:, 3]
     transfer_columns = relative[:, 0, :, None] * relative_columns(blocks.centre, parameters)
     coefficients = parameters.transfer.coefficients
     columns = transfer_columns.reshape(blocks.weight.size, coefficients.size)
@@ -200,7 +201,8 @@ def joint_scoring_point(
 
 def parameter_bounds(blocks: SpectrumBlocks) -> tuple[Field, Field]:
     """Return lower and upper bounds of ln A, ln f, ln ζ, ln g."""
-    low, high = np.log(0.97 * blocks.centre[0]), np.log(1.03 * blocks.centre[-1])
+    low = np.log(0.97 * blocks.centre[0])
+    high = np.log(1.03 * blocks.centre[-1])
     return np.array([-60.0, low, np.log(LEAST_DAMPING), -60.0]), np.array(
         [60.0, high, np.log(MOST_DAMPING), 60.0]
     )

@@ -69,7 +69,8 @@ class FrictionCurve:
 
     def verdict(self) -> str:
         """Return one sentence on the range of friction."""
-        first, last = self.points[0], self.points[-1]
+        first = self.points[0]
+        last = self.points[-1]
         if self.kind == "stribeck":
             sentence = (
                 f"The friction coefficient changes from {first.friction_coefficient:.4f} at "
@@ -200,7 +201,8 @@ def _point(case: Case, solution: ContactSolution) -> FrictionPoint:
     friction, heat = friction_and_heat(
         solution, boundary_friction=case.boundary_friction, thermal=case.thermal
     )
-    state, conditions = contact_state(solution), solution.conditions
+    state = contact_state(solution)
+    conditions = solution.conditions
     return FrictionPoint(
         entrainment_speed_m_s=conditions.entrainment_speed,
         slide_to_roll=conditions.slide_to_roll,

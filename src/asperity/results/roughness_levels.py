@@ -7,7 +7,8 @@ from asperity.results.run import Run
 
 def levels_verdict(runs: Mapping[str, Run]) -> str:
     """Return one sentence on load share and resonance over increasing roughness levels."""
-    levels, solved = list(runs), list(runs.values())
+    levels = list(runs)
+    solved = list(runs.values())
     first, last = solved[0], solved[-1]
     first_clr, last_clr = (f"{100 * run.state.clr:.0f} %" for run in (first, last))
     at_last = last.resonance_text().removeprefix("contact resonance ")

@@ -110,7 +110,8 @@ class Run:
     @property
     def remarks(self) -> tuple[str, ...]:
         """`notes`, and those on friction, heat and stiffness over frequency."""
-        heat, curve = self.heat, self._dynamic_curve
+        heat = self.heat
+        curve = self._dynamic_curve
         failures = () if curve.value is None else curve.value.failures
         if curve.reason:
             failures = (f"no stiffness over frequency: {curve.reason}",)
@@ -290,7 +291,8 @@ class Run:
         Full film: asperities carry less than 1 % of the load; boundary lubrication: 90 % or more;
         mixed between. If the grid does not determine CLR, the sentence states so, with the reason.
         """
-        numbers, error = mean_row((self.summary_row, *self.others)), self.error
+        numbers = mean_row((self.summary_row, *self.others))
+        error = self.error
         clr, car = (float(numbers[key]) for key in ("clr", "car"))
         if self.solution.lubricant is None:
             regime = "Dry contact"
@@ -316,11 +318,10 @@ class Run:
         """Return edge pressure and loaded length of a roller; empty for other contacts."""
         if self.axial is None:
             return ""
-        numbers, edge = self.numbers([]), quantity("edge_pressure_pa")
-        pressure, middle = (
-            self.axial.edge_pressure,
-            quantity("middle_pressure_pa").named(numbers["middle_pressure_pa"]),
-        )
+        numbers = self.numbers([])
+        edge = quantity("edge_pressure_pa")
+        pressure = self.axial.edge_pressure
+        middle = quantity("middle_pressure_pa").named(numbers["middle_pressure_pa"])
         if pressure is None:
             text = f"no {edge.name} (outside the grid)"
         elif pressure.value is None:

@@ -47,7 +47,8 @@ def run_contents(run: SolvedRun) -> ehl.FileContents:
     Maps of traction, temperature and von Mises stress are in single precision. A loaded run
     recomputes them.
     """
-    (variables, coordinates, attributes), stress = run.solution.contents(), run.stress
+    (variables, coordinates, attributes) = run.solution.contents()
+    stress = run.stress
     axis = {"axis": "Z", "positive": "down"}
     coordinates["depth"] = ("depth", stress.depths, quantity("depth").attributes | axis)
     for entry in map(quantity, MAPS):
@@ -64,7 +65,8 @@ def run_contents(run: SolvedRun) -> ehl.FileContents:
         section,
     )
     if run.dynamic_curve is not None:
-        frequency, values = "dynamic_frequency", run.dynamic_curve.frequency_hz
+        frequency = "dynamic_frequency"
+        values = run.dynamic_curve.frequency_hz
         coordinates[frequency] = (frequency, values, quantity(frequency).attributes)
         variables |= _dynamic_variables(run.dynamic_curve)
     for key, value in run.scalars().items():

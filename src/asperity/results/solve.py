@@ -217,7 +217,8 @@ def load_run(path: str | Path) -> Run:
     path = Path(path)
     solution = load_solution(path)
     try:
-        text, notes = solution.attributes["case"], tuple(json.loads(solution.attributes["notes"]))
+        text = solution.attributes["case"]
+        notes = tuple(json.loads(solution.attributes["notes"]))
         others = json.loads(solution.attributes.get("surfaces", "[]"))
     except (KeyError, ValueError):
         raise UnreadableFile(

@@ -61,7 +61,8 @@ def prediction_interval(values: Sequence[float], *, share: bool) -> tuple[float,
 
     A `share` is transformed to log odds, so that the interval stays within 0 to 1.
     """
-    mean, count = float(np.mean(values)), len(values)
+    mean = float(np.mean(values))
+    count = len(values)
     if count < 2:
         raise ValueError("a prediction interval needs at least two values")
     scale = np.array([_odds(value) for value in values]) if share else np.array(values)

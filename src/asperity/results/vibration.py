@@ -41,7 +41,9 @@ class VibratedCase:
 
     def verdict(self) -> str:
         """Return one sentence: resonance, contact, and a warning if the spring is nonlinear."""
-        resonance, model, force = self.resonance, self.case.vibration, self.vibration.dynamic_load
+        resonance = self.resonance
+        model = self.case.vibration
+        force = self.vibration.dynamic_load
         load = f"{self.case.conditions.load:g} N on asperities"
         solved = model is not None and model.needs_solution
         contact = (

@@ -138,7 +138,8 @@ class RunRecorder(Generic[Row]):
     def require_rows(self, complete: bool) -> None:
         """Raise UnreadableFile if the stored rows end before the stored state."""
         if self.files is not None and not complete:
-            table, memory = self.files.layout.table, self.files.path / MEMORY
+            table = self.files.layout.table
+            memory = self.files.path / MEMORY
             raise UnreadableFile(
                 f"{self.files.path / table} ends before {memory}; choose another folder"
             )

@@ -135,7 +135,8 @@ class OscillatingContact:
         return self._to_stiffness(answer, frequency_hz)
 
     def _to_stiffness(self, answer: OscillationResponse, frequency_hz: float) -> DynamicStiffness:
-        response, omega = self._response(complex(answer.total.sum())), 2.0 * math.pi * frequency_hz
+        response = self._response(complex(answer.total.sum()))
+        omega = 2.0 * math.pi * frequency_hz
         return DynamicStiffness(
             frequency_hz=frequency_hz,
             stiffness=response.real,
@@ -221,17 +222,17 @@ class OscillatingContact:
             approach = conditions.hertz.approach
             assert approach is not None  # a line's alone depends on the depth
             return 1.5 * conditions.load / approach
-        radius, modulus, length = (
-            conditions.radius_along_rolling,
-            conditions.pair.reduced_modulus,
-            conditions.line_length,
-        )
+        radius = conditions.radius_along_rolling
+        modulus = conditions.pair.reduced_modulus
+        length = conditions.line_length
         depth = length if self.depth is None else self.depth  # for a roller its length
         return line_stiffness(conditions.load, length, radius, modulus, depth)
 
     def _stiffness_scale(self) -> float:
         """Return the factor from dimensionless to physical stiffness [N/m]."""
-        problem, scales, conditions = self.balance.problem, self.scales, self.conditions
+        problem = self.balance.problem
+        scales = self.scales
+        conditions = self.conditions
         dx, dy = problem.spacing
         cell = scales.pressure * scales.length**2 / scales.gap * dx * dy
         if not conditions.endless or conditions.length is None:
@@ -243,7 +244,8 @@ class OscillatingContact:
         conditions = self.conditions
         if self.depth is None or conditions.length is None:
             return response
-        modulus, a = conditions.pair.reduced_modulus, conditions.hertz.half_widths[0]
+        modulus = conditions.pair.reduced_modulus
+        a = conditions.hertz.half_widths[0]
         return 1.0 / (
             1.0 / response
             + 2.0 / (math.pi * modulus * conditions.length) * math.log(self.depth / a)

@@ -104,20 +104,18 @@ class AxialDistribution:
 
 def axial_distribution(solution: ContactSolution) -> AxialDistribution | None:
     """Evaluate a solved roller along its length; None for another geometry."""
-    conditions, grid = solution.conditions, solution.grid
+    conditions = solution.conditions
+    grid = solution.grid
     if conditions.geometry != "roller":
         return None
     scales = Scales.from_conditions(conditions, solution.lubricant)
-    profile, y = RollerProfile(conditions, scales.length, scales.gap), grid.y / scales.length
-    central_pressure, gap = (
-        profile.central_pressure(grid.x, solution.pressure, grid.spacing[0]),
-        solution.gap.min(axis=0),
-    )
-    on_roller, pressures, films = (
-        profile.inside(y),
-        profile.end_values(y, central_pressure),
-        profile.end_values(y, gap),
-    )
+    profile = RollerProfile(conditions, scales.length, scales.gap)
+    y = grid.y / scales.length
+    central_pressure = profile.central_pressure(grid.x, solution.pressure, grid.spacing[0])
+    gap = solution.gap.min(axis=0)
+    on_roller = profile.inside(y)
+    pressures = profile.end_values(y, central_pressure)
+    films = profile.end_values(y, gap)
     end_values = (
         {"edge_pressure": float(pressures.max()), "end_film": float(films.min())}
         if films.size
@@ -147,7 +145,8 @@ def _at_end(solution: ContactSolution, name: str, value: float) -> EndValue:
 
 def _why_not(solution: ContactSolution, name: str, value: float, error_bar: float | None) -> str:
     """Return the reason why an end value is not determined; empty if it is."""
-    conditions, load = solution.conditions, solution.conditions.sliced_load
+    conditions = solution.conditions
+    load = solution.conditions.sliced_load
     spacing = solution.grid.spacing[1] / conditions.hertz.half_widths[0]
     hardness = conditions.hardness
     if name == "edge_pressure" and hardness is not None and value >= hardness * (1.0 - 1e-6):

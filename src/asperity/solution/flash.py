@@ -135,7 +135,8 @@ def _times(nx: int, dx: float, dy: float, drift: float, reach: float) -> tuple[F
     however little the heat has spread, each panel then lies on one side of a cell edge. Once the
     heat has spread beyond a cell, the drift per panel may be as long as the spread.
     """
-    first, last = FIRST_S * min(dx, dy), LAST_S * reach
+    first = FIRST_S * min(dx, dy)
+    last = LAST_S * reach
     ends = np.geomspace(first, last, int(np.ceil(np.log(last / first) / np.log(PANEL_RATIO))) + 1)
     if drift != 0.0:
         drifted = [0.5 * dx]
@@ -224,7 +225,8 @@ def flash_temperature(
         if the division of heat between the bodies does not converge.
     """
     thermal = thermal or Thermal()
-    conditions, grid = solution.conditions, solution.grid
+    conditions = solution.conditions
+    grid = solution.grid
     friction_result = friction_result or friction(solution, thermal=thermal)
     heat = np.abs(friction_result.shear) * conditions.sliding_speed
     bodies = tuple(
@@ -234,9 +236,12 @@ def flash_temperature(
     resistance, exchanging = _film_resistance(solution, thermal)
     bulk_1, bulk_2 = thermal.bulk_rise
     passed = _heat_across_film(bodies, heat, resistance, exchanging, bulk_2 - bulk_1)
-    into_1, into_2 = 0.5 * heat + passed, 0.5 * heat - passed
-    rise_1, rise_2 = bodies[0](into_1), bodies[1](into_2)
-    surface_1, surface_2 = bulk_1 + rise_1, bulk_2 + rise_2
+    into_1 = 0.5 * heat + passed
+    into_2 = 0.5 * heat - passed
+    rise_1 = bodies[0](into_1)
+    rise_2 = bodies[1](into_2)
+    surface_1 = bulk_1 + rise_1
+    surface_2 = bulk_2 + rise_2
     # parabolic temperature profile across the film
     film = 0.5 * (surface_1 + surface_2) + heat * resistance / 12.0
     area = _cell_area(solution)
@@ -263,7 +268,8 @@ def _film_resistance(solution: ContactSolution, thermal: Thermal) -> tuple[Field
 
 def _cell_area(solution: ContactSolution) -> float:
     """Return the area [m^2] of a cell, that of a line contact in proportion to its length."""
-    grid, length = solution.grid, solution.conditions.length
+    grid = solution.grid
+    length = solution.conditions.length
     dx, dy = grid.spacing
     return dx * dy * (length / grid.extent[1] if length is not None else 1.0)
 
@@ -309,7 +315,9 @@ def _heat_across_film(
     if not np.any(target):
         return target
     operator = _FilmExchange(bodies, resistance, exchanging)
-    scaled_flux, residual, size = np.zeros(heat.size), target.ravel(), float(np.linalg.norm(target))
+    scaled_flux = np.zeros(heat.size)
+    residual = target.ravel()
+    size = float(np.linalg.norm(target))
     for rounds in range(MAX_ROUNDS + 1):
         residual_norm = float(np.linalg.norm(residual))
         if residual_norm <= SHARING_TOLERANCE * size:

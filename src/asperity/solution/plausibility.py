@@ -41,7 +41,8 @@ def plausibility_notes(
     conditions: ContactConditions, lubricant: Lubricant | None
 ) -> tuple[str, ...]:
     """Return notes on doubtful input: bodies, load and oil."""
-    solids, oil = _solids(conditions), () if lubricant is None else _oil(conditions, lubricant)
+    solids = _solids(conditions)
+    oil = () if lubricant is None else _oil(conditions, lubricant)
     return (*solids, *(_roller(conditions) if conditions.geometry == "roller" else ()), *oil)
 
 
@@ -56,7 +57,8 @@ def inlet_notes(
     """
     if lubricant is None:
         return ()
-    a, inlet_start = conditions.hertz.half_widths[0], -grid.lower[0]
+    a = conditions.hertz.half_widths[0]
+    inlet_start = -grid.lower[0]
     loss = FILM_LOSS_PER_PRESSURE_LOSS * missing_inlet(conditions, lubricant, inlet_start)
     flooded = flooded_inlet(conditions, lubricant) / a
     length = inlet_length(conditions, lubricant)
@@ -100,7 +102,8 @@ def undetermined(solution: ContactSolution, clr: Uncertainty) -> str | None:
 
 
 def _solids(conditions: ContactConditions) -> Iterator[str]:
-    pair, hertz = conditions.pair, conditions.hertz
+    pair = conditions.pair
+    hertz = conditions.hertz
     for body, (modulus, poisson) in enumerate(
         zip(pair.youngs_moduli, pair.poisson_ratios, strict=True), 1
     ):
@@ -145,7 +148,8 @@ def _roller(conditions: ContactConditions) -> Iterator[str]:
 
 
 def _oil(conditions: ContactConditions, lubricant: Lubricant) -> Iterator[str]:
-    law, p_h = lubricant.viscosity, conditions.hertz.p_max
+    law = lubricant.viscosity
+    p_h = conditions.hertz.p_max
     alpha = getattr(law, "alpha", None)
     if alpha is not None and not OIL_ALPHA[0] <= alpha <= OIL_ALPHA[1]:
         yield (
@@ -165,8 +169,11 @@ def _oil(conditions: ContactConditions, lubricant: Lubricant) -> Iterator[str]:
 
 
 def _of_solution(solution: ContactSolution) -> Iterator[str]:
-    conditions, lubricant, grid = solution.conditions, solution.lubricant, solution.grid
-    highest, modulus = float(solution.pressure.max()), conditions.pair.effective_modulus
+    conditions = solution.conditions
+    lubricant = solution.lubricant
+    grid = solution.grid
+    highest = float(solution.pressure.max())
+    modulus = conditions.pair.effective_modulus
     if highest > modulus / MIN_MODULUS_RATIO:
         yield (
             f"The largest pressure of {highest / 1e9:.3g} GPa exceeds a twentieth of E' = "
@@ -210,7 +217,8 @@ def ridge_radii(solution: ContactSolution) -> tuple[float, float] | None:
     Both agree for smooth crests. For an edge, whose radius is set by the cells, the second is twice
     the first. None if fewer than twenty crests touch.
     """
-    heights, dx = solution.surface.heights, solution.grid.spacing[0]
+    heights = solution.surface.heights
+    dx = solution.grid.spacing[0]
     crest = heights[2:-2]
     narrow, wide = (
         2.0 * crest - heights[2 - n : -2 - n] - heights[2 + n : heights.shape[0] - 2 + n]

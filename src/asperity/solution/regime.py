@@ -110,7 +110,8 @@ class RegimeCard:
             return rows
         numbers = ", ".join(quantity(key).named(values[key]) for key in _NUMBERS)
         rows += [("regime", str(self.regime)), ("dimensionless numbers", numbers)]
-        film, deviation = quantity("film_thickness_m"), quantity("film_deviation")
+        film = quantity("film_thickness_m")
+        deviation = quantity("film_deviation")
         rows += [
             (
                 f"fitted {_PLACES[fit.place]}, {fit.source}",
@@ -124,11 +125,9 @@ class RegimeCard:
 
 def regime_card(solution: ContactSolution) -> RegimeCard:
     """Return the regime card of a solved contact."""
-    conditions, lubricant, hertz = (
-        solution.conditions,
-        solution.lubricant,
-        solution.conditions.hertz,
-    )
+    conditions = solution.conditions
+    lubricant = solution.lubricant
+    hertz = solution.conditions.hertz
     a, b = hertz.half_widths
     regime = None if lubricant is None else lubrication_regime(conditions, lubricant)
     central, density = _central(
@@ -158,7 +157,9 @@ def regime_card(solution: ContactSolution) -> RegimeCard:
 
 def far_from_fits(solution: ContactSolution) -> str | None:
     """Return a note if the central film without asperity contact is far from all valid fits."""
-    conditions, lubricant, sq = solution.conditions, solution.lubricant, solution.surface.sq
+    conditions = solution.conditions
+    lubricant = solution.lubricant
+    sq = solution.surface.sq
     if (
         lubricant is None
         or solution.in_contact.any()
@@ -169,11 +170,10 @@ def far_from_fits(solution: ContactSolution) -> str | None:
     if not central or min(abs(fit.deviation) for fit in central) <= MAX_DEVIATION:
         return None
     nearest = min(central, key=lambda fit: abs(fit.deviation))
-    length, cell = inlet_length(conditions, lubricant), solution.grid.spacing[0]
-    flooded, inlet_start = (
-        flooded_inlet(conditions, lubricant, missing=0.05),
-        -solution.grid.lower[0],
-    )
+    length = inlet_length(conditions, lubricant)
+    cell = solution.grid.spacing[0]
+    flooded = flooded_inlet(conditions, lubricant, missing=0.05)
+    inlet_start = -solution.grid.lower[0]
     reason = (
         f"the grid has {length / cell:.2g} cells across the inlet"
         if length < MIN_CELLS_IN_INLET * cell
@@ -198,7 +198,8 @@ def _central(solution: ContactSolution, *, at_the_peak: bool) -> tuple[float, fl
     middle = hertz_zone(solution.conditions, solution.grid, CENTRE)
     if at_the_peak:
         middle = solution.pressure == solution.pressure.max()
-    film, oil = float(solution.gap[middle].mean()), solution.lubricant
+    film = float(solution.gap[middle].mean())
+    oil = solution.lubricant
     if oil is None:
         return film, 1.0
     return film, float(oil.density(solution.pressure[middle]).mean()) / oil.density.rho0

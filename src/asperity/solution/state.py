@@ -67,9 +67,13 @@ def plastic_overlap(solution: ContactSolution) -> Field:
 
 def state_of(solution: ContactSolution, balance: Balance | MixedBalance) -> ContactState:
     """Return the scalars of a solution from its evaluated equations (also of a moving contact)."""
-    grid, in_contact, problem = solution.grid, solution.in_contact, balance.problem
-    sq, oil = solution.surface.sq, solution.lubricant
-    zone, centre = problem.zone(), problem.zone(CENTRE)
+    grid = solution.grid
+    in_contact = solution.in_contact
+    problem = balance.problem
+    sq = solution.surface.sq
+    oil = solution.lubricant
+    zone = problem.zone()
+    centre = problem.zone(CENTRE)
     dx, dy = problem.spacing
     width = grid.cells[1] * dy if problem.form.periodic else 2.0 * problem.form.aspect
     unbalanced, carried_oil = _unbalanced_oil(balance, zone)
@@ -104,14 +108,15 @@ def _unbalanced_oil(balance: Balance | MixedBalance, zone: Mask) -> tuple[float,
 
 def _error(solution: ContactSolution) -> ContactError:
     """Return the errors known from the solution alone (iteration and grid), and the assumptions."""
-    convergence, options = solution.convergence, solution.options
-    step, cells = convergence.iteration_error, convergence.discretisation_error
-    iteration, grid = (
-        None if step is None else (step.clr, step.clr),
-        None if cells is None else cells.sides("clr"),
-    )
+    convergence = solution.convergence
+    options = solution.options
+    step = convergence.iteration_error
+    cells = convergence.discretisation_error
+    iteration = None if step is None else (step.clr, step.clr)
+    grid = None if cells is None else cells.sides("clr")
     clr = carried_share(solution.pressure, solution.in_contact)
-    cap, inlet = solution.p_cap, -solution.grid.lower[0] / solution.conditions.hertz.half_widths[0]
+    cap = solution.p_cap
+    inlet = -solution.grid.lower[0] / solution.conditions.hertz.half_widths[0]
     return ContactError(
         clr=Uncertainty(value=clr, iteration=iteration, grid=grid, range=(0.0, 1.0)),
         choices=(
@@ -129,7 +134,8 @@ def _error(solution: ContactSolution) -> ContactError:
 
 def _contact_slope(solution: ContactSolution) -> float | None:
     """Return the mean slope of the touching cells by central differences; y is periodic."""
-    heights, (dx, dy) = solution.surface.heights, solution.grid.spacing
+    heights = solution.surface.heights
+    (dx, dy) = solution.grid.spacing
     across = (np.roll(heights, -1, axis=1) - np.roll(heights, 1, axis=1)) / (2.0 * dy)
     slope = np.hypot(np.gradient(heights, dx, axis=0), across)
     return float(slope[solution.in_contact].mean()) if solution.in_contact.any() else None

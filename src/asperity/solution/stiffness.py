@@ -106,7 +106,8 @@ def tangent_stiffness(
 
 def _after_shakedown(solution: ContactSolution) -> ContactSolution:
     """Return the contact after shakedown: flattened by its load, with a raised pressure cap."""
-    surface, conditions = solution.surface, solution.conditions
+    surface = solution.surface
+    conditions = solution.conditions
     if solution.options.model == CONSERVING or conditions.hardness is None:
         raise BadInput("shakedown needs the model unified or mixed; solve with one of them")
     flattened = replace(
@@ -178,7 +179,8 @@ def approach_of(solution: ContactSolution, depth: float | None) -> float:
     The solver refers a line contact to points one half-width away, and the half-width grows with
     the load; this approach has the same zero at any load.
     """
-    conditions, approach = solution.conditions, -solution.rigid_approach
+    conditions = solution.conditions
+    approach = -solution.rigid_approach
     if depth is not None:
         slope = 2.0 * conditions.line_load / (np.pi * conditions.pair.reduced_modulus)
         approach += slope * float(np.log(depth / conditions.hertz.half_widths[0]))

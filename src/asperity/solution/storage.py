@@ -52,7 +52,8 @@ def load_solution(path: str | Path) -> ContactSolution:
 
 def _solution(dataset: "xarray.Dataset") -> ContactSolution:
     described = {name: json.loads(dataset.attrs[name]) for name in DESCRIBED}
-    lubricant, grid = described["lubricant"], described["grid"]
+    lubricant = described["lubricant"]
+    grid = described["grid"]
     pressure, gap, heights = (
         dataset[name].values for name in ("pressure", "gap", "surface_height")
     )

@@ -193,7 +193,8 @@ def hertz_stress(
     'largest von Mises stress at 0.7 half-widths'
     """
     line = conditions.long
-    (a, b), cells = conditions.hertz.half_widths, HERTZ_CELLS
+    (a, b) = conditions.hertz.half_widths
+    cells = HERTZ_CELLS
     reach = (1.25 * a, a if line else 1.25 * b)
     grid = Grid((cells, MIN_CELLS if line else cells), (-reach[0], -reach[1]), reach, (False, line))
     inside = (
@@ -220,7 +221,8 @@ def default_depths(conditions: ContactConditions, grid: Grid) -> Field:
 
     The 14 depths are in geometric progression, starting at half a cell along x.
     """
-    half_width, first = _half_width(conditions), 0.5 * grid.spacing[0]
+    half_width = _half_width(conditions)
+    first = 0.5 * grid.spacing[0]
     min_depth = np.geomspace(first, max(MAX_DEPTH * half_width, 10.0 * first), DEPTHS - 2)
     return np.unique(np.concatenate([[0.0, CORE * half_width], min_depth]))
 
@@ -345,7 +347,8 @@ def _peak_depth(depths: list[float], values: list[float]) -> float | None:
     shift = depths[1]
     a, b, c = np.log(np.array(depths) + shift)
     fa, fb, fc = values
-    left, right = (b - a) * (fb - fc), (b - c) * (fb - fa)
+    left = (b - a) * (fb - fc)
+    right = (b - c) * (fb - fa)
     if left == right:
         return None
     vertex = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)

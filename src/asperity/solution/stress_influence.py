@@ -56,7 +56,8 @@ class Tractions:
 
     def stresses(self, depth: float, poisson_ratio: float, *, cache: bool = True) -> Field:
         """Return σ_xx, σ_yy, σ_zz, σ_xy, σ_yz, σ_xz [Pa] below all cell centres, (6, nx, ny)."""
-        (nx, ny), (_, repeats) = self.grid.cells, self.grid.periodic
+        (nx, ny) = self.grid.cells
+        (_, repeats) = self.grid.periodic
         influence = _cached_influence if cache and nx * ny <= CACHED_CELLS else _influence
         kernels = influence(self.grid.cells, self.grid.spacing, repeats, depth, poisson_ratio)
         # columns of wavenumbers along y; the inverse transform takes the others as zero
@@ -78,7 +79,8 @@ class Tractions:
 
 
 def _transformed(field: Field, grid: Grid) -> Waves:
-    (nx, ny), (_, repeats) = grid.cells, grid.periodic
+    (nx, ny) = grid.cells
+    (_, repeats) = grid.periodic
     field = field.astype(np.float32)
     return np.asarray(
         scipy.fft.fft(scipy.fft.rfft(field, n=ny if repeats else 2 * ny, axis=1), n=2 * nx, axis=0)
@@ -174,13 +176,17 @@ class _Corners(NamedTuple):
     @classmethod
     def at_depth(cls, x: Field, y: Field, z: float) -> "_Corners":
         """Return the integrals at a depth z."""
-        xx, yy, zz, xy = x * x, y * y, z * z, x * y
+        xx = x * x
+        yy = y * y
+        zz = z * z
+        xy = x * y
         r = np.sqrt(xx + yy + zz)
         in_xz, in_yz = xx + zz, yy + zz
         turned = xy * (xx + yy) / (r + z)
         angle_x = np.arctan2(turned, xx * r + yy * z)
         angle_y = np.arctan2(turned, yy * r + xx * z)
-        log_x, log_y = np.arcsinh(x / np.sqrt(in_yz)), np.arcsinh(y / np.sqrt(in_xz))
+        log_x = np.arcsinh(x / np.sqrt(in_yz))
+        log_y = np.arcsinh(y / np.sqrt(in_xz))
         return cls(x, y, z, r, in_xz, in_yz, angle_x, angle_y, log_x, log_y)
 
 
@@ -217,9 +223,12 @@ def _under_shear(at: _Corners, nu: float) -> tuple[Field, ...]:
 
 def _strips(count: int, dx: float, depth: float, nu: float) -> Field:
     """Return the stresses at cells 0, 1, ... along x below an infinite strip, (2, 6, nx + 1)."""
-    x, z = (np.arange(count + 2) - 0.5) * dx, depth
+    x = (np.arange(count + 2) - 0.5) * dx
+    z = depth
     square = x * x + z * z
-    angle, beside, below = np.arctan2(x, z), z * x / square, z * z / square
+    angle = np.arctan2(x, z)
+    beside = z * x / square
+    below = z * z / square
     nothing = np.zeros_like(x)
     edges = np.stack(
         [
@@ -258,8 +267,10 @@ def _images(cells: tuple[int, int], spacing: tuple[float, float], depth: float, 
     rectangles = _rectangles((reach, 2 * ny), spacing, depth, nu)
     kernels = np.zeros((2, 6, nx + 1, ny // 2 + 1))
     for traction, component in np.ndindex(2, 6):
-        given, odd = rectangles[traction, component], ODD_IN_Y[component]
-        ahead, behind = given[:, :ny] + given[:, ny:-1], given[:, ny:0:-1] + given[:, :ny:-1]
+        given = rectangles[traction, component]
+        odd = ODD_IN_Y[component]
+        ahead = given[:, :ny] + given[:, ny:-1]
+        behind = given[:, ny:0:-1] + given[:, :ny:-1]
         waves = scipy.fft.rfft(ahead - behind if odd else ahead + behind, axis=1)
         kernels[traction, component, : reach + 1] = waves.imag if odd else waves.real
     return _to_waves(kernels, axis=-2)
@@ -320,7 +331,9 @@ def _aliased(
     total = np.zeros((12, along.size, across.size))
     for m, n in _alias_waves(along, across, spacing, depth):
         (dx, dy), alpha = spacing, np.hypot(m, n)
-        c, s, deep = m / alpha, n / alpha, alpha * depth
+        c = m / alpha
+        s = n / alpha
+        deep = alpha * depth
         wave = np.exp(-deep) * np.sinc(m * dx / (2.0 * np.pi)) * np.sinc(n * dy / (2.0 * np.pi))
         waves = *_pressure_waves(c, s, deep, wave, nu), *_shear_waves(c, s, deep, wave, nu)
         for out, term in zip(total, waves, strict=True):
@@ -336,14 +349,18 @@ def _alias_waves(
     if depth < DEEP * max(spacing):
         aliases = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     for i, j in aliases:
-        m, n = along[:, None] + 2.0 * np.pi * i / dx, across[None, :] + 2.0 * np.pi * j / dy
+        m = along[:, None] + 2.0 * np.pi * i / dx
+        n = across[None, :] + 2.0 * np.pi * j / dy
         if max(np.abs(m).min(), np.abs(n).min()) * depth <= -np.log(NEGLIGIBLE):
             yield m, n
 
 
 def _pressure_waves(c: Field, s: Field, deep: Field, wave: Field, nu: float) -> Iterator[Field]:
     """Yield the components under a wave of pressure; its direction is (c, s)."""
-    cc, ss, cs, slow = c * c, s * s, c * s, wave * (1.0 - deep)
+    cc = c * c
+    ss = s * s
+    cs = c * s
+    slow = wave * (1.0 - deep)
     yield -cc * slow - 2.0 * nu * ss * wave
     yield -ss * slow - 2.0 * nu * cc * wave
     yield -(1.0 + deep) * wave

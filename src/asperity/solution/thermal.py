@@ -165,7 +165,8 @@ def _iterate_with_heat(
     progress: Progress | None,
 ) -> tuple[ContactSolution, bool]:
     """Solve contact and heat in turn from an isothermal solution; return convergence, too."""
-    history, seconds = solution.convergence.history, solution.convergence.seconds
+    history = solution.convergence.history
+    seconds = solution.convergence.seconds
     warm_options = replace(options, max_iterations=min(options.max_iterations, MAX_WARM_ITERATIONS))
     # film temperature rise at which the solution's viscosity was evaluated
     temperature_rise: Field = np.zeros(solution.grid.cells)
@@ -191,7 +192,8 @@ def _iterate_with_heat(
         history += candidate.convergence.history
         seconds += candidate.convergence.seconds
         if candidate.convergence.converged:
-            solution, temperature_rise = replace(candidate, options=options), target
+            solution = replace(candidate, options=options)
+            temperature_rise = target
             damping = min(1.0, 2.0 * damping)
         else:  # temperature step too large
             damping *= 0.5

@@ -63,7 +63,8 @@ def friction(
             "steel in oil is 0.15"
         )
     thermal = thermal or Thermal()
-    conditions, grid = solution.conditions, solution.grid
+    conditions = solution.conditions
+    grid = solution.grid
     if film_temperature is not None and film_temperature.shape != grid.cells:
         raise BadInput(
             f"film_temperature must have the grid's shape {grid.cells}, got "
@@ -101,7 +102,8 @@ def _oil_stress(
     solution: ContactSolution, thermal: Thermal, film_temperature: Field | None
 ) -> Field:
     """Return the shear stress of the oil [Pa], not negative; zero where the oil is cavitated."""
-    oil, conditions = solution.lubricant, solution.conditions
+    oil = solution.lubricant
+    conditions = solution.conditions
     if oil is None:
         return np.zeros(solution.grid.cells)
     viscosity = oil.viscosity(solution.pressure)

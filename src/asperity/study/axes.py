@@ -141,5 +141,6 @@ def _numbers(written: Sequence[object]) -> tuple[Field, str]:
 
 def _logarithmic(values: Field) -> bool:
     """Return True if most values lie at the lower end, as on a logarithmic scale."""
-    low, high = float(values[0]), float(values[-1])
+    low = float(values[0])
+    high = float(values[-1])
     return low > 0.0 and high >= 4.0 * low and float(np.median(values)) - low < 0.35 * (high - low)

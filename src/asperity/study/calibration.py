@@ -142,7 +142,8 @@ def _result(
     check: WearCurve,
 ) -> Calibration:
     ranges, aimed = solver.ranges, solver.aimed
-    curve, start_curve = solver.curve(best), solver.curve(None)
+    curve = solver.curve(best)
+    start_curve = solver.curve(None)
     covariance, scale = slopes.covariance(len(aimed) - len(ranges))
     deviations = np.sqrt(np.diag(covariance))
     return Calibration(

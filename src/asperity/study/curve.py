@@ -86,10 +86,8 @@ class WearCurve:
         self, sq: float, quantity: str, level: float = MEAN_CONFIDENCE
     ) -> tuple[float, float, float]:
         """Interpolate mean and interval linearly at a roughness [m]; nan outside the levels."""
-        mean, half_width = (
-            self.mean(quantity),
-            np.diff(self.interval(quantity, level), axis=1)[:, 0] / 2.0,
-        )
+        mean = self.mean(quantity)
+        half_width = np.diff(self.interval(quantity, level), axis=1)[:, 0] / 2.0
         if not self.sq[0] * (1 - 1e-9) <= sq <= self.sq[-1] * (1 + 1e-9):
             return np.nan, np.nan, np.nan
         weights = np.ones(1)
@@ -109,7 +107,8 @@ class WearCurve:
     @cached_property
     def stages(self) -> dict[str, Stages]:
         """Stages over Sq [um] from CRF and CRFA of each preset; empty without vibration."""
-        rows, stages = self.table[self.table["status"] == DONE], {}
+        rows = self.table[self.table["status"] == DONE]
+        stages = {}
         for preset in BOTH_PRESETS:
             if f"crf_{preset}_hz" in rows:
                 keys = (SQ_KEY, f"crf_{preset}_hz", f"crfa_{preset}", f"crf_std_{preset}_hz")
@@ -144,7 +143,8 @@ class WearCurve:
 
     def verdict(self) -> str:
         """Return one sentence on load sharing, resonance and the onset of severe wear."""
-        sq, clr = 1e6 * self.sq, 100.0 * self.mean("clr")
+        sq = 1e6 * self.sq
+        clr = 100.0 * self.mean("clr")
         sentence = (
             f"Between Sq {sq[0]:.3g} and {sq[-1]:.3g} um the asperities' share of the load goes "
             f"from {clr[0]:.0f} to {clr[-1]:.0f} %"

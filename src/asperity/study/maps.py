@@ -47,14 +47,16 @@ def write_maps(folder: Path, study: str, case_id: str, maps: Mapping[str, Field]
 
 def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
     """Read the maps of a case; UnreadableFile if there are none, or they belong to another case."""
-    zarr, path = require_zarr(), folder / MAPS / case_id
+    zarr = require_zarr()
+    path = folder / MAPS / case_id
     if not path.is_dir():
         raise UnreadableFile(
             f"{folder} has no maps of case {case_id}; request them with --fields when computing it"
         )
     try:
         group = zarr.open_group(path, mode="r", zarr_format=3)
-        about, arrays = dict(group.attrs), dict(group.arrays())
+        about = dict(group.attrs)
+        arrays = dict(group.arrays())
         require_unpacked(path, float(sum(array.nbytes for array in arrays.values())), REMEDY)
         maps = {name: np.asarray(array[...]) for name, array in sorted(arrays.items())}
     except UnreadableFile:

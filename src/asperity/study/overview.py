@@ -113,7 +113,8 @@ class StudyOverview:
         """Return one sentence on the ranges of the study's outputs."""
         if self.curve is not None:
             return self.curve.verdict()
-        failed, total = self.result.failed, len(self.result.table)
+        failed = self.result.failed
+        total = len(self.result.table)
         sentence = f"{total} cases over {', '.join(self.result.plan.axes) or 'seeds'}"
         for key in self.outputs:
             if key in ("clr", "crf_sound_hz", "crf_hz"):
@@ -191,7 +192,8 @@ class StudyOverview:
     def _changed_maps(self, runs: Sequence[Run]) -> list[str]:
         """Return a note for each map that differs from the contact in the table."""
         mapped = self.used[self.used["number"].isin(self.mapped)]
-        shares, share = (mapped["clr"] if len(mapped) else ()), quantity("clr")
+        shares = mapped["clr"] if len(mapped) else ()
+        share = quantity("clr")
         return [
             f"The contact mapped at Sq {run.state.sq * 1e6:.3g} µm has a CLR of "
             f"{share.text(run.state.clr)} when solved again, but {share.text(clr)} in the study's "

@@ -301,7 +301,8 @@ def full_key(case: Case, name: str, section: str = "study") -> str:
 def _entries(section: Section, parents: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
     """Yield every key of a case with its value, tables and their entries."""
     for name, entry in type(section).model_fields.items():
-        keys, value = (*parents, entry.alias or name), getattr(section, name)
+        keys = (*parents, entry.alias or name)
+        value = getattr(section, name)
         yield ".".join(keys), value
         if isinstance(value, Section):
             yield from _entries(value, keys)

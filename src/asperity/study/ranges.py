@@ -175,7 +175,8 @@ def _resolved(
         entry.value(share) for entry in others if entry.key == "grid.x[0]" for share in (0.0, 1.0)
     ]
     grid = case.grid
-    a, upper = case.conditions.hertz.half_widths[0], grid.upper[0]
+    a = case.conditions.hertz.half_widths[0]
+    upper = grid.upper[0]
     extents = [upper - inlet * a for inlet in inlets] or [grid.extent[0]]
     # the number of cells follows the domain, rounded to an even number: one may be missing
     fewest = grid.cells[0] * min(extents) / max(extents)
@@ -183,7 +184,8 @@ def _resolved(
     # in um, as the range of the length
     coarsest = 1e6 * max(widened * max(extents) / grid.cells[0], grid.spacing[1])
     shortest = 1e6 * min(*extents, grid.extent[1])
-    low, high = max(lengths.low, 2.0 * coarsest), min(lengths.high, 0.49 * shortest)
+    low = max(lengths.low, 2.0 * coarsest)
+    high = min(lengths.high, 0.49 * shortest)
     if low >= high:
         reason = (
             f"the grid resolves no correlation length from {lengths.low:g} to {lengths.high:g} um"

@@ -31,7 +31,8 @@ class MisfitSlopes:
     @classmethod
     def from_differences(cls, solver: MisfitSolver, best: Field, seeds: int) -> "MisfitSlopes":
         """Take central differences over STEP either side, on more surfaces than the fit."""
-        pairs, aimed = neighbours(best), solver.aimed
+        pairs = neighbours(best)
+        aimed = solver.aimed
         tables = solver.solve([best, *itertools.chain(*pairs)], seeds)
         centre, *around = (_anchored_values(solver, table, seeds) for table in tables)
         tolerances = np.array([anchor.tolerance for anchor in aimed])
@@ -128,7 +129,8 @@ class MisfitSlopes:
             others = [i for i in range(len(aimed)) if i != number]
             if not others:
                 continue
-            before, after = all_fitted[others], fitted(others)[others]
+            before = all_fitted[others]
+            after = fitted(others)[others]
             most = int(np.argmax(before**2 - after**2))
             trade_offs.append(
                 TradeOff(

@@ -73,7 +73,8 @@ def indices(design: SampleDesign, outcome: Field) -> dict[str, Field]:
     if np.count_nonzero(whole) < FEWEST_BLOCKS:
         raise AsperityError("too many contacts failed to rank the factors; narrow the ranges")
     kept = np.repeat(whole, design.block)
-    values, shares = outcome[kept], design.shares[kept]
+    values = outcome[kept]
+    shares = design.shares[kept]
     names = MEASURES[design.method]
     if np.ptp(values) <= ROUNDING * np.abs(values).max():
         return {name: np.zeros(shares.shape[1]) for name in names}

@@ -149,7 +149,8 @@ def read_study_folder(folder: Path, plan: StudyPlan) -> StudyFolder:
 
 def _lock(folder: Path, shard: tuple[int, int], locks: ExitStack) -> None:
     """Lock the folder: a whole study exclusively, a shard against itself and a whole study."""
-    whole, own = folder / ".whole.lock", folder / f".shard-{shard[0]}-of-{shard[1]}.lock"
+    whole = folder / ".whole.lock"
+    own = folder / f".shard-{shard[0]}-of-{shard[1]}.lock"
     try:
         if shard == (1, 1):
             for lock in (whole, *folder.glob(".shard-*.lock")):

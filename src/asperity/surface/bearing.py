@@ -69,7 +69,8 @@ def core_heights(curve: BearingCurve) -> CoreHeights:
     first = int(np.argmin(height[:-span] - height[span:]))
     slope, top = np.polyfit(share[first : first + span + 1], height[first : first + span + 1], 1)
     bottom = top + slope
-    upper, lower = curve.material_ratio(top), curve.material_ratio(bottom)
+    upper = curve.material_ratio(top)
+    lower = curve.material_ratio(bottom)
     peaks = np.trapezoid(np.maximum(height - top, 0.0), share)
     pits = np.trapezoid(np.maximum(bottom - height, 0.0), share)
     return CoreHeights(

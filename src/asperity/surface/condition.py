@@ -55,7 +55,8 @@ class SurfaceConditioning:
         for name in ("s_filter", "l_filter"):
             if (cutoff := getattr(self, name)) is not None:
                 require_positive(name, cutoff, "m")
-        shorter, longer = self.s_filter, self.l_filter
+        shorter = self.s_filter
+        longer = self.l_filter
         if shorter is not None and longer is not None and not shorter < longer:
             raise BadInput(
                 f"s_filter must be shorter than l_filter, got {length_text(shorter)} and "
@@ -107,7 +108,8 @@ def _filter_waves(
     for removed, cutoff in (("shorter", settings.s_filter), ("longer", settings.l_filter)):
         if cutoff is None:
             continue
-        before, heights = measured.sq, _low_pass(measured, cutoff)
+        before = measured.sq
+        heights = _low_pass(measured, cutoff)
         if removed == "longer":
             heights = measured.heights - heights
             heights -= np.nanmean(heights)
@@ -176,7 +178,9 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
     scale = max(grid.extent) / 2.0
     x, y = np.meshgrid(grid.x / scale, grid.y / scale, indexing="ij")
     coarse = np.flatnonzero(known)[:: max(1, np.count_nonzero(known) // _MAX_FIT_POINTS)]
-    at_x, at_y, z = x.flat[coarse], y.flat[coarse], heights.flat[coarse] / scale
+    at_x = x.flat[coarse]
+    at_y = y.flat[coarse]
+    z = heights.flat[coarse] / scale
 
     start = _cylinder_guess(at_x, at_y, z, measured.uniform)
     # the axis of a cylinder cannot be fitted to a profile
@@ -200,7 +204,8 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
 
 def _cylinder_heights(p: Field, x: Field, y: Field) -> Field:
     z0, slope, tilt, angle, curvature = p
-    across, along = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    across = x * np.cos(angle) + y * np.sin(angle)
+    along = y * np.cos(angle) - x * np.sin(angle)
     # w = across - w0, w0 = slope/curvature, in a form that holds for a plane (curvature 0)
     flat = np.sqrt(np.maximum(1.0 - slope**2, 1e-12))
     round_ = np.sqrt(np.maximum(1.0 - (slope - curvature * across) ** 2, 1e-12))
@@ -216,7 +221,8 @@ def _cylinder_guess(x: Field, y: Field, z: Field, uniform: int | None) -> Field:
     steep = int(np.argmax(np.abs(bends)))
     direction = axes[:, steep]
     angle = float(np.arctan2(direction[1], direction[0]))
-    slope, tilt = gradient @ direction, gradient @ np.array([-direction[1], direction[0]])
+    slope = gradient @ direction
+    tilt = gradient @ np.array([-direction[1], direction[0]])
     return np.array([c[0, 0], np.clip(slope, -0.9, 0.9), tilt, angle, -bends[steep]])
 
 
@@ -252,7 +258,8 @@ def find_outliers(measured: MeasuredSurface) -> Mask:
 def _low_pass(measured: MeasuredSurface, cutoff: float) -> Field:
     """Return the waviness: the Gaussian mean over valid cells, truncated at the edges."""
     known = np.isfinite(measured.heights)
-    weighted, weights = np.where(known, measured.heights, 0.0), known.astype(np.float64)
+    weighted = np.where(known, measured.heights, 0.0)
+    weights = known.astype(np.float64)
     for axis, pixel in enumerate(measured.grid.spacing):
         if axis != measured.uniform:
             sigma = SIGMA_OVER_CUTOFF * cutoff / pixel

@@ -76,7 +76,8 @@ def require_lengths(
     names: tuple[str, str] = ("correlation length along x", "correlation length along y"),
 ) -> None:
     """Raise BadInput for a length below 2 cells or above half the domain in its direction."""
-    cosine, sine = abs(np.cos(direction)), abs(np.sin(direction))
+    cosine = abs(np.cos(direction))
+    sine = abs(np.sin(direction))
     for name, length, along in zip(names, lengths, ((cosine, sine), (sine, cosine)), strict=True):
         subject = (
             name
@@ -102,10 +103,13 @@ def _gaussian_spectrum(
     lengths: tuple[float, float], direction: float
 ) -> tuple[Callable[[Field, Field], Field], tuple[float, float]]:
     """Return the amplitude as a function of (kx, ky), and the largest relevant kx and ky."""
-    (first, second), cosine, sine = lengths, np.cos(direction), np.sin(direction)
+    (first, second) = lengths
+    cosine = np.cos(direction)
+    sine = np.sin(direction)
 
     def amplitude(kx: Field, ky: Field) -> Field:
-        along, across = kx * cosine + ky * sine, ky * cosine - kx * sine
+        along = kx * cosine + ky * sine
+        across = ky * cosine - kx * sine
         return np.asarray(np.exp(-((along * first) ** 2 + (across * second) ** 2) / 8.0))
 
     return amplitude, (
@@ -279,14 +283,16 @@ def self_affine_surface(
             f"hurst must lie above 0 and be at most 1, got {hurst:g}; machined metal has about 0.8"
         )
     shortest, longest = cutoffs
-    coarsest, domain = 2.0 * max(grid.spacing), min(grid.extent)
+    coarsest = 2.0 * max(grid.spacing)
+    domain = min(grid.extent)
     if not coarsest <= shortest < longest <= domain:
         raise BadInput(
             f"cutoffs must rise from at least 2 cells, {length_text(coarsest)}, to at most the "
             f"domain, {length_text(domain)}, got {length_text(shortest)} to "
             f"{length_text(longest)}; change them or the grid"
         )
-    k_short, k_long = 2.0 * np.pi / shortest, 2.0 * np.pi / longest
+    k_short = 2.0 * np.pi / shortest
+    k_long = 2.0 * np.pi / longest
 
     def amplitude(kx: Field, ky: Field) -> Field:
         k = np.hypot(kx, ky)

@@ -148,7 +148,8 @@ def sandblasted_surface(
     'Sq 1.00 um'
     """
     require_positive("crater_radius", crater_radius, "m")
-    least, most = 2.0 * max(grid.spacing), min(grid.extent) / 8.0
+    least = 2.0 * max(grid.spacing)
+    most = min(grid.extent) / 8.0
     if not least <= crater_radius <= most:
         raise BadInput(
             f"crater_radius must lie between 2 cells, {length_text(least)}, and an eighth of the "
@@ -212,8 +213,11 @@ def _cut_grooves(grid: Grid, grooves: _Grooves) -> Field:
 
 def _cut_batch(heights: Field, grid: Grid, grooves: _Grooves, marks: npt.NDArray[np.intp]) -> None:
     """Cut grooves of ascending width into flat heights in place."""
-    (nx, ny), (dx, dy), cosine = grid.cells, grid.spacing, grooves.cosine
-    columns, rows = grooves.half_columns(dx), grooves.half_rows(marks[-1], dy)
+    (nx, ny) = grid.cells
+    (dx, dy) = grid.spacing
+    cosine = grooves.cosine
+    columns = grooves.half_columns(dx)
+    rows = grooves.half_rows(marks[-1], dy)
     x, y = grooves.centres[marks].T
     i = _cells_around(x, dx, columns)
     off_x = (i + 0.5) * dx - x[:, None]

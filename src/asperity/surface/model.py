@@ -121,7 +121,8 @@ class MeasuredSurface:
 
     def turned(self) -> "MeasuredSurface":
         """Return the surface rotated by 90 degrees counter-clockwise, so that x becomes y."""
-        (x0, y0), (x1, y1) = self.grid.lower, self.grid.upper
+        (x0, y0) = self.grid.lower
+        (x1, y1) = self.grid.upper
         grid = replace(
             self.grid,
             cells=self.grid.cells[::-1],

@@ -127,7 +127,8 @@ class MovingSurfaces:
 
     def passage_time(self, index: int) -> float:
         """Return the time of one passage of the track of surface 0 or 1 [s]; infinite at rest."""
-        surface, speed = (self.first, self.second)[index], abs(self.speeds[index])
+        surface = (self.first, self.second)[index]
+        speed = abs(self.speeds[index])
         return surface.grid.extent[0] / speed if speed > 0.0 else float("inf")
 
     def _heights_at(self, index: int, time: float) -> Field:
@@ -157,7 +158,9 @@ def shift_periodic(heights: Field, cells: float, spectrum: ComplexField) -> Fiel
 
 def track_grid(grid: Grid, lengths: int = 1) -> Grid:
     """Return a track of several lengths of the contact's grid, periodic along rolling."""
-    (nx, ny), (left, front), (right, back) = grid.cells, grid.lower, grid.upper
+    (nx, ny) = grid.cells
+    (left, front) = grid.lower
+    (right, back) = grid.upper
     return replace(
         grid,
         cells=(lengths * nx, ny),

@@ -223,7 +223,8 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
             str_bounded=False,
         )
     sal, texture, bounded = _texture(heights, surface.grid)
-    sp, sv = float(np.nanmax(heights)), -float(np.nanmin(heights))
+    sp = float(np.nanmax(heights))
+    sv = -float(np.nanmin(heights))
     return SurfaceParameters(
         **of_heights._asdict(),
         sp=sp,
@@ -373,8 +374,10 @@ def _first_below(along: Field, radii: Field, threshold: float) -> Field:
     below = along < threshold
     ray = np.flatnonzero(below.any(axis=1))
     after = np.argmax(below[ray], axis=1)
-    high, low = along[ray, after - 1], along[ray, after]
-    inner, outer = radii[ray, after - 1], radii[ray, after]
+    high = along[ray, after - 1]
+    low = along[ray, after]
+    inner = radii[ray, after - 1]
+    outer = radii[ray, after]
     distances = np.full(len(radii), np.nan)
     distances[ray] = inner + (outer - inner) * (high - threshold) / (high - low)
     return distances

@@ -103,7 +103,8 @@ def prepare_surface(
         require_roughness(sq)
     levelled, conditioning_steps = condition_surface(measured, conditioning)
     overlap = _overlap(levelled, grid)
-    fitting, centre = _fitting(levelled, grid, fit), _centre(levelled, grid, place)
+    fitting = _fitting(levelled, grid, fit)
+    centre = _centre(levelled, grid, place)
     if place:
         fitting += f", then moved by {' and '.join(map(length_text, centre))} to place {place}"
     heights, positions = _cut(levelled, grid, overlap, centre)
@@ -156,7 +157,8 @@ def _place_centres(measured: MeasuredSurface, grid: Grid) -> list[tuple[float, f
     for axis, (side, cell, shared) in enumerate(
         zip(grid.extent, grid.spacing, _overlap(measured, grid), strict=True)
     ):
-        step, extent = side + shared * cell, measured.grid.extent[axis]
+        step = side + shared * cell
+        extent = measured.grid.extent[axis]
         steps.append(step)
         counts.append(  # to either side
             0
@@ -183,10 +185,12 @@ def _centre(measured: MeasuredSurface, grid: Grid, place: int) -> tuple[float, f
 
 def _fitting(measured: MeasuredSurface, grid: Grid, fit: FitMode) -> str:
     """Return a sentence on the part of the map that is used; raise BadInput if it is too small."""
-    available, required = area_text(measured.grid.extent), area_text(grid.extent)
+    available = area_text(measured.grid.extent)
+    required = area_text(grid.extent)
     if measured.uniform is not None:
         axis = 1 - measured.uniform
-        length, side = measured.grid.extent[axis], grid.extent[axis]
+        length = measured.grid.extent[axis]
+        side = grid.extent[axis]
         extended = f"extended unchanged along {'xy'[measured.uniform]}"
         profile = f"the profile of {length_text(length)}"
         if length >= side * (1.0 - 1e-9):
@@ -272,7 +276,8 @@ def _resample(
         weights /= weights.sum(axis=1, keepdims=True)
         heights = np.moveaxis(np.tensordot(weights, heights, axes=(1, axis)), 0, axis)
         shortest.append(2.0 * step)
-    pixels, cells = area_text(source.spacing), area_text(grid.spacing)
+    pixels = area_text(source.spacing)
+    cells = area_text(grid.spacing)
     return np.ascontiguousarray(heights), (
         f"resampled from pixels of {pixels} to cells of {cells} by a windowed sinc, "
         f"which preserves waves longer than {area_text((shortest[0], shortest[1]))}"
@@ -286,7 +291,8 @@ def _blend_ends(heights: Field, axis: int, cells: int, shared: int) -> Field:
     w1 w2 = 1.
     """
     rows = np.moveaxis(heights, axis, 0)
-    start, beyond = rows[:shared], rows[cells : cells + shared]
+    start = rows[:shared]
+    beyond = rows[cells : cells + shared]
     rho = float(
         np.clip(
             np.mean(start * beyond) / max(np.std(start) * np.std(beyond), np.finfo(float).tiny),
@@ -347,5 +353,6 @@ def _height_statistics(heights: Field, grid: Grid) -> _HeightStatistics:
     )
     if sq == 0.0:
         return _HeightStatistics(0.0, 0.0, 0.0, 0.0)
-    skewness, kurtosis = float(np.mean(inside**3)) / sq**3, float(np.mean(inside**4)) / sq**4
+    skewness = float(np.mean(inside**3)) / sq**3
+    kurtosis = float(np.mean(inside**4)) / sq**4
     return _HeightStatistics(sq, sdq, skewness, kurtosis)

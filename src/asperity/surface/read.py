@@ -83,7 +83,8 @@ def read_surface(
         require_positive("pixel", size, "m")
     require_file(path)
     stated = (unit, lateral_unit, sizes)
-    reader, library = "asperity.surface.read:load_surface", "SurfaceTopography"
+    reader = "asperity.surface.read:load_surface"
+    library = "SurfaceTopography"
     surface: MeasuredSurface = read_in_subprocess(
         path.absolute(), reader, *stated, remedy=_REMEDY, library=library
     )
@@ -208,7 +209,8 @@ def _scales(
 def _read(path: Path, *, matrix: bool) -> RawMap:
     """Read a file with the readers of its suffix, or by its content if the suffix is unknown."""
     _require_readable(path)
-    name, suffix = path.name, path.suffix.lower().removeprefix(".")
+    name = path.name
+    suffix = path.suffix.lower().removeprefix(".")
     if suffix == "npy":
         return _array(path)
     if matrix and suffix in TABLES:
@@ -314,7 +316,8 @@ def _topography(path: Path, form: str | None) -> RawMap:
             reader.topography(physical_sizes=channel.nb_grid_pts) if bare else reader.topography()
         )
         heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
-        (width, length), unit = topography.physical_sizes, topography.unit
+        (width, length) = topography.physical_sizes
+        unit = topography.unit
     pixel = None if bare else (float(width) / heights.shape[0], float(length) / heights.shape[1])
     maps = [other.name for other in reader.channels if other.dim == 2]
     if len(maps) > 1:

@@ -170,7 +170,8 @@ class _TransientContact:
         solution = solve_contact(self.conditions, oil, surface, options=self.options)
         solution = replace(solution, lubricant=self.lubricant)
         approach = solution.rigid_approach / self.scales.gap
-        pressure, problem = solution.pressure / self.scales.pressure, self._problem(surface, None)
+        pressure = solution.pressure / self.scales.pressure
+        problem = self._problem(surface, None)
         unknowns = Pressures(np.zeros_like(pressure), pressure, approach)
         if solution.oil is not None:
             unknowns = pressures_of(solution, problem, self.scales)
@@ -223,7 +224,8 @@ class _TransientContact:
         move their borders by only a cell or two per iteration; the macroscopic pressure stays in
         place. The guess with the smaller residual is used.
         """
-        (nx, lines), approach = problem.cells, float(memory["approach"])
+        (nx, lines) = problem.cells
+        approach = float(memory["approach"])
         starts = []
         for cells in dict.fromkeys((self.moved, 0)):
             previous = np.clip(np.arange(nx) - cells, 0, nx - 1)
@@ -260,14 +262,15 @@ class _TransientContact:
         upwinded = self.options.model == MIXED and self.follows_oil
         first_order = upwinded or self.options.model == CONSERVING
         if "content_before" in memory and not first_order:
-            previous, rate, previous_weight, earlier_weight = (
-                memory["content_before"],
-                1.5,
-                -2.0,
-                0.5,
-            )
+            previous = memory["content_before"]
+            rate = 1.5
+            previous_weight = -2.0
+            earlier_weight = 0.5
         else:  # first order: no earlier flow after a start from rest, or upwinding in space
-            previous, rate, previous_weight, earlier_weight = content, 1.0, -1.0, 0.0
+            previous = content
+            rate = 1.0
+            previous_weight = -1.0
+            earlier_weight = 0.0
         source = previous_weight * content + earlier_weight * previous
         if not self.follows_oil:
             return TransientTerm(rate / self.length, source / self.length, self.follows_oil)
@@ -305,7 +308,8 @@ class _TransientContact:
         if isinstance(balance, MixedBalance):
             memory["leant"] = balance.limiter_correction
         flow, elastic = _powers(balance)
-        grid, conditions = solution.grid, self.conditions
+        grid = solution.grid
+        conditions = self.conditions
         area = self.scales.length**2 * (
             1.0 if conditions.length is None else conditions.length / grid.extent[1]
         )
@@ -356,7 +360,8 @@ def _overlap(balance: Balance | MixedBalance) -> Field:
 
 def _on_one_line(problem: Problem) -> Problem:
     """Return a problem uniform along y on one line of cells of the same total width."""
-    past, (dx, dy) = problem.past, problem.spacing
+    past = problem.past
+    (dx, dy) = problem.spacing
     return replace(
         problem,
         roughness=problem.roughness[:, :1],
@@ -367,12 +372,10 @@ def _on_one_line(problem: Problem) -> Problem:
 
 def _powers(balance: Balance | MixedBalance) -> tuple[float, float]:
     """Return ∫ ε |grad P|² over faces between separated cells, and the elastic energy ½ ∫ P V."""
-    problem, pressure, faces, separated = (
-        balance.problem,
-        balance.oil_pressure,
-        balance.faces,
-        balance.parted,
-    )
+    problem = balance.problem
+    pressure = balance.oil_pressure
+    faces = balance.faces
+    separated = balance.parted
     assert faces is not None
     dx, dy = problem.spacing
     along = faces.east[:-1] * np.diff(pressure, axis=0) ** 2 * (separated[:-1] & separated[1:])

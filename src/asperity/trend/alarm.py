@@ -146,7 +146,8 @@ def sequential_alarm(
     """
     _require_rate(false_alarm_rate)
     states: list[AlarmState] = ["none"] * acknowledged
-    reason, raised_by = history.reason, history.raised_by
+    reason = history.reason
+    raised_by = history.raised_by
     for number in range(acknowledged, len(statuses)):
         earlier = history.states.get(number) if number < len(statuses) - 1 else None
         if earlier is not None:
@@ -163,7 +164,9 @@ def sequential_alarm(
             partial(checks.confirmed, number),
         )
         if state in ("alert", "alarm") and (other := checks.explanation(number, raised_by)):
-            state, reason, raised_by = "none", other, ""
+            state = "none"
+            reason = other
+            raised_by = ""
         states.append(state)
     state = states[-1] if len(states) > acknowledged else "none"
     if len(states) == acknowledged:

@@ -67,13 +67,15 @@ class ModelComparison(NamedTuple):
 
 def common_breaks(series: Sequence[SeriesPoints]) -> Field:
     """Return possible common breaks, from the third to the third-last point of every series."""
-    low, high = max(points.x[2] for points in series), min(points.x[-3] for points in series)
+    low = max(points.x[2] for points in series)
+    high = min(points.x[-3] for points in series)
     return np.linspace(low, high, BREAK_POINTS)
 
 
 def compare_models(points: SeriesPoints, breaks: Field) -> ModelComparison:
     """Fit every candidate to the points."""
-    candidates, scatters = _candidates(points, breaks), _scatters(points)
+    candidates = _candidates(points, breaks)
+    scatters = _scatters(points)
     fits = {candidate.name: _fit(candidate, points, scatters) for candidate in candidates}
     bic = {
         candidate.name: -2.0 * float(np.max(fits[candidate.name].best))

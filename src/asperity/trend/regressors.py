@@ -102,7 +102,8 @@ def fit_conditions(
 
 def _fit_differences(values: Field, rows: Field, low: Field, high: Field) -> tuple[Field, float]:
     """Return the coefficients within bounds, and the standard deviation of one recording."""
-    change, row_change = np.diff(values), np.diff(rows, axis=1)
+    change = np.diff(values)
+    row_change = np.diff(rows, axis=1)
     change, row_change = change - change.mean(), row_change - row_change.mean(axis=1, keepdims=True)
     size = np.maximum(np.abs(row_change).max(axis=1), 1e-12)  # equal scales for the solver
     fitted = scipy.optimize.lsq_linear(

@@ -187,7 +187,9 @@ def _knee_candidates(
 ) -> tuple[Field, Mask]:
     """Return each broken stick's rise at its break (least squares), and which of them are knees."""
     centred, line, bend = (rows - rows.mean(axis=-1, keepdims=True) for rows in (y, t, hinges))
-    xx, xh, hh = line @ line, bend @ line, np.sum(bend**2, axis=1)
+    xx = line @ line
+    xh = bend @ line
+    hh = np.sum(bend**2, axis=1)
     determinant = np.maximum(xx * hh - xh**2, TINY)
     before = (hh * (line @ centred) - xh * (bend @ centred)) / determinant
     turn = (xx * (bend @ centred) - xh * (line @ centred)) / determinant

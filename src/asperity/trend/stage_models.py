@@ -79,7 +79,8 @@ def weigh_explanations(
     comparisons: list[ModelComparison], crfa: Field | None, x: Field, x_std: Field
 ) -> Outcome:
     """Weigh all explanations: a common break in some series, the best own model in the others."""
-    bics, breaks = _all_bics(comparisons), comparisons[0].breaks
+    bics = _all_bics(comparisons)
+    breaks = comparisons[0].breaks
     best = min(bics.constant, bics.smooth, *bics.broken.values())
     broken = {pattern: value - best for pattern, value in bics.broken.items()}
     weights = {pattern: float(np.exp(-0.5 * value)) for pattern, value in broken.items()}

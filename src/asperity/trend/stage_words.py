@@ -38,7 +38,8 @@ class Axis(NamedTuple):
 
     def range_text(self, points: SeriesPoints) -> str:
         """Return the range of x in words."""
-        first, last = self.x_at(float(points.x[0])), self.x_at(float(points.x[-1]))
+        first = self.x_at(float(points.x[0]))
+        last = self.x_at(float(points.x[-1]))
         return f"{first:.4g} to {last:.4g} {self.unit}".rstrip()
 
 
@@ -135,7 +136,8 @@ def describe_course(
     series: IndicatorSeries, comparison: ModelComparison, split: float, has_break: bool, axis: Axis
 ) -> IndicatorCourse:
     """Describe a series by its stick at the break `split`."""
-    points, fit = comparison.points, comparison.fits[STICK]
+    points = comparison.points
+    fit = comparison.fits[STICK]
     nearest = int(np.argmin(np.abs(comparison.breaks - split)))
     base, before, change = fit.linear[nearest, int(np.argmax(fit.marginal[nearest]))]
     slopes = (float(before), float(before + change))
@@ -156,7 +158,8 @@ def describe_course(
 def _crf_course(
     points: SeriesPoints, sign: int, flattens: bool, slopes: tuple[float, float], unit: str
 ) -> IndicatorCourse:
-    mean, std = float(np.mean(points.y)), float(np.std(points.y, ddof=1))
+    mean = float(np.mean(points.y))
+    std = float(np.std(points.y, ddof=1))
     per = f"Hz per {unit}" if unit else "Hz per unit of x"
     before, after = (
         f"{'rises' if slope > 0.0 else 'falls'} by {abs(slope):.3g}" for slope in slopes
@@ -177,7 +180,8 @@ def _crf_course(
 def _damping_course(
     points: SeriesPoints, sign: int, flattens: bool, log_levels: tuple[float, float, float]
 ) -> IndicatorCourse:
-    mean, std = float(np.mean(points.y)), float(np.std(points.y, ddof=1))
+    mean = float(np.mean(points.y))
+    std = float(np.std(points.y, ddof=1))
     first, middle, last = (float(np.exp(-value)) for value in log_levels)
     ways = [
         "falls" if after < before else "rises" for before, after in pairwise((first, middle, last))

@@ -40,7 +40,8 @@ def warm_up(x: Field, crf: Field, level: Field) -> WarmUp | None:
     `crf` and `level` have shape (recordings,); nan where not known.
     """
     known = np.isfinite(crf) & np.isfinite(level)
-    t, both = x[known], (crf[known], level[known])
+    t = x[known]
+    both = (crf[known], level[known])
     if t.size < FEWEST_POINTS or not t[-1] > t[0]:
         return None
     t = (t - t[0]) / (t[-1] - t[0])
@@ -49,7 +50,8 @@ def warm_up(x: Field, crf: Field, level: Field) -> WarmUp | None:
         return None
     columns = np.vstack([np.ones(t.size), decay])
     fits = [_fit(columns, values) for values in both]
-    crf_change, level_change = -fits[0][1] / float(np.median(both[0])), -fits[1][1]
+    crf_change = -fits[0][1] / float(np.median(both[0]))
+    level_change = -fits[1][1]
     if not LEAST_CRF_CHANGE <= crf_change <= MOST_CRF_CHANGE:
         return None
     if abs(level_change) < LEAST_LEVEL_CHANGE:

@@ -106,7 +106,8 @@ class FilteredNoise(NoiseFilter):
 
         |H|^2 = 1 / (1 + (f/fc)^2n), with tan(π f/rate) for f, likewise fc, if bilinear.
         """
-        frequency, cutoff = np.asarray(frequency_hz), self.cutoff_hz
+        frequency = np.asarray(frequency_hz)
+        cutoff = self.cutoff_hz
         if self.filter == "bilinear":
             _require_below_half(cutoff, rate_hz)
             warped = np.tan(np.pi * np.minimum(frequency / rate_hz, 0.5))
@@ -351,7 +352,8 @@ def _butterworth_recursion(omega: float) -> tuple[Field, Field]:
     variance = noise[0, 0] + back @ noise @ back
     neighbour = back @ noise[:, 0]
     # ... equal those of b0 w_n + b1 w_(n-1)
-    plus, minus = np.sqrt(variance + 2.0 * neighbour), np.sqrt(variance - 2.0 * neighbour)
+    plus = np.sqrt(variance + 2.0 * neighbour)
+    minus = np.sqrt(variance - 2.0 * neighbour)
     return np.array([plus + minus, plus - minus]) / 2.0, np.array(
         [1.0, -np.trace(step), np.linalg.det(step)]
     )

@@ -110,7 +110,8 @@ def resample_to_constant_speed(
 def _rising(pulses: Field) -> Field:
     """Return the positions of rising edges [samples] between which the signal returns to low."""
     # the full range, since a pulse may last two samples of ten thousand
-    low, high = float(np.nanmin(pulses)), float(np.nanmax(pulses))
+    low = float(np.nanmin(pulses))
+    high = float(np.nanmax(pulses))
     middle = 0.5 * (low + high)
     (low_level, high_level) = (low + level * (high - low) for level in LEVELS)
     state = np.where(pulses > high_level, 1, np.where(pulses < low_level, -1, 0))

@@ -266,14 +266,16 @@ def _runge_kutta(
     from asperity.kernels.oscillator import ContactSpring, integrate_contact
 
     _require_stable(oscillator, rate_hz, substeps)
-    nonlinear, mass = method == "nonlinear", oscillator.mass
+    nonlinear = method == "nonlinear"
+    mass = oscillator.mass
     static_compression = oscillator.static_compression if nonlinear else 0.0
     load = (oscillator.load or 0.0) / mass if nonlinear else 0.0
     stiffness_per_mass = (
         load / static_compression**1.5 if nonlinear else oscillator.stiffness / mass
     )
     damping_per_mass = oscillator.damping / mass
-    compression, velocity = np.empty(slopes.size + 1), np.empty(slopes.size + 1)
+    compression = np.empty(slopes.size + 1)
+    velocity = np.empty(slopes.size + 1)
     compression[0], velocity[0] = static_compression, slopes[0]
     integrate_contact(
         ContactSpring(stiffness_per_mass, damping_per_mass, load, nonlinear),

@@ -124,12 +124,14 @@ class Ploughing(Parametric):
         """Return the marks of the jump."""
         film = passage.loaded_film
         track_cells = loaded_columns(passage)
-        dug, piled = np.zeros(passage.grid.cells), np.zeros(passage.grid.cells)
+        dug = np.zeros(passage.grid.cells)
+        piled = np.zeros(passage.grid.cells)
         marks = self._drawn_marks(passage, film, track_bounds(passage.grid, track_cells))
         for mark, at in marks:
             add_mark(dug, piled, mark, at, passage.grid)
         cell = float(np.prod(passage.grid.spacing))
-        loose, stays = float(piled.sum()), (1.0 - self.cutting) * float(dug.sum())
+        loose = float(piled.sum())
+        stays = (1.0 - self.cutting) * float(dug.sum())
         if loose > 0.0:
             piled *= stays / loose  # the grid discretises ridges and grooves differently
         elif stays > 0.0:
@@ -224,7 +226,9 @@ def loaded_columns(passage: Passage) -> slice:
 
 def track_bounds(grid: Grid, track_cells: slice) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return lower and upper corner of a track of those cells [m]."""
-    (left, low), (right, high), step = grid.lower, grid.upper, grid.spacing[1]
+    (left, low) = grid.lower
+    (right, high) = grid.upper
+    step = grid.spacing[1]
     whole = track_cells == slice(0, grid.cells[1])
     return (left, low if whole else low + track_cells.start * step), (
         right,
@@ -249,7 +253,8 @@ def _points_under(
     grid: Grid, axis: int, mark: WearMark, centre: float
 ) -> tuple[npt.NDArray[np.intp], Field]:
     """Return the cells under a mark along an axis, and points in them from the mark's centre."""
-    step, low = grid.spacing[axis], grid.lower[axis]
+    step = grid.spacing[axis]
+    low = grid.lower[axis]
     divided = int(np.clip(np.ceil(MIN_POINTS * step / mark.width), 1, MAX_SUBDIVISION))
     span = 0.5 * mark.length + mark.reach if axis == 0 else mark.reach
     first, last = (int(np.floor((centre + sign * span - low) / step)) for sign in (-1.0, 1.0))

@@ -89,7 +89,8 @@ class Pits(Parametric):
         self, damage: Field, depths: Field, strength: Field, passage: Passage
     ) -> tuple[float, Field]:
         """Add the damage of the jump in place; return the largest measure and remaining lives."""
-        stressed, left = 0.0, np.full(damage.shape, np.inf)
+        stressed = 0.0
+        left = np.full(damage.shape, np.inf)
         for layer, depth in enumerate(depths):
             path = stress_path(
                 passage.patches, passage.grid, float(depth), passage.material.poisson_ratio

@@ -148,7 +148,8 @@ def read_friction_trace(
     opened = recording.open_channels(path, rate_hz=1.0)  # nothing here depends on time
     columns = {role: _column(opened, names) for role, names in _COLUMNS.items()}
     name, notes = Path(path).name, []
-    mu, force = columns["coefficient"], columns["force"]
+    mu = columns["coefficient"]
+    force = columns["force"]
     if load is None:
         load = _median_load(name, mu, force)
         notes.append(f"load {load:.4g} N: friction force over coefficient")

@@ -82,7 +82,8 @@ def find_scar(measured: MeasuredSurface) -> Scar:
     """
     known = np.isfinite(measured.profile)
     spacing = measured.grid.spacing[0 if measured.uniform != 0 else 1]
-    x, z = (np.arange(known.size) * spacing)[known], measured.profile[known]
+    x = (np.arange(known.size) * spacing)[known]
+    z = measured.profile[known]
     off, roughness = _off_the_bulk(x, z)
     first, last = _track(x, off, roughness, measured.name)
     edges = float(x[first]), float(x[last])
@@ -131,7 +132,8 @@ def _track(x: Field, off: Field, roughness: float, name: str) -> tuple[int, int]
     parts = np.split(outstanding, np.flatnonzero(np.diff(outstanding) > 1) + 1)
     first, last = _close_gaps(x, parts, int(np.argmax([np.abs(off[part]).sum() for part in parts])))
     quiet = np.flatnonzero(np.abs(off) <= roughness)
-    before, after = quiet[quiet < first], quiet[quiet > last]
+    before = quiet[quiet < first]
+    after = quiet[quiet > last]
     return int(before[-1]) if before.size else 0, int(after[0]) if after.size else x.size - 1
 
 
@@ -140,7 +142,9 @@ def _close_gaps(x: Field, parts: Sequence[npt.NDArray[np.intp]], largest: int) -
     low = high = largest
     grown = True
     while grown:
-        grown, first, last = False, int(parts[low][0]), int(parts[high][-1])
+        grown = False
+        first = int(parts[low][0])
+        last = int(parts[high][-1])
         reach = MAX_GAP * max(x[last] - x[first], float(np.ptp(x)) / 20.0)
         if low > 0 and x[first] - x[parts[low - 1][-1]] <= reach:
             low, grown = low - 1, True

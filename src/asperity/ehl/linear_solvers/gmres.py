@@ -58,7 +58,8 @@ def gmres(
         return np.zeros_like(rhs)
     workspace = workspace or Workspace()
     basis, corrections = workspace.rows(min(KRYLOV.initial_vectors, max_steps) + 1, rhs)
-    projection, count = _Projection(norm, max_steps, np.result_type(rhs.dtype, float)), 0
+    projection = _Projection(norm, max_steps, np.result_type(rhs.dtype, float))
+    count = 0
     np.divide(rhs, norm, out=basis[0])
     while count < max_steps:
         if count + 1 == len(basis):
@@ -84,7 +85,8 @@ def _orthogonalise(vector: Vector, norm: float, basis: Vector) -> tuple[Vector, 
     """
     overlaps = (basis @ vector.conj()).conj()
     vector -= overlaps @ basis
-    column, length = overlaps.astype(np.result_type(vector.dtype, float)), _norm(vector)
+    column = overlaps.astype(np.result_type(vector.dtype, float))
+    length = _norm(vector)
     if length < KRYLOV.reorthogonalise * norm:
         overlaps = (basis @ vector.conj()).conj()
         vector -= overlaps @ basis
@@ -208,7 +210,8 @@ class Shifted:
 
     def move(self, frequency: float) -> None:
         """Recombine the corrections for another Ω."""
-        count, further = self.count, self.kind.type(1j * (frequency - self.frequency))
+        count = self.count
+        further = self.kind.type(1j * (frequency - self.frequency))
         rows = self.triangle[:count, :count].T.astype(self.kind) @ self.basis[:count]
         rows += further * self.stored[:count]
         self.frequency, self.count = frequency, 0
@@ -231,7 +234,8 @@ class Shifted:
     def _append(self, new: Vector) -> bool:
         """Orthogonalise a vector and update the residual; return False if it is dependent."""
         count = self.count
-        known, before = self.basis[:count].T, _norm(new)
+        known = self.basis[:count].T
+        before = _norm(new)
         column = np.zeros(count, complex)
         for _ in range(2 if count else 0):
             overlaps = self.times(1.0, known, new, trans=ADJOINT)

@@ -73,7 +73,8 @@ class _OnePressure:
             balance.gap.size,
         )
         self.deflection = balance.problem.deflection
-        film, wet = balance.film, balance.rows.state == LUBRICATED
+        film = balance.film
+        wet = balance.rows.state == LUBRICATED
         scale = np.where(wet, balance.rows.fluid_scale, 0.0)
         nothing = np.zeros_like(scale)
         self.by_gap = (nothing if film is None else scale * film.content_by_gap).astype(real)
@@ -146,7 +147,8 @@ class _TwoPressures:
         No cell changes its state here.
         """
         wet, gap_rows = self._split(rows * self.opening_cells)
-        oil, closed = self.linear.answer(wet), gap_rows * self.own
+        oil = self.linear.answer(wet)
+        closed = gap_rows * self.own
         if self.patch is not None:
             lines, deflection = self.patch
             stiff = self.stiff[lines]
@@ -162,7 +164,8 @@ class _TwoPressures:
 
         Line relaxation alone would let each of them deform by itself.
         """
-        film, problem = self.linear.balance.film, self.linear.balance.problem
+        film = self.linear.balance.film
+        problem = self.linear.balance.problem
         dx, dy = problem.spacing
         flow = film.mobility * (2.0 / dx**2 + 2.0 / dy**2) + film.content_by_pressure / dx
         carried = film.content_by_gap / (dx * self.linear.rows.contact_scale)
@@ -227,7 +230,9 @@ class Oscillating:
         rows, stored = self.by_approach
         rhs = rows + 1j * frequency * stored
         size = float(np.linalg.norm(rhs))
-        vector, left, share = np.zeros(self.exact.size, complex), rhs, 1.0
+        vector = np.zeros(self.exact.size, complex)
+        left = rhs
+        share = 1.0
         if start is not None:
             vector = start.unknowns
             left, share = self._residual(rhs, vector, frequency, size)
@@ -331,10 +336,8 @@ def _product(equations: _Equations, vector: Waves, frequency: float) -> Waves:
 
 def _each_part(operator: Callable[[Field], Field], vector: Waves) -> Waves:
     """Apply a real linear operator to a complex vector."""
-    real, imaginary = (
-        operator(np.ascontiguousarray(vector.real)),
-        operator(np.ascontiguousarray(vector.imag)),
-    )
+    real = operator(np.ascontiguousarray(vector.real))
+    imaginary = operator(np.ascontiguousarray(vector.imag))
     both = np.empty(real.shape, vector.dtype)
     both.real, both.imag = real, imaginary
     return both
@@ -345,7 +348,8 @@ def _both(equations: _Equations, vector: Waves) -> tuple[Waves, Waves]:
     parts = [
         equations.product(np.ascontiguousarray(part), 0.0) for part in (vector.real, vector.imag)
     ]
-    rows, stored = np.empty(vector.size, vector.dtype), np.empty(vector.size, vector.dtype)
+    rows = np.empty(vector.size, vector.dtype)
+    stored = np.empty(vector.size, vector.dtype)
     (rows.real, stored.real), (rows.imag, stored.imag) = parts
     return rows, stored
 

@@ -199,7 +199,8 @@ class BlockSolver:
 
     def __call__(self, residual: Field) -> Field:
         """Return the change, one number per block, for a residual; zero in cells without weight."""
-        coarse, change = np.empty(self.cells), np.zeros_like(self.weight)
+        coarse = np.empty(self.cells)
+        change = np.zeros_like(self.weight)
         line_relaxation.restrict(residual, self.weight, self.block, coarse)
         line_relaxation.prolong(
             self.pattern.solve(self.factors, coarse), self.weight, self.block, change
@@ -239,7 +240,8 @@ def _allocate_hierarchy(cells: tuple[int, int], dtype: np.dtype) -> GridHierarch
     )
     count, even, odd = starts[-1]
     places = np.concatenate([grids, starts[:-1]], axis=1)
-    cells_of, last = (count,), grids[-1][0] * grids[-1][1]
+    cells_of = (count,)
+    last = grids[-1][0] * grids[-1][1]
     shapes = [(5, count), cells_of, cells_of, (5, even), (5, odd), cells_of, cells_of, (last, last)]
     return GridHierarchy._make([places, *(np.empty(shape, dtype) for shape in shapes)])
 
@@ -301,7 +303,8 @@ class _Pattern(NamedTuple):
 def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
     """Return the pattern of a grid; cached."""
     columns, rows = _couplings(cells)
-    there, size = columns >= 0, cells[0] * cells[1]
+    there = columns >= 0
+    size = cells[0] * cells[1]
     model = scipy.sparse.csc_array(
         (np.where(columns == rows, 5.0, -1.0)[there], (rows[there], columns[there])),
         shape=(size, size),

@@ -32,15 +32,14 @@ class _ContactLines(NamedTuple):
         """Return all lines of a problem."""
         inside = np.broadcast_to(~problem.rim, problem.cells)
         dx, dy = problem.spacing
-        load, stiffness = problem.load / (dx * dy), 1.0 / problem.softness
+        load = problem.load / (dx * dy)
+        stiffness = 1.0 / problem.softness
         return cls(problem.deflection, problem.undeformed, inside, stiffness, load, inside.size)
 
     def window(self, touching: Mask) -> tuple["_ContactLines", slice]:
         """Return the touching lines with a margin."""
-        margin, lines = (
-            self.undeformed.shape[0] // ELASTIC_DRY.window_margin,
-            np.flatnonzero(touching.any(axis=1)),
-        )
+        margin = self.undeformed.shape[0] // ELASTIC_DRY.window_margin
+        lines = np.flatnonzero(touching.any(axis=1))
         window = slice(max(lines[0] - margin, 0), lines[-1] + 1 + margin)
         undeformed = self.undeformed[window]
         restrict_to = self.deflection.restrict_to(undeformed.shape[0])
@@ -121,9 +120,12 @@ def level_gaps(
 
     To a relative residual `share`. Returns change, mean gap, and the steps taken.
     """
-    count, level = np.float32(np.count_nonzero(touching)), gap[touching].mean()
+    count = np.float32(np.count_nonzero(touching))
+    level = gap[touching].mean()
     residual = np.where(touching, level - gap, 0.0).astype(np.float32)
-    change, direction, step = np.zeros_like(residual), residual.copy(), 0
+    change = np.zeros_like(residual)
+    direction = residual.copy()
+    step = 0
     size = first = float(np.vdot(residual, residual))
     while size > share**2 * first and step < most:
         answer = deflection(direction)

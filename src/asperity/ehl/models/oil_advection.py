@@ -45,7 +45,8 @@ def slope_limiter(problem: Problem, content: Field, gap: Field) -> Field:
     falls beside nearly closed cells and is zero beside closed ones: there the film is constant, and
     its content varies with density only.
     """
-    closed, limiter = problem.contact_gap, np.empty_like(content)
+    closed = problem.contact_gap
+    limiter = np.empty_like(content)
     load_sharing.limiter(
         content, upstream_content(problem, content), gap, closed, OPENING_RANGE * closed, limiter
     )

@@ -32,7 +32,8 @@ class _Sets(NamedTuple):
     @classmethod
     def from_problem(cls, problem: Problem) -> "_Sets":
         """Return the contact of a problem."""
-        (dx, dy), real = problem.spacing, np.float32
+        (dx, dy) = problem.spacing
+        real = np.float32
         return cls(
             problem.deflection,
             problem.undeformed.astype(real),
@@ -94,10 +95,13 @@ def dry_contact(
 
     Returns pressure (nx, ny), approach, and whether the residual met the tolerance.
     """
-    cap, stiffness = problem.p_cap, 1.0 / problem.softness
+    cap = problem.p_cap
+    stiffness = 1.0 / problem.softness
     inside = np.broadcast_to(~problem.rim, problem.cells)
     pressure = _scale_to_load(problem, pressure)
-    direction, size, keep = np.zeros_like(pressure), 1.0, False
+    direction = np.zeros_like(pressure)
+    size = 1.0
+    keep = False
     for step in range(max_steps + 1):
         gap, approach, free = _level_gap(problem, pressure, inside)
         converged = _residual(pressure, gap * stiffness, cap, inside) < PLASTIC_DRY.tolerance
@@ -141,7 +145,8 @@ def _step_length(problem: Problem, steepest: Field, direction: Field, free: Mask
 
 def _scale_to_load(problem: Problem, pressure: Field) -> Field:
     """Clip the pressure to its bounds and scale it between them until it carries the load."""
-    (dx, dy), cap = problem.spacing, problem.p_cap
+    (dx, dy) = problem.spacing
+    cap = problem.p_cap
     inside = np.broadcast_to(~problem.rim, problem.cells)
     pressure = np.where(inside, np.clip(pressure, 0.0, cap), 0.0)
     target = problem.load / (dx * dy)

@@ -28,11 +28,9 @@ class _StepProposal(NamedTuple):
 
     def apply(self, damping: float = 1.0) -> tuple[Pressures, Mask]:
         """Return the unknowns after a damped step, and the cells that then count as free."""
-        problem, (_, total, approach), share = (
-            self.balance.problem,
-            self.balance.unknowns,
-            damping * self.share,
-        )
+        problem = self.balance.problem
+        (_, total, approach) = self.balance.unknowns
+        share = damping * self.share
         free = self.balance.solid == FREE
         signed = _updated_oil(self.balance, share * self.step.oil)
         oil = np.clip(signed, 0.0, problem.p_cap)
@@ -55,13 +53,19 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     A closed cell whose oil pressure would exceed the total takes the total as its oil pressure and
     is free in the next step: the oil separates the bodies. Cells at the cap are exempt.
     """
-    mean_pressure, change = problem.mean_pressure, np.inf
-    limits, workspace = _StepLimits(problem, unknowns), Workspace()
-    lowest, stagnation, share, stagnated = np.inf, 0, 1.0, False
+    mean_pressure = problem.mean_pressure
+    change = np.inf
+    limits = _StepLimits(problem, unknowns)
+    workspace = Workspace()
+    lowest = np.inf
+    stagnation = 0
+    share = 1.0
+    stagnated = False
     balance = evaluate(problem, unknowns, second_order=second_order)
     settled_cells = np.zeros(problem.cells, dtype=bool)
     for number in count():
-        approach, gap = balance.unknowns.approach, balance.gap
+        approach = balance.unknowns.approach
+        gap = balance.gap
         yield Step(number, balance, approach, change)
         try:
             step = newton_step(balance, None if stagnated else settled_cells, workspace)
@@ -71,7 +75,8 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         change = float(np.mean(np.abs(step.total)) / mean_pressure)
         stagnation += 1
         if balance.residual_rms < MIXED_NEWTON.required_decrease * lowest:
-            lowest, stagnation = balance.residual_rms, 0
+            lowest = balance.residual_rms
+            stagnation = 0
         elif stagnation == MIXED_NEWTON.stagnation_iterations:
             lowest, stagnation, share, stagnated = balance.residual_rms, 0, 1.5 - share, True
         proposal = _StepProposal(balance, limits(step, balance), share)
@@ -106,7 +111,8 @@ class _StepLimits:
 
 def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance:
     """Halve a step that increases the residual near the solution: thin films may alternate."""
-    problem, residual = proposal.balance.problem, proposal.balance.residual_rms
+    problem = proposal.balance.problem
+    residual = proposal.balance.residual_rms
     damping = 1.0
     while True:
         unknowns, freed = proposal.apply(damping)
@@ -125,11 +131,13 @@ def _updated_oil(balance: MixedBalance, step: Field) -> Field:
 
     Where oil is conserved, at most up to the next state.
     """
-    before, cap = balance.unknowns.oil, balance.problem.p_cap
+    before = balance.unknowns.oil
+    cap = balance.problem.p_cap
     signed = before + step
     if balance.surplus is None:
         return np.clip(signed, 0.0, cap)
-    ruptured, pressed = before < 0.0, before > cap
+    ruptured = before < 0.0
+    pressed = before > cap
     full = ~ruptured & ~pressed
     signed = np.where(
         ruptured, np.maximum(signed, MIXED_NEWTON.min_content_share * (1.0 + before) - 1.0), signed

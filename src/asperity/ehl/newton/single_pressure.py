@@ -61,7 +61,10 @@ def newton(
     mean_pressure = problem.mean_pressure
     limit = StepLimit(pressure, initial=STEP_LIMITS.max_pressure_step, bound_reversals=False)
     approach_limit = ApproachLimit(problem.roughness)
-    lowest, stagnation, attempt, change = np.inf, 0, 0, np.inf
+    lowest = np.inf
+    stagnation = 0
+    attempt = 0
+    change = np.inf
     for number in count():
         balance = problem.evaluate(pressure, approach)
         yield Step(number, balance, approach, change)
@@ -75,7 +78,8 @@ def newton(
         change = float(np.mean(np.abs(d_pressure)) / mean_pressure)
         stagnation += 1
         if balance.residual_rms < 0.9 * lowest:
-            lowest, stagnation = balance.residual_rms, 0
+            lowest = balance.residual_rms
+            stagnation = 0
         elif stagnation == NEWTON.stagnation_iterations:
             lowest, stagnation, attempt = balance.residual_rms, 0, attempt + 1
         limited = limit(d_pressure, pressure)
@@ -90,7 +94,8 @@ def newton_step(
 
     Includes the load, unless the approach is `fixed`.
     """
-    unknown, linear = balance.unknown, Linear(balance, storing=storing)
+    unknown = balance.unknown
+    linear = Linear(balance, storing=storing)
     known_change = np.where(unknown, 0.0, -balance.residual)
     rows = -balance.residual - linear.product(known_change.astype(linear.dtype), 0.0)
     rhs = np.where(unknown, rows, 0.0).astype(linear.dtype)
@@ -125,14 +130,17 @@ class _LoadedEquations:
 
     def load_missing(self, known_change: Field) -> np.floating:
         """Return the load that known changes of pressure leave to the unknown ones."""
-        problem, (dx, dy) = self.problem, self.problem.spacing
+        problem = self.problem
+        (dx, dy) = self.problem.spacing
         missing = -self.linear.balance.load_error * problem.load / (dx * dy)
         return missing - problem.sum_over_cells(known_change)
 
     def product(self, vector: Field) -> Field:
         """Apply the equations."""
-        d_pressure, d_approach = vector[:-1].reshape(self.cells), float(vector[-1])
-        rows, real = self.linear.product(d_pressure, 0.0), self.linear.dtype
+        d_pressure = vector[:-1].reshape(self.cells)
+        d_approach = float(vector[-1])
+        rows = self.linear.product(d_pressure, 0.0)
+        real = self.linear.dtype
         if d_approach:
             rows += real(d_approach) * self.by_approach
         return np.append(rows.ravel(), real(self.weight * self.problem.sum_over_cells(d_pressure)))

@@ -58,7 +58,8 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
     pressure, approach, converged = dry_contact(dry, hertz, max_steps=GUESS.max_gradient_steps)
     if not converged:
         step, _ = _by_newton(dry, pressure, approach)
-        pressure, approach = step.balance.pressure, step.approach
+        pressure = step.balance.pressure
+        approach = step.approach
     return pressure, approach
 
 

@@ -27,7 +27,8 @@ def refine_locally(problem: Problem, unknowns: Pressures) -> Pressures:
     Unchanged if these cells are many.
     """
     balance = evaluate(problem, unknowns, second_order=False)
-    oil, total = unknowns.oil.copy(), unknowns.total.copy()
+    oil = unknowns.oil.copy()
+    total = unknowns.total.copy()
     for box in _worst_boxes(balance):
         part, start = _subproblem(balance, box)
         oil[box], total[box] = _solved(part, start)
@@ -43,7 +44,8 @@ def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
             first = least = residual
         elif residual < least:
             assert isinstance(step.balance, MixedBalance)
-            least, best = residual, step.balance.unknowns
+            least = residual
+            best = step.balance.unknowns
         if (
             least < REFINEMENT.target * first
             or step.number == REFINEMENT.max_steps
@@ -55,7 +57,8 @@ def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
 
 def _worst_boxes(balance: MixedBalance) -> list[Box]:
     """Return boxes around the largest residuals; none where these are many, or small."""
-    problem, residual = balance.problem, np.abs(balance.oil_residual)
+    problem = balance.problem
+    residual = np.abs(balance.oil_residual)
     worst = residual > REFINEMENT.worst_residual * residual.max()
     share = float((residual[worst] ** 2).sum() / max((residual**2).sum(), np.finfo(float).tiny))
     if balance.residual_rms < REFINEMENT.min_residual or share < REFINEMENT.min_residual_share:
@@ -73,14 +76,14 @@ def _subproblem(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
 
     The deflection by the surrounding pressures counts as shape.
     """
-    problem, (along, across) = balance.problem, box
-    (x, y), (dx, dy) = problem.lower, problem.spacing
+    problem = balance.problem
+    (along, across) = box
+    (x, y) = problem.lower
+    (dx, dy) = problem.spacing
     start = Pressures(balance.unknowns.oil[box], balance.unknowns.total[box], 0.0)
     fixed = np.ones(start.total.shape, dtype=bool)
-    inner, mirror = (
-        slice(REFINEMENT.fixed_margin, -REFINEMENT.fixed_margin),
-        problem.mirror if across.stop == problem.cells[1] else 0,
-    )
+    inner = slice(REFINEMENT.fixed_margin, -REFINEMENT.fixed_margin)
+    mirror = problem.mirror if across.stop == problem.cells[1] else 0
     fixed[
         inner,
         slice(None)

@@ -124,10 +124,8 @@ class MixedSearch(Search):
         The effect of the order on the results then follows from steps back to first order.
         """
         tolerance, most = self._targets(problem, coarse=coarse, from_coarse=True)
-        roughly, soon = (
-            max(SEARCH.first_order_tolerance, tolerance),
-            min(SEARCH.max_second_order_iterations, most),
-        )
+        roughly = max(SEARCH.first_order_tolerance, tolerance)
+        soon = min(SEARCH.max_second_order_iterations, most)
         if uses_limiter(problem):
             steps = newton(problem, unknowns, second_order=True)
             step = self.run(
@@ -156,7 +154,8 @@ class MixedSearch(Search):
         self, problem: Problem, *, coarse: bool, from_coarse: bool = False
     ) -> tuple[float, int]:
         """Return tolerance and largest number of steps, for the finest or a coarser grid."""
-        tolerance, most = self.options.tolerance, self.options.max_iterations
+        tolerance = self.options.tolerance
+        most = self.options.max_iterations
         if not coarse:
             return tolerance, most
         roughly = (
@@ -171,7 +170,9 @@ class MixedSearch(Search):
 
         Returns strategy and step; the robust ones if this fails.
         """
-        history, figures, error = list(self.history), list(self.figures), self.iteration_error
+        history = list(self.history)
+        figures = list(self.figures)
+        error = self.iteration_error
         better = self.run(
             problem,
             newton(problem, unknowns_of(step), second_order=False),
@@ -249,7 +250,8 @@ class MixedSearch(Search):
         the step was too long. From a guess with too little information on the oil no step is short
         enough.
         """
-        length, content = first, evaluate(problem, unknowns, second_order=False).content
+        length = first
+        content = evaluate(problem, unknowns, second_order=False).content
         most = min(MARCHING.max_newton_steps, self.options.max_iterations)
         for _ in range(MARCHING.max_steps):
             stepped = replace(problem, past=_implicit_step(problem, length, content))
@@ -261,7 +263,8 @@ class MixedSearch(Search):
                 divergence=SEARCH.divergence,
             )
             if self.converged(tolerance):
-                unknowns, content = unknowns_of(step), step.balance.content
+                unknowns = unknowns_of(step)
+                content = step.balance.content
                 if length >= MARCHING.final_length:
                     break
                 length *= (

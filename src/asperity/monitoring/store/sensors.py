@@ -292,7 +292,8 @@ class Sensors:
         self.refresh()
         track = self._with_standing_alarm(track)
         judgement = track.scalars(all_sources=False)
-        alarm, lines = judgement["alarm"], judgement.pop("recordings")
+        alarm = judgement["alarm"]
+        lines = judgement.pop("recordings")
         leading, others = stored_rows([*self._sensors()], track, lines, keys)
         content = json.dumps({**judgement, "numbers": [stored.number for stored in leading]})
         entry = {name: alarm[name] for name in ALARM_COLUMNS}

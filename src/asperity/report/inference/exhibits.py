@@ -74,7 +74,8 @@ def _marginal(axes: Axes, key: str, draws: tuple[Field, Field, Field], *, labell
 
 def pairs(inference: Inference) -> Exhibit:
     """Draw CLR over Sq, and the most correlated pairs of unknowns."""
-    posterior, prior = inference.values(inference.draws), inference.values(inference.prior)
+    posterior = inference.values(inference.draws)
+    prior = inference.values(inference.prior)
     shown = _most_correlated(posterior, [unknown.key for unknown in inference.setting.unknowns])
 
     def draw(medium: Medium) -> Figure:
@@ -82,7 +83,8 @@ def pairs(inference: Inference) -> Exhibit:
         for number, (axes, (first, second)) in enumerate(
             zip(panels_in_rows(figure, len(shown)), shown, strict=True)
         ):
-            x, y = quantity(first), quantity(second)
+            x = quantity(first)
+            y = quantity(second)
             for values, colour, name in ((prior, GREY, "prior"), (posterior, BLUE, "posterior")):
                 axes.plot(
                     x.factor * values[first][:MAX_DRAWS],
@@ -133,7 +135,8 @@ def predicted(inference: Inference) -> Exhibit:
             label = None if number else "predicted, 90 %"
             axes.plot([number, number], [low, high], color=BLUE, label=label, **style)
             axes.plot(number, middle, "_", color=BLUE, markersize=12)
-        x, (values, stds) = np.arange(len(observed)), _observed_crf(observed)
+        x = np.arange(len(observed))
+        (values, stds) = _observed_crf(observed)
         style = {"color": VERMILION, "markersize": 4, "capsize": 3, "label": "observed"}
         axes.errorbar(x, values, 1.645 * stds, fmt="o", **style)
         names = [f"{point.load_n:.4g} N\n{point.entrainment_m_s:.3g} m/s" for _, point in observed]

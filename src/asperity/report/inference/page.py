@@ -91,9 +91,11 @@ def render_inference_page(
 
 
 def _posterior_rows(inference: Inference) -> list[PosteriorRow]:
-    exact, rows = inference.posterior(discrepancy=False), []
+    exact = inference.posterior(discrepancy=False)
+    rows = []
     for key, estimate in inference.posterior().items():
-        entry, without_error = quantity(key), exact[key]
+        entry = quantity(key)
+        without_error = exact[key]
         remark = "" if estimate.learnt else "prior only"
         if estimate.against:
             end = "lower" if estimate.against == "low" else "upper"

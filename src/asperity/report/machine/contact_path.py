@@ -110,9 +110,12 @@ def _position(result: MachineResult, row: Numbers) -> float:
 
 def _panel(axes: Axes, result: MachineResult, key: str, name: str) -> None:
     """Draw a quantity of every series over the position, with intervals and rating."""
-    entry, place, series = quantity(name), result.case.machine.place, _series(result)
+    entry = quantity(name)
+    place = result.case.machine.place
+    series = _series(result)
     for (label, rows), (colour, stroke, marker) in zip(series.items(), STROKES, strict=False):
-        x, y = _positions(result, rows), display(name, _numbers(rows, key))
+        x = _positions(result, rows)
+        y = display(name, _numbers(rows, key))
         axes.plot(x, y, stroke, color=colour, marker=marker, markersize=4, label=label)
         _draw_bars(axes, x, rows, entry, colour)
     _draw_rating(axes, result, key)

@@ -53,7 +53,8 @@ def machine_sketch(result: MachineResult) -> Exhibit:
             ),
         )
     elif isinstance(machine, TwinDisc):
-        draw, caption = partial(_discs, machine), "Side view of both discs, to scale."
+        draw = partial(_discs, machine)
+        caption = "Side view of both discs, to scale."
     else:
         assert isinstance(machine, Cam)
         draw, caption = (
@@ -106,9 +107,14 @@ def _bearing(
     bearing: CylindricalRollerBearing | BallBearing, result: MachineResult, axes: Axes
 ) -> None:
     diameter, loads = _loaded_elements(bearing, result)
-    middle, radius, wall = bearing.pitch_diameter / 2.0, diameter / 2.0, 0.35 * diameter
-    inner, outer = middle - radius, middle + radius
-    rim, bore, room = outer + wall, inner - wall, 1.1 * diameter
+    middle = bearing.pitch_diameter / 2.0
+    radius = diameter / 2.0
+    wall = 0.35 * diameter
+    inner = middle - radius
+    outer = middle + radius
+    rim = outer + wall
+    bore = inner - wall
+    room = 1.1 * diameter
     _draw_rings(axes, rim, outer, inner, bore)
     largest = float(loads.max())
     for number, (angle, load) in enumerate(zip(bearing.angles, loads, strict=True)):
@@ -149,7 +155,8 @@ def _direction(angle: float) -> Field:
 def _rolling_element(axes: Axes, number: int, place: Field, radius: float, share: float) -> None:
     """Draw a numbered rolling element, shaded by its share of the largest load."""
     x, y = place
-    colour, opacity = BLUE if share > 0.0 else IDLE, 0.25 + 0.6 * share
+    colour = BLUE if share > 0.0 else IDLE
+    opacity = 0.25 + 0.6 * share
     _circle(axes, x, y, radius, facecolor=colour, alpha=opacity, zorder=2)
     axes.text(MM * x, MM * y, str(number), ha="center", va="center", fontsize="x-small", zorder=3)
 
@@ -204,7 +211,8 @@ def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
 
 def _line_of_action(gears: SpurGear) -> tuple[Field, Field]:
     """Return the start of the line of action on the pinion's base circle, and its direction."""
-    sine, cosine = math.sin(gears.working_angle), math.cos(gears.working_angle)
+    sine = math.sin(gears.working_angle)
+    cosine = math.cos(gears.working_angle)
     return gears.base_radii[0] * np.array([sine, cosine]), np.array([-cosine, sine])
 
 
@@ -243,8 +251,10 @@ def _flanks(gears: SpurGear, body: int, contact_point: Field) -> Polyline:
 
 def _tooth(gears: SpurGear, body: int) -> tuple[float, Field, Field]:
     """Return half the angle of a tooth at the base circle, and its outline in polar coordinates."""
-    teeth, shift = gears.teeth[body], gears.profile_shift[body]
-    base, tip = gears.base_radii[body], gears.tip_radii[body]
+    teeth = gears.teeth[body]
+    shift = gears.profile_shift[body]
+    base = gears.base_radii[body]
+    tip = gears.tip_radii[body]
     half = (0.5 * math.pi + 2.0 * shift * math.tan(gears.pressure_angle)) / teeth + _involute(
         gears.pressure_angle
     )
@@ -284,7 +294,8 @@ def _cam(cam: Cam, result: MachineResult, axes: Axes) -> None:
     rotation = result.worst["position"]
     angles = np.linspace(-math.pi, math.pi, 721)
     outline = np.array([_on_cam(cam, angle) for angle in angles])
-    cosine, sine = math.cos(rotation), math.sin(rotation)
+    cosine = math.cos(rotation)
+    sine = math.sin(rotation)
     matrix = np.array([[cosine, -sine], [sine, cosine]])
     x, y = (outline @ matrix.T).T
     axes.fill(MM * x, MM * y, facecolor=METAL, edgecolor=EDGE, linewidth=1.0)

@@ -99,7 +99,8 @@ def running_in(history: History) -> Exhibit:
         for number, (side, keys) in enumerate(panels, 1):
             axes = figure.add_subplot(rows, 2, number)
             for key, (_, colour), marker in zip(keys, STROKES, "os", strict=False):
-                values, title = display(key, table[key].to_numpy()), quantity(key).title
+                values = display(key, table[key].to_numpy())
+                title = quantity(key).title
                 axes.plot(
                     table["pass"], values, marker=marker, markersize=3.5, color=colour, label=title
                 )

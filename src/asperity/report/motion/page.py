@@ -58,7 +58,9 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
     over_time = exhibits.curves(history)
     figure = over_time.figure()
     box = figure.axes[0].get_position()
-    motion, rows, values = history.case.motion, history.settled, history.scalars()
+    motion = history.case.motion
+    rows = history.settled
+    values = history.scalars()
     pass_by_pass = motion.flattening and len(history.by_pass()) >= 2
     return render(
         "motion/page.html.j2",

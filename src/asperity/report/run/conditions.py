@@ -67,7 +67,8 @@ def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
         contact += f", length {quantity('length_m').text(conditions.length)}"
         load += f" ({quantity('line_load_n_per_m').text(conditions.line_load)})"
     speeds = " and ".join(map(quantity("surface_speed_m_s").text, conditions.surface_speeds))
-    mean, slip = quantity("entrainment_speed_m_s"), quantity("slide_to_roll")
+    mean = quantity("entrainment_speed_m_s")
+    slip = quantity("slide_to_roll")
     shape = (
         {"Shape along the roller": _shape(conditions)} if conditions.geometry == "roller" else {}
     )
@@ -82,7 +83,9 @@ def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
 
 def _solid_rows(conditions: ContactConditions) -> dict[str, str]:
     """Return elastic constants, hardness, and the smooth, dry contact that follows from them."""
-    pair, hertz, modulus = conditions.pair, conditions.hertz, quantity("reduced_modulus_pa")
+    pair = conditions.pair
+    hertz = conditions.hertz
+    modulus = quantity("reduced_modulus_pa")
     half_widths = [quantity("half_width_m").text(half_width) for half_width in hertz.half_widths]
     across = "" if conditions.long else f", across rolling b = {half_widths[1]}"
     return {
@@ -104,7 +107,9 @@ def _solid_rows(conditions: ContactConditions) -> dict[str, str]:
 
 def _shape(conditions: ContactConditions) -> str:
     """Describe the profile of a roller along its length."""
-    shape, drop, length = conditions.roller, quantity("height_m"), quantity("length_m")
+    shape = conditions.roller
+    drop = quantity("height_m")
+    length = quantity("length_m")
     parts = []
     if shape.amplitude > 0.0:
         ends = (
@@ -186,7 +191,9 @@ def _temperature(kelvin: float) -> str:
 
 
 def _numerical_rows(solution: ContactSolution) -> dict[str, str]:
-    grid, a, cell = solution.grid, solution.conditions.hertz.half_widths[0], quantity("cell_m")
+    grid = solution.grid
+    a = solution.conditions.hertz.half_widths[0]
+    cell = quantity("cell_m")
     (nx, ny), (dx, dy) = grid.cells, grid.spacing
     ends = [
         [with_deviation(end / a, None, ".2f") for end in corner]
@@ -209,10 +216,8 @@ def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
     if model is None:
         return {"Vibration": "not requested"}
     damping = model.damping_law.summary(model.damping_ratio)
-    duration, rate = (
-        quantity("duration_s").text(model.duration_s),
-        quantity("record_rate_hz").text(model.rate_hz),
-    )
+    duration = quantity("duration_s").text(model.duration_s)
+    rate = quantity("record_rate_hz").text(model.rate_hz)
     return {
         "Oscillator": f"{quantity('mass_kg').name} {quantity('mass_kg').text(model.mass)}, "
         f"{damping}, stiffness law {model.stiffness_law.name}",

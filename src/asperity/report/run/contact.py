@@ -25,7 +25,8 @@ from asperity.results import Run
 def contact_map(run: Run) -> Exhibit:
     """Map asperity contact, oil film and cavitated film (Fig 6 of the paper)."""
     solution = run.solution
-    car, cavitated_share = run.state.car, run.sharing.cavitated
+    car = run.state.car
+    cavitated_share = run.sharing.cavitated
     contact, cavitated, film = (
         quantity("share").text(share)
         for share in (car, cavitated_share, 1.0 - car - cavitated_share)
@@ -72,7 +73,8 @@ def film_map(run: Run) -> Exhibit:
 
 def pressure_map(run: Run) -> Exhibit:
     """Map the total pressure of oil and asperities."""
-    solution, pressure = run.solution, quantity("pressure")
+    solution = run.solution
+    pressure = quantity("pressure")
     largest = pressure.text(float(solution.pressure.max()))
     capped = ""
     if solution.p_cap is not None and solution.lubricant is not None:  # not part of CLR
@@ -118,7 +120,8 @@ def centre_line(run: Run) -> Exhibit:
 
 
 def _draw_pressure_section(axes: Axes, solution: ContactSolution, row: int) -> None:
-    x, hertz = display("x_m", solution.grid.x), solution.conditions.hertz
+    x = display("x_m", solution.grid.x)
+    hertz = solution.conditions.hertz
     pressure = solution.pressure[:, row]
     smooth = line_pressure(solution.grid.x, hertz.half_widths[0], hertz.p_max)
     axes.plot(
@@ -133,7 +136,8 @@ def _draw_pressure_section(axes: Axes, solution: ContactSolution, row: int) -> N
 
 
 def _draw_gap_section(axes: Axes, solution: ContactSolution, row: int) -> None:
-    x, gap = display("x_m", solution.grid.x), display("gap", solution.gap[:, row])
+    x = display("x_m", solution.grid.x)
+    gap = display("gap", solution.gap[:, row])
     inside = np.abs(solution.grid.x) <= 1.2 * solution.conditions.hertz.half_widths[0]
     top = 1.15 * float(gap[inside].max()) or 1.0
     axes.plot(x, gap, color=GREEN, linestyle="-.", linewidth=1.1, label="gap h")
@@ -154,10 +158,8 @@ def _draw_gap_section(axes: Axes, solution: ContactSolution, row: int) -> None:
 def roughness_map(run: Run) -> Exhibit:
     """Map the composite roughness before deformation."""
     solution, sq = run.solution, quantity("sq_m")
-    heights, title = (
-        solution.surface.heights,
-        f"Composite roughness, {sq.named(solution.surface.sq)}",
-    )
+    heights = solution.surface.heights
+    title = f"Composite roughness, {sq.named(solution.surface.sq)}"
     limit = display("surface_height", float(np.percentile(np.abs(heights), 99.5))) or 1.0
     colours: Style = {"extend": "both", "cmap": "cividis", "vmin": -limit, "vmax": limit}
     return Exhibit(
@@ -227,7 +229,8 @@ def convergence_history(run: Run) -> Exhibit:
 
 def _draw_residuals(axes: Axes, convergence: Convergence) -> None:
     history = convergence.history
-    steps, sparse = np.arange(1, len(history) + 1), max(len(history) // 60, 1)
+    steps = np.arange(1, len(history) + 1)
+    sparse = max(len(history) // 60, 1)
     for name, stroke, colour in (
         ("residual", "-o", BLUE),
         ("load_error", "--s", VERMILION),

@@ -22,16 +22,12 @@ SECTION_ROWS = 160
 
 def traction_map(run: Run, friction: Friction) -> Exhibit:
     """Map the shear stress; a square-root colour scale keeps the oil's part visible."""
-    values, coefficient = (
-        np.abs(friction.shear),
-        quantity("friction_coefficient").text(friction.coefficient),
-    )
+    values = np.abs(friction.shear)
+    coefficient = quantity("friction_coefficient").text(friction.coefficient)
     top = float(display("shear", values).max()) or 1.0
     ticks = [float(f"{share * top:.2g}") for share in (0.0, 0.04, 0.16, 0.36, 0.64, 0.98)]
-    title, norm = (
-        f"Shear stress (square-root scale), friction {coefficient}",
-        PowerNorm(0.5, 0.0, top),
-    )
+    title = f"Shear stress (square-root scale), friction {coefficient}"
+    norm = PowerNorm(0.5, 0.0, top)
     speed = quantity("sliding_speed_m_s").text(run.solution.conditions.sliding_speed)
     return Exhibit(
         "traction",
@@ -47,10 +43,8 @@ def traction_map(run: Run, friction: Friction) -> Exhibit:
 def temperature_map(run: Run, friction: Friction, heat: FlashTemperature) -> Exhibit:
     """Map the temperature rise of the hotter surface."""
     largest = quantity("flash_temperature_max_k").text(heat.max_k)
-    hotter, title = (
-        np.maximum(heat.surface_1, heat.surface_2),
-        f"Flash temperature, maximum {largest}",
-    )
+    hotter = np.maximum(heat.surface_1, heat.surface_2)
+    title = f"Flash temperature, maximum {largest}"
     total, first, second = map(
         quantity("friction_power_w").text, (friction.power, heat.heat_1_w, heat.heat_2_w)
     )
@@ -71,10 +65,8 @@ def temperature_line(run: Run, heat: FlashTemperature) -> Exhibit:
     def draw(axes: Axes) -> None:
         hotter = np.maximum(heat.surface_1, heat.surface_2)
         row = int(np.unravel_index(hotter.argmax(), hotter.shape)[1])
-        x, half_width = (
-            display("x_m", solution.grid.x),
-            display("x_m", solution.conditions.hertz.half_widths[0]),
-        )
+        x = display("x_m", solution.grid.x)
+        half_width = display("x_m", solution.conditions.hertz.half_widths[0])
         first, second = (
             quantity("surface_speed_m_s").text(speed)
             for speed in solution.conditions.surface_speeds
@@ -157,13 +149,14 @@ def _section(run: Run) -> tuple[Field, tuple[float, float, float, float]]:
 
     Its ends are left, right, bottom and top [m].
     """
-    stress, peak, x = run.stress, run.stress.peak, run.stress.grid.x
-    dx, size = (
-        stress.grid.spacing[0],
-        SECTION_DEPTH * run.solution.conditions.hertz.half_widths[0],
-    )
+    stress = run.stress
+    peak = run.stress.peak
+    x = run.stress.grid.x
+    dx = stress.grid.spacing[0]
+    size = SECTION_DEPTH * run.solution.conditions.hertz.half_widths[0]
     shown = (x >= min(-size, peak.x - size / 4.0)) & (x <= max(size, peak.x + size / 4.0))
-    left, right = x[shown][0] - dx / 2.0, x[shown][-1] + dx / 2.0
+    left = x[shown][0] - dx / 2.0
+    right = x[shown][-1] + dx / 2.0
     bottom = min(size, float(stress.depths[-1]))
     depths = (np.arange(SECTION_ROWS) + 0.5) * bottom / SECTION_ROWS
     columns = stress.von_mises[shown, stress.row]
@@ -198,10 +191,8 @@ def stress_over_depth(run: Run) -> Exhibit:
             axes.axhline(
                 solved[~below][0], color=GREEN, linestyle=":", label="solved, at the surface"
             )
-        depth, value = (
-            display("depth_m", stress.peak.depth),
-            display("von_mises_stress_pa", stress.peak.value),
-        )
+        depth = display("depth_m", stress.peak.depth)
+        value = display("von_mises_stress_pa", stress.peak.value)
         circle: Style = {
             "color": VERMILION,
             "markerfacecolor": "none",
@@ -229,5 +220,6 @@ def stress_over_depth(run: Run) -> Exhibit:
 
 
 def _peak(run: Run) -> str:
-    value, depth = quantity("von_mises_max_pa"), quantity("von_mises_depth_m")
+    value = quantity("von_mises_max_pa")
+    depth = quantity("von_mises_depth_m")
     return f"{value.text(run.stress.peak.value)} at depth {depth.text(run.stress.peak.depth)}"

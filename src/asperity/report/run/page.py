@@ -117,7 +117,8 @@ class _RunView(NamedTuple):
 
 
 def _view(run: Run, number: int, numbered: bool) -> _RunView:
-    scalars, roughness = run.scalars(), quantity("sq_m").named(run.state.sq)
+    scalars = run.scalars()
+    roughness = quantity("sq_m").named(run.state.sq)
     return _RunView(
         label=f"{number}. {roughness}" if numbered else roughness,
         anchor=f"run-{number}",

@@ -20,7 +20,8 @@ def end_value_text(key: str, end: EndValue | None) -> str:
 
 def along_length(run: Run, along: AxialDistribution) -> Exhibit:
     """Draw line load, maximum pressure and minimum gap along a roller."""
-    hertz, lubricated = run.solution.conditions.hertz.p_max, run.solution.lubricant is not None
+    hertz = run.solution.conditions.hertz.p_max
+    lubricated = run.solution.lubricant is not None
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.single, 4.6), layout="constrained")
@@ -57,7 +58,8 @@ def along_length(run: Run, along: AxialDistribution) -> Exhibit:
 
 
 def _draw_line_load(axes: Axes, along: AxialDistribution) -> None:
-    y, load = display("y_m", along.y), display("line_load_n_per_m", along.line_load)
+    y = display("y_m", along.y)
+    load = display("line_load_n_per_m", along.line_load)
     axes.plot(y, load, color=VERMILION, label="line load")
     mean = display("line_load_n_per_m", along.load / along.length)
     axes.axhline(mean, color="black", linestyle="--")

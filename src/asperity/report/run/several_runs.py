@@ -40,10 +40,8 @@ def resonance_against_roughness(points: Points, full_load_crf_hz: float | None) 
         for point in points:
             crf, low, high = (point[key] for key in ("crf_hz", "crf_low_hz", "crf_high_hz"))
             if crf is not None and low is not None and high is not None:
-                sq, bars = (
-                    display("sq_m", point["sq_m"]),
-                    [[max(crf - low, 0.0)], [max(high - crf, 0.0)]],
-                )
+                sq = display("sq_m", point["sq_m"])
+                bars = [[max(crf - low, 0.0)], [max(high - crf, 0.0)]]
                 axes.errorbar(sq, crf, bars, color=VERMILION, capsize=5, linewidth=1.0, zorder=1)
         if full_load_crf_hz is not None:
             label = "CRF at full load"

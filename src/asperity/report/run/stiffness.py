@@ -21,7 +21,8 @@ def stiffness_over_frequency(run: Run) -> Exhibit:
     BadInput
         for a run without a dynamic curve.
     """
-    curve, own = run.dynamic_curve, run.own_resonance
+    curve = run.dynamic_curve
+    own = run.own_resonance
     if curve is None:
         raise BadInput(
             "the run has no stiffness over frequency; set solver.dynamic in the case and solve "

@@ -36,17 +36,21 @@ def surface_map(description: SurfaceDescription, path: Path) -> Path:
 
 @ON_PAGE.drawing()
 def _surface_figure(description: SurfaceDescription) -> Figure:
-    levelled, spectrum = description.levelled, surface_spectrum(description.levelled)
+    levelled = description.levelled
+    spectrum = surface_spectrum(description.levelled)
     figure = Figure(figsize=(11.0, 7.4), layout="constrained")
-    places, is_map = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0)), levelled.uniform is None
+    places = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
+    is_map = levelled.uniform is None
     if is_map:
         _draw_levelled_map(figure, figure.add_subplot(places[0, :2]), levelled)
         _draw_lay(figure.add_subplot(places[0, 2], projection="polar"), spectrum)
-        left, title = figure.add_subplot(places[1, 0]), "Profile through the middle, along x"
+        left = figure.add_subplot(places[1, 0])
+        title = "Profile through the middle, along x"
         _draw_profile(left, levelled, title)
     else:
         _draw_profile(figure.add_subplot(places[0, :]), levelled, "Levelled profile")
-        left, rms = figure.add_subplot(places[1, 0]), f"{description.profile_letter}q"
+        left = figure.add_subplot(places[1, 0])
+        rms = f"{description.profile_letter}q"
         draw_height_distribution(left, levelled.profile, rms)
     curve, radial = (figure.add_subplot(places[1, column]) for column in (1, 2))
     _draw_bearing_curve(curve, description)
@@ -58,8 +62,10 @@ def _surface_figure(description: SurfaceDescription) -> Figure:
 
 def _size(description: SurfaceDescription) -> str:
     """Return Sq or Rq, the number of pixels or points and their spacing as text."""
-    levelled, pixel = description.levelled, quantity("cell_m")
-    sq, (dx, dy) = quantity("sq_m").text(description.parameters.sq), levelled.grid.spacing
+    levelled = description.levelled
+    pixel = quantity("cell_m")
+    sq = quantity("sq_m").text(description.parameters.sq)
+    (dx, dy) = levelled.grid.spacing
     if levelled.uniform is None:
         nx, ny = levelled.grid.cells
         return f"Sq {sq}, {nx} × {ny} pixels of {pixel.number(dx)} × {pixel.text(dy)}"
@@ -104,11 +110,9 @@ def _draw_profile(axes: Axes, levelled: MeasuredSurface, title: str) -> None:
 
 
 def _draw_bearing_curve(axes: Axes, description: SurfaceDescription) -> None:
-    curve, parameters, sq = (
-        bearing_curve(distinct_heights(description.levelled)),
-        description.parameters,
-        quantity("sk_m"),
-    )
+    curve = bearing_curve(distinct_heights(description.levelled))
+    parameters = description.parameters
+    sq = quantity("sk_m")
     prefix = "S" if description.profile is None else description.profile_letter
     axes.plot(display("material_ratio", curve.share), display("height_m", curve.height), color=BLUE)
     top, bottom = (

@@ -34,10 +34,12 @@ def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
     BadInput
         for a contact without a spectrum: no asperity touches.
     """
-    density, resonance = vibration.spectrum, vibration.resonance
+    density = vibration.spectrum
+    resonance = vibration.resonance
     if density is None:
         raise BadInput(f"no spectrum to draw: {resonance.reason}")
-    (low, high), line = vibration.band_hz, quantity("crf_hz")
+    (low, high) = vibration.band_hz
+    line = quantity("crf_hz")
     margin = 0.35 * (high - low)
 
     @one_panel(3.5)
@@ -61,10 +63,8 @@ def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
         axes.set_xlim(low - margin, high + margin)
 
     ends = quantity("band_hz")
-    band, full_load = (
-        f"{ends.number(low)} to {ends.text(high)}",
-        ends.text(vibration.full_load_crf_hz),
-    )
+    band = f"{ends.number(low)} to {ends.text(high)}"
+    full_load = ends.text(vibration.full_load_crf_hz)
     return Exhibit(
         "spectrum",
         draw,
@@ -97,7 +97,8 @@ def _mark_resonance(axes: Axes, resonance: Resonance, frequency: Field) -> None:
         axes.semilogy(
             frequency, resonance.curve(frequency), color=VERMILION, label="fitted resonance"
         )
-    crf, half_width = resonance.crf_hz, 2.0 * resonance.crf_std
+    crf = resonance.crf_hz
+    half_width = 2.0 * resonance.crf_std
     if np.isfinite(half_width):
         axes.axvspan(crf - half_width, crf + half_width, color=BLUE, alpha=0.35, linewidth=0)
     label = "CRF ± 2 std" if np.isfinite(half_width) else "CRF"
@@ -147,7 +148,9 @@ def response_figure(vibration: Vibration, model: VibrationModel) -> Figure:
     BadInput
         for a contact without touching asperities.
     """
-    profile, oscillator, density = vibration.profile, vibration.oscillator, vibration.spectrum
+    profile = vibration.profile
+    oscillator = vibration.oscillator
+    density = vibration.spectrum
     if profile is None or oscillator is None or density is None or vibration.expected is None:
         raise BadInput(f"no response to draw: {vibration.resonance.reason}")
     motion = mass_motion(oscillator, profile, method=model.response, substeps=model.substeps)
@@ -155,9 +158,11 @@ def response_figure(vibration: Vibration, model: VibrationModel) -> Figure:
     for axes, letter, (key, colour) in zip(records, "abc", MOTION.items(), strict=True):
         record = Signal(getattr(motion, key), profile.rate_hz, quantity(key).unit)
         _draw_record(axes, record, key, f"({letter}) {quantity(key).name}", colour)
-    f0, resonance = oscillator.natural_frequency_hz, vibration.resonance
+    f0 = oscillator.natural_frequency_hz
+    resonance = vibration.resonance
     inside = np.abs(density.frequency_hz / f0 - 1.0) < 0.1
-    f, expected = density.frequency_hz[inside], vibration.expected.density[inside]
+    f = density.frequency_hz[inside]
+    expected = vibration.expected.density[inside]
     d.plot(f, density.density[inside], color=GREY, linewidth=0.7, label="raw periodogram")
     d.plot(f, expected, color="black", linewidth=1.2, label="closed form")
     _mark_frequencies(d, resonance, f0)
@@ -192,7 +197,8 @@ def _draw_record(axes: Axes, record: Signal, key: str, title: str, colour: str) 
 def _draw_spectrum(axes: Axes, record: Signal, title: str, colour: str) -> None:
     """Draw the spectrum, averaged over bins of equal width on a logarithmic axis."""
     density = power_spectrum(record)
-    frequency, level = density.frequency_hz[2:], density.density[2:]
+    frequency = density.frequency_hz[2:]
+    level = density.density[2:]
     edges = np.unique(np.searchsorted(frequency, np.geomspace(frequency[0], frequency[-1], 1200)))
     width = np.diff([*edges, frequency.size])
     binned = (np.add.reduceat(values, edges) / width for values in (frequency, level))

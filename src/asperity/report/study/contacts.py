@@ -87,7 +87,8 @@ def _sheet(
     columns = min(PANELS_PER_ROW, len(runs))
     rows = -(-len(runs) // columns)
     extent = runs[0].case.grid.extent
-    line, width = medium.line_height, medium.width(columns)
+    line = medium.line_height
+    width = medium.width(columns)
     panel = (width - 4.0 * line) / columns - 0.6 * line
     height = (
         rows * (panel * min(max(extent[1] / extent[0], 0.15), 1.4) + above * line) + below * line
@@ -100,7 +101,8 @@ def _label_outer(panels: Sequence[Axes]) -> None:
     """Label only the leftmost and the lowest panels of each column."""
     columns = min(PANELS_PER_ROW, len(panels))
     for number, axes in enumerate(panels):
-        lowest, leftmost = number + columns >= len(panels), number % columns == 0
+        lowest = number + columns >= len(panels)
+        leftmost = number % columns == 0
         axes.set_xlabel(quantity("x_m").axis if lowest else "")
         axes.set_ylabel(quantity("y_m").axis if leftmost else "")
         axes.tick_params(labelbottom=lowest, labelleft=leftmost)

@@ -102,7 +102,8 @@ def surface_count(study: StudyOverview) -> str:
 
 def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
     """Draw CRF and CRFA over Sq for each preset with stages and anchors (Fig 8 of the paper)."""
-    presets, anchors = list(curve.stages), study.anchors
+    presets = list(curve.stages)
+    anchors = study.anchors
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.double, 0.62 * medium.double), layout="constrained")
@@ -173,7 +174,8 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
         label = f"study, preset {first}"
         draw_mean(axes, curve, f"crf_{first}_hz", "-", BLUE, label, seeds=False)
         for other in others:
-            sq, crf = display("sq_m", curve.sq), curve.mean(f"crf_{other}_hz")
+            sq = display("sq_m", curve.sq)
+            crf = curve.mean(f"crf_{other}_hz")
             label = f"study, preset {other}"
             axes.plot(sq, crf, "--", color=GREEN, linewidth=1.0, label=label)
         printed = _draw_rings(axes, rig_prediction(curve, f"crf_{first}_hz"))
@@ -205,7 +207,8 @@ def _draw_rings(axes: Axes, rings: pandas.DataFrame) -> Field:
     draw_intervals(axes, sq, predicted, predicted - low, "o", label=label, **style)
     known = rings[rings["printed_hz"].notna()]
     style = {"color": "black", "markersize": 4.5, "zorder": 4, "xerr": known["sq_std_um"]}
-    label, printed = "rings, CRF printed", known["printed_hz"].to_numpy()
+    label = "rings, CRF printed"
+    printed = known["printed_hz"].to_numpy()
     draw_intervals(axes, known["sq_um"], printed, None, "D", label=label, **style)
     return np.asarray(printed)
 
@@ -276,7 +279,8 @@ def limit_to_data(axes: Axes, values: Field) -> None:
     """Limit the y axis to the values: intervals of two seeds can be ten times as wide."""
     if not values.size:
         return
-    lowest, highest = float(values.min()), float(values.max())
+    lowest = float(values.min())
+    highest = float(values.max())
     margin = 0.3 * (highest - lowest)
     bottom, top = axes.get_ylim()
     if margin > 0.0:

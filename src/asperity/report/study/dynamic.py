@@ -21,11 +21,9 @@ from asperity.report.study.curve import (
 from asperity.report.style import BLUE, GREEN, GREY, Medium, Style
 from asperity.study import StudyOverview, WearCurve
 
-ELASTIC, VIRGIN, STIFFNESS = (
-    "contact_damping_ratio",
-    "contact_damping_ratio_virgin",
-    "contact_stiffness_n_m",
-)
+ELASTIC = "contact_damping_ratio"
+VIRGIN = "contact_damping_ratio_virgin"
+STIFFNESS = "contact_stiffness_n_m"
 BY_LAW = "crf_sound_hz"
 
 

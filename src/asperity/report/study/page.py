@@ -139,7 +139,8 @@ def _tiles(study: StudyOverview) -> list[Tile]:
         return tiles
     for key in TILES:
         if key in curve.table:
-            entry, (first, last) = quantity(key), curve.mean(key)[[0, -1]]
+            entry = quantity(key)
+            (first, last) = curve.mean(key)[[0, -1]]
             if np.isfinite([first, last]).all():
                 tiles.append(
                     Tile(

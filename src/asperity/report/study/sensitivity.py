@@ -20,7 +20,8 @@ OUTCOMES = ("car", "clr", "crf_hz", "log10_crfa", "knee_m")
 @ON_PAGE.drawing()
 def sensitivity_figure(result: Sensitivity) -> Figure:
     """Draw the effect of each factor on each outcome; dark cells are the largest shares."""
-    overall, outcomes = result.overall(), result.outcomes
+    overall = result.overall()
+    outcomes = result.outcomes
     order = [str(name) for name in overall.index]
     figure = Figure(
         figsize=(2.6 + 0.52 * len(outcomes), 1.55 + 0.34 * len(order)), layout="constrained"
@@ -75,7 +76,8 @@ def _draw_column_heads(axes: Axes, outcomes: tuple[SensitivityOutcome, ...]) -> 
     for key in OUTCOMES:
         columns = [column for column, outcome in enumerate(outcomes) if outcome.quantity == key]
         if columns:
-            middle, first = (columns[0] + columns[-1]) / 2.0, columns[0]
+            middle = (columns[0] + columns[-1]) / 2.0
+            first = columns[0]
             axes.annotate(
                 quantity(key).label,
                 (middle, 1.0),
@@ -129,7 +131,8 @@ def _draw_deviations(axes: Axes, result: Calibration) -> None:
 
 def _mark_deviation(axes: Axes, deviation: float, y: float, colour: str, marker: str) -> None:
     """Mark a deviation; one beyond the axis becomes an arrow at its end, with its value."""
-    beyond, side = abs(deviation) > MAX_DEVIATION, float(np.sign(deviation))
+    beyond = abs(deviation) > MAX_DEVIATION
+    side = float(np.sign(deviation))
     symbol = (">" if side > 0 else "<") if beyond else marker
     x = side * MAX_DEVIATION if beyond else deviation
     axes.plot(x, y, symbol, color=colour, markersize=5)
@@ -200,7 +203,8 @@ def _in_words(parameter: CalibratedParameter) -> str:
 
 
 def _draw_curves(axes: Axes, result: Calibration) -> None:
-    sq, start = display("sq_m", result.check_curve.sq), display("sq_m", result.start_curve.sq)
+    sq = display("sq_m", result.check_curve.sq)
+    start = display("sq_m", result.start_curve.sq)
     for key, colour, stroke, marker in (
         ("car_domain", BLUE, "-", "o"),
         ("clr", VERMILION, "--", "s"),

@@ -113,7 +113,8 @@ def _panel_figure(
     """Create a figure with `count` equal panels in rows."""
     columns = min(PANELS_PER_ROW, count)
     rows = -(-count // columns)
-    line, width = medium.line_height, medium.width(columns)
+    line = medium.line_height
+    width = medium.width(columns)
     height = rows * (width / columns * shape + 1.0 * line) + (2.0 + legend_lines) * line
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, panels_in_rows(figure, count)

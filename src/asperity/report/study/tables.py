@@ -82,7 +82,9 @@ def level_rows(study: StudyOverview) -> list[list[Cell]]:
     curve = study.curve
     if curve is None:
         return []
-    summary, stages, sq = study.tables["levels"], curve.stages.get("sound"), quantity("sq_m")
+    summary = study.tables["levels"]
+    stages = curve.stages.get("sound")
+    sq = quantity("sq_m")
     entries = [quantity(key) for key in LEVELS if key in summary]
     rows = [
         [Cell(sq.label), Cell("Used"), *(Cell(entry.short, entry.display) for entry in entries)]
@@ -93,7 +95,8 @@ def level_rows(study: StudyOverview) -> list[list[Cell]]:
     for level, row in enumerate(summary.to_dict("records")):
         cells = [Cell(sq.number(curve.sq[level])), Cell(str(curve.values("clr", level).size))]
         for entry in entries:
-            low, high = row[f"{entry.key}_low"], row[f"{entry.key}_high"]
+            low = row[f"{entry.key}_low"]
+            high = row[f"{entry.key}_high"]
             cells.append(Cell(entry.number(row[entry.key]), _interval(entry, low, high)))
         if stages is not None and has_split:
             before, after = stage_names(stages)

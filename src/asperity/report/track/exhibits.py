@@ -112,7 +112,8 @@ def _draw_references(axes: Axes, track: Track, resonant: list[TrackedRecording])
 def _mark_missing(axes: Axes, places: list[float], label: str) -> None:
     """Mark recordings without a value along the lower edge."""
     if places:
-        along_edge, height = axes.get_xaxis_transform(), np.full(len(places), 0.02)
+        along_edge = axes.get_xaxis_transform()
+        height = np.full(len(places), 0.02)
         axes.plot(places, height, "x", color=GREY, transform=along_edge, label=label)
 
 

@@ -132,7 +132,8 @@ def _title(track: Track) -> str:
 
 def _actions(track: Track) -> list[tuple[str, str]]:
     """Return finding, start, severity, confidence and recommended action."""
-    alarm, last = track.alarm, track.recordings[-1]
+    alarm = track.alarm
+    last = track.recordings[-1]
     rows = [("Finding", capitalised(in_print(alarm.reason)) + ".")]
     if alarm.since is not None:
         first = track.recordings[alarm.since]
@@ -158,7 +159,8 @@ def _when(recording: TrackedRecording) -> str:
 
 def _confidence(track: Track) -> str:
     """State the false-alarm rate and the probability of the severe stage."""
-    alarm, last = track.alarm, track.recordings[-1]
+    alarm = track.alarm
+    last = track.recordings[-1]
     if alarm.raised_by == "zone":
         return (
             "Limits of the standard for machines of this class, not the baseline of this machine."
@@ -193,7 +195,8 @@ def _probability_text(probability: float) -> str:
 
 
 def _tiles(track: Track) -> list[Tile]:
-    total, stages = len(track.recordings), track.stages
+    total = len(track.recordings)
+    stages = track.stages
     tiles = [Tile("Resonance found", f"{track.resonance_count}", f"of {total}")]
     if stages is not None and stages.found:
         low, high = stages.interval
@@ -215,7 +218,9 @@ def _tiles(track: Track) -> list[Tile]:
 
 def _resonance_tiles(recording: TrackedRecording) -> Iterator[Tile]:
     """Yield CRF, probability of the severe stage and load share of a recording."""
-    crf, clr, resonance = quantity("crf_hz"), quantity("clr"), recording.resonance
+    crf = quantity("crf_hz")
+    clr = quantity("clr")
+    resonance = recording.resonance
     value, _, deviation = crf.text(resonance.crf_hz, resonance.crf_std).partition(" ")
     yield Tile(f"Last {crf.short}", value, deviation)
     if np.isfinite(recording.severe_probability):
@@ -268,7 +273,8 @@ def _heads(track: Track) -> list[str]:
 
 
 def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
-    resonance, row = recording.resonance, recording.row()
+    resonance = recording.resonance
+    row = recording.row()
     place = f"{recording.x:.4g}" + (f" ± {recording.x_std:.2g}" if recording.x_std else "")
     resonant = [
         quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa")

@@ -119,11 +119,9 @@ def spectrum_with_fit(track: Track, recording: TrackedRecording) -> Exhibit:
     BadInput
         for a recording without a spectrum.
     """
-    spectrum, name, resonance = (
-        recording.reading.spectrum,
-        Path(recording.file).name,
-        recording.resonance,
-    )
+    spectrum = recording.reading.spectrum
+    name = Path(recording.file).name
+    resonance = recording.resonance
     if recording.clean is None or spectrum is None:
         raise BadInput(f"no spectrum of {recording.file} to draw: {resonance.reason}")
     draw = one_panel(4.4)(partial(_draw_spectrum, track=track, recording=recording))
@@ -138,7 +136,8 @@ def spectrum_with_fit(track: Track, recording: TrackedRecording) -> Exhibit:
 
 
 def _draw_spectrum(axes: Axes, track: Track, recording: TrackedRecording) -> None:
-    spectrum, clean = recording.reading.spectrum, recording.clean
+    spectrum = recording.reading.spectrum
+    clean = recording.clean
     assert spectrum is not None
     assert clean is not None
     frequency, inside = _band_frequencies(track)
@@ -176,7 +175,9 @@ def _mark_lines(axes: Axes, clean: CleanSpectrum, ends: tuple[float, float]) -> 
 
 
 def _draw_fit(axes: Axes, track: Track, recording: TrackedRecording, frequency: Field) -> None:
-    (low, high), resonance, crf = track.target.band_hz, recording.resonance, quantity("crf_hz")
+    (low, high) = track.target.band_hz
+    resonance = recording.resonance
+    crf = quantity("crf_hz")
     curve = resonance.curve(frequency)
     within = (frequency >= low) & (frequency <= high) & (curve > 0.0)
     if np.isfinite(curve[within]).any():

@@ -44,7 +44,8 @@ class WornTrack(NamedTuple):
 
 def worn_tracks(history: WearHistory) -> tuple[WornTrack, ...]:
     """Return the tracks of the bodies that are rough or have worn."""
-    before, after = history.initial_surfaces, history.final_surfaces
+    before = history.initial_surfaces
+    after = history.final_surfaces
     pairs = ((before.first, after.first), (before.second, after.second))
     return tuple(
         WornTrack(name, *pair)
@@ -89,7 +90,8 @@ def curves(history: WearHistory) -> Exhibit:
 
 
 def _draw_over_hours(axes: Axes, history: WearHistory, key: str, colour: str, stroke: str) -> None:
-    hours, factor = history.table["hours"].to_numpy(float), quantity(key).factor
+    hours = history.table["hours"].to_numpy(float)
+    factor = quantity(key).factor
     label = quantity(key).short if quantity(key).symbol else quantity(key).title
     axes.plot(hours, factor * history.table[key].to_numpy(float), stroke, color=colour, label=label)
     if key == "clr":
@@ -117,7 +119,8 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
         table = history.table
         figure = Figure(figsize=(medium.double, 3.2), layout="constrained")
         left, right = panels_in_rows(figure, 2)
-        hours, sq = table["hours"].to_numpy(float), display("sq_m", table["sq_m"].to_numpy(float))
+        hours = table["hours"].to_numpy(float)
+        sq = display("sq_m", table["sq_m"].to_numpy(float))
         for axes, x, key in ((left, hours, "hours"), (right, sq, "sq_m")):
             _draw_crf(axes, x, key, history)
         new = table["crf_hz"].to_numpy(float)[:1]

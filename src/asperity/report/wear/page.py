@@ -65,8 +65,10 @@ def write_wear_report(history: WearHistory, path: str | Path) -> Path:
 
 def render_wear_page(history: WearHistory) -> str:
     """Render the page as HTML text."""
-    table, model = history.table, history.contact.model
-    last, tracks = table.iloc[-1], exhibits.worn_tracks(history)
+    table = history.table
+    model = history.contact.model
+    last = table.iloc[-1]
+    tracks = exhibits.worn_tracks(history)
     scale = animated_maps.ranges(history.case, history.frames)
     captions = [_caption(history, frame) for frame in history.frames]
     return render(
@@ -107,7 +109,8 @@ def _resonance(history: WearHistory) -> Picture | None:
 
 def _caption(history: WearHistory, frame: WearFrame) -> str:
     """Describe a frame: time, positions on the tracks and means over all positions."""
-    row, spacing = history.table.iloc[frame.number], history.case.grid.spacing[0]
+    row = history.table.iloc[frame.number]
+    spacing = history.case.grid.spacing[0]
     moving_bodies = [body for body in (0, 1) if history.contact.bodies[body].speed != 0.0]
     positions = " and ".join(
         f"{1e3 * frame.position[body] * spacing:.3f} mm on body {body + 1}"
@@ -126,7 +129,8 @@ def _row(key: str, first: float, second: float) -> ComparisonRow:
 
 def _volumes(history: WearHistory) -> list[str]:
     """Return the wear volume of each body as a sentence, with the interval of k."""
-    entry, sentences = quantity("worn_volume_m3"), []
+    entry = quantity("worn_volume_m3")
+    sentences = []
     for body, volume in enumerate(history.worn_volume):
         ends = history.volume_interval(body)
         interval = (

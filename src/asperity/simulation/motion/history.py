@@ -126,7 +126,8 @@ class History:
 
         None without [vibration], or where its stiffness or excitation requires a solved contact.
         """
-        model, case = self.case.vibration, self.case
+        model = self.case.vibration
+        case = self.case
         if model is None or model.needs_solution:
             return None
         with case.naming("vibration"):
@@ -146,7 +147,8 @@ class History:
 
     def scalars(self) -> dict[str, Any]:
         """Return the values of `asperity run --json`: statistics of the settled steps."""
-        rows, first = self.settled, self.table.iloc[0]
+        rows = self.settled
+        first = self.table.iloc[0]
         scalars: dict[str, Any] = {
             "verdict": self.verdict(),
             "steps": self.steps,
@@ -176,9 +178,11 @@ class History:
 
     def verdict(self) -> str:
         """Return one sentence: load share in motion and at the start."""
-        rows, first = self.settled, self.table.iloc[0]
+        rows = self.settled
+        first = self.table.iloc[0]
         at_start = "snapshot" if self.case.motion.start == "steady" else "contact at rest"
-        mean, deviation = 100 * rows["clr"].mean(), 100 * rows["clr"].std(ddof=0)
+        mean = 100 * rows["clr"].mean()
+        deviation = 100 * rows["clr"].std(ddof=0)
         sentence = (
             f"Asperities carry {mean:.1f} ± {deviation:.1f} % of the load in "
             f"motion, {100 * first['clr']:.1f} % in the {at_start}: {self.steps} steps, "

@@ -98,7 +98,8 @@ class HistoryRecorder(RunRecorder[Row]):
 
     def _record_frame(self, snapshot: Snapshot) -> None:
         solution = snapshot.solution
-        gap, pressure = solution.gap.astype(np.float32), solution.pressure.astype(np.float32)
+        gap = solution.gap.astype(np.float32)
+        pressure = solution.pressure.astype(np.float32)
         if self.files is None:
             self.frames.append(
                 MotionFrame(snapshot.number, snapshot.time, gap, pressure, solution.in_contact)
@@ -178,7 +179,8 @@ def _memory(files: RunFolder) -> Memory | None:
 
 def _frame_contents(snapshot: Snapshot, identity: str) -> FileContents:
     """Return the maps of a step as a dataset."""
-    solution, grid = snapshot.solution, snapshot.solution.grid
+    solution = snapshot.solution
+    grid = snapshot.solution.grid
     maps = {
         "gap": solution.gap.astype(np.float32),
         "pressure": solution.pressure.astype(np.float32),
@@ -212,7 +214,8 @@ def _frames(files: RunFolder, last: int) -> tuple[MotionFrame, ...]:
         remedy = f"delete it, or {REMEDY}"
         stored = read_netcdf(path, remedy)
         require_case(path, stored.attrs.get("case"), files.identity, remedy)
-        number, when = int(stored.attrs["step"]), float(stored.attrs["time_s"])
+        number = int(stored.attrs["step"])
+        when = float(stored.attrs["time_s"])
         maps = [stored[name].values for name in ("gap", "pressure", "in_contact")]
         if number <= last:
             frames.append(MotionFrame(number, when, maps[0], maps[1], maps[2].astype(bool)))

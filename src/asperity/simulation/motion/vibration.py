@@ -129,11 +129,9 @@ class HistoryVibration:
 
     def verdict(self) -> str:
         """Return one sentence: the contact's own resonance, the paper's, and the excitation."""
-        f0, coupled, force = (
-            self.oscillator.natural_frequency_hz,
-            self.coupled.oscillator,
-            self.dynamic_load,
-        )
+        f0 = self.oscillator.natural_frequency_hz
+        coupled = self.coupled.oscillator
+        force = self.dynamic_load
         by_paper = "none" if coupled is None else f"{coupled.natural_frequency_hz:.0f} Hz"
         sentence = (
             f"Resonance by the tangent stiffness at {len(self.moments)} moments: {f0:.0f} ± "
@@ -279,7 +277,8 @@ def repeating(
             math.nan,
             f"{missing}; extend the history by {math.ceil(length) - time.size} steps",
         )
-    waves, samples = int(WAVES * length), math.ceil(length)
+    waves = int(WAVES * length)
+    samples = math.ceil(length)
     coefficients, remainder = _fitted_waves(time / period, heights, waves)
     spectrum = np.zeros(samples // 2 + 1, dtype=complex)
     spectrum[1 : waves + 1] = (
@@ -293,7 +292,8 @@ def _fitted_waves(periods: Field, heights: Field, waves: int) -> tuple[Field, fl
     phase = 2.0 * np.pi * np.outer(periods, np.arange(1, waves + 1))
     basis = np.hstack([np.ones((periods.size, 1)), np.cos(phase), np.sin(phase)])
     coefficients: Field = np.linalg.lstsq(basis, heights - heights.mean(), rcond=None)[0]
-    left, varied = float(np.std(heights - basis @ coefficients)), float(np.std(heights))
+    left = float(np.std(heights - basis @ coefficients))
+    varied = float(np.std(heights))
     return coefficients, left / varied if varied else 0.0
 
 
@@ -346,9 +346,15 @@ class _Moments(NamedTuple):
 def _moments(
     history: History, surfaces: MovingSurfaces, model: VibrationModel, moments: int
 ) -> _Moments:
-    case, rows, spring = history.case, history.settled, Tangent(model.stated.get("reference_depth"))
+    case = history.case
+    rows = history.settled
+    spring = Tangent(model.stated.get("reference_depth"))
     chosen = np.unique(np.linspace(0, len(rows) - 1, moments + 2)[1:-1].round().astype(int))
-    solved, stiffness, shaken, unsolved, failure = [], [], [], [], ""
+    solved = []
+    stiffness = []
+    shaken = []
+    unsolved = []
+    failure = ""
     for number, time in zip(rows["step"].iloc[chosen], rows["time_s"].iloc[chosen], strict=True):
         try:
             contact = solve_contact(

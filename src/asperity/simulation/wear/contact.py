@@ -148,7 +148,8 @@ class PositionSolver:
             rubbing, heat = friction_and_heat(
                 solution, boundary_friction=self.boundary_friction, thermal=self.thermal
             )
-            temperatures, flash = (heat.surface_1, heat.surface_2), heat.max_k
+            temperatures = (heat.surface_1, heat.surface_2)
+            flash = heat.max_k
         except AsperityError:  # the contact is valid without temperatures
             rubbing = rubbing or friction(solution, boundary_friction=self.boundary_friction)
         endless = self.conditions.endless

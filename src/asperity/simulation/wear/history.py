@@ -186,7 +186,8 @@ class WearHistory:
         if self.k_interval is None:
             return None
         slow, fast = self.k_interval
-        hours, values = self.table["hours"].to_numpy(float), self.table[key].to_numpy(float)
+        hours = self.table["hours"].to_numpy(float)
+        values = self.table[key].to_numpy(float)
         ends = []
         for now in hours:
             inside = values[(hours >= slow * now) & (hours <= fast * now)]
@@ -278,7 +279,8 @@ class WearHistory:
 
     def scalars(self) -> JsonObject:
         """Return the values of `asperity wear --json`."""
-        first, last = self.table.iloc[0], self.table.iloc[-1]
+        first = self.table.iloc[0]
+        last = self.table.iloc[-1]
         scalars: JsonObject = {
             "verdict": self.verdict(),
             "hours": self.hours,
@@ -307,7 +309,8 @@ class WearHistory:
 
     def verdict(self) -> str:
         """Return one sentence: worn depths, and changes of Sq, CLR and CRF."""
-        first, last = self.table.iloc[0], self.table.iloc[-1]
+        first = self.table.iloc[0]
+        last = self.table.iloc[-1]
         depths = " and ".join(
             quantity("worn_depth_m").text(last[body_column("worn_depth_m", body)])
             for body in BODIES
@@ -323,7 +326,8 @@ class WearHistory:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes for a reader of the numbers, one sentence each."""
-        model, contact = self.contact.model, self.contact
+        model = self.contact.model
+        contact = self.contact
         notes = [*self.remarks, *self.case.notes]
         if model.overrolling is None:
             rates = " and ".join(f"{rate:.4g}" for rate in contact.overrolling)

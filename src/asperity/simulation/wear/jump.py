@@ -122,7 +122,8 @@ class WearingContact(WearingTracks):
 
     def booked_rate(self, solutions: Solutions, body: int) -> float:
         """Return the volume a body loses by the law [m^3/s]: k times the law's mean sum."""
-        (dx, dy), grid = self.surfaces.grid.spacing, self.surfaces.grid
+        (dx, dy) = self.surfaces.grid.spacing
+        grid = self.surfaces.grid
         sums = [float(self.model.law(self.rubbing(solved, body)).sum()) for _, solved in solutions]
         return (
             self.model.coefficients[body].k
@@ -136,7 +137,8 @@ class WearingContact(WearingTracks):
     def seconds(self, worn: WearState, solutions: Solutions) -> float:
         """Return the length of the jump from the contacts at those positions [s]."""
         rates = self.rate(worn, solutions, 0), self.rate(worn, solutions, 1)
-        exposures, spacing = self.exposures(solutions), self.surfaces.grid.spacing
+        exposures = self.exposures(solutions)
+        spacing = self.surfaces.grid.spacing
         height = self.model.step * self.height(worn)
         modulus = self.case.conditions.pair.reduced_modulus
         longest = longest_jump(exposures, rates, height, self.model.decay, spacing, modulus)
@@ -201,10 +203,8 @@ class WearingContact(WearingTracks):
     def _removed(
         self, rates: tuple[Field, Field], seconds: float, exposures: tuple[Exposure, Exposure]
     ) -> tuple[Field, Field]:
-        modulus, tracks = (
-            self.case.conditions.pair.reduced_modulus,
-            (self.surfaces.first, self.surfaces.second),
-        )
+        modulus = self.case.conditions.pair.reduced_modulus
+        tracks = (self.surfaces.first, self.surfaces.second)
         first, second = (
             removed_depth(rates[body], seconds, exposures[body], tracks[body].grid, modulus)
             for body in BODIES
@@ -249,7 +249,8 @@ class WearingContact(WearingTracks):
             for long in (worn.seconds, worn.seconds + seconds)
         )
         after = replace(worn, worn=(worn.worn[0] + removed[0], worn.worn[1] + removed[1]))
-        levels, tracks = self.levelled(after), [self.track(after, body) for body in BODIES]
+        levels = self.levelled(after)
+        tracks = [self.track(after, body) for body in BODIES]
         now = math.hypot(*(surface.sq for surface in levels))
         at_once = math.hypot(
             *(
@@ -276,7 +277,8 @@ class WearingContact(WearingTracks):
         """Return the state after one mechanism of one body."""
         body, _ = which
         now = self.worn_surfaces(after)
-        surface, label = (now.first, now.second)[body], f"{name}.{body + 1}"
+        surface = (now.first, now.second)[body]
+        label = f"{name}.{body + 1}"
         passage = Passage(
             body=body,
             grid=surface.grid,
@@ -304,7 +306,8 @@ class WearingContact(WearingTracks):
         label: str,
         places: Sequence[TrackPosition],
     ) -> WearState:
-        changed, mechanical = list(after.changed), list(after.mechanical)
+        changed = list(after.changed)
+        mechanical = list(after.mechanical)
         changed[body] = changed[body] + change.heights_change
         mechanical[body] -= self.volume(change.heights_change, body)
         if change.transferred is not None and change.transferred.any():

@@ -56,7 +56,8 @@ def cells_note(contact: WearingContact) -> str | None:
 
 def grooves_note(contact: WearingContact) -> str | None:
     """Return a note on a smooth moving body that contacts a single track of its partner."""
-    rough, speeds = contact.surfaces.rough, contact.case.conditions.surface_speeds
+    rough = contact.surfaces.rough
+    speeds = contact.case.conditions.surface_speeds
     if not contact.case.conditions.endless or sum(rough) != 1 or 0.0 in speeds:
         return None
     smooth = rough.index(False)
@@ -72,7 +73,8 @@ def grooves_note(contact: WearingContact) -> str | None:
 
 def radii_note(contact: WearingContact) -> str | None:
     """Return a note if speeds and over-rolling rates contradict the contact's radius."""
-    stated, conditions = contact.model.overrolling, contact.case.conditions
+    stated = contact.model.overrolling
+    conditions = contact.case.conditions
     if stated is None or 0.0 in conditions.surface_speeds:
         return None
     curvatures = [

@@ -22,7 +22,8 @@ def reached_cells(depth: Field, places: Field, half_width: float) -> slice:
 
 def cropped(surface: Surface, cells: tuple[slice, slice]) -> Surface:
     """Return the part of a surface on those cells."""
-    heights, grid = surface.heights[cells], surface.grid
+    heights = surface.heights[cells]
+    grid = surface.grid
     if heights.shape == grid.cells:
         return surface
     starts = [part.start or 0 for part in cells]

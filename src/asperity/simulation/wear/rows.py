@@ -146,7 +146,9 @@ def _resonance(case: Case, row: Row, off: float) -> Row:
     `off` is the standard deviation of the mean CLR.
     """
     nothing = dict.fromkeys(("crf_hz", "crf_std_hz", *RESONANCE, "crfa"), math.nan)
-    model, conditions, state = case.vibration, case.conditions, state_of_row(row)
+    model = case.vibration
+    conditions = case.conditions
+    state = state_of_row(row)
     if model is None or model.needs_solution:
         return nothing
     try:

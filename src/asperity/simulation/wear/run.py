@@ -96,7 +96,9 @@ def _advance(
     if recorder.end is not None and abs(recorder.end.worn.time - end) <= TIME_TOLERANCE * end:
         return 0
     _require_longer(recorder, end)
-    worn, at_end, computed = recorder.worn, False, 0
+    worn = recorder.worn
+    at_end = False
+    computed = 0
     while True:
         solutions, row = solve_positions(contact, worn, solve)
         frame = WearFrame.from_solutions(worn.number, worn.time / HOUR, solutions)
@@ -132,7 +134,8 @@ def solve_positions(
     contact: WearingContact, worn: WearState, solve: BatchSolver
 ) -> tuple[SolvedPositions, Row]:
     """Solve the contact at every position of the jump; return the solutions and their row."""
-    surfaces, places = contact.worn_surfaces(worn), contact.positions(worn)
+    surfaces = contact.worn_surfaces(worn)
+    places = contact.positions(worn)
     outcomes = solve([combined_roughness(surfaces, place) for place in places])
     solutions = [
         (place, outcome)
@@ -162,7 +165,8 @@ def _row(contact: WearingContact, worn: WearState, solutions: SolvedPositions, f
     rough = roughness(contact.levelled(worn))
     row: Row = {"jump": worn.number, "hours": worn.time / HOUR}
     for body in BODIES:
-        depth, track = worn.worn[body] - worn.changed[body], contact.track(worn, body)
+        depth = worn.worn[body] - worn.changed[body]
+        track = contact.track(worn, body)
         row |= {
             body_column("overrollings", body): worn.time * contact.overrolling[body],
             body_column("worn_depth_m", body): float(depth[track].mean()),
@@ -182,7 +186,8 @@ def _row(contact: WearingContact, worn: WearState, solutions: SolvedPositions, f
 
 def _require_affordable(contact: WearingContact, end: float) -> None:
     """Refuse wear that needs too many jumps, limited by the decay of its shortest waves."""
-    nothing, grid = (contact.surfaces.first.heights * 0.0,) * 2, contact.case.grid
+    nothing = (contact.surfaces.first.heights * 0.0,) * 2
+    grid = contact.case.grid
     modulus = contact.case.conditions.pair.reduced_modulus
     longest = longest_jump(
         contact.exposures(), nothing, 1.0, contact.model.decay, grid.spacing, modulus

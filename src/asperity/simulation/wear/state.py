@@ -92,5 +92,6 @@ class WearState:
         base = cls(
             **maps, number=int(number), time=time, seconds=seconds, error=error, longest=longest
         )
-        booked, mechanical = (volumes[0], volumes[1]), (volumes[2], volumes[3])
+        booked = (volumes[0], volumes[1])
+        mechanical = (volumes[2], volumes[3])
         return replace(base, booked=booked, mechanical=mechanical, facts=facts, states=states)

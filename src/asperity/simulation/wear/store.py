@@ -37,7 +37,9 @@ from asperity.simulation.wear.rows import Row
 from asperity.simulation.wear.state import WearState
 from asperity.surface import MovingSurfaces, write_surface
 
-END, SURFACES, FRAMES = "end.npz", "surfaces", "frames"
+END = "end.npz"
+SURFACES = "surfaces"
+FRAMES = "frames"
 LAYOUT = FolderLayout(
     kind="wear",
     version=3,
@@ -202,7 +204,8 @@ def load_wear(folder: str | Path) -> WearHistory:
         )
     assert case.wear is not None
     contact = WearingContact(case, case.wear, case.moving_surfaces())
-    rows, frames = _rows(files), _frames(files, end.worn.number)
+    rows = _rows(files)
+    frames = _frames(files, end.worn.number)
     return _history(contact, end, rows, frames, folder=folder, remarks=remarks)
 
 

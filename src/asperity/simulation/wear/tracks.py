@@ -80,7 +80,8 @@ class WearingTracks:
 
     def perimeter(self, body: int) -> float:
         """Return the length that wears as the track does [m]: circumference, or domain at rest."""
-        speed, rate = self.bodies[body].speed, self.overrolling[body]
+        speed = self.bodies[body].speed
+        rate = self.overrolling[body]
         return self.surfaces.first.grid.extent[0] if speed == 0.0 else abs(speed) / rate
 
     @property
@@ -103,7 +104,8 @@ class WearingTracks:
         All cells along rolling of a body that moves, and all across in a line contact.
         """
         along = transverse = slice(None)
-        grid, half_widths = self.surfaces.grid, self.case.conditions.hertz.half_widths
+        grid = self.surfaces.grid
+        half_widths = self.case.conditions.hertz.half_widths
         if self.bodies[body].speed == 0.0:
             along = reached_cells(worn.worn[body].mean(axis=1), grid.x, half_widths[0])
         if not self.case.conditions.endless:
@@ -130,7 +132,8 @@ class WearingTracks:
 
         If both bodies are smooth, the whole scar is form.
         """
-        lowered, endless = worn.lowered(body), self.case.conditions.endless
+        lowered = worn.lowered(body)
+        endless = self.case.conditions.endless
         moves = self.bodies[body].speed != 0.0
         if endless and moves:
             return np.zeros_like(lowered)
@@ -141,7 +144,8 @@ class WearingTracks:
         scar = worn.worn[body] + worn.flattened[body]
         if not any(self.surfaces.rough):
             return np.asarray(scar)
-        half_width, spacing = self.case.conditions.hertz.half_widths[0], self.surfaces.grid.spacing
+        half_width = self.case.conditions.hertz.half_widths[0]
+        spacing = self.surfaces.grid.spacing
         return np.asarray(
             scipy.ndimage.gaussian_filter(
                 scar, [GAUSS * half_width / step for step in spacing], mode="nearest"
@@ -166,7 +170,8 @@ class WearingTracks:
 
         The bound is MIN_HEIGHT of the approach. The form of a scar is left out for rough bodies.
         """
-        conditions, now = self.case.conditions, self.worn_surfaces(worn)
+        conditions = self.case.conditions
+        now = self.worn_surfaces(worn)
         bodies = self.levelled(worn) if any(self.surfaces.rough) else (now.first, now.second)
         approach = conditions.hertz.half_widths[0] ** 2 / (2.0 * conditions.radius_along_rolling)
         return max(math.hypot(*(surface.sq for surface in bodies)), MIN_HEIGHT * approach)
