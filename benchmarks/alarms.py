@@ -55,7 +55,7 @@ CRF_HZ, RISE_HZ, AFTER = (
     2921.93,
     718.0,
     0.18,
-)  # printed end of the paper, the rig's rise to its knee, slope after over before the knee
+)  # published end of the paper, the rig's rise to its knee, slope after over before the knee
 SCATTERS = (0.001, 0.003, 0.005, 0.01)  # of CRF; one value per series
 LEVEL_SCATTER = 0.1  # of the logarithm of the level: 0.9 dB
 DEPTH_SCATTER = 0.14  # of the logarithm of a depth, as in one second of white noise
@@ -389,7 +389,7 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     series = SERIES // (10 if fast else 1)
     rows = Rows()
     yield (
-        f"## Alarms: {series} series of {RECORDINGS} recordings a row, one false alarm in"
+        f"## Alarms: {series} series of {RECORDINGS} recordings per row, one false alarm in"
         f" {1.0 / FALSE_ALARM_RATE:.0f}\n"
     )
     yield (

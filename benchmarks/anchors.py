@@ -1,7 +1,7 @@
-"""Compare four studies with the paper's printed values: `python -m benchmarks.anchors [CELLS]`.
+"""Compare four studies with the paper's published values: `python -m benchmarks.anchors [CELLS]`.
 
-Default: examples/paper.toml with its own model and with the paper's. As printed: the domain in the
-paper, which starves the film. Calibrated: the free parameters that fit the anchors best
+Default: examples/paper.toml with its own model and with the paper's. As published: the domain in
+the paper, which starves the film. Calibrated: the free parameters that fit the anchors best
 (docs/theory/calibration.md). The last two use the paper's model.
 """
 
@@ -16,7 +16,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 CASES = {
     "default": ("paper.toml", "mixed"),
     "default, the paper's model": ("paper.toml", "paper"),
-    "as printed": ("paper-as-printed.toml", "paper"),
+    "as published": ("paper-as-printed.toml", "paper"),
     "calibrated": ("paper-calibrated.toml", "paper"),
 }
 PERCENT = ("car", "car_domain", "clr")
@@ -43,7 +43,7 @@ def curves(cells: int | None) -> dict[str, WearCurve]:
 
 def print_anchors(cells: int | None = None) -> None:
     found = curves(cells)
-    print("\n| anchor | printed | " + " | ".join(found) + " |")
+    print("\n| anchor | published | " + " | ".join(found) + " |")
     print("|---|---|" + "---|" * len(found))
     tables = {
         name: compare_with_anchors(curve).set_index("anchor") for name, curve in found.items()
@@ -65,7 +65,7 @@ def print_anchors(cells: int | None = None) -> None:
             f" {' | '.join(cells_shown)} |"
         )
     for name, reference in (
-        ("ends", "two printed ends"),
+        ("ends", "two published ends"),
         ("knee", "12 rings, bent"),
         ("smooth", "12 rings, saturating"),
     ):

@@ -150,8 +150,8 @@ def lines(*, fast: bool, artefact: Path = Path("build/bounded.csv")) -> Iterator
                 [float(str(row[key])) for row in solved] for key in ("processor_s", "steps")
             )
             yield (
-                f"{name}: {len(solved)} of {len(rows)} solved, the others reported failure; median"
-                f" {np.median(times):.1f} s of processor time and {np.median(steps):.0f} steps, at"
+                f"{name}: {len(solved)} of {len(rows)} solved, failures are reported; median"
+                f" {np.median(times):.1f} s of CPU time and {np.median(steps):.0f} steps, at"
                 f" most {max(times):.0f} s."
             )
     yield f"All results: {artefact}."

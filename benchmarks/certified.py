@@ -16,7 +16,7 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield "## The benchmark's certified values"
     yield ""
     yield (
-        "Errors relative to the certified value; processor time per case, excluding imports and"
+        "Errors relative to the certified value; CPU time per case, excluding imports and"
         " compilation."
     )
     yield ""

@@ -52,7 +52,7 @@ kind = "flat"
 
 
 def timed(conditions: ContactConditions, oil: Lubricant) -> tuple[ContactSolution, float]:
-    """Return the solution on the automatic grid and the least processor time of a few tries [s].
+    """Return the solution on the automatic grid and the least CPU time of a few tries [s].
 
     The time includes the choice of the grid.
     """
@@ -75,7 +75,7 @@ def films(solution: ContactSolution) -> tuple[float, float]:
 
 def heavy() -> Iterator[str]:
     yield (
-        "| M, L, law | cells | time [s] | H_c | off by [%] | error bar [%] | H_min | off by [%] |"
+        "| M, L, law | cells | time [s] | H_c | error [%] | error bar [%] | H_min | error [%] |"
         " error"
         " bar [%] | covered |"
     )
@@ -138,7 +138,7 @@ def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - short as it is
     """Yield the tables as Markdown."""
     yield "## Smooth films on automatic grids\n"
     yield (
-        f"Lines, processor time on one thread, least of {TRIES}; covered: error within 1 % or the"
+        f"Lines, CPU time on one thread, least of {TRIES}; covered: error within 1 % or the"
         " stated error bar:\n"
     )
     yield from heavy()

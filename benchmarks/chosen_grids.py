@@ -43,7 +43,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Convergence, processor time [s], CLR, its interval, and whether the grid determines CLR."""
+    """Convergence, CPU time [s], CLR, its interval, and whether the grid determines CLR."""
 
     cells: tuple[int, int]
     converged: bool
@@ -151,7 +151,7 @@ def summary(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
     )
     return (
         f"{sum(outcome.converged for outcome in chosen)} of {len(chosen)} solved on the"
-        f" chosen grid, median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s; of"
+        f" automatic grid, median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s; of"
         f" {len(both)} solved on both,"
         f" {len(determined_pairs)} are determined, {covering} of these contain the finer CLR in"
         " their"

@@ -2,7 +2,7 @@
 motion, cost.
 
 The rigid films are those of `tests/validation/test_cavitation.py`, which compares them with closed
-forms and quadratures. Every steady solve starts cold; times are processor times. One pass has as
+forms and quadratures. Every steady solve is a cold start; times are CPU times. One pass has as
 many steps as the domain has cells along rolling.
 """
 
@@ -45,7 +45,7 @@ def rigid_films() -> Iterator[str]:
     """Yield a parabolic slider and a pocketed slider over cells (physics: p = 0 where the film
     ruptures).
     """
-    yield "| rigid film | cells | p_max off | flow off | flow varies by | Newton steps |"
+    yield "| rigid film | cells | p_max error | flow error | flow variation | Newton steps |"
     yield "|---|---|---|---|---|---|"
     for cells in (100, 400, 1600):
         x = (np.arange(cells) + 0.5) / cells
@@ -142,8 +142,8 @@ def standing(seeds: tuple[int, ...]) -> Iterator[str]:
     solved_counts = ", ".join(f"{solved[seed]} of 16 on surface {seed}" for seed in seeds)
     yield (
         f"Static, 128 x 128: solved {solved_counts}. Net oil loss at most"
-        f" {worst:.1e} of the throughflow. Cold in {median(seconds):.2f} s in the median (longest"
-        f" {max(seconds):.1f} s), {median(ratios):.1f} times the default model (longest"
+        f" {worst:.1e} of the throughflow. From a cold start: median {median(seconds):.2f} s"
+        f" (longest {max(seconds):.1f} s), {median(ratios):.1f} times the default model (longest"
         f" {max(ratios):.0f} times).\n"
     )
     yield from _shares(shares)

@@ -165,7 +165,7 @@ class Reading(NamedTuple):
 
 def series_lines(library: Sequence[Point]) -> Iterator[str]:
     yield (
-        "| frequency by | other lines in the band | rings with a resonance | read from | CLR off,"
+        "| frequency from | other lines in the band | rings with a resonance | source | CLR error,"
         " rms"
         " [points] | rings in the right stage | series with 11 of 12 right |"
     )
@@ -201,7 +201,7 @@ def series(library: Sequence[Point], number: int, law: str, modes: int) -> list[
         )
         if (
             law != "the contact itself"
-        ):  # the printed curve: full load at 3834 Hz; a line for 0.1 kg
+        ):  # the published curve: full load at 3834 Hz; a line for 0.1 kg
             stiffness = HEAVY * (2.0 * np.pi * 3834.0 * max(clr, 0.02) ** (1.0 / 6.0)) ** 2
         recordings = []
         for test in range(TESTS):

@@ -38,7 +38,7 @@ from benchmarks.damping import (
 TESTS, TRIALS = 5, 200
 CRF_STD, DAMPING_STD = 15.0, 0.1  # Hz; relative
 ENDS = (SAMPLES_SQ_UM[0], SAMPLES_SQ_UM[-1])
-LOWEST, HIGHEST = 2921.93, 3811.88  # the paper's printed CRFs
+LOWEST, HIGHEST = 2921.93, 3811.88  # the paper's published CRFs
 FULL_LOAD = 3834.0
 SOURCES: tuple[StageSource, ...] = ("crf", "damping", "both")
 KINDS = ("severe", "running-in", "no distinct stage", "no change", "disagree")
@@ -83,7 +83,7 @@ TRUTHS = (
     Truth("CRF breaks at 1.8 um, damping level", frequency(1.8), level(0.02), 1.8),
     Truth("CRF breaks at 1.31 um, damping at 2.43 um", frequency(1.31), width(2.43)),
     Truth("both smooth", smooth(LOWEST, HIGHEST), smooth(0.04, 0.012)),
-    Truth("both level", level(3400.0), level(0.02)),
+    Truth("both constant", level(3400.0), level(0.02)),
     Truth("CRF breaks at 1.8 um, damping rises", frequency(1.8), width(1.8, down=False)),
 )
 
@@ -93,7 +93,7 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     yield f"## Stages from CRF, damping and both, {TRIALS} trials per row\n"
     heads = [
         "truth",
-        "read from",
+        "source",
         *(f"classed: {kind}" for kind in KINDS),
         "break, mean ± sd [um]",
         "90 % interval covers",
@@ -187,7 +187,7 @@ def width_lines(*, fast: bool = False) -> Iterator[str]:
     ]
     yield f"| {' | '.join(heads)} |"
     yield "|---" * len(heads) + "|"
-    for name, law in (("falls from 0.04 to 0.012", width(1.8)), ("level at 0.02", level(0.02))):
+    for name, law in (("falls from 0.04 to 0.012", width(1.8)), ("constant at 0.02", level(0.02))):
         for scatter in (0.0, 0.002, 0.005, 0.02):
             rows_of_series = [
                 row for number in range(count) for row in judged(law, scatter, number)

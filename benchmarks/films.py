@@ -189,7 +189,7 @@ def fft_pair() -> Callable[[], object]:
 
 
 def spent(work: Callable[[], object], tries: int) -> float:
-    """Return the least processor time [s] of several tries."""
+    """Return the least CPU time [s] of several tries."""
     times = []
     for _ in range(tries):
         began = process_time()
@@ -243,7 +243,7 @@ def lines(*, fast: bool) -> Iterator[str]:
         " and 256 cells."
     )
     yield ""
-    yield "| M, L | law | H_c | off by [%] | order | H_min | off by [%] | order |"
+    yield "| M, L | law | H_c | error [%] | order | H_min | error [%] | order |"
     yield "|---|---|---|---|---|---|---|---|"
     for load_number, oil_number in LINE_CASES[:: 3 if fast else 1]:
         for law in ("Barus", "Roelands"):
@@ -261,7 +261,7 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield "Balls against extrapolated references:"
     yield ""
     yield (
-        "| M, L, oil | cells | H_c | off by [%] | extrapolated | H_min | off by [%] | extrapolated"
+        "| M, L, oil | cells | H_c | error [%] | extrapolated | H_min | error [%] | extrapolated"
         " | seconds |"
     )
     yield "|---|---|---|---|---|---|---|---|---|"
@@ -283,21 +283,21 @@ def lines(*, fast: bool) -> Iterator[str]:
         )
     yield ""
     yield (
-        "Balls on 257 x 257 cells to 1e-4, one thread, processor time, least of five; steps"
-        " evaluated on 65, 129 and 257 cells a side; an FFT pair is a real one of 512 x 512 and"
-        " back, in the same run:"
+        "Balls on 257 x 257 cells to 1e-4, one thread, CPU time, least of five; steps"
+        " evaluated on 65, 129 and 257 cells per side; an FFT pair is a real 512 x 512 FFT and"
+        " its inverse, in the same run:"
     )
     yield ""
-    yield "| M, L, oil | steps | time [s] | over an FFT pair | H_c off by [%] | H_min off by [%] |"
+    yield "| M, L, oil | steps | time [s] | over an FFT pair | H_c error [%] | H_min error [%] |"
     yield "|---|---|---|---|---|---|"
     for timed in TIMED:
         yield _timed(*timed)
     yield ""
-    yield "Balls and barrels (Roelands) against fits; extrapolated from 256 and 512 cells a side:"
+    yield "Balls and barrels (Roelands) against fits; extrapolated from 256 and 512 cells per side:"
     yield ""
     yield (
-        "| M, L, Rx/Ry | H_c | Nijenbanning et al. | off by [%] | H_min | Hamrock and Dowson | off"
-        " by [%] |"
+        "| M, L, Rx/Ry | H_c | Nijenbanning et al. | error [%] | H_min | Hamrock and Dowson |"
+        " error [%] |"
     )
     yield "|---|---|---|---|---|---|---|"
     balls = [

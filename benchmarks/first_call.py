@@ -32,6 +32,6 @@ def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - there is only one f
     yield "## The first call\n"
     seconds, explained = first_call()
     yield (
-        f"First `asperity solve` after installation, compilation included: {seconds:.1f} s; "
-        f"{'explains the wait' if explained else 'DOES NOT EXPLAIN the wait'}."
+        f"First `asperity solve` after installation, including compilation: {seconds:.1f} s, "
+        f"{'announced by a message' if explained else 'NOT ANNOUNCED by a message'}."
     )

@@ -278,19 +278,18 @@ def tables() -> Iterator[str]:
                 yield _line(shape, some)
     for kind, kind_text in (
         ("steady", "without wear"),
-        ("slow", "without wear, with autocorrelated scatter"),
+        ("slow", "with autocorrelated scatter and without wear"),
     ):
         if own := [row for row in rows if row["kind"] == kind]:
             alarms = sum(row["alarm"] == "1" for row in own)
             changes = sum(float(row["log_odds"]) >= np.log(100.0) for row in own)
             yield (
-                f"Of {len(own)} machines {kind_text}, {changes} were classed as changing and"
+                f"{changes} of {len(own)} machines {kind_text} were classed as changing;"
                 f" {alarms} raised an alarm."
             )
     took = np.median([float(row["seconds"]) for row in rows])
     yield (
-        f"A forecast took {took:.1f} s of processor time (median). Rows per code version:"
-        f" {kept.codes()}."
+        f"A forecast took {took:.1f} s of CPU time (median). Rows per code version: {kept.codes()}."
     )
 
 

@@ -93,8 +93,8 @@ def limit_lines() -> Iterator[str]:
         ),
     }
     yield (
-        "| traction of a Hertz pressure over 0.7 um | cells over 2a | coefficient | closed form |"
-        " off |"
+        "| traction of a Hertz pressure, film 0.7 um | cells over 2a | coefficient | closed form |"
+        " error |"
     )
     yield "|---|---|---|---|---|"
     for name, (law, force) in exact.items():
@@ -108,7 +108,7 @@ def limit_lines() -> Iterator[str]:
     dry = solve_contact(conditions, None, case.surface())
     found = friction(dry).coefficient
     yield (
-        f"\nDry, Sq 1 um, 256 x 256: {found:.6f} where f_b is 0.15, off by"
+        f"\nDry, Sq 1 um, 256 x 256: {found:.6f} where f_b is 0.15, error"
         f" {abs(found / 0.15 - 1):.0e}."
     )
 
@@ -144,7 +144,7 @@ def source_lines() -> Iterator[str]:
         "Sources of half-width b = 50 um on steel, 64 x 64 cells over the source, Pe = u b/(2 κ);"
         " largest rise."
     )
-    yield "\n| source | Pe | rise over q b/k | closed form | off |"
+    yield "\n| source | Pe | rise over q b/k | closed form | error |"
     yield "|---|---|---|---|---|"
     dx = 2.0 * HALF / 64
     for peclet in (0.01, 0.1, 1.0, 10.0, 100.0, 1e4):
@@ -203,8 +203,8 @@ def _compared(name: str, peclet: float, found: float, exact: float) -> str:
 
 def balance_lines() -> Iterator[str]:
     yield (
-        "| Sq [um] | speeds [m/s] | friction power [W] | into body 1 [W] | into body 2 [W] | sum"
-        " off |"
+        "| Sq [um] | speeds [m/s] | friction power [W] | into body 1 [W] | into body 2 [W] |"
+        " error of the sum |"
     )
     yield "|---|---|---|---|---|---|"
     case = load_case(CASE).with_overrides({"grid.cells": [128, 128]})

@@ -1,4 +1,4 @@
-"""Processor time of each script of the gallery, in its own process on one thread."""
+"""CPU time of each script of the gallery, in its own process on one thread."""
 
 import os
 import resource
@@ -9,15 +9,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 SCRIPTS = Path(__file__).parents[1] / "docs" / "scripts"
-MOST = 60  # limit of processor time [s]
+MOST = 60  # limit of CPU time [s]
 
 
 def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - short already
     """Yield one row per script."""
     scripts = sorted(SCRIPTS.glob("[0-9]*.py"))
-    yield "## The gallery's scripts"
+    yield "## Gallery scripts"
     yield ""
-    yield f"Processor time of the whole script, with imports; limit {MOST} s."
+    yield f"CPU time of a complete script, with imports; limit {MOST} s."
     yield ""
     yield "| script | time [s] |"
     yield "|---|---|"
@@ -26,7 +26,7 @@ def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - short already
 
 
 def _taken(script: Path) -> float:
-    """Return the processor time of a script and its subprocesses [s]."""
+    """Return the CPU time of a script and its subprocesses [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with tempfile.TemporaryDirectory() as folder:
         limited = {"MPLBACKEND": "agg", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}

@@ -1,9 +1,10 @@
-"""`asperity watch` on an untidy logger folder: one watch runs undisturbed, one is killed ten times.
+"""`asperity watch` on a disordered logger folder: one watch runs undisturbed, one is killed ten
+times.
 
 Files arrive late, in parts, twice, from a clock that is ahead, and from other programs. At the end
 every file must have an outcome on each sensor, and both stores must be equal. `python -m
 benchmarks.hostile --minutes 60 [--kills 10] [--sensors 2]` runs this part alone. It needs little
-processor time but the full elapsed time.
+CPU time but the full elapsed time.
 """
 
 import argparse
@@ -196,7 +197,7 @@ def run(
             file for file in first.keys() | second.keys() if first.get(file) != second.get(file)
         )
         yield f"Sample: {minutes:.0f} minutes."
-        yield "| untidy logger folder | |"
+        yield "| disordered logger folder | |"
         yield "|---|---|"
         took = (monotonic() - began) / 60.0
         yield f"| minutes, arrivals, kills, sensors | {took:.1f}, {number}, {kills}, {sensors} |"

@@ -61,22 +61,22 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     share = 20 if fast else 1
     yield (
         f"## Indicators: 12 samples x 5 repeats of {DURATION:g} s at 20 kHz, {SERIES // share}"
-        " series a row\n"
+        " series per row\n"
     )
     yield from table_lines(SERIES // share)
     few, fewer = max(FEW // share, 1), max(FEWER // share, 1)
-    yield f"\n## Indicators: each spectrum alone, {fewer} series a row\n"
+    yield f"\n## Indicators: single spectra, {fewer} series per row\n"
     yield from table_lines(fewer, (20.0, 6.0, 0.0), BY_ITSELF)
-    yield f"\n## Indicators: short recordings of 10 s, {few} series a row\n"
+    yield f"\n## Indicators: short recordings of 10 s, {few} series per row\n"
     yield from table_lines(few, (10.0, 0.0), METHODS, duration_s=10.0)
     yield (
         "\n## Indicators: poor repeatability of the machine (modes' levels 0.3 dB, frequencies"
-        f" 0.05 %), {few} series a row\n"
+        f" 0.05 %), {few} series per row\n"
     )
     yield from table_lines(few, (6.0, 0.0), METHODS, mode_gain_db=0.3, mode_drift=5e-4)
-    yield f"\n## Indicators: line transmitted by a structure, {few} series a row\n"
+    yield f"\n## Indicators: line transmitted by a structure, {few} series per row\n"
     yield from through_lines(few)
-    yield f"\n## Stages: {TRIALS // share} trials a row, CRF standard deviation {CRF_STD:g} Hz\n"
+    yield f"\n## Stages: {TRIALS // share} trials per row, CRF standard deviation {CRF_STD:g} Hz\n"
     yield from stage_lines(TRIALS // share)
 
 
@@ -127,7 +127,7 @@ def moved(rig: Rig, size: float, seed: int) -> Rig:
 def through_lines(series: int) -> Iterator[str]:
     """Yield the errors of the joint separation with a structure between contact and sensor."""
     yield (
-        "| recordings | modes up to | failures | > 100 Hz off | not found | CRF rms error [Hz] |"
+        "| recordings | modes up to | failures | error > 100 Hz | not found | CRF rms error [Hz] |"
         " stated [Hz] | CRFA rms error | CRFA median error | 90 % intervals cover CRF and CRFA | s"
         " a series |"
     )
@@ -256,7 +256,7 @@ def table_lines(
     **choices: float,
 ) -> Iterator[str]:
     yield (
-        "| SNR [dB] | method | failures | > 100 Hz off | not found | CRF rms error [Hz] | stated"
+        "| SNR [dB] | method | failures | error > 100 Hz | not found | CRF rms error [Hz] | stated"
         " [Hz] | CRFA rms error | CRFA median error | 90 % intervals cover CRF and CRFA | s a"
         " series |"
     )
@@ -294,7 +294,7 @@ def stage_lines(trials: int) -> Iterator[str]:
     }
     for name, truth in truths.items():
         for errors, tests in ((0.0, 1), (0.0, 5), (0.5, 5), (1.0, 5)):
-            known = f"off by {errors:g} of the printed ±" if errors else "exact"
+            known = f"error {errors:g} times the published ±" if errors else "exact"
             yield f"| {name} | {known} | {tests} | {stage_row(truth, errors, tests, trials)} |"
 
 

@@ -370,7 +370,7 @@ def tables() -> Iterator[str]:
     yield (
         "| truth | points | machines | CLR covered | CLR covered, laws exact | Sq covered | Sq"
         " covered, laws"
-        " exact | stage covered | likeliest stage right (stated probability) |"
+        " exact | stage covered | most likely stage correct (stated probability) |"
     )
     yield "|---|---|---|---|---|---|---|---|---|"
     groups = {(row["law"], row["points"]): [] for row in every}
@@ -429,8 +429,8 @@ def tables() -> Iterator[str]:
         if row["law"] == INSIDE and row["points"] != "1" and row["observations"] == "0"
     }
     yield (
-        f"{len(machines)} machines with {SURFACES} surfaces at each operating point; of"
-        f" {len(unobserved)} too few recordings show a line, so no result is given. Rows per code"
+        f"{len(machines)} machines with {SURFACES} surfaces at each operating point; for"
+        f" {len(unobserved)} too few recordings show a line, so they have no result. Rows per code"
         f" version: {kept.codes()}."
     )
 

@@ -14,8 +14,8 @@ DOCS = Path(__file__).parents[1] / "docs"
 FOLDER, PAGE = DOCS / "benchmarks", DOCS / "benchmarks.md"
 CHANGED = 0.1  # relative threshold of reported changes; smaller ones are noise of a shared machine
 IN_FULL, IN_SHORT = (
-    "Measured in full.",
-    "Measured in short; `python -m benchmarks --whole` takes all of it.",
+    "Full sample.",
+    "Reduced sample; `python -m benchmarks --whole` uses the full one.",
 )
 SAMPLE = re.compile(r"Sample: (\d+) ")  # line of a part that uses all its time
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -95,11 +95,11 @@ def sample(sentences: Iterable[str]) -> float:
 
 def _in_words(size: float) -> str:
     return (
-        "all of it"
+        "the full sample"
         if size == float("inf")
         else f"a sample of {size:.0f}"
         if size
-        else "a short run"
+        else "a reduced sample"
     )
 
 
@@ -162,11 +162,8 @@ def page(folder: Path = FOLDER, parts: Iterable[str] = ()) -> str:
     text = [
         "# Benchmarks",
         "",
-        (
-            "Written by `make bench` from the csv files in `docs/benchmarks`; not by hand. Times"
-            " are those of the machine"
-        ),
-        "that ran them, shared with other work: ratios within a table are the result.",
+        "`make bench` writes this page from the csv files in `docs/benchmarks`.",
+        "Times are from a shared machine: compare ratios within a table.",
     ]
     for part in parts:
         if not (folder / f"{part}-said.csv").is_file():

@@ -1,6 +1,6 @@
 """Cost of monitoring: a store of 10 000 recordings and one more, and a watch over known files.
 
-Processor time, least of several. `python -m benchmarks.monitor` runs this part alone; `--fast` uses
+CPU time, least of several. `python -m benchmarks.monitor` runs this part alone; `--fast` uses
 a tenth of the recordings.
 """
 
@@ -93,7 +93,7 @@ def filled(folder: Path, store: Path, many: int, sensors: int) -> None:
 
 
 def one_more(folder: Path, out: Path, many: int, sensors: int) -> tuple[list[float], list[float]]:
-    """Return processor times [s] of judging one more recording, and of the whole scan of the
+    """Return CPU times [s] of judging one more recording, and of the whole scan of the
     folder.
     """
     rng = np.random.default_rng(2)
@@ -140,7 +140,7 @@ def _require_known(update: Update) -> None:
 
 
 def known(folder: Path, out: Path) -> float:
-    """Return processor time [s] of `asperity watch --once` without new files, with imports."""
+    """Return CPU time [s] of `asperity watch --once` without new files, with imports."""
     command = [
         sys.executable,
         "-m",
@@ -166,9 +166,9 @@ def known(folder: Path, out: Path) -> float:
 def lines(*, fast: bool = False) -> Iterator[str]:
     """Yield the lines of a Markdown table."""
     many = 1000 if fast else 10_000
-    yield "## A monitor's store"
+    yield "## Store of a monitor"
     yield ""
-    yield "| operation | processor time |"
+    yield "| operation | CPU time |"
     yield "|---|---|"
     for sensors in (1, 2):
         with TemporaryDirectory() as name:
@@ -178,9 +178,11 @@ def lines(*, fast: bool = False) -> Iterator[str]:
             size = (out / STORE).stat().st_size / 2**20
             of = "a sensor" if sensors == 1 else f"{sensors} sensors"
             yield f"| a store of {many} recordings of {of}: size | {size:.0f} MB |"
-            yield f"| {of}: one more judged, median of {MORE} | {1e3 * np.median(judged):.0f} ms |"
             yield (
-                f"| {of}: one more found, read, judged and stored, median |"
+                f"| {of}: one more evaluated, median of {MORE} | {1e3 * np.median(judged):.0f} ms |"
+            )
+            yield (
+                f"| {of}: one more found, read, evaluated and stored, median |"
                 f" {1e3 * np.median(whole):.0f} ms |"
             )
             yield f"| {of}: the same, longest | {1e3 * np.max(whole):.0f} ms |"

@@ -116,7 +116,7 @@ def _amplitudes(*, fast: bool) -> Iterator[str]:
     yield (
         f"| wavelength/b | {' | '.join(f'{n} cells per half-width' for n in grids)} | Δ -> 0 |"
         " Venner"
-        " | off | curve |"
+        " | error | curve |"
     )
     yield "|---|" + "---|" * (len(grids) + 4)
     for wavelength, printed in VENNER.items():
@@ -158,7 +158,7 @@ def _orders(*, fast: bool) -> Iterator[str]:
 
 def _costs(*, fast: bool) -> Iterator[str]:
     yield (
-        "| Sq [um] | cells | steps | not converged | bodies held | Newton steps | s per step |"
+        "| Sq [um] | cells | steps | not converged | fixed approach | Newton steps | s per step |"
         " over a"
         " cold solve |"
     )

@@ -245,8 +245,8 @@ COLUMNS = (  # heading, field, scale, digits
     ("h_min [nm]", "h_min", 1e9, 1),
     ("h_mean [um]", "h_mean", 1e6, 2),
     ("cavitated", "cavitated", 1.0, 3),
-    ("CRF by share [Hz]", "shared_hz", 1.0, 0),
-    ("CRF by tangent [Hz]", "tangent_hz", 1.0, 0),
+    ("CRF from share [Hz]", "shared_hz", 1.0, 0),
+    ("CRF from tangent [Hz]", "tangent_hz", 1.0, 0),
 )
 
 

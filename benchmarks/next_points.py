@@ -157,13 +157,16 @@ def tables() -> Iterator[str]:
     """Yield how often the advised point is better, as Markdown, from all stored rows."""
     kept = Rows(ROWS, ("machine",))
     rows = [{key: float(value) for key, value in row.items() if key != "code"} for row in kept]
-    yield f"## The advised next point against {RANDOM} random ones, machines recorded at one point"
+    yield (
+        f"## The recommended next point against {RANDOM} random ones, machines recorded at one"
+        " point"
+    )
     yield f"Sample: {len(rows)} machines."
     if not rows:
         return
     yield (
-        "| recordings at the point | machines | advised gains more than random on average | bits,"
-        " advised | bits, mean of random |"
+        "| recordings at the point | machines | recommended point gains more than random ones on"
+        " average | bits, recommended | bits, mean of random |"
     )
     yield "|---|---|---|---|---|"
     for key, name in (("once", "once"), ("mean", f"mean of {TIMES} times")):
@@ -174,7 +177,7 @@ def tables() -> Iterator[str]:
         yield f"| {name} | {len(rows)} | {better} | {information_gain[0]} | {information_gain[1]} |"
     shows = share([row["advised_shows"] == 1.0 for row in rows])
     yield (
-        f"At the advised point a line is detectable (CLR over {100 * LEAST_SHARE:.0f} %) in"
+        f"At the recommended point a line is detectable (CLR over {100 * LEAST_SHARE:.0f} %) in"
         f" {shows} of machines. Rows per code version: {kept.codes()}."
     )
 

@@ -3,7 +3,7 @@ curve.
 
 The lines are the paper's contact; the balls have 10 mm radius, 15 N and the paper's oil. The gear
 pair is an FZG type C at its pitch point, load stage 7, ground across, on 256 x 128 cells. Each
-speed of the curve is solved cold, and from the solution of the next higher speed.
+speed of the curve is solved from a cold start, and from the solution of the next higher speed.
 """
 
 import time
@@ -80,7 +80,7 @@ def posed(
 def limits(*, fast: bool) -> Iterator[str]:
     """Yield a row per body, grid and speed: nine contacts of three roughnesses and three caps."""
     heads = (
-        "contact | cells | speed [m/s] | solved | CLR, least | largest | within 0.02 of 1 | median"
+        "contact | cells | speed [m/s] | solved | minimum CLR | largest | within 0.02 of 1 | median"
         " [s] | longest"
     )
     yield f"| {heads} |"

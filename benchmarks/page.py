@@ -2,7 +2,7 @@
 
 Measured are the time from a changed setting to new maps, the first content, three users at once and
 a large file. Needs the extra `page`, Playwright and Debian's chromium. Times are by the clock, so
-the machine's load is reported. Processor time of a change is split into server, solver and browser.
+the machine's load is reported. CPU time of a change is split into server, solver and browser.
 """
 
 import os
@@ -96,7 +96,7 @@ def _resident(process: int) -> float:
 
 
 def _spent(process: int) -> dict[str, float]:
-    """Return the processor time so far [s] of the page's server, its solvers and the browser."""
+    """Return the CPU time so far [s] of the page's server, its solvers and the browser."""
     server, ours = _descendants(process), _descendants(os.getpid())
     return {
         "the server": _seconds([process]),
@@ -119,7 +119,7 @@ def _descendants(process: int) -> set[int]:
 
 
 def _seconds(processes: Iterable[int]) -> float:
-    """Return the processor time of processes so far [s]; ended processes count as 0."""
+    """Return the CPU time of processes so far [s]; ended processes count as 0."""
     ticks = 0
     for number in processes:
         with suppress(OSError):
@@ -161,7 +161,7 @@ def lines(*, fast: bool) -> Iterator[str]:
             page = browser.new_page()
             page.goto(f"{url}contact")
             _solved(page)
-            yield "| seconds by the clock | median | 95 % | longest |"
+            yield "| wall-clock time [s] | median | 95 % | longest |"
             yield "|---|---|---|---|"
             contents, wholes = [], []
             for _ in range(3 if fast else 8):
@@ -195,7 +195,7 @@ def lines(*, fast: bool) -> Iterator[str]:
             before, after = _memory(browser, url, process, 20 if fast else SESSIONS)
             browser.close()
         yield ""
-        yield "| processor time per changed setting [s] | 128 x 128 | 256 x 256 |"
+        yield "| CPU time per changed setting [s] | 128 x 128 | 256 x 256 |"
         yield "|---|---|---|"
         for name in parts[128]:
             yield f"| {name} | {parts[128][name]:.2f} | {parts[256][name]:.2f} |"

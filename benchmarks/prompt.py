@@ -1,4 +1,4 @@
-"""Processor time of whole commands, and of the solves in them."""
+"""CPU time of whole commands, and of the solves in them."""
 
 import json
 import os
@@ -79,12 +79,12 @@ def _run(*arguments: str) -> tuple[float, str]:
 
 
 def seconds(*arguments: str, tries: int) -> float:
-    """Return the least processor time of `asperity` [s]; a first run, not counted, compiles."""
+    """Return the least CPU time of `asperity` [s]; a first run, not counted, compiles."""
     return min([_run("-m", "asperity", *arguments)[0] for _ in range(tries + 1)][1:])
 
 
 def rows(*, fast: bool) -> Iterator[tuple[str, float]]:
-    """Yield each measured command and its least processor time [s] with warm caches."""
+    """Yield each measured command and its least CPU time [s] with warm caches."""
     tries = 2 if fast else 5
     with tempfile.TemporaryDirectory() as folder:
         recording, run = Path(folder) / "small.csv", Path(folder) / "run.nc"
@@ -103,16 +103,16 @@ def rows(*, fast: bool) -> Iterator[tuple[str, float]]:
             whole = parts.pop("whole")
             yield title, whole
             for part, spent in parts.items():
-                yield f"- thereof {part}, all surfaces", spent
-            yield "- thereof the rest", whole - sum(parts.values())
+                yield f"- of which {part}, all surfaces", spent
+            yield "- remainder", whole - sum(parts.values())
         yield "the same with --out", seconds("solve", str(CASE), "--out", str(run), tries=tries)
 
 
 def lines(*, fast: bool) -> Iterator[str]:
     """Yield the table as Markdown."""
-    yield "## Processor time of whole commands"
+    yield "## CPU time of complete commands"
     yield ""
-    yield "| command | processor time [s] |"
+    yield "| command | CPU time [s] |"
     yield "|---|---|"
     for name, spent in rows(fast=fast):
         yield f"| {name} | {spent:.2f} |"

@@ -49,7 +49,7 @@ def lines(*, fast: bool) -> Iterator[str]:
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         processor_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         yield (
-            f"- `asperity track`: {seconds:.1f} s, {processor_s:.1f} s of processor time, peak"
+            f"- `asperity track`: {seconds:.1f} s, {processor_s:.1f} s of CPU time, peak"
             f" {peak:.0f} MB in all processes together. {first_line}"
         )
         yield f"- {one_file(next(iter(sorted(where.glob('*.h5')))))}"
@@ -113,7 +113,7 @@ def one_file(path: Path) -> str:
         processor.append(time.process_time() - worked)
     return (
         f"one recording from disk to CRF ({found.crf_hz:.1f} Hz): {np.median(times):.2f} s, "
-        f"{np.median(processor):.2f} s of processor time (medians of 5)"
+        f"{np.median(processor):.2f} s of CPU time (medians of 5)"
     )
 
 
@@ -186,9 +186,9 @@ def damaged_files(count: int) -> Iterator[str]:
     peak = sum(int(line.split()[1]) for line in status if line.startswith("VmHWM")) / 1024
     counts = ", ".join(f"{number} {outcome}" for outcome, number in outcomes.most_common())
     yield (
-        f"{count} files of {len(contents)} kinds, cut, flipped, lengthened, with huge counts, NaN"
-        f" and text in numbers: {counts}; slowest {slowest[0]:.2f} s ({slowest[1]}); peak memory"
-        f" {peak:.0f} MB."
+        f"{count} files of {len(contents)} kinds, truncated, with flipped bits, lengthened, with"
+        f" huge counts, NaN and text in numbers: {counts};"
+        f" slowest {slowest[0]:.2f} s ({slowest[1]}); peak memory {peak:.0f} MB."
     )
 
 
@@ -212,7 +212,7 @@ def false_detections() -> Iterator[str]:
         usable = [track for track in tracks if track.recordings[0].reading.usable]
         found = sum(track.resonance_count for track in usable)
         yield (
-            f"| MFPT and IMS channels, each alone (machine running) | {name} | {found} |"
+            f"| MFPT and IMS channels, separately (machine running) | {name} | {found} |"
             f" {len(usable)} |"
         )
     with tempfile.TemporaryDirectory() as folder:
@@ -226,7 +226,7 @@ def false_detections() -> Iterator[str]:
             track = track_recordings(names)
             found, total = found + track.resonance_count, total + len(names)
         yield (
-            f"| MFPT, each record in 8 pieces as a series | default (joint) | {found} | {total} |"
+            f"| MFPT, each record as a series of 8 pieces | default (joint) | {found} | {total} |"
         )
         every = sorted(Path(folder).iterdir())
         count = track_recordings(every).resonance_count

@@ -1,4 +1,4 @@
-"""CLR of the paper's twelve rings from their measured Sq, and from the two printed CRF.
+"""CLR of the paper's twelve rings from their measured Sq, and from the two published CRF.
 
 `python -m benchmarks.rings` runs this part alone; the emulator is that of `benchmarks.inference`.
 """
@@ -39,9 +39,9 @@ def lines(*, fast: bool, kept: Path = KEPT) -> Iterator[str]:  # noqa: ARG001 - 
     setting = inference_setting(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     clr, kg = quantity("clr"), quantity("mass_kg")
-    yield "## The paper's rings at 500 N: CLR from Sq, and from a printed CRF"
+    yield "## The paper's rings at 500 N: CLR from Sq, and from a published CRF"
     yield (
-        "| Sq [um] | CLR from Sq alone, 90 % | printed CRF [Hz] | CLR from CRF, 90 % | bits |"
+        "| Sq [um] | CLR from Sq, 90 % | published CRF [Hz] | CLR from CRF, 90 % | bits |"
         " effective mass, 90 % | P(law own) |"
     )
     yield "|---|---|---|---|---|---|---|"
@@ -71,7 +71,7 @@ def lines(*, fast: bool, kept: Path = KEPT) -> Iterator[str]:  # noqa: ARG001 - 
                 f"{found.law_probability('own'):.2f}",
             ]
         yield f"| {' | '.join(cells)} |"
-    yield "The paper prints two of the twelve CRF; the other rings have Sq alone."
+    yield "The paper states two of the twelve CRF; the other rings have only Sq."
 
 
 def _interval(values: Field) -> tuple[float, float]:

@@ -179,7 +179,7 @@ def lines(*, fast: bool, artefact: Path = Path("build/robustness.csv")) -> Itera
     yield "## Contacts from a fixed Latin hypercube, 128 x 128"
     yield ""
     yield (
-        f"{len(solved)} of {len(results)} converged, the others reported non-convergence; median"
+        f"{len(solved)} of {len(results)} converged, failures are reported; median"
         f" {np.median([outcome.seconds for outcome in solved]):.2f} s and"
         f" {np.median([outcome.steps for outcome in solved]):.0f} iterations. Bodies overlap by at"
         f" most {max(outcome.overlap_nm for outcome in solved):.3f} nm. {len(errors)} were solved"

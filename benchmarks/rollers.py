@@ -68,7 +68,7 @@ def lines(*, fast: bool) -> Iterator[str]:
         values = (f"{_largest(lundberg(share).tilted(tilt)):.3f}" for tilt in TILTS)
         yield f"| {share:g} | {' | '.join(values)} |"
     yield ""
-    yield "## Rollers: smooth and lubricated, processor time on one thread"
+    yield "## Rollers: smooth and lubricated, CPU time on one thread"
     yield ""
     yield (
         "| shape | cells | iterations | time [s] | central film [um] | film at the ends [um] | edge"

@@ -1,6 +1,6 @@
 """Convergence, time and results of the paper's contact at nine roughness levels, five surfaces.
 
-Every solve is a cold start including the elastic kernel, on one thread; times are processor times
+Every solve is a cold start including the elastic kernel, on one thread; times are CPU times
 with cached compiled kernels. Solves with tolerance 1e-6 give the error of the default (1e-4).
 """
 

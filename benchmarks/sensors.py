@@ -39,7 +39,7 @@ ROWS: dict[str, dict[str, Any]] = {
 def lines(*, fast: bool = False) -> Iterator[str]:
     """Yield the table as Markdown; `fast` takes a tenth of the series."""
     series = SERIES // (10 if fast else 1)
-    yield f"## One line on two sensors: {series} series of {TRUTH.size} recordings a row\n"
+    yield f"## One line on two sensors: {series} series of {TRUTH.size} recordings per row\n"
     yield (
         "| signal | claimed | falsely claimed | sensors disagree | found by the better sensor alone"
         " | CRF rms error [Hz] | one sensor [Hz] | coverage of 90 % intervals | one sensor |"

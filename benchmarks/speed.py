@@ -65,7 +65,7 @@ def _grids(*, fast: bool) -> Iterator[str]:
 
 
 def _against_papers_model() -> Iterator[str]:
-    """Solve the same rough contacts alternately by the default model and by the paper's."""
+    """Solve the same rough contacts alternately with the default model and with the paper's."""
     spent: dict[str, list[float]] = {"paper": [], "mixed": []}
     for sq_um in (SQ_UM[0], 1.0, 2.5, SQ_UM[-1]):
         for seed in SEEDS[:3]:
@@ -83,8 +83,8 @@ def _against_papers_model() -> Iterator[str]:
                 times.append(process_time() - began)
     paper, mixed = (median(times) for times in spent.values())
     yield (
-        f"Rough, 256 x 256, median of {len(spent['mixed'])} surfaces, alternating: {mixed:.2f} s by"
-        f" the default model, {paper:.2f} s by the paper's; ratio {mixed / paper:.2f}."
+        f"Rough, 256 x 256, median of {len(spent['mixed'])} surfaces, alternating: {mixed:.2f} s"
+        f" with the default model, {paper:.2f} s with the paper's; ratio {mixed / paper:.2f}."
     )
 
 
@@ -117,7 +117,7 @@ def _smooth() -> Iterator[str]:
         ]
         yield (
             f"Smooth ball, M {load_number}, L {oil_number}, {name}, 257 x 257: {seconds:.2f} s; "
-            f"deviation from the reference: central film {off[0]:+.2f} %, least film"
+            f"deviation from the reference: central film {off[0]:+.2f} %, minimum film"
             f" {off[1]:+.2f} %."
         )
 
@@ -154,7 +154,7 @@ def elastic_case(sq_um: float, seed: int, cells: int) -> tuple[ContactConditions
 
 
 def _against_tamaas(sq_um: float, seed: int, cells: int) -> str:
-    """Return the least processor times of alternating runs of both codes, and their ratio."""
+    """Return the least CPU times of alternating runs of both codes, and their ratio."""
     conditions, surface = elastic_case(sq_um, seed, cells)
     options = Options(tolerance=1e-8)
     works = {
@@ -237,10 +237,7 @@ def _two_processors() -> Iterator[str]:
     alone = sum(_one_solve(seed) for seed in (0, 1))
     with ProcessPoolExecutor(2) as pool:
         together = max(pool.map(_one_solve, (0, 1)))
-    yield (
-        f"Two solves on two processors: {alone / together:.2f} times as fast as one after the"
-        " other."
-    )
+    yield f"Two solves on two processors: {alone / together:.2f} times as fast as sequentially."
 
 
 def _error_bars(*, fast: bool) -> Iterator[str]:
@@ -263,7 +260,7 @@ def _error_bars(*, fast: bool) -> Iterator[str]:
                     factors.append(getattr(error, name) / off)
     counts = ", ".join(f"{name} in {count}" for name, count in covered.items())
     yield (
-        f"Of {cases} contacts at 256 x 256 the stated error covers the difference to 512 x 512 for"
+        f"For {cases} contacts at 256 x 256 the stated error covers the difference to 512 x 512:"
         f" {counts}; it is {median(factors):.1f} times that difference (median)."
     )
 

@@ -43,7 +43,7 @@ def lines(*, fast: bool) -> Iterator[str]:
             ("point", _point(0.0, 256).shear_peak),
         )
     )
-    yield "\nSeconds of one processor, with new and with cached kernels:\n"
+    yield "\nCPU time [s] with new and with cached kernels:\n"
     yield (
         "| case | cells | solve | friction and heat, new | stress, new | friction and heat, cached"
         " | stress, cached |"

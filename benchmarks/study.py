@@ -81,9 +81,9 @@ def overhead(cases: int = 10_000) -> Iterator[str]:
     )
     overhead_ms = 1e3 * (parent + workers - work)
     yield (
-        f"- {1e3 * wall / cases:.2f} ms a case; processor time: parent {1e3 * parent:.2f} ms,"
-        f" workers {1e3 * workers:.2f} ms, thereof work {1e3 * work:.2f} ms; overhead"
-        f" {overhead_ms:.2f} ms a case"
+        f"- {1e3 * wall / cases:.2f} ms per case; CPU time: parent {1e3 * parent:.2f} ms,"
+        f" workers {1e3 * workers:.2f} ms, of which work {1e3 * work:.2f} ms; overhead"
+        f" {overhead_ms:.2f} ms per case"
     )
     memory = f"{memory_mib[early]:.0f} MiB after {early} cases, {memory_mib[late]:.0f} after {late}"
     yield f"- memory of the parent: {memory}; {result.failed} cases failed"

@@ -38,7 +38,7 @@ SEEDS = (0, 1, 2)
 
 def lines(*, fast: bool = False) -> Iterator[str]:
     """Yield the tables as Markdown; `fast` omits the solved contacts."""
-    yield "## Vibration: the paper's Table 1, preset paper, 200 records a row\n"
+    yield "## Vibration: the paper's Table 1, preset paper, 200 records per row\n"
     yield from table_lines()
     yield "\n## Vibration: exponent of CRFA over load (100 to 400 N, closed form)\n"
     yield from trend_lines()
@@ -56,8 +56,8 @@ def lines(*, fast: bool = False) -> Iterator[str]:
 
 def table_lines() -> Iterator[str]:
     yield (
-        "| cut-off [Hz] | height [um] | load [N] | CRF [Hz] | printed | deviation | CRFA |"
-        " 5 to 95 % | printed | inside |"
+        "| cut-off [Hz] | height [um] | load [N] | CRF [Hz] | published | deviation | CRFA |"
+        " 5 to 95 % | published | inside |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for row in reproduce_table1():

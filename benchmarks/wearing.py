@@ -105,7 +105,7 @@ class Store:
         self.made = 0
 
     def worn(self, plan: Plan) -> tuple[WearHistory, float] | None:
-        """Return a history and its total processor time; None if the time runs out."""
+        """Return a history and its total CPU time; None if the time runs out."""
         folder = self.folder / plan.folder
         clock, ended = (self.folder / f"{plan.folder}.{kind}" for kind in ("json", "ended"))
         if time.perf_counter() > self.end and not ended.is_file():
@@ -182,7 +182,7 @@ def end_mean(history: WearHistory) -> str:
 def speed(store: Store) -> Iterator[str]:
     yield "\n## 1e7 over-rollings of the roller at 128 x 128 cells\n"
     yield (
-        "| hours | jumps | positions | processor time [s] | per jump [s] | by two processes [s] | "
+        "| hours | jumps | positions | CPU time [s] | per jump [s] | by two processes [s] | "
         f"{heads('sq_m', 'clr')} | volume error | jump error |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
@@ -200,7 +200,7 @@ def speed(store: Store) -> Iterator[str]:
 
 def kills() -> Iterator[str]:
     yield "\n## Histories killed at random times\n"
-    yield "| history | jumps | times killed | numbers and surfaces |"
+    yield "| history | jumps | kills | numbers and surfaces |"
     yield "|---|---|---|---|"
     for name, (hours, overrides) in KILLED.items():
         with tempfile.TemporaryDirectory() as folder:
@@ -280,7 +280,7 @@ def grids(store: Store) -> Iterator[str]:
     yield "\n## Effect of the grid, 1 h\n"
     yield (
         f"| cells | {heads(*keys)} | {heads('clr')} of {END_POSITIONS} positions | jumps |"
-        " processor time [s] |"
+        " CPU time [s] |"
     )
     yield "|---|---|---|---|---|---|---|---|"
     plans = [Plan(f"grid-{cells}", 1.0, {"grid.cells": [cells] * 2}) for cells in (64, 128, 256)]
@@ -406,7 +406,7 @@ def measured(store: Store) -> Iterator[str]:
 
 def rings(store: Store) -> Iterator[str]:
     keys = ("sq_m", "clr", "crf_hz", "worn_depth_2_m")
-    yield "\n## The paper's first ring after ten hours, removal alone (printed: 0.87 um)\n"
+    yield "\n## The paper's first ring after ten hours, removal alone (published: 0.87 um)\n"
     yield f"| k of the ring [1/Pa] | {heads(*keys)} |"
     yield "|---|---|---|---|---|"
     most = 1e-15
@@ -432,7 +432,7 @@ def debris_rings(store: Store) -> Iterator[str]:
     marks: Overrides = {"law": "debris", "concentration": "1.74e10 1/m^3", "sinking": 0.2}
     yield (
         "\n## The paper's first ring in contaminated oil (code 21), ten hours, three seeds"
-        " (printed: 0.54 to 0.87 um)\n"
+        " (published: 0.54 to 0.87 um)\n"
     )
     yield f"| seed | {heads(*keys)} | minimum Sq of the ring |"
     yield "|---|---|---|---|---|---|"

@@ -36,7 +36,7 @@ def figure(table: Path = TABLE) -> Figure:
         axes.loglog(
             times, errors, STROKES[solver], color=colour, marker=marker, label=f"{family}, {solver}"
         )
-    axes.set_xlabel("processor time of a case, median [s]")
+    axes.set_xlabel("median CPU time per case [s]")
     axes.set_ylabel("error over certified value, median [%]")
     axes.set_title("Certified values: error over time, coarse to fine cells")
     drawn.legend(loc="outside lower center", ncols=2)

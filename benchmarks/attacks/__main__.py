@@ -30,7 +30,7 @@ class Kind(NamedTuple):
 def in_worker(kind: str, count: int) -> Iterator[str | None]:
     """Run attacks in a worker process, restarted after an attack that kills or blocks it.
 
-    An attack hangs if it takes over 20 s of processor time or three times that by the clock, which
+    An attack hangs if it takes over 20 s of CPU time or three times that in wall-clock time, which
     allows for other work on the machine.
     """
     at, longest = 0, (0.0, 0.0, 0)

@@ -69,7 +69,7 @@ def _family(pid: int) -> list[int]:
 
 
 def processor_s(pid: int) -> float:
-    """Return the processor time [s] of a process and its descendants, ended ones included."""
+    """Return the CPU time [s] of a process and its descendants, ended ones included."""
     total = 0.0
     for member in _family(pid):
         try:
@@ -125,6 +125,6 @@ def run(name: str, arguments: tuple[str, ...], folder: Path, *, limit_s: float =
 
 
 def _ended_s() -> float:
-    """Return the processor time [s] of all ended child processes."""
+    """Return the CPU time [s] of all ended child processes."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime

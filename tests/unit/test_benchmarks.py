@@ -170,7 +170,7 @@ def test_solved_contacts_are_stored_and_resumed(tmp_path, monkeypatch):
     pairs = chosen_grids.kept_pairs({9: "early", 11: "later"}, float("-inf"))
     assert solved == [(name, finer) for name in ("late", "early") for finer in (1.0, 1.5)]
     assert list(pairs) == [9, 10]
-    assert "2 of 2 solved on the chosen grid, median 0.1 s" in chosen_grids.summary(
+    assert "2 of 2 solved on the automatic grid, median 0.1 s" in chosen_grids.summary(
         list(pairs.values())
     )
 

@@ -23,7 +23,7 @@ CLOCKED = re.compile(rf"{NUMBER}[\s ]?{SIZES}")
 BY_A_CLOCK = re.compile(
     r"(?i)\b(?:takes?|took|taken|costs?|median|medians|slowest|longest|processor|by the clock)\b"
 )
-OF_TIME = re.compile(r"\[(?:s|ms)\]|\b(?:seconds|processor time)\b")
+OF_TIME = re.compile(r"\[(?:s|ms)\]|\b(?:seconds|CPU time)\b")
 FILE = re.compile(r"^:file: (\S+)$", re.MULTILINE)
 MIN_NUMBERS = 3  # numbers that identify a row
 
