@@ -107,7 +107,7 @@ def _describe(
     unit: str | None,
     lateral_unit: str | None,
     pixel: float | None,
-    conditioning: surface.SurfaceConditioning,
+    conditioning: "surface.SurfaceConditioning",
 ) -> "tuple[list[SurfaceDescription], list[tuple[Path, BadInput]]]":
     """Describe every file; return those that were refused with the reason."""
     described: list[SurfaceDescription] = []
