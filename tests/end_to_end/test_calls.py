@@ -294,8 +294,8 @@ def test_an_mqtt_broker_holds_the_last_state(asp):
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
-        ("--on-alarm", "no-such-program --now", "there is no program 'no-such-program' to run"),
-        ("--on-alarm", "", "there is no program '' to run"),
+        ("--on-alarm", "no-such-program --now", "program 'no-such-program' not found"),
+        ("--on-alarm", "", "program '' not found"),
         ("--on-alarm", "echo 'open", "cannot be parsed"),
         ("--webhook", "ftp://there/x", "it begins with http or https"),
         (

@@ -123,7 +123,7 @@ def test_a_long_series_is_fitted_in_groups(asp, rig, monkeypatch):
     result = json.loads(asp("track", str(folder), "--case", "case.toml", "--json")[1])
     for row in result["recordings"]:
         assert row["crf_hz"] == pytest.approx(truth[Path(row["file"]).name], abs=50.0)
-    assert any("24 recordings were separated in 2 groups" in note for note in result["notes"])
+    assert any("24 recordings were separated into 2 groups" in note for note in result["notes"])
 
 
 def test_track_reports_its_assumptions_and_omissions(asp, rig):

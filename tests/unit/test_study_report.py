@@ -364,7 +364,7 @@ def test_the_rigs_rings_are_plotted_beside_the_prediction():
     assert [bar[1, 0] - bar[0, 0] for bar in horizontal] == pytest.approx(
         2.0 * np.array(RINGS_STD_UM)
     )
-    assert dict(points_of(axes, "rings, CRF printed")) == pytest.approx(PRINTED_CRF)
+    assert dict(points_of(axes, "rings, published CRF")) == pytest.approx(PRINTED_CRF)
 
 
 def test_maps_show_the_contact_of_the_study(overview_of_wear, wear):

@@ -192,7 +192,7 @@ def test_few_recordings_are_judged_separately_with_a_note(tmp_path):
         r"a line at (2\d|30)\d\d Hz stands out, but a single spectrum cannot separate",
         track.verdict(),
     )
-    assert any("needs 6 recordings and has 1" in note for note in track.notes)
+    assert any("needs 6 recordings, got 1" in note for note in track.notes)
     resonance = (
         track_recordings([tmp_path / "a.npz"], TrackSettings(method="likelihood"), case=CASE)
         .recordings[0]

@@ -28,11 +28,11 @@ from asperity.app.widgets import (
 )
 from asperity.case import Case, read_amount
 from asperity.core.arrays import Field
+from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 
 RECORDING_LIMIT = 400_000_000  # bytes of a recording
-NORMAL_90 = 1.6449  # half-width of a normal 90 % interval in standard deviations
 MAX_LEVEL = 30.0  # dB over the median, upper end of the waterfall's colours
 NO_LINE: dict[str, Sequence[float] | Field] = {"f": [], "s": []}
 COLUMNS = ("crf_hz", "crfa", "damping_ratio", "clr")
@@ -279,7 +279,7 @@ class RecordingsView:
         ]
         x = [row["x"] for _, row in rows]
         crf = [row["crf_hz"] for _, row in rows]
-        bars = [NORMAL_90 * (row["crf_std_hz"] or 0.0) for _, row in rows]
+        bars = [NORMAL_FACTOR * (row["crf_std_hz"] or 0.0) for _, row in rows]
         self._line.data = {
             "x": x,
             "crf": crf,

@@ -1,3 +1,5 @@
+from .case import DEFAULT_SURFACES as DEFAULT_SURFACES
+from .case import DEFAULT_SURFACES_FINE as DEFAULT_SURFACES_FINE
 from .case import Case as Case
 from .case import load_case as load_case
 from .infer import MOST_POINTS as MOST_POINTS

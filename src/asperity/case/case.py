@@ -29,7 +29,7 @@ from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_gr
 from asperity.wear import WearModel
 
 # default number of surfaces per solution on coarse and on fine grids, to limit computing time
-MANY_SURFACES, FEW_SURFACES = 5, 3
+DEFAULT_SURFACES, DEFAULT_SURFACES_FINE = 5, 3
 MOST_SURFACES = 1000  # a prediction interval hardly narrows beyond a few dozen
 FINE_GRID = 256 * 256  # cells above which a grid counts as fine
 CELL_BYTES, CELL_S = 800.0, 1e-4  # cost of a cell while a contact is solved
@@ -250,9 +250,9 @@ class Case:
         with self.naming("surface"):
             stated = self.contents.solver.surfaces if count is None else count
             number = stated or (
-                MANY_SURFACES
+                DEFAULT_SURFACES
                 if self.grid.cells[0] * self.grid.cells[1] <= FINE_GRID
-                else FEW_SURFACES
+                else DEFAULT_SURFACES_FINE
             )
             if not 1 <= number <= MOST_SURFACES:
                 raise BadInput(

@@ -339,13 +339,13 @@ def _directions(result: "Calibration") -> Block:
 
 
 def _trade_offs(result: "Calibration") -> Block:
-    dearest = [trade for trade in result.trade_offs if trade.misfit - trade.without > MIN_GAIN]
-    if dearest:
+    improving = [trade for trade in result.trade_offs if trade.misfit - trade.without > MIN_GAIN]
+    if improving:
         yield "  improvement of the other anchors without one of them, linearised"
-    for trade in dearest:
+    for trade in improving:
         yield (
-            f"    {trade.given_up}: misfit of the others {trade.misfit:.1f} to "
-            f"{trade.without:.1f}; largest change in {trade.relieved}, {trade.miss:+.1f} to "
+            f"    without {trade.given_up}: misfit of the others from {trade.misfit:.1f} to "
+            f"{trade.without:.1f}; deviation of {trade.relieved} from {trade.miss:+.1f} to "
             f"{trade.miss_without:+.1f} tolerances"
         )
 

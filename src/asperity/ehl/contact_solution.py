@@ -1,4 +1,4 @@
-"""Result of a contact solve: fields, convergence, and netCDF output."""
+"""Result of a contact solve: fields, convergence, and the netCDF file format (`save`)."""
 
 import json
 from collections.abc import Mapping

@@ -19,6 +19,7 @@ import pandas
 
 from asperity.case import MOST_POINTS
 from asperity.core.arrays import Field
+from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.documents import JsonObject
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.files import make_folder, user_cache
@@ -44,7 +45,6 @@ FITTED = "emulator.json"
 REFIT = "delete it to fit it again"
 FURTHER, SHARES = "further", "shares.json"
 FINER, FINER_POINTS = "finer", 24  # points also solved on twice the cells
-NORMAL_90 = 1.6448536269514722
 
 
 @dataclass(frozen=True)
@@ -437,7 +437,7 @@ def _held_out(means: _Means, output: Output, whole: GaussianProcess) -> Emulator
         predicted[out], std[out] = process(whole.x[out])
     mean = means.mean[output.key].to_numpy()
     variance = means.variance[output.key].to_numpy()
-    within = np.abs(y - predicted) <= NORMAL_90 * np.sqrt(std**2 + noise)
+    within = np.abs(y - predicted) <= NORMAL_FACTOR * np.sqrt(std**2 + noise)
     return EmulatorQuality(
         error=float(np.sqrt(np.mean((output.back(predicted) - mean) ** 2))),
         coverage=float(np.mean(within)),

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import QUANTILES
 from asperity.core.documents import JsonObject
 
-ENDS = (0.05, 0.5, 0.95)
 BINS = 20  # equally probable bins of the prior
 LEARNT_FROM_BITS = 0.5  # information gain at which an interval shrinks to about two thirds
 EDGE = 0.05  # fraction of the prior counted as its end
@@ -53,7 +53,7 @@ def quantity_estimate(
     values: Field, prior: Field, effective: float, *, bounded: bool = False
 ) -> Estimate:
     """Estimate a quantity from posterior and prior draws of `effective` sample size."""
-    low, median, high = (float(end) for end in np.quantile(values, ENDS))
+    low, median, high = (float(end) for end in np.quantile(values, QUANTILES))
     return Estimate(
         median,
         low,

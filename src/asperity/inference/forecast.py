@@ -10,6 +10,7 @@ from scipy.special import logsumexp
 
 from asperity.case import read_amount
 from asperity.core.arrays import Field
+from asperity.core.coverage import QUANTILES
 from asperity.core.documents import JsonObject
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
@@ -36,7 +37,6 @@ FEWEST, ROUGH = 20.0, 60.0  # minimum effective sample size; below the second th
 LONGEST = 120  # maximum number of rounds if the effective sample size is below ROUGH
 HORIZON, STEPS = 2.0, 80  # of the forecast, in spans of the series; number of time steps
 ODDS = 100.0  # of a change over none from which on it counts as detected: 1 % false alarms
-ENDS = (0.05, 0.5, 0.95)
 WORSE_ABOVE = (CLR, "sq_m")  # a decrease of these is running-in and raises no alarm
 
 
@@ -57,7 +57,7 @@ class Interval(NamedTuple):
     @classmethod
     def from_values(cls, values: Field) -> "Interval":
         """Return the interval of equally probable values; nan without values."""
-        ends = np.quantile(values, ENDS, method="higher") if len(values) else [math.nan] * 3
+        ends = np.quantile(values, QUANTILES, method="higher") if len(values) else [math.nan] * 3
         return cls(*(float(end) for end in ends))
 
 
@@ -362,7 +362,7 @@ def _forecast(models: list[_Model], limit: Limit, seed: int) -> Forecast:
 def _bands(limit: Limit, series: VisitSeries, courses: Field, step: float) -> Bands:
     """Return the 90 % interval of courses (n, visits + steps)."""
     x = np.concatenate([series.x, series.x[-1] + step * np.arange(1, STEPS + 1)])
-    return Bands(*limit, x, series.x[-1], np.quantile(courses, ENDS, axis=0))
+    return Bands(*limit, x, series.x[-1], np.quantile(courses, QUANTILES, axis=0))
 
 
 class _Courses(NamedTuple):

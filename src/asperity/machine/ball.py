@@ -97,22 +97,22 @@ class BallBearing:
         if self.contact_angle > 0.0 and self.clearance != 0.0:
             equivalent = 2e6 * self.groove_distance * (1.0 - math.cos(self.contact_angle))
             raise BadInput(
-                "clearance and contact_angle are equivalent, "
-                f"{math.degrees(self.contact_angle):g} deg is a clearance of {equivalent:.1f} um "
-                "in these grooves; leave one of them out"
+                "clearance and contact_angle both define the internal geometry "
+                f"({math.degrees(self.contact_angle):g} deg is a clearance of {equivalent:.1f} um "
+                "in these grooves); give one of them"
             )
         self._require_shape()
         if not 0.0 <= self.axial_load < math.inf:
             raise BadInput(
-                f"axial_load must not be negative, got {self.axial_load:g} N; leave out its sign"
+                f"axial_load must not be negative, got {self.axial_load:g} N; give its magnitude"
             )
         if not 0.0 <= self.radial_load < math.inf:
             raise BadInput(
-                f"radial_load must not be negative, got {self.radial_load:g} N; leave out its sign"
+                f"radial_load must not be negative, got {self.radial_load:g} N; give its magnitude"
             )
         if self.radial_load == self.axial_load == 0.0 <= self.clearance:
             raise BadInput(
-                "radial_load and axial_load are both 0 N, no ball carries; give one of them"
+                "radial_load and axial_load are both 0 N, no ball is loaded; give one of them"
             )
         if self.contact_angle > 0.0 and self.axial_load == 0.0:
             raise BadInput(self._separation(f"radial_load of {self.radial_load:g} N alone"))

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas
 
-from asperity.case import Case, MachineCase
+from asperity.case import DEFAULT_SURFACES, DEFAULT_SURFACES_FINE, Case, MachineCase
 from asperity.core.arrays import finite_or_none
 from asperity.core.documents import Json, JsonObject
 from asperity.core.errors import BadInput
@@ -26,10 +26,7 @@ from asperity.study import DONE, StudyPlan, StudyProgress, plan_points, run_stud
 
 ALL_CELLS = 1_000_000  # of all automatic grids together: about two minutes on two processors
 FEWEST_CELLS = 48  # along an axis
-# default number of surfaces per contact: few on grids above FINE_GRID cells
-MANY_SURFACES = 5
-FEW_SURFACES = 3
-FINE_GRID = 128 * 128
+FINE_CONTACT_GRID = 128 * 128  # cells above which a contact counts as fine: few surfaces
 WORST = "worst.nc"
 SOLVED_KEYS = (  # quantities of a solved contact
     *(
@@ -145,7 +142,7 @@ def _effort(case: Case, max_cells: int) -> JsonObject:
     smaller = _smaller_grid(case, max_cells)
     coarse = case.with_overrides(smaller) if smaller else case
     nx, ny = coarse.grid.cells
-    surfaces = MANY_SURFACES if nx * ny <= FINE_GRID else FEW_SURFACES
+    surfaces = DEFAULT_SURFACES if nx * ny <= FINE_CONTACT_GRID else DEFAULT_SURFACES_FINE
     stated = case.contents.solver.surfaces
     return {
         **smaller,

@@ -180,12 +180,12 @@ def _method_notes(count: int, requested: SeriesMethod | None, method: SeriesMeth
     groups = _group_count(count, method)
     if requested is None and method != "joint" and count:
         notes.append(
-            f"The joint separation of contact and structure needs {FEWEST_RECORDINGS} recordings "
-            f"and has {count}; `method` {method} takes the most prominent line instead."
+            f"The joint separation of contact and structure needs {FEWEST_RECORDINGS} recordings, "
+            f"got {count}; `method` {method} takes the most prominent line instead."
         )
     if groups > 1:
         notes.append(
-            f"{count} recordings were separated in {groups} groups, each spread over the whole "
+            f"{count} recordings were separated into {groups} groups, each spread over the whole "
             "series."
         )
     return notes

@@ -201,7 +201,7 @@ def notifiers(
             ) from None
         if not arguments or shutil.which(arguments[0]) is None:
             raise BadInput(
-                f"there is no program {arguments[0] if arguments else ''!r} to run; "
+                f"program {arguments[0] if arguments else ''!r} not found; "
                 "check its name, or give its path"
             )
         recipients.append(Command(tuple(arguments)))

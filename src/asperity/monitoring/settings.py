@@ -1,7 +1,7 @@
 """Settings of `track_recordings` and `watch_folder`; the command line builds them in one place."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Protocol
 
@@ -9,6 +9,11 @@ from asperity.core.documents import JsonObject
 from asperity.recording import ReadOptions
 from asperity.resonance import SeriesMethod
 from asperity.trend import ALARM_STATES, FALSE_ALARM_RATE, AlarmState, Detector, StageSource
+
+# settings of reading, and those that leave a judgement as it is; all others are part of it
+_OTHER_THAN_JUDGEMENT = frozenset(
+    ("rate_hz", "unit", "channel", "scale", "band_hz", "acknowledge", "workers")
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +42,7 @@ class TrackSettings:
 
     def judgement(self) -> dict[str, object]:
         """Return the settings on which a judgement depends, beyond those of reading."""
-        names = ("shaft_hz", "method", "detector", "stages_from", "false_alarm_rate")
+        names = (field.name for field in fields(self) if field.name not in _OTHER_THAN_JUDGEMENT)
         return {name: getattr(self, name) for name in names}
 
 

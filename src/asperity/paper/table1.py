@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import QUANTILES
 from asperity.core.errors import BadInput
 from asperity.core.signals import power_spectrum
 from asperity.coupling import (
@@ -79,7 +80,7 @@ def reproduce_table1(
     rows = []
     for cutoff, height_um, load, paper_crf, paper_crfa in TABLE1_PRINTED:
         crf, crfa = read(cutoff, height_um * 1e-6, load)
-        low, median, high = np.quantile(crfa, (0.05, 0.5, 0.95))
+        low, median, high = np.quantile(crfa, QUANTILES)
         rows.append(
             Table1Row(
                 cutoff_hz=cutoff,

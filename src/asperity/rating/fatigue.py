@@ -15,7 +15,7 @@ ROUNDING = 1e-10  # tolerance of weights, and of steps over a sphere's radius
 MAX_STEPS = 1000  # of the exact algorithm, far more than needed
 APPROXIMATION_STEPS = 50  # of the approximate algorithm for many paths
 BATCH_PATHS = 20_000  # about 10 MB
-_HALF, _SIXTH = np.sqrt(0.5), np.sqrt(1.0 / 6.0)
+_SQRT_HALF, _SQRT_SIXTH = np.sqrt(0.5), np.sqrt(1.0 / 6.0)
 
 
 def dang_van_slope(torsion: float, bending: float) -> float:
@@ -83,7 +83,7 @@ def _bounds(deviators: Field, hydrostatic: Field, slope: float) -> Field:
     """Return an upper bound of each path's measure [Pa]: half Tresca is at most |s|/sqrt 2."""
     middle = 0.5 * (deviators.max(axis=2) + deviators.min(axis=2))
     radius = np.sqrt(np.square(deviators - middle[:, :, None]).sum(axis=0)).max(axis=1)
-    return np.asarray(_HALF * radius + slope * hydrostatic.max(axis=1))
+    return np.asarray(_SQRT_HALF * radius + slope * hydrostatic.max(axis=1))
 
 
 def _centres(points: Field) -> Field:
@@ -130,17 +130,23 @@ def _as_vectors(stresses: Field) -> Field:
     xx, yy, zz, xy, yz, xz = stresses
     root = np.sqrt(2.0)
     return np.stack(
-        [_HALF * (xx - yy), _SIXTH * (2.0 * zz - xx - yy), root * xy, root * yz, root * xz]
+        [
+            _SQRT_HALF * (xx - yy),
+            _SQRT_SIXTH * (2.0 * zz - xx - yy),
+            root * xy,
+            root * yz,
+            root * xz,
+        ]
     )
 
 
 def _half_tresca(vectors: Field) -> Field:
     """Return half the Tresca stress of deviators, shape (times, 5) to (times,)."""
     first, second, xy, yz, xz = vectors.T
-    xx = _HALF * first - _SIXTH * second
-    yy = -_HALF * first - _SIXTH * second
-    zz = 2.0 * _SIXTH * second
-    xy, yz, xz = _HALF * xy, _HALF * yz, _HALF * xz
+    xx = _SQRT_HALF * first - _SQRT_SIXTH * second
+    yy = -_SQRT_HALF * first - _SQRT_SIXTH * second
+    zz = 2.0 * _SQRT_SIXTH * second
+    xy, yz, xz = _SQRT_HALF * xy, _SQRT_HALF * yz, _SQRT_HALF * xz
     tensors = np.stack(
         [np.stack([xx, xy, xz], -1), np.stack([xy, yy, yz], -1), np.stack([xz, yz, zz], -1)], -1
     )

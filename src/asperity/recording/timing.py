@@ -28,7 +28,7 @@ TIME_NAMES = {
 _EVEN = 0.05
 # most missing samples: so many for each one present, counted from so many on
 LARGEST_MISSING_RATIO, MISSING_FROM = 4, 1 << 16
-_HALF = 1.5  # steps: the limit between one step and a gap of one sample
+_GAP_THRESHOLD = 1.5  # steps: the limit between one step and a gap of one sample
 _DIGITS = 12
 _KNOWN = sorted(  # common rates of converters [Hz]; one within the doubt is used
     {base / 2**k for base in (102400.0, 131072.0, 100e3, 96e3, 88200.0) for k in range(9)}
@@ -73,7 +73,9 @@ def fit_clock(times: Field) -> Clock | None:
     median_step = float(np.median(steps))
     if not np.isfinite(median_step) or median_step <= 0.0:
         return None
-    single_steps = steps[(steps > 0.0) & (steps < _HALF * median_step + rounding)]  # without gaps
+    single_steps = steps[
+        (steps > 0.0) & (steps < _GAP_THRESHOLD * median_step + rounding)
+    ]  # without gaps
     clock = Clock(step=float(single_steps.mean()), rounding=rounding, doubt=0.0, even=False)
     for _ in range(2):
         number = np.concatenate([[0.0], np.cumsum(clock.strides(steps))])
@@ -100,7 +102,7 @@ def _distinguishable(step: float, rounding: float) -> bool:
         return True
     return bool(
         np.ceil(step / rounding) * rounding
-        < _HALF * step
+        < _GAP_THRESHOLD * step
         < np.floor(2.0 * step / rounding) * rounding
     )
 

@@ -72,7 +72,7 @@ def read(path: Path) -> Contents:
             "export the time response itself (data set 58, function type 1)"
         )
     if others:
-        notes.append(f"left out {' and '.join(dict.fromkeys(others))}: not time records")
+        notes.append(f"ignored {' and '.join(dict.fromkeys(others))}: not time records")
     return Contents(format="uff 58", channels=channels, notes=notes)
 
 

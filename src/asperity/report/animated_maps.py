@@ -26,7 +26,7 @@ from asperity.ehl import hertz_zone
 from asperity.report.base import Exhibit, Picture
 from asperity.report.drawing import display, name_axes
 from asperity.report.maps import colour_bar, map_figure
-from asperity.report.style import CAVITY_COLOUR, CONTACT_COLOUR, OIL_COLOUR, Medium
+from asperity.report.style import CAVITY_COLOUR, CONTACT_COLOUR, FILM_COLOURS, OIL_COLOUR, Medium
 
 SCRIPT = resources.files("asperity.report").joinpath("moving.js").read_text("utf-8")
 SHADES = 56  # colours of a map: few enough for small files, enough to look continuous
@@ -41,7 +41,7 @@ TEXTS: Mapping[Kind, tuple[str, str]] = {  # title and caption
     "pressure": ("Pressure", "Total pressure of oil and asperities."),
     "contact": ("Asperity contact", "Contact state: asperity contact, oil film, cavitated film."),
 }
-COLOURS = {"gap": "viridis", "pressure": "inferno"}
+COLOURS = {"gap": FILM_COLOURS, "pressure": "inferno"}
 CLASSES = {"oil film": OIL_COLOUR, "cavitated": CAVITY_COLOUR, "asperity contact": CONTACT_COLOUR}
 
 

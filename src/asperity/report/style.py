@@ -24,6 +24,7 @@ from asperity.core.files import atomic_write
 # Colours of Okabe and Ito, distinguishable with any colour vision; lines also differ by stroke or
 # marker.
 BLUE, VERMILION, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#6b7280"
+FILM_COLOURS = "viridis"  # Matplotlib's name; `app.figures` has its own copy of the map
 # The paper's Fig 6 has oil in red and asperities in yellow. These differ in lightness too, for grey
 # printers.
 CONTACT_COLOUR, OIL_COLOUR, CAVITY_COLOUR, CAVITY_STRIPE = (

@@ -131,7 +131,7 @@ def model_shares(blocks: SpectrumBlocks, parameters: ModelParameters) -> tuple[F
 
 
 class LineScoringPoint(NamedTuple):
-    """Score and information of the own parameters at one scoring step, base and transfer held."""
+    """Score and Fisher information of each recording's parameters; base and transfer held."""
 
     score: Field  # (recordings, 4)
     information: Field  # (recordings, 4, 4)
@@ -150,14 +150,14 @@ class LineScoringPoint(NamedTuple):
 
 
 def line_scoring_point(blocks: SpectrumBlocks, parameters: ModelParameters) -> LineScoringPoint:
-    """Return score and information of the own parameters."""
+    """Return score and Fisher information of each recording's parameters."""
     return _line_scoring(blocks, parameters, *model_shares(blocks, parameters))[0]
 
 
 def _line_scoring(
     blocks: SpectrumBlocks, parameters: ModelParameters, relative: Field, expected: Field
 ) -> tuple[LineScoringPoint, Field]:
-    """Return score and information of the own parameters, and the weighted residual."""
+    """Return score and Fisher information of each recording, and the weighted residual."""
     weighted_residual = blocks.weight * (blocks.density / expected - 1.0)
     weighted = relative * blocks.weight[:, None]
     score = np.einsum("npb,nb->np", relative, weighted_residual)

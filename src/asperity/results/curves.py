@@ -166,7 +166,7 @@ def _curve(
     speeds: Sequence[tuple[float, float]],
     progress: SolverProgress | None,
 ) -> FrictionCurve:
-    """Solve the contacts at these surface speeds, each warm-started from the last."""
+    """Solve the contacts at these surface speeds, each from the previous converged point."""
     if not speeds:
         raise BadInput("a curve needs at least one point, got none")
     surface, points = case.surface(), []

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import expit, logit, stdtrit
 
 from asperity.contact.conditions import ContactConditions
+from asperity.core.coverage import NORMAL_FACTOR, UPPER
 from asperity.core.quantities import lines
 from asperity.coupling import Vibration, VibrationModel, resonance_at
 from asperity.ehl import ContactError, ContactState, Sides, Uncertainty
@@ -20,8 +21,6 @@ from asperity.ehl import ContactError, ContactState, Sides, Uncertainty
 Scalar = float | int | bool | None
 Row = Mapping[str, Scalar]
 
-LEVEL = 0.95  # one-sided quantile of the t distribution, for a 90 % interval
-NORMAL = 1.6448536269514722  # the same for a normal distribution [standard deviations]
 FLOOR = 0.01  # load share of a full film; log odds do not distinguish smaller shares
 # groups of the catalogue
 AVERAGED = (
@@ -66,7 +65,7 @@ def prediction_interval(values: Sequence[float], *, share: bool) -> tuple[float,
     if count < 2:
         raise ValueError("a prediction interval needs at least two values")
     scale = np.array([_odds(value) for value in values]) if share else np.array(values)
-    reach = float(stdtrit(count - 1, LEVEL) * math.sqrt(1.0 + 1.0 / count) * np.std(scale, ddof=1))
+    reach = float(stdtrit(count - 1, UPPER) * math.sqrt(1.0 + 1.0 / count) * np.std(scale, ddof=1))
     ends = float(np.mean(scale)) - reach, float(np.mean(scale)) + reach
     low, high = (_share(end) for end in ends) if share else ends
     return mean, (max(0.0, mean - low), max(0.0, high - mean))
@@ -149,7 +148,7 @@ def _crf_error(
     """
     crf_hz = [float(row["crf_hz"] or 0.0) for row in rows if row["crf_hz"] is not None]
     deviations = [float(row["crf_std_hz"]) for row in rows if row["crf_std_hz"] is not None]
-    record = NORMAL * float(np.mean(deviations)) if len(deviations) == len(crf_hz) else None
+    record = NORMAL_FACTOR * float(np.mean(deviations)) if len(deviations) == len(crf_hz) else None
 
     def propagated(sides: Sides | None) -> Sides | None:
         if sides is None:

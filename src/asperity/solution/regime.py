@@ -1,4 +1,7 @@
-"""Regime card: lubrication regime of a solved contact, compared with published film formulas."""
+"""Regime card: lubrication regime of a solved contact, compared with published film formulas.
+
+The regime is decided in `ehl.film_formulas`; full, mixed or boundary lubrication in `results.run`.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -27,7 +30,7 @@ _NUMBERS = {  # key in the catalogue -> field
     "moes_load": "moes_load",
     "moes_oil": "moes_oil",
 }
-_PLACES = {"central": "central film thickness", "least": "minimum film thickness"}
+_PLACES = {"central": "h_central_m", "least": "h_min_m"}  # key in the catalogue
 MAX_DEVIATION = 0.25  # of the film from all fits; their authors claim 5 to 15 %
 FULL_FILM = 3.0  # film ratio from which roughness does not affect the mean film
 
@@ -114,7 +117,7 @@ class RegimeCard:
         deviation = quantity("film_deviation")
         rows += [
             (
-                f"fitted {_PLACES[fit.place]}, {fit.source}",
+                f"fitted {quantity(_PLACES[fit.place]).name}, {fit.source}",
                 f"{film.text(fit.film)}; solved {film.text(fit.solved)}, "
                 f"{deviation.text(fit.deviation)}",
             )

@@ -287,7 +287,7 @@ def _waves(cells: tuple[int, int], spacing: tuple[float, float], depth: float, n
     """
     (nx, ny), (dx, dy) = cells, spacing
     kernels = np.zeros((2, 6, nx + 1, ny // 2 + 1))
-    for wrap, columns in _wraps(cells, spacing):
+    for wrap, columns in _padding_factors(cells, spacing):
         along = np.arange(wrap * nx // 2 + 1) * (2.0 * np.pi / (wrap * nx * dx))
         across = columns * (2.0 * np.pi / (ny * dy))
         reaching = -np.log(NEGLIGIBLE) / depth
@@ -306,10 +306,10 @@ def _waves(cells: tuple[int, int], spacing: tuple[float, float], depth: float, n
     return kernels
 
 
-def _wraps(
+def _padding_factors(
     cells: tuple[int, int], spacing: tuple[float, float]
 ) -> Iterator[tuple[int, npt.NDArray[np.intp]]]:
-    """Yield domain lengths and the wavenumbers along y that need them.
+    """Yield each padding factor of the domain and the wavenumbers along y that need it.
 
     Images along x decay as e^(-q (wrap - 1) L) on a domain of `wrap` lengths.
     """

@@ -14,7 +14,6 @@ from .calibration_result import ParameterDirection as ParameterDirection
 from .calibration_result import TradeOff as TradeOff
 from .cost import StudyCost as StudyCost
 from .cost import estimate_study as estimate_study
-from .curve import MEAN_CONFIDENCE as MEAN_CONFIDENCE
 from .curve import SQ_KEY as SQ_KEY
 from .curve import WearCurve as WearCurve
 from .curve import curve_from_study as curve_from_study

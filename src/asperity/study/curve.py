@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from asperity.case import Case
 from asperity.core.arrays import Field
+from asperity.core.coverage import COVERAGE
 from asperity.core.errors import BadInput, require_positive
 from asperity.study.evaluate import BOTH_PRESETS, DONE
 from asperity.study.execute import StudyProgress, StudyResult, run_study
@@ -19,7 +20,6 @@ from asperity.study.plan import plan_points
 from asperity.trend import StageErrors, Stages, split_stages
 
 SQ_KEY = "surface.sq"
-MEAN_CONFIDENCE = 0.90  # confidence level of intervals of means
 
 
 @dataclass(frozen=True)
@@ -76,14 +76,14 @@ class WearCurve:
             ]
         )
 
-    def interval(self, quantity: str, level: float = MEAN_CONFIDENCE) -> Field:
+    def interval(self, quantity: str, level: float = COVERAGE) -> Field:
         """Return Student's interval of the mean, shape (levels, 2); nan for fewer than 2 seeds."""
         counts = np.array([values.size for values in self._by_level(quantity)])
         half_width = student_half_width(self.std(quantity), counts, level)
         return self.mean(quantity)[:, None] + np.outer(half_width, (-1.0, 1.0))
 
     def interpolate(
-        self, sq: float, quantity: str, level: float = MEAN_CONFIDENCE
+        self, sq: float, quantity: str, level: float = COVERAGE
     ) -> tuple[float, float, float]:
         """Interpolate mean and interval linearly at a roughness [m]; nan outside the levels."""
         mean = self.mean(quantity)
@@ -164,7 +164,7 @@ class WearCurve:
         return [self.values(quantity, level) for level in range(self.sq.size)]
 
 
-def student_half_width(std: ArrayLike, counts: ArrayLike, level: float = MEAN_CONFIDENCE) -> Field:
+def student_half_width(std: ArrayLike, counts: ArrayLike, level: float = COVERAGE) -> Field:
     """Return half the width of Student's interval of a mean over `counts` values."""
     quantile = scipy.special.stdtrit(np.maximum(np.asarray(counts) - 1, 1), 0.5 + level / 2.0)
     return np.asarray(quantile * std / np.sqrt(np.maximum(counts, 1)))

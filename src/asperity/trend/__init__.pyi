@@ -10,7 +10,6 @@ from .alarm_inputs import AlarmState as AlarmState
 from .alarm_inputs import MonitoredSeries as MonitoredSeries
 from .alarm_inputs import RecordingStatus as RecordingStatus
 from .change_points import FEWEST_STAGE_POINTS as FEWEST_STAGE_POINTS
-from .comparison import INTERVAL_FACTOR as INTERVAL_FACTOR
 from .comparison import LoadShare as LoadShare
 from .comparison import RecordingFacts as RecordingFacts
 from .comparison import asperity_load_share as asperity_load_share

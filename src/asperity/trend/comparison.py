@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.errors import BadInput, require_positive
 
 SAME_WITHIN = (
     0.01  # relative difference of rate, speed or load up to which recordings are comparable
 )
-INTERVAL_FACTOR = 1.6449  # standard deviations on either side of a 90 % interval
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +67,7 @@ def asperity_load_share(
             "standard deviations of CRF and of the full-load resonance must be 0 or more"
         )
     ratio = np.asarray(crf_hz, dtype=float) / full_load_crf_hz
-    half_width = INTERVAL_FACTOR * np.hypot(
+    half_width = NORMAL_FACTOR * np.hypot(
         std / full_load_crf_hz, ratio * full_load_std_hz / full_load_crf_hz
     )
     return LoadShare(

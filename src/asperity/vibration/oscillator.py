@@ -103,7 +103,7 @@ class ContactOscillator:
         )
 
     def _recursion(self, rate_hz: float, output_weights: Field) -> tuple[Field, Field]:
-        """Return denominator and numerator of the filter from slope changes to read · (r, r').
+        """Return denominator and numerator of the filter from slope changes to the output.
 
         See `_exact`.
         """
@@ -243,11 +243,11 @@ def _check(profile: Signal, method: ResponseMethod) -> None:
 
 
 def _exact(oscillator: ContactOscillator, profile: Signal, output_weights: Field) -> Field:
-    """Return read · (r, r') for the compression r = y_i - y by first-order hold, exact to rounding.
+    """Return output_weights · (r, r') for the compression r = y_i - y by first-order hold.
 
-    Between samples r'' = -(C r' + S r)/m, free; at each sample the profile's slope, and r' with it,
-    jumps by d. So x⁺ = e^(Fh) (x + (0, d)) with x = (r, r'), read in the middle of the jump. There
-    is no cancellation of large terms.
+    Exact to rounding, without cancellation of large terms. Between samples r'' = -(C r' + S r)/m,
+    free; at each sample the profile's slope, and r' with it, jumps by d. So x⁺ = e^(Fh)
+    (x + (0, d)) with x = (r, r'), output in the middle of the jump.
     """
     denominator, numerator = oscillator._recursion(profile.rate_hz, output_weights)
     jumps = np.zeros(profile.values.size)
@@ -352,7 +352,8 @@ def expected_spectrum(
     """
     if profile.unit != "m^2/Hz":
         raise BadInput(
-            f"a profile's spectrum must be in m^2/Hz, got {profile.unit!r}; use that of its heights"
+            f"a profile's spectrum must be in m^2/Hz, got {profile.unit!r}; compute it from "
+            "heights in m"
         )
     frequency = profile.frequency_hz
     gain = (

@@ -14,6 +14,7 @@ import numpy as np
 
 from asperity import recording, surface
 from asperity.core.arrays import Field
+from asperity.core.coverage import QUANTILES
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput, UnreadableFile, require_positive
 from asperity.core.quantities import quantity
@@ -23,7 +24,6 @@ from asperity.wear.scar import Scar, find_scar
 # relative scatter of the scar's area round the track, which one profile does not show; assumed
 AREA_SCATTER = 0.2
 DRAWS = 20_000
-INTERVAL = (0.05, 0.95)
 _COLUMNS = {
     "distance": ("distance", "path", "sliding"),
     "laps": ("lap", "rev", "turn", "cycle"),
@@ -61,7 +61,7 @@ class WearEstimate:
     @classmethod
     def from_draws(cls, draws: Field) -> "WearEstimate":
         """Return median and interval of equally likely values."""
-        low, median, high = np.quantile(draws, [INTERVAL[0], 0.5, INTERVAL[1]])
+        low, median, high = np.quantile(draws, QUANTILES)
         return cls(float(median), float(low), float(high))
 
     def as_dict(self) -> dict[str, float]:

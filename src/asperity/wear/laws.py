@@ -12,6 +12,7 @@ from typing import Annotated, ClassVar, Literal, Protocol, get_args
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.errors import BadInput, require_choice
 from asperity.core.quantities import Parameter, Parametric
 
@@ -26,7 +27,6 @@ PRIORS: dict[Severity, tuple[float, float]] = {
 }
 # standard deviation of ln k from test to test: -40 to +60 %, Podra and Andersson (1999)
 SCATTER = 0.5
-NORMAL = 1.6448536269514722  # 95 % quantile of the standard normal distribution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,7 +187,7 @@ class WearCoefficient:
                     f"{name} must be finite and not negative, got {value:g}; "
                     "correct its sign or value"
                 )
-        reach = math.exp(NORMAL * scatter)
+        reach = math.exp(NORMAL_FACTOR * scatter)
         return cls(k, 1.0 / reach, reach)
 
     @classmethod

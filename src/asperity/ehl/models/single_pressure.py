@@ -217,7 +217,7 @@ class Problem:
 
     @property
     def symmetric(self) -> bool:
-        """True if smooth bodies are symmetric, so that the half up to Y = 0 suffices."""
+        """True if the problem is symmetric about Y = 0: only half of it is then solved."""
         if self.form.periodic or self.form.roller is not None or np.any(self.roughness):
             return False
         (_, ny), dy, factor = self.cells, self.spacing[1], self.viscosity_factor

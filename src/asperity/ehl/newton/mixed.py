@@ -47,8 +47,8 @@ class _StepProposal(NamedTuple):
 def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iterator[Step]:
     """Yield the initial guess and then the result of each Newton step.
 
-    After a stagnation, streaks of oil and the opening of the wedge are no longer linearised,
-    because they may cause cycles.
+    After a stagnation the Jacobian omits two terms that may cause cycles: ruptured cells downstream
+    of a lubricated one, and the change of the slope limiter with the gap.
 
     A closed cell whose oil pressure would exceed the total takes the total as its oil pressure and
     is free in the next step: the oil separates the bodies. Cells at the cap are exempt.

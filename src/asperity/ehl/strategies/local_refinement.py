@@ -72,9 +72,9 @@ def _worst_boxes(balance: MixedBalance) -> list[Box]:
 
 
 def _subproblem(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
-    """Return the contact in a box, and its pressures.
+    """Return the subproblem on `box` and its initial pressures.
 
-    The deflection by the surrounding pressures counts as shape.
+    Deflection due to pressures outside the box is included in the undeformed gap.
     """
     problem = balance.problem
     (along, across) = box

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import NORMAL_FACTOR, QUANTILES
 from asperity.core.quantities import quantity
 from asperity.inference import KEY_QUANTITIES, Design, Inference, ObservationPoint
 from asperity.report.base import Exhibit
@@ -130,7 +131,7 @@ def predicted(inference: Inference) -> Exhibit:
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(3.4)
         for number, (place, _) in enumerate(observed):
-            low, middle, high = np.quantile(predictions[:, place], (0.05, 0.5, 0.95))
+            low, middle, high = np.quantile(predictions[:, place], QUANTILES)
             style: Style = {"linewidth": 7, "alpha": 0.35, "solid_capstyle": "butt"}
             label = None if number else "predicted, 90 %"
             axes.plot([number, number], [low, high], color=BLUE, label=label, **style)
@@ -138,7 +139,7 @@ def predicted(inference: Inference) -> Exhibit:
         x = np.arange(len(observed))
         (values, stds) = _observed_crf(observed)
         style = {"color": VERMILION, "markersize": 4, "capsize": 3, "label": "observed"}
-        axes.errorbar(x, values, 1.645 * stds, fmt="o", **style)
+        axes.errorbar(x, values, NORMAL_FACTOR * stds, fmt="o", **style)
         names = [f"{point.load_n:.4g} N\n{point.entrainment_m_s:.3g} m/s" for _, point in observed]
         axes.set_xticks(x, names, fontsize=7.5)
         axes.set(ylabel=quantity("crf_hz").label, xlim=(-0.6, len(observed) - 0.4))
@@ -212,10 +213,10 @@ def next_recording(inference: Inference) -> Exhibit:
     return Exhibit(
         "next-point",
         draw,
-        "Expected information of one more recording about all unknowns, over the loads and speeds "
-        "that the case permits.",
-        "Expected information over load and speed, with recorded points and the recommended next "
-        "one",
+        "Expected information gain from one more recording about all unknowns, over the loads "
+        "and speeds that the case permits.",
+        "Expected information gain over load and speed, with recorded points and the recommended "
+        "next one",
     )
 
 

@@ -115,8 +115,8 @@ def running_in(history: History) -> Exhibit:
     return Exhibit(
         "passes",
         draw,
-        "Running-in, one point per pass of the rough surface: means of shares and resonance over "
-        "the pass, Sq and flattening at its end. Flattened volume is distributed uniformly: the "
-        "mean plane rises and, at constant load, separates the bodies by the same distance.",
+        "Running-in, one point per pass of the rough surface: load and area shares and resonance "
+        "averaged over the pass, Sq and flattening at its end. Flattened volume is distributed "
+        "uniformly: the mean plane rises, and at constant load the bodies separate equally.",
         "Load and area shares, Sq, flattening and resonance over passes",
     )

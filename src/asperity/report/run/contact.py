@@ -18,7 +18,16 @@ from asperity.report.maps import (
     mark_hertz_zone,
     show_map,
 )
-from asperity.report.style import BLUE, CONTACT_COLOUR, GREEN, GREY, VERMILION, Medium, Style
+from asperity.report.style import (
+    BLUE,
+    CONTACT_COLOUR,
+    FILM_COLOURS,
+    GREEN,
+    GREY,
+    VERMILION,
+    Medium,
+    Style,
+)
 from asperity.results import Run
 
 
@@ -63,7 +72,14 @@ def film_map(run: Run) -> Exhibit:
     return Exhibit(
         "film",
         map_drawer(
-            solution, "gap", solution.gap, title, extend="max", cmap="viridis", vmin=0.0, vmax=top
+            solution,
+            "gap",
+            solution.gap,
+            title,
+            extend="max",
+            cmap=FILM_COLOURS,
+            vmin=0.0,
+            vmax=top,
         ),
         "Gap between the deformed surfaces. Colours end at the 99th percentile in the Hertz zone.",
         f"Map of the film thickness: mean {quantity('h_mean_m').text(state.h_mean)} in the Hertz "

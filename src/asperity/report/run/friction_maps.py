@@ -53,7 +53,7 @@ def temperature_map(run: Run, friction: Friction, heat: FlashTemperature) -> Exh
         map_drawer(run.solution, "surface_temperature", hotter, title, cmap="inferno"),
         f"Temperature of the hotter surface. Friction power {total}: {first} flow into body 1, "
         f"{second} into body 2.",
-        f"Map of the flash temperature: at most {largest} above the bulk of the body.",
+        f"Map of the flash temperature: maximum {largest} above the bulk of the body.",
     )
 
 

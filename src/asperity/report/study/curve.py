@@ -68,8 +68,9 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
     anchor_note = " Hollow markers: anchors with their tolerance." if anchors else ""
     if study.papers:
         anchor_note = (
-            " Diamonds: CAR as printed (the paper does not define its area); crosses: CLR from the "
-            "CRF printed for the smoothest and the roughest ring. Bars: tolerances set by asperity."
+            " Diamonds: CAR as published (the paper does not define its area); crosses: CLR from "
+            "the published CRF of the smoothest and the roughest ring. Bars: tolerances set by "
+            "asperity."
         )
     ends = (
         f"{quantity(key).short} from {first_to_last(key, curve.mean(key))}" for key, *_ in SHARES
@@ -77,8 +78,8 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
     return Exhibit(
         "shares",
         draw,
-        "Asperity load share (CLR), contact area ratio in the Hertz zone (CAR), and contact area "
-        f"of the domain over the Hertz area (CAR of the domain). {legend_note(study)}{anchor_note}",
+        "Asperity load share (CLR), contact area ratio in the Hertz zone (CAR), and total contact "
+        f"area divided by the Hertz area (CAR of the domain). {legend_note(study)}{anchor_note}",
         f"CLR and CAR over Sq from {first_to_last('sq_m', curve.sq)}: {', '.join(ends)}.",
     )
 
@@ -189,11 +190,11 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
     return Exhibit(
         "rig",
         draw,
-        "The twelve rings of the rig. Filled: printed CRF of the smoothest and the roughest ring; "
-        "the paper draws the other ten without numbers. Hollow: the study's CRF at each ring's "
-        "Sq, with the interval over seeds and the printed error of Sq. Strip: onset of severe "
-        f"wear in the paper. {_deviations(rig_deviation(curve, key))}",
-        "Printed CRF of the rig's rings, and the study's prediction at their Sq.",
+        "The twelve rings of the rig. Filled symbols: published CRF of the smoothest and the "
+        "roughest ring; the paper draws the other ten without numbers. Hollow symbols: the study's "
+        "CRF at each ring's Sq, with the interval over seeds and the published error of Sq. Shaded "
+        f"band: onset of severe wear in the paper. {_deviations(rig_deviation(curve, key))}",
+        "Published CRF of the rig's rings, and the study's prediction at their Sq.",
     )
 
 
@@ -207,7 +208,7 @@ def _draw_rings(axes: Axes, rings: pandas.DataFrame) -> Field:
     draw_intervals(axes, sq, predicted, predicted - low, "o", label=label, **style)
     known = rings[rings["printed_hz"].notna()]
     style = {"color": "black", "markersize": 4.5, "zorder": 4, "xerr": known["sq_std_um"]}
-    label = "rings, CRF printed"
+    label = "rings, published CRF"
     printed = known["printed_hz"].to_numpy()
     draw_intervals(axes, known["sq_um"], printed, None, "D", label=label, **style)
     return np.asarray(printed)

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import COVERAGE
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import (
@@ -27,7 +28,6 @@ from asperity.report.study.quantity_names import axis_label, value_label
 from asperity.report.style import BLUE, GREY, Medium, Style
 from asperity.study import (
     GROUPS,
-    MEAN_CONFIDENCE,
     StudyOverview,
     SweptAxis,
     group_means,
@@ -59,7 +59,7 @@ def output_curves(study: StudyOverview, axis: SweptAxis) -> Exhibit:
         for axes in panels[-min(PANELS_PER_ROW, len(panels)) :]:
             axes.set_xlabel(axis_label(axis))
         mean: Style = {"color": BLUE, "marker": "o", "markersize": 3.5}
-        interval = f"mean, {100 * MEAN_CONFIDENCE:.0f} % interval"
+        interval = f"mean, {100 * COVERAGE:.0f} % interval"
         keys = [
             Line2D([], [], color=GREY, marker=".", linestyle="none", alpha=0.7, label="case"),
             Line2D([], [], label=interval, **mean),

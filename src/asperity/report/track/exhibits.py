@@ -9,6 +9,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.errors import BadInput
 from asperity.core.quantities import in_print, quantity
 from asperity.monitoring import BASELINE, LEVEL_LEAST, Track, TrackedRecording
@@ -22,7 +23,7 @@ from asperity.report.drawing import (
     plain_log_labels,
 )
 from asperity.report.style import BLUE, DASHED, GREEN, GREY, VERMILION, Medium, Style
-from asperity.trend import INTERVAL_FACTOR, Stages
+from asperity.trend import Stages
 
 MIN_CORRECTION = 1e-3  # of the CRF; smaller corrections for operating conditions are not drawn
 MARKERS = "osv^Dp*hXP<>"
@@ -82,9 +83,9 @@ def _draw_crf(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> Non
     crf, crf_std = np.array(
         [(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in resonant]
     ).T
-    x_bars: Style = {"xerr": INTERVAL_FACTOR * x_std} if x_std.any() else {}
+    x_bars: Style = {"xerr": NORMAL_FACTOR * x_std} if x_std.any() else {}
     style: Style = {"ecolor": GREY, "zorder": 1, "label": "90 % interval"}
-    draw_intervals(axes, x, crf, INTERVAL_FACTOR * crf_std, "none", **x_bars, **style)
+    draw_intervals(axes, x, crf, NORMAL_FACTOR * crf_std, "none", **x_bars, **style)
     colours = SEVERITY(np.nan_to_num([recording.severe_probability for recording in resonant]))
     label = quantity("crf_hz").short
     axes.scatter(x, crf, c=colours, s=22, zorder=2, edgecolors="white", linewidths=0.4, label=label)
@@ -144,7 +145,7 @@ def amplitude(track: Track) -> Exhibit:
         crfa = np.array([recording.resonance.crfa for recording in resonant])
         std = np.array([recording.resonance.crfa_std for recording in resonant])
         factor = (
-            np.exp(INTERVAL_FACTOR * np.where(np.isfinite(std), std, 0.0) / crfa)
+            np.exp(NORMAL_FACTOR * np.where(np.isfinite(std), std, 0.0) / crfa)
             if resonant
             else crfa
         )
@@ -173,7 +174,7 @@ def damping(track: Track) -> Exhibit:
             display("damping_ratio", np.array(part))
             for part in zip(*[recording.damping for recording in known], strict=True)
         )
-        factor = np.exp(INTERVAL_FACTOR * std / ratio)
+        factor = np.exp(NORMAL_FACTOR * std / ratio)
         bars = [ratio - ratio / factor, ratio * factor - ratio]
         x = [recording.x for recording in known]
         style: Style = {
@@ -235,8 +236,8 @@ def levels(track: Track) -> Exhibit | None:
     return Exhibit(
         "levels",
         draw,
-        f"Each relative to its baseline, the median of the first {BASELINE} values. Line: rms at "
-        "a fault frequency and two harmonics; envelope: depth of modulation there. These levels "
+        f"All values relative to their baseline, the median of the first {BASELINE}. Line: rms at "
+        "a fault frequency and two harmonics; envelope: modulation depth there. These levels "
         "alone do not indicate the state of the contact.",
         f"Levels over {x_label(track)}, relative to the baseline.",
     )

@@ -1,4 +1,4 @@
-"""Row of a history table: values of the contact at one step, by the keys of the catalogue."""
+"""Columns of the motion history: values of the contact at one step, by the catalogue's keys."""
 
 import math
 from dataclasses import dataclass

@@ -134,8 +134,8 @@ class HistoryVibration:
         force = self.dynamic_load
         by_paper = "none" if coupled is None else f"{coupled.natural_frequency_hz:.0f} Hz"
         sentence = (
-            f"Resonance by the tangent stiffness at {len(self.moments)} moments: {f0:.0f} ± "
-            f"{self.natural_frequency_std_hz:.0f} Hz, by the paper's coupling: {by_paper}"
+            f"Resonance from the tangent stiffness at {len(self.moments)} moments: {f0:.0f} ± "
+            f"{self.natural_frequency_std_hz:.0f} Hz, from the paper's coupling: {by_paper}"
         )
         ratio = quantity("history_damping_ratio")
         if np.isfinite(self.damping_ratio):

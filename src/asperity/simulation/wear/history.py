@@ -13,6 +13,7 @@ import scipy
 
 from asperity.case import Case
 from asperity.core.arrays import finite_or_none
+from asperity.core.coverage import UPPER
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
@@ -242,7 +243,7 @@ class WearHistory:
             return None
         fitted = scipy.stats.linregress(rows["hours"].to_numpy(float), rows[key].to_numpy(float))
         return _Slope(
-            float(fitted.slope), float(scipy.stats.t.ppf(0.95, len(rows) - 2) * fitted.stderr)
+            float(fitted.slope), float(scipy.stats.t.ppf(UPPER, len(rows) - 2) * fitted.stderr)
         )
 
     def volume_interval(self, body: int) -> tuple[float, float] | None:

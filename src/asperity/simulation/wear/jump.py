@@ -212,7 +212,7 @@ class WearingContact(WearingTracks):
         return first, second
 
     def _flattening(self, worn: WearState, solutions: Solutions) -> tuple[Field, Field]:
-        """Return the plastic flattening: per point the deepest overlap, shared by rough bodies."""
+        """Return the plastic flattening: deepest overlap of each point, shared by rough bodies."""
         if not self.model.flattening:
             return worn.flattened
         rough = self.surfaces.rough

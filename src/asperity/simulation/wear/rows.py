@@ -1,4 +1,4 @@
-"""Row of a wear table: roughness of both bodies, their wear, and the contact."""
+"""Columns of the wear history: roughness of both bodies, their wear, and the contact."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,6 +7,7 @@ import numpy as np
 import scipy
 
 from asperity.case import Case
+from asperity.core.coverage import UPPER
 from asperity.core.errors import BadInput
 from asperity.coupling import excitation, oscillator, resonance_at
 from asperity.ehl import ContactState, Sides, Uncertainty
@@ -16,7 +17,6 @@ from asperity.surface import Surface, height_parameters
 
 Row = dict[str, float | int]
 
-LEVEL = 0.95  # quantile of Student's distribution for a two-sided 90 % interval
 RESONANCE = {  # end of an interval of CRF: the corresponding end of CLR
     "crf_low_hz": "clr_low",
     "crf_high_hz": "clr_high",
@@ -113,7 +113,7 @@ def contact_row(case: Case, solved: Sequence[SolvedPosition], sq: float) -> Row:
     row: Row = {"sq_m": sq} | _mean_state(solved)
     shares = [position.state.clr for position in solved]
     off = float(np.std(shares, ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
-    reach = off * float(scipy.special.stdtrit(max(len(shares) - 1, 1), LEVEL))
+    reach = off * float(scipy.special.stdtrit(max(len(shares) - 1, 1), UPPER))
     of_mean = max(0.0, row["clr"] - reach), min(1.0, row["clr"] + reach)
     row |= {
         "clr_low": low,
