@@ -341,6 +341,11 @@ def test_a_converged_run_shows_no_warning(single):
     assert "not converged" not in single.text.lower()
 
 
+def test_names_between_backticks_are_code_and_the_rest_is_escaped():
+    written = base.html_sentence("give `rate_hz`, not <b> or `<i>`")
+    assert written == "give <code>rate_hz</code>, not &lt;b&gt; or <code>&lt;i&gt;</code>"
+
+
 def test_external_text_is_escaped():
     hostile = CASE.replace(
         'kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', ""

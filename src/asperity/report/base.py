@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from asperity.core.files import atomic_write, require_writable
@@ -144,6 +145,11 @@ def capitalised(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def html_sentence(text: str) -> Markup:
+    """Return a sentence for a page: escaped, units in print, names between backticks as code."""
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(in_print(text)))))
+
+
 def render(template: str, *, script: str = "", **values: object) -> str:
     """Render a template to an HTML page, with escaping.
 
@@ -160,7 +166,7 @@ def render(template: str, *, script: str = "", **values: object) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(in_print=in_print, capitalised=capitalised)
+    environment.filters.update(in_print=html_sentence, capitalised=capitalised)
     shared = {
         "version": version("asperity"),
         "paper": CITATION,
