@@ -132,20 +132,20 @@ def run_job(work: Callable[..., object], *arguments: object) -> object:
 
 def warm_up() -> float:
     """Solve a small contact to load and compile everything; return the time [s]."""
-    began = time.perf_counter()
-    small = papers_case().with_overrides(
+    start = time.perf_counter()
+    case = papers_case().with_overrides(
         {"grid.cells": [64, 64], "surface.correlation_length": "40 um"}
     )
-    result_of_run(solve_case(small, strict=False), 0.0)
-    return time.perf_counter() - began
+    result_of_run(solve_case(case, strict=False), 0.0)
+    return time.perf_counter() - start
 
 
 def solve_fully(ticket: Ticket, case: Case) -> ContactResult:
     """Solve the contact on the grid of its case, with error bars."""
-    began = time.perf_counter()
+    start = time.perf_counter()
     limit_cells(case.source, case.grid.cells)
     run = solve_case(case, strict=False, progress=_progress_hook(ticket, TIME_LIMIT_S))
-    return result_of_run(run, time.perf_counter() - began)
+    return result_of_run(run, time.perf_counter() - start)
 
 
 def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) -> CoarseResult:
@@ -154,7 +154,7 @@ def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) ->
     Attempts with a limited number of steps, in this order: warm start from `start`, cold start,
     cold start on still fewer cells.
     """
-    began = time.perf_counter()
+    begin = time.perf_counter()
     limit_cells(case.source, case.grid.cells)
     fine = case.surface()
     coarse = _coarsen(fine, COARSE_CELLS)
@@ -168,7 +168,7 @@ def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) ->
             continue
         solution = _attempt(ticket, case, surface, warm_start, steps)
         if solution is not None:
-            result = coarse_result(solution, case.text, time.perf_counter() - began)
+            result = coarse_result(solution, case.text, time.perf_counter() - begin)
             return CoarseResult(result, solution)
     return CoarseResult(None, None)
 

@@ -96,7 +96,7 @@ class ContactView:
         self.drop = FileDrop(
             limit=SURFACE_LIMIT,
             on_file=self._surface_dropped,
-            on_error=self._say,
+            on_error=self._show_message,
             several=False,
             name="Drop a measured surface here",
             sizing_mode="stretch_width",
@@ -118,12 +118,12 @@ class ContactView:
         if result is not None and not query:
             self.session.open(self.session.settings, result)
             return
-        held = surface_key(query)
-        case = self._surfaces.load(held, self.drop.folder) if held else None
+        key = surface_key(query)
+        case = self._surfaces.load(key, self.drop.folder) if key else None
         if case is not None:
-            self.session.settings = Settings(case, dropped=case.contents.surface.name, held=held)
+            self.session.settings = Settings(case, dropped=case.contents.surface.name, held=key)
             self._build_knobs()
-        self._say(*self.session.go_to(query))
+        self._show_message(*self.session.go_to(query))
 
     def create_next_figure(self) -> None:
         """Create the next figure and schedule the one after it, to keep the server responsive."""
@@ -212,7 +212,7 @@ class ContactView:
         if self._trials is not None:
             self._trials.show(self.session.trials)
 
-    def _say(self, *lines: str) -> None:
+    def _show_message(self, *lines: str) -> None:
         self.message.text = sentences(lines, "alarm")
 
     # Inputs
@@ -240,7 +240,7 @@ class ContactView:
         self.input_column.children = children
 
     def _change(self, key: str, text: str) -> None:
-        self._say()
+        self._show_message()
         self.session.change(key, text)
 
     def _show_more(self) -> None:
@@ -251,7 +251,7 @@ class ContactView:
 
     def _restore(self, number: int) -> None:
         """Restore the settings of an earlier result."""
-        self._say()
+        self._show_message()
         self.session.go_back(number)
 
     def _pin(self) -> None:
@@ -264,19 +264,19 @@ class ContactView:
     # ---------------------------------------------------------------------------------
 
     def _surface_dropped(self, path: Path) -> None:
-        self._say()
+        self._show_message()
         case = self.session.settings.case
         self._side_jobs.submit((open_surface, (case, path)), self._surface_read)
 
     def _surface_read(self, result: object) -> None:
         if isinstance(result, JobFailure):
-            self._say(result.message)
+            self._show_message(result.message)
             return
         assert isinstance(result, tuple)
-        case, held, steps = result
-        self._surfaces.add(held, case)
+        case, key, steps = result
+        self._surfaces.add(key, case)
         self.message.text = sentences((*steps, LINK_NOTE), "soft")
-        self.session.open(Settings(case, dropped=case.contents.surface.name, held=held))
+        self.session.open(Settings(case, dropped=case.contents.surface.name, held=key))
 
     def _give_case(self) -> None:
         self.download.offer(
@@ -295,7 +295,7 @@ class ContactView:
     def _report_made(self, result: object) -> None:
         self.report.disabled, self.report.label = False, "Report"
         if isinstance(result, JobFailure):
-            self._say(result.message)
+            self._show_message(result.message)
         else:
             self.download.offer(export.REPORT, "text/html", str(result))
 

@@ -154,28 +154,28 @@ class MapFigures:
 
     def show(self, result: ContactMaps, pinned: ContactMaps | None) -> None:
         """Draw a result, and its film minus a pinned one on the same grid (`compares`)."""
-        (x0, x1), (y0, y1) = ((to_display("x_m", end) for end in ends) for ends in result.extent)
+        (x0, x1), (y0, y1) = ((to_display("x_m", end) for end in axis) for axis in result.extent)
         self.compares = pinned is not None and pinned.gap.shape == result.gap.shape
         if self.compares and self.change is None:
             self.change = self._map("Film minus pinned film", CHANGES, "gap")
         self._set_extent((x0, x1), (y0, y1))
-        place = {"x": [x0], "y": [y0], "dw": [x1 - x0], "dh": [y1 - y0]}
+        box = {"x": [x0], "y": [y0], "dw": [x1 - x0], "dh": [y1 - y0]}
         gap = to_display("gap", result.gap)
         top = to_display("gap", result.gap_top) or 1.0
-        self._fill(self.film, gap, (0.0, top), place, _state_colours(result))
+        self._fill(self.film, gap, (0.0, top), box, _state_colours(result))
         largest = max(float(result.pressure.max()), result.hertz_pressure)
         pressure = to_display("pressure", result.pressure)
         top = to_display("pressure", largest)
-        self._fill(self.pressure, pressure, (0.0, top), place, None)
+        self._fill(self.pressure, pressure, (0.0, top), box, None)
         zone = _hertz_outline(result, (y0, y1))
         for plot in self._figures():
             plot.tags[0]["zone"].data = zone
         if self.compares and pinned is not None:
-            self._fill_change(to_display("gap", result.gap - pinned.gap), place)
+            self._fill_change(to_display("gap", result.gap - pinned.gap), box)
 
-    def _fill_change(self, change: Array, place: Source) -> None:
+    def _fill_change(self, change: Array, box: Source) -> None:
         limit = float(np.percentile(np.abs(change), 98.0)) or 1.0
-        self._fill(self.change, change, (-limit, limit), place, None)
+        self._fill(self.change, change, (-limit, limit), box, None)
 
     def _set_extent(self, x: tuple[float, float], y: tuple[float, float]) -> None:
         """Set ends and shape of all maps, in the display unit."""
@@ -197,13 +197,13 @@ class MapFigures:
 
     @staticmethod
     def _fill(
-        plot: Plot, values: Array, ends: tuple[float, float], place: Source, marks: Array | None
+        plot: Plot, values: Array, ends: tuple[float, float], box: Source, marks: Array | None
     ) -> None:
         parts = plot.tags[0]
         parts["mapper"].update(low=float(ends[0]), high=float(ends[1]))
-        parts["source"].data = {"image": [np.ascontiguousarray(values.T, np.float32)], **place}
+        parts["source"].data = {"image": [np.ascontiguousarray(values.T, np.float32)], **box}
         if marks is not None:
-            parts["overlay"].data = {"image": [marks], **place}
+            parts["overlay"].data = {"image": [marks], **box}
 
 
 def _state_colours(result: ContactMaps) -> Array:
@@ -219,11 +219,11 @@ def _state_colours(result: ContactMaps) -> Array:
     return colours.view(np.uint32).reshape(cells.shape)
 
 
-def _hertz_outline(result: ContactMaps, ends: tuple[float, float]) -> Source:
+def _hertz_outline(result: ContactMaps, y: tuple[float, float]) -> Source:
     """Return the outline of the smooth, dry contact in the display unit."""
     a, b = (to_display("x_m", half) for half in result.half_widths)
     if result.endless:
-        return {"x": [-a, -a, np.nan, a, a], "y": [ends[0], ends[1], np.nan, ends[0], ends[1]]}
+        return {"x": [-a, -a, np.nan, a, a], "y": [y[0], y[1], np.nan, y[0], y[1]]}
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
     return {"x": a * np.cos(angle), "y": b * np.sin(angle)}
 

@@ -69,9 +69,9 @@ def open_study(ticket: Ticket, folder: Path) -> StudyData:  # noqa: ARG001
     means = {}
     for axis in axes:
         for key, column in outputs.items():
-            known = np.isfinite(column)
+            finite = np.isfinite(column)
             means[axis.key, key] = group_means(
-                axis.values[known], column[known], binned=axis.binned
+                axis.values[finite], column[finite], binned=axis.binned
             )
     numbers = tuple(int(number) for number in overview.used["number"])
     plan = overview.result.plan

@@ -101,18 +101,18 @@ class HistoryView:
             figures[-1].xaxis.axis_label = clock.axis
         self.curves.children = figures
 
-    def _show(self, place: int) -> None:
+    def _show(self, number: int) -> None:
         """Draw the maps of a frame."""
         history = self.history
-        if history is None or not 0 <= place < len(history.maps):
+        if history is None or not 0 <= number < len(history.maps):
             return
         clock = quantity(history.clock)
-        time = history.times[place] * clock.factor
-        position = f"map {place + 1} of {len(history.maps)}"
-        caption = f"{history.names[place]}, {time:.4g} {clock.display}, {position}"
-        self.step.tags = ["Step", history.names[place]]
+        time = history.times[number] * clock.factor
+        position = f"map {number + 1} of {len(history.maps)}"
+        caption = f"{history.names[number]}, {time:.4g} {clock.display}, {position}"
+        self.step.tags = ["Step", history.names[number]]
         self.maps.make()
-        self.maps.show(history.maps[place])
+        self.maps.show(history.maps[number])
         for mark in self._now:
             mark.location = time
         self.status.text = sentences([caption], "soft")

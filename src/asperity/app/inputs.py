@@ -86,8 +86,8 @@ INPUT_SPECS: dict[str, InputSpec] = {
     "lubricant.density.law": _law("Density law", OIL, DENSITY_LAWS),
     "lubricant.rheology.law": _law("Rheology law", OIL, RHEOLOGY_LAWS),
     "lubricant.friction.law": _law("Limiting shear stress law", OIL, FRICTION_LAWS),
-    **{f"surface.{key}": turned for key, turned in _SURFACE.items()},
-    **{f"surface.second.{key}": turned._replace(group=SECOND) for key, turned in _SURFACE.items()},
+    **{f"surface.{key}": entry for key, entry in _SURFACE.items()},
+    **{f"surface.second.{key}": entry._replace(group=SECOND) for key, entry in _SURFACE.items()},
     "material.hardness": InputSpec("hardness_pa", BODIES, decades=0.7),
     "material.boundary_friction": InputSpec("boundary_friction", BODIES, (0.0, 0.4, 0.01)),
     "contact.radius": InputSpec("radius_m", BODIES, decades=0.5, more=True),
@@ -221,21 +221,21 @@ class CaseInput:
         first, last = self.positions
         if self._linear:
             low, _, step = self.ends
-            place = (value - low) / step
+            steps = (value - low) / step
         else:
             if not value > 0.0:
                 return None
-            place = PER_DECADE * math.log10(value / self._amount[0])
-        return max(first, min(last, round(place)))
+            steps = PER_DECADE * math.log10(value / self._amount[0])
+        return max(first, min(last, round(steps)))
 
 
 def case_inputs(case: Case) -> dict[str, CaseInput]:
     """Return the inputs of a case by key, in display order."""
     tables = tomllib.loads(case.text)
-    found = ((key, _lookup(tables, key)) for key in INPUT_SPECS)
+    entries = ((key, _lookup(tables, key)) for key in INPUT_SPECS)
     inputs = [
         CaseInput(key, value, _names(tables, key))
-        for key, value in found
+        for key, value in entries
         if value is not None and _is_single(key, value)
     ]
     return {
@@ -272,17 +272,17 @@ def overrides(case: Case, changes: Mapping[str, str]) -> dict[str, object]:
     for key, text in sorted(
         changes.items(), key=lambda change: change[0].rpartition(".")[2] != "law"
     ):
-        stem, _, place = key.rpartition(".")
-        if place == "law" and text in INPUT_SPECS[key].laws:
-            own = {part.name for part in fields(INPUT_SPECS[key].laws[text])}
+        stem, _, suffix = key.rpartition(".")
+        if suffix == "law" and text in INPUT_SPECS[key].laws:
+            names = {part.name for part in fields(INPUT_SPECS[key].laws[text])}
             merged[stem] = {
                 "law": text,
-                **{name: value for name, value in _lookup(tables, stem).items() if name in own},
+                **{name: value for name, value in _lookup(tables, stem).items() if name in names},
             }
-        elif place.isdigit():
+        elif suffix.isdigit():
             pair = merged.get(stem, list(_lookup(tables, stem)))
             assert isinstance(pair, list)
-            pair[int(place)] = text
+            pair[int(suffix)] = text
             merged[stem] = pair
         else:
             merged[key] = _cells(text) if key == "grid.cells" else text
@@ -301,13 +301,13 @@ def _cells(text: str) -> str:
 
 def _lookup(tables: Table, key: str) -> Any:
     """Return the value at a dotted key, or None."""
-    found: object = tables
+    value: object = tables
     for name in key.split("."):
-        if isinstance(found, list) and name.isdigit():
-            found = found[int(name)] if int(name) < len(found) else None
+        if isinstance(value, list) and name.isdigit():
+            value = value[int(name)] if int(name) < len(value) else None
         else:
-            found = found.get(name) if isinstance(found, Mapping) else None
-    return found
+            value = value.get(name) if isinstance(value, Mapping) else None
+    return value
 
 
 def _is_single(key: str, value: object) -> bool:

@@ -76,14 +76,14 @@ class RecordingSeries:
 def track_files(
     ticket: Ticket,  # noqa: ARG001
     paths: Sequence[Path],
-    stated: RecordingInputs,
+    inputs: RecordingInputs,
     case: Case | None,
 ) -> RecordingSeries:
     """Track dropped recordings as one series."""
     try:
         track = track_recordings(
             paths,
-            TrackSettings(**stated._asdict()),
+            TrackSettings(**inputs._asdict()),
             case=case,
         )
     except BadInput as error:
@@ -95,7 +95,7 @@ def track_folder(
     ticket: Ticket,  # noqa: ARG001
     folder: Path,
     memory: Path,
-    stated: RecordingInputs,
+    inputs: RecordingInputs,
     case: Case | None,
 ) -> RecordingSeries | None:
     """Track a folder in its current state; None without readable recordings.
@@ -105,7 +105,7 @@ def track_folder(
     updates = watch_folder(
         folder,
         memory,
-        TrackSettings(**stated._asdict()),
+        TrackSettings(**inputs._asdict()),
         WatchSettings(once=True, settle_time_s=SETTLE_S),
         case=case,
     )

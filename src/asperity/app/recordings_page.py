@@ -65,30 +65,30 @@ class RecordingsView:
         self.drop = FileDrop(
             limit=RECORDING_LIMIT,
             on_file=self._file_dropped,
-            on_error=self._say,
+            on_error=self._show_message,
             several=True,
             name="Drop recordings here",
             sizing_mode="stretch_width",
             margin=0,
             stylesheets=[LOOK, DROP],
         )
-        look: Look = {
+        style: Look = {
             "sizing_mode": "stretch_width",
             "stylesheets": [LOOK],
             "margin": (0, 0, 6, 0),
         }
         self.rate = TextInput(
-            title="Sampling rate, if not in the files", placeholder="20 kHz", **look
+            title="Sampling rate, if not in the files", placeholder="20 kHz", **style
         )
         self.unit = TextInput(
-            title="Unit of the values, if not in the files", placeholder="g", **look
+            title="Unit of the values, if not in the files", placeholder="g", **style
         )
-        self.channel = TextInput(title="Channel, if files have several", **look)
+        self.channel = TextInput(title="Channel, if files have several", **style)
         self.band = TextInput(
-            title="Search band (default: from the case)", placeholder="2 kHz to 5 kHz", **look
+            title="Search band (default: from the case)", placeholder="2 kHz to 5 kHz", **style
         )
-        self.again = button("Read again", self.read)
-        self.choice = Select(title="Recording", options=[], **look)
+        self.reread = button("Read again", self.read)
+        self.choice = Select(title="Recording", options=[], **style)
         self.choice.on_change("value", lambda _name, _old, new: self._show_one(new))
         self._build_figures()
 
@@ -174,29 +174,29 @@ class RecordingsView:
     def read(self) -> None:
         """Read the folder or the dropped files again, with the typed properties."""
         self._discard_memory()
-        self.look()
+        self.refresh()
 
-    def look(self) -> None:
+    def refresh(self) -> None:
         """Check the folder or read the dropped files, unless a job is still running."""
         if self._queue.busy or (self._folder is None and not self._dropped):
             return
         try:
-            stated = self.typed_inputs()
+            inputs = self.typed_inputs()
         except BadInput as error:
-            self._say(str(error))
+            self._show_message(str(error))
             return
         if self._dropped:
             self._submitted = len(self._dropped)
             self._tell(f"Reading {self._submitted} recordings ...")
             self._queue.submit(
-                (track_files, (tuple(self._dropped), stated, self._case)), self._read
+                (track_files, (tuple(self._dropped), inputs, self._case)), self._read
             )
             return
         if self._memory is None:
             self._memory = TemporaryDirectory(prefix="asperity-page-")
             self._tell("Reading the folder ...")
         self._queue.submit(
-            (track_folder, (self._folder, Path(self._memory.name), stated, self._case)), self._read
+            (track_folder, (self._folder, Path(self._memory.name), inputs, self._case)), self._read
         )
 
     @property
@@ -218,23 +218,23 @@ class RecordingsView:
 
     def _file_dropped(self, path: Path) -> None:
         self._dropped.append(path)
-        self.look()
+        self.refresh()
 
     def _read(self, result: object) -> None:
         if isinstance(result, JobFailure):
-            self._say(result.message)
+            self._show_message(result.message)
         elif result is None:
             self._tell("No recording has arrived yet; the folder is being watched.")
         else:
             assert isinstance(result, RecordingSeries)
             self.show(result)
         if len(self._dropped) > self._submitted:
-            self.look()  # further files arrived in the meantime
+            self.refresh()  # further files arrived in the meantime
 
     # Results
     # ---------------------------------------------------------------------------------
 
-    def _say(self, message: str) -> None:
+    def _show_message(self, message: str) -> None:
         self.status.text = sentences([f"{message.rstrip('.')}."], "alarm")
 
     def _tell(self, message: str) -> None:
@@ -266,8 +266,8 @@ class RecordingsView:
         (low, high) = series.band_hz
         low_hz = float(series.frequency[0])
         high_hz = float(series.frequency[-1])
-        place = {"x": [0.5], "y": [low_hz], "dw": [count], "dh": [high_hz - low_hz]}
-        self._water.data = {"image": [np.ascontiguousarray(series.levels.T)], **place}
+        rectangle = {"x": [0.5], "y": [low_hz], "dw": [count], "dh": [high_hz - low_hz]}
+        self._water.data = {"image": [np.ascontiguousarray(series.levels.T)], **rectangle}
         self.waterfall.x_range.update(start=0.5, end=count + 0.5)
         self.waterfall.y_range.update(start=low_hz, end=min(high_hz, 1.6 * high))
         for edge, end in zip(self._edges, (low, high), strict=True):
@@ -342,7 +342,7 @@ def layout(view: RecordingsView) -> Layout:
         "unit": view.unit,
         "channel": view.channel,
         "band": view.band,
-        "again": view.again,
+        "again": view.reread,
         "status": view.status,
         "verdict": view.verdict,
         "waterfall": view.waterfall,

@@ -108,9 +108,9 @@ class PageSite:
         panel.extension("filedropper", notifications=False)
         self.template = files("asperity.app").joinpath("page.html.j2").read_text("utf-8")
         self.style = files("asperity.app").joinpath("style.css").read_text("utf-8")
-        self.places = [("contact", "Contact"), ("recordings", "Recordings")]
+        self.links = [("contact", "Contact"), ("recordings", "Recordings")]
         if opened.kind in ("study", "history"):
-            self.places.append((opened.kind, opened.kind.capitalize()))
+            self.links.append((opened.kind, opened.kind.capitalize()))
 
     def close(self) -> None:
         """Remove the dropped files."""
@@ -143,8 +143,8 @@ class PageSite:
         view = recordings.RecordingsView(folder, case, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         if folder is not None:
-            _document().add_periodic_callback(view.look, FOLDER_CHECK_MS)
-            view.look()
+            _document().add_periodic_callback(view.refresh, FOLDER_CHECK_MS)
+            view.refresh()
         return self._page("recordings", "Recordings", *recordings.layout(view))
 
     def study(self) -> Any:
@@ -172,10 +172,10 @@ class PageSite:
             "study": self.study,
             "history": self.history,
         }
-        return {name: creators[name] for name, _ in self.places}
+        return {name: creators[name] for name, _ in self.links}
 
     def _page(
-        self, here: str, heading: str, parts: dict[str, object], sections: list[PageSection]
+        self, kind: str, heading: str, parts: dict[str, object], sections: list[PageSection]
     ) -> Any:
         page = panel.Template(self.template, location=True)
         document = _document()
@@ -190,11 +190,11 @@ class PageSite:
             section["blocks"] = [{**_BLOCK, **block} for block in section["blocks"]]
         variables = {
             "heading": heading,
-            "here": here,
-            "places": self.places,
+            "here": kind,
+            "places": self.links,
             "sections": sections,
             "style": self.style,
-            "kind": here,
+            "kind": kind,
             "foot": f"asperity {version('asperity')}, {self.opened.name}",
         }
         for name, value in variables.items():

@@ -52,7 +52,7 @@ class ContactSession:
         self.pinned: ContactResult | None = None
         self.trials: list[Trial] = []
         self._queue, self._changed, self._full_queue = queue, changed, full_queue
-        self.pending = False  # the full result of the current settings is not there yet
+        self.pending = False  # the full result of the current settings is not available yet
         self._full_submitted = False
         self._start: ContactSolution | None = None
 

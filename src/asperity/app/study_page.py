@@ -52,20 +52,20 @@ class StudyView:
         )
         self.tiles = text_block(TILE_STYLES)
         self.stale_mark = StaleMark(self.chosen)
-        self._answer: ContactResult | None = None
+        self._solution: ContactResult | None = None
         self._create_choices()
         self._create_figure()
         self.maps = MapImages()
 
     def _create_choices(self) -> None:
-        look: Look = {
+        style: Look = {
             "sizing_mode": "stretch_width",
             "stylesheets": [LOOK],
             "margin": (0, 0, 6, 0),
         }
-        self.x_choice = Select(title="Swept quantity", **look)
-        self.y_choice = Select(title="Output", **look)
-        self.point = Select(title="Contact of the study", **look)
+        self.x_choice = Select(title="Swept quantity", **style)
+        self.y_choice = Select(title="Output", **style)
+        self.point = Select(title="Contact of the study", **style)
         for choice in (self.x_choice, self.y_choice):
             choice.on_change("value", lambda _name, _old, _new: self._draw())
         self.point.on_change("value", lambda _name, _old, new: self._solve(new))
@@ -78,8 +78,8 @@ class StudyView:
         self._means = ColumnDataSource({"x": [], "mean": [], "low": [], "high": []})
         self.figure.scatter("x", "y", source=self._points, size=9, color=BLUE, alpha=0.6)
         self.figure.line("x", "mean", source=self._means, color=VERMILION, line_width=2)
-        ends = {"base": "x", "lower": "low", "upper": "high"}
-        band = Band(**ends, source=self._means, fill_color=VERMILION, fill_alpha=0.18)
+        fields = {"base": "x", "lower": "low", "upper": "high"}
+        band = Band(**fields, source=self._means, fill_color=VERMILION, fill_alpha=0.18)
         self.figure.add_layout(band)
         self._points.selected.on_change("indices", lambda _name, _old, new: self._pick(new))
 
@@ -91,7 +91,7 @@ class StudyView:
     def close(self) -> None:
         """Release the resources of the visit."""
         self._queue.close()
-        self.study = self._answer = None
+        self.study = self._solution = None
 
     def _read(self, result: object) -> None:
         if isinstance(result, JobFailure):
@@ -130,12 +130,12 @@ class StudyView:
         axis = next(axis for axis in study.axes if axis.key == self.x_choice.value)
         entry = quantity(self.y_choice.value)
         column = study.outputs[entry.key]
-        known = np.flatnonzero(np.isfinite(column))
-        self._rows = [int(row) for row in known]
+        finite = np.flatnonzero(np.isfinite(column))
+        self._rows = [int(row) for row in finite]
         self._points.selected.indices = []
         self._points.data = {
-            "x": study.values[axis.key][known],
-            "y": to_display(entry.key, column[known]),
+            "x": study.values[axis.key][finite],
+            "y": to_display(entry.key, column[finite]),
         }
         self._draw_means(entry.key, *study.means[axis.key, entry.key])
         self.figure.xaxis.axis_label = (
@@ -147,8 +147,8 @@ class StudyView:
         self.figure.xaxis.major_label_overrides = ticks
 
     def _draw_means(self, key: str, x: Field, mean: Field, low: Field, high: Field) -> None:
-        """Draw means with their intervals, of no width where one is not known."""
-        lows, highs = (np.where(np.isfinite(ends), ends, mean) for ends in (low, high))
+        """Draw means with their intervals, of zero width where unknown."""
+        lows, highs = (np.where(np.isfinite(limits), limits, mean) for limits in (low, high))
         parts = {"mean": mean, "low": lows, "high": highs}
         displayed = {name: to_display(key, values) for name, values in parts.items()}
         self._means.data = {"x": x, **displayed}
@@ -175,7 +175,7 @@ class StudyView:
             self.chosen.text = sentences([result.message], "alarm")
             return
         assert isinstance(result, ContactResult)
-        self._answer = result
+        self._solution = result
         self._mark(stale=False)
         self.maps.make()
         self.maps.show(result)
@@ -187,8 +187,8 @@ class StudyView:
 
     def _mark(self, *, stale: bool) -> None:
         """Mark numbers and maps as those of the selected point, or of the previous one."""
-        if self._answer is not None:
-            self.tiles.text = tiles(self._answer.tiles, self._answer, None, stale=stale)
+        if self._solution is not None:
+            self.tiles.text = tiles(self._solution.tiles, self._solution, None, stale=stale)
             self.stale_mark.show(stale)
 
     def _address(self, row: int) -> str:

@@ -16,8 +16,8 @@ _UNSAFE = re.compile(r"[^\w.\-]+")
 def safe_name(name: str) -> str:
     """Return a file name without folders and without characters special to shells or HTML."""
     last = re.split(r"[/\\]", name)[-1]
-    safe = _UNSAFE.sub("_", last).lstrip(".-")[-MAX_NAME:].lstrip(".-")
-    return safe or "file"
+    cleaned = _UNSAFE.sub("_", last).lstrip(".-")[-MAX_NAME:].lstrip(".-")
+    return cleaned or "file"
 
 
 class FileDrop(FileDropper):  # type: ignore[misc]

@@ -164,7 +164,10 @@ class InputWidget:
         self.text: Any
         if case_input.choices:
             self.text = Select(
-                title=title, value=case_input.text, options=list(case_input.choices), **self._look()
+                title=title,
+                value=case_input.text,
+                options=list(case_input.choices),
+                **self._style(),
             )
             self.text.on_change("value", self._typed)
             parts = [self.text]
@@ -173,7 +176,7 @@ class InputWidget:
                 title=title,
                 value=case_input.text,
                 description=case_input.meaning or None,
-                **self._look(),
+                **self._style(),
             )
             self.text.on_change("value", self._typed)
             first, last = case_input.positions
@@ -184,7 +187,7 @@ class InputWidget:
                 start=first,
                 end=last,
                 step=1,
-                value=self._place(case_input.text),
+                value=self._slider_position(case_input.text),
                 sizing_mode="stretch_width",
                 stylesheets=[LOOK],
                 margin=(0, 12, 6, 12),
@@ -202,12 +205,12 @@ class InputWidget:
         )
 
     @staticmethod
-    def _look() -> Look:
+    def _style() -> Look:
         return {"sizing_mode": "stretch_width", "stylesheets": [LOOK], "margin": 0}
 
-    def _place(self, text: str) -> int:
-        place = self.case_input.position(text)
-        return self.case_input.positions[0] if place is None else place
+    def _slider_position(self, text: str) -> int:
+        position = self.case_input.position(text)
+        return self.case_input.positions[0] if position is None else position
 
     def show(self, text: str, message: str = "") -> None:
         """Show a value, and the error message of an invalid one."""
@@ -216,10 +219,10 @@ class InputWidget:
             if isinstance(self.text, Select) and text not in self.text.options:
                 self.text.options = [*self.text.options, text]
             self.text.value = text
-        place = self.case_input.position(text) if self.slider is not None else None
-        if self.slider is not None and place is not None:
-            if self.slider.value != place:
-                self.slider.value = place
+        position = self.case_input.position(text) if self.slider is not None else None
+        if self.slider is not None and position is not None:
+            if self.slider.value != position:
+                self.slider.value = position
             tags = [self.slider.tags[0], text]
             if self.slider.tags != tags:
                 self.slider.tags = tags

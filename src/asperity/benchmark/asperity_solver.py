@@ -33,48 +33,48 @@ class AsperitySolver:
     name = "asperity"
     kinds = ("dry", "wave", "ehl", "mixed", "conserving", "moving", "slider")
 
-    def solve(self, given: CaseTable, cells: int) -> dict[str, float]:
+    def solve(self, inputs: CaseTable, cells: int) -> dict[str, float]:
         """Return quantities by key."""
-        return _SOLVES[given["kind"]](given, cells)
+        return _SOLVES[inputs["kind"]](inputs, cells)
 
 
-def _conditions(given: CaseTable, speed: float = 1.0) -> ContactConditions:
-    line = given["geometry"] == "line"
-    radius = given["radius_m"]
+def _conditions(inputs: CaseTable, speed: float = 1.0) -> ContactConditions:
+    line = inputs["geometry"] == "line"
+    radius = inputs["radius_m"]
     return ContactConditions(
-        pair=ElasticPair(tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"])),
-        geometry=given["geometry"],
+        pair=ElasticPair(tuple(inputs["youngs_modulus_pa"]), tuple(inputs["poisson_ratio"])),
+        geometry=inputs["geometry"],
         radius=tuple(radius) if isinstance(radius, list) else radius,
         length=LENGTH if line else None,
-        load=given["line_load_n_m"] * LENGTH if line else given["load_n"],
+        load=inputs["line_load_n_m"] * LENGTH if line else inputs["load_n"],
         surface_speeds=(speed, speed),
     )
 
 
-def waves_on(grid: Grid, given: CaseTable) -> Field:
+def waves_on(grid: Grid, inputs: CaseTable) -> Field:
     """Return the heights of the case's waves [m].
 
     Each wave is (amplitude [m], waves along x and y over the side, phase [rad]).
     """
     x, y = grid.x[:, None], grid.y[None, :]
-    angular_wavenumber = 2.0 * np.pi / given["side_m"]
+    angular_wavenumber = 2.0 * np.pi / inputs["side_m"]
     return np.asarray(
         np.sum(
             [
                 a * np.cos(angular_wavenumber * (kx * x + ky * y) + phase)
-                for a, kx, ky, phase in given["waves"]
+                for a, kx, ky, phase in inputs["waves"]
             ],
             axis=0,
         )
     )
 
 
-def dry_roughness(grid: Grid, given: CaseTable) -> Field:
+def dry_roughness(grid: Grid, inputs: CaseTable) -> Field:
     """Return the heights [m] of a dry ball's or ellipse's roughness: waves, rings, or none."""
-    if "waves" in given:
-        return waves_on(grid, given)
-    if "rings" in given:
-        amplitude, length = given["rings"]
+    if "waves" in inputs:
+        return waves_on(grid, inputs)
+    if "rings" in inputs:
+        amplitude, length = inputs["rings"]
         return np.asarray(
             amplitude * np.cos(2.0 * np.pi * np.hypot(grid.x[:, None], grid.y[None, :]) / length)
         )
@@ -93,21 +93,21 @@ def pressures(pressure: Field, cell_area: float) -> dict[str, float]:
     }
 
 
-def _dry(given: CaseTable, cells: int) -> dict[str, float]:
-    conditions = _conditions(given)
+def _dry(inputs: CaseTable, cells: int) -> dict[str, float]:
+    conditions = _conditions(inputs)
     a, b = conditions.hertz.half_widths
-    if given["geometry"] == "line":
+    if inputs["geometry"] == "line":
         grid = Grid((cells, 8), (-1.5 * a, 0.0), (1.5 * a, 8 * 3.0 * a / cells))
     else:
-        x, y = (given["side_m"] / 2.0,) * 2 if "side_m" in given else (1.5 * a, 1.5 * b)
+        x, y = (inputs["side_m"] / 2.0,) * 2 if "side_m" in inputs else (1.5 * a, 1.5 * b)
         grid = Grid((cells, cells), (-x, -y), (x, y), periodic=(False, False))
-    if given["geometry"] == "line" and "waves" in given:
-        surface = _oiled_waves(given, grid)
+    if inputs["geometry"] == "line" and "waves" in inputs:
+        surface = _oiled_waves(inputs, grid)
     else:
-        surface = Surface(dry_roughness(grid, given), grid)
+        surface = Surface(dry_roughness(grid, inputs), grid)
     solution = solve_contact(conditions, None, surface, options=TIGHT)
     values = pressures(solution.pressure, grid.spacing[0] * grid.spacing[1])
-    if given["geometry"] == "line" and "waves" not in given:
+    if inputs["geometry"] == "line" and "waves" not in inputs:
         values["half_width_m"] = _half_width(grid.x, solution.pressure[:, 0])
     return values
 
@@ -119,12 +119,12 @@ def _half_width(x: Field, pressure: Field) -> float:
     return float(np.sqrt(-level / slope))
 
 
-def _wave(given: CaseTable, cells: int) -> dict[str, float]:
+def _wave(inputs: CaseTable, cells: int) -> dict[str, float]:
     """Solve waves across a wide line contact, whose middle approximates an infinite contact."""
-    pair = ElasticPair(tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"]))
-    length = given["wavelength_m"]
-    amplitude = given["amplitude_m"]
-    p_mean = given["pressure_over_full"] * np.pi * pair.reduced_modulus * amplitude / length
+    pair = ElasticPair(tuple(inputs["youngs_modulus_pa"]), tuple(inputs["poisson_ratio"]))
+    length = inputs["wavelength_m"]
+    amplitude = inputs["amplitude_m"]
+    p_mean = inputs["pressure_over_full"] * np.pi * pair.reduced_modulus * amplitude / length
     a = 30.0 * length
     wide = {
         "geometry": "line",
@@ -134,7 +134,7 @@ def _wave(given: CaseTable, cells: int) -> dict[str, float]:
     grid = Grid((cells, cells), (-1.5 * a, 0.0), (1.5 * a, length))
     heights = np.tile(amplitude * np.cos(2.0 * np.pi * grid.y / length), (cells, 1))
     solution = solve_contact(
-        _conditions({**given, **wide}), None, Surface(heights, grid), options=TIGHT
+        _conditions({**inputs, **wide}), None, Surface(heights, grid), options=TIGHT
     )
     middle = slice(cells // 2 - 1, cells // 2 + 1)
     return {
@@ -143,13 +143,13 @@ def _wave(given: CaseTable, cells: int) -> dict[str, float]:
     }
 
 
-def _oil(given: CaseTable) -> Lubricant:
-    oil = given["oil"]
-    stated = (oil["density"], oil["density_c1_1_pa"], oil["density_c2_1_pa"])
-    if stated != ("dowson-higginson", 0.6e-9, 1.7e-9):
+def _oil(inputs: CaseTable) -> Lubricant:
+    oil = inputs["oil"]
+    density = (oil["density"], oil["density_c1_1_pa"], oil["density_c2_1_pa"])
+    if density != ("dowson-higginson", 0.6e-9, 1.7e-9):
         raise BadInput(
             "the oil's density law must be Dowson and Higginson's with 0.6e-9 and 1.7e-9 1/Pa, "
-            f"got {stated}"
+            f"got {density}"
         )
     viscosity: Barus | Roelands
     if oil["viscosity"] == "barus":
@@ -161,53 +161,53 @@ def _oil(given: CaseTable) -> Lubricant:
     )
 
 
-def _ehl_grid(given: CaseTable, a: float, cells: int) -> Grid:
-    low = given["inlet_half_widths"] * a
-    high = given["outlet_half_widths"] * a
-    if given["geometry"] == "point":
-        side = given["side_half_widths"] * a
+def _ehl_grid(inputs: CaseTable, a: float, cells: int) -> Grid:
+    low = inputs["inlet_half_widths"] * a
+    high = inputs["outlet_half_widths"] * a
+    if inputs["geometry"] == "point":
+        side = inputs["side_half_widths"] * a
         return Grid((cells, cells), (low, -side), (high, side), periodic=(False, False))
-    if "width_m" in given:
-        return Grid((cells, max(8, cells // 4)), (low, 0.0), (high, given["width_m"]))
+    if "width_m" in inputs:
+        return Grid((cells, max(8, cells // 4)), (low, 0.0), (high, inputs["width_m"]))
     return Grid((cells, 8), (low, 0.0), (high, 8 * (high - low) / cells))
 
 
-def _oiled_waves(given: CaseTable, grid: Grid) -> Surface:
+def _oiled_waves(inputs: CaseTable, grid: Grid) -> Surface:
     """Return the surface of waves in a lubricated contact.
 
     Each wave is (amplitude [m], waves per metre along x, waves over the width along y, phase
     [rad]).
     """
     x = grid.x[:, None]
-    y = grid.y[None, :] / given.get("width_m", 1.0)
+    y = grid.y[None, :] / inputs.get("width_m", 1.0)
     heights = [
         a * np.cos(2.0 * np.pi * (wavenumber * x + across * y) + phase)
-        for a, wavenumber, across, phase in given["waves"]
+        for a, wavenumber, across, phase in inputs["waves"]
     ]
     return Surface(np.broadcast_to(np.sum(heights, axis=0), grid.cells).copy(), grid)
 
 
-def _ehl(given: CaseTable, cells: int) -> dict[str, float]:
+def _ehl(inputs: CaseTable, cells: int) -> dict[str, float]:
     """Solve a contact that is smooth, has stationary waves, or conserves oil."""
-    conditions = _conditions(given, float(np.mean(given["surface_speeds_m_s"])))
-    grid = _ehl_grid(given, conditions.hertz.half_widths[0], cells)
-    surface = _oiled_waves(given, grid) if "waves" in given else flat_surface(grid)
+    conditions = _conditions(inputs, float(np.mean(inputs["surface_speeds_m_s"])))
+    grid = _ehl_grid(inputs, conditions.hertz.half_widths[0], cells)
+    surface = _oiled_waves(inputs, grid) if "waves" in inputs else flat_surface(grid)
     options = TIGHT
-    if "touching_film_m" in given:
-        model: ContactModel = "conserving" if given["kind"] == "conserving" else "mixed"
-        options = Options(tolerance=1e-6, contact_film=given["touching_film_m"], model=model)
-    return _films(given, solve_contact(conditions, _oil(given), surface, options=options))
+    if "touching_film_m" in inputs:
+        model: ContactModel = "conserving" if inputs["kind"] == "conserving" else "mixed"
+        options = Options(tolerance=1e-6, contact_film=inputs["touching_film_m"], model=model)
+    return _films(inputs, solve_contact(conditions, _oil(inputs), surface, options=options))
 
 
-def _films(given: CaseTable, solution: ContactSolution) -> dict[str, float]:
+def _films(inputs: CaseTable, solution: ContactSolution) -> dict[str, float]:
     grid = solution.grid
     gap = solution.gap
     pressure = solution.pressure
-    if given["geometry"] == "point":
+    if inputs["geometry"] == "point":
         state = contact_state(solution)
         return {"h_central_m": state.h_central, "h_min_m": state.h_min}
     middle = (
-        gap[:, 0] if grid.y[0] == 0.0 or "width_m" not in given else 0.5 * (gap[:, 0] + gap[:, -1])
+        gap[:, 0] if grid.y[0] == 0.0 or "width_m" not in inputs else 0.5 * (gap[:, 0] + gap[:, -1])
     )
     inside = np.linspace(-1.0, 1.0, 4001) * solution.conditions.hertz.half_widths[0]
     values = {
@@ -217,28 +217,28 @@ def _films(given: CaseTable, solution: ContactSolution) -> dict[str, float]:
         "p_weighted_pa": float((pressure**2).sum() / pressure.sum()),
         "load_share": float((pressure * solution.in_contact).sum() / pressure.sum()),
     }
-    if solution.oil is not None and given["kind"] == "conserving":
-        speed = float(np.mean(given["surface_speeds_m_s"]))
+    if solution.oil is not None and inputs["kind"] == "conserving":
+        speed = float(np.mean(inputs["surface_speeds_m_s"]))
         # at the outlet only entrainment drives the oil
         values["flux_m2_s"] = speed * float((solution.oil.content * gap)[-1].mean())
     return values
 
 
-def _moving(given: CaseTable, cells: int) -> dict[str, float]:
+def _moving(inputs: CaseTable, cells: int) -> dict[str, float]:
     """Solve waves of the first surface that pass through: film at x = 0 over their last period."""
-    speeds = tuple(given["surface_speeds_m_s"])
-    conditions = replace(_conditions(given), surface_speeds=speeds)
+    speeds = tuple(inputs["surface_speeds_m_s"])
+    conditions = replace(_conditions(inputs), surface_speeds=speeds)
     a = conditions.hertz.half_widths[0]
-    grid = _ehl_grid(given, a, cells)
-    surfaces = MovingSurfaces.one_rough(_oiled_waves(given, grid), speeds)
-    ((amplitude, wavenumber, _, _),) = given["waves"]
+    grid = _ehl_grid(inputs, a, cells)
+    surfaces = MovingSurfaces.one_rough(_oiled_waves(inputs, grid), speeds)
+    ((amplitude, wavenumber, _, _),) = inputs["waves"]
     step = grid.spacing[0]
     rough = speeds[0] / float(np.mean(speeds))
     period = round(1.0 / (wavenumber * rough * step))
-    last = round(given["settles_half_widths"] * a / step) + period
+    last = round(inputs["settles_half_widths"] * a / step) + period
     films = []
     for snapshot in islice(
-        moving_contact(conditions, _oil(given), surfaces, options=TIGHT), last + 1
+        moving_contact(conditions, _oil(inputs), surfaces, options=TIGHT), last + 1
     ):
         if not snapshot.solution.convergence.converged:
             raise AsperityError(
@@ -264,20 +264,20 @@ def _min_film(gap: Field) -> float:
     return float(centre - (right - left) ** 2 / (8.0 * bend)) if bend > 0.0 else float(centre)
 
 
-def _slider(given: CaseTable, cells: int) -> dict[str, float]:
-    journal = given["shape"] == "journal"
-    length = 2.0 * np.pi * given["radius_m"] if journal else given["length_m"]
+def _slider(inputs: CaseTable, cells: int) -> dict[str, float]:
+    journal = inputs["shape"] == "journal"
+    length = 2.0 * np.pi * inputs["radius_m"] if journal else inputs["length_m"]
     share = (np.arange(cells) + 0.5) / cells
     if journal:
-        gap = given["clearance_m"] * (1.0 + given["eccentricity"] * np.cos(2.0 * np.pi * share))
+        gap = inputs["clearance_m"] * (1.0 + inputs["eccentricity"] * np.cos(2.0 * np.pi * share))
     else:
-        gap = given["least_m"] * (1.0 + (2.0 * share - 1.0) ** 2)
+        gap = inputs["least_m"] * (1.0 + (2.0 * share - 1.0) ** 2)
     film = solve_film(
         gap,
         spacing=length / cells,
-        entrainment_speed=given["speed_m_s"],
-        viscosity=given["viscosity_pa_s"],
-        boundary=FilmBoundary(ends=tuple(given["pressures_pa"])),
+        entrainment_speed=inputs["speed_m_s"],
+        viscosity=inputs["viscosity_pa_s"],
+        boundary=FilmBoundary(ends=tuple(inputs["pressures_pa"])),
     )
     load = {} if journal else {"load_n_m": float(film.load)}
     return {"p_max_pa": float(film.pressure.max()), "flux_m2_s": float(film.flux.mean()), **load}

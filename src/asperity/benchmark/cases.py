@@ -12,7 +12,7 @@ from asperity.core.errors import BadInput
 CaseTable: TypeAlias = Mapping[str, Any]  # plain SI numbers of a case by key
 
 KINDS = ("dry", "wave", "ehl", "mixed", "conserving", "moving", "slider")
-_IN_PACKAGE = Path(__file__).with_name("cases")  # in a wheel
+_IN_PACKAGE = Path(__file__).with_name("cases")  # of an installed wheel
 _IN_REPOSITORY = Path(__file__).parents[3] / "benchmark" / "cases"
 
 
@@ -54,7 +54,7 @@ def load_benchmark(folder: Path | None = None) -> tuple[BenchmarkCase, ...]:
 
 def _read(path: Path) -> BenchmarkCase:
     try:
-        given = tomllib.loads(path.read_text("utf-8"))
+        inputs = tomllib.loads(path.read_text("utf-8"))
         certified = tuple(
             Certified(
                 entry["quantity"],
@@ -63,9 +63,9 @@ def _read(path: Path) -> BenchmarkCase:
                 float(entry["uncertainty"]),
                 (entry["ways"][0]["by"], entry["ways"][1]["by"]),
             )
-            for entry in given.pop("certified")
+            for entry in inputs.pop("certified")
         )
-        kind = given["kind"]
+        kind = inputs["kind"]
     except (
         tomllib.TOMLDecodeError,
         UnicodeDecodeError,
@@ -81,4 +81,4 @@ def _read(path: Path) -> BenchmarkCase:
         raise BadInput(f"{path}: kind must be one of {', '.join(KINDS)}, got {kind}")
     if any(not math.isfinite(entry.value) or entry.uncertainty <= 0.0 for entry in certified):
         raise BadInput(f"{path}: a value must be finite and its uncertainty positive")
-    return BenchmarkCase(path.stem, kind, given, certified)
+    return BenchmarkCase(path.stem, kind, inputs, certified)

@@ -19,18 +19,18 @@ class DryContactSolver(ABC):
     name: str
     kinds = ("dry", "wave")
 
-    def solve(self, given: CaseTable, cells: int) -> dict[str, float]:
+    def solve(self, inputs: CaseTable, cells: int) -> dict[str, float]:
         """Return quantities by key; none for line contacts (mixed periodicity)."""
         modulus = ElasticPair(
-            tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"])
+            tuple(inputs["youngs_modulus_pa"]), tuple(inputs["poisson_ratio"])
         ).reduced_modulus
-        if given["kind"] == "wave":
-            return self._wave(given, cells, modulus)
-        return {} if given["geometry"] == "line" else self._bounded(given, cells, modulus)
+        if inputs["kind"] == "wave":
+            return self._wave(inputs, cells, modulus)
+        return {} if inputs["geometry"] == "line" else self._bounded(inputs, cells, modulus)
 
-    def _bounded(self, given: CaseTable, cells: int, modulus: float) -> dict[str, float]:
-        load = given["load_n"]
-        radius = given["radius_m"]
+    def _bounded(self, inputs: CaseTable, cells: int, modulus: float) -> dict[str, float]:
+        load = inputs["load_n"]
+        radius = inputs["radius_m"]
         radii = tuple(radius) if isinstance(radius, list) else (radius, radius)
         hertz = (
             elliptic_contact(load, radii, modulus)
@@ -38,22 +38,22 @@ class DryContactSolver(ABC):
             else point_contact(load, radius, modulus)
         )
         a, b = hertz.half_widths
-        x, y = (given["side_m"] / 2.0,) * 2 if "side_m" in given else (1.5 * a, 1.5 * b)
+        x, y = (inputs["side_m"] / 2.0,) * 2 if "side_m" in inputs else (1.5 * a, 1.5 * b)
         grid = Grid((cells, cells), (-x, -y), (x, y), periodic=(False, False))
         heights = -(grid.x[:, None] ** 2) / (2.0 * radii[0]) - grid.y[None, :] ** 2 / (
             2.0 * radii[1]
         )
-        heights = heights + dry_roughness(grid, given)
+        heights = heights + dry_roughness(grid, inputs)
         side = grid.extent[0]
         pressure, _ = self.pressed(
             heights / side, (1.0, grid.extent[1] / side), load / np.prod(grid.extent) / modulus
         )
         return pressures(pressure * modulus, grid.spacing[0] * grid.spacing[1])
 
-    def _wave(self, given: CaseTable, cells: int, modulus: float) -> dict[str, float]:
-        length = given["wavelength_m"]
-        amplitude = given["amplitude_m"]
-        mean = given["pressure_over_full"] * np.pi * amplitude / length
+    def _wave(self, inputs: CaseTable, cells: int, modulus: float) -> dict[str, float]:
+        length = inputs["wavelength_m"]
+        amplitude = inputs["amplitude_m"]
+        mean = inputs["pressure_over_full"] * np.pi * amplitude / length
         wave = amplitude / length * np.cos(2.0 * np.pi * (np.arange(cells) + 0.5) / cells)
         pressure, gap = self.pressed(np.tile(wave, (cells, 1)), (1.0, 1.0), mean, images=True)
         return {

@@ -27,7 +27,7 @@ class BenchmarkRow:
 
     `error` is relative to the certified value; `over_uncertainty` is the error over its
     uncertainty, None if the solver is one of the two methods behind the value; `seconds` is the
-    processor time for the whole case without loading and compilation, the smallest of three if it
+    CPU time for the whole case without loading and compilation, the smallest of three if it
     is under a second.
     """
 
@@ -66,12 +66,12 @@ class BenchmarkResult:
 
     def scalars(self) -> dict[str, object]:
         """Return the result for `--json`."""
-        left = [{"case": case, "reason": reason} for case, reason in self.left_out]
+        omitted = [{"case": case, "reason": reason} for case, reason in self.left_out]
         return {
             "verdict": self.verdict(),
             "solver": self.solver,
             "rows": [asdict(row) for row in self.rows],
-            "left_out": left,
+            "left_out": omitted,
         }
 
     def save(self, path: Path) -> Path:
@@ -142,7 +142,7 @@ def _solved(solver: Solver, case: BenchmarkCase, cells: int) -> Iterator[Benchma
                 entry.uncertainty,
                 deviation / abs(entry.value),
                 None
-                if any(way.lower().startswith(solver.name) for way in entry.ways)
+                if any(method.lower().startswith(solver.name) for method in entry.ways)
                 else deviation / entry.uncertainty,
                 min(seconds),
             )

@@ -29,7 +29,7 @@ class Solver(Protocol):
     name: str
     kinds: Collection[str]
 
-    def solve(self, given: CaseTable, cells: int) -> Mapping[str, float]:
+    def solve(self, inputs: CaseTable, cells: int) -> Mapping[str, float]:
         """Return quantities by key, in SI, of a case solved with this many cells along x."""
         ...
 

@@ -67,8 +67,8 @@ class Case:
 
     # the sections of laws are created at run time, which pickle cannot import
     def __reduce__(self) -> tuple[object, ...]:
-        again = partial(load_case, folder=self.folder, name=self.source, stored=self.stored)
-        return again, (self.text,), {"stored_notes": self.stored_notes}
+        loader = partial(load_case, folder=self.folder, name=self.source, stored=self.stored)
+        return loader, (self.text,), {"stored_notes": self.stored_notes}
 
     @contextmanager
     def naming(self, part: str) -> Iterator[None]:
@@ -146,11 +146,11 @@ class Case:
         if section.chosen and self.stored is not None:
             return self.stored.grid
         x, y = (
-            None if ends is None else (ends[0] * half, ends[1] * half)
-            for ends, half in (
+            None if limits is None else (limits[0] * half, limits[1] * half)
+            for limits, half in (
                 (section.x, a),
                 (section.y, a if line else b),
-            )  # y runs along a line: in a too
+            )  # y of a line contact is in half-widths a too
         )
         if section.cells != "auto" and x is not None and y is not None:
             grid = Grid(section.cells, (x[0], y[0]), (x[1], y[1]), periodic=(False, line))
@@ -248,8 +248,8 @@ class Case:
         overlap, a run only its own: BadInput if more are requested.
         """
         with self.naming("surface"):
-            stated = self.contents.solver.surfaces if count is None else count
-            number = stated or (
+            requested = self.contents.solver.surfaces if count is None else count
+            number = requested or (
                 DEFAULT_SURFACES
                 if self.grid.cells[0] * self.grid.cells[1] <= FINE_GRID
                 else DEFAULT_SURFACES_FINE
@@ -264,7 +264,7 @@ class Case:
             try:
                 available = self.contents.surface.available(self.grid, self.folder)
             except UnreadableFile:
-                if self.stored is None or stated:
+                if self.stored is None or requested:
                     raise
                 # a run stores its surface; the measurement may be missing
                 available = 1
@@ -272,9 +272,9 @@ class Case:
                 part.is_fixed for part in self.contents.surface.parts.values()
             ):
                 return 1
-            if available is not None and stated and stated > available:
+            if available is not None and requested and requested > available:
                 raise BadInput(
-                    f"the measured map holds {available} non-overlapping contacts, got {stated} "
+                    f"the measured map holds {available} non-overlapping contacts, got {requested} "
                     "surfaces to solve; solve fewer, or measure a larger map"
                 )
             return number if available is None else min(number, available)
@@ -321,11 +321,11 @@ class Case:
         return replace(case, stored=self.stored, stored_notes=self.stored_notes) if same else case
 
 
-def _require_beyond_contact(axis: str, ends: tuple[float, float] | None, usual: str) -> None:
-    if ends is not None and not (ends[0] < -1.0 and ends[1] > 1.0):
+def _require_beyond_contact(axis: str, limits: tuple[float, float] | None, usual: str) -> None:
+    if limits is not None and not (limits[0] < -1.0 and limits[1] > 1.0):
         raise BadInput(
-            f"{axis} must reach beyond the contact on both sides, got {ends[0]:g} to "
-            f"{ends[1]:g} half-widths; use {usual}, or leave it out"
+            f"{axis} must reach beyond the contact on both sides, got {limits[0]:g} to "
+            f"{limits[1]:g} half-widths; use {usual}, or leave it out"
         )
 
 

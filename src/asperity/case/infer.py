@@ -23,10 +23,8 @@ class PriorSection(Section):
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:
-        stated = [
-            name for name in ("start", "to", "value", "std") if getattr(self, name) is not None
-        ]
-        if stated not in (["start", "to"], ["value", "std"]):
+        keys = [name for name in ("start", "to", "value", "std") if getattr(self, name) is not None]
+        if keys not in (["start", "to"], ["value", "std"]):
             raise BadInput(
                 "must have from and to, or value and std, such as "
                 '{ value = "0.8 um", std = "0.1 um" }'
@@ -52,7 +50,7 @@ class InferSection(Section):
 
 
 def parse_infer(value: object) -> InferSection | None:
-    """Parse [infer]; quantities stand beside the section's own keys."""
+    """Parse [infer], which has its own keys and keys of quantities."""
     return with_axes(InferSection, value, _ENDS, _prior)
 
 

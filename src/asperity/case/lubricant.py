@@ -57,10 +57,10 @@ class SheetSection(Section):
     @cached_property
     def sheet(self) -> OilSheet:
         """Data sheet; raises BadInput if it is inconsistent."""
-        stated = {name: plain(getattr(self, name)) for name in _SHEET_KEYS}
+        values = {name: plain(getattr(self, name)) for name in _SHEET_KEYS}
         if self.oil is None:
-            return OilSheet(base=self.base, **stated)
-        others = [name for name, value in stated.items() if value is not None]
+            return OilSheet(base=self.base, **values)
+        others = [name for name, value in values.items() if value is not None]
         if others or self.base != "mineral":
             raise BadInput(
                 f"has both oil and {[*others, 'base'][0]}; use oil alone for a measured oil, "

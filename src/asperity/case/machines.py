@@ -206,30 +206,30 @@ class MachineCase:
 
     def contact_table(self, contact: MachineContact) -> dict[str, object]:
         """Return the [contact] table of one of the contacts; BadInput without entrainment."""
-        stated = contact.conditions(self.pair)
+        conditions = contact.conditions(self.pair)
         radii = [
             _written(radius, "m")
-            for radius in (stated.radius_along_rolling, stated.radius_across_rolling)
+            for radius in (conditions.radius_along_rolling, conditions.radius_across_rolling)
         ]
-        length = {} if stated.length is None else {"length": _written(stated.length, "m")}
+        length = {} if conditions.length is None else {"length": _written(conditions.length, "m")}
         return {
-            "geometry": stated.geometry,
-            "radius": radii if stated.geometry == "elliptic" else radii[0],
+            "geometry": conditions.geometry,
+            "radius": radii if conditions.geometry == "elliptic" else radii[0],
             **length,
-            "load": _written(stated.load, "N"),
-            "entrainment_speed": _written(stated.entrainment_speed, "m/s"),
+            "load": _written(conditions.load, "N"),
+            "entrainment_speed": _written(conditions.entrainment_speed, "m/s"),
             # symmetric in the two bodies
             "slip": float(f"{contact.slide_to_roll or 0.0:.{DIGITS}g}"),
         }
 
     def case(self, contact: MachineContact) -> Case:
         """Return the case of one of the contacts; BadInput as `load_case`."""
-        own = {key: table for key, table in self.tables.items() if key not in MACHINE_TABLES}
-        tables = {"material": STEEL, **own}
-        stated = parse_section(
+        sections = {key: table for key, table in self.tables.items() if key not in MACHINE_TABLES}
+        tables = {"material": STEEL, **sections}
+        contents = parse_section(
             CaseFile, {**tables, "contact": self.contact_table(contact)}, self.source
         )
-        return Case(stated, self.folder, self.source)
+        return Case(contents, self.folder, self.source)
 
     def with_overrides(self, overrides: Mapping[str, object]) -> "MachineCase":
         """Return the machine with values replaced, such as `{"machine.torque": "300 N m"}`."""
@@ -268,18 +268,18 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
         )
     if "contact" in tables:
         raise BadInput(f"{source}: has a [machine] and a [contact]; leave one of them out")
-    known = {key: tables[key] for key in _MachineTables.model_fields if key in tables}
-    stated = parse_section(_MachineTables, {"material": STEEL, **known}, source)
-    section = stated.machine
-    material = stated.material
+    present = {key: tables[key] for key in _MachineTables.model_fields if key in tables}
+    parsed = parse_section(_MachineTables, {"material": STEEL, **present}, source)
+    section = parsed.machine
+    material = parsed.material
     pair = ElasticPair(plain(material.youngs_modulus), material.poisson_ratio)
-    given = {
+    arguments = {
         name: plain(getattr(section, name)) for name in type(section).model_fields if name != "kind"
     }
     try:
-        machine = MACHINES[section.kind][1](**given)
-        stated.rating.require_applicable(section.kind)
-        machine_case = MachineCase(tables, machine, pair, stated.rating, folder, source)
+        machine = MACHINES[section.kind][1](**arguments)
+        parsed.rating.require_applicable(section.kind)
+        machine_case = MachineCase(tables, machine, pair, parsed.rating, folder, source)
         drawn = [contact for contact in machine_case.contacts if not contact.stands_still]
     except BadInput as refusal:
         raise BadInput(f"{source}: machine: {refusal}") from None

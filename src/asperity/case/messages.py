@@ -90,12 +90,12 @@ def with_axes(
         return None
     if not isinstance(value, Mapping):
         raise BadInput(f"must be a table, got {quoted(value)}")
-    known = set(model.model_fields) - {"axes"}
-    stated = {
-        key: tuple(v) if isinstance(v, list) else v for key, v in value.items() if key in known
+    fields = set(model.model_fields) - {"axes"}
+    settings = {
+        key: tuple(v) if isinstance(v, list) else v for key, v in value.items() if key in fields
     }
-    axes = dict(_axes({key: v for key, v in value.items() if key not in known}, own, read))
-    return validated(model, {**stated, "axes": axes})
+    axes = dict(_axes({key: v for key, v in value.items() if key not in fields}, own, read))
+    return validated(model, {**settings, "axes": axes})
 
 
 def _axes(
@@ -122,15 +122,17 @@ def choose(key: str, sections: Callable[[], Mapping[str, type[S]]], value: objec
     table = {key: value} if isinstance(value, str) else value
     if not isinstance(table, Mapping):
         raise BadInput(f"must be a table with the key {key}, got {quoted(value)}")
-    known = sections()
+    choices = sections()
     if key not in table:
-        raise LocatedError((key,), f"is missing; choose one of {', '.join(known)}")
+        raise LocatedError((key,), f"is missing; choose one of {', '.join(choices)}")
     name = table[key]
-    if not isinstance(name, str) or name not in known:
-        matches = get_close_matches(str(name), known, n=1)
+    if not isinstance(name, str) or name not in choices:
+        matches = get_close_matches(str(name), choices, n=1)
         remedy = f'; did you mean "{matches[0]}"?' if matches else ""
-        raise LocatedError((key,), f"must be one of {', '.join(known)}, got {quoted(name)}{remedy}")
-    return validated(known[name], table)
+        raise LocatedError(
+            (key,), f"must be one of {', '.join(choices)}, got {quoted(name)}{remedy}"
+        )
+    return validated(choices[name], table)
 
 
 def _first_error(model: type[Section], error: ValidationError) -> LocatedError:
@@ -139,16 +141,16 @@ def _first_error(model: type[Section], error: ValidationError) -> LocatedError:
     entry = next((m for m in errors if m["type"] == "extra_forbidden"), errors[0])
     keys = entry["loc"]
     kind = entry["type"]
-    given = entry["input"]
+    value = entry["input"]
     cause = entry.get("ctx", {}).get("error")
     if isinstance(cause, LocatedError):
         return LocatedError(keys + cause.keys, cause.message)
     if isinstance(cause, BadInput):
         return LocatedError(keys, str(cause))
     if kind == "extra_forbidden":
-        known = _keys_of(model, keys[:-1])
-        matches = get_close_matches(str(keys[-1]), known, n=1)
-        remedy = f"did you mean {matches[0]}?" if matches else f"known here: {', '.join(known)}"
+        valid = _keys_of(model, keys[:-1])
+        matches = get_close_matches(str(keys[-1]), valid, n=1)
+        remedy = f"did you mean {matches[0]}?" if matches else f"known here: {', '.join(valid)}"
         return LocatedError(keys, f"is not a known key; {remedy}")
     if kind == "missing":
         return LocatedError(keys, "is missing; add it")
@@ -156,7 +158,7 @@ def _first_error(model: type[Section], error: ValidationError) -> LocatedError:
     if expected.startswith("be a valid dictionary"):
         expected = "be a table"
     expected = expected.replace("'", '"').replace("a valid tuple", "a list")
-    return LocatedError(keys, f"must {expected}, got {quoted(given)}{remedy_for(given)}")
+    return LocatedError(keys, f"must {expected}, got {quoted(value)}{remedy_for(value)}")
 
 
 def _keys_of(model: type[Section], keys: tuple[str | int, ...]) -> list[str]:

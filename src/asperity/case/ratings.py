@@ -33,9 +33,9 @@ class RatingSection(Section):
 
     def require_applicable(self, machine: str) -> None:
         """Raise BadInput for keys that do not apply to this kind of machine."""
-        foreign: tuple[str, ...] = () if machine == "spur-gear" else OF_GEARS
-        foreign += () if machine.endswith("-bearing") else OF_BEARINGS
-        for key in foreign:
+        inapplicable: tuple[str, ...] = () if machine == "spur-gear" else OF_GEARS
+        inapplicable += () if machine.endswith("-bearing") else OF_BEARINGS
+        for key in inapplicable:
             if key in self.model_fields_set:
                 raise BadInput(f"rating.{key} does not apply to a {machine}; leave it out")
         if self.contamination is not None and not 0.0 <= self.contamination <= 1.0:

@@ -31,10 +31,10 @@ class ShapeSection(Section):
 
     @model_validator(mode="after")
     def _one_logarithm(self) -> Self:
-        given = [key for key in LOGARITHMS if getattr(self, key) is not None]
-        if len(given) > 1:
+        names = [key for key in LOGARITHMS if getattr(self, key) is not None]
+        if len(names) > 1:
             raise BadInput(
-                f"has {given[0]} and {given[1]}, which both define the logarithmic profile; leave "
+                f"has {names[0]} and {names[1]}, which both define the logarithmic profile; leave "
                 "one of them out"
             )
         if self.end_drop is not None and self.amplitude is None:

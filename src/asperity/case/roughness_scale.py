@@ -51,15 +51,15 @@ Arguments: TypeAlias = dict[str, Any]  # of a generator of surfaces, by name
 
 
 def _correlated(arguments: Arguments) -> Texture:
-    return _turned(arguments["sq"], arguments["correlation_length"], arguments["direction"])
+    return _texture(arguments["sq"], arguments["correlation_length"], arguments["direction"])
 
 
 def _ground(arguments: Arguments) -> Texture:
     grooves = arguments["groove_length"], arguments["groove_width"]
-    return _turned(arguments["sq"], grooves, arguments["direction"], GROOVE)
+    return _texture(arguments["sq"], grooves, arguments["direction"], GROOVE)
 
 
-def _turned(sq: float, sizes: Pair, direction: float, shares: Pair = (1.0, 1.0)) -> Texture:
+def _texture(sq: float, sizes: Pair, direction: float, shares: Pair = (1.0, 1.0)) -> Texture:
     """Return scales along a direction; `shares` of the sizes are correlation lengths.
 
     The domain holds at least two of each size.
@@ -123,12 +123,12 @@ def _measured(section: FileSection, folder: Path) -> Texture:
     ]
     return Texture(
         sq=sq,
-        lengths=(_known(lengths[0]), _known(lengths[1])),
+        lengths=(_length_or_inf(lengths[0]), _length_or_inf(lengths[1])),
         most=(extents[0], extents[1]) if section.fit == "crop" else (math.inf, math.inf),
     )
 
 
-def _known(length: float) -> float:
+def _length_or_inf(length: float) -> float:
     return math.inf if math.isnan(length) else length
 
 

@@ -70,9 +70,9 @@ def _parse_cells(value: object) -> Literal["auto"] | tuple[int, int]:
         return "auto"
     if not isinstance(value, list | tuple) or len(value) != 2:
         raise BadInput(f'must be a list of two such as [256, 128], or "auto", got {quoted(value)}')
-    for place, count in enumerate(value):
+    for index, count in enumerate(value):
         if type(count) is not int:
-            raise LocatedError((place,), f"must be a whole number, got {quoted(count)}")
+            raise LocatedError((index,), f"must be a whole number, got {quoted(count)}")
     return value[0], value[1]
 
 

@@ -51,7 +51,7 @@ class StudySection(Section):
 
 
 def parse_study(value: object) -> StudySection | None:
-    """Parse [study]; quantities stand beside its own keys."""
+    """Parse [study], which has its own keys and keys of quantities."""
     return with_axes(StudySection, value, {"from", "to", "step", "count"}, _values)
 
 

@@ -220,16 +220,16 @@ class GeneratedSection(SurfaceSection):
         if self.kind not in ("gaussian", "non-gaussian"):
             return ()
         arguments = self.arguments()
-        stated = arguments["correlation_length"]
+        nominal = arguments["correlation_length"]
         lengths = correlation_lengths(surface, arguments["direction"])
         if all(
             abs(sample / mean - 1.0) <= SAMPLE_DEVIATION
-            for sample, mean in zip(lengths, stated, strict=True)
+            for sample, mean in zip(lengths, nominal, strict=True)
         ):
             return ()
         return (
             f"The correlation lengths of this sample are {area_text(lengths)}, "
-            f"{area_text(stated)} were requested: the domain holds few correlation lengths, so "
+            f"{area_text(nominal)} were requested: the domain holds few correlation lengths, so "
             "samples scatter with the seed.",
         )
 

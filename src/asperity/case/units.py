@@ -144,10 +144,10 @@ def _common(unit_text: str) -> tuple[str, str] | None:
 @lru_cache(4096)  # a case has forty quantities, and a study repeats most of them a thousand times
 def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
     """Convert a number of `unit_text` to `unit`; None is the SI unit of its kind."""
-    own = _common(unit_text)
+    source = _common(unit_text)
     target = _common(unit_text if unit is None else unit)
-    if own is not None and target is not None and own[0] == target[0]:
-        return Decimal(number) * Decimal(own[1]) / (1 if unit is None else Decimal(target[1]))
+    if source is not None and target is not None and source[0] == target[0]:
+        return Decimal(number) * Decimal(source[1]) / (1 if unit is None else Decimal(target[1]))
     import pint
 
     try:
@@ -260,12 +260,12 @@ def split_amount(value: object, unit: str | None = None) -> tuple[Decimal, str]:
     parts = (str(value), "") if bare else _split(value)
     if parts is None:
         raise BadInput(f'must be a number, or a quantity such as "0.5 um", got {quoted(value)}')
-    number, own = parts
-    if unit is None or own == unit:
-        return Decimal(number), own
+    number, written_unit = parts
+    if unit is None or written_unit == unit:
+        return Decimal(number), written_unit
     try:
-        if own and unit:
-            return _convert(number, own, unit), unit
+        if written_unit and unit:
+            return _convert(number, written_unit, unit), unit
     except _UnusableUnit:
         pass
     raise BadInput(

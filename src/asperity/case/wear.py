@@ -62,15 +62,15 @@ class WearSection(_Mechanisms):  # type: ignore[misc]  # with the keys of MECHAN
 
     def model(self, conditions: ContactConditions, boundary_friction: float) -> WearModel:
         """Return the wear model of the bodies of a contact."""
-        law = _made(self.law, REMOVAL_LAWS)
+        law = _build_law(self.law, REMOVAL_LAWS)
 
-        def coefficient(stated: object) -> WearCoefficient:
-            if not isinstance(stated, str):
-                known = WearCoefficient.from_value(plain(stated), self.scatter)
+        def coefficient(value: object) -> WearCoefficient:
+            if not isinstance(value, str):
+                result = WearCoefficient.from_value(plain(value), self.scatter)
                 # refuses a law that cannot wear
-                law.equivalent_coefficient(known.k, boundary_friction if known.k else 1.0)
-                return known
-            middle = WearCoefficient.from_severity(stated, conditions.hardness)  # type: ignore[arg-type]
+                law.equivalent_coefficient(result.k, boundary_friction if result.k else 1.0)
+                return result
+            middle = WearCoefficient.from_severity(value, conditions.hardness)  # type: ignore[arg-type]
             return WearCoefficient(
                 law.equivalent_coefficient(middle.k, boundary_friction), middle.low, middle.high
             )
@@ -84,7 +84,7 @@ class WearSection(_Mechanisms):  # type: ignore[misc]  # with the keys of MECHAN
             coefficients=(first, second),
             flattening=self.flattening,
             mechanisms={
-                name: _made(section, MECHANISMS[name])
+                name: _build_law(section, MECHANISMS[name])
                 for name, section in chosen.items()
                 if section is not None
             },
@@ -107,6 +107,6 @@ def _require_circumference(
             )
 
 
-def _made(section: Section, table: Mapping[str, Callable[..., Made]]) -> Made:
+def _build_law(section: Section, table: Mapping[str, Callable[..., Made]]) -> Made:
     described = law_description(section)
     return table[str(described.pop("law"))](**described)

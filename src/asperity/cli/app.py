@@ -66,9 +66,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _print_error(sentence: str, code: int) -> int:
-    shown = printable(sentence)
+    text = printable(sentence)
     print(
-        f"error: {shown if len(shown) <= MAX_ERROR else f'{shown[: MAX_ERROR - 3]}...'}",
+        f"error: {text if len(text) <= MAX_ERROR else f'{text[: MAX_ERROR - 3]}...'}",
         file=sys.stderr,
     )
     return code
@@ -95,9 +95,9 @@ def _plain(error: UnicodeError) -> tuple[str, int]:
 
 def _name(sign: str) -> str:
     """Return the name of a Greek letter, or the decomposition of another character."""
-    known = unicodedata.name(sign, "")
-    if known.startswith("GREEK SMALL LETTER"):
-        return known.split()[-1].lower()
+    unicode_name = unicodedata.name(sign, "")
+    if unicode_name.startswith("GREEK SMALL LETTER"):
+        return unicode_name.split()[-1].lower()
     return unicodedata.normalize("NFKD", sign).encode("ascii", "ignore").decode() or "?"
 
 

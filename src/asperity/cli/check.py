@@ -137,6 +137,6 @@ def _summary(checks: "RecordingChecks") -> Block:
         ["recording", *(entry.label for entry in selected), "unit", ""], rows, left=1
     )
     for sentence, names in holders.items():
-        everywhere = len(names) == len(checks.checked)
-        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-        yield f"  note: {sentence} ({'all' if everywhere else '; '.join(names[:3]) + more})"
+        universal = len(names) == len(checks.checked)
+        others = f" and {len(names) - 3} more" if len(names) > 3 else ""
+        yield f"  note: {sentence} ({'all' if universal else '; '.join(names[:3]) + others})"

@@ -17,7 +17,7 @@ from asperity.cli.options import (
     chosen_case,
     require_output,
 )
-from asperity.cli.output import Block, SolverSteps, known, progress, show, table, text
+from asperity.cli.output import Block, SolverSteps, known_rows, progress, show, table, text
 from asperity.core import files, processes
 from asperity.core.errors import AsperityError
 from asperity.core.quantities import quantity
@@ -102,16 +102,16 @@ def solve(
         chosen = chosen.with_overrides({"solver.surfaces": surfaces})
     if dynamic and not chosen.contents.solver.dynamic:
         chosen = chosen.with_overrides({"solver.dynamic": results.FREQUENCIES})
-    shown = () if quiet else results.SHORT_GROUPS
-    groups = shown if out is None and not as_json else results.RUN_GROUPS
+    displayed = () if quiet else results.SHORT_GROUPS
+    groups = displayed if out is None and not as_json else results.RUN_GROUPS
     run = _solve(chosen, label=path.name, quiet=quiet, surfaces=None, groups=groups)
     if out is not None:
         run.save(out)
     saved = [] if out is None else [f"Saved in {out}; asperity report {out} writes a page of it"]
     show(run.verdict(), run.summary, run_table(run), saved, as_json=as_json, quiet=quiet)
     if not run.solution.convergence.converged:
-        where = f"; the unfinished state is in {out}" if out is not None else ""
-        raise AsperityError(f"not converged: {run.solution.convergence.explain()}{where}")
+        location = f"; the unfinished state is in {out}" if out is not None else ""
+        raise AsperityError(f"not converged: {run.solution.convergence.explain()}{location}")
 
 
 def _solve(
@@ -141,7 +141,7 @@ def run_table(run: "Run") -> Block:
     """Return the rows of a run: numbers of the catalogue, solver status, and notes."""
     touching = 0.0 if run.solution.lubricant is None else run.solution.options.contact_film
     rows = [
-        *known(run.scalars()),
+        *known_rows(run.scalars()),
         *results.uncertainty_rows(run.error),
         (quantity("contact_film_m").title, text("contact_film_m", touching)),
         ("cells", " x ".join(map(str, run.solution.grid.cells))),

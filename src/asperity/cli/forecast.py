@@ -20,8 +20,8 @@ EMULATING = "solving contacts for the emulator; once per case ..."
 def require_forecast(forecast: str | None, **only_with: object) -> None:
     """Raise BadInput for options that need `--forecast`."""
     reasons = {"worn": "is the prior for the drift of Sq", "emulator": "is used for forecasts"}
-    for name, given in only_with.items():
-        if given is not None and forecast is None:
+    for name, value in only_with.items():
+        if value is not None and forecast is None:
             raise BadInput(f"--{name} {reasons[name]}; add --forecast")
 
 
@@ -62,8 +62,8 @@ def contacts_solved(*, quiet: bool) -> "Iterator[Callable[[StudyProgress], None]
     with progress("emulator", EMULATING, quiet=quiet) as display:
 
         def step(state: "StudyProgress") -> None:
-            left = state.seconds_left
-            remaining = "" if left is None else f", {left:.0f} s left"
+            remaining_s = state.seconds_left
+            remaining = "" if remaining_s is None else f", {remaining_s:.0f} s left"
             display(
                 f"{state.kept + state.done} of {state.total} contacts{remaining}",
                 state.kept + state.done,

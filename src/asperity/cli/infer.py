@@ -119,21 +119,21 @@ def infer(
     case_file = _required(
         case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design
     )
-    setting, known = _setting(case_file, overrides, surface)
+    setting, surface_notes = _setting(case_file, overrides, surface)
     limit = _limit(forecast, setting, worn)
     history = None if worn is None else simulation.load_wear(worn)
     require_output(page, ".html", option="--report")
     source = _source(table_file, band, rate, unit, channel, scale, shaft, method)
     count = workers or processes.cores()
     observations = _observe(paths, setting, source, count, quiet=quiet)
-    answering = emulated(setting, emulator, count, quiet=quiet)
+    initial = emulated(setting, emulator, count, quiet=quiet)
     forecaster = partial(_forecast, setting, observations, limit, history, seed)
-    ahead = forecaster(answering)
-    now = _latest(observations, ahead, known)
-    found = _infer(setting, answering, now, sampler, seed, extend, count, quiet=quiet)
-    if found.emulator is not answering:
-        ahead = forecaster(found.emulator)
-    _show(found, ahead, design, page, as_json=as_json, quiet=quiet)
+    ahead = forecaster(initial)
+    latest = _latest(observations, ahead, surface_notes)
+    result = _infer(setting, initial, latest, sampler, seed, extend, count, quiet=quiet)
+    if result.emulator is not initial:
+        ahead = forecaster(result.emulator)
+    _show(result, ahead, design, page, as_json=as_json, quiet=quiet)
 
 
 def _infer(
@@ -149,9 +149,9 @@ def _infer(
 ) -> "Inference":
     """Infer the state, and again after `extend` contacts were added where the posterior lies."""
     by = cast("Sampler", sampler)
-    found = inference.infer_series(setting, emulator, observations, sampler=by, seed=seed)
+    result = inference.infer_series(setting, emulator, observations, sampler=by, seed=seed)
     with contacts_solved(quiet=quiet) as step:
-        return inference.refine_emulator(found, extend, sampler=by, workers=workers, progress=step)
+        return inference.refine_emulator(result, extend, sampler=by, workers=workers, progress=step)
 
 
 def _limit(forecast: str | None, setting: "Setting", worn: Path | None) -> "Limit | None":
@@ -259,7 +259,7 @@ def _setting(
 
 
 def _show(
-    found: "Inference",
+    result: "Inference",
     ahead: "Forecast | None",
     design: float | None,
     page: Path | None,
@@ -270,25 +270,25 @@ def _show(
     """Print verdicts and tables, or all as JSON; exit with the alarm's code if there is one."""
     designed = None
     if design is not None:
-        designed = inference.design_contact(found.forward, found.draws.z, clr=design)
+        designed = inference.design_contact(result.forward, result.draws.z, clr=design)
     if page is not None:
-        report.write_inference_report(found, page, forecast=ahead, design=designed)
-    verdicts = [result.sentence() for result in (ahead, designed) if result is not None]
-    further = {
+        report.write_inference_report(result, page, forecast=ahead, design=designed)
+    verdicts = [outcome.sentence() for outcome in (ahead, designed) if outcome is not None]
+    extras = {
         "forecast": None if ahead is None else ahead.scalars(),
         "design": None if designed is None else designed.scalars(),
         "report": None if page is None else str(page),
     }
     blocks = (
-        _posterior(found),
-        _points(found),
-        _models(found),
-        _notes(found),
+        _posterior(result),
+        _points(result),
+        _models(result),
+        _notes(result),
         written("report", page),
     )
     show(
-        [*verdicts, found.verdict()],
-        lambda: found.scalars() | further,
+        [*verdicts, result.verdict()],
+        lambda: result.scalars() | extras,
         *blocks,
         as_json=as_json,
         quiet=quiet,
@@ -297,11 +297,11 @@ def _show(
         raise typer.Exit(EXIT_CODES["alarm"])
 
 
-def _posterior(found: "Inference") -> Block:
+def _posterior(result: "Inference") -> Block:
     """Return a row per quantity: median, interval with and without the law's error, information."""
-    exact = found.posterior(discrepancy=False)
+    exact = result.posterior(discrepancy=False)
     rows = []
-    for key, estimate in found.posterior().items():
+    for key, estimate in result.posterior().items():
         entry = quantity(key)
         rows.append(
             [
@@ -313,7 +313,7 @@ def _posterior(found: "Inference") -> Block:
                 "" if estimate.learnt else "as assumed",
             ]
         )
-    point = found.forward.points[0]
+    point = result.forward.points[0]
     speed = quantity("entrainment_speed_m_s").text(point.entrainment_m_s)
     yield from columns(
         [
@@ -329,19 +329,19 @@ def _posterior(found: "Inference") -> Block:
     )
 
 
-def _points(found: "Inference") -> Block:
+def _points(result: "Inference") -> Block:
     """Return a row per recorded operating point."""
-    rows = [point.cells() for point in found.point_estimates()]
+    rows = [point.cells() for point in result.point_estimates()]
     if rows:
-        yield from columns(found.point_estimates()[0].HEADS, rows)
+        yield from columns(result.point_estimates()[0].HEADS, rows)
 
 
-def _notes(found: "Inference") -> Block:
+def _notes(result: "Inference") -> Block:
     """Return warnings, assumptions and the emulator's accuracy."""
-    return table([], (*found.warnings(), *found.notes, found.emulator.sentence()))
+    return table([], (*result.warnings(), *result.notes, result.emulator.sentence()))
 
 
-def _models(found: "Inference") -> Block:
+def _models(result: "Inference") -> Block:
     """Return a row per model: law, with or without its error, evidence and probability."""
     rows = [
         [
@@ -350,6 +350,6 @@ def _models(found: "Inference") -> Block:
             quantity("log_evidence").number(model.log_evidence, model.log_evidence_std),
             quantity("model_probability").text(model.probability),
         ]
-        for model in found.models
+        for model in result.models
     ]
     yield from columns(["law of the spring", "", "ln evidence", "probability"], rows, left=2)

@@ -105,29 +105,29 @@ def _ratings(result: "MachineResult") -> Iterator[Row]:
     """Return the ratings of the machine; ranges for those along the path of contact."""
     for rating in result.ratings:
         entry = quantity(rating.key)
-        known = [value for value in rating.values.values() if value is not None]
-        beyond = f"; outside its range: {rating.beyond}" if rating.beyond else ""
+        values = [value for value in rating.values.values() if value is not None]
+        outside = f"; outside its range: {rating.beyond}" if rating.beyond else ""
         if rating.reason:
             yield entry.title, f"not rated: {rating.reason}"
         elif rating.machine_value is not None:
-            yield entry.title, f"{entry.text(rating.machine_value)}  ({rating.standard}{beyond})"
+            yield entry.title, f"{entry.text(rating.machine_value)}  ({rating.standard}{outside})"
         else:
             yield (
                 entry.title,
-                f"{entry.number(min(known))} to {entry.text(max(known))}  "
-                f"({rating.standard}{beyond})",
+                f"{entry.number(min(values))} to {entry.text(max(values))}  "
+                f"({rating.standard}{outside})",
             )
 
 
 def _contacts(result: "MachineResult") -> Block:
     """Return a row per contact, including both sides of a load zone."""
-    shown = [(key, quantity(name)) for key, name in CONDITIONS]
+    heads = [(key, quantity(name)) for key, name in CONDITIONS]
     if result.solved:
         solved_keys = [key for key in SOLVED if any(row[key] is not None for row in result.rows)]
-        shown += [(key, quantity(key)) for key in solved_keys]
+        heads += [(key, quantity(key)) for key in solved_keys]
     return columns(
-        ["contact", *(entry.label for _, entry in shown)],
-        ([row["name"], *(_number(row, key, entry) for key, entry in shown)] for row in result.rows),
+        ["contact", *(entry.label for _, entry in heads)],
+        ([row["name"], *(_number(row, key, entry) for key, entry in heads)] for row in result.rows),
         left=1,
     )
 

@@ -116,9 +116,9 @@ def _steps_shown(label: str, *, quiet: bool) -> "Iterator[Callable[[HistoryProgr
     clr = quantity("clr")
     with progress(label, COMPILES, quiet=quiet) as display:
 
-        def step(taken: "HistoryProgress") -> None:
-            share = f"{clr.short} {clr.text(taken.row['clr'])}"
-            display(f"step {taken.number} of {taken.steps}, {share}", taken.number, taken.steps)
+        def step(state: "HistoryProgress") -> None:
+            share = f"{clr.short} {clr.text(state.row['clr'])}"
+            display(f"step {state.number} of {state.steps}, {share}", state.number, state.steps)
 
         yield step
 

@@ -330,7 +330,7 @@ def require_output(path: Path | None, *suffixes: str, option: str = "--out") -> 
     if path is None:
         return
     if path.suffix.lower() not in suffixes:
-        *most, last = suffixes
-        allowed = f"{', '.join(most)} or {last}" if most else last
+        *first, last = suffixes
+        allowed = f"{', '.join(first)} or {last}" if first else last
         raise BadInput(f"{option} must be a file that ends in {allowed}, got {path}")
     files.require_writable(path)

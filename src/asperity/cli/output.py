@@ -77,7 +77,7 @@ def columns(titles: Sequence[str], rows: Iterable[Sequence[str]], *, left: int =
         yield f"  {'  '.join(aligned)}".rstrip()
 
 
-def known(values: Table, *groups: str) -> list[Row]:
+def known_rows(values: Table, *groups: str) -> list[Row]:
     """Return the numbers of `values` that the catalogue shows, of some of its groups or of all."""
     groups = groups or tuple({entry.group for entry in catalogue().values()})
     return [
@@ -90,9 +90,9 @@ def text(key: str, value: float | str | None) -> str:
     return quantity(key).text(value)
 
 
-def span(key: str, ends: Sequence[float]) -> str:
+def span(key: str, limits: Sequence[float]) -> str:
     """Return a range of a quantity, with its unit."""
-    low, high = ends
+    low, high = limits
     return f"{quantity(key).number(low)} to {text(key, high)}"
 
 
@@ -186,8 +186,8 @@ class SolverSteps:
         """Show a Newton iteration; not the start, which precedes compilation."""
         if iteration.number > 0:
             nx, ny = iteration.cells
-            words = f"{nx} x {ny} cells, step {iteration.number}, residual {iteration.residual:.1e}"
-            self.display(words, self.done, self.total)
+            text = f"{nx} x {ny} cells, step {iteration.number}, residual {iteration.residual:.1e}"
+            self.display(text, self.done, self.total)
 
     def surface(self, done: int, total: int) -> None:
         """Show a completed surface."""

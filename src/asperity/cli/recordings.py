@@ -74,7 +74,7 @@ Once = Annotated[
     bool, typer.Option("--once", help="Process the present recordings and end, for cron.")
 ]
 PollInterval = Annotated[
-    float, typer.Option(metavar="SECONDS", min=0.05, help="Time between two looks into the folder.")
+    float, typer.Option(metavar="SECONDS", min=0.05, help="Interval between checks of the folder.")
 ]
 SettleTime = Annotated[
     float, typer.Option(metavar="SECONDS", min=0.0, help="Time for which a file must be unchanged.")

@@ -9,7 +9,7 @@ import typer
 from asperity import case, paper, simulation
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, case_at
-from asperity.cli.output import Row, known, progress, show, span, table
+from asperity.cli.output import Row, known_rows, progress, show, span, table
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 
@@ -140,7 +140,7 @@ def _rows(simulated: "paper.Rig", out: Path) -> list[Row]:
     )
     return [
         (quantity("band_hz").title, span("band_hz", simulated.band_hz)),
-        *known({"full_load_crf_hz": simulated.full_load_crf_hz}),
+        *known_rows({"full_load_crf_hz": simulated.full_load_crf_hz}),
         ("SNR in that band", noise),
         ("truth", str(out / "truth.csv")),
     ]

@@ -138,12 +138,12 @@ def _sample_size(method: str, trajectories: int | None, samples: int | None) -> 
         raise BadInput(f"--method must be morris or sobol, got {method}")
     size, other = (trajectories, samples) if method == "morris" else (samples, trajectories)
     if other is not None:
-        wrong, right = (
+        refused, usable = (
             ("--samples", "--trajectories")
             if method == "morris"
             else ("--trajectories", "--samples")
         )
-        raise BadInput(f"{wrong} does not apply to --method {method}; use {right}")
+        raise BadInput(f"{refused} does not apply to --method {method}; use {usable}")
     return size
 
 
@@ -232,14 +232,14 @@ def calibrate(
     quiet: Quiet = False,
 ) -> None:
     """Fit free quantities so that the wear curve meets anchors, and report what stays open."""
-    aims = paper.PAPER_ANCHORS if anchors is None else paper.load_anchors(anchors)
+    targets = paper.PAPER_ANCHORS if anchors is None else paper.load_anchors(anchors)
     chosen = chosen_case(path, overrides)
     if out is not None:
         files.make_folder(out)
     with study_progress(chosen.source, quiet=quiet) as step:
         result = study.calibrate(
             chosen,
-            aims,
+            targets,
             settings=study.CalibrationSettings(
                 free=free,
                 levels=lengths("--level", level),
@@ -291,19 +291,19 @@ def _parameters(result: "Calibration") -> Block:
     for row in result.scalars()["parameters"]:
         start = "none" if row["start"] is None else f"{row['start']:.4g}"
         value = f"{row['value']:.4g} {row['unit']}".rstrip()
-        known = (
+        interval = (
             f"({row['low']:.4g} to {row['high']:.4g}; was {start}), "
             f"learnt {100 * row['learnt']:.0f} %"
         )
         undetermined = "" if row["identifiable"] else ", NOT DETERMINED"
-        yield f"    {row['key']:28}  {value} {known}{undetermined}"
+        yield f"    {row['key']:28}  {value} {interval}{undetermined}"
 
 
 def _anchors(result: "Calibration") -> Block:
     """Return target values, and those of the case as given, of the fit and of its check."""
     values = result.scalars()
-    given, check = ({row["anchor"]: row for row in values[name]} for name in ("start", "check"))
-    aimed = {anchor.name for anchor in result.aimed_at}
+    original, check = ({row["anchor"]: row for row in values[name]} for name in ("start", "check"))
+    fitted = {anchor.name for anchor in result.aimed_at}
     yield (
         f"  misfit {values['misfit']:.3g} (was {values['start_misfit']:.3g}): "
         "sum of squared deviations in tolerances"
@@ -311,12 +311,14 @@ def _anchors(result: "Calibration") -> Block:
     rows = []
     for row in values["fit"]:
         name = row["anchor"]
-        if name in given and name in check:
+        if name in original and name in check:
             mean, low, high = (_number(check[name][key]) for key in ("ours", "low", "high"))
             numbers = [
-                _number(value) for value in (row["printed"], given[name]["ours"], row["ours"])
+                _number(value) for value in (row["printed"], original[name]["ours"], row["ours"])
             ]
-            rows.append(["*" if name in aimed else "", name, *numbers, f"{mean} ({low} to {high})"])
+            rows.append(
+                ["*" if name in fitted else "", name, *numbers, f"{mean} ({low} to {high})"]
+            )
     titles = ["", "", "target", "as given", "fitted", "checked (90 % over surfaces)"]
     yield from columns(titles, rows, left=2)
     yield "  * fitted; checked: on the case's own grid, on surfaces not used in the fit"
@@ -334,8 +336,8 @@ def _directions(result: "Calibration") -> Block:
             for key, weight in direction["weights"].items()
             if abs(weight) >= MIN_WEIGHT
         ]
-        known = f"± {direction['std']:.2g} of a range" if direction["determined"] else "open"
-        yield f"    {known:18}  {', '.join(parts)}"
+        deviation = f"± {direction['std']:.2g} of a range" if direction["determined"] else "open"
+        yield f"    {deviation:18}  {', '.join(parts)}"
 
 
 def _trade_offs(result: "Calibration") -> Block:

@@ -100,12 +100,12 @@ def study_command(
             fields=tuple(name.strip() for name in (fields or "").split(",") if name.strip()),
             progress=step,
         )
-    made = _make_page(result, page, figures, quiet=quiet)
+    page_rows = _make_page(result, page, figures, quiet=quiet)
     show(
         study.study_verdict(result),
-        lambda: {**study.study_scalars(result), **made},
+        lambda: {**study.study_scalars(result), **page_rows},
         _curve(study.finished_curve(result)),
-        _failures_and_files(result, made),
+        _failures_and_files(result, page_rows),
         as_json=as_json,
         quiet=quiet,
     )
@@ -132,14 +132,14 @@ def study_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[StudyProgr
     with progress(label, "starting workers ...", quiet=quiet) as display:
 
         def step(state: "StudyProgress") -> None:
-            left = (
+            eta = (
                 ""
                 if state.seconds_left is None
                 else f", {study.duration_text(state.seconds_left)} left"
             )
             rate = f"{state.rate:.2g} cases/s" if state.done else "starting workers ..."
             done = state.kept + state.done
-            display(f"{done}/{state.total}, {rate}, {state.failed} failed{left}", done, state.total)
+            display(f"{done}/{state.total}, {rate}, {state.failed} failed{eta}", done, state.total)
 
         yield step
 
@@ -204,19 +204,19 @@ def _curve(curve: "WearCurve | None") -> Block:
     yield "  mean ± standard deviation over the surfaces of a level"
 
 
-def _failures_and_files(result: "StudyResult", made: dict[str, str]) -> Block:
+def _failures_and_files(result: "StudyResult", page_rows: dict[str, str]) -> Block:
     for _, row in result.failures.head(SHOWN_FAILURES).iterrows():
         chosen = result.plan.cases[row["number"]].overrides
-        where = ", ".join(
+        point = ", ".join(
             f"{key} = {study.as_written(chosen[key])}" for key in result.plan.axes if key in chosen
         )
-        yield f"  failed: {where}, realisation {row['realisation']}: {row['reason']}"
+        yield f"  failed: {point}, realisation {row['realisation']}: {row['reason']}"
     if result.failed > SHOWN_FAILURES:
         yield f"  ... and {result.failed - SHOWN_FAILURES} more; column reason of the table"
     yield from table(
         [
             ("table", str(result.path)),
-            *(made or {"report": f"asperity report {result.folder}"}).items(),
+            *(page_rows or {"report": f"asperity report {result.folder}"}).items(),
         ]
     )
 

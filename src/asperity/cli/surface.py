@@ -8,7 +8,7 @@ import typer
 from asperity import case, report, surface
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, LateralUnit, OutPicture, Quiet, Unit, require_output
-from asperity.cli.output import Block, Row, known, show, table, written
+from asperity.cli.output import Block, Row, known_rows, show, table, written
 from asperity.core.errors import BadInput
 from asperity.core.quantities import select
 
@@ -143,7 +143,7 @@ def _parameters(description: "SurfaceDescription", *, named: bool) -> Block:
     rows: list[Row] = [("format", measured.format), ("size", size)]
     profile = () if of_map else map(description.symbol, select("profile"))
     rows += (
-        known(values, "film", "surface")
+        known_rows(values, "film", "surface")
         if of_map
         else [(entry.title, entry.text_in(values["profile"])) for entry in profile]
     )

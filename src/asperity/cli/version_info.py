@@ -21,10 +21,10 @@ def about() -> Iterator[str]:
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
         extra = re.search(r"extra == ['\"](\w+)['\"]", requirement)
         try:
-            found = version(name)
+            installed = version(name)
         except PackageNotFoundError:
-            found = "not installed"
-        yield f"{name} {found}{f' (extra {extra[1]})' if extra else ''}"
+            installed = "not installed"
+        yield f"{name} {installed}{f' (extra {extra[1]})' if extra else ''}"
 
 
 def _threads() -> Iterator[str]:

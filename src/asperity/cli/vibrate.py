@@ -13,7 +13,7 @@ from asperity.cli.options import AsJson, Overrides, Quiet, chosen_case
 from asperity.cli.output import (
     Block,
     columns,
-    known,
+    known_rows,
     progress,
     show,
     solver_progress,
@@ -106,7 +106,7 @@ def _vibrate(chosen: "Case", figures: Path | None, *, as_json: bool, quiet: bool
         ]
     rows = [
         ("resonance", vibration.resonance.reason),
-        *known(scalars, "vibration"),
+        *known_rows(scalars, "vibration"),
         (quantity("band_hz").title, span("band_hz", vibration.band_hz)),
     ]
     show(

@@ -116,10 +116,10 @@ def wear(
                 "only these two"
             )
         amounts = {
-            "load": _stated("--load", "N", load),
-            "track_radius": _stated("--track-radius", "m", track_radius),
-            "second_load": _stated("--second-load", "N", second_load),
-            "second_distance": _stated("--second-distance", "m", second_distance),
+            "load": _amount("--load", "N", load),
+            "track_radius": _amount("--track-radius", "m", track_radius),
+            "second_load": _amount("--second-load", "N", second_load),
+            "second_distance": _amount("--second-distance", "m", second_distance),
         }
         fitted = _fit(
             fit, surfaces.read_surface(scar, unit=unit, lateral_unit=lateral_unit), **amounts
@@ -133,20 +133,20 @@ def wear(
         )
     require_output(page, ".html", option="--report")
     chosen = chosen_case(path, overrides, surface)
-    worn = _simulate(chosen, path.name, hours, out, workers or cores(), quiet=quiet)
+    history = _simulate(chosen, path.name, hours, out, workers or cores(), quiet=quiet)
     if page is not None:
-        report.write_wear_report(worn, page)
-    _show(worn, page, as_json=as_json, quiet=quiet)
+        report.write_wear_report(history, page)
+    _show(history, page, as_json=as_json, quiet=quiet)
 
 
-def _show(worn: "WearHistory", page: Path | None, *, as_json: bool, quiet: bool) -> None:
+def _show(history: "WearHistory", page: Path | None, *, as_json: bool, quiet: bool) -> None:
     show(
-        worn.verdict(),
-        lambda: {**worn.scalars(), "report": None if page is None else str(page)},
-        _contact(worn),
-        _bodies(worn),
-        table([], worn.notes),
-        written("saved in", worn.folder),
+        history.verdict(),
+        lambda: {**history.scalars(), "report": None if page is None else str(page)},
+        _contact(history),
+        _bodies(history),
+        table([], history.notes),
+        written("saved in", history.folder),
         written("report", page),
         as_json=as_json,
         quiet=quiet,
@@ -158,19 +158,19 @@ def _simulate(
 ) -> "WearHistory":
     with progress(label, STARTS, quiet=quiet) as display:
 
-        def jump(taken: "WearProgress") -> None:
-            row = taken.row
+        def jump(state: "WearProgress") -> None:
+            row = state.row
             values = ", ".join(quantity(key).named(row[key]) for key in ("sq_m", "clr"))
             display(
-                f"{taken.hours:.4g} of {taken.of_hours:.4g} h, {values}",
-                round(1000.0 * taken.hours / taken.of_hours),
+                f"{state.hours:.4g} of {state.of_hours:.4g} h, {values}",
+                round(1000.0 * state.hours / state.of_hours),
                 1000,
             )
 
         return simulation.run_wear(chosen, hours=hours, out=out, workers=workers, progress=jump)
 
 
-def _stated(option: str, unit: str, text: str | None) -> float | None:
+def _amount(option: str, unit: str, text: str | None) -> float | None:
     return None if text is None else case.read_amount(option, unit, text)
 
 
@@ -227,10 +227,10 @@ def _fitted(fitted: "WearFit") -> Block:
     yield from table(rows, fitted.notes)
 
 
-def _contact(worn: "WearHistory") -> Block:
+def _contact(history: "WearHistory") -> Block:
     """Return the initial and final values of the composite surface and the contact."""
-    first = worn.table.iloc[0]
-    last = worn.final_values
+    first = history.table.iloc[0]
+    last = history.final_values
     rows = [
         (
             quantity(key).title,
@@ -240,15 +240,15 @@ def _contact(worn: "WearHistory") -> Block:
         )
         for key in CONTACT
     ]
-    return columns(["", "new", f"after {worn.hours:.4g} h", ""], rows, left=1)
+    return columns(["", "new", f"after {history.hours:.4g} h", ""], rows, left=1)
 
 
-def _bodies(worn: "WearHistory") -> Block:
+def _bodies(history: "WearHistory") -> Block:
     """Return the final values of each body."""
-    last = worn.table.iloc[-1]
+    last = history.table.iloc[-1]
     rows = []
     for key in BODY_COLUMNS:
         entry = quantity(key)
-        ends = [entry.number(last[simulation.body_column(key, body)]) for body in (0, 1)]
-        rows.append((entry.title, *ends, entry.display))
+        values = [entry.number(last[simulation.body_column(key, body)]) for body in (0, 1)]
+        rows.append((entry.title, *values, entry.display))
     return columns(["", "body 1", "body 2", ""], rows, left=1)

@@ -43,9 +43,9 @@ class DesignVariable:
     def sentence(self) -> str:
         """Return the result as a sentence."""
         entry = quantity(self.key)
-        ends = f"{entry.number(float(self.values.min()))} to {entry.text(float(self.values.max()))}"
+        span = f"{entry.number(float(self.values.min()))} to {entry.text(float(self.values.max()))}"
         if self.bound is None:
-            return f"{entry.name}: {'any' if self.way == 'any' else 'none'} of {ends}"
+            return f"{entry.name}: {'any' if self.way == 'any' else 'none'} of {span}"
         return f"{entry.name}: {self.way} {entry.text(self.bound)}"
 
     def scalars(self) -> JsonObject:
@@ -70,10 +70,10 @@ class Design:
     def sentence(self) -> str:
         """Return the result as a sentence."""
         limit = quantity(CLR).text(self.clr)
-        ways = "; ".join(lever.sentence() for lever in self.levers)
+        bounds = "; ".join(lever.sentence() for lever in self.levers)
         return (
             f"CLR stays below {limit} with a probability of {self.now:.2f} at present; "
-            f"changing one quantity gives {PROBABILITY:.2f} for {ways}."
+            f"changing one quantity gives {PROBABILITY:.2f} for {bounds}."
         )
 
     def scalars(self) -> JsonObject:
@@ -111,16 +111,16 @@ def design_contact(forward: ForwardModel, z: Field, *, clr: float) -> Design:
     """
     require_share("`clr`", clr)
     chosen = z[:: max(1, len(z) // CONTACTS)][:CONTACTS]
-    own = replace(forward, points=forward.points[:1])
-    levers = [_design_variable(own, chosen, entry, clr) for entry in _variables(own.setting)]
-    return Design(clr, float(_probability_below(own, chosen, clr)[0]), tuple(levers))
+    model = replace(forward, points=forward.points[:1])
+    levers = [_design_variable(model, chosen, entry, clr) for entry in _variables(model.setting)]
+    return Design(clr, float(_probability_below(model, chosen, clr)[0]), tuple(levers))
 
 
 def _variables(setting: Setting) -> Sequence[Unknown]:
     """Return the unknowns and operating quantities that can be chosen by design."""
-    known = {unknown.range.key: unknown for unknown in setting.contact}
-    known |= {entry.key: Unknown(NAMES[entry.key], entry) for entry in setting.operating}
-    return [known[key] for key in VARIABLE_KEYS if key in known]
+    candidates = {unknown.range.key: unknown for unknown in setting.contact}
+    candidates |= {entry.key: Unknown(NAMES[entry.key], entry) for entry in setting.operating}
+    return [candidates[key] for key in VARIABLE_KEYS if key in candidates]
 
 
 def _design_variable(
@@ -142,15 +142,15 @@ def _design_variable(
                 for value in unknown.at_share(shares)
             ]
         )
-    enough = chances >= PROBABILITY
-    way: Way = "any" if enough.all() else "none"
+    sufficient = chances >= PROBABILITY
+    way: Way = "any" if sufficient.all() else "none"
     bound = None
-    if enough[0] and not enough.all():
-        last = int(np.argmin(enough)) - 1  # end of the sufficient values from the low end
+    if sufficient[0] and not sufficient.all():
+        last = int(np.argmin(sufficient)) - 1  # end of the sufficient values from the low end
         way = "at most"
         bound = _crossing(values, chances, last)
-    elif enough[-1] and not enough.all():
-        last = VALUES - 1 - int(np.argmin(enough[::-1]))
+    elif sufficient[-1] and not sufficient.all():
+        last = VALUES - 1 - int(np.argmin(sufficient[::-1]))
         way = "at least"
         bound = _crossing(values, chances, last)
     return DesignVariable(unknown.key, way, bound, values, chances)

@@ -79,10 +79,10 @@ class DriftModel:
     drift: tuple[float, float] = (0.0, DRIFT_STD)
 
     def __post_init__(self) -> None:
-        known = [unknown.key for unknown in self.forward.setting.contact]
-        if self.drifting not in known:
+        allowed = [unknown.key for unknown in self.forward.setting.contact]
+        if self.drifting not in allowed:
             raise BadInput(
-                f"the drifting quantity must be among {', '.join(known)}, got {self.drifting!r}"
+                f"the drifting quantity must be among {', '.join(allowed)}, got {self.drifting!r}"
             )
 
     @property
@@ -175,9 +175,9 @@ class DriftModel:
                 time = entry.time
             state.update(entry, table, points)
             path[:, entry.visit] = state.mean[:, SHARE]
-        kept = [SHARE, DRIFT, FIRST_ERROR + self.series.main_point]
+        retained = [SHARE, DRIFT, FIRST_ERROR + self.series.main_point]
         return FilteredState(
-            state.log, state.mean[:, kept], state.covariance[:, kept][:, :, kept], path
+            state.log, state.mean[:, retained], state.covariance[:, retained][:, :, retained], path
         )
 
 

@@ -291,11 +291,11 @@ def _with_further(
     tables = [result.table]
     failed = result.failed
     for folder in _further(home):
-        own = np.array(read_json(folder / SHARES, f"delete {folder}")["shares"], dtype=float)
-        more = run(_plan(setting, own), out=folder / "study")
-        tables.append(more.table.assign(point=more.table["point"] + sum(map(len, shares))))
-        shares.append(own)
-        failed += more.failed
+        added = np.array(read_json(folder / SHARES, f"delete {folder}")["shares"], dtype=float)
+        solved = run(_plan(setting, added), out=folder / "study")
+        tables.append(solved.table.assign(point=solved.table["point"] + sum(map(len, shares))))
+        shares.append(added)
+        failed += solved.failed
     return np.concatenate(shares), pandas.concat(tables, ignore_index=True), failed
 
 
@@ -303,11 +303,11 @@ def _finer(
     setting: Setting, sobol: Field, home: Path, run: partial[StudyResult]
 ) -> pandas.DataFrame:
     """Solve the first points on twice the cells along each axis, with the same surfaces."""
-    twice = setting.case.with_overrides(
+    refined = setting.case.with_overrides(
         {"grid.cells": [2 * count if count > 1 else 1 for count in setting.case.grid.cells]}
     )
-    points = [overrides_at(twice, setting.ranges, shares) for shares in sobol[:FINER_POINTS]]
-    plan = plan_points(twice, points, seeds=setting.surfaces, kind="still")
+    points = [overrides_at(refined, setting.ranges, shares) for shares in sobol[:FINER_POINTS]]
+    plan = plan_points(refined, points, seeds=setting.surfaces, kind="still")
     return run(plan, out=home / FINER).table
 
 
@@ -318,10 +318,10 @@ def _grid_errors(coarse: pandas.DataFrame, fine: pandas.DataFrame) -> dict[str, 
     for table in (coarse, fine):
         done = table[table["status"] == "done"].dropna(subset=keys)
         means.append(done.set_index(["point", "realisation"])[keys])
-    both = means[0].index.intersection(means[1].index)
-    if both.empty:
+    common = means[0].index.intersection(means[1].index)
+    if common.empty:
         return {}
-    old, new = (table.loc[both].groupby("point").mean() for table in means)
+    old, new = (table.loc[common].groupby("point").mean() for table in means)
     errors = {}
     for key, output in OUTPUTS.items():
         change = output.forward(new[key].to_numpy()) - output.forward(old[key].to_numpy())
@@ -334,22 +334,22 @@ def _processes(
 ) -> tuple[dict[str, GaussianProcess], dict[str, EmulatorQuality]]:
     """Return processes and their quality, loaded, or fitted and stored."""
     processes, quality = {}, {}
-    known = read_json(fitted, REFIT) if fitted.exists() else None
-    if known is not None and known.get("points", len(x)) != len(x):
-        known = None  # points have been added since
+    stored = read_json(fitted, REFIT) if fitted.exists() else None
+    if stored is not None and stored.get("points", len(x)) != len(x):
+        stored = None  # points have been added since
     for output in OUTPUTS.values():
         y, noise = means.scaled(output)
-        if known is None:
+        if stored is None:
             processes[output.key] = fit_process(x, y, noise)
             quality[output.key] = _held_out(means, output, processes[output.key])
         else:
-            processes[output.key], quality[output.key] = _load(known, output.key, x, y, noise)
-    if known is None:
-        kept = {
+            processes[output.key], quality[output.key] = _load(stored, output.key, x, y, noise)
+    if stored is None:
+        outputs = {
             key: {**processes[key].settings(), "quality": vars(quality[key])} for key in OUTPUTS
         }
         write_json(
-            fitted, {"identity": identity, "layout": LAYOUT, "points": len(x), "outputs": kept}
+            fitted, {"identity": identity, "layout": LAYOUT, "points": len(x), "outputs": outputs}
         )
     return processes, quality
 
@@ -364,10 +364,10 @@ def sobol_shares(setting: Setting) -> Field:
 
 
 def _load(
-    known: Mapping[str, Any], key: str, x: Field, y: Field, noise: Field
+    stored: Mapping[str, Any], key: str, x: Field, y: Field, noise: Field
 ) -> tuple[GaussianProcess, EmulatorQuality]:
     try:
-        entry = known["outputs"][key]
+        entry = stored["outputs"][key]
         lengths = np.asarray(entry["lengths"], dtype=float)
         process = GaussianProcess(
             x, y, noise, lengths, float(entry["level"]), float(entry["rough"])
@@ -392,9 +392,9 @@ class _Means:
         keys = list(OUTPUTS)
         done = table[table["status"] == "done"].dropna(subset=keys)
         groups = done.groupby("point")[keys]
-        whole = groups.size() == surfaces
-        mean = groups.mean()[whole]
-        spread = groups.var(ddof=1)[whole] if surfaces > 1 else mean * 0.0
+        complete = groups.size() == surfaces
+        mean = groups.mean()[complete]
+        spread = groups.var(ddof=1)[complete] if surfaces > 1 else mean * 0.0
         smoothed = {
             key: _smoothed(OUTPUTS[key], mean[key].to_numpy(), spread[key].to_numpy())
             for key in keys
@@ -425,7 +425,7 @@ def _smoothed(output: Output, mean: Field, variance: Field) -> Field:
     return np.asarray(np.exp(np.interp(scaled, centres, np.log(levels))) / output.slope(mean) ** 2)
 
 
-def _held_out(means: _Means, output: Output, whole: GaussianProcess) -> EmulatorQuality:
+def _held_out(means: _Means, output: Output, full_fit: GaussianProcess) -> EmulatorQuality:
     """Cross-validate a process: predict each point from a fit to the other folds."""
     y, noise = means.scaled(output)
     fold = np.arange(y.size) % FOLDS
@@ -433,14 +433,14 @@ def _held_out(means: _Means, output: Output, whole: GaussianProcess) -> Emulator
     std = np.empty(y.size)
     for number in range(FOLDS):
         out = fold == number
-        process = fit_process(whole.x[~out], y[~out], noise[~out], start=whole)
-        predicted[out], std[out] = process(whole.x[out])
+        process = fit_process(full_fit.x[~out], y[~out], noise[~out], start=full_fit)
+        predicted[out], std[out] = process(full_fit.x[out])
     mean = means.mean[output.key].to_numpy()
     variance = means.variance[output.key].to_numpy()
-    within = np.abs(y - predicted) <= NORMAL_FACTOR * np.sqrt(std**2 + noise)
+    inside = np.abs(y - predicted) <= NORMAL_FACTOR * np.sqrt(std**2 + noise)
     return EmulatorQuality(
         error=float(np.sqrt(np.mean((output.back(predicted) - mean) ** 2))),
-        coverage=float(np.mean(within)),
+        coverage=float(np.mean(inside)),
         scatter=float(np.sqrt(np.mean(variance))),
         scatter_of_mean=float(np.sqrt(np.mean(variance / means.surfaces))),
     )

@@ -57,8 +57,8 @@ class Interval(NamedTuple):
     @classmethod
     def from_values(cls, values: Field) -> "Interval":
         """Return the interval of equally probable values; nan without values."""
-        ends = np.quantile(values, QUANTILES, method="higher") if len(values) else [math.nan] * 3
-        return cls(*(float(end) for end in ends))
+        levels = np.quantile(values, QUANTILES, method="higher") if len(values) else [math.nan] * 3
+        return cls(*(float(end) for end in levels))
 
 
 @dataclass(frozen=True)
@@ -128,14 +128,14 @@ class Forecast:
                 f"No change of the contact is detected over {len(x)} visits "
                 f"(odds {odds:.2g} to 1); no forecast of when {limit} is crossed."
             )
-        way = "rises above" if self.rising else "falls below"
+        verb = "rises above" if self.rising else "falls below"
         if self.already >= 0.5:
             side = "above" if self.rising else "below"
             value = entry.text(self.limit.value)
             return f"{entry.short} is {side} {value} (probability {self.already:.2f})."
         unit = f" in {self.x_name}" if self.x_name else ""
         sentence = (
-            f"{entry.short} {way} {entry.text(self.limit.value)} within {self.horizon:.3g} after "
+            f"{entry.short} {verb} {entry.text(self.limit.value)} within {self.horizon:.3g} after "
             f"the last recording{unit} with a probability of {self.already + self.within:.2f}"
         )
         if self.within < 0.05:
@@ -185,15 +185,13 @@ def read_limit(text: str, setting: Setting) -> Limit:
         for an unknown name, a malformed amount, or a limit that cannot be reached.
     """
     name, _, amount = (part.strip() for part in text.partition("="))
-    known = {unknown.range.key.rpartition(".")[2]: unknown.key for unknown in setting.contact}
-    if name not in (CLR, *known):
+    keys = {unknown.range.key.rpartition(".")[2]: unknown.key for unknown in setting.contact}
+    if name not in (CLR, *keys):
         raise BadInput(
-            f"`limit` takes a limit such as clr=0.5, of clr, {' or '.join(known)}, got {text!r}"
+            f"`limit` takes a limit such as clr=0.5, of clr, {' or '.join(keys)}, got {text!r}"
         )
     if name != CLR:
-        limit = Limit(
-            known[name], read_amount(f"`limit` {name}", quantity(known[name]).unit, amount)
-        )
+        limit = Limit(keys[name], read_amount(f"`limit` {name}", quantity(keys[name]).unit, amount))
     else:
         try:
             limit = Limit(CLR, float(amount))
@@ -404,8 +402,8 @@ def _extrapolate(model: _Model, count: int, limit: Limit, rng: np.random.Generat
             return OUTPUTS[CLR].back(between_knots(scale, shares)[0] + error_clr[:, None])
         return course.unknown.value(course.unknown.at_share(shares))
 
-    past, now = filtered.path, share[:, None]
-    clr, value = (values(key, now)[:, 0] for key in (CLR, course.drifting))
+    past, latest = filtered.path, share[:, None]
+    clr, value = (values(key, latest)[:, 0] for key in (CLR, course.drifting))
     return _Courses(values(limit.key, past), values(limit.key, ahead), clr, value)
 
 

@@ -93,9 +93,9 @@ class ForwardModel:
         offset = self.unknown(z, OFFSET, 0.0)
         for number, entry in enumerate(self.setting.operating, contact.shape[1]):
             for column, point in enumerate(self.points):
-                stated = _operating_value(self.setting, point, entry.key)
+                nominal = _operating_value(self.setting, point, entry.key)
                 value = Unknown("", entry).from_si(
-                    stated + (offset if entry.key == TEMPERATURE else 0.0)
+                    nominal + (offset if entry.key == TEMPERATURE else 0.0)
                 )
                 shares[:, column, number] = np.clip(share_of(entry, value), 0.0, 1.0)
         return shares
@@ -108,15 +108,15 @@ class ForwardModel:
         rows, points, ranges = shares.shape
         flat = shares.reshape(-1, ranges)
         if deviations:
-            answers = self.emulator(flat, keys)
+            emulated = self.emulator(flat, keys)
         else:
-            answers = {
+            emulated = {
                 key: (mean, np.zeros(len(mean)))
                 for key, mean in self.emulator.means(flat, keys).items()
             }
         z_grid = self.unknown(z, GRID_ERROR, 0.0)[:, None]
         outputs: dict[str, tuple[Field, Field]] = {}
-        for key, (mean, std) in answers.items():
+        for key, (mean, std) in emulated.items():
             error = self.emulator.grid.get(key, EmulatorGridError())
             corrected = mean.reshape(rows, points) + error.correction(z_grid)
             outputs[key] = corrected, std.reshape(rows, points)
@@ -125,8 +125,8 @@ class ForwardModel:
     def correlations(self, z: Field, law: Law) -> dict[str, Field]:
         """Return correlations of the emulator's errors by channel, shape (n, points, points)."""
         count, points = len(z), len(self.points)
-        stiff, damped = (CLR, CLR) if law == "hertz-point" else (STIFFNESS, DAMPING)
-        keys = {"crf": stiff, "damping": damped, "crfa": CAR}
+        spring, damper = (CLR, CLR) if law == "hertz-point" else (STIFFNESS, DAMPING)
+        keys = {"crf": spring, "damping": damper, "crfa": CAR}
         if points == 1:
             return dict.fromkeys(keys, np.ones((count, 1, 1)))
         x = self.emulator.features(self.shares(z).reshape(count * points, -1)).reshape(
@@ -144,8 +144,8 @@ class ForwardModel:
 
     def required_outputs(self, law: Law, *, heights: bool = True) -> tuple[str, ...]:
         """Return the emulator outputs that a law needs."""
-        own: tuple[str, ...] = (CLR,) if law == "hertz-point" else (STIFFNESS, DAMPING)
-        return (*own, CAR) if heights and self._noise_excited else own
+        required: tuple[str, ...] = (CLR,) if law == "hertz-point" else (STIFFNESS, DAMPING)
+        return (*required, CAR) if heights and self._noise_excited else required
 
     @property
     def _noise_excited(self) -> bool:
@@ -263,14 +263,14 @@ def _emulated_spring(
 ) -> _Spring:
     """Return the spring of the emulated contact, whose damping adds to the machine's."""
     stiffness, stiffness_std = emulated[STIFFNESS]
-    own, own_std = emulated[DAMPING]
+    contact_damping, contact_std = emulated[DAMPING]
     scale = OUTPUTS[DAMPING]
-    total = np.maximum(machine_damping + scale.back(own), MIN_DAMPING)
+    total = np.maximum(machine_damping + scale.back(contact_damping), MIN_DAMPING)
     return _Spring(
         stiffness,
         stiffness_std,
         np.log(total),
-        own_std / scale.slope(scale.back(own)) / total,
+        contact_std / scale.slope(scale.back(contact_damping)) / total,
         np.broadcast_to(np.log(loads), stiffness.shape),
     )
 
@@ -289,23 +289,23 @@ def _operating_value(setting: Setting, point: ObservationPoint, key: str) -> flo
 def require_inside(setting: Setting, point: ObservationPoint) -> None:
     """Raise BadInput for a point outside the emulator's ranges or an unusable temperature."""
     if point.temperature_k is not None and all(
-        entry.key != TEMPERATURE for entry in setting.operating
+        limits.key != TEMPERATURE for limits in setting.operating
     ):
         raise BadInput(
             "a recording's temperature needs an oil given by its data sheet; "
             "set [lubricant] by grade and temperature, or remove the column temperature_degc"
         )
     names = {LOAD: "load_n", SPEED: "entrainment_speed_m_s", TEMPERATURE: "oil_temperature_k"}
-    for entry in setting.operating:
-        value = _operating_value(setting, point, entry.key)
+    for limits in setting.operating:
+        value = _operating_value(setting, point, limits.key)
         low, high = (
-            float(end) for end in Unknown("", entry).to_si(np.array([entry.low, entry.high]))
+            float(end) for end in Unknown("", limits).to_si(np.array([limits.low, limits.high]))
         )
         if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
-            shown = quantity(names[entry.key])
+            entry = quantity(names[limits.key])
             label = f" of {point.names[0]}" if point.names and point.names[0] else ""
             raise BadInput(
-                f"{shown.name}{label} must lie within {shown.number(low)} to {shown.text(high)}, "
-                f"the emulator's range, got {shown.text(value)}; "
-                f"widen infer.{entry.key.rpartition('.')[2]} in the case"
+                f"{entry.name}{label} must lie within {entry.number(low)} to {entry.text(high)}, "
+                f"the emulator's range, got {entry.text(value)}; "
+                f"widen infer.{limits.key.rpartition('.')[2]} in the case"
             )

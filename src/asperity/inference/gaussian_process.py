@@ -91,9 +91,9 @@ class GaussianProcess:
         for part in np.array_split(x, max(1, -(-len(x) // CHUNK_SIZE))):
             kernel = self._kernel(part)
             white = kernel @ whitener
-            known = np.einsum("ij,ij->i", white, white).astype(float)
+            explained = np.einsum("ij,ij->i", white, white).astype(float)
             means.append(_basis(part) @ self._trend + self._scale * (kernel @ weights))
-            stds.append(self._scale * np.sqrt(np.maximum(self.level - known, 0.0) + self.rough))
+            stds.append(self._scale * np.sqrt(np.maximum(self.level - explained, 0.0) + self.rough))
         return np.concatenate(means), np.concatenate(stds)
 
     def mean(self, x: Field) -> Field:
@@ -161,17 +161,17 @@ def fit_process(
         lengths = start.lengths
         level = start.level
         rough = start.rough
-    plain = GaussianProcess(x, y, noise, lengths, level, rough)
+    unscaled = GaussianProcess(x, y, noise, lengths, level, rough)
     kernel = ConstantKernel(level, LEVELS) * Matern(lengths, LENGTHS, nu=2.5) + WhiteKernel(
         rough, WHITE_NOISE
     )
     learner = GaussianProcessRegressor(
-        kernel, alpha=noise / plain._scale**2 + 1e-10, random_state=0
+        kernel, alpha=noise / unscaled._scale**2 + 1e-10, random_state=0
     )
     with warnings.catch_warnings():
         # a length at its upper bound means that the axis has no effect
         warnings.simplefilter("ignore", ConvergenceWarning)
-        learner.fit(x, (y - _basis(x) @ plain._trend) / plain._scale)
+        learner.fit(x, (y - _basis(x) @ unscaled._trend) / unscaled._scale)
     product = learner.kernel_.k1
     white = learner.kernel_.k2
     return GaussianProcess(

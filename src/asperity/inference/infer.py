@@ -90,14 +90,14 @@ def infer_contact(
     settings = settings or InferenceSettings()
     require_choice("sampler", settings.sampler, SAMPLERS)
     setting = inference_setting(case)
-    given = [entry for entry in recordings if isinstance(entry, Observation)]
+    observed = [entry for entry in recordings if isinstance(entry, Observation)]
     files = [entry for entry in recordings if not isinstance(entry, Observation)]
-    if given and files:
+    if observed and files:
         raise BadInput("recordings must be files or observations, not both")
     if files:
         series = observe_recordings(files, setting, source=RecordingInput(table=table))
     else:
-        series = ObservedSeries(observations=tuple(given))
+        series = ObservedSeries(observations=tuple(observed))
     if not isinstance(emulator, Emulator):
         emulator = build_emulator(
             setting, folder=emulator, executor=executor, workers=workers, progress=progress
@@ -253,12 +253,12 @@ def wear_drift(setting: Setting, history: WearHistory, hours: float) -> tuple[fl
 def latest_observations(series: ObservedSeries) -> ObservedSeries:
     """Return only the last recording at each operating point, from the last tenth of the series."""
     times = [observation.x for observation in series.observations]
-    begin = max(times) - RECENT * (max(times) - min(times))
+    start = max(times) - RECENT * (max(times) - min(times))
     last = {
         observation.conditions: observation
         for observation in sorted(series.observations, key=lambda entry: entry.x)
     }
-    recent = [observation for observation in last.values() if observation.x >= begin]
+    recent = [observation for observation in last.values() if observation.x >= start]
     note = (
         "The contact changes over the series: the numbers are those of the last recording at each "
         "operating point, within the last tenth of the series."
@@ -289,8 +289,8 @@ def infer_observations(
     notes : notes to add to the result
     """
     conditions = setting.case.conditions
-    own = ObservationPoint(conditions.load, conditions.entrainment_speed)
-    forward = ForwardModel(setting, emulator, (own, *operating_points(observations)))
+    case_point = ObservationPoint(conditions.load, conditions.entrainment_speed)
+    forward = ForwardModel(setting, emulator, (case_point, *operating_points(observations)))
     source = _Source(tuple(observations), excluded, notes)
     return _infer(forward, source, new_pools(forward, seed), sampler, seed)
 

@@ -179,11 +179,11 @@ class Inference:
         return bool(self.observations) and not self._unidentified()
 
     def _unidentified(self) -> list[str]:
-        known = self.posterior()
+        estimates = self.posterior()
         return [
             key
             for key in KEY_QUANTITIES
-            if key in known and known[key].information_bits < IDENTIFIED_BITS
+            if key in estimates and estimates[key].information_bits < IDENTIFIED_BITS
         ]
 
     @property
@@ -192,12 +192,12 @@ class Inference:
         if not self.observations:
             return f"no recording shows a contact resonance ({_most_frequent(self.excluded)})"
         unidentified = self._unidentified()
-        known = self.posterior()
+        estimates = self.posterior()
         if not unidentified:
             return ""
         points = len({point.names for point in self.forward.points if point.names})
         names = " and ".join(quantity(key).short for key in unidentified)
-        gains = " and ".join(f"{known[key].information_bits:.1f}" for key in unidentified)
+        gains = " and ".join(f"{estimates[key].information_bits:.1f}" for key in unidentified)
         reasons = [f"{names}: information gain {gains} bits"]
         if points == 1:
             reasons.append("one operating point gives one frequency, which many contacts share")
@@ -267,12 +267,12 @@ class Inference:
         """Return CLR and Sq with intervals, or why they are not identified; and the next point."""
         if not self.observations:
             return f"Not identified: {self.reason}. The stated values are the prior."
-        known = self.posterior()
+        estimates = self.posterior()
         following = self.next_point
         parts = []
         for key in KEY_QUANTITIES:
-            if key in known:
-                estimate = known[key]
+            if key in estimates:
+                estimate = estimates[key]
                 entry = quantity(key)
                 interval = entry.interval(estimate.low, estimate.high)
                 value = (
@@ -284,7 +284,7 @@ class Inference:
         identified = [
             key
             for key in KEY_QUANTITIES
-            if key in known and known[key].information_bits >= IDENTIFIED_BITS
+            if key in estimates and estimates[key].information_bits >= IDENTIFIED_BITS
         ]
         first = "; ".join(parts) if identified else f"Not identified: {self.reason}"
         reason = f" ({self.reason})" if identified and self.reason else ""
@@ -332,5 +332,5 @@ def _most_frequent(excluded: tuple[tuple[str, str], ...]) -> str:
     reasons = [reason for _, reason in excluded]
     if not reasons:
         return "none was given"
-    most = max(dict.fromkeys(reasons), key=reasons.count)
-    return f"{reasons.count(most)} of {len(reasons)}: {most.rstrip('.')}"
+    mode = max(dict.fromkeys(reasons), key=reasons.count)
+    return f"{reasons.count(mode)} of {len(reasons)}: {mode.rstrip('.')}"

@@ -43,10 +43,12 @@ class DriftParameters(NamedTuple):
     @classmethod
     def from_normal(cls, z: Field) -> "DriftParameters":
         """Convert standard normal numbers (n, PARAMETERS)."""
-        own = np.array(SIZES)[np.minimum((len(SIZES) * ndtr(z[:, :3])).astype(int), len(SIZES) - 1)]
+        sizes = np.array(SIZES)[
+            np.minimum((len(SIZES) * ndtr(z[:, :3])).astype(int), len(SIZES) - 1)
+        ]
         thresholds = np.cumsum(CORRELATION_PROBABILITIES)[:-1]
         return cls(
-            dict(zip(CHANNELS, own.T, strict=True)),
+            dict(zip(CHANNELS, sizes.T, strict=True)),
             DIFFUSION * np.exp(DIFFUSION_SPREAD * z[:, 3]),
             SCATTER * np.exp(SCATTER_SPREAD * z[:, 4]),
             np.array(CORRELATIONS)[np.searchsorted(thresholds, ndtr(z[:, 5]))],
@@ -169,10 +171,10 @@ class KalmanState:
         diagonal = np.arange(mean.shape[1])
         covariance[:, diagonal, diagonal] = _prior_variance(table, drift[1], points, mean.shape)
         for number, channel in enumerate(CHANNELS):
-            own = slice(FIRST_ERROR + number * points, FIRST_ERROR + (number + 1) * points)
+            block = slice(FIRST_ERROR + number * points, FIRST_ERROR + (number + 1) * points)
             size = WEIGHTS[channel] * table.parameters.sizes[channel]
             correlations = law_correlations(table.log_force, similarity)
-            covariance[:, own, own] += (
+            covariance[:, block, block] += (
                 table.errors[channel] + size[:, None, None] ** 2 * correlations
             )
         return cls(mean, covariance, np.zeros(count), slope_scatter)

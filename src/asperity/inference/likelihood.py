@@ -34,8 +34,8 @@ def log_likelihood(
 ) -> Field:
     """Return ln p(measurements | unknowns), shape (n,); `prediction` has a column per point."""
     sizes = SIZES if discrepancy else (0.0,)
-    whole = [log_at_sizes(prediction, points, channel, sizes) for channel in WEIGHTS]
-    return np.asarray(sum(np.logaddexp.reduce(logs, axis=0) - np.log(len(sizes)) for logs in whole))
+    terms = [log_at_sizes(prediction, points, channel, sizes) for channel in WEIGHTS]
+    return np.asarray(sum(np.logaddexp.reduce(logs, axis=0) - np.log(len(sizes)) for logs in terms))
 
 
 def log_at_sizes(
@@ -48,21 +48,21 @@ def log_at_sizes(
     value, std = measured_channel(points, channel)
     mean = getattr(prediction, channel)
     log_force = prediction.log_force
-    here = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
+    observed = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
     logs = np.zeros((len(sizes), len(mean)))
-    if not here.any():
+    if not observed.any():
         return logs
-    similarity = point_similarity(points)[np.ix_(here, here)]
-    for rows in _row_blocks(len(mean), int(here.sum())):
-        residual = value[here] - mean[rows][:, here]
-        known = emulated_errors(
-            channel, _deviation(prediction, channel)[rows][:, here], similarity
-        ) + np.diag(std[here] ** 2)
+    similarity = point_similarity(points)[np.ix_(observed, observed)]
+    for rows in _row_blocks(len(mean), int(observed.sum())):
+        residual = value[observed] - mean[rows][:, observed]
+        emulator_error = emulated_errors(
+            channel, _deviation(prediction, channel)[rows][:, observed], similarity
+        ) + np.diag(std[observed] ** 2)
         for number, size in enumerate(sizes):
             law = law_errors(
-                channel, log_force[rows][:, here], np.full(len(rows), size), similarity
+                channel, log_force[rows][:, observed], np.full(len(rows), size), similarity
             )
-            logs[number, rows] = _log_normal(residual, known + law)
+            logs[number, rows] = _log_normal(residual, emulator_error + law)
     return logs
 
 
@@ -103,18 +103,20 @@ def predictive_mixture(
     value, measured = measured_channel(points, channel)
     mean = getattr(prediction, channel)
     similarity = point_similarity(points)
-    here = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
+    observed = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
     logs = log_at_sizes(prediction, points, channel, sizes)
     share = logs - np.logaddexp.reduce(logs, axis=0)
     expected = np.tile(mean, (len(sizes), 1, 1))
     std = np.empty((len(sizes), *mean.shape))
     for rows in _row_blocks(len(mean), len(points)):
-        covariances = _block_errors(prediction, channel, rows, similarity, here, sizes)
+        covariances = _block_errors(prediction, channel, rows, similarity, observed, sizes)
         for number, errors in enumerate(covariances):
             variance = np.einsum("nii->ni", errors).copy()
-            if here.any():
-                residual = (value - mean[rows])[:, here]
-                shift, explained = _explained_errors(errors, here, residual, measured[here] ** 2)
+            if observed.any():
+                residual = (value - mean[rows])[:, observed]
+                shift, explained = _explained_errors(
+                    errors, observed, residual, measured[observed] ** 2
+                )
                 expected[number, rows] += shift
                 variance -= explained
             std[number, rows] = np.sqrt(np.maximum(variance, 0.0))
@@ -126,23 +128,23 @@ def _block_errors(
     channel: str,
     rows: Field,
     similarity: Field,
-    here: Mask,
+    observed: Mask,
     sizes: Sequence[float],
 ) -> Iterator[Field]:
-    """Yield the covariance of all errors of some rows for each size, relative to points `here`."""
+    """Yield the covariance of all errors of rows for each size, relative to `observed` points."""
     log_force = prediction.log_force[rows]
-    pivot = log_force[:, here].mean(axis=1, keepdims=True) if here.any() else log_force
+    pivot = log_force[:, observed].mean(axis=1, keepdims=True) if observed.any() else log_force
     emulated = emulated_errors(channel, _deviation(prediction, channel)[rows], similarity)
     for size in sizes:
         yield emulated + law_errors(channel, log_force, np.full(len(rows), size), similarity, pivot)
 
 
 def _explained_errors(
-    errors: Field, here: Mask, residual: Field, noise: Field
+    errors: Field, observed: Mask, residual: Field, noise: Field
 ) -> tuple[Field, Field]:
-    """Return the mean and the variance of errors at all points that residuals `here` explain."""
-    across = errors[:, here]
-    weights = np.linalg.solve(across[:, :, here] + np.diag(noise), across)
+    """Return the mean and the variance of errors at all points, given `observed` residuals."""
+    across = errors[:, observed]
+    weights = np.linalg.solve(across[:, :, observed] + np.diag(noise), across)
     return (
         np.asarray(np.einsum("nh,nhp->np", residual, weights)),
         np.asarray(np.einsum("nhp,nhp->np", across, weights)),
@@ -176,8 +178,8 @@ def law_errors(
     errors = (WEIGHTS[channel] * size[:, None, None]) ** 2 * law_correlations(log_force, similarity)
     if channel == "crf":
         pivot = log_force.mean(axis=1, keepdims=True) if pivot is None else pivot
-        steep = EXPONENT_STD * (log_force - pivot) * (size[:, None] > 0.0)
-        errors += steep[:, :, None] * steep[:, None, :]
+        exponent_error = EXPONENT_STD * (log_force - pivot) * (size[:, None] > 0.0)
+        errors += exponent_error[:, :, None] * exponent_error[:, None, :]
     return np.asarray(errors)
 
 

@@ -39,7 +39,7 @@ def with_measured_surface(setting: Setting, measured: MeasuredSurface) -> tuple[
     std = math.hypot(_between_parts(rough.heights), INSTRUMENT_STD * sq)
     unknown = setting.contact[index]
     zero, mean = (float(unknown.from_si(value)) for value in (0.0, sq))
-    spread = float(unknown.from_si(std)) - zero
+    prior_std = float(unknown.from_si(std)) - zero
     entry = quantity("sq_m")
     low = unknown.range.low
     high = unknown.range.high
@@ -48,9 +48,9 @@ def with_measured_surface(setting: Setting, measured: MeasuredSurface) -> tuple[
             f"Sq of {measured.name} is {entry.text(sq)}, outside the emulator's range of {low:g} "
             f"to {high:g} {unknown.range.unit}; widen infer.sq in the case"
         )
-    spread = min(spread, 0.999 * mean / REACH)
-    known = Unknown(unknown.key, unknown.range, mean, spread)
-    contact = (*setting.contact[:index], known, *setting.contact[index + 1 :])
+    prior_std = min(prior_std, 0.999 * mean / REACH)
+    updated = Unknown(unknown.key, unknown.range, mean, prior_std)
+    contact = (*setting.contact[:index], updated, *setting.contact[index + 1 :])
     note = (
         f"The prior of Sq is that of {measured.name}, {entry.text(sq, std)}, "
         "taken as the composite roughness (smooth counterbody)."
@@ -65,5 +65,5 @@ def _between_parts(heights: Field) -> float:
         for row in np.array_split(heights, PARTS)
         for part in np.array_split(row, PARTS, axis=1)
     ]
-    known = [float(np.nanstd(part)) for part in parts if np.count_nonzero(np.isfinite(part)) > 1]
-    return float(np.std(known, ddof=1)) / math.sqrt(len(known)) if len(known) > 1 else 0.0
+    stds = [float(np.nanstd(part)) for part in parts if np.count_nonzero(np.isfinite(part)) > 1]
+    return float(np.std(stds, ddof=1)) / math.sqrt(len(stds)) if len(stds) > 1 else 0.0

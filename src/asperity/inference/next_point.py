@@ -68,8 +68,8 @@ def predict_recordings(
     forward: ForwardModel, draws: Draws, points: Sequence[ObservationPoint]
 ) -> PredictedRecordings:
     """Predict measurements of posterior draws at points, with errors conditional on the data."""
-    known = tuple(point for point in forward.points if not np.isnan(point.crf.value))
-    extended = replace(forward, points=(*known, *points))
+    recorded = tuple(point for point in forward.points if not np.isnan(point.crf.value))
+    extended = replace(forward, points=(*recorded, *points))
     shape = len(SIZES), len(draws.z), len(points)
     channels = {key: PredictiveMixture(*(np.empty(shape) for _ in range(3))) for key in TYPICAL_STD}
     detectable = np.ones(shape[1:], dtype=bool)
@@ -80,11 +80,11 @@ def predict_recordings(
         emulated = extended.emulate(draws.z[of_law], extended.required_outputs(law, heights=False))
         prediction = extended.predict_from(draws.z[of_law], law, emulated, heights=False)
         if CLR in emulated:
-            detectable[of_law] = OUTPUTS[CLR].back(emulated[CLR][0][:, len(known) :]) > MIN_CLR
+            detectable[of_law] = OUTPUTS[CLR].back(emulated[CLR][0][:, len(recorded) :]) > MIN_CLR
         for key, mixture in channels.items():
             by_law = predictive_mixture(prediction, extended.points, key)
-            for array, own in zip(mixture, by_law, strict=True):
-                array[:, of_law] = own[:, :, len(known) :]
+            for array, values in zip(mixture, by_law, strict=True):
+                array[:, of_law] = values[:, :, len(recorded) :]
     return PredictedRecordings(channels, detectable)
 
 
@@ -99,11 +99,11 @@ def expected_information(
     """
     rng = np.random.default_rng([seed, 6])
     rows = rng.choice(len(draws.z), min(CONTACTS, len(draws.z)), replace=False)
-    known = [point for point in forward.points if not np.isnan(point.crf.value)]
-    temperature = known[0].temperature_k if known else None
+    recorded = [point for point in forward.points if not np.isnan(point.crf.value)]
+    temperature = recorded[0].temperature_k if recorded else None
     measured = dict(TYPICAL_STD)
-    if known:
-        measured["crf"] = float(np.median([point.crf.std for point in known]))
+    if recorded:
+        measured["crf"] = float(np.median([point.crf.std for point in recorded]))
     points = [ObservationPoint(load, speed, temperature) for load, speed in candidates]
     predicted = predict_recordings(forward, draws.select_rows(rows), points)
     # common random numbers for all candidates

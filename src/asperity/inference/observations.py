@@ -147,7 +147,7 @@ def _combined(
     The result is the weighted mean; its deviation is at least that of the scatter of the repeats
     and includes the shared part.
     """
-    known = np.array(
+    logs = np.array(
         [
             (
                 math.log(value),
@@ -158,13 +158,13 @@ def _combined(
             if not math.isnan(value)
         ]
     )
-    if not len(known):
+    if not len(logs):
         return LogMeasurement()
-    values, stds, common = known.T
+    values, stds, common = logs.T
     weights = stds**-2.0 / np.sum(stds**-2.0)
     mean = float(weights @ values)
     std = float(np.sum(stds**-2.0) ** -0.5)
-    if len(known) > 1:
-        scatter = float(np.sqrt(np.sum((values - mean) ** 2) / (len(known) - 1) / len(known)))
+    if len(logs) > 1:
+        scatter = float(np.sqrt(np.sum((values - mean) ** 2) / (len(logs) - 1) / len(logs)))
         std = max(std, scatter)
     return LogMeasurement(mean, math.hypot(std, float(weights @ common)))

@@ -24,16 +24,16 @@ class Output:
 
 def _share(key: str, floor: float) -> Output:
     """Return a share (0 to 1) on a logit scale with a floor, finite at 0 and 1."""
-    whole = 1.0 + 2.0 * floor
+    width = 1.0 + 2.0 * floor
 
     def forward(value: Field) -> Field:
         return np.asarray(np.log((value + floor) / (1.0 + floor - value)))
 
     def back(scaled: Field) -> Field:
-        return np.asarray(np.clip(whole / (1.0 + np.exp(-scaled)) - floor, 0.0, 1.0))
+        return np.asarray(np.clip(width / (1.0 + np.exp(-scaled)) - floor, 0.0, 1.0))
 
     def slope(value: Field) -> Field:
-        return np.asarray(whole / ((value + floor) * (1.0 + floor - value)))
+        return np.asarray(width / ((value + floor) * (1.0 + floor - value)))
 
     return Output(key, forward, back, slope)
 

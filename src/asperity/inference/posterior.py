@@ -104,14 +104,14 @@ def sample_models(
     """
     forward = forward.observed
     sampled: dict[tuple[Law, bool], WeightedSamples] = {}
-    enough, probed = (QUICK_ENOUGH, 0) if quickly else (ENOUGH, PROBED)
+    required, probed = (QUICK_ENOUGH, 0) if quickly else (ENOUGH, PROBED)
     best = -np.inf
     for law, discrepancy in _by_likelihood(forward, pools):
         target = _target(forward.points, discrepancy=discrepancy)
         if sampler == "nested":
             samples = nested(_evaluate(forward, law), target, forward.dims, seed)
         else:
-            samples = importance(pools[law], target, best=best, enough=enough, probed=probed)
+            samples = importance(pools[law], target, best=best, enough=required, probed=probed)
         sampled[law, discrepancy], best = samples, max(best, samples.log_evidence)
     for (law, _), samples in sampled.items():
         if samples.effective < FEWEST and samples.log_evidence > best - RULED_OUT:
@@ -180,9 +180,9 @@ def with_point(
         pool = complete.reduced(
             [_target(previous, discrepancy=flag)(complete.outputs) for flag in (True, False)]
         )
-        more = added.predict(pool.z, law)
+        outputs = added.predict(pool.z, law)
         columns = ChannelPrediction(
-            *(np.hstack(pair) for pair in zip(pool.outputs, more, strict=True))
+            *(np.hstack(pair) for pair in zip(pool.outputs, outputs, strict=True))
         )
         extended[law] = pool.with_columns(_evaluate(forward, law), columns)
     return extended
@@ -319,21 +319,25 @@ def _corrected(
     the measured frequencies from it.
     """
     measured, measured_std = measured_channel(points, "crf")
-    here = ~np.isnan(measured)
+    observed = ~np.isnan(measured)
     similarity = point_similarity(points)
     emulator = emulated_errors("crf", std, similarity)
     errors = _draw_normal(emulator, rng)
-    if not here.any():
+    if not observed.any():
         return mean + errors
     share = OUTPUTS[CLR].back(mean)
     # d ln CRF / d scale
-    slope = (1.0 / (6.0 * np.maximum(share, MIN_SHARE) * OUTPUTS[CLR].slope(share)))[:, here]
-    law = law_errors("crf", prediction.log_force[:, here], size, similarity[np.ix_(here, here)])
-    noise = law + np.diag(measured_std[here] ** 2)
-    across = emulator[:, :, here] * slope[:, None]  # covariance of shares and frequencies
-    total = across[:, here] * slope[:, :, None] + noise
+    slope = (1.0 / (6.0 * np.maximum(share, MIN_SHARE) * OUTPUTS[CLR].slope(share)))[:, observed]
+    law = law_errors(
+        "crf", prediction.log_force[:, observed], size, similarity[np.ix_(observed, observed)]
+    )
+    noise = law + np.diag(measured_std[observed] ** 2)
+    across = emulator[:, :, observed] * slope[:, None]  # covariance of shares and frequencies
+    total = across[:, observed] * slope[:, :, None] + noise
     residual = (
-        (measured - prediction.crf)[:, here] - slope * errors[:, here] - _draw_normal(noise, rng)
+        (measured - prediction.crf)[:, observed]
+        - slope * errors[:, observed]
+        - _draw_normal(noise, rng)
     )
     correction = across @ np.linalg.solve(total, residual[:, :, None])
     return np.asarray(mean + errors + correction[:, :, 0])

@@ -149,9 +149,9 @@ def observations_from_rows(
         else:
             assumed |= {key for key in ("load_n", "entrainment_m_s") if row[key] is None}
             observations.append(_observation(row, name, case, comparable=comparable))
-    words = {"load_n": "load", "entrainment_m_s": "entrainment speed"}
+    names = {"load_n": "load", "entrainment_m_s": "entrainment speed"}
     notes = [
-        f"The {words[key]} is not given for every recording; that of {case.source} was used."
+        f"The {names[key]} is not given for every recording; that of {case.source} was used."
         for key in sorted(assumed)
     ]
     return ObservedSeries(None, tuple(observations), tuple(excluded), tuple(notes))

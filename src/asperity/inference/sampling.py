@@ -25,7 +25,7 @@ COMPONENT_WIDTH = 0.6  # width of a proposal's components relative to the whole
 PRIOR_WEIGHT = 0.1  # of the prior in a proposal
 HOPELESS = 40.0  # deficit in ln evidence from which on no more draws are spent on a model
 RULED_OUT = 12.0  # deficit from which on a model counts as ruled out: odds of 160 000 to one
-PROBED = 4  # rounds before a model may be judged hopeless
+PROBED = 4  # rounds before a model may be ruled out
 NEGLIGIBLE = 1e-5  # weight relative to the largest, below which a draw is dropped
 LIVE_POINTS = 400  # of nested sampling
 
@@ -99,8 +99,8 @@ class Pool(Generic[Outputs]):
         drawn = proposal.draw(self.rng)
         self._log_proposed = np.logaddexp(self._log_proposed, proposal(self.z) + np.log(BATCH))
         earlier = np.stack([np.log(count) + density(drawn) for count, density in self.proposals])
-        here = np.logaddexp(logsumexp(earlier, axis=0), proposal(drawn) + np.log(BATCH))
-        self._log_proposed = np.concatenate([self._log_proposed, here])
+        log_drawn = np.logaddexp(logsumexp(earlier, axis=0), proposal(drawn) + np.log(BATCH))
+        self._log_proposed = np.concatenate([self._log_proposed, log_drawn])
         self.z = np.concatenate([self.z, drawn])
         self.outputs = self.join(self.outputs, self.evaluate(drawn))
         self.proposals.append((BATCH, proposal))
@@ -168,10 +168,10 @@ def importance(
         fresh = pool.take(pool.outputs, slice(len(target), None))
         target = np.concatenate([target, log_target(fresh)])
         weights = pool.log_weights(target)
-        behind = best - (float(logsumexp(weights)) - np.log(pool.drawn))
-        hopeless = number >= probed and behind > HOPELESS
-        done = number >= rounds and (_effective(weights) >= least or behind > RULED_OUT)
-        if _effective(weights) >= enough or hopeless or done or number >= max(rounds, longest):
+        deficit = best - (float(logsumexp(weights)) - np.log(pool.drawn))
+        rejected = number >= probed and deficit > HOPELESS
+        done = number >= rounds and (_effective(weights) >= least or deficit > RULED_OUT)
+        if _effective(weights) >= enough or rejected or done or number >= max(rounds, longest):
             break
         pool.learn(weights)
     peak = float(logsumexp(weights))
@@ -261,10 +261,10 @@ class _Proposal:
 
     def __call__(self, points: Field) -> Field:
         """Return the ln density at points (n, d)."""
-        own = points @ self.inverse.T
-        exponent = own @ self.whitened.T  # minus half the squared distance to each centre, in place
+        z = points @ self.inverse.T
+        exponent = z @ self.whitened.T  # minus half the squared distance to each centre, in place
         exponent -= 0.5 * np.sum(self.whitened**2, axis=1)
-        exponent -= 0.5 * np.sum(own**2, axis=1)[:, None]
+        exponent -= 0.5 * np.sum(z**2, axis=1)[:, None]
         peak = exponent.max(axis=1)
         exponent -= peak[:, None]
         parts = peak + np.log(np.exp(exponent, out=exponent).mean(axis=1)) + self.log_norm

@@ -66,12 +66,12 @@ class SeriesForecaster:
     @property
     def question(self) -> str:
         """Text that identifies the forecast, to recognise a stored one."""
-        worn = (
+        wear_text = (
             "" if self.worn is None else f", {self.worn.hours:g} h of wear from {self.worn.folder}"
         )
         # the number of contacts changes when the emulator is extended
         emulator = f"{self.emulator.folder}, {self.emulator.points} contacts"
-        return f"{self.limit.key}={self.limit.value:g} by {emulator}, seed {self.seed}{worn}"
+        return f"{self.limit.key}={self.limit.value:g} by {emulator}, seed {self.seed}{wear_text}"
 
     def __call__(self, rows: Sequence[Table], x_name: str, *, comparable: bool) -> SeriesForecast:
         """Return the forecast, or the reason why there is none."""

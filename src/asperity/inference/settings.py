@@ -17,7 +17,7 @@ OFFSET = "temperature_offset_k"
 GRID_ERROR = "grid_error"
 # default ranges of load and speed, as factors on the case's values
 OPERATING: Mapping[str, tuple[float, float]] = {LOAD: (0.4, 2.0), SPEED: (0.25, 2.0)}
-TEMPERATURE_SPAN_K = 25.0  # either side of the case's temperature
+TEMPERATURE_SPAN_K = 25.0  # on both sides of the case's temperature
 OFFSET_STD_K = 3.0
 MIN_CELLS_PER_LENGTH = 2.0  # the grid does not resolve shorter correlation lengths
 Prior = PriorSection | Literal["known"]
@@ -30,11 +30,11 @@ LENGTHS = (
 
 @dataclass(frozen=True, slots=True)
 class _Default:
-    """Default prior of a quantity: a factor either way, ends, or a relative deviation."""
+    """Default prior of a quantity: a factor up and down, limits, or a relative deviation."""
 
     key: str
     factor: float = 1.0
-    ends: tuple[float, float] | None = None
+    limits: tuple[float, float] | None = None
     relative_std: float = math.nan
     reason: str = ""
     emulated: bool = True
@@ -63,7 +63,7 @@ UNKNOWNS: Mapping[str, _Default] = {
     ),
     "vibration.cutoff_exponent": _Default(
         "cutoff_exponent",
-        ends=(0.0, 0.5),
+        limits=(0.0, 0.5),
         emulated=False,
         reason="from a cut-off independent of CAR to one proportional to its square root",
     ),
@@ -116,14 +116,14 @@ def inference_setting(case: Case) -> Setting:
     base = case.with_overrides(
         {"infer": "none", "study": "none", "grid.cells": list(section.cells)}
     )
-    stated = {_key_of(case, name): prior for name, prior in section.axes.items()}
-    operating = _operating(base, stated)
+    priors = {_key_of(case, name): prior for name, prior in section.axes.items()}
+    operating = _operating(base, priors)
     unknowns = [
         unknown
         for key, default in UNKNOWNS.items()
-        if (unknown := _unknown(base, key, default, stated.get(key), operating)) is not None
+        if (unknown := _unknown(base, key, default, priors.get(key), operating)) is not None
     ]
-    if not any(unknown.key == "sq_m" for unknown in unknowns) and "surface.sq" not in stated:
+    if not any(unknown.key == "sq_m" for unknown in unknowns) and "surface.sq" not in priors:
         raise BadInput(
             f"{case.source}: surface has no sq to infer; use a generated surface, kind gaussian"
         )
@@ -160,27 +160,27 @@ def _key_of(case: Case, name: str) -> str:
     """Return the case key of a name in [infer]; BadInput for one that cannot be inferred."""
     key = name if name in UNKNOWNS else full_key(case, name, "infer")
     if key not in UNKNOWNS and key not in (*OPERATING, TEMPERATURE):
-        known = ", ".join(
+        names = ", ".join(
             sorted({entry.rpartition(".")[2] for entry in (*UNKNOWNS, *OPERATING, TEMPERATURE)})
         )
-        raise BadInput(f"{case.source}: infer.{name} cannot be inferred; possible are {known}")
+        raise BadInput(f"{case.source}: infer.{name} cannot be inferred; possible are {names}")
     return key
 
 
-def _operating(case: Case, stated: Mapping[str, Prior]) -> tuple[ParameterRange, ...]:
+def _operating(case: Case, priors: Mapping[str, Prior]) -> tuple[ParameterRange, ...]:
     ranges = []
     for key, (low, high) in OPERATING.items():
-        own, unit = split_amount(stated_value(case, key))
+        value, unit = split_amount(stated_value(case, key))
         default = ParameterRange(
-            key, low * float(own), high * float(own), unit, "about the case's own"
+            key, low * float(value), high * float(value), unit, "about the case's own"
         )
-        ranges.append(_stated_range(case, key, stated.get(key)) or default)
+        ranges.append(_stated_range(case, key, priors.get(key)) or default)
     if isinstance(case.contents.lubricant, SheetSection):
-        own, unit = split_amount(stated_value(case, TEMPERATURE))
-        ends = float(own) - TEMPERATURE_SPAN_K, float(own) + TEMPERATURE_SPAN_K
-        default = ParameterRange(TEMPERATURE, *ends, unit, "about the case's own")
-        ranges.append(_stated_range(case, TEMPERATURE, stated.get(TEMPERATURE)) or default)
-    elif TEMPERATURE in stated:
+        value, unit = split_amount(stated_value(case, TEMPERATURE))
+        limits = float(value) - TEMPERATURE_SPAN_K, float(value) + TEMPERATURE_SPAN_K
+        default = ParameterRange(TEMPERATURE, *limits, unit, "about the case's own")
+        ranges.append(_stated_range(case, TEMPERATURE, priors.get(TEMPERATURE)) or default)
+    elif TEMPERATURE in priors:
         raise BadInput(
             f"{case.source}: infer.temperature needs an oil given by its data sheet; "
             "set grade and temperature"
@@ -208,10 +208,10 @@ def _amount(
     case: Case, key: str, entry: str, value: object, unit: str | None = None
 ) -> tuple[float, str]:
     try:
-        number, own = split_amount(value, unit)
+        number, written_unit = split_amount(value, unit)
     except BadInput as error:
         raise BadInput(f"{case.source}: infer.{key.rpartition('.')[2]}.{entry} {error}") from None
-    return float(number), own
+    return float(number), written_unit
 
 
 def _unknown(
@@ -222,8 +222,8 @@ def _unknown(
     operating: tuple[ParameterRange, ...],
 ) -> Unknown | None:
     """Return an unknown with its stated or default prior; None if absent or known in the case."""
-    own = _own_value(case, key)
-    if prior == "known" or own is None:
+    case_value = _own_value(case, key)
+    if prior == "known" or case_value is None:
         if isinstance(prior, PriorSection):
             raise BadInput(
                 f"{case.source}: infer.{key} has a prior, but the case has no such quantity"
@@ -231,23 +231,23 @@ def _unknown(
         return None
     if prior is not None:
         return _stated_unknown(case, key, default.key, prior, operating)
-    number, unit = split_amount(own)
+    number, unit = split_amount(case_value)
     mean = float(number)
     if not math.isnan(default.relative_std):
         return Unknown.stated(
             default.key, key, mean, default.relative_std * mean, unit, default.reason
         )
-    low, high = default.ends or (mean / default.factor, mean * default.factor)
+    low, high = default.limits or (mean / default.factor, mean * default.factor)
     entry = ParameterRange(key, float(f"{low:.4g}"), float(f"{high:.4g}"), unit, default.reason)
     return Unknown(default.key, _resolved(case, entry, operating))
 
 
 def _own_value(case: Case, key: str) -> object:
     """Return the case's own value of a quantity; None if it has none, or as another quantity."""
-    own = stated_value(case, key)
-    if key == LENGTHS[0] and isinstance(own, list):
-        return own[0] if own[0] == own[1] else None
-    return None if key in LENGTHS[1:] and _isotropic(case) else own
+    value = stated_value(case, key)
+    if key == LENGTHS[0] and isinstance(value, list):
+        return value[0] if value[0] == value[1] else None
+    return None if key in LENGTHS[1:] and _isotropic(case) else value
 
 
 def _stated_unknown(
@@ -267,15 +267,15 @@ def _stated_unknown(
                 'for a certain value, write "known"'
             )
         return Unknown.stated(name, key, mean, std, unit, "as stated")
-    stated = _range(case, key, prior)
-    resolved = _resolved(case, stated, operating)
-    if resolved != stated:
+    entered = _range(case, key, prior)
+    resolved = _resolved(case, entered, operating)
+    if resolved != entered:
         raise BadInput(
             f"{case.source}: infer.{key.rpartition('.')[2]} must lie within {resolved.low:g} "
             f"to {resolved.high:g} {resolved.unit}, which the emulator's grid resolves at "
             "every load; narrow it, or increase infer.cells"
         )
-    return Unknown(name, stated)
+    return Unknown(name, entered)
 
 
 def _isotropic(case: Case) -> bool:

@@ -87,7 +87,7 @@ def raise_alarm(
     alarm = sequential_alarm(
         x,
         [*contact, *levels],
-        _sights(tracked, contact),
+        _statuses(tracked, contact),
         false_alarm_rate=false_alarm_rate,
         checks=AlarmChecks(
             confirmed=lambda number: _severe(stages_of(tracked[: number + 1])),
@@ -121,25 +121,27 @@ class Warming:
         level = next((indicator for indicator in levels if indicator.name.startswith(RMS)), None)
         self.x, self.unit, self.crf, self.level = x, unit, crf, level
         self.names = {CRF, *(indicator.name for indicator in levels if indicator.gain_dependent)}
-        stated = [] if crf is None else [condition.name for condition in crf.conditions]
-        self.known = crf is not None and level is not None and "temperature" not in " ".join(stated)
+        names = [] if crf is None else [condition.name for condition in crf.conditions]
+        self.applicable = (
+            crf is not None and level is not None and "temperature" not in " ".join(names)
+        )
 
     def explanation(self, number: int) -> str:
         """Return a sentence if recordings up to `number` look like a warm-up, otherwise nothing."""
-        if not self.known or self.crf is None or self.level is None:
+        if not self.applicable or self.crf is None or self.level is None:
             return ""
-        upto = slice(number + 1)
-        found = warm_up(self.x[upto], self.crf.values[upto], self.level.values[upto])
+        rows = slice(number + 1)
+        fit = warm_up(self.x[rows], self.crf.values[rows], self.level.values[rows])
         if (
-            found is None
-            or abs(found.residual[0]) > MAX_RESIDUAL * CRF_LEAST
-            or abs(found.residual[1]) > MAX_RESIDUAL * LEVEL_LEAST
+            fit is None
+            or abs(fit.residual[0]) > MAX_RESIDUAL * CRF_LEAST
+            or abs(fit.residual[1]) > MAX_RESIDUAL * LEVEL_LEAST
         ):
             return ""
-        length = f"{found.time_constant:.2g} {self.unit}".rstrip()
+        length = f"{fit.time_constant:.2g} {self.unit}".rstrip()
         return (
-            f"this looks like a warm-up: CRF {_relative_change(found.crf)} and {self.level.name} "
-            f"{_ratio(found.level)}, time constant {length}; state the oil temperature to confirm"
+            f"this looks like a warm-up: CRF {_relative_change(fit.crf)} and {self.level.name} "
+            f"{_ratio(fit.level)}, time constant {length}; state the oil temperature to confirm"
         )
 
     def excuses(self, number: int, name: str) -> str:
@@ -291,23 +293,23 @@ def _levels_on_sensor(
         _conditions(tracked, exponents, response) for exponents in (LEVEL, PULSES)
     )
     values_by_name = {
-        words: _logarithms(readings, unit, value) for words, value in (levels | depths).items()
+        label: _logarithms(readings, unit, value) for label, value in (levels | depths).items()
     }
     return [
         MonitoredSeries(
-            name=f"{words} on {sensor}" if sensor else words,
+            name=f"{label} on {sensor}" if sensor else label,
             values=values,
             smallest_change=LEVEL_LEAST,
             contact=False,
             describe=_ratio,
-            gain_dependent=words not in depths and words != KURTOSIS,
-            step_alarms=words in depths,
+            gain_dependent=label not in depths and label != KURTOSIS,
+            step_alarms=label in depths,
             sensor=sensor,
             conditions=pulse_conditions
-            if words in depths or words in lines or words == KURTOSIS
+            if label in depths or label in lines or label == KURTOSIS
             else level_conditions,
         )
-        for words, values in values_by_name.items()
+        for label, values in values_by_name.items()
         if np.isfinite(values).any()
     ]
 
@@ -321,13 +323,13 @@ def _usual_unit(readings: Sequence[Reading | None]) -> str | None:
 
 
 def _named_getters(
-    readings: Sequence[Reading | None], field: str, words: str
+    readings: Sequence[Reading | None], field: str, label: str
 ) -> dict[str, Callable[[Reading], float]]:
     """Return a function for each named value in a field of the readings, by its words."""
     names = dict.fromkeys(
         name for reading in readings if reading is not None for name in getattr(reading, field)
     )
-    return {f"{words} {name}": _getter(field, name) for name in names}
+    return {f"{label} {name}": _getter(field, name) for name in names}
 
 
 def _logarithms(
@@ -372,8 +374,8 @@ def _by_zone(tracked: Sequence[TrackedRecording], first: int, alarm: Alarm) -> A
                 else alarm.with_alarm_since(number, tracked[number].severity(), "zone")
             )
     latest = zones[-2:]
-    known = len(latest) == 2 and latest[-1][0] == len(tracked) - 1
-    if known and min(zone for _, zone in latest) == "C" and alarm.state == "none":
+    current = len(latest) == 2 and latest[-1][0] == len(tracked) - 1
+    if current and min(zone for _, zone in latest) == "C" and alarm.state == "none":
         return alarm.with_alert(tracked[-1].severity(), "zone")
     return alarm
 
@@ -386,36 +388,36 @@ def _ratio(by: float) -> str:
     return f"{'rose' if by > 0.0 else 'fell'} to {np.exp(by):.3g} times its baseline"
 
 
-def _sights(
+def _statuses(
     tracked: Sequence[TrackedRecording], contact: Sequence[MonitoredSeries]
 ) -> list[RecordingStatus]:
     """Return what each recording shows of the machine: contact, nothing, or a dead sensor."""
-    seen = np.any(
+    detected = np.any(
         [
             np.zeros(len(tracked), dtype=bool),
             *(np.isfinite(indicator.values) for indicator in contact),
         ],
         axis=0,
     )
-    sights = []
+    statuses = []
     for number, recording in enumerate(tracked):
         if recording.dead:
-            sights.append(
+            statuses.append(
                 RecordingStatus("blind", f"{Path(recording.file).name}: {recording.reading.reason}")
             )
-        elif seen[max(number - UNSEEN + 1, 0) : number + 1].any():
-            sights.append(RecordingStatus())
+        elif detected[max(number - UNSEEN + 1, 0) : number + 1].any():
+            statuses.append(RecordingStatus())
         else:
             reason = recording.resonance.reason or "not determined"
             last = (
                 "first recording" if number == 0 else f"last {min(number + 1, UNSEEN)} recordings"
             )
-            sights.append(
+            statuses.append(
                 RecordingStatus(
                     "cannot-tell", f"no deciding indicator found in the {last} ({reason})"
                 )
             )
-    return sights
+    return statuses
 
 
 def _acknowledged(tracked: Sequence[TrackedRecording], name: str | None) -> int:

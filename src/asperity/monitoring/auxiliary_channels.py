@@ -25,7 +25,7 @@ from asperity.vibration import (
 
 MAX_SAMPLES = 1 << 21  # for order tracking, which holds them in memory
 HARMONICS = 3
-RATE_TOLERANCE = 0.015  # relative, either way: rolling elements slip
+RATE_TOLERANCE = 0.015  # relative, in both directions: rolling elements slip
 MIN_LINES = 4  # spectral lines below a rate for its line to be resolved
 UNITS: dict[str, dict[str, float]] = {  # factors from the unit of a channel to that of a key
     "load_n": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "MN": 1e6},
@@ -66,13 +66,13 @@ def read_auxiliary(opened: OpenRecording, place: RecordingPlace | None) -> Auxil
     """Read the channels that a sidecar names for load, speed, temperature and tacho."""
     conditions = _condition_channels(opened)
     tacho = _tacho(opened)
-    stated = {
+    table_facts = {
         key: (f"{value:.10g}", "table")
         for key in OPERATING_KEYS
         if (value := getattr(place, key, None)) is not None
     }
     return AuxiliaryData(
-        facts=conditions.facts | tacho.facts | stated,
+        facts=conditions.facts | tacho.facts | table_facts,
         turning=conditions.turning if tacho.turning is None else tacho.turning,
         remarks=conditions.remarks + tacho.remarks,
     )
@@ -83,8 +83,8 @@ def _condition_channels(opened: OpenRecording) -> AuxiliaryData:
     facts: dict[str, tuple[str, str]] = {}
     remarks: list[str] = []
     turning = None
-    stated = opened.facts.get("condition_channels")
-    for key, name in ({} if stated is None else stated.value).items():
+    fact = opened.facts.get("condition_channels")
+    for key, name in ({} if fact is None else fact.value).items():
         try:
             values = _channel_in(opened.path, key, name)
             if not np.isfinite(values).any():
@@ -117,13 +117,13 @@ def fault_rates(
     opened: OpenRecording, auxiliary: AuxiliaryData, target: Target
 ) -> dict[str, float]:
     """Return the rates [Hz] of faults and meshes at the speed of a recording, by name."""
-    stated = opened.facts.get("speed_hz")
+    fact = opened.facts.get("speed_hz")
     speed = (
         float(auxiliary.facts["speed_hz"][0])
         if "speed_hz" in auxiliary.facts
         else None
-        if stated is None
-        else float(stated.value)
+        if fact is None
+        else float(fact.value)
     )
     per_turn = dict(target.rates_per_turn)
     if "faults_per_turn" in opened.facts:
@@ -131,8 +131,8 @@ def fault_rates(
     if auxiliary.turning is not None:
         speed = auxiliary.turning.speed_hz  # speed to which the vibration is resampled
     speed = speed or target.shaft_hz
-    found = {} if speed is None else {name: times * speed for name, times in per_turn.items()}
-    return found | (opened.facts["faults_hz"].value if "faults_hz" in opened.facts else {})
+    rates_hz = {} if speed is None else {name: times * speed for name, times in per_turn.items()}
+    return rates_hz | (opened.facts["faults_hz"].value if "faults_hz" in opened.facts else {})
 
 
 def order_tracked(opened: OpenRecording, auxiliary: AuxiliaryData) -> tuple[Field, float] | None:
@@ -165,29 +165,29 @@ def envelope_and_lines(
 def lines(frequency_hz: Field, density: Field, rates_hz: Mapping[str, float]) -> dict[str, float]:
     """Return the rms at each rate and its next two harmonics; nan if they are not resolved."""
     spacing = float(frequency_hz[1])
-    found = {}
+    levels = {}
     for name, rate in rates_hz.items():
         total = 0.0
         for number in range(1, HARMONICS + 1):
-            reach = max(RATE_TOLERANCE * number * rate, 1.5 * spacing)
-            total += float(density[np.abs(frequency_hz - number * rate) <= reach].sum())
+            half_width = max(RATE_TOLERANCE * number * rate, 1.5 * spacing)
+            total += float(density[np.abs(frequency_hz - number * rate) <= half_width].sum())
         resolved = rate >= MIN_LINES * spacing and rate < frequency_hz[-1]
-        found[name] = float(np.sqrt(total * spacing)) if resolved else float("nan")
-    return found
+        levels[name] = float(np.sqrt(total * spacing)) if resolved else float("nan")
+    return levels
 
 
 def bands(opened: OpenRecording, frequency_hz: Field, density: Field) -> dict[str, float]:
     """Return the rms in the bands of the sidecar, or three default bands, within the sampling."""
-    stated = opened.facts["bands_hz"].value if "bands_hz" in opened.facts else DEFAULT_BANDS
+    limits = opened.facts["bands_hz"].value if "bands_hz" in opened.facts else DEFAULT_BANDS
     spacing = float(frequency_hz[1])
     highest = USABLE_BANDWIDTH * opened.rate_hz
-    found = {}
-    for name, (low, high) in stated.items():
+    levels = {}
+    for name, (low, high) in limits.items():
         high = min(high, highest) if high == np.inf else high
         if low < high <= highest:
             inside = (frequency_hz >= low) & (frequency_hz < high)
-            found[name] = float(np.sqrt(density[inside].sum() * spacing))
-    return found
+            levels[name] = float(np.sqrt(density[inside].sum() * spacing))
+    return levels
 
 
 def _channel_in(path: Path, key: str, name: str) -> Field:
@@ -201,30 +201,30 @@ def _channel_in(path: Path, key: str, name: str) -> Field:
 def _factor(unit: str, key: str, path: Path, name: str) -> float:
     """Return the factor of a unit to that of a key; upper or lower case only if unambiguous."""
     factors = UNITS[key]
-    alike = (
-        [unit] if unit in factors else [known for known in factors if known.lower() == unit.lower()]
+    matches = (
+        [unit] if unit in factors else [label for label in factors if label.lower() == unit.lower()]
     )
-    if len(alike) != 1:
+    if len(matches) != 1:
         raise BadInput(
             f"{path.name}: channel {name} is in {unit}, but {key} needs {', '.join(factors)}"
         )
-    return factors[alike[0]]
+    return factors[matches[0]]
 
 
 def _require_same_clock(opened: OpenRecording, name: str) -> None:
     """Raise BadInput unless tacho and vibration have the same rate and number of samples."""
     tacho = raw_channel(opened.path, name)
-    for quantity, own, expected in (
+    for quantity, value, expected in (
         ("Hz", tacho.rate_hz, opened.channel.rate_hz),
         ("samples", tacho.samples, opened.samples),
     ):
         if (
-            own is not None
+            value is not None
             and expected is not None
-            and abs(own - expected) > CLOCK_TOLERANCE * expected
+            and abs(value - expected) > CLOCK_TOLERANCE * expected
         ):
             raise BadInput(
-                f"the tacho in channel {name} has {own:.10g} {quantity} and the vibration "
+                f"the tacho in channel {name} has {value:.10g} {quantity} and the vibration "
                 f"{expected:.10g}; record both with the same clock, or state speed_hz"
             )
 

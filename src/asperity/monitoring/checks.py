@@ -69,9 +69,9 @@ class RecordingChecks:
             return f"{recording.path.name}: {judged}"
         files = {checked.recording.path for checked in self.checked}
         noun = "channels" if len(files) < len(self.checked) else "recordings"
-        bad = [checked.quality for checked in self.checked if not checked.quality.usable]
-        reasons = dict.fromkeys(quality.faults[0].partition(":")[0] for quality in bad)
-        sentence = f"{len(self.checked) - len(bad)} of {total} {noun} can be used"
+        unusable = [checked.quality for checked in self.checked if not checked.quality.usable]
+        reasons = dict.fromkeys(quality.faults[0].partition(":")[0] for quality in unusable)
+        sentence = f"{len(self.checked) - len(unusable)} of {total} {noun} can be used"
         return f"{sentence}{': ' if reasons else ''}{'; '.join(reasons)}."
 
     def scalars(self) -> JsonObject:

@@ -45,8 +45,8 @@ class DataSet:
         if self.whole:
             content = f"{self.recordings} recordings, {self.maps} maps"
             return f"{self.folder} is a complete data set: {content}."
-        more = f", and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
-        return f"{self.folder} is not a complete data set: {self.missing[0]}{more}."
+        others = f", and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
+        return f"{self.folder} is not a complete data set: {self.missing[0]}{others}."
 
     def scalars(self) -> JsonObject:
         """Return the JSON of `asperity check --set`."""

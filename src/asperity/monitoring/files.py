@@ -108,11 +108,11 @@ class RecordingTable:
         by_row: dict[str, list[Path]] = {}
         for path in paths:
             by_row.setdefault(self.row(path) or "", []).append(path)
-        for row, several in by_row.items():
-            if row and len(several) > 1:
+        for row, recordings in by_row.items():
+            if row and len(recordings) > 1:
                 raise BadInput(
-                    f"{self.name} has one row {row} for {len(several)} recordings, such as "
-                    f"{several[0]} and {several[1]}; name them with their folders"
+                    f"{self.name} has one row {row} for {len(recordings)} recordings, such as "
+                    f"{recordings[0]} and {recordings[1]}; name them with their folders"
                 )
         return {str(path): self.place(path) for path in paths}
 
@@ -122,23 +122,23 @@ def x_by_time(
 ) -> tuple[list[float], str]:
     """Return hours since the first recording and their name, or numbers if starts are unknown.
 
-    An unreadable file takes no place of its own: it gets that of the recording before.
+    An unreadable file gets the x of the recording before.
     """
-    known = [time for time, usable in zip(times, readable, strict=True) if usable]
-    stated = [time for time in known if time is not None]
-    if len(stated) == len(known) and any(time != stated[0] for time in stated):
-        first = min(stated)
-        x = iter([(time - first).total_seconds() / 3600.0 for time in stated])
+    usable_times = [time for time, usable in zip(times, readable, strict=True) if usable]
+    starts = [time for time in usable_times if time is not None]
+    if len(starts) == len(usable_times) and any(time != starts[0] for time in starts):
+        first = min(starts)
+        x = iter([(time - first).total_seconds() / 3600.0 for time in starts])
         x_name = "time_h"
     else:
-        x = iter([float(number) for number in range(1, len(known) + 1)])
+        x = iter([float(number) for number in range(1, len(usable_times) + 1)])
         x_name = "recording"
-    place = 0.0 if x_name == "time_h" else 1.0
-    places = []
+    value = 0.0 if x_name == "time_h" else 1.0
+    values = []
     for usable in readable:
-        place = next(x) if usable else place
-        places.append(place)
-    return places, x_name
+        value = next(x) if usable else value
+        values.append(value)
+    return values, x_name
 
 
 def locate_recordings(
@@ -298,10 +298,10 @@ def _require_units(path: Path, columns: Sequence[str]) -> None:
     """Raise BadInput for a load, speed or temperature by another name, perhaps in another unit."""
     for name in columns:
         words = set(re.split(r"[\W_]+", name.lower()))
-        meant = [key for key, known in _CONDITION_WORDS.items() if words & known]
-        if meant:
+        keys = [key for key, synonyms in _CONDITION_WORDS.items() if words & synonyms]
+        if keys:
             raise BadInput(
-                f"{path} has a column {name}; use {' or '.join(meant)} with that unit, or another "
+                f"{path} has a column {name}; use {' or '.join(keys)} with that unit, or another "
                 "name if the column is x"
             )
 

@@ -28,7 +28,7 @@ def exclude_machine_off(series: list[Reading]) -> list[Reading]:
     for reading in series:
         if reading.quality is not None and not reading.quality.off:
             by_unit.setdefault((reading.sensor, reading.unit), []).append(reading.quality.rms)
-    usual = {
+    usual_rms = {
         key: float(np.median(levels[:REFERENCE_RECORDINGS])) for key, levels in by_unit.items()
     }
     judged = []
@@ -37,9 +37,9 @@ def exclude_machine_off(series: list[Reading]) -> list[Reading]:
         if (
             quality is not None
             and not quality.off
-            and quality.rms < OFF_LEVEL * usual[reading.sensor, reading.unit]
+            and quality.rms < OFF_LEVEL * usual_rms[reading.sensor, reading.unit]
         ):
-            share = 100.0 * quality.rms / usual[reading.sensor, reading.unit]
+            share = 100.0 * quality.rms / usual_rms[reading.sensor, reading.unit]
             reason = (
                 f"the machine was off, or the sensor disconnected: rms is {share:.1g} % of that of "
                 "the first recordings"
@@ -70,12 +70,12 @@ def on_common_grid(series: list[Reading]) -> tuple[list[Reading], list[str]]:
 def _on_grid(reading: Reading, grid: Spectrum, rate_hz: int) -> Reading:
     """Bring a usable spectrum to a grid, or exclude it with the reason."""
     spectrum = spectrum_of(reading)
-    lines = grid.frequency_hz
-    if spectrum.frequency_hz.shape == lines.shape:
-        if np.array_equal(spectrum.frequency_hz, lines):
-            return reading  # as nearly all are
-        if abs(spectrum.frequency_hz[-1] - lines[-1]) <= GRID_TOLERANCE * grid.spacing_hz:
-            return replace(reading, spectrum=replace(spectrum, frequency_hz=lines))
+    frequency_hz = grid.frequency_hz
+    if spectrum.frequency_hz.shape == frequency_hz.shape:
+        if np.array_equal(spectrum.frequency_hz, frequency_hz):
+            return reading  # nearly all have the same grid
+        if abs(spectrum.frequency_hz[-1] - frequency_hz[-1]) <= GRID_TOLERANCE * grid.spacing_hz:
+            return replace(reading, spectrum=replace(spectrum, frequency_hz=frequency_hz))
     reason = (
         f"sampled at {reading.rate_hz:g} Hz where the series has {rate_hz:g} Hz; "
         "track it separately"

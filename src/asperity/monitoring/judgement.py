@@ -137,8 +137,8 @@ def _single_sensor(
             remounted = reading.sensor if moved else None
             tracked.append(tracked_recording(reading, place, clean, resonance, remounted=remounted))
         else:
-            nothing = no_resonance(reading.reason, target.band_hz, method)
-            tracked.append(tracked_recording(reading, place, None, nothing))
+            no_line = no_resonance(reading.reason, target.band_hz, method)
+            tracked.append(tracked_recording(reading, place, None, no_line))
     return _Series(tracked, x_name, method, notes)
 
 
@@ -251,14 +251,14 @@ def _with_states(
     severe = np.full(len(tracked), np.nan)
     labels = ("none",) * len(tracked)
     if stages is not None:
-        known = [
+        determined = [
             np.isfinite(
                 recording.damping_reference if source == "damping" else recording.crf_reference_hz
             )
             for recording in tracked
         ]
         weight = severe_stage_weight(tracked, source, response)
-        severe = np.where(known, stages.probability * weight, np.nan)
+        severe = np.where(determined, stages.probability * weight, np.nan)
         labels = stages.labels
     return [
         replace(recording, severe_probability=float(probability), label=label, state=state)
@@ -332,9 +332,9 @@ class _StagesBySource(Mapping[StageSource, Stages]):
             unit,
             comparable,
         )
-        found = any(recording.resonance.found for recording in tracked)
-        self.sources: tuple[StageSource, ...] = get_args(StageSource) if found else ()
-        self.known: dict[StageSource, Stages] = {}
+        resonant = any(recording.resonance.found for recording in tracked)
+        self.sources: tuple[StageSource, ...] = get_args(StageSource) if resonant else ()
+        self.computed: dict[StageSource, Stages] = {}
 
     def __len__(self) -> int:
         return len(self.sources)
@@ -345,11 +345,11 @@ class _StagesBySource(Mapping[StageSource, Stages]):
     def __getitem__(self, source: StageSource) -> Stages:
         if source not in self.sources:
             raise KeyError(source)
-        if source not in self.known:
+        if source not in self.computed:
             resonances = [recording.resonance for recording in self.tracked]
             damping = [recording.damping_reference for recording in self.tracked]
             damping_std = [recording.damping[1] for recording in self.tracked]
-            self.known[source] = split_stages(
+            self.computed[source] = split_stages(
                 [recording.x for recording in self.tracked],
                 [recording.crf_reference_hz for recording in self.tracked],
                 [resonance.crfa for resonance in resonances] if self.comparable else None,
@@ -363,7 +363,7 @@ class _StagesBySource(Mapping[StageSource, Stages]):
                 detector=self.detector,
                 unit=self.unit,
             )
-        return self.known[source]
+        return self.computed[source]
 
 
 def _remounted(tracked: Sequence[TrackedRecording]) -> list[str]:
@@ -379,11 +379,11 @@ def _remounted(tracked: Sequence[TrackedRecording]) -> list[str]:
 
 def _without_damping(tracked: Sequence[TrackedRecording]) -> list[str]:
     """Return a sentence on resonances whose damping is not determined."""
-    found = [recording for recording in tracked if recording.resonance.found]
-    reasons = [recording.damping_reason for recording in found if recording.damping_reason]
+    resonant = [recording for recording in tracked if recording.resonance.found]
+    reasons = [recording.damping_reason for recording in resonant if recording.damping_reason]
     if not reasons:
         return []
-    many = f"{len(reasons)} of {len(found)} resonances" if len(found) > 1 else "the resonance"
+    many = f"{len(reasons)} of {len(resonant)} resonances" if len(resonant) > 1 else "the resonance"
     return [
         f"Damping is not determined for {many}: {reasons[0]}"
         f"{', and other reasons' if len({*reasons}) > 1 else ''}."
@@ -405,11 +405,11 @@ def _resonances(
         spectra = [clean.spectrum for clean in group]
         kept = [clean.kept for clean in group]
         if method == "joint":
-            found, _, changes = learn_series(spectra, band_hz=target.band_hz, kept=kept)
+            lines, _, changes = learn_series(spectra, band_hz=target.band_hz, kept=kept)
             moved += [first + groups * number for number in changes]
         else:
-            found = series_resonances(spectra, band_hz=target.band_hz, method=method, kept=kept)
-        resonances |= zip(range(first, len(cleaned), groups), found, strict=True)
+            lines = series_resonances(spectra, band_hz=target.band_hz, method=method, kept=kept)
+        resonances |= zip(range(first, len(cleaned), groups), lines, strict=True)
     moved.sort()  # groups find the same move within as many recordings as there are groups
     distinct = {
         number
@@ -425,8 +425,8 @@ def _ambiguous(resonance: Resonance) -> Resonance:
         f"a line at {resonance.crf_hz:.0f} Hz stands out, but a single spectrum cannot separate "
         "contact from structure"
     )
-    kept = {name: getattr(resonance, name) for name in ("floor", "evidence", "background")}
-    return no_resonance(reason, resonance.band_hz, resonance.method, **kept)
+    retained = {name: getattr(resonance, name) for name in ("floor", "evidence", "background")}
+    return no_resonance(reason, resonance.band_hz, resonance.method, **retained)
 
 
 def _unit_of(x_name: str) -> str:

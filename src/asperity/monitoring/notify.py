@@ -69,8 +69,8 @@ class Command:
                     _stop(process)
             if code:
                 errors.seek(0)
-                words = errors.read(500).decode(errors="replace").strip().splitlines()
-                raise NotificationFailed(f"exit code {code}{f': {words[-1]}' if words else ''}")
+                lines = errors.read(500).decode(errors="replace").strip().splitlines()
+                raise NotificationFailed(f"exit code {code}{f': {lines[-1]}' if lines else ''}")
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
@@ -139,9 +139,9 @@ class Topic:
         parts = urlsplit(self.url)
         address = [str(notification[name]) for name in ("machine", "point", "sensor")]
         topic = unquote(parts.path).strip("/") or "/".join(["asperity", *map(_level, address)])
-        answers: list[str] = []
+        replies: list[str] = []
         client = mqtt.Client(CallbackAPIVersion.VERSION2)
-        client.on_connect = lambda _client, _data, _flags, reason, _more: answers.append(
+        client.on_connect = lambda _client, _data, _flags, reason, _more: replies.append(
             str(reason)
         )
         client.connect_timeout = NETWORK_S
@@ -155,11 +155,11 @@ class Topic:
             sent = client.publish(topic, json.dumps(notification), qos=1, retain=True)
             sent.wait_for_publish(NETWORK_S)
             if not sent.is_published():
-                answer = (
-                    f"; it answered: {answers[-1]}" if answers and answers[-1] != "Success" else ""
+                reply = (
+                    f"; it answered: {replies[-1]}" if replies and replies[-1] != "Success" else ""
                 )
                 raise NotificationFailed(
-                    f"no confirmation by the broker within {NETWORK_S:g} s{answer}"
+                    f"no confirmation by the broker within {NETWORK_S:g} s{reply}"
                 )
         finally:
             client.disconnect()

@@ -54,10 +54,10 @@ def tracked_recording(
     clock_std = reading.rate_doubt * resonance.crf_hz  # relative errors of rate and CRF are equal
     if resonance.found and clock_std > 0.0:
         # repeats share the error of the clock
-        whole, shared = (
+        total_std, shared_std = (
             float(np.hypot(std, clock_std)) for std in (resonance.crf_std, resonance.crf_shared_std)
         )
-        resonance = replace(resonance, crf_std=whole, crf_shared_std=shared)
+        resonance = replace(resonance, crf_std=total_std, crf_shared_std=shared_std)
     return TrackedRecording(
         file=reading.file,
         x=place.x,
@@ -76,11 +76,11 @@ def _damping_reason(resonance: Resonance, clean: CleanSpectrum) -> str:
     """Return why damping is not determined, or nothing."""
     spectrum, missing = clean.spectrum, 0.0
     if resonance.method != "joint":  # the joint separation takes removed lines into account
-        within = (
+        inside = (
             np.abs(spectrum.frequency_hz - resonance.crf_hz)
             <= resonance.damping_ratio * resonance.crf_hz
         )
-        missing = float(np.mean(~clean.kept[within])) if within.any() else 0.0
+        missing = float(np.mean(~clean.kept[inside])) if inside.any() else 0.0
     return damping_objection(resonance, spectrum.resolution_hz, taken_out=missing) or ""
 
 
@@ -171,8 +171,8 @@ def _joint_lines(
         reason = (
             f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor and has {most}"
         )
-        nothing = no_resonance(reason, band_hz, "joint")
-        return [SensorLine(nothing, (), dict.fromkeys(usable))] * len(instants)
+        no_line = no_resonance(reason, band_hz, "joint")
+        return [SensorLine(no_line, (), dict.fromkeys(usable))] * len(instants)
     keys = [
         tuple((instant.readings[name].file, name) for name in clean)
         for instant, clean in zip(instants, cleaned, strict=True)
@@ -309,11 +309,11 @@ def _match_stated(
     """Match recordings by their stated x."""
     keys: _Keys = {}
     located = dict(places)
-    stated = [
+    placed = [
         PlacedRecording(reading.sensor, places[reading.file].x, _duration(reading))
         for reading in readings
     ]
-    for reading, slot in zip(readings, match_places(stated, x_name), strict=True):
+    for reading, slot in zip(readings, match_places(placed, x_name), strict=True):
         located[reading.file] = replace(places[reading.file], x=slot.x)
         keys[reading.file, reading.sensor] = slot
     return keys, located
@@ -344,37 +344,37 @@ def _match_numbers(
     """Match the n-th recordings of all sensors."""
     counts = {name: len(series) for name, series in by_sensor.items()}
     if len({*counts.values()}) > 1:
-        listed = ", ".join(f"{count} of {name}" for name, count in counts.items())
+        counts_text = ", ".join(f"{count} of {name}" for name, count in counts.items())
         raise BadInput(
             f"recordings of different sensors are matched by number, but their numbers differ: "
-            f"{listed}; state their start, or their places in a table"
+            f"{counts_text}; state their start, or their places in a table"
         )
     keys: _Keys = {}
     located: dict[str, RecordingPlace] = {}
     numbers = dict.fromkeys(by_sensor, 0)
     lead = next(iter(by_sensor))
-    for place, reading in enumerate(readings, 1):
+    for order, reading in enumerate(readings, 1):
         if reading.sensor:
             numbers[reading.sensor] += 1
-        # a recording of an unknown sensor stands alone at the place of the one before
+        # a recording of an unknown sensor has the x of the recording before and no match
         number = numbers.get(reading.sensor, numbers[lead])
         located[reading.file] = replace(
             places.get(reading.file, RecordingPlace(x=number)), x=float(number)
         )
-        keys[reading.file, reading.sensor] = (float(number), 0 if reading.sensor else place)
+        keys[reading.file, reading.sensor] = (float(number), 0 if reading.sensor else order)
     return keys, located
 
 
 def _rarely_simultaneous(instants: Sequence[Instant], names: Sequence[str]) -> list[str]:
     """Return a note if few recordings of different sensors are simultaneous."""
-    together = sum(len(instant.readings) > 1 for instant in instants)
+    number = sum(len(instant.readings) > 1 for instant in instants)
     counts = sorted(sum(name in instant.readings for instant in instants) for name in names)
     possible = counts[-2]
-    if 2 * together >= possible:
+    if 2 * number >= possible:
         return []
-    many = f"Only {together} of {possible}" if together else "No"
+    count = f"Only {number} of {possible}" if number else "No"
     return [
-        f"{many} recordings of two sensors have the same x; elsewhere no second sensor confirms a "
+        f"{count} recordings of two sensors have the same x; elsewhere no second sensor confirms a "
         "line. Sensors are matched by x or time."
     ]
 

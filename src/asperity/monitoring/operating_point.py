@@ -37,7 +37,7 @@ COLDEST, HOTTEST = -20.0, 150.0  # range of the table of viscosities [degC]
 MIN_VARIATION = 0.05  # relative variation of a condition from which the contact is solved
 MIN_STATED = 0.5  # share of recordings that must state a condition for it to be used
 STEP = 1.3  # factor on load and speed, up and down, for the contact's response
-EXPONENT_UNCERTAINTY = 0.5  # relative, either way: the roughness differs from the case and changes
+EXPONENT_UNCERTAINTY = 0.5  # relative, up or down: the roughness differs from the case and changes
 MIN_HALF_RANGE = 0.05  # least half-width of the range of an exponent
 
 
@@ -60,8 +60,8 @@ def operating_point(reading: Reading, place: RecordingPlace | None) -> Operating
     values: dict[str, float | None] = {}
     for key in OPERATING_KEYS:
         fact = reading.facts.get(key)
-        stated = None if place is None else getattr(place, key)
-        values[key] = float(fact[0]) if stated is None and fact is not None else stated
+        value = None if place is None else getattr(place, key)
+        values[key] = float(fact[0]) if value is None and fact is not None else value
     return OperatingPoint(**values)
 
 
@@ -99,40 +99,40 @@ def conditions_of(
     points: Sequence[OperatingPoint], exponents: ResponseExponents, oil: OilSheet
 ) -> tuple[Condition, ...]:
     """Return the conditions that an indicator may respond to: those that most recordings state."""
-    found: list[Condition] = []
+    conditions: list[Condition] = []
     for name, unit, limits, read in (
         ("load", "N", exponents.load, attrgetter("load_n")),
         ("speed", "m/s", exponents.speed, attrgetter("entrainment_m_s")),
         ("speed", "Hz", exponents.speed, attrgetter("speed_hz")),
     ):
-        if name in {condition.name for condition in found}:
+        if name in {condition.name for condition in conditions}:
             continue
-        shown = _known(points, read)
-        if shown is not None and (shown[np.isfinite(shown)] > 0.0).all():
-            found.append(
+        series = _series_if_stated(points, read)
+        if series is not None and (series[np.isfinite(series)] > 0.0).all():
+            conditions.append(
                 Condition(
                     name=name,
-                    values=np.log(shown),
+                    values=np.log(series),
                     low=limits[0],
                     high=limits[1],
-                    shown=shown,
+                    shown=series,
                     unit=unit,
                 )
             )
-    shown = _known(points, attrgetter("temperature_degc"))
-    if shown is not None and exponents.viscosity != (0.0, 0.0):
+    series = _series_if_stated(points, attrgetter("temperature_degc"))
+    if series is not None and exponents.viscosity != (0.0, 0.0):
         degrees, logarithms = _viscosities(oil)
-        values = np.interp(shown, degrees, logarithms)
+        values = np.interp(series, degrees, logarithms)
         low, high = exponents.viscosity
-        found.append(
+        conditions.append(
             Condition(
-                name="oil temperature", values=values, low=low, high=high, shown=shown, unit="degC"
+                name="oil temperature", values=values, low=low, high=high, shown=series, unit="degC"
             )
         )
-    return tuple(found)
+    return tuple(conditions)
 
 
-def _known(
+def _series_if_stated(
     points: Sequence[OperatingPoint], read: Callable[[OperatingPoint], float | None]
 ) -> Field | None:
     """Return a condition of all recordings, nan if not stated; None if most do not state it."""
@@ -143,18 +143,18 @@ def _known(
 def unstated(points: Sequence[OperatingPoint]) -> list[str]:
     """Return a sentence on each condition that only some recordings state."""
     notes = []
-    known_by = (
+    conditions = (
         ("load", ("load_n",)),
         ("speed", ("entrainment_m_s", "speed_hz")),
         ("oil temperature", TEMPERATURE),
     )
-    for words, keys in known_by:
+    for name, keys in conditions:
         missing = min(sum(getattr(point, key) is None for point in points) for key in keys)
         if 0 < missing < len(points):
-            used = any(_known(points, attrgetter(key)) is not None for key in keys)
+            used = any(_series_if_stated(points, attrgetter(key)) is not None for key in keys)
             consequence = "these are excluded from trend and alarm" if used else "it is not used"
             notes.append(
-                f"The {words} is not stated for {missing} of {len(points)} recordings; "
+                f"The {name} is not stated for {missing} of {len(points)} recordings; "
                 f"{consequence}."
             )
     return notes
@@ -163,11 +163,11 @@ def unstated(points: Sequence[OperatingPoint]) -> list[str]:
 @lru_cache(maxsize=8)
 def _viscosities(sheet: OilSheet) -> tuple[Field, Field]:
     """Return the logarithm of an oil's viscosity over temperature [degC]."""
-    known = []
+    points = []
     for degree in np.linspace(COLDEST, HOTTEST, 35):
         with suppress(BadInput):  # outside the range of the data sheet
-            known.append((degree, math.log(sheet.viscosity(degree + ZERO_CELSIUS))))
-    degrees, logarithms = np.array(known).T
+            points.append((degree, math.log(sheet.viscosity(degree + ZERO_CELSIUS))))
+    degrees, logarithms = np.array(points).T
     return degrees, logarithms
 
 
@@ -176,9 +176,9 @@ def operating_response(case: Case | None, points: Sequence[OperatingPoint]) -> R
     if case is None:
         return ANY_CONTACT
     changed = any(
-        shown is not None
-        and np.nanmax(shown) - np.nanmin(shown) > MIN_VARIATION * np.nanmax(np.abs(shown))
-        for shown in (_known(points, attrgetter(key)) for key in OPERATING_KEYS)
+        series is not None
+        and np.nanmax(series) - np.nanmin(series) > MIN_VARIATION * np.nanmax(np.abs(series))
+        for series in (_series_if_stated(points, attrgetter(key)) for key in OPERATING_KEYS)
     )
     oil = case.oil_sheet or USUAL_OIL
     if not changed:
@@ -218,17 +218,17 @@ def contact_exponents(case: Case) -> ResponseExponents:
     cached = user_cache() / "follows" / f"{digest}.json"
     with suppress(OSError, ValueError, TypeError):
         return _with_uncertainty(*json.loads(cached.read_text()))
-    stated = case.conditions
+    conditions = case.conditions
     exponents = []
     for key, value, unit in (
-        ("contact.load", stated.load, "N"),
-        ("contact.entrainment_speed", stated.entrainment_speed, "m/s"),
+        ("contact.load", conditions.load, "N"),
+        ("contact.entrainment_speed", conditions.entrainment_speed, "m/s"),
     ):
-        ends = [
+        frequencies = [
             _resonance(case.with_overrides({key: f"{value * by:.10g} {unit}"}))
             for by in (1.0 / STEP, STEP)
         ]
-        exponents.append(math.log(ends[1] / ends[0]) / (2.0 * math.log(STEP)))
+        exponents.append(math.log(frequencies[1] / frequencies[0]) / (2.0 * math.log(STEP)))
     with suppress(AsperityError):
         make_folder(cached.parent)
         write_text(cached, json.dumps(exponents))

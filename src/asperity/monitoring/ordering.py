@@ -173,8 +173,8 @@ def _wait_notes(waits: Sequence[FileVersion], reason: str, remedy: str) -> tuple
     """Return a sentence on recordings that have to wait, if there are any."""
     if not waits:
         return ()
-    more = f" (and {len(waits) - 1} more)" if len(waits) > 1 else ""
-    return (f"{file_name(waits[0])}{more} waits: it {reason}; {remedy}",)
+    others = f" (and {len(waits) - 1} more)" if len(waits) > 1 else ""
+    return (f"{file_name(waits[0])}{others} waits: it {reason}; {remedy}",)
 
 
 def max_window() -> int:

@@ -54,14 +54,14 @@ class StoreOverview:
         if not self.rows:
             return f"{self.path.name} contains no recordings yet."
         machines = len({row["machine"] for row in self.rows})
-        held = sum(row["recordings"] for row in self.rows)
+        recordings = sum(row["recordings"] for row in self.rows)
         sensors = f"{len(self.rows)} sensor{'s' * (len(self.rows) > 1)}"
-        places = f"{machines} machine{'s' * (machines > 1)}"
+        location = f"{machines} machine{'s' * (machines > 1)}"
         counts = {state: sum(row["state"] == state for row in self.rows) for state in SEVERITY[:-1]}
         states = ", ".join(
             f"{STATE_TEXTS[state]} {count}" for state, count in counts.items() if count
         )
-        return f"{sensors} on {places}, {held} recordings: {states or 'no alarm'}."
+        return f"{sensors} on {location}, {recordings} recordings: {states or 'no alarm'}."
 
     def scalars(self) -> dict[str, Any]:
         """Return the JSON of `asperity store`."""
@@ -106,7 +106,7 @@ def store_overview(path: str | Path) -> StoreOverview:
 
 def _sensor_row(store: Store, number: int, address: SensorAddress) -> dict[str, Any]:
     """Return a sensor's row."""
-    ((held, last),) = store.read(
+    ((count, last),) = store.read(
         "SELECT count(*), max(heard) FROM recording WHERE sensor = ?", number
     )
     judged = store.read(
@@ -117,7 +117,7 @@ def _sensor_row(store: Store, number: int, address: SensorAddress) -> dict[str, 
     missing = ("cannot-tell", None, "no judgement yet", None, "No judgement yet.")
     state, since, reason, judged_at, verdict = judged[0] if judged else missing
     values = {
-        "recordings": held,
+        "recordings": count,
         "last_heard": last,
         "state": state,
         "since": since,
@@ -157,7 +157,7 @@ def keep_track(
     sensor: str | None = None,
     acknowledge: str | None = None,
 ) -> Track:
-    """Append a track to a store and return it, with the alarm that stands there.
+    """Append a track to a store and return it, with the unacknowledged alarm there.
 
     Parameters
     ----------

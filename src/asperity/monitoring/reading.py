@@ -113,12 +113,12 @@ def read_spectrum(
         opened = open_recording(path, **asdict(options))
     except BadInput as refusal:
         return Reading(file=str(path), sensor=_sensor_of_refused(path, place), reason=str(refusal))
-    known = _with_facts(path, opened, place)
+    partial = _with_facts(path, opened, place)
     auxiliary = read_auxiliary(opened, place)
     rates_hz = fault_rates(opened, auxiliary, target)
-    gauge = SampleStatistics()
+    statistics = SampleStatistics()
     envelope = Envelope(opened.rate_hz)
-    blocks = gauge.without_stuck(gauge.pass_through(opened.blocks()))
+    blocks = statistics.without_stuck(statistics.pass_through(opened.blocks()))
     spectrum, failed = None, ""
     try:
         spectrum = averaged_spectrum(
@@ -129,15 +129,15 @@ def read_spectrum(
             window=WINDOW,
         )
     except UnreadableFile as refusal:
-        return replace(known, reason=str(refusal))
+        return replace(partial, reason=str(refusal))
     except BadInput as refusal:
         failed = str(refusal)
-    quality = gauge.quality(opened, width_hz=target.width_hz, band_hz=target.band_hz)
+    quality = statistics.quality(opened, width_hz=target.width_hz, band_hz=target.band_hz)
     reading = replace(
-        known,
+        partial,
         spectrum=spectrum,
         quality=replace(quality, remarks=(*quality.remarks, *auxiliary.remarks)),
-        facts=known.facts | auxiliary.facts,
+        facts=partial.facts | auxiliary.facts,
         depths=envelope.depths(rates_hz),
         reason="; ".join(quality.faults) or failed,
     )
@@ -147,7 +147,7 @@ def read_spectrum(
 
 
 def _with_facts(path: Path, opened: OpenRecording, place: RecordingPlace | None) -> Reading:
-    """Return a reading of all that is known without the samples."""
+    """Return a reading with the facts that do not need the samples."""
     return Reading(
         file=str(path),
         rate_hz=opened.rate_hz,
@@ -292,8 +292,8 @@ def pack_reading(reading: Reading) -> bytes:
     density = np.empty(0) if reading.spectrum is None else reading.spectrum.density
     content = asdict(replace(reading, spectrum=None))
     if reading.spectrum is not None:
-        kept = ("unit", "duration_s", "segment", "window", "resolution_hz", "averages")
-        content["spectrum"] = {name: getattr(reading.spectrum, name) for name in kept}
+        names = ("unit", "duration_s", "segment", "window", "resolution_hz", "averages")
+        content["spectrum"] = {name: getattr(reading.spectrum, name) for name in names}
     packed = BytesIO()
     np.savez(packed, density=density, told=np.array(json.dumps(content)))
     return append_digest(packed.getvalue())

@@ -130,8 +130,8 @@ class TrackedRecording:
     @property
     def _most_severe(self) -> Reading:
         """Reading with the highest velocity."""
-        known = [reading for reading in self.readings.values() if np.isfinite(reading.velocity)]
-        return max(known, key=lambda reading: reading.velocity, default=self.reading)
+        measured = [reading for reading in self.readings.values() if np.isfinite(reading.velocity)]
+        return max(measured, key=lambda reading: reading.velocity, default=self.reading)
 
     def severity(self) -> str:
         """Return velocity and zone as text, or why they are not determined."""
@@ -244,16 +244,16 @@ def sensor_summary(recordings: Sequence[TrackedRecording]) -> str:
 def _sensor_faults(recordings: Sequence[TrackedRecording], name: str) -> list[str]:
     """Return sentences on a sensor that is unusable where others are not, or delivers nothing."""
     sentences = []
-    held = [recording for recording in recordings if name in recording.on_sensors]
+    recorded = [recording for recording in recordings if name in recording.on_sensors]
     reasons = [
         recording.on_sensors[name].reading.reason
-        for recording in held
+        for recording in recorded
         if not recording.on_sensors[name].reading.usable
         and any(other.reading.usable for other in recording.on_sensors.values())
     ]
     if reasons:
         sentences.append(
-            f"Sensor {name} is not usable in {len(reasons)} of {len(held)}: {reasons[-1]}."
+            f"Sensor {name} is not usable in {len(reasons)} of {len(recorded)}: {reasons[-1]}."
         )
     if len(recordings) >= MISSING_RECORDINGS and all(
         name not in recording.on_sensors for recording in recordings[-MISSING_RECORDINGS:]

@@ -72,18 +72,18 @@ class SeriesMemory:
         self, key: Key, spectrum: Spectrum, shaft_hz: Sequence[float] | None
     ) -> CleanSpectrum:
         """Return a spectrum without tones; computed once per spectrum."""
-        held = self.cleaned.get(key)
+        cached = self.cleaned.get(key)
         highest = spectrum.frequency_hz[-1]
         if (
-            held is None
-            or held[0].density is not spectrum.density
-            or held[0].frequency_hz[-1] != highest
+            cached is None
+            or cached[0].density is not spectrum.density
+            or cached[0].frequency_hz[-1] != highest
         ):
-            held = self.cleaned[key] = (spectrum, remove_lines(spectrum, shaft_hz=shaft_hz))
+            cached = self.cleaned[key] = (spectrum, remove_lines(spectrum, shaft_hz=shaft_hz))
             self.found.pop(key, None)
             for keys in [keys for keys in self.together if key in keys]:
                 self.together.pop(keys)
-        return held[1]
+        return cached[1]
 
     def resonances(
         self, keys: Sequence[Key], cleaned: Sequence[CleanSpectrum], band_hz: tuple[float, float]

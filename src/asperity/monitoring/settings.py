@@ -69,6 +69,6 @@ class WatchSettings:
     notify_states: Sequence[AlarmState] = ALARM_STATES  # notify on entering or leaving these
     reuse_judgement: bool = False  # start with the stored judgement if nothing has changed
     once: bool = False  # process the present recordings and stop
-    poll_interval_s: float = 5.0  # time between two looks into the folder [s]
+    poll_interval_s: float = 5.0  # interval between checks of the folder [s]
     settle_time_s: float = 2.0  # time for which a file must be unchanged before it is read [s]
     overdue_after_s: float | None = None  # time without recordings until "blind" [s]; None: 5 usual

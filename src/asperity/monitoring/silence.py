@@ -24,20 +24,20 @@ def overdue_reason(
     if not arrivals:
         return ""
     intervals = [(after - before).total_seconds() for before, after in pairwise(arrivals)]
-    usual = median(intervals) if len(intervals) >= MIN_INTERVALS else None
-    if limit_s is None and usual is None:
+    typical = median(intervals) if len(intervals) >= MIN_INTERVALS else None
+    if limit_s is None and typical is None:
         return ""
-    longest = max(OVERDUE_FACTOR * (usual or 0.0), MIN_WAIT_S) if limit_s is None else limit_s
-    waited = ((now or datetime.now(UTC)) - arrivals[-1]).total_seconds()
-    if waited <= longest:
+    longest = max(OVERDUE_FACTOR * (typical or 0.0), MIN_WAIT_S) if limit_s is None else limit_s
+    elapsed = ((now or datetime.now(UTC)) - arrivals[-1]).total_seconds()
+    if elapsed <= longest:
         return ""
     expected = (
-        f"the usual interval is {duration_text(usual)}"
-        if limit_s is None and usual
+        f"the usual interval is {duration_text(typical)}"
+        if limit_s is None and typical
         else f"the limit is {duration_text(longest)}"
     )
     last = arrivals[-1].isoformat(timespec="seconds")
-    return f"no recording has come for {duration_text(waited)}, since {last}; {expected}"
+    return f"no recording has come for {duration_text(elapsed)}, since {last}; {expected}"
 
 
 def duration_text(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""Matching of recordings of several sensors: made at one time, or at one stated place."""
+"""Matching of recordings of several sensors: made at one time, or at one stated x."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
@@ -44,45 +44,45 @@ def match_times(recordings: Sequence[TimedRecording]) -> list[Slot]:
     """Match recordings of different sensors by time.
 
     Recordings match if they begin at one time or overlap by half of the shorter. A recording
-    without a time, of which nothing could be read, stands alone at the place of the one before.
+    without a time, of which nothing could be read, has the x of the one before and no match.
     """
     timed = sorted(
-        (recording.time, place, recording)
-        for place, recording in enumerate(recordings)
+        (recording.time, index, recording)
+        for index, recording in enumerate(recordings)
         if recording.time is not None
     )
     slots: dict[int, Slot] = {}
-    taken: set[str] = set()
-    first = began = until = timed[0][0] if timed else datetime.min
+    sensors: set[str] = set()
+    first = start = stop = timed[0][0] if timed else datetime.min
     number = -1
-    for time, place, recording in timed:
+    for time, index, recording in timed:
         duration_s = recording.duration_s if isfinite(recording.duration_s) else 0.0
         end = time + timedelta(seconds=duration_s)
-        overlap = min(until, end) - time
-        shorter = min(until - began, end - time)
-        together = time == began or (time < until and 2 * overlap >= shorter)
-        if number < 0 or not together or recording.sensor in taken:
-            began, until, taken, number = time, end, set(), number + 1
-        taken.add(recording.sensor)
-        slots[place] = Slot((began - first).total_seconds() / 3600.0, number)
+        overlap = min(stop, end) - time
+        shorter = min(stop - start, end - time)
+        together = time == start or (time < stop and 2 * overlap >= shorter)
+        if number < 0 or not together or recording.sensor in sensors:
+            start, stop, sensors, number = time, end, set(), number + 1
+        sensors.add(recording.sensor)
+        slots[index] = Slot((start - first).total_seconds() / 3600.0, number)
     before = Slot(0.0, -1)
-    for place in range(len(recordings)):
-        before = slots.setdefault(place, before._replace(alone=place + 1))
-    return [slots[place] for place in range(len(recordings))]
+    for index in range(len(recordings)):
+        before = slots.setdefault(index, before._replace(alone=index + 1))
+    return [slots[index] for index in range(len(recordings))]
 
 
 def match_places(recordings: Sequence[PlacedRecording], x_name: str) -> list[Slot]:
     """Match recordings of different sensors by x, the n-th of one with the n-th of another.
 
     Two x are equal within a recording's duration if `x_name` ends in a unit of time, otherwise
-    within rounding. A recording of an unknown sensor stands alone.
+    within rounding. A recording of an unknown sensor has no match.
     """
     tolerance = _tolerance(recordings, x_name)
     common_x = dict[float, float]()
-    began = -inf
+    start = -inf
     for x in sorted({recording.x for recording in recordings}):
-        began = began if x - began <= tolerance else x
-        common_x[x] = began
+        start = start if x - start <= tolerance else x
+        common_x[x] = start
     counts: dict[tuple[str, float], int] = {}
     slots = []
     for number, recording in enumerate(recordings, 1):

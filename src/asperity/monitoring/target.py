@@ -117,5 +117,5 @@ def _rates(machine: MachineCase) -> tuple[dict[str, float], float | None]:
 
 def _name(key: str) -> str:
     """Return the label of a rate, such as BPFO."""
-    bare = key.removesuffix("_hz")
-    return bare.upper() if bare in ("bpfo", "bpfi", "bsf", "ftf") else bare.replace("_", " ")
+    name = key.removesuffix("_hz")
+    return name.upper() if name in ("bpfo", "bpfi", "bsf", "ftf") else name.replace("_", " ")

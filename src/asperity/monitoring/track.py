@@ -55,8 +55,8 @@ def track_recordings(
     """
     target = search_target(case, settings.band_hz)
     files = recordings_in(paths)
-    stated = table if isinstance(table, RecordingTable) or table is None else read_table(table)
-    x_name, places = _stated_places(files, x, stated)
+    parsed = table if isinstance(table, RecordingTable) or table is None else read_table(table)
+    x_name, places = _stated_places(files, x, parsed)
     readings = require_readable(_read_files(files, settings, target, places, progress))
     track = judge(readings, target, settings, places=places, x_name=x_name)
     if forecaster is None:
@@ -90,7 +90,7 @@ def _read_files(
     readings: list[Reading] = []
     for number, channel in enumerate(channels):
         by_number = dict(numbered_readings[number * len(files) : (number + 1) * len(files)])
-        of_channel = [by_number[place] for place in range(len(files))]
+        of_channel = [by_number[index] for index in range(len(files))]
         if len(channels) > 1 and all(reading.refused for reading in of_channel):
             raise BadInput(
                 f"channel {channel} cannot be read in any recording: {of_channel[0].reason}"

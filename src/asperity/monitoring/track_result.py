@@ -91,10 +91,10 @@ class Track:
         )
 
     def overdue(self, reason: str) -> "Track":
-        """Return the track with recordings overdue: blind, unless an alarm stands."""
-        noted = replace(self, notes=(*self.notes, f"{reason[:1].upper()}{reason[1:]}."))
+        """Return the track with recordings overdue: blind, unless an alarm is active."""
+        track = replace(self, notes=(*self.notes, f"{reason[:1].upper()}{reason[1:]}."))
         if self.alarm.state == "alarm":
-            return noted
+            return track
         states: tuple[AlarmState, ...] = (*self.alarm.states[:-1], "blind")
         since = len(states) - 1
         blind = replace(
@@ -106,7 +106,7 @@ class Track:
             raised_by=SILENCE,
             explained="",
         )
-        return replace(noted, alarm=blind)
+        return replace(track, alarm=blind)
 
     def with_forecast(self, forecast: ForecastResult) -> "Track":
         """Return the track with a forecast, which may raise the alarm at the last recording."""
@@ -127,40 +127,40 @@ class Track:
 
     def _judgement(self) -> str:
         total = len(self.recordings)
-        several = f"{total} recordings" if total != 1 else "1 recording"
-        seen = self._without_resonance(several)
+        recordings = f"{total} recordings" if total != 1 else "1 recording"
+        finding = self._without_resonance(recordings)
         if self.stages is not None:
-            seen = (
+            finding = (
                 f"{self.stages.verdict.rstrip('.')}; "
-                f"contact resonance found in {self.resonance_count} of {several}."
+                f"contact resonance found in {self.resonance_count} of {recordings}."
             )
-        seen = " ".join(filter(None, [seen, sensor_summary(self.recordings)]))
+        finding = " ".join(filter(None, [finding, sensor_summary(self.recordings)]))
         alarm = self.alarm
         if alarm.explained:
-            seen = f"{seen} {alarm.explained[0].upper()}{alarm.explained[1:]}."
+            finding = f"{finding} {alarm.explained[0].upper()}{alarm.explained[1:]}."
         if alarm.state == "alarm":
             first = Path(self.recordings[alarm.since or 0].file).name
-            return f"ALARM since {first}: {alarm.reason}. {seen}"
+            return f"ALARM since {first}: {alarm.reason}. {finding}"
         if alarm.state == "alert":
-            return f"Alert: {alarm.reason}. {seen}"
+            return f"Alert: {alarm.reason}. {finding}"
         if alarm.state == "blind" or (alarm.state == "cannot-tell" and self.stages is not None):
-            return f"{alarm.verdict} {seen}"
-        return seen
+            return f"{alarm.verdict} {finding}"
+        return finding
 
-    def _without_resonance(self, several: str) -> str:
+    def _without_resonance(self, recordings: str) -> str:
         """Return the sentence without any resonance, with the most frequent reason."""
         reasons = [recording.resonance.reason for recording in self.recordings]
         (kind, count), *_ = Counter(map(_without_numbers, reasons)).most_common(1)
         reason = next(reason for reason in reasons if _without_numbers(reason) == kind)
         share = f"{count} of {len(reasons)}: " if count < len(reasons) else ""
-        return f"Cannot tell: no contact resonance found in {several} ({share}{reason})."
+        return f"Cannot tell: no contact resonance found in {recordings} ({share}{reason})."
 
     def stage_rows(self) -> list[tuple[str, str]]:
         """Return the stages by CRF, damping and both as rows, with the deciding one marked."""
-        decides = None if self.stages is None else self.stages.source
+        deciding = None if self.stages is None else self.stages.source
         return [
             (
-                f"stage by {SOURCE_NAMES[source]}{' (deciding)' if source == decides else ''}",
+                f"stage by {SOURCE_NAMES[source]}{' (deciding)' if source == deciding else ''}",
                 stages.verdict,
             )
             for source, stages in self.stages_by.items()
@@ -243,7 +243,7 @@ class Track:
             np.array([row["found"] for row in rows], dtype=np.int8),
         )
         spectra, coordinates = self._spectra()
-        stated = {
+        scalars = {
             key: value
             for key, value in self.scalars().items()
             if key not in ("recordings", "verdict")
@@ -253,7 +253,7 @@ class Track:
             "title": "Contact resonance of a series of recordings",
             "source": f"asperity {version('asperity')}",
             "verdict": self.verdict(),
-            "track": json.dumps(stated),
+            "track": json.dumps(scalars),
         }
         return xarray.Dataset(variables | spectra, coordinates, attributes)
 
@@ -320,7 +320,7 @@ class Track:
 
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a recording's row with one column per fault depth, line and band."""
-    rest = {name: value for name, value in row.items() if name not in (*NAMED, "sensors")}
+    scalars = {name: value for name, value in row.items() if name not in (*NAMED, "sensors")}
     by_sensor = {
         f"{key}_{name}": value
         for name, values in row.get("sensors", {}).items()
@@ -331,7 +331,7 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
         for field, prefix in NAMED.items()
         for name, value in row.get(field, {}).items()
     }
-    return rest | named | by_sensor
+    return scalars | named | by_sensor
 
 
 def _stages_row(stages: Stages) -> JsonObject:

@@ -49,7 +49,7 @@ def watch_folder(
     ----------
     folder : where recordings arrive
     out : folder of the store, made if need be; a later watch with the same store continues it
-    settings : as `track_recordings`. `acknowledge` is kept in the store: an alarm stands until then
+    settings : as `track_recordings`. `acknowledge` is stored: an alarm persists until then
     watching : store, sensor, notifications and timing
     case, table, progress : as `track_recordings`; a recording that is not in `table` yet waits
     forecaster : forecasts the series after the last acknowledged recording, when a judgement has

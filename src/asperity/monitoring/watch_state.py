@@ -1,4 +1,4 @@
-"""State of a watched folder: what the store holds and what this run has needed of it."""
+"""State of a watched folder: what the store holds and what this run has read of it."""
 
 import json
 import os
@@ -79,12 +79,12 @@ def _digest(
     target: Target,
 ) -> str:
     """Return a digest of all on which a judgement depends, besides the content of the store."""
-    stated = json.dumps([question, repr(table), target.full_load_crf_hz], default=str)
-    return sha256("\n".join([stated, *map("\0".join, series)]).encode(errors="replace")).hexdigest()
+    inputs = json.dumps([question, repr(table), target.full_load_crf_hz], default=str)
+    return sha256("\n".join([inputs, *map("\0".join, series)]).encode(errors="replace")).hexdigest()
 
 
 class WatchState:
-    """Sensors of a watch: the store, and in memory what this run has needed of it."""
+    """Sensors of a watch: the store, and in memory what this run has read of it."""
 
     def __init__(
         self,
@@ -137,8 +137,8 @@ class WatchState:
     def left_out(self) -> Iterator[str]:
         """Yield a sentence on each file that the store cannot hold."""
         for name in sorted(self._not_utf8):
-            shown = name.encode(errors="surrogateescape").decode(errors="replace")
-            yield f"{shown} is left out: its name is not UTF-8; rename it"
+            displayed = name.encode(errors="surrogateescape").decode(errors="replace")
+            yield f"{displayed} is left out: its name is not UTF-8; rename it"
 
     def unchanged(self, keys: list[FileVersion]) -> list[FileVersion]:
         """Return files unchanged for the settling time; with a future time, since first seen."""

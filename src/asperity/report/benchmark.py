@@ -20,7 +20,7 @@ SMALLEST_ERROR = 1e-8  # smaller errors are drawn at this value
 
 @ON_PAGE.drawing()
 def benchmark_figure(*results: BenchmarkResult) -> Figure:
-    """Draw relative error over processor time, one panel per solver, one line per value."""
+    """Draw relative error over CPU time, one panel per solver, one line per value."""
     figure = Figure(
         figsize=(ON_PAGE.single, 4.2 if len(results) == 1 else 3.2 * len(results)),
         layout="constrained",
@@ -28,7 +28,7 @@ def benchmark_figure(*results: BenchmarkResult) -> Figure:
     rows = figure.subplots(len(results), squeeze=False, sharex=True, sharey=True)[:, 0]
     for axes, result in zip(rows, results, strict=True):
         _panel(axes, result)
-    rows[-1].set_xlabel("processor time of the case [s]")
+    rows[-1].set_xlabel("CPU time of the case [s]")
     return figure
 
 

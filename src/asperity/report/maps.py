@@ -52,7 +52,7 @@ def show_map(axes: Axes, values: Field, solution: ContactSolution, **style: Any)
     roller = solution.conditions.geometry == "roller"
     aspect: Literal["auto", "equal"] = (
         "auto" if roller else "equal"
-    )  # a roller is too long to scale
+    )  # a roller is too long to be drawn to scale
     image = axes.imshow(
         np.swapaxes(values, 0, 1),
         origin="lower",
@@ -102,9 +102,9 @@ def colour_bar(
     """Add the colour bar of a quantity below its map."""
     box = axes.get_position()
     total = figure.get_size_inches()[1]
-    place = figure.add_axes((box.x0, 0.42 / total, box.width, 0.11 / total))
+    bar_axes = figure.add_axes((box.x0, 0.42 / total, box.width, 0.11 / total))
     figure.colorbar(
-        image, cax=place, orientation="horizontal", label=quantity(key).axis, **settings
+        image, cax=bar_axes, orientation="horizontal", label=quantity(key).axis, **settings
     )
 
 
@@ -118,11 +118,9 @@ def mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
     elif solution.conditions.long:
         sliced = solution.conditions.sliced_load
         loaded = sliced.line_load > 0.0
-        places = display("y_m", sliced.y[loaded])
+        y = display("y_m", sliced.y[loaded])
         side = a * np.sqrt(sliced.line_load[loaded] / sliced.line_load.mean())
-        axes.plot(
-            np.concatenate([side, -side[::-1]]), np.concatenate([places, places[::-1]]), **style
-        )
+        axes.plot(np.concatenate([side, -side[::-1]]), np.concatenate([y, y[::-1]]), **style)
     else:
         angle = np.linspace(0.0, 2.0 * np.pi, 200)
         axes.plot(a * np.cos(angle), b * np.sin(angle), **style)

@@ -21,7 +21,7 @@ from matplotlib.transforms import Bbox
 from asperity.core.errors import BadInput
 from asperity.core.files import atomic_write
 
-# Colours of Okabe and Ito, distinguishable with any colour vision; lines also differ by stroke or
+# Colours of Okabe and Ito, distinguishable with any colour vision; lines also differ by style or
 # marker.
 BLUE, VERMILION, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#6b7280"
 FILM_COLOURS = "viridis"  # Matplotlib's name; `app.figures` has its own copy of the map
@@ -151,8 +151,8 @@ def _titles(axes: Axes) -> list[Text]:
 
 def _is_short(axes: Axes, title: Text) -> bool:
     """Return True if a title certainly fits into its column."""
-    place = axes.get_subplotspec()
-    column = axes.figure.bbox.width / (place.get_gridspec().ncols if place is not None else 1)
+    spec = axes.get_subplotspec()
+    column = axes.figure.bbox.width / (spec.get_gridspec().ncols if spec is not None else 1)
     return bool(title.get_window_extent().width < _SAFE_WIDTH * column)
 
 

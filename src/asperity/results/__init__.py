@@ -1,4 +1,4 @@
-"""Cases solved: the contact, what is read off it, how a mass on it vibrates; friction curves."""
+"""Solved cases: the contact, derived quantities, vibration of a mass on it; friction curves."""
 
 import lazy_loader
 

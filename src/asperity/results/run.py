@@ -170,10 +170,10 @@ class Run:
     @cached_property
     def _virgin_resonance(self) -> Determined[DynamicStiffness]:
         """The same while cells at the pressure cap still yield, if determined."""
-        own = self._own_resonance.value
-        if own is None:
+        resonance = self._own_resonance.value
+        if resonance is None:
             return Determined(None, self._own_resonance.reason)
-        return Determined.attempt(lambda: own.virgin)
+        return Determined.attempt(lambda: resonance.virgin)
 
     @property
     def virgin_resonance(self) -> DynamicStiffness | None:
@@ -188,8 +188,8 @@ class Run:
             return Determined(None)
         if not self.solution.convergence.converged:
             return Determined(None, "the contact is not solved")
-        own = self.own_resonance
-        resonance_hz = None if own is None else own.elastic.frequency_hz
+        resonance = self.own_resonance
+        resonance_hz = None if resonance is None else resonance.elastic.frequency_hz
         return Determined.attempt(lambda: dynamic_curve(self.solution, count, resonance_hz))
 
     @property

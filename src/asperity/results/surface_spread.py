@@ -66,8 +66,8 @@ def prediction_interval(values: Sequence[float], *, share: bool) -> tuple[float,
         raise ValueError("a prediction interval needs at least two values")
     scale = np.array([_odds(value) for value in values]) if share else np.array(values)
     reach = float(stdtrit(count - 1, UPPER) * math.sqrt(1.0 + 1.0 / count) * np.std(scale, ddof=1))
-    ends = float(np.mean(scale)) - reach, float(np.mean(scale)) + reach
-    low, high = (_share(end) for end in ends) if share else ends
+    limits = float(np.mean(scale)) - reach, float(np.mean(scale)) + reach
+    low, high = (_share(end) for end in limits) if share else limits
     return mean, (max(0.0, mean - low), max(0.0, high - mean))
 
 
@@ -153,8 +153,8 @@ def _crf_error(
     def propagated(sides: Sides | None) -> Sides | None:
         if sides is None:
             return None
-        ends = (max(0.0, clr.value - sides[0]), clr.value, min(1.0, clr.value + sides[1]))
-        low, middle, high = (resonance_at(end, state, conditions, model) for end in ends)
+        values = (max(0.0, clr.value - sides[0]), clr.value, min(1.0, clr.value + sides[1]))
+        low, middle, high = (resonance_at(end, state, conditions, model) for end in values)
         if low is None or middle is None or high is None:
             return None
         return abs(middle - low), abs(high - middle)

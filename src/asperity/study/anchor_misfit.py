@@ -37,14 +37,14 @@ class MisfitSolver:
         self,
         case: Case,
         ranges: Sequence[ParameterRange],
-        aimed: Sequence[Anchor],
+        targets: Sequence[Anchor],
         sq: Sequence[float],
         seeds: int,
         run: Callable[[StudyPlan, str], StudyResult],
     ) -> None:
-        self.case, self.ranges, self.aimed, self.sq, self.seeds = case, ranges, aimed, sq, seeds
+        self.case, self.ranges, self.targets, self.sq, self.seeds = case, ranges, targets, sq, seeds
         self.run = run
-        self.known: dict[tuple[float, ...] | None, pandas.DataFrame] = {}
+        self.solved: dict[tuple[float, ...] | None, pandas.DataFrame] = {}
         self.cases = self.failed = 0
         self.seconds = 0.0
 
@@ -73,21 +73,21 @@ class MisfitSolver:
 
     def solve_missing(self, parameter_sets: Sequence[Field | None]) -> None:
         """Solve the sets that have not been solved yet."""
-        new = [shares for shares in parameter_sets if _name(shares) not in self.known]
+        new = [shares for shares in parameter_sets if _name(shares) not in self.solved]
         if new:
-            self.known.update(zip(map(_name, new), self.solve(new), strict=True))
+            self.solved.update(zip(map(_name, new), self.solve(new), strict=True))
 
     def curve(self, shares: Field | None) -> WearCurve:
         """Return the wear curve of one set."""
         self.solve_missing([shares])
-        return WearCurve(np.array(self.sq), self.known[_name(shares)])
+        return WearCurve(np.array(self.sq), self.solved[_name(shares)])
 
     def residuals(self, shares: Field | None) -> Field:
         """Return the residual of each fitted anchor, in its tolerances."""
         curve = self.curve(shares)
         if not (curve.table["status"] == DONE).any():
-            return np.full(len(self.aimed), MISSING_RESIDUAL)
-        values = ((anchor, anchor.evaluate(curve)[0]) for anchor in self.aimed)
+            return np.full(len(self.targets), MISSING_RESIDUAL)
+        values = ((anchor, anchor.evaluate(curve)[0]) for anchor in self.targets)
         return np.array(
             [
                 anchor.miss(value) / anchor.tolerance if np.isfinite(value) else MISSING_RESIDUAL
@@ -117,8 +117,8 @@ def least_misfit(solver: MisfitSolver, screened: int, starts: int, seed: int) ->
         for shares in scipy.stats.qmc.LatinHypercube(count, rng=seed).random(screened)
     ]
     solver.solve_missing([None, *cube])
-    if not any((table["status"] == DONE).any() for table in solver.known.values()):
-        reasons = next(iter(solver.known.values()))["reason"]
+    if not any((table["status"] == DONE).any() for table in solver.solved.values()):
+        reasons = next(iter(solver.solved.values()))["reason"]
         raise AsperityError(f"no parameter set could be solved: {reasons.iloc[0]}")
     for first in sorted(cube, key=solver.misfit)[:starts]:
         scipy.optimize.least_squares(
@@ -131,7 +131,7 @@ def least_misfit(solver: MisfitSolver, screened: int, starts: int, seed: int) ->
             ftol=TOLERANCE,
         )
     return min(
-        (np.array(shares) for shares in solver.known if shares is not None), key=solver.misfit
+        (np.array(shares) for shares in solver.solved if shares is not None), key=solver.misfit
     )
 
 

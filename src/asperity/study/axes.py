@@ -65,9 +65,9 @@ class SweptAxis:
 
 def swept_axis(plan: StudyPlan, table: pandas.DataFrame, key: str) -> SweptAxis:
     """Return a swept key over the rows of a study's table, in the unit of its first value."""
-    own = stated_value(plan.case, key)
-    own = "not set" if own is None else own
-    written = [plan.cases[number].overrides.get(key, own) for number in table["number"]]
+    case_value = stated_value(plan.case, key)
+    case_value = "not set" if case_value is None else case_value
+    written = [plan.cases[number].overrides.get(key, case_value) for number in table["number"]]
     try:
         numbers, unit = _numbers(written)
     except BadInput:
@@ -118,8 +118,8 @@ def pair_means(values: Field, across: SweptAxis, up: SweptAxis) -> Field:
 
 def _varies(values: Field) -> bool:
     """Return True if numbers differ by more than rounding."""
-    known = values[np.isfinite(values)]
-    return known.size > 0 and float(np.ptp(known)) > ROUNDING * float(np.abs(known).max())
+    finite = values[np.isfinite(values)]
+    return finite.size > 0 and float(np.ptp(finite)) > ROUNDING * float(np.abs(finite).max())
 
 
 def _short(value: object) -> str:

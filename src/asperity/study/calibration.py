@@ -111,10 +111,10 @@ def calibrate(
         if no parameter set can be solved.
     """
     settings = settings or CalibrationSettings()
-    given, case = case, at_cells(case, settings.cells)
+    original, case = case, at_cells(case, settings.cells)
     ranges = settings.ranges(case)
-    aimed = _aimed_at(case, anchors)
-    sq = _levels(aimed, settings.levels)
+    targets = _fitted_anchors(case, anchors)
+    sq = _levels(targets, settings.levels)
     for name in ("seeds", "screened", "starts"):
         if getattr(settings, name) < 1:
             raise BadInput(f"{name} must be 1 or more, got {getattr(settings, name)}")
@@ -124,16 +124,16 @@ def calibrate(
             path = None if out is None else Path(out) / folder
             return run_study(plan, out=path, executor=pool, progress=progress)
 
-        solver = MisfitSolver(case, ranges, aimed, sq, settings.seeds, run)
+        solver = MisfitSolver(case, ranges, targets, sq, settings.seeds, run)
         best = least_misfit(solver, settings.screened, settings.starts, settings.sample_seed)
         slopes = MisfitSlopes.from_differences(solver, best, SLOPE_SEEDS * settings.seeds)
-        calibrated = _calibrated(given, ranges, best)
+        calibrated = _calibrated(original, ranges, best)
         check = solver.check(calibrated)
-    return _result(given, calibrated, anchors, solver, best, slopes, check)
+    return _result(original, calibrated, anchors, solver, best, slopes, check)
 
 
 def _result(
-    given: Case,
+    original: Case,
     calibrated: Case,
     anchors: Sequence[Anchor],
     solver: MisfitSolver,
@@ -141,25 +141,25 @@ def _result(
     slopes: MisfitSlopes,
     check: WearCurve,
 ) -> Calibration:
-    ranges, aimed = solver.ranges, solver.aimed
+    ranges, targets = solver.ranges, solver.targets
     curve = solver.curve(best)
     start_curve = solver.curve(None)
-    covariance, scale = slopes.covariance(len(aimed) - len(ranges))
+    covariance, scale = slopes.covariance(len(targets) - len(ranges))
     deviations = np.sqrt(np.diag(covariance))
     return Calibration(
         case=solver.case,
         calibrated=calibrated,
         anchors=tuple(anchors),
-        parameters=tuple(_parameters(given, ranges, best, deviations)),
+        parameters=tuple(_parameters(original, ranges, best, deviations)),
         correlation=covariance / np.outer(deviations, deviations),
         directions=tuple(slopes.directions(scale)),
-        trade_offs=tuple(slopes.trade_offs(best, aimed)),
+        trade_offs=tuple(slopes.trade_offs(best, targets)),
         start=_compared(start_curve, anchors),
         fit=_compared(curve, anchors),
         check=_compared(check, anchors),
         start_misfit=solver.misfit(None),
         misfit=solver.misfit(best),
-        evaluations=len(solver.known),
+        evaluations=len(solver.solved),
         cases=solver.cases,
         failed=solver.failed,
         seconds=solver.seconds,
@@ -169,11 +169,11 @@ def _result(
     )
 
 
-def _aimed_at(case: Case, anchors: Sequence[Anchor]) -> tuple[Anchor, ...]:
-    aimed = tuple(anchor for anchor in anchors if anchor.fitted)
-    if not aimed:
+def _fitted_anchors(case: Case, anchors: Sequence[Anchor]) -> tuple[Anchor, ...]:
+    targets = tuple(anchor for anchor in anchors if anchor.fitted)
+    if not targets:
         raise BadInput("calibration needs a fitted anchor, got none; remove fitted = false")
-    for anchor in aimed:
+    for anchor in targets:
         if anchor.quantity == SPLIT_ANCHOR:
             raise BadInput(
                 f"anchor {anchor.name!r} is a split, which varies in steps; set fitted = false"
@@ -182,13 +182,13 @@ def _aimed_at(case: Case, anchors: Sequence[Anchor]) -> tuple[Anchor, ...]:
             raise BadInput(
                 f"{case.source}: anchor {anchor.name!r} needs a vibration; add [vibration]"
             )
-    return aimed
+    return targets
 
 
-def _levels(aimed: Sequence[Anchor], levels: Sequence[float] | None) -> tuple[float, ...]:
+def _levels(targets: Sequence[Anchor], levels: Sequence[float] | None) -> tuple[float, ...]:
     """Return the roughnesses to solve at [m]: as given, or the anchors' with close ones merged."""
     anchored = sorted(
-        {sq for anchor in aimed for sq in (anchor.sq, anchor.since) if sq is not None}
+        {sq for anchor in targets for sq in (anchor.sq, anchor.since) if sq is not None}
     )
     if levels is not None:
         chosen = sorted({require_positive("level", level, "m") for level in levels})
@@ -203,12 +203,12 @@ def _levels(aimed: Sequence[Anchor], levels: Sequence[float] | None) -> tuple[fl
                 f"got {', '.join(f'{1e6 * level:g}' for level in chosen) or 'none'}"
             )
         return tuple(chosen)
-    kept = [anchored[-1]]
+    merged = [anchored[-1]]
     for level in reversed(anchored[:-1]):
-        if level < kept[-1] * (1.0 - SAME_LEVEL):
-            kept.append(level)
-    kept[-1] = anchored[0]
-    return tuple(sorted(kept))
+        if level < merged[-1] * (1.0 - SAME_LEVEL):
+            merged.append(level)
+    merged[-1] = anchored[0]
+    return tuple(sorted(merged))
 
 
 def _calibrated(case: Case, ranges: Sequence[ParameterRange], best: Field) -> Case:
@@ -229,8 +229,8 @@ def _parameters(
     parameters = []
     for entry, share, std in zip(ranges, best, deviations, strict=True):
         learnt = float(1.0 - std**2 / PRIOR_VARIANCE)
-        ends = (share - std, share + std) if learnt >= LEARNT_FROM else (0.0, 1.0)
-        low, high = (entry.value(min(max(end, 0.0), 1.0)) for end in ends)
+        limits = (share - std, share + std) if learnt >= LEARNT_FROM else (0.0, 1.0)
+        low, high = (entry.value(min(max(end, 0.0), 1.0)) for end in limits)
         parameters.append(
             CalibratedParameter(
                 range=entry,

@@ -118,8 +118,8 @@ class Calibration:
 
     def verdict(self) -> str:
         """Return the values found, the anchors met and missed, and the undetermined quantities."""
-        aimed = {anchor.name for anchor in self.aimed_at}
-        fitted = self.fit[self.fit["anchor"].isin(aimed)]
+        targets = {anchor.name for anchor in self.aimed_at}
+        fitted = self.fit[self.fit["anchor"].isin(targets)]
         missed = [
             f"{row.anchor} ({row.ours:.4g} for {row.printed:g})"
             for row in fitted[~fitted["met"]].itertuples()
@@ -132,9 +132,9 @@ class Calibration:
         sentence += f"; missed: {', '.join(missed)}." if missed else "."
         if self.unidentifiable:
             sentence += f" Not determined by the anchors: {', '.join(self.unidentifiable)}."
-        ends = [p.range.key for p in self.parameters if p.at_end]
-        if ends:
-            sentence += f" At the end of the range: {', '.join(ends)}."
+        at_limits = [p.range.key for p in self.parameters if p.at_end]
+        if at_limits:
+            sentence += f" At the end of the range: {', '.join(at_limits)}."
         return sentence
 
     def scalars(self) -> dict[str, Any]:

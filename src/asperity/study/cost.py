@@ -27,9 +27,9 @@ class StudyCost:
     @property
     def seconds(self) -> float:
         """Remaining wall-clock time; workers start in parallel, one per processor."""
-        left = self.cases - self.kept
-        parallel = max(1, min(self.workers, cores(), left))
-        return left * self.case_s / parallel + (self.start_s if left else 0.0)
+        remaining = self.cases - self.kept
+        parallel = max(1, min(self.workers, cores(), remaining))
+        return remaining * self.case_s / parallel + (self.start_s if remaining else 0.0)
 
 
 def estimate_study(
@@ -46,7 +46,7 @@ def estimate_study(
     BadInput
         for a folder that holds another study.
     """
-    known = (
+    finished = (
         read_study_folder(Path(out), plan).finished()
         if out is not None and (Path(out) / MANIFEST).exists()
         else {}
@@ -57,7 +57,7 @@ def estimate_study(
     chosen = [share[round(part * (len(share) - 1))].overrides for part in (0.0, 0.5, 1.0)]
     _, first = timed_batch(plan.case, plan.kind, [chosen[1]])  # loads and compiles
     _, seconds = timed_batch(plan.case, plan.kind, chosen)
-    kept = sum(case.id in known for case in share)
+    kept = sum(case.id in finished for case in share)
     case_s = seconds / len(chosen)
     start_s = PROCESS_S + max(0.0, first - case_s)
     return StudyCost(len(share), kept, case_s, len(chosen), workers or cores(), start_s)

@@ -137,9 +137,9 @@ class WearCurve:
         resonances = [
             key for preset in BOTH_PRESETS for key in (f"crf_{preset}_hz", f"crfa_{preset}")
         ]
-        own = ("contact_damping_ratio", "contact_damping_ratio_virgin", "contact_stiffness_n_m")
+        contact = ("contact_damping_ratio", "contact_damping_ratio_virgin", "contact_stiffness_n_m")
         static = ("car", "car_domain", "clr", "friction_coefficient", "h_mean_m")
-        return tuple(name for name in (*static, *resonances, *own) if name in self.table)
+        return tuple(name for name in (*static, *resonances, *contact) if name in self.table)
 
     def verdict(self) -> str:
         """Return one sentence on load sharing, resonance and the onset of severe wear."""

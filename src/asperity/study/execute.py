@@ -256,15 +256,15 @@ class _Work:
         start: float,
         progress: Callable[[StudyProgress], None] | None,
     ) -> None:
-        known = {} if store is None else store.finished()
+        stored = {} if store is None else store.finished()
         self.plan, self.store, self.fields = plan, store, fields
         self.start, self.progress = start, progress
-        self.attempts = {case_id: attempt + 1 for case_id, (_, attempt) in known.items()}
+        self.attempts = {case_id: attempt + 1 for case_id, (_, attempt) in stored.items()}
         share = {case.id: case for case in shard_cases(plan, shard)}
-        kept = {
-            case_id for case_id, (status, _) in known.items() if status == DONE or not retry_failed
+        settled = {
+            case_id for case_id, (status, _) in stored.items() if status == DONE or not retry_failed
         }
-        self.waiting = deque(case for case in share.values() if case.id not in kept)
+        self.waiting = deque(case for case in share.values() if case.id not in settled)
         self.total, self.kept = len(share), len(share) - len(self.waiting)
         self.done = self.failures = 0
         self.crashes: Counter[str] = Counter()
@@ -281,9 +281,9 @@ class _Work:
             else math.ceil(BATCH_S / max(self.case_s, BATCH_S / LARGEST_BATCH))
         )
         # otherwise one worker finishes long after the others
-        fair = math.ceil(len(self.waiting) / (2 * workers))
+        limit = math.ceil(len(self.waiting) / (2 * workers))
         following = takewhile(
-            lambda case: not self.crashes[case.id], islice(self.waiting, min(size, fair))
+            lambda case: not self.crashes[case.id], islice(self.waiting, min(size, limit))
         )
         return [self.waiting.popleft() for _ in list(following)]
 
@@ -302,8 +302,8 @@ class _Work:
             self.rows += rows
         else:
             self.store.write_batch(rows, fields)
-        pace = seconds / len(batch)
-        self.case_s = pace if self.case_s is None else 0.7 * self.case_s + 0.3 * pace
+        mean_s = seconds / len(batch)
+        self.case_s = mean_s if self.case_s is None else 0.7 * self.case_s + 0.3 * mean_s
         self.done += len(batch)
         self.failures += sum(row["status"] != DONE for row in rows)
         self.report()

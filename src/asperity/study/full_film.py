@@ -24,10 +24,10 @@ def with_full_film_limits(table: pandas.DataFrame) -> pandas.DataFrame:
     full = is_full_film(table)
     lowest = table["full_load_crf_hz"] * np.maximum(table["clr"], FULL_FILM_CLR) ** (1.0 / 6.0)
     limits = {**dict.fromkeys(CRF_COLUMNS, lowest), **dict.fromkeys(CRFA_COLUMNS, 0.0)}
-    known = {name: table[name].astype(float) for name in limits if name in table}
+    present = {name: table[name].astype(float) for name in limits if name in table}
     return table.assign(
         **{
             name: values.where(values.notna() | ~full, limits[name])
-            for name, values in known.items()
+            for name, values in present.items()
         }
     )

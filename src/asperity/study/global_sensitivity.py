@@ -156,8 +156,8 @@ def _curve_levels(sq: Sequence[float], levels: int) -> tuple[float, ...]:
         require_positive("Sq", value, "m")
     if levels < 0:
         raise BadInput(f"levels must be 0 or more, got {levels}")
-    between = np.linspace(min(sq), max(sq), levels) if len(sq) > 1 and levels > 1 else np.empty(0)
-    return tuple(sorted({float(f"{value:.6g}") for value in (*sq, *between)}))
+    spaced = np.linspace(min(sq), max(sq), levels) if len(sq) > 1 and levels > 1 else np.empty(0)
+    return tuple(sorted({float(f"{value:.6g}") for value in (*sq, *spaced)}))
 
 
 class _Design(NamedTuple):
@@ -198,16 +198,16 @@ class _Design(NamedTuple):
             )
 
     def _realisation_seeds(self, number: int, share: float, surface: int) -> dict[str, int]:
-        """Return the seeds that a share of the seed factor's range stands for.
+        """Return the seeds that a share of the seed factor's range represents.
 
         Sobol's shares are all different. Morris has four, so each trajectory draws four surfaces
         of its own: a step along the seed changes to an independent surface.
         """
         trajectory = number // self.sample.block if self.sample.method == "morris" else 0
-        words = np.random.SeedSequence(
+        entropy = np.random.SeedSequence(
             [self.sample_seed, trajectory, round(share * 2**31), surface]
         )
-        drawn = zip(SEED_KEYS, words.generate_state(len(SEED_KEYS)), strict=True)
+        drawn = zip(SEED_KEYS, entropy.generate_state(len(SEED_KEYS)), strict=True)
         return {key: int(word) for key, word in drawn if key in self.seeded}
 
 
@@ -220,8 +220,8 @@ def _analyse(
     outcomes, columns = _outcomes(curves, sq, curve)
     names = [*factors, *(outcome.name for outcome in outcomes)]
     values = pandas.DataFrame(dict(zip(names, [*sample.shares.T, *columns], strict=True)))
-    whole = np.isfinite(columns).reshape(len(columns), -1, sample.block).all(axis=2)
-    if whole.sum(axis=1).min() < FEWEST_BLOCKS:
+    complete = np.isfinite(columns).reshape(len(columns), -1, sample.block).all(axis=2)
+    if complete.sum(axis=1).min() < FEWEST_BLOCKS:
         first = f"; the first: {result.failures['reason'].iloc[0]}" if result.failed else ""
         raise AsperityError(
             f"too many contacts failed to rank the factors{first}; narrow the ranges"
@@ -234,7 +234,7 @@ def _analyse(
         outcomes=tuple(outcomes),
         effects=_effects(sample, factors, outcomes, columns),
         values=values,
-        left_out=int(np.count_nonzero(~whole.all(axis=0))) * sample.block,
+        left_out=int(np.count_nonzero(~complete.all(axis=0))) * sample.block,
         distinct=_distinct(curves, curve),
         full_film_share=full_film_share,
         result=result,
@@ -330,5 +330,5 @@ def knee(x: Field, y: Field) -> float:
 def _distinct(curves: dict[str, Field], curve: Sequence[float]) -> float:
     if "crf_hz" not in curves or len(curve) < FEWEST_STAGE_POINTS:
         return math.nan
-    whole = [crf for crf in curves["crf_hz"] if np.isfinite(crf).all()]
-    return float(np.mean([split_stages(curve, crf).found for crf in whole])) if whole else math.nan
+    crfs = [crf for crf in curves["crf_hz"] if np.isfinite(crf).all()]
+    return float(np.mean([split_stages(curve, crf).found for crf in crfs])) if crfs else math.nan

@@ -55,7 +55,7 @@ def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
         )
     try:
         group = zarr.open_group(path, mode="r", zarr_format=3)
-        about = dict(group.attrs)
+        attributes = dict(group.attrs)
         arrays = dict(group.arrays())
         require_unpacked(path, float(sum(array.nbytes for array in arrays.values())), REMEDY)
         maps = {name: np.asarray(array[...]) for name, array in sorted(arrays.items())}
@@ -63,7 +63,7 @@ def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
         raise
     except Exception as error:
         raise UnreadableFile(f"{path} is damaged ({first_line(error)}); {REMEDY}") from error
-    if about.get(_SEAL) != _sealed(study, case_id, maps):
+    if attributes.get(_SEAL) != _sealed(study, case_id, maps):
         raise UnreadableFile(
             f"{path} is damaged or belongs to another study (digest mismatch); {REMEDY}"
         )

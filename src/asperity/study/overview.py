@@ -78,7 +78,7 @@ class StudyOverview:
 
     @property
     def papers(self) -> bool:
-        """True if the study is compared with the paper's printed numbers."""
+        """True if the study is compared with the paper's published numbers."""
         return (
             self.stated_anchors is None
             and self.curve is not None
@@ -90,12 +90,12 @@ class StudyOverview:
         """Anchors to compare the curve with."""
         if self.stated_anchors is not None:
             return tuple(self.stated_anchors)
-        known = (
+        names = (
             {SPLIT_ANCHOR, *self.used}
             if self.curve is not None and self.curve.stages
             else set(self.used)
         )
-        return tuple(anchor for anchor in PAPER_ANCHORS if self.papers and anchor.quantity in known)
+        return tuple(anchor for anchor in PAPER_ANCHORS if self.papers and anchor.quantity in names)
 
     @cached_property
     def axes(self) -> list[SweptAxis]:
@@ -191,8 +191,8 @@ class StudyOverview:
 
     def _changed_maps(self, runs: Sequence[Run]) -> list[str]:
         """Return a note for each map that differs from the contact in the table."""
-        mapped = self.used[self.used["number"].isin(self.mapped)]
-        shares = mapped["clr"] if len(mapped) else ()
+        rows = self.used[self.used["number"].isin(self.mapped)]
+        shares = rows["clr"] if len(rows) else ()
         share = quantity("clr")
         return [
             f"The contact mapped at Sq {run.state.sq * 1e6:.3g} µm has a CLR of "
@@ -212,10 +212,10 @@ class StudyOverview:
                 self._point_in_words(int(str(point)), count)
                 for point, count in points.head(MAX_NAMED).items()
             ]
-            more = (
+            others = (
                 f"; and {len(points) - len(names)} more points" if len(points) > len(names) else ""
             )
-            reasons.append(FailureReason(f"{status}: {text}", len(rows), "; ".join(names) + more))
+            reasons.append(FailureReason(f"{status}: {text}", len(rows), "; ".join(names) + others))
         reasons.sort(key=lambda reason: -reason.number)
         rest = reasons[MAX_REASONS:]
         if rest:
@@ -229,11 +229,11 @@ class StudyOverview:
     def _point_in_words(self, point: int, cases: int) -> str:
         """Return the swept values of a point, and the number of its surfaces if it has several."""
         values = self.result.plan.points[point]
-        words = (
+        text = (
             ", ".join(f"{key} {as_written(value)}" for key, value in values.items()) or "its case"
         )
         surfaces = self.result.plan.realisations
-        return words if surfaces == 1 else f"{words} ({cases} of {surfaces} surfaces)"
+        return text if surfaces == 1 else f"{text} ({cases} of {surfaces} surfaces)"
 
     # Tables
     # ----------------------------------------------------------------------

@@ -94,8 +94,8 @@ class StudyPlan:
     @cached_property
     def _fixed(self) -> dict[str, object]:
         # [infer] does not change a contact
-        stated = ((k, v) for k, v in _entries(self.case.contents) if k != "infer")
-        values = {key: to_si(value) for key, value in stated if not isinstance(value, Section)}
+        entries = ((k, v) for k, v in _entries(self.case.contents) if k != "infer")
+        values = {key: to_si(value) for key, value in entries if not isinstance(value, Section)}
         return {"kind": self.kind, "surface file": self.surface_digest, **values}
 
     @cached_property
@@ -112,7 +112,7 @@ class StudyPlan:
         base = int(getattr(self.case.contents.surface, "seed", None) or 0)
         number = 0
         for position, point in enumerate(self.points):
-            plain = {key: to_si(value) for key, value in point.items()}
+            values = {key: to_si(value) for key, value in point.items()}
             shaped = self.case if SHAPING.isdisjoint(point) else self.case.with_overrides(point)
             seeded = [
                 key for key in SEED_KEYS if _has_seed(shaped, key) and not _states(point, key)
@@ -120,11 +120,11 @@ class StudyPlan:
             shared: dict[str, object] = {}
             if self.ids is None:
                 file = self.surface_digest if shaped is self.case else _surface_digest(shaped)
-                shared = {**self._fixed, **plain, "surface file": file}
+                shared = {**self._fixed, **values, "surface file": file}
             words = (
                 []
                 if self.seeding == "common"
-                else [int(_hash(plain)[i : i + 8], 16) for i in (0, 8)]
+                else [int(_hash(values)[i : i + 8], 16) for i in (0, 8)]
             )
             for realisation in range(self.realisations):
                 drawn = self._seeds(base, realisation, words)
@@ -138,8 +138,10 @@ class StudyPlan:
         if self.seeds is None:
             drawn = np.random.SeedSequence([base, realisation, *words]).generate_state(2)
         else:
-            own = self.seeds[realisation]
-            drawn = np.array([own, np.random.SeedSequence([own, *words]).generate_state(1)[0]])
+            entropy = self.seeds[realisation]
+            drawn = np.array(
+                [entropy, np.random.SeedSequence([entropy, *words]).generate_state(1)[0]]
+            )
         return {key: int(seed) for key, seed in zip(SEED_KEYS, drawn, strict=True)}
 
 
@@ -231,12 +233,12 @@ def plan_points(
     if axes is None:
         axes = tuple(dict.fromkeys(key for point in points for key in point))
     _require_values(base, axes, points)
-    given, realisations = (None, seeds) if isinstance(seeds, int) else (tuple(seeds), len(seeds))
+    explicit, realisations = (None, seeds) if isinstance(seeds, int) else (tuple(seeds), len(seeds))
     if realisations < 1:
         raise BadInput(f"seeds must be 1 or more, got {realisations}")
-    if given is not None and len(set(given)) < realisations:
-        raise BadInput(f"seeds must differ from one another, got {', '.join(map(str, given))}")
-    return StudyPlan(base, tuple(axes), tuple(points), realisations, kind, seeding, given)
+    if explicit is not None and len(set(explicit)) < realisations:
+        raise BadInput(f"seeds must differ from one another, got {', '.join(map(str, explicit))}")
+    return StudyPlan(base, tuple(axes), tuple(points), realisations, kind, seeding, explicit)
 
 
 def _require_values(case: Case, axes: Sequence[str], points: Sequence[Table]) -> None:
@@ -254,12 +256,12 @@ def _require_distinct(case: Case, points: Sequence[Table]) -> None:
     """Raise BadInput for a duplicate point, whose cases would count as independent ones."""
     seen = set()
     for point in points:
-        plain = json.dumps({key: to_si(value) for key, value in point.items()}, sort_keys=True)
-        if plain in seen:
+        encoded = json.dumps({key: to_si(value) for key, value in point.items()}, sort_keys=True)
+        if encoded in seen:
             text = ", ".join(f"{key} = {as_written(value)}" for key, value in point.items())
             remedy = "write each value once, and set seeds for more surfaces"
             raise BadInput(f"{case.source}: study has the point {text} twice; {remedy}")
-        seen.add(plain)
+        seen.add(encoded)
 
 
 def full_key(case: Case, name: str, section: str = "study") -> str:
@@ -292,8 +294,8 @@ def full_key(case: Case, name: str, section: str = "study") -> str:
         raise BadInput(
             f"{case.source}: {section}.{name} could mean {' or '.join(matches)}; write one of them"
         )
-    known = [*tables, *keys, *(key.rpartition(".")[2] for key in keys)]
-    close = get_close_matches(name, known, n=1)
+    candidates = [*tables, *keys, *(key.rpartition(".")[2] for key in keys)]
+    close = get_close_matches(name, candidates, n=1)
     remedy = f"did you mean {close[0]}?" if close else "name one such as surface.sq or contact.load"
     raise BadInput(f"{case.source}: {section}.{name} is not a key of the case; {remedy}")
 

@@ -122,8 +122,8 @@ def parse_range(text: str) -> ParameterRange:
 
     `BadInput` for malformed text, ends of different dimensions or a descending range.
     """
-    key, equals, ends = (part.strip() for part in text.partition("="))
-    low, dots, high = (part.strip() for part in ends.partition(".."))
+    key, equals, interval = (part.strip() for part in text.partition("="))
+    low, dots, high = (part.strip() for part in interval.partition(".."))
     if not (key and equals and low and dots and high):
         raise BadInput(
             f"a range is KEY=LOW..HIGH such as 'material.hardness=0.65 GPa..3 GPa', got {text!r}"
@@ -233,9 +233,9 @@ def overrides_at(
         if index is None:
             overrides[key] = entry.written(share)
         else:
-            whole = overrides.get(key, stated_value(case, key))
+            components = overrides.get(key, stated_value(case, key))
             overrides[key] = [
-                entry.written(share) if i == index else value for i, value in enumerate(whole)
+                entry.written(share) if i == index else value for i, value in enumerate(components)
             ]
     cells = list(case.grid.cells)
     for axis, key in enumerate(("grid.x", "grid.y")):

@@ -30,15 +30,15 @@ class MisfitSlopes:
 
     @classmethod
     def from_differences(cls, solver: MisfitSolver, best: Field, seeds: int) -> "MisfitSlopes":
-        """Take central differences over STEP either side, on more surfaces than the fit."""
+        """Take central differences over STEP on both sides, on more surfaces than the fit."""
         pairs = neighbours(best)
-        aimed = solver.aimed
+        targets = solver.targets
         tables = solver.solve([best, *itertools.chain(*pairs)], seeds)
-        centre, *around = (_anchored_values(solver, table, seeds) for table in tables)
-        tolerances = np.array([anchor.tolerance for anchor in aimed])
+        centre, *adjacent = (_anchored_values(solver, table, seeds) for table in tables)
+        tolerances = np.array([anchor.tolerance for anchor in targets])
         slopes = np.stack(
             [
-                (around[2 * i + 1] - around[2 * i]) / (high[i] - low[i]) / tolerances
+                (adjacent[2 * i + 1] - adjacent[2 * i]) / (high[i] - low[i]) / tolerances
                 for i, (low, high) in enumerate(pairs)
             ],
             axis=2,
@@ -50,9 +50,9 @@ class MisfitSlopes:
             )
         centre, slopes = centre[solved], slopes[solved]
         mean = centre.mean(axis=0)
-        miss = _misses(aimed, mean)
-        active = np.array([anchor.sense == "about" for anchor in aimed]) | (miss != 0.0)
-        residuals = np.where(active, (centre - mean + miss) / tolerances, 0.0)
+        misses = _misses(targets, mean)
+        active = np.array([anchor.sense == "about" for anchor in targets]) | (misses != 0.0)
+        residuals = np.where(active, (centre - mean + misses) / tolerances, 0.0)
         return cls(residuals, np.where(active[None, :, None], slopes, 0.0))
 
     @property
@@ -83,8 +83,8 @@ class MisfitSlopes:
         total = count * self.mean
         information = total.T @ (weights[:, None] * total)
         if count > 1:
-            own = sum(slopes.T @ (weights[:, None] * slopes) for slopes in self.slopes)
-            information = (information - own) / (count * (count - 1))
+            diagonal = sum(slopes.T @ (weights[:, None] * slopes) for slopes in self.slopes)
+            information = (information - diagonal) / (count * (count - 1))
         values, vectors = np.linalg.eigh(information)
         return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
 
@@ -131,15 +131,15 @@ class MisfitSlopes:
                 continue
             before = all_fitted[others]
             after = fitted(others)[others]
-            most = int(np.argmax(before**2 - after**2))
+            largest = int(np.argmax(before**2 - after**2))
             trade_offs.append(
                 TradeOff(
                     anchor.name,
                     float(np.sum(before**2)),
                     float(np.sum(after**2)),
-                    aimed[others[most]].name,
-                    float(before[most]),
-                    float(after[most]),
+                    aimed[others[largest]].name,
+                    float(before[largest]),
+                    float(after[largest]),
                 )
             )
         return sorted(trade_offs, key=lambda trade: trade.without - trade.misfit)
@@ -151,10 +151,10 @@ def _misses(anchors: Sequence[Anchor], values: Field) -> Field:
 
 def _anchored_values(solver: MisfitSolver, table: pandas.DataFrame, seeds: int) -> Field:
     """Return the anchored quantities of each surface, shape (seeds, anchors)."""
-    by_seed = np.full((seeds, len(solver.aimed)), np.nan)
+    by_seed = np.full((seeds, len(solver.targets)), np.nan)
     for seed in range(seeds):
         rows = table[(table["realisation"] == seed) & (table["status"] == DONE)]
         if len(rows) == len(solver.sq):
             curve = WearCurve(np.array(solver.sq), rows)
-            by_seed[seed] = [anchor.evaluate(curve)[0] for anchor in solver.aimed]
+            by_seed[seed] = [anchor.evaluate(curve)[0] for anchor in solver.targets]
     return by_seed

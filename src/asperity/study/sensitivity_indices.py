@@ -69,12 +69,12 @@ def indices(design: SampleDesign, outcome: Field) -> dict[str, Field]:
     Returns `mu`, `mu_star`, `mu_star_conf`, `sigma`, or `s1`, `s1_conf`, `st`, `st_conf`, of shape
     (factors,); `AsperityError` if fewer than two blocks remain.
     """
-    whole = np.isfinite(outcome.reshape(-1, design.block)).all(axis=1)
-    if np.count_nonzero(whole) < FEWEST_BLOCKS:
+    complete = np.isfinite(outcome.reshape(-1, design.block)).all(axis=1)
+    if np.count_nonzero(complete) < FEWEST_BLOCKS:
         raise AsperityError("too many contacts failed to rank the factors; narrow the ranges")
-    kept = np.repeat(whole, design.block)
-    values = outcome[kept]
-    shares = design.shares[kept]
+    retained = np.repeat(complete, design.block)
+    values = outcome[retained]
+    shares = design.shares[retained]
     names = MEASURES[design.method]
     if np.ptp(values) <= ROUNDING * np.abs(values).max():
         return {name: np.zeros(shares.shape[1]) for name in names}
@@ -82,16 +82,16 @@ def indices(design: SampleDesign, outcome: Field) -> dict[str, Field]:
     if design.method == "morris":
         from SALib.analyze import morris
 
-        analysed = morris.analyze(
+        measures = morris.analyze(
             problem, shares, values, num_levels=LEVELS, conf_level=CONFIDENCE, seed=RESAMPLING
         )
     else:
         from SALib.analyze import sobol
 
-        analysed = sobol.analyze(
+        measures = sobol.analyze(
             problem, values, calc_second_order=False, conf_level=CONFIDENCE, seed=RESAMPLING
         )
-    return {name: np.asarray(analysed[salib], dtype=float) for name, salib in names.items()}
+    return {name: np.asarray(measures[salib], dtype=float) for name, salib in names.items()}
 
 
 def _problem(factors: int) -> dict[str, object]:

@@ -112,7 +112,7 @@ class Sensitivity:
 
     def scalars(self) -> dict[str, Any]:
         """Return the JSON output of `asperity sensitivity`, in SI units."""
-        ends = {outcome.name: self.spread(outcome.name) for outcome in self.outcomes}
+        intervals = {outcome.name: self.spread(outcome.name) for outcome in self.outcomes}
         return {
             "verdict": self.verdict(),
             "method": self.method,
@@ -131,8 +131,8 @@ class Sensitivity:
                     "outcome": outcome.name,
                     "quantity": outcome.quantity,
                     "sq_m": as_json(outcome.sq),
-                    "p05": ends[outcome.name][0],
-                    "p95": ends[outcome.name][1],
+                    "p05": intervals[outcome.name][0],
+                    "p95": intervals[outcome.name][1],
                     "effects": [
                         {key: as_json(value) for key, value in row.items()}
                         for row in self.ranking(outcome.name)

@@ -77,8 +77,8 @@ class StudyFolder:
         """Write all finished cases as one table, in the order of the plan; return its path."""
         path = self.folder / TABLE
         table = pyarrow.Table.from_pandas(self.table(), preserve_index=False)
-        about = {"asperity": version("asperity"), "case": self.plan.case.text}
-        self._write(path, table.replace_schema_metadata({**table.schema.metadata, **about}))
+        metadata = {"asperity": version("asperity"), "case": self.plan.case.text}
+        self._write(path, table.replace_schema_metadata({**table.schema.metadata, **metadata}))
         return path
 
     @property
@@ -149,15 +149,15 @@ def read_study_folder(folder: Path, plan: StudyPlan) -> StudyFolder:
 
 def _lock(folder: Path, shard: tuple[int, int], locks: ExitStack) -> None:
     """Lock the folder: a whole study exclusively, a shard against itself and a whole study."""
-    whole = folder / ".whole.lock"
-    own = folder / f".shard-{shard[0]}-of-{shard[1]}.lock"
+    study_lock = folder / ".whole.lock"
+    shard_lock = folder / f".shard-{shard[0]}-of-{shard[1]}.lock"
     try:
         if shard == (1, 1):
-            for lock in (whole, *folder.glob(".shard-*.lock")):
+            for lock in (study_lock, *folder.glob(".shard-*.lock")):
                 locks.enter_context(filelock.FileLock(lock, timeout=0))
         else:
-            with filelock.FileLock(whole, timeout=1):
-                locks.enter_context(filelock.FileLock(own, timeout=0))
+            with filelock.FileLock(study_lock, timeout=1):
+                locks.enter_context(filelock.FileLock(shard_lock, timeout=0))
     except filelock.Timeout:
         raise BadInput(
             f"another process computes this study in {folder}; wait for it or stop it"
@@ -200,7 +200,7 @@ def study_manifest(folder: Path) -> dict[str, Any]:
 
 
 def _manifest(plan: StudyPlan, folder: Path) -> dict[str, object]:
-    stated = ("surface_digest", "kind", "seeding", "seeds", "realisations", "axes", "points")
+    names = ("surface_digest", "kind", "seeding", "seeds", "realisations", "axes", "points")
     return {
         "of": "study",
         "format": FORMAT,
@@ -209,7 +209,7 @@ def _manifest(plan: StudyPlan, folder: Path) -> dict[str, object]:
         "source": plan.case.source,
         "case": plan.case.text,
         "case_folder": relative_path(plan.case.folder.resolve(), folder.resolve()),
-        **{name: getattr(plan, name) for name in stated},
+        **{name: getattr(plan, name) for name in names},
         "ids": [case.id for case in plan.cases],
     }
 
@@ -268,9 +268,9 @@ def _last_attempts(parts: Sequence[pyarrow.Table]) -> pandas.DataFrame:
     """Return the last attempt at each finished case."""
     fewest_last = sorted(parts, key=lambda part: part.num_columns, reverse=True)
     table = pyarrow.concat_tables(fewest_last, promote_options="permissive")
-    for place, column in enumerate(table.schema):
+    for index, column in enumerate(table.schema):
         if pyarrow.types.is_null(column.type):  # no case has this number
-            table = table.set_column(place, column.name, table.column(place).cast("float64"))
+            table = table.set_column(index, column.name, table.column(index).cast("float64"))
     runs = table.select(["case_id", "attempt"]).to_pandas()
     last = runs.sort_values("attempt", kind="stable").drop_duplicates("case_id", keep="last").index
     finished = table.take(sorted(last)).drop_columns("attempt").to_pandas()

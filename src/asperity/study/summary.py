@@ -8,8 +8,8 @@ from asperity.study.plan import StudyPlan
 
 def study_verdict(result: StudyResult) -> str:
     """Return the number of cases and failures, and the verdict of a finished wear curve."""
-    of_all = f" of {len(result.plan.cases)}" if result.missing else ""
-    sentence = f"{len(result.table)}{of_all} cases, {result.failed or 'none'} failed"
+    total = f" of {len(result.plan.cases)}" if result.missing else ""
+    sentence = f"{len(result.table)}{total} cases, {result.failed or 'none'} failed"
     if result.computed:
         sentence += f"; {result.computed} computed in {duration_text(result.seconds)}"
     curve = None if result.missing else finished_curve(result)

@@ -44,7 +44,7 @@ def open_sensors(
     settings = settings_of(target, replace(options, channel=channel))
     settings |= {} if machine and point else {FOLDER: str(folder)}
     return Sensors(
-        Store(store), address, settings, channels=max(len(channels), 1), stated=sensor is not None
+        Store(store), address, settings, channels=max(len(channels), 1), named=sensor is not None
     )
 
 

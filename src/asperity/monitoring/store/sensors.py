@@ -46,7 +46,7 @@ class Sensors:
     ----------
     settings : with which recordings are read
     channels : number of channels read per file
-    stated : whether the user named the sensor; then all recordings belong to it
+    named : whether the user named the sensor; then all recordings belong to it
 
     Raises
     ------
@@ -61,21 +61,21 @@ class Sensors:
         settings: Table,
         *,
         channels: int = 1,
-        stated: bool = False,
+        named: bool = False,
     ) -> None:
-        if stated and channels > 1:
+        if named and channels > 1:
             raise BadInput(
                 f"each channel is a sensor of its own, got sensor {address.sensor}; omit the sensor"
             )
         self.store, self.address, self.settings = store, address, settings
-        self.channels, self.stated = channels, stated
+        self.channels, self.named = channels, named
         self.notifications = NotificationQueue(store)
         self.by_name: dict[str, Sensor] = {}
         self._spacing_hz: float | None = None
         # version of the database and rows by recording number, as of the last judgement
         self._written: tuple[int | None, dict[int, JsonObject]] = (None, {})
         for name, stored in store.sensors_at(address.machine, address.point):
-            if name == address.sensor or (stored.get(TOGETHER) == address.sensor and not stated):
+            if name == address.sensor or (stored.get(TOGETHER) == address.sensor and not named):
                 self._registered(name)
 
     def _registered(self, name: str) -> Sensor:
@@ -112,8 +112,8 @@ class Sensors:
 
     def first_stored(self, key: FileVersion) -> StoredRecording:
         """Return the stored recording of a file on the first sensor that could read it."""
-        held = [sensor.recordings[key] for sensor in self._sensors() if key in sensor.recordings]
-        return next((recording for recording in held if not recording.refused), held[0])
+        stored = [sensor.recordings[key] for sensor in self._sensors() if key in sensor.recordings]
+        return next((recording for recording in stored if not recording.refused), stored[0])
 
     def readable_names(self, keys: Sequence[FileVersion]) -> set[str]:
         """Return the names of sensors that could read any of the files."""
@@ -173,15 +173,15 @@ class Sensors:
         return self._name_of(reading) in self.stored(key)
 
     def _name_of(self, reading: Reading) -> str:
-        name = self.address.sensor if self.stated else reading.sensor
+        name = self.address.sensor if self.named else reading.sensor
         if not name and reading.refused:  # its sensor is unknown
             name = next(iter(self.by_name), "")
         return name or self.address.sensor
 
     def readings(self, key: FileVersion) -> list[Reading]:
         """Return the stored readings of a file, without damaged ones."""
-        held = [sensor.reading(key) for sensor in self._sensors() if key in sensor.recordings]
-        return [reading for reading in held if reading is not None]
+        stored = [sensor.reading(key) for sensor in self._sensors() if key in sensor.recordings]
+        return [reading for reading in stored if reading is not None]
 
     def rows(self, instants: Sequence[Sequence[FileVersion]]) -> list[JsonObject]:
         """Return one judged row per instant, as in `asperity track --json`."""
@@ -238,8 +238,8 @@ class Sensors:
             return None
         judgement: dict[str, Any] = json.loads(text)
         numbers = judgement.pop("numbers")
-        among = f"({', '.join('?' * len(numbers))})"
-        rows = dict(self.store.read(f"SELECT id, row FROM recording WHERE id IN {among}", *numbers))
+        marks = f"({', '.join('?' * len(numbers))})"
+        rows = dict(self.store.read(f"SELECT id, row FROM recording WHERE id IN {marks}", *numbers))
         return {
             "verdict": judgement.pop("verdict"),
             "recordings": [json.loads(rows[number]) for number in numbers],
@@ -258,12 +258,12 @@ class Sensors:
         """Return what the series has in common; empty at first."""
         if self._first is None:
             return SeriesMemory()
-        held = self.store.read(
+        stored = self.store.read(
             "SELECT body, since FROM learned JOIN sensor ON sensor.id = learned.sensor "
             "WHERE sensor = ?",
             self._first.number,
         )
-        return unpack_shared(held[0][0], held[0][1] or 0) if held else SeriesMemory()
+        return unpack_shared(stored[0][0], stored[0][1] or 0) if stored else SeriesMemory()
 
     def record_judgement(
         self,
@@ -332,7 +332,7 @@ class Sensors:
         return version, rows
 
     def _set_standing(self, alarm: Mapping[str, Any]) -> None:
-        """Let an alarm stand on the sensors that have none."""
+        """Store an alarm as unacknowledged on the sensors that have none."""
         for sensor in self._sensors():
             if alarm["state"] == "alarm" and sensor.standing is None:
                 sensor.standing = StandingAlarm(
@@ -341,7 +341,7 @@ class Sensors:
 
     def _require_single(self, track: Track) -> None:
         """Raise BadInput for recordings of several sensors if the user named one."""
-        if self.stated and track.sensors:
+        if self.named and track.sensors:
             raise BadInput(
                 f"these recordings belong to the sensors {', '.join(track.sensors)}, got sensor "
                 f"{self.address.sensor}; omit the sensor"
@@ -384,7 +384,7 @@ class Sensors:
     def record_overdue(self, reason: str, recipients: Sequence[str]) -> dict[str, Any] | None:
         """Store, once, that recordings are overdue; return the last judgement with that added.
 
-        None before the first judgement. An alarm that has not been acknowledged stands.
+        None before the first judgement. An unacknowledged alarm persists.
         """
         self.refresh()
         judgement = self.last_judgement()

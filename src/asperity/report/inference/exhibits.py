@@ -77,12 +77,12 @@ def pairs(inference: Inference) -> Exhibit:
     """Draw CLR over Sq, and the most correlated pairs of unknowns."""
     posterior = inference.values(inference.draws)
     prior = inference.values(inference.prior)
-    shown = _most_correlated(posterior, [unknown.key for unknown in inference.setting.unknowns])
+    selected = _most_correlated(posterior, [unknown.key for unknown in inference.setting.unknowns])
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.double, PANEL_SIZE + 0.3), layout="constrained")
         for number, (axes, (first, second)) in enumerate(
-            zip(panels_in_rows(figure, len(shown)), shown, strict=True)
+            zip(panels_in_rows(figure, len(selected)), selected, strict=True)
         ):
             x = quantity(first)
             y = quantity(second)
@@ -122,16 +122,16 @@ def _most_correlated(values: dict[str, Field], keys: Sequence[str]) -> list[tupl
 def predicted(inference: Inference) -> Exhibit:
     """Draw observed and posterior predictive CRF at each operating point."""
     observed = [
-        (place, point)
-        for place, point in enumerate(inference.forward.points)
+        (index, point)
+        for index, point in enumerate(inference.forward.points)
         if not np.isnan(point.crf.value)
     ]
     predictions = np.exp(inference.posterior_predictive())
 
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(3.4)
-        for number, (place, _) in enumerate(observed):
-            low, middle, high = np.quantile(predictions[:, place], QUANTILES)
+        for number, (index, _) in enumerate(observed):
+            low, middle, high = np.quantile(predictions[:, index], QUANTILES)
             style: Style = {"linewidth": 7, "alpha": 0.35, "solid_capstyle": "butt"}
             label = None if number else "predicted, 90 %"
             axes.plot([number, number], [low, high], color=BLUE, label=label, **style)
@@ -203,8 +203,8 @@ def next_recording(inference: Inference) -> Exhibit:
             yscale="log",
             xscale="log",
         )
-        ends = ((axes.xaxis, loads), (axes.yaxis, speeds))
-        for axis, values in ends:
+        axis_values = ((axes.xaxis, loads), (axes.yaxis, speeds))
+        for axis, values in axis_values:
             axis.set_ticks(values, [f"{value:.3g}" for value in values])
             axis.set_ticks([], minor=True)
         legend_below(figure, 2)

@@ -34,7 +34,7 @@ CONDITIONS_ONLY = (  # for a machine that is not solved
 )
 RATED = {"flash_temperature_max_k": "rated_flash_k"}  # ratings drawn with solved quantities
 RATING = "rating"
-STROKES = ((BLUE, "-", "o"), (VERMILION, "--", "s"))
+STYLES = ((BLUE, "-", "o"), (VERMILION, "--", "s"))
 MAX_NAMED = 9  # contacts of one path whose names fit below an axis
 
 
@@ -86,8 +86,8 @@ def _is_by_contact(rating: Rating) -> bool:
 
 def _bars_note(result: MachineResult) -> str:
     low, high = quantity("clr").ends
-    known = any(row.get(low) is not None and row.get(high) is not None for row in result.rows)
-    return " Bars: 90 % intervals from surfaces, grid and iteration." if known else ""
+    drawn = any(row.get(low) is not None and row.get(high) is not None for row in result.rows)
+    return " Bars: 90 % intervals from surfaces, grid and iteration." if drawn else ""
 
 
 def _series(result: MachineResult) -> dict[str, list[Numbers]]:
@@ -113,10 +113,10 @@ def _panel(axes: Axes, result: MachineResult, key: str, name: str) -> None:
     entry = quantity(name)
     place = result.case.machine.place
     series = _series(result)
-    for (label, rows), (colour, stroke, marker) in zip(series.items(), STROKES, strict=False):
+    for (label, rows), (colour, line_style, marker) in zip(series.items(), STYLES, strict=False):
         x = _positions(result, rows)
         y = display(name, _numbers(rows, key))
-        axes.plot(x, y, stroke, color=colour, marker=marker, markersize=4, label=label)
+        axes.plot(x, y, line_style, color=colour, marker=marker, markersize=4, label=label)
         _draw_bars(axes, x, rows, entry, colour)
     _draw_rating(axes, result, key)
     axes.tick_params(labelbottom=True)
@@ -134,9 +134,9 @@ def _panel(axes: Axes, result: MachineResult, key: str, name: str) -> None:
 def _draw_bars(axes: Axes, x: Field, rows: Sequence[Numbers], entry: Quantity, colour: str) -> None:
     """Draw the intervals of a quantity that the rows have."""
     low, high = (display(entry.key, _numbers(rows, end)) for end in entry.ends)
-    known = np.isfinite(low) & np.isfinite(high)
-    if known.any():
-        axes.vlines(x[known], low[known], high[known], color=colour, linewidth=1.0)
+    finite = np.isfinite(low) & np.isfinite(high)
+    if finite.any():
+        axes.vlines(x[finite], low[finite], high[finite], color=colour, linewidth=1.0)
 
 
 def _draw_rating(axes: Axes, result: MachineResult, key: str) -> None:
@@ -164,16 +164,16 @@ def fatigue_over_depth(fatigue: DangVan) -> Exhibit:
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(3.4)
         depths = display("depth_m", fatigue.depths)
-        for values, label, (colour, stroke, marker) in zip(
+        for values, label, (colour, line_style, marker) in zip(
             (fatigue.solved, fatigue.smooth),
             ("solved, rough", "smooth, same friction"),
-            STROKES,
+            STYLES,
             strict=True,
         ):
             axes.plot(
                 display("dang_van_pa", values),
                 depths,
-                stroke,
+                line_style,
                 color=colour,
                 marker=marker,
                 markersize=3,

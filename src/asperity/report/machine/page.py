@@ -56,7 +56,9 @@ def write_machine_report(
 
 
 def _page(result: MachineResult, opened: str | None) -> str:
-    keys = [(key, quantity(name)) for key, name in (*CONDITIONS, *SOLVED) if _known(result, key)]
+    keys = [
+        (key, quantity(name)) for key, name in (*CONDITIONS, *SOLVED) if _has_values(result, key)
+    ]
     return render(
         "machine/page.html.j2",
         title=result.case.machine.title(),
@@ -80,7 +82,7 @@ def _page(result: MachineResult, opened: str | None) -> str:
     )
 
 
-def _known(result: MachineResult, key: str) -> bool:
+def _has_values(result: MachineResult, key: str) -> bool:
     return any(row.get(key) is not None for row in result.rows)
 
 
@@ -109,9 +111,9 @@ def _rating_view(rating: Rating) -> _RatingView:
     elif rating.machine_value is not None:
         value = entry.text(rating.machine_value)
     else:
-        known = {name: number for name, number in rating.values.items() if number is not None}
+        determined = {name: number for name, number in rating.values.items() if number is not None}
         value = (
-            "; ".join(f"{name} {entry.number(number)}" for name, number in known.items())
+            "; ".join(f"{name} {entry.number(number)}" for name, number in determined.items())
             or NO_VALUE
         )
         value = f"{value} {entry.display}".rstrip()

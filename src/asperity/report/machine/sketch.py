@@ -83,12 +83,12 @@ def _line(axes: Axes, line: Polyline, **style: Any) -> None:
 
 
 def _note(
-    axes: Axes, text: str, place: tuple[float, float], shift: tuple[float, float], **style: Any
+    axes: Axes, text: str, position: tuple[float, float], shift: tuple[float, float], **style: Any
 ) -> None:
-    """Write a note beside a place [m]; `shift` in points."""
+    """Write a note beside a position [m]; `shift` in points."""
     axes.annotate(
         text,
-        (MM * place[0], MM * place[1]),
+        (MM * position[0], MM * position[1]),
         shift,
         textcoords="offset points",
         **{"ha": "center", "color": VERMILION, "fontsize": "small", **style},
@@ -152,9 +152,9 @@ def _direction(angle: float) -> Field:
     return np.array([math.sin(angle), -math.cos(angle)])
 
 
-def _rolling_element(axes: Axes, number: int, place: Field, radius: float, share: float) -> None:
+def _rolling_element(axes: Axes, number: int, centre: Field, radius: float, share: float) -> None:
     """Draw a numbered rolling element, shaded by its share of the largest load."""
-    x, y = place
+    x, y = centre
     colour = BLUE if share > 0.0 else IDLE
     opacity = 0.25 + 0.6 * share
     _circle(axes, x, y, radius, facecolor=colour, alpha=opacity, zorder=2)
@@ -201,11 +201,11 @@ def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
     pinion, wheel = _mesh(gears, foot + result.worst["position"] * along)
     axes.fill(MM * pinion[0], MM * pinion[1], facecolor=METAL, edgecolor=EDGE, linewidth=0.9)
     axes.fill(MM * wheel[0], MM * wheel[1], facecolor=MATE, edgecolor=EDGE, linewidth=0.9)
-    places = np.array([foot + s * along for s in gears.path.values()])
-    _line(axes, (places[[0, -1], 0], places[[0, -1], 1]), color=VERMILION, linewidth=1.6)
-    _mark_path(axes, gears.path, places, result.worst["name"])
-    size = 0.62 * float(np.ptp(places[:, 0])) + 1.2 * gears.module
-    x, y = places.mean(axis=0)
+    points = np.array([foot + s * along for s in gears.path.values()])
+    _line(axes, (points[[0, -1], 0], points[[0, -1], 1]), color=VERMILION, linewidth=1.6)
+    _mark_path(axes, gears.path, points, result.worst["name"])
+    size = 0.62 * float(np.ptp(points[:, 0])) + 1.2 * gears.module
+    x, y = points.mean(axis=0)
     _frame(axes, (x - size, x + size), (y - 0.8 * size, y + 0.8 * size))
 
 
@@ -224,9 +224,9 @@ def _mesh(gears: SpurGear, touching: Field) -> tuple[Polyline, Polyline]:
     return _flanks(gears, 0, touching), (-wheel[0], centres - wheel[1])
 
 
-def _mark_path(axes: Axes, names: Iterable[str], places: Field, worst: str) -> None:
+def _mark_path(axes: Axes, names: Iterable[str], points: Field, worst: str) -> None:
     """Mark and name the points of the path of contact, the worst in bold."""
-    for side, (name, (x, y)) in enumerate(zip(names, places, strict=True)):
+    for side, (name, (x, y)) in enumerate(zip(names, points, strict=True)):
         is_worst = name == worst
         size = 6.0 if is_worst else 3.5
         axes.plot(MM * x, MM * y, "o", color=VERMILION, markersize=size)
@@ -285,8 +285,8 @@ def _discs(discs: TwinDisc, axes: Axes) -> None:
         axes.text(MM * x, 0.0, turning, ha="center", va="center", fontsize="small")
     axes.plot(0.0, 0.0, "o", color=VERMILION, markersize=6)
     _note(axes, quantity("load_n").text(discs.load), (0.0, 0.0), (0, 12))
-    tallest = 1.05 * max(first, second)
-    _frame(axes, (-2.1 * first, 2.1 * second), (-tallest, tallest))
+    half_height = 1.05 * max(first, second)
+    _frame(axes, (-2.1 * first, 2.1 * second), (-half_height, half_height))
 
 
 def _cam(cam: Cam, result: MachineResult, axes: Axes) -> None:
@@ -341,6 +341,6 @@ def _on_cam(cam: Cam, angle: float) -> Field:
 def _lift_slope(cam: Cam, angle: float) -> float:
     """Differentiate the lift over the cam angle numerically [m]."""
     step = 1e-5
-    ends = (min(max(angle + side * step, 0.0), cam.half_angle) for side in (-1.0, 1.0))
-    low, high = ends
+    angles = (min(max(angle + side * step, 0.0), cam.half_angle) for side in (-1.0, 1.0))
+    low, high = angles
     return (cam.lift_at(high) - cam.lift_at(low)) / (high - low)

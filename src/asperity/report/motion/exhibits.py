@@ -15,7 +15,7 @@ from asperity.report.drawing import display, name_axes
 from asperity.report.style import BLUE, GREEN, GREY, VERMILION, Medium
 from asperity.simulation import History
 
-STROKES = (("-", BLUE), ("--", VERMILION), (":", GREEN))
+STYLES = (("-", BLUE), ("--", VERMILION), (":", GREEN))
 PANELS = (  # over time: quantity of the axis, and of its curves
     ("share", ("clr", "car")),
     ("film_thickness_m", ("h_mean_m", "h_central_m", "h_min_m")),
@@ -34,7 +34,7 @@ PASSES = (
 )
 
 
-def _known(
+def _with_values(
     panels: Sequence[tuple[str, tuple[str, ...]]], table: pandas.DataFrame
 ) -> list[tuple[str, tuple[str, ...]]]:
     """Return the panels that have values."""
@@ -46,7 +46,7 @@ def curves(history: History) -> Exhibit:
     table = history.table
 
     def draw(medium: Medium) -> Figure:
-        panels = _known(PANELS, table)
+        panels = _with_values(PANELS, table)
         figure = Figure(figsize=(medium.double, 1.55 * len(panels) + 0.5))
         all_axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         bottom = 0.5 / figure.get_size_inches()[1]
@@ -75,8 +75,8 @@ def curves(history: History) -> Exhibit:
 
 
 def _draw_over_time(axes: Axes, time: Field, lines: Mapping[str, Field]) -> None:
-    for (name, values), (stroke, colour) in zip(lines.items(), STROKES, strict=False):
-        axes.plot(time, values, stroke, color=colour, label=name)
+    for (name, values), (line_style, colour) in zip(lines.items(), STYLES, strict=False):
+        axes.plot(time, values, line_style, color=colour, label=name)
     axes.set_xlim(0.0, float(time[-1]) or 1.0)
     low, high = axes.get_ylim()
     low = (
@@ -93,12 +93,12 @@ def running_in(history: History) -> Exhibit:
     table = history.by_pass()
 
     def draw(medium: Medium) -> Figure:
-        panels = _known(PASSES, table)
+        panels = _with_values(PASSES, table)
         rows = -(-len(panels) // 2)
         figure = Figure(figsize=(medium.double, 2.4 * rows), layout="constrained")
         for number, (side, keys) in enumerate(panels, 1):
             axes = figure.add_subplot(rows, 2, number)
-            for key, (_, colour), marker in zip(keys, STROKES, "os", strict=False):
+            for key, (_, colour), marker in zip(keys, STYLES, "os", strict=False):
                 values = display(key, table[key].to_numpy())
                 title = quantity(key).title
                 axes.plot(

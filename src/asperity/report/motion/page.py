@@ -93,8 +93,8 @@ def _script_data(history: History, scale: animated_maps.Ranges, ends: tuple[floa
     """Return the data of the page's script: frames, captions and positions on the time axis."""
     last = float(history.table["time_s"].iloc[-1])
     captions = [_caption(history, frame.number) for frame in history.frames]
-    place = [frame.time / last if last else 0.0 for frame in history.frames]
-    return animated_maps.script_data(history.frames, captions, scale, ends=ends, place=place)
+    positions = [frame.time / last if last else 0.0 for frame in history.frames]
+    return animated_maps.script_data(history.frames, captions, scale, ends=ends, place=positions)
 
 
 def _caption(history: History, number: int) -> str:

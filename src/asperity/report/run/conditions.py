@@ -42,12 +42,12 @@ def _conditions(run: Run) -> dict[str, str]:
 
 def _law(family: LawFamily, law: object) -> str:
     values = ((name, entry, getattr(law, name)) for name, entry in parameters(type(law)).items())
-    stated = (
+    constants = (
         f"{entry.symbol or name} = {entry.text(value)}"
         for name, entry, value in values
         if value is not None
     )
-    return ", ".join([law_name(family, law), *stated])
+    return ", ".join([law_name(family, law), *constants])
 
 
 def _both(texts: Sequence[str]) -> str:
@@ -112,12 +112,12 @@ def _shape(conditions: ContactConditions) -> str:
     length = quantity("length_m")
     parts = []
     if shape.amplitude > 0.0:
-        ends = (
+        end_text = (
             "unbounded at the ends"
             if shape.end_drop is None
             else f"{drop.text(shape.end_drop)} at the ends"
         )
-        parts.append(f"logarithmic drop of amplitude {drop.text(shape.amplitude)}, {ends}")
+        parts.append(f"logarithmic drop of amplitude {drop.text(shape.amplitude)}, {end_text}")
     if shape.crown_radius is not None:
         parts.append(f"circular crown of radius {length.text(shape.crown_radius)}")
     if shape.flat > 0.0:
@@ -195,13 +195,13 @@ def _numerical_rows(solution: ContactSolution) -> dict[str, str]:
     a = solution.conditions.hertz.half_widths[0]
     cell = quantity("cell_m")
     (nx, ny), (dx, dy) = grid.cells, grid.spacing
-    ends = [
+    limits = [
         [with_deviation(end / a, None, ".2f") for end in corner]
         for corner in (grid.lower, grid.upper)
     ]
     sides = (
         f"{axis} from {lower} a to {upper} a"
-        for axis, lower, upper in zip("xy", *ends, strict=True)
+        for axis, lower, upper in zip("xy", *limits, strict=True)
     )
     return {
         "Grid": f"{nx} × {ny} cells of {cell.number(dx)} × {cell.text(dy)}",
@@ -236,9 +236,9 @@ def _roughness(case_text: str) -> str:
 
 
 def _table_in_words(table: Table) -> str:
-    stated = {key: value for key, value in table.items() if OMITTED_DEFAULTS.get(key) != value}
+    entries = {key: value for key, value in table.items() if OMITTED_DEFAULTS.get(key) != value}
     texts = {
         key: " and ".join(map(str, value)) if isinstance(value, list) else value
-        for key, value in stated.items()
+        for key, value in entries.items()
     }
     return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in texts.items())

@@ -246,16 +246,16 @@ def convergence_history(run: Run) -> Exhibit:
 def _draw_residuals(axes: Axes, convergence: Convergence) -> None:
     history = convergence.history
     steps = np.arange(1, len(history) + 1)
-    sparse = max(len(history) // 60, 1)
-    for name, stroke, colour in (
+    interval = max(len(history) // 60, 1)
+    for name, line_style, colour in (
         ("residual", "-o", BLUE),
         ("load_error", "--s", VERMILION),
         ("change", ":^", GREEN),
     ):
         values = np.array([getattr(step, name) for step in history])
         positive = np.where(values > 0.0, values, np.nan)  # a log axis cannot show exact zeros
-        style: Style = {"color": colour, "markersize": 3, "markevery": sparse, "linewidth": 1.0}
-        axes.semilogy(steps, positive, stroke, label=name.replace("_", " "), **style)
+        style: Style = {"color": colour, "markersize": 3, "markevery": interval, "linewidth": 1.0}
+        axes.semilogy(steps, positive, line_style, label=name.replace("_", " "), **style)
     style = {"color": "black", "linewidth": 0.8, "linestyle": (0, (6, 2))}
     axes.axhline(convergence.tolerance, label="tolerance", **style)
 
@@ -264,7 +264,7 @@ def _mark_grids(axes: Axes, convergence: Convergence) -> None:
     """Mark the first step on each grid."""
     history = convergence.history
     starts = [i for i, step in enumerate(history) if i == 0 or step.cells != history[i - 1].cells]
-    crowded = min(np.diff([*starts, len(history)])) < 0.16 * len(history)
+    dense = min(np.diff([*starts, len(history)])) < 0.16 * len(history)
     for start in starts:
         nx, ny = history[start].cells
         axes.axvline(start + 0.5, color=GREY, linewidth=0.6)
@@ -276,5 +276,5 @@ def _mark_grids(axes: Axes, convergence: Convergence) -> None:
             textcoords="offset points",
             fontsize=8,
             color="#374151",
-            rotation=90 if crowded else 0,
+            rotation=90 if dense else 0,
         )

@@ -12,14 +12,14 @@ from asperity.report.drawing import display, name_axes
 from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, VERMILION
 from asperity.results import FrictionCurve
 
-STROKES = ((BLUE, "-", "o"), (VERMILION, "--", "s"), (GREEN, "-.", "^"), (GREY, ":", "D"))
+STYLES = ((BLUE, "-", "o"), (VERMILION, "--", "s"), (GREEN, "-.", "^"), (GREY, ":", "D"))
 ABSCISSA = {"stribeck": "entrainment_speed_m_s", "traction": "slide_to_roll"}
-PARTS = {  # components drawn for a single curve: quantity, label, stroke
+PARTS = {  # components drawn for a single curve: quantity, label, line style
     "friction_coefficient": (
-        ("asperity_part", "asperities", STROKES[1]),
-        ("oil_part", "oil", STROKES[2]),
+        ("asperity_part", "asperities", STYLES[1]),
+        ("oil_part", "oil", STYLES[2]),
     ),
-    "flash_temperature_max_k": (("film_temperature_max_k", "film", STROKES[2]),),
+    "flash_temperature_max_k": (("film_temperature_max_k", "film", STYLES[2]),),
 }
 
 
@@ -60,9 +60,9 @@ def _draw_panel(axes: Axes, curves: Sequence[FrictionCurve], key: str, name: str
     """Draw a quantity of every curve, and its components for a single curve."""
     single = len(curves) == 1
     for number, curve in enumerate(curves):
-        _draw(axes, curve, key, name if single else _name(curve), *STROKES[number % len(STROKES)])
-        for part, label, stroke in PARTS[key] if single else ():
-            _draw(axes, curve, part, label, *stroke)
+        _draw(axes, curve, key, name if single else _name(curve), *STYLES[number % len(STYLES)])
+        for part, label, line_style in PARTS[key] if single else ():
+            _draw(axes, curve, part, label, *line_style)
     abscissa = ABSCISSA[curves[0].kind]
     if abscissa == "entrainment_speed_m_s":
         axes.set_xscale("log")
@@ -76,7 +76,7 @@ def _name(curve: FrictionCurve) -> str:
 
 
 def _draw(
-    axes: Axes, curve: FrictionCurve, name: str, label: str, colour: str, stroke: str, marker: str
+    axes: Axes, curve: FrictionCurve, name: str, label: str, colour: str, style: str, marker: str
 ) -> None:
     abscissa = ABSCISSA[curve.kind]
     x = display(abscissa, np.array([getattr(point, abscissa) for point in curve.points]))
@@ -85,7 +85,7 @@ def _draw(
     axes.plot(
         x,
         np.where(converged, y, np.nan),
-        stroke,
+        style,
         marker=marker,
         markersize=4,
         color=colour,

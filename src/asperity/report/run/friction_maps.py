@@ -147,19 +147,19 @@ def stress_section(run: Run) -> Exhibit:
 def _section(run: Run) -> tuple[Field, tuple[float, float, float, float]]:
     """Return the von Mises stress [Pa] of the section around its peak, shape (x, depth).
 
-    Its ends are left, right, bottom and top [m].
+    Its limits are left, right, bottom and top [m].
     """
     stress = run.stress
     peak = run.stress.peak
     x = run.stress.grid.x
     dx = stress.grid.spacing[0]
     size = SECTION_DEPTH * run.solution.conditions.hertz.half_widths[0]
-    shown = (x >= min(-size, peak.x - size / 4.0)) & (x <= max(size, peak.x + size / 4.0))
-    left = x[shown][0] - dx / 2.0
-    right = x[shown][-1] + dx / 2.0
+    inside = (x >= min(-size, peak.x - size / 4.0)) & (x <= max(size, peak.x + size / 4.0))
+    left = x[inside][0] - dx / 2.0
+    right = x[inside][-1] + dx / 2.0
     bottom = min(size, float(stress.depths[-1]))
     depths = (np.arange(SECTION_ROWS) + 0.5) * bottom / SECTION_ROWS
-    columns = stress.von_mises[shown, stress.row]
+    columns = stress.von_mises[inside, stress.row]
     values = np.stack([np.interp(depths, stress.depths, column) for column in columns])
     return values, (left, right, bottom, 0.0)
 

@@ -40,7 +40,7 @@ def along_length(run: Run, along: AxialDistribution) -> Exhibit:
     film = (
         f"; film at the ends {end_value_text('end_film_m', along.end_film)}" if lubricated else ""
     )
-    spike = (
+    spike_note = (
         "Edge pressures exclude the outlet spike, which grows with grid refinement. "
         if lubricated
         else ""
@@ -50,7 +50,7 @@ def along_length(run: Run, along: AxialDistribution) -> Exhibit:
         "along",
         draw,
         "Line load, maximum pressure and minimum gap of each line of cells along rolling. Edge "
-        f"pressure {edge}{film}; {loaded} of the length carry load. {spike}Both bodies are "
+        f"pressure {edge}{film}; {loaded} of the length carry load. {spike_note}Both bodies are "
         "half-spaces; the free end face of a real roller, which is softer, is not modelled.",
         "Curves along the roller: line load and pressure, with those of a uniform load dashed, and "
         f"below them the minimum gap. Edge pressure {edge}.",

@@ -75,19 +75,19 @@ def friction_against_roughness(points: Points) -> Exhibit:
     )
 
 
-def _draw(axes: Axes, points: Points, key: str, stroke: str, colour: str, label: str = "") -> None:
+def _draw(axes: Axes, points: Points, key: str, style: str, colour: str, label: str = "") -> None:
     """Draw a scalar over Sq, with hollow markers for runs that did not converge."""
-    known = sorted(
+    determined = sorted(
         (point for point in points if point[key] is not None),
         key=lambda point: float(point["sq_m"]),
     )
-    sq, values = ([display(name, point[name]) for point in known] for name in ("sq_m", key))
-    axes.plot(sq, values, stroke, color=colour, markersize=6, label=label or quantity(key).title)
-    unconverged = [i for i, point in enumerate(known) if not point["converged"]]
+    sq, values = ([display(name, point[name]) for point in determined] for name in ("sq_m", key))
+    axes.plot(sq, values, style, color=colour, markersize=6, label=label or quantity(key).title)
+    unconverged = [i for i, point in enumerate(determined) if not point["converged"]]
     axes.plot(
         sq,
         values,
-        stroke[-1],
+        style[-1],
         color=colour,
         markerfacecolor="white",
         markersize=6,

@@ -22,7 +22,7 @@ def stiffness_over_frequency(run: Run) -> Exhibit:
         for a run without a dynamic curve.
     """
     curve = run.dynamic_curve
-    own = run.own_resonance
+    resonance = run.own_resonance
     if curve is None:
         raise BadInput(
             "the run has no stiffness over frequency; set solver.dynamic in the case and solve "
@@ -42,9 +42,9 @@ def stiffness_over_frequency(run: Run) -> Exhibit:
             linewidth=0.9,
             label="quasi-static limit",
         )
-        if own is not None:
-            _mark_resonance(upper, own.elastic, "dynamic_stiffness")
-            _mark_resonance(lower, own.elastic, "dynamic_damping")
+        if resonance is not None:
+            _mark_resonance(upper, resonance.elastic, "dynamic_stiffness")
+            _mark_resonance(lower, resonance.elastic, "dynamic_damping")
         upper.set_title("Stiffness and damping of the solved contact")
         name_axes(lower, "dynamic_frequency")
         lower.set_xscale("log")
@@ -54,15 +54,15 @@ def stiffness_over_frequency(run: Run) -> Exhibit:
         return figure
 
     at_resonance = ""
-    if own is not None:
+    if resonance is not None:
         parts = (
-            quantity(key).named(getattr(own.elastic, name))
+            quantity(key).named(getattr(resonance.elastic, name))
             for key, name in (
                 ("contact_stiffness_n_m", "stiffness"),
                 ("contact_damping_ratio", "damping_ratio"),
             )
         )
-        frequency = quantity("contact_resonance_hz").text(own.elastic.frequency_hz)
+        frequency = quantity("contact_resonance_hz").text(resonance.elastic.frequency_hz)
         at_resonance = f" At {frequency}: {', '.join(parts)}."
     return Exhibit(
         "stiffness-over-frequency",
@@ -77,14 +77,14 @@ def stiffness_over_frequency(run: Run) -> Exhibit:
 
 def _draw(axes: Axes, curve: DynamicCurve, key: str) -> None:
     name = key.removeprefix("dynamic_")
-    for branch, label, colour, stroke in (
+    for branch, label, colour, line_style in (
         (curve.elastic, "yielded cells elastic", BLUE, "-o"),
         (curve.virgin, "yielded cells flowing", GREY, "--s"),
     ):
         axes.plot(
             curve.frequency_hz,
             display(key, getattr(branch, name)),
-            stroke,
+            line_style,
             color=colour,
             markersize=3,
             label=label,

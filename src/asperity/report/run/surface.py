@@ -39,20 +39,20 @@ def _surface_figure(description: SurfaceDescription) -> Figure:
     levelled = description.levelled
     spectrum = surface_spectrum(description.levelled)
     figure = Figure(figsize=(11.0, 7.4), layout="constrained")
-    places = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
+    layout = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
     is_map = levelled.uniform is None
     if is_map:
-        _draw_levelled_map(figure, figure.add_subplot(places[0, :2]), levelled)
-        _draw_lay(figure.add_subplot(places[0, 2], projection="polar"), spectrum)
-        left = figure.add_subplot(places[1, 0])
+        _draw_levelled_map(figure, figure.add_subplot(layout[0, :2]), levelled)
+        _draw_lay(figure.add_subplot(layout[0, 2], projection="polar"), spectrum)
+        left = figure.add_subplot(layout[1, 0])
         title = "Profile through the middle, along x"
         _draw_profile(left, levelled, title)
     else:
-        _draw_profile(figure.add_subplot(places[0, :]), levelled, "Levelled profile")
-        left = figure.add_subplot(places[1, 0])
+        _draw_profile(figure.add_subplot(layout[0, :]), levelled, "Levelled profile")
+        left = figure.add_subplot(layout[1, 0])
         rms = f"{description.profile_letter}q"
         draw_height_distribution(left, levelled.profile, rms)
-    curve, radial = (figure.add_subplot(places[1, column]) for column in (1, 2))
+    curve, radial = (figure.add_subplot(layout[1, column]) for column in (1, 2))
     _draw_bearing_curve(curve, description)
     _draw_radial_spectrum(radial, spectrum, profile=not is_map)
     title = f"{description.path.name}: {_size(description)}"

@@ -45,12 +45,12 @@ def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
     @one_panel(3.5)
     def draw(axes: Axes) -> None:
         _draw_band(axes, density, (low - margin, high + margin), (low, high))
-        found = (
+        title = (
             f"Contact resonance at {line.text(resonance.crf_hz)}"
             if resonance.found
             else "No resonance found"
         )
-        axes.set_title(found)
+        axes.set_title(title)
         if resonance.found:
             _mark_resonance(axes, resonance, np.linspace(low, high, 600))
         axes.axvline(
@@ -62,9 +62,9 @@ def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
         )
         axes.set_xlim(low - margin, high + margin)
 
-    ends = quantity("band_hz")
-    band = f"{ends.number(low)} to {ends.text(high)}"
-    full_load = ends.text(vibration.full_load_crf_hz)
+    entry = quantity("band_hz")
+    band = f"{entry.number(low)} to {entry.text(high)}"
+    full_load = entry.text(vibration.full_load_crf_hz)
     return Exhibit(
         "spectrum",
         draw,
@@ -77,10 +77,10 @@ def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
 
 
 def _draw_band(
-    axes: Axes, density: Spectrum, ends: tuple[float, float], band: tuple[float, float]
+    axes: Axes, density: Spectrum, limits: tuple[float, float], band: tuple[float, float]
 ) -> None:
-    """Draw the spectrum between the ends, averaged over neighbouring lines if there are many."""
-    inside = (density.frequency_hz >= ends[0]) & (density.frequency_hz <= ends[1])
+    """Draw the spectrum between limits, averaged over neighbouring lines if there are many."""
+    inside = (density.frequency_hz >= limits[0]) & (density.frequency_hz <= limits[1])
     lines_per_point = max(int(np.count_nonzero(inside)) // 400, 1)
     axes.axvspan(*band, facecolor=BAND_COLOUR, edgecolor=GREY, linewidth=0.7, label="search band")
     frequency, level = (
@@ -212,7 +212,7 @@ def _draw_spectrum(axes: Axes, record: Signal, title: str, colour: str) -> None:
 
 @ON_PAGE.drawing()
 def table1_figure(rows: Sequence[Table1Row]) -> Figure:
-    """Draw CRFA over load, height and cut-off: printed values and simulated 5 to 95 % ranges."""
+    """Draw CRFA over load, height and cut-off: published values and simulated 5 to 95 % ranges."""
     parts = (
         (rows[:4], "load_n", "load_n", "load"),
         (rows[4:8], "height_m", "profile_height_m", "height"),
@@ -220,7 +220,7 @@ def table1_figure(rows: Sequence[Table1Row]) -> Figure:
     )
     figure = Figure(figsize=(ON_PAGE.double, 3.9), layout="constrained")
     panels = figure.subplots(1, 3)
-    for axes, (part, name, key, word) in zip(panels, parts, strict=True):
+    for axes, (part, name, key, symbol) in zip(panels, parts, strict=True):
         x = display(key, np.array([getattr(row, name) for row in part]))
         median, low, high = (
             np.array([getattr(row, f"crfa{end}") for row in part]) for end in ("", "_low", "_high")
@@ -237,7 +237,7 @@ def table1_figure(rows: Sequence[Table1Row]) -> Figure:
         axes.plot(
             x, [row.paper_crfa for row in part], "x", color=VERMILION, markersize=9, label="paper"
         )
-        axes.set(xscale="log", yscale="log", title=f"median ~ {_power(word, x, median)}")
+        axes.set(xscale="log", yscale="log", title=f"median ~ {_power(symbol, x, median)}")
         name_axes(axes, key)
         _tick_at(axes, x)
     panels[0].set_ylabel(quantity("crfa").label)
@@ -254,11 +254,11 @@ def trend_over_load_figure(model: VibrationModel) -> Figure:
     strokes = (("-o", VERMILION), ("--s", BLUE), ("-.^", GREEN), (":D", GREY))
     figure = Figure(figsize=(5.6, 4.4), layout="constrained")
     axes = figure.add_subplot()
-    for (stroke, colour), rate in zip(strokes, RATES, strict=True):
+    for (line_style, colour), rate in zip(strokes, RATES, strict=True):
         sampled = replace(model, rate_hz=rate)
         crfa = np.array([expected_crfa(sampled, CUTOFF, HEIGHT, load) for load in LOADS])
         label = f"{quantity('record_rate_hz').text(rate)}: {_power('load', np.array(LOADS), crfa)}"
-        axes.loglog(LOADS, crfa, stroke, color=colour, label=label)
+        axes.loglog(LOADS, crfa, line_style, color=colour, label=label)
     continuous = [continuous_crfa(model, CUTOFF, HEIGHT, load) for load in LOADS]
     axes.loglog(LOADS, continuous, color="black", linewidth=1.0, label="continuous: load^0")
     name_axes(axes, "load_n", "expected_crfa", title="CRFA over load: effect of sampling")
@@ -267,13 +267,13 @@ def trend_over_load_figure(model: VibrationModel) -> Figure:
     return figure
 
 
-def _tick_at(axes: Axes, places: Field) -> None:
-    axes.set_xticks(places, [f"{value:g}" for value in places])
+def _tick_at(axes: Axes, positions: Field) -> None:
+    axes.set_xticks(positions, [f"{value:g}" for value in positions])
     axes.set_xticks([], minor=True)
 
 
-def _power(word: str, x: Field, values: Field) -> str:
+def _power(symbol: str, x: Field, values: Field) -> str:
     """Fit a power law to the values and return it as text, such as "load^−0.67"."""
     power = float(np.polyfit(np.log(x), np.log(values), 1)[0])
     number = f"{power:.2f}".replace("-0.00", "0").replace("-", "−")
-    return f"{word}^{number}"
+    return f"{symbol}^{number}"

@@ -1,4 +1,4 @@
-"""Exhibits of a wear study: Figs 7, 8 and 13 of the paper, with its printed values."""
+"""Exhibits of a wear study: Figs 7, 8 and 13 of the paper, with its published values."""
 
 from collections.abc import Iterator, Sequence
 from itertools import cycle
@@ -27,7 +27,7 @@ from asperity.report.style import BLUE, GREEN, GREY, SPLIT_COLOUR, VERMILION, Me
 from asperity.study import StudyOverview, WearCurve
 from asperity.trend import Stages
 
-SPLIT_STROKES = ("-.", (0.0, (6.0, 1.5, 1.0, 1.5, 1.0, 1.5)), (0.0, (1.0, 1.0)))
+SPLIT_STYLES = ("-.", (0.0, (6.0, 1.5, 1.0, 1.5, 1.0, 1.5)), (0.0, (1.0, 1.0)))
 MAX_MARKERS = 20  # on a curve
 SHARES = (("clr", "-o", VERMILION), ("car", "--s", BLUE), ("car_domain", "-.^", GREEN))
 
@@ -47,18 +47,16 @@ def curve_exhibits(study: StudyOverview, curve: WearCurve) -> Iterator[Exhibit]:
 def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
     """Draw CLR and both CARs over Sq with seeds, intervals and anchors (Fig 7 of the paper)."""
     anchors = study.anchors
-    printed = set(anchors) <= set(PAPER_ANCHORS)
+    paper = set(anchors) <= set(PAPER_ANCHORS)
 
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(0.9 * medium.single)
-        for key, stroke, colour in SHARES:
-            draw_mean(axes, curve, key, stroke, colour, quantity(key).short)
+        for key, line_style, colour in SHARES:
+            draw_mean(axes, curve, key, line_style, colour, quantity(key).short)
         _draw_anchors(
-            axes, anchors, ("car", "car_domain"), "D", "CAR, printed" if printed else "CAR, given"
+            axes, anchors, ("car", "car_domain"), "D", "CAR, printed" if paper else "CAR, given"
         )
-        _draw_anchors(
-            axes, anchors, ("clr",), "P", "CLR from rig's CRF" if printed else "CLR, given"
-        )
+        _draw_anchors(axes, anchors, ("clr",), "P", "CLR from rig's CRF" if paper else "CLR, given")
         name_axes(axes, "sq_m", "share")
         axes.set_ylim(0.0, max(100.0, axes.get_ylim()[1]))
         medium.title(axes, "Asperity load and area share")
@@ -72,7 +70,7 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
             "the published CRF of the smoothest and the roughest ring. Bars: tolerances set by "
             "asperity."
         )
-    ends = (
+    ranges = (
         f"{quantity(key).short} from {first_to_last(key, curve.mean(key))}" for key, *_ in SHARES
     )
     return Exhibit(
@@ -80,7 +78,7 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
         draw,
         "Asperity load share (CLR), contact area ratio in the Hertz zone (CAR), and total contact "
         f"area divided by the Hertz area (CAR of the domain). {legend_note(study)}{anchor_note}",
-        f"CLR and CAR over Sq from {first_to_last('sq_m', curve.sq)}: {', '.join(ends)}.",
+        f"CLR and CAR over Sq from {first_to_last('sq_m', curve.sq)}: {', '.join(ranges)}.",
     )
 
 
@@ -135,12 +133,12 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
 
 def _limit_rows(upper: Axes, lower: Axes, curve: WearCurve, anchors: Sequence[Anchor]) -> None:
     """Limit the axes of CRF and CRFA to their values with all presets, and to the anchors."""
-    known = [anchor.value for anchor in anchors if anchor.quantity in _CRF]
+    anchor_values = [anchor.value for anchor in anchors if anchor.quantity in _CRF]
     crf, crfa = (
         [curve.by_case(key.format(preset))[1] for preset in curve.stages]
         for key in ("crf_{}_hz", "crfa_{}")
     )
-    limit_to_data(upper, np.concatenate([known, *crf]))
+    limit_to_data(upper, np.concatenate([anchor_values, *crf]))
     limit_to_data(lower, np.concatenate(crfa))
 
 
@@ -150,22 +148,22 @@ _CRF = ("crf_sound_hz", "crf_paper_hz")
 def _draw_preset(
     upper: Axes, lower: Axes, curve: WearCurve, anchors: Sequence[Anchor], preset: str
 ) -> None:
-    printed = set(anchors) <= set(PAPER_ANCHORS)
+    paper = set(anchors) <= set(PAPER_ANCHORS)
     splits = [anchor for anchor in anchors if anchor.quantity == SPLIT_ANCHOR]
     for axes in (upper, lower):
         _mark_stages(axes, curve, preset, named=axes is upper)
-        for split, stroke in zip(splits, cycle(SPLIT_STROKES), strict=False):
-            label = f"{'printed ' if printed else ''}{split.name}"
-            axes.axvline(split.value, color="black", linestyle=stroke, linewidth=0.9, label=label)
+        for split, style in zip(splits, cycle(SPLIT_STYLES), strict=False):
+            label = f"{'printed ' if paper else ''}{split.name}"
+            axes.axvline(split.value, color="black", linestyle=style, linewidth=0.9, label=label)
     draw_mean(upper, curve, f"crf_{preset}_hz", "-o", VERMILION, quantity("crf_hz").short)
     _draw_full_load(upper, curve)
-    _draw_anchors(upper, anchors, _CRF, "D", "CRF of the rig, printed" if printed else "CRF, given")
+    _draw_anchors(upper, anchors, _CRF, "D", "CRF of the rig, printed" if paper else "CRF, given")
     draw_mean(lower, curve, f"crfa_{preset}", "--s", BLUE, quantity("crfa").short)
     name_axes(lower, "sq_m")
 
 
 def rig(curve: WearCurve, preset: str) -> Exhibit:
-    """Draw the printed CRF of the rig's rings and the study's prediction (Fig 13 of the paper)."""
+    """Draw the published CRF of the rig's rings and the study's prediction (the paper's Fig 13)."""
     key = f"crf_{preset}_hz"
 
     def draw(medium: Medium) -> Figure:
@@ -179,10 +177,10 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
             crf = curve.mean(f"crf_{other}_hz")
             label = f"study, preset {other}"
             axes.plot(sq, crf, "--", color=GREEN, linewidth=1.0, label=label)
-        printed = _draw_rings(axes, rig_prediction(curve, f"crf_{first}_hz"))
+        rings_hz = _draw_rings(axes, rig_prediction(curve, f"crf_{first}_hz"))
         _draw_full_load(axes, curve)
         name_axes(axes, "sq_m", ylabel=quantity("crf_hz").label)
-        limit_to_data(axes, np.concatenate([curve.by_case(f"crf_{first}_hz")[1], printed]))
+        limit_to_data(axes, np.concatenate([curve.by_case(f"crf_{first}_hz")[1], rings_hz]))
         medium.title(axes, "Rings of the rig, measured and predicted")
         legend_of_panels(figure, axes, columns=2, seeds=False)
         return figure
@@ -199,19 +197,19 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
 
 
 def _draw_rings(axes: Axes, rings: pandas.DataFrame) -> Field:
-    """Draw predicted and printed CRF of the rings; return the printed values [Hz]."""
+    """Draw predicted and published CRF of the rings; return the published values [Hz]."""
     sq, predicted, low, std = (
         rings[column].to_numpy() for column in ("sq_um", "crf_hz", "low", "sq_std_um")
     )
     style: Style = {"color": BLUE, "markerfacecolor": "white", "markersize": 4, "xerr": std}
     label = "study at a ring's Sq"
     draw_intervals(axes, sq, predicted, predicted - low, "o", label=label, **style)
-    known = rings[rings["printed_hz"].notna()]
-    style = {"color": "black", "markersize": 4.5, "zorder": 4, "xerr": known["sq_std_um"]}
+    measured = rings[rings["printed_hz"].notna()]
+    style = {"color": "black", "markersize": 4.5, "zorder": 4, "xerr": measured["sq_std_um"]}
     label = "rings, published CRF"
-    printed = known["printed_hz"].to_numpy()
-    draw_intervals(axes, known["sq_um"], printed, None, "D", label=label, **style)
-    return np.asarray(printed)
+    rings_hz = measured["printed_hz"].to_numpy()
+    draw_intervals(axes, measured["sq_um"], rings_hz, None, "D", label=label, **style)
+    return np.asarray(rings_hz)
 
 
 def _deviations(rms_hz: dict[str, float]) -> str:
@@ -228,7 +226,7 @@ def draw_mean(
     axes: Axes,
     curve: WearCurve,
     key: str,
-    stroke: str,
+    line_style: str,
     colour: str,
     label: str,
     *,
@@ -249,7 +247,7 @@ def draw_mean(
     axes.plot(
         sq,
         display(key, curve.mean(key)),
-        stroke,
+        line_style,
         color=colour,
         markersize=3.5,
         markevery=-(-sq.size // MAX_MARKERS),
@@ -262,11 +260,11 @@ def _draw_anchors(
     axes: Axes, anchors: Sequence[Anchor], keys: Sequence[str], marker: str, label: str
 ) -> None:
     """Draw the anchors of these quantities with tolerances, except changes between two Sq."""
-    places = {}
+    distinct = {}
     for anchor in anchors:
         if anchor.quantity in keys and anchor.sq is not None and anchor.since is None:
-            places[anchor.sq, anchor.value] = anchor
-    for number, anchor in enumerate(places.values()):
+            distinct[anchor.sq, anchor.value] = anchor
+    for number, anchor in enumerate(distinct.values()):
         assert anchor.sq is not None
         value, tolerance = (
             display(anchor.quantity, value) for value in (anchor.value, anchor.tolerance)
@@ -289,10 +287,10 @@ def limit_to_data(axes: Axes, values: Field) -> None:
 
 
 def _draw_full_load(axes: Axes, curve: WearCurve) -> None:
-    known = curve.table["full_load_crf_hz"].dropna().unique()
-    if known.size == 1:  # omit the line if cases differ
+    values = curve.table["full_load_crf_hz"].dropna().unique()
+    if values.size == 1:  # omit the line if cases differ
         axes.axhline(
-            float(known[0]),
+            float(values[0]),
             color="black",
             linestyle=":",
             linewidth=1.0,

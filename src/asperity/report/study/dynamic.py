@@ -58,14 +58,14 @@ def damping_over_roughness(study: StudyOverview, curve: WearCurve) -> Exhibit:
         legend_of_panels(figure, upper, lower, columns=2)
         return figure
 
-    ends = first_to_last(ELASTIC, curve.mean(ELASTIC))
+    span = first_to_last(ELASTIC, curve.mean(ELASTIC))
     return Exhibit(
         "damping",
         draw,
         "Damping ratio of the contact and its stiffness k at resonance, both computed from the "
         "solved contact without the laws of the paper. Yielded cells elastic: surfaces that have "
         f"run in; flowing: virgin roughness. {legend_note(study)}",
-        f"Damping ratio of the contact over Sq, {ends}, and its dynamic stiffness.",
+        f"Damping ratio of the contact over Sq, {span}, and its dynamic stiffness.",
     )
 
 
@@ -86,16 +86,16 @@ def clr_correlations(study: StudyOverview, curve: WearCurve) -> Exhibit:
         figure.colorbar(dots, ax=panels, label=quantity("sq_m").label, pad=0.01)
         return figure
 
-    in_words = "; ".join(f"{quantity(key).short}: {_number(rank)}" for key, rank in ranks.items())
+    text = "; ".join(f"{quantity(key).short}: {_number(rank)}" for key, rank in ranks.items())
     return Exhibit(
         "load-share-correlations",
         draw,
         "Asperity load share of each contact over quantities that a recording can show; colour: "
-        f"Sq. Rank correlation: {in_words}. CRF is computed from CLR by the empirical law of the "
+        f"Sq. Rank correlation: {text}. CRF is computed from CLR by the empirical law of the "
         "paper, so its correlation tests nothing; stiffness and damping come from the solved "
         "contacts.",
         "Asperity load share over CRF by law, dynamic stiffness and damping. Rank correlations: "
-        f"{in_words}.",
+        f"{text}.",
     )
 
 
@@ -105,20 +105,20 @@ def _draw_correlation(axes: Axes, rows: pandas.DataFrame, key: str) -> PathColle
         display(name, rows[column].to_numpy(dtype=float))
         for name, column in ((key, key), ("clr", "clr"), ("sq_m", "surface.sq"))
     )
-    known = np.isfinite(x)
+    finite = np.isfinite(x)
     style: Style = {"cmap": "cividis", "s": 14, "edgecolors": "white", "linewidths": 0.3}
-    colour = sq[known]
-    dots = axes.scatter(x[known], clr[known], c=colour, vmin=colour.min(initial=0.0), **style)
+    colour = sq[finite]
+    dots = axes.scatter(x[finite], clr[finite], c=colour, vmin=colour.min(initial=0.0), **style)
     axes.set_xlabel(quantity(key).label)
-    if key == ELASTIC and np.all(x[known] > 0.0):
+    if key == ELASTIC and np.all(x[finite] > 0.0):
         axes.set_xscale("log")
     return dots
 
 
 def rank_correlation(rows: pandas.DataFrame, key: str) -> float:
     """Return Spearman's rank correlation of CLR and a column; nan if either does not vary."""
-    known = rows[["clr", key]].dropna()
-    return float(known.corr(method="spearman").to_numpy()[0, 1]) if len(known) > 2 else float("nan")
+    pairs = rows[["clr", key]].dropna()
+    return float(pairs.corr(method="spearman").to_numpy()[0, 1]) if len(pairs) > 2 else float("nan")
 
 
 def _number(rank: float) -> str:

@@ -1,6 +1,6 @@
 """HTML report of a study, with figures and tables for a paper.
 
-A study of Sq alone shows Figs 5 to 8 and 13 of the paper with its printed values; any other shows
+A study of Sq alone shows Figs 5 to 8 and 13 of the paper with its published values; any other shows
 each output over each swept quantity.
 """
 
@@ -41,8 +41,8 @@ def write_study_report(
     path : file to write; its folder must exist
     figures : folder for each figure as PDF and PNG (300 dpi, 84 or 174 mm wide), `captions.md` and
         the tables as csv; created if missing
-    anchors : reference values of a study of Sq (default: the paper's printed values, if the case is
-        its contact)
+    anchors : reference values of a study of Sq (default: the paper's published values, if it
+        is the paper's contact)
     progress : called with a description of each step
 
     Returns

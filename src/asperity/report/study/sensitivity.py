@@ -112,8 +112,8 @@ def _draw_deviations(axes: Axes, result: Calibration) -> None:
     )
     for number, (_, table, colour, marker) in enumerate(tables):
         deviations = dict(zip(table["anchor"], table["miss"] / table["tolerance"], strict=True))
-        for place, name in enumerate(names):
-            y = place + 0.2 * (number - 1)
+        for row, name in enumerate(names):
+            y = row + 0.2 * (number - 1)
             if np.isfinite(deviations[name]):
                 _mark_deviation(axes, deviations[name], y, colour, marker)
     axes.axvline(0.0, color="black", linewidth=0.8)
@@ -131,12 +131,12 @@ def _draw_deviations(axes: Axes, result: Calibration) -> None:
 
 def _mark_deviation(axes: Axes, deviation: float, y: float, colour: str, marker: str) -> None:
     """Mark a deviation; one beyond the axis becomes an arrow at its end, with its value."""
-    beyond = abs(deviation) > MAX_DEVIATION
+    outside = abs(deviation) > MAX_DEVIATION
     side = float(np.sign(deviation))
-    symbol = (">" if side > 0 else "<") if beyond else marker
-    x = side * MAX_DEVIATION if beyond else deviation
+    symbol = (">" if side > 0 else "<") if outside else marker
+    x = side * MAX_DEVIATION if outside else deviation
     axes.plot(x, y, symbol, color=colour, markersize=5)
-    if beyond:
+    if outside:
         axes.annotate(
             f"{deviation:.0f}",
             (x, y),
@@ -150,16 +150,16 @@ def _mark_deviation(axes: Axes, deviation: float, y: float, colour: str, marker:
 
 
 def _draw_ranges(axes: Axes, result: Calibration) -> None:
-    for place, parameter in enumerate(result.parameters):
+    for row, parameter in enumerate(result.parameters):
         colour = BLUE if parameter.identifiable else GREY
         share = parameter.range.share(parameter.value)
-        axes.plot((0.0, 1.0), (place, place), color="#e5e7eb", linewidth=9, solid_capstyle="butt")
-        ends = [parameter.range.share(end) for end in (parameter.low, parameter.high)]
-        axes.plot(ends, (place, place), color=colour, linewidth=3, solid_capstyle="butt")
-        axes.plot(share, place, "o", color=colour, markersize=6)
+        axes.plot((0.0, 1.0), (row, row), color="#e5e7eb", linewidth=9, solid_capstyle="butt")
+        limits = [parameter.range.share(end) for end in (parameter.low, parameter.high)]
+        axes.plot(limits, (row, row), color=colour, linewidth=3, solid_capstyle="butt")
+        axes.plot(share, row, "o", color=colour, markersize=6)
         axes.annotate(
             _in_words(parameter),
-            (0.0, place),
+            (0.0, row),
             xytext=(0, 8),
             textcoords="offset points",
             fontsize=8.5,
@@ -171,7 +171,7 @@ def _draw_ranges(axes: Axes, result: Calibration) -> None:
         ):
             axes.annotate(
                 f"{value:g}",
-                (end, place),
+                (end, row),
                 xytext=(0, -13),
                 textcoords="offset points",
                 ha=align,
@@ -205,7 +205,7 @@ def _in_words(parameter: CalibratedParameter) -> str:
 def _draw_curves(axes: Axes, result: Calibration) -> None:
     sq = display("sq_m", result.check_curve.sq)
     start = display("sq_m", result.start_curve.sq)
-    for key, colour, stroke, marker in (
+    for key, colour, line_style, marker in (
         ("car_domain", BLUE, "-", "o"),
         ("clr", VERMILION, "--", "s"),
     ):
@@ -217,7 +217,7 @@ def _draw_curves(axes: Axes, result: Calibration) -> None:
         }
         low, high = display(key, result.check_curve.interval(key)).T
         axes.fill_between(sq, low, high, color=colour, alpha=0.15, linewidth=0)
-        axes.plot(sq, display(key, result.check_curve.mean(key)), stroke, **style)
+        axes.plot(sq, display(key, result.check_curve.mean(key)), line_style, **style)
         axes.plot(
             start, display(key, result.start_curve.mean(key)), ":", color=colour, linewidth=1.0
         )
@@ -226,9 +226,9 @@ def _draw_curves(axes: Axes, result: Calibration) -> None:
                 value, tolerance = (
                     display(key, number) for number in (anchor.value, anchor.tolerance)
                 )
-                place = display("sq_m", anchor.sq)
+                at_sq = display("sq_m", anchor.sq)
                 axes.errorbar(
-                    place, value, tolerance, fmt="D", color=GREEN, markersize=4, capsize=2, zorder=5
+                    at_sq, value, tolerance, fmt="D", color=GREEN, markersize=4, capsize=2, zorder=5
                 )
     axes.plot([], [], ":", color=GREY, linewidth=1.0, label="initial")
     axes.plot([], [], "D", color=GREEN, markersize=4, label="anchors")

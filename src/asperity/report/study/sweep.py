@@ -83,23 +83,23 @@ def _file_name(axis: SweptAxis) -> str:
 
 
 def _draw_output(axes: Axes, axis: SweptAxis, values: Field) -> None:
-    known = np.isfinite(values)
+    finite = np.isfinite(values)
     dots: Style = {"color": GREY, "alpha": 0.6, "markersize": 4.5, "markeredgewidth": 0}
     axes.plot(
-        axis.values[known], values[known], ".", rasterized=values.size > MAX_VECTOR_DOTS, **dots
+        axis.values[finite], values[finite], ".", rasterized=values.size > MAX_VECTOR_DOTS, **dots
     )
-    x, mean, low, high = group_means(axis.values[known], values[known], binned=axis.binned)
+    x, mean, low, high = group_means(axis.values[finite], values[finite], binned=axis.binned)
     style: Style = {"linestyle": "none" if axis.names else "-", "color": BLUE, "markersize": 3.5}
     draw_intervals(axes, x, mean, [mean - low, high - mean], "o", **style)
-    limit_to_data(axes, values[known])
+    limit_to_data(axes, values[finite])
     _scale(axes, axis)
 
 
 def _scale(axes: Axes, axis: SweptAxis) -> None:
     if axis.names:
-        places = np.arange(len(axis.names))
-        axes.set_xticks(places, axis.names, rotation=30 if max(map(len, axis.names)) > 6 else 0)
-        axes.set_xlim(-0.5, places[-1] + 0.5)
+        positions = np.arange(len(axis.names))
+        axes.set_xticks(positions, axis.names, rotation=30 if max(map(len, axis.names)) > 6 else 0)
+        axes.set_xlim(-0.5, positions[-1] + 0.5)
     elif axis.logarithmic:
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -110,12 +110,12 @@ def _draw_references(axes: Axes, track: Track, resonant: list[TrackedRecording])
         axes.axhline(full_load, label="CRF at full load", **style)
 
 
-def _mark_missing(axes: Axes, places: list[float], label: str) -> None:
+def _mark_missing(axes: Axes, positions: list[float], label: str) -> None:
     """Mark recordings without a value along the lower edge."""
-    if places:
+    if positions:
         along_edge = axes.get_xaxis_transform()
-        height = np.full(len(places), 0.02)
-        axes.plot(places, height, "x", color=GREY, transform=along_edge, label=label)
+        height = np.full(len(positions), 0.02)
+        axes.plot(positions, height, "x", color=GREY, transform=along_edge, label=label)
 
 
 def _draw_severity(axes: Axes, track: Track) -> None:
@@ -169,14 +169,14 @@ def damping(track: Track) -> Exhibit:
 
     @one_panel(3.1)
     def draw(axes: Axes) -> None:
-        known = [recording for recording in track.recordings if not recording.damping_reason]
+        determined = [recording for recording in track.recordings if not recording.damping_reason]
         ratio, std = (
             display("damping_ratio", np.array(part))
-            for part in zip(*[recording.damping for recording in known], strict=True)
+            for part in zip(*[recording.damping for recording in determined], strict=True)
         )
         factor = np.exp(NORMAL_FACTOR * std / ratio)
         bars = [ratio - ratio / factor, ratio * factor - ratio]
-        x = [recording.x for recording in known]
+        x = [recording.x for recording in determined]
         style: Style = {
             "marker": "^",
             "color": GREEN,
@@ -261,11 +261,11 @@ def _relative_levels(track: Track) -> dict[str, Field]:
             ]
     relative: dict[str, Field] = {}
     for name, values in levels.items():
-        known = [value for value in values if value > 0.0]
-        if len(known) > 1:
+        positive = [value for value in values if value > 0.0]
+        if len(positive) > 1:
             relative[name] = np.array(
                 [value if value > 0.0 else np.nan for value in values]
-            ) / np.median(known[:BASELINE])
+            ) / np.median(positive[:BASELINE])
     return relative
 
 
@@ -274,12 +274,12 @@ def asperity_load_share(track: Track) -> Exhibit:
 
     @one_panel(3.1)
     def draw(axes: Axes) -> None:
-        known = [recording for recording in track.recordings if np.isfinite(recording.clr)]
-        clr = display("clr", np.array([recording.clr for recording in known]))
+        determined = [recording for recording in track.recordings if np.isfinite(recording.clr)]
+        clr = display("clr", np.array([recording.clr for recording in determined]))
         low, high = display(
-            "clr", np.array([recording.clr_interval for recording in known]).reshape(-1, 2)
+            "clr", np.array([recording.clr_interval for recording in determined]).reshape(-1, 2)
         ).T
-        x = [recording.x for recording in known]
+        x = [recording.x for recording in determined]
         style: Style = {
             "marker": "o",
             "color": VERMILION,

@@ -126,8 +126,8 @@ def _with_damping(track: Track) -> bool:
 
 def _title(track: Track) -> str:
     folders = {Path(recording.file).parent.name for recording in track.recordings}
-    where = f" in {folders.pop()}" if len(folders) == 1 and folders != {""} else ""
-    return f"Contact resonance of a series{where}"
+    location = f" in {folders.pop()}" if len(folders) == 1 and folders != {""} else ""
+    return f"Contact resonance of a series{location}"
 
 
 def _actions(track: Track) -> list[tuple[str, str]]:
@@ -275,7 +275,7 @@ def _heads(track: Track) -> list[str]:
 def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
     resonance = recording.resonance
     row = recording.row()
-    place = f"{recording.x:.4g}" + (f" ± {recording.x_std:.2g}" if recording.x_std else "")
+    position = f"{recording.x:.4g}" + (f" ± {recording.x_std:.2g}" if recording.x_std else "")
     resonant = [
         quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa")
     ]
@@ -291,7 +291,7 @@ def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
         else NO_VALUE
     )
     shares = [quantity("clr").number(row["clr"])] if with_clr else []
-    cells = [place, *resonant, *shares, severe]
+    cells = [position, *resonant, *shares, severe]
     return _Row(
         Path(recording.file).name,
         cells,
@@ -330,13 +330,13 @@ def _facts(track: Track) -> list[tuple[str, str, str]]:
     rows = [row for name in FACTS if (row := _fact(readings, name)) is not None]
     lengths = [reading.quality.duration_s for reading in readings if reading.quality is not None]
     if lengths:
-        ends = (quantity("duration_s").text(length) for length in (min(lengths), max(lengths)))
-        rows.append(("Length", _span(*ends), "number of samples"))
+        limits = (quantity("duration_s").text(length) for length in (min(lengths), max(lengths)))
+        rows.append(("Length", _span(*limits), "number of samples"))
     started = sorted(reading.started for reading in readings if reading.started)
     if started:
-        ends = (time.replace("T", " ") for time in (started[0], started[-1]))
+        limits = (time.replace("T", " ") for time in (started[0], started[-1]))
         source = next(reading.facts["started"][1] for reading in readings if reading.started)
-        rows.append(("Started", _span(*ends), source))
+        rows.append(("Started", _span(*limits), source))
     return rows
 
 
@@ -346,8 +346,8 @@ def _fact(readings: Sequence[Reading], name: str) -> tuple[str, str, str] | None
     if not counts:
         return None
     ((value, source), count), *others = counts.most_common()
-    rest = f"; others in {counts.total() - count} recordings" if others else ""
-    return name.capitalize(), f"{value}{' Hz' if name == 'rate' else ''}{rest}", source
+    exceptions = f"; others in {counts.total() - count} recordings" if others else ""
+    return name.capitalize(), f"{value}{' Hz' if name == 'rate' else ''}{exceptions}", source
 
 
 def _span(first: str, last: str) -> str:

@@ -61,9 +61,9 @@ def _draw_waterfall(axes: Axes, track: Track, rows: list[TrackedRecording]) -> N
     label = f"recording at {x_label(track)}"
     name_axes(axes, "frequency_hz", title="Spectra of the series", ylabel=label)
     axes.set_xlim(frequency[0], frequency[-1])
-    places = sorted({*(part * len(rows) // 4 for part in range(4)), len(rows) - 1})
-    labels = [f"{rows[place].x:.3g}" for place in places]
-    axes.set_yticks([place + 1 for place in places], labels)
+    selected = sorted({*(part * len(rows) // 4 for part in range(4)), len(rows) - 1})
+    labels = [f"{rows[index].x:.3g}" for index in selected]
+    axes.set_yticks([index + 1 for index in selected], labels)
     axes.spines[:].set_visible(False)
     style: Style = {"location": "bottom", "shrink": 0.8}
     axes.figure.colorbar(image, ax=axes, label=quantity("level_db").axis, **style)
@@ -158,9 +158,9 @@ def _draw_spectrum(axes: Axes, track: Track, recording: TrackedRecording) -> Non
     axes.set_xlim(f[0], f[-1])
 
 
-def _mark_lines(axes: Axes, clean: CleanSpectrum, ends: tuple[float, float]) -> None:
+def _mark_lines(axes: Axes, clean: CleanSpectrum, limits: tuple[float, float]) -> None:
     """Mark the removed lines between two frequencies along the top edge."""
-    low, high = ends
+    low, high = limits
     lines = [line.frequency_hz for line in clean.removed if low <= line.frequency_hz <= high]
     axes.plot(
         lines,
@@ -179,11 +179,11 @@ def _draw_fit(axes: Axes, track: Track, recording: TrackedRecording, frequency: 
     resonance = recording.resonance
     crf = quantity("crf_hz")
     curve = resonance.curve(frequency)
-    within = (frequency >= low) & (frequency <= high) & (curve > 0.0)
-    if np.isfinite(curve[within]).any():
+    inside = (frequency >= low) & (frequency <= high) & (curve > 0.0)
+    if np.isfinite(curve[inside]).any():
         axes.semilogy(
-            frequency[within],
-            curve[within],
+            frequency[inside],
+            curve[inside],
             color=BLUE,
             label="fit" if resonance.found else "fit, no resonance",
         )

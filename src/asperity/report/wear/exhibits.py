@@ -18,7 +18,7 @@ from asperity.simulation import WearHistory
 from asperity.surface import Surface, bearing_curve
 
 COLOURS = (BLUE, VERMILION, GREEN)
-STROKES = ("-", "--", ":")
+STYLES = ("-", "--", ":")
 PANELS: Sequence[tuple[str, tuple[str, ...]]] = (  # quantity of the axis, and of its curves
     ("sq_m", ("sq_m", "sq_1_m", "sq_2_m")),
     ("sk_m", ("sk_m", "spk_m", "svk_m")),
@@ -64,10 +64,10 @@ def curves(history: WearHistory) -> Exhibit:
         figure = Figure(figsize=(medium.double, 2.3 * rows), layout="constrained")
         for number, (side, keys) in enumerate(panels, 1):
             axes = figure.add_subplot(rows, 2, number)
-            for key, colour, stroke in zip(keys, COLOURS, STROKES, strict=False):
+            for key, colour, line_style in zip(keys, COLOURS, STYLES, strict=False):
                 if key != keys[0] and not np.any(table[key].to_numpy(float)):
                     continue  # this body is smooth
-                _draw_over_hours(axes, history, key, colour, stroke)
+                _draw_over_hours(axes, history, key, colour, line_style)
             if len(axes.get_lines()) > 1:
                 low, high = axes.get_ylim()
                 axes.set_ylim(low, high + 0.25 * (high - low))  # room for the legend
@@ -89,11 +89,11 @@ def curves(history: WearHistory) -> Exhibit:
     )
 
 
-def _draw_over_hours(axes: Axes, history: WearHistory, key: str, colour: str, stroke: str) -> None:
+def _draw_over_hours(axes: Axes, history: WearHistory, key: str, colour: str, style: str) -> None:
     hours = history.table["hours"].to_numpy(float)
     factor = quantity(key).factor
     label = quantity(key).short if quantity(key).symbol else quantity(key).title
-    axes.plot(hours, factor * history.table[key].to_numpy(float), stroke, color=colour, label=label)
+    axes.plot(hours, factor * history.table[key].to_numpy(float), style, color=colour, label=label)
     if key == "clr":
         low, high = (
             factor * history.table[end].to_numpy(float) for end in ("clr_mean_low", "clr_mean_high")
@@ -113,7 +113,7 @@ def _draw_over_hours(axes: Axes, history: WearHistory, key: str, colour: str, st
 
 
 def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
-    """Draw CRF over hours and over Sq, with the printed values if `papers`."""
+    """Draw CRF over hours and over Sq, with the published values if `papers`."""
 
     def draw(medium: Medium) -> Figure:
         table = history.table
@@ -179,9 +179,9 @@ def _draw_crf(axes: Axes, x: Field, key: str, history: WearHistory) -> None:
 
 def _draw_paper_values(left: Axes, right: Axes) -> None:
     """Draw the paper's CRF of the first and last ring, and Sq of all rings."""
-    ends = SAMPLES_SQ_UM[0], SAMPLES_SQ_UM[-1]
+    sq_limits = SAMPLES_SQ_UM[0], SAMPLES_SQ_UM[-1]
     right.plot(
-        ends,
+        sq_limits,
         CRF_ENDS_HZ,
         "D",
         color=VERMILION,

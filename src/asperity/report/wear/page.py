@@ -132,11 +132,11 @@ def _volumes(history: WearHistory) -> list[str]:
     entry = quantity("worn_volume_m3")
     sentences = []
     for body, volume in enumerate(history.worn_volume):
-        ends = history.volume_interval(body)
+        limits = history.volume_interval(body)
         interval = (
             ""
-            if ends is None
-            else f" ({entry.number(ends[0])} to {entry.text(ends[1])} for the interval of k)"
+            if limits is None
+            else f" ({entry.number(limits[0])} to {entry.text(limits[1])} for the interval of k)"
         )
         sentences.append(f"Wear volume of body {body + 1}: {entry.text(volume)}{interval}.")
     return sentences
