@@ -93,10 +93,10 @@ def shifted_solver(dtype, spread=1.0):
 
 def test_the_shifted_solver_converges_and_returns_the_weighted_sum():
     solver, weights, equations = shifted_solver(np.complex128)
-    while solver.left > 1e-9:
+    while solver.residual > 1e-9:
         assert solver.step()
-    np.testing.assert_allclose(solver.answer(), np.linalg.solve(*equations(1.7)), atol=1e-7)
-    assert solver.sum == pytest.approx(weights @ solver.answer(), rel=1e-9)
+    np.testing.assert_allclose(solver.solution(), np.linalg.solve(*equations(1.7)), atol=1e-7)
+    assert solver.sum == pytest.approx(weights @ solver.solution(), rel=1e-9)
     assert solver.count < 40
 
 
@@ -105,26 +105,28 @@ def test_the_shifted_solver_keeps_its_space_at_a_new_frequency():
     solver, _, equations = shifted_solver(np.complex128)
     for _ in range(8):
         solver.step()
-    before = solver.left
+    before = solver.residual
     solver.move(1.8)
     assert solver.count == 8
-    assert before < solver.left < 0.2
+    assert before < solver.residual < 0.2
     matrix, rhs = equations(1.8)
-    residual = rhs - matrix @ solver.answer()
-    assert solver.left == pytest.approx(np.linalg.norm(residual) / np.linalg.norm(rhs), rel=1e-9)
-    while solver.left > 1e-9:
+    residual = rhs - matrix @ solver.solution()
+    assert solver.residual == pytest.approx(
+        np.linalg.norm(residual) / np.linalg.norm(rhs), rel=1e-9
+    )
+    while solver.residual > 1e-9:
         assert solver.step()
-    np.testing.assert_allclose(solver.answer(), np.linalg.solve(matrix, rhs), atol=1e-7)
+    np.testing.assert_allclose(solver.solution(), np.linalg.solve(matrix, rhs), atol=1e-7)
 
 
 @pytest.mark.parametrize("spread", [1.0, 300.0])
 def test_the_shifted_solver_reaches_single_precision(spread):
     """Building on the last vector alone, the second case would stagnate at 5e-4."""
     solver, _, equations = shifted_solver(np.complex64, spread)
-    while solver.left > 3e-6:
+    while solver.residual > 3e-6:
         assert not solver.full
         assert solver.step()
-    np.testing.assert_allclose(solver.answer(), np.linalg.solve(*equations(1.7)), atol=1e-4)
+    np.testing.assert_allclose(solver.solution(), np.linalg.solve(*equations(1.7)), atol=1e-4)
 
 
 def test_the_shifted_solver_continues_through_stagnation():
@@ -135,6 +137,6 @@ def test_the_shifted_solver_continues_through_stagnation():
     )
     for _ in range(7):
         assert solver.step()
-    assert solver.left == pytest.approx(1.0)
+    assert solver.residual == pytest.approx(1.0)
     assert solver.step()
-    np.testing.assert_allclose(solver.answer(), np.roll(rhs, -1), atol=1e-12)
+    np.testing.assert_allclose(solver.solution(), np.roll(rhs, -1), atol=1e-12)

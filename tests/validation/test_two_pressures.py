@@ -15,7 +15,7 @@ from asperity.contact.grid import Grid
 from asperity.ehl import Options, solve_contact
 from asperity.ehl.controls import GUESS, MIXED_SOLVER, PLASTIC_DRY
 from asperity.ehl.grid_design import auto_grid
-from asperity.ehl.linear_solvers.mixed import MixedLinear, extend_streaks, is_firm
+from asperity.ehl.linear_solvers.mixed import MixedLinear, extend_lubrication, is_firm
 from asperity.ehl.load_shares import carried_share
 from asperity.ehl.models import plastic_dry as dry
 from asperity.ehl.models.mixed import Pressures, evaluate
@@ -343,7 +343,7 @@ def test_oil_fills_a_streak_of_closed_cells_in_one_step():
     )
     oil = np.where(np.random.default_rng(5).random(total.shape) < 0.3, 0.3 * total, 0.0)
     before = evaluate(problem, Pressures(oil, total, approach), second_order=False)
-    after = extend_streaks(before)
+    after = extend_lubrication(before)
     closed = (before.solid == CAPPED) & (before.gap <= 1.01 * problem.contact_gap)
     filling, expected = np.zeros(problem.cells[1], dtype=bool), np.zeros(problem.cells, dtype=bool)
     for i in range(problem.cells[0]):

@@ -101,8 +101,8 @@ class Quantity:
     @property
     def attributes(self) -> dict[str, str]:
         """Attributes of the netCDF variable, by the CF conventions."""
-        known = {"long_name": self.title, "units": self.unit, "standard_name": self.standard_name}
-        return {name: text for name, text in known.items() if text}
+        values = {"long_name": self.title, "units": self.unit, "standard_name": self.standard_name}
+        return {name: text for name, text in values.items() if text}
 
     def value_from(self, owner: object) -> Any:
         """Return the value at the path `source` in its owner; None if a part of it is None."""
@@ -221,9 +221,9 @@ def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> 
     decimals = max(0, 1 - math.floor(math.log10(spread)))
     if form.endswith("f"):
         decimals = min(decimals, int(form.strip(".f")))
-    shown = f" ± {spread:.{decimals}f}" if float(f"{spread:.{decimals}f}") > 0.0 else ""
-    number = f"{scaled:.{decimals}f}{shown}"
-    return (f"({number}){power}" if power and shown else f"{number}{power}").replace("-", "−")
+    uncertainty = f" ± {spread:.{decimals}f}" if float(f"{spread:.{decimals}f}") > 0.0 else ""
+    number = f"{scaled:.{decimals}f}{uncertainty}"
+    return (f"({number}){power}" if power and uncertainty else f"{number}{power}").replace("-", "−")
 
 
 def in_print(text: str) -> str:
@@ -267,21 +267,21 @@ def quantity(key: str) -> Quantity:
     >>> quantity("clr").unit
     '1'
     """
-    known = catalogue()
-    if key in known:
-        return known[key]
+    quantities = catalogue()
+    if key in quantities:
+        return quantities[key]
     for preset in ("sound", "paper"):
         plain = key.replace(f"_{preset}", "")
-        if plain != key and plain in known:
-            base = known[plain]
+        if plain != key and plain in quantities:
+            base = quantities[plain]
             deviation = base.deviation.replace("_std", f"_std_{preset}")
             return replace(
                 base, key=key, symbol=f"{base.short}, {preset}", deviation=deviation, source=""
             )
     plain = re.sub(r"_[12](?=_m3?$|$)", "", key)
     body = re.search(r"_([12])(?=_m3?$|$)", key)
-    if body is not None and plain in known:
-        base = known[plain]
+    if body is not None and plain in quantities:
+        base = quantities[plain]
         return replace(
             base, key=key, symbol=f"{base.short} of body {body[1]}", deviation="", source=""
         )

@@ -23,9 +23,9 @@ from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.limits import GIGABYTE, MEMORY, reading_limit, stored_size
 from asperity.core.third_party import first_line
 
-BASE_SECONDS = 12.0  # processor time of a read
-SECONDS_PER_MEGABYTE = 1.0  # additional processor time, by the file's size
-WALL_CLOCK_FACTOR = 4.0  # wall-clock over processor time, for a busy machine
+BASE_SECONDS = 12.0  # CPU time of a read
+SECONDS_PER_MEGABYTE = 1.0  # additional CPU time, by the file's size
+WALL_CLOCK_FACTOR = 4.0  # wall-clock over CPU time, for a busy machine
 EXIT_TIMEOUT_S = 4.0  # wall-clock limit for a crashed subprocess to end
 LOADING_S = 300.0  # wall-clock limit for importing a library
 _START = "import sys; sys.path[:] = sys.argv[1:]; from asperity.core.sandbox import serve; serve()"
@@ -116,7 +116,7 @@ class _Server:
             try:
                 pickle.dump(message, process.stdin, 5)
                 process.stdin.flush()
-                answer: tuple[str, object] = pickle.load(process.stdout)
+                response: tuple[str, object] = pickle.load(process.stdout)
             except (EOFError, OSError, pickle.UnpicklingError):
                 with suppress(subprocess.TimeoutExpired):
                     process.wait(EXIT_TIMEOUT_S)
@@ -132,7 +132,7 @@ class _Server:
                 timer.cancel()
             if late.is_set():
                 self.end()
-            return answer
+            return response
 
     def end(self) -> None:
         """Stop the subprocess if it runs."""
@@ -204,7 +204,7 @@ def _answer(
 
 
 def _limit_resources(memory: float, seconds: float) -> None:
-    """Limit additional memory and processor time, where the system supports such limits."""
+    """Limit additional memory and CPU time, where the system supports such limits."""
     with suppress(ImportError, OSError, ValueError, StopIteration):
         import resource
 

@@ -232,18 +232,18 @@ def read_manifest(folder: Path, *, of: str, layout: int) -> dict[str, Any]:
 
 def require_same_version(manifest: Mapping[str, Any], folder: Path) -> None:
     """Raise BadInput if another version of asperity began the folder, so that results never mix."""
-    found = manifest["versions"]["asperity"]
+    version = manifest["versions"]["asperity"]
     current = asperity.__version__
-    if found != current:
+    if version != current:
         raise BadInput(
-            f"{folder} was computed by asperity {found}, this is {current}; choose another folder"
+            f"{folder} was computed by asperity {version}, this is {current}; choose another folder"
         )
 
 
 def version_notes(versions: Table) -> tuple[str, ...]:
     """Return a note if the results are from another version of asperity."""
-    found = versions.get("asperity")
+    version = versions.get("asperity")
     current = asperity.__version__
-    if found == current:
+    if version == current:
         return ()
-    return (f"Computed by asperity {found}, read by {current}: recomputed values may differ.",)
+    return (f"Computed by asperity {version}, read by {current}: recomputed values may differ.",)

@@ -36,8 +36,8 @@ def first_line(reason: object) -> str:
     text = next(
         (line.strip() for line in str(reason).splitlines() if line.strip()), type(reason).__name__
     )
-    shown = "".join(c for c in text if c.isprintable()).rstrip(".;")
-    return shown if len(shown) <= MAX_LENGTH else shown[: MAX_LENGTH - 3] + "..."
+    clean = "".join(c for c in text if c.isprintable()).rstrip(".;")
+    return clean if len(clean) <= MAX_LENGTH else clean[: MAX_LENGTH - 3] + "..."
 
 
 def printable(text: str) -> str:

@@ -114,11 +114,11 @@ class NoiseExcitation(NoiseFilter, CutoffLaw, ExcitationLaw):
         scope = "" if self.height_of == "process" else f" of the {self.height_of}"
         kind = "" if self.filter == "continuous" else f"{self.filter} "
         order = "" if self.filter_order == 2 else f" of order {self.filter_order}"
-        kept = ", coefficient kept" if self.coefficient == "kept" else ""
+        suffix = ", coefficient kept" if self.coefficient == "kept" else ""
         return (
             f"white noise of {height} height Sq{scope} behind a {kind}low pass{order} at "
             f"{self.cutoff_reference_hz:.4g} Hz × "
-            f"(CAR/{self.car_reference:.3g})^{self.cutoff_exponent:.3g}{kept}"
+            f"(CAR/{self.car_reference:.3g})^{self.cutoff_exponent:.3g}{suffix}"
         )
 
 

@@ -251,8 +251,8 @@ def _by_name(choices: Mapping[str, Any]) -> dict[str, Any]:
     for slot in LAWS:
         law = choices.get(slot)
         if law is not None and not isinstance(law, str):
-            own = {name: value for name, value in asdict(law).items() if value is not None}
-            stated = {**own, **stated, slot: law.name}
+            values = {name: value for name, value in asdict(law).items() if value is not None}
+            stated = {**values, **stated, slot: law.name}
     return stated
 
 
@@ -261,8 +261,8 @@ def _law(slot: str, stated: Mapping[str, Any]) -> Any:
     default = getattr(VibrationModel, slot).name
     label = _NAMES.get(slot, slot.replace("_", " "))
     laws = LAWS[slot]
-    chosen = stated.get(slot, default)
-    require_choice(label, chosen, laws)
+    name_of_law = stated.get(slot, default)
+    require_choice(label, name_of_law, laws)
     instances = {}
     for name, law in laws.items():
         missing = [
@@ -274,9 +274,9 @@ def _law(slot: str, stated: Mapping[str, Any]) -> Any:
             instances[name] = law(
                 **{entry.name: stated[entry.name] for entry in fields(law) if entry.name in stated}
             )
-        elif name == chosen:
+        elif name == name_of_law:
             unit = parameters(law)[missing[0]].unit
             raise BadInput(
                 f"{label} {name} needs {missing[0]}, in {unit}; add it, or use the law {default}"
             )
-    return instances[chosen]
+    return instances[name_of_law]

@@ -75,7 +75,7 @@ class Vibration:
 class SampledLine:
     """Effect of sampling on an oscillator's line over noise that is white in acceleration.
 
-    Includes linear interpolation between samples with its aliases, and the digital filter of the
+    It includes linear interpolation between samples with its aliases, and the digital filter of the
     noise; see `ContactOscillator.sampled_gain`.
     """
 

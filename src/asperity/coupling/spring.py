@@ -56,8 +56,8 @@ def loaded_oscillator(
 
 def natural_frequency_hz(law: StiffnessLaw, contact: LoadedContact, model: VibrationModel) -> float:
     """Return the natural frequency [Hz] on the spring of `law`; the contact need not be solved."""
-    known = model.with_choices(damping_law="ratio") if model.damping_law.needs_solution else model
-    return loaded_oscillator(law, contact, known).natural_frequency_hz
+    simple = model.with_choices(damping_law="ratio") if model.damping_law.needs_solution else model
+    return loaded_oscillator(law, contact, simple).natural_frequency_hz
 
 
 def damped_oscillator(

@@ -64,9 +64,9 @@ class FilmSolution:
         ruptures = np.flatnonzero(full[:-1] & ~full[1:]) + 1
         # the last cell that is not full contains the front
         forms = np.flatnonzero(~full[:-1] & full[1:])
-        before = np.maximum(forms - 1, 0)
+        upstream = np.maximum(forms - 1, 0)
         streaming = np.minimum(
-            self.content[before] * self.gap[before] / self.gap[forms], self.content[forms]
+            self.content[upstream] * self.gap[upstream] / self.gap[forms], self.content[forms]
         )
         filled = (self.content[forms] - streaming) / (1.0 - streaming)
         return ruptures * dx, (forms + 1.5 - filled) * dx
@@ -137,11 +137,11 @@ def solve_film(
     _check(channel, line=line, field_spacing=not isinstance(spacing, (int, float)))
     signed, flows, residual, steps = _solve_newton(channel, tolerance)
     pressure, content = channel.split(signed)
-    shown = np.s_[:, 0] if line else np.s_[:]
+    index = np.s_[:, 0] if line else np.s_[:]
     film = FilmSolution(
-        pressure=pressure[shown],
-        content=content[shown],
-        flux=flows.along[shown],
+        pressure=pressure[index],
+        content=content[index],
+        flux=flows.along[index],
         gap=gaps,
         spacing=channel.spacing,
         steps=steps,
@@ -159,7 +159,7 @@ def solve_film(
 def _solve_newton(channel: "RoughChannel", tolerance: float) -> tuple[Field, "Flows", float, int]:
     """Iterate from a film without pressure; return signed unknown, flows, residual and steps."""
     signed = np.zeros(channel.gap.shape)
-    best, stagnation, share, steps = np.inf, 0, 1.0, 0
+    best, stagnation, damping, steps = np.inf, 0, 1.0, 0
     while True:
         flows = channel.flows(signed)
         residual = float(np.max(np.abs(flows.outflow)) / flows.through)
@@ -167,10 +167,10 @@ def _solve_newton(channel: "RoughChannel", tolerance: float) -> tuple[Field, "Fl
             return signed, flows, residual, steps
         stagnation += 1
         if residual < 0.9 * best:
-            best, stagnation, share = residual, 0, min(1.0, 1.5 * share)
+            best, stagnation, damping = residual, 0, min(1.0, 1.5 * damping)
         elif stagnation == RIGID_FILM.stagnation_iterations:  # damp alternating cells
-            best, stagnation, share = residual, 0, max(0.5 * share, RIGID_FILM.min_damping)
-        signed = signed + share * channel.limit_step(signed, -_newton_step(flows))
+            best, stagnation, damping = residual, 0, max(0.5 * damping, RIGID_FILM.min_damping)
+        signed = signed + damping * channel.limit_step(signed, -_newton_step(flows))
         steps += 1
 
 
@@ -196,7 +196,7 @@ class Cells(NamedTuple):
 class Flows(NamedTuple):
     """Flows [m^2/s] through the faces along x, and the imbalance of each cell.
 
-    With its derivatives in the signed unknown as matrix entries.
+    Its derivatives in the signed unknown are matrix entries.
     """
 
     along: Field
@@ -257,21 +257,21 @@ class RoughChannel:
         """Return all flows and their derivatives."""
         cells = self._cells(signed)
         flow, by_left, by_right = self._inner_faces(cells)
-        entering, d_entering, leaving, d_leaving = self._end_faces(cells)
-        along = np.concatenate([entering[None], flow, leaving[None]])
-        own = np.concatenate([by_left, d_leaving[None]])
-        own[0] -= d_entering
-        own[1:] -= by_right
+        inlet_flow, d_inlet_flow, outlet_flow, d_outlet_flow = self._end_faces(cells)
+        along = np.concatenate([inlet_flow[None], flow, outlet_flow[None]])
+        diagonal = np.concatenate([by_left, d_outlet_flow[None]])
+        diagonal[0] -= d_inlet_flow
+        diagonal[1:] -= by_right
         index: Index = np.arange(self.gap.size, dtype=np.intp).reshape(self.gap.shape)
         entries = [
-            (index, index, own),
+            (index, index, diagonal),
             (index[:-1], index[1:], by_right),
             (index[1:], index[:-1], -by_left),
         ]
         outflow = np.diff(along, axis=0)
         outflow += self._flow_across(cells, index, entries)
         rows, columns = (
-            np.concatenate([entry[place].ravel() for entry in entries]) for place in (0, 1)
+            np.concatenate([entry[item].ravel() for entry in entries]) for item in (0, 1)
         )
         slopes = np.concatenate([entry[2].ravel() for entry in entries])
         through = float(np.max(np.abs(along.mean(axis=1))))
@@ -296,22 +296,22 @@ class RoughChannel:
         """
         u, (half_left, d_half_left) = self.speed, self._half_cells(left)
         half_right, d_half_right = self._half_cells(right)
-        both = half_left + half_right
-        share = half_right / both  # weight of the left cell's oil in the face's
-        face_oil = share * left.oil + (1.0 - share) * right.oil
-        joint = share * half_left
-        step = (right.oil - left.oil) / both
+        total = half_left + half_right
+        weight = half_right / total  # weight of the left cell's oil in the face's
+        face_oil = weight * left.oil + (1.0 - weight) * right.oil
+        joint = weight * half_left
+        step = (right.oil - left.oil) / total
         drop = left.pressure - right.pressure
         flow = u * left.content * face_oil + joint * drop
         by_left = (
             u * left.d_content * face_oil
-            + u * left.content * (share * left.d_oil + share * step * d_half_left)
-            + share**2 * d_half_left * drop
+            + u * left.content * (weight * left.d_oil + weight * step * d_half_left)
+            + weight**2 * d_half_left * drop
             + joint * left.d_pressure
         )
         by_right = (
-            u * left.content * ((1.0 - share) * right.d_oil - (1.0 - share) * step * d_half_right)
-            + (1.0 - share) ** 2 * d_half_right * drop
+            u * left.content * ((1.0 - weight) * right.d_oil - (1.0 - weight) * step * d_half_right)
+            + (1.0 - weight) ** 2 * d_half_right * drop
             - joint * right.d_pressure
         )
         return flow, by_left, by_right
@@ -338,29 +338,29 @@ class RoughChannel:
         u, (half, d_half) = self.speed, self._half_cells(cells)
         pressure, d_pressure, content, d_content, oil, d_oil, *_ = cells
         inlet, outlet = self.boundary.ends
-        entering = (
+        inlet_flow = (
             u
             * self.boundary.inflow_content
             * self.density(np.array(inlet))
             / self.density.rho0
             * self.gap[0]
         )
-        entering = entering + half[0] * (inlet - pressure[0])
-        d_entering = d_half[0] * (inlet - pressure[0]) - half[0] * d_pressure[0]
-        leaving = u * content[-1] * oil[-1] + half[-1] * (pressure[-1] - outlet)
-        d_leaving = (
+        inlet_flow = inlet_flow + half[0] * (inlet - pressure[0])
+        d_inlet_flow = d_half[0] * (inlet - pressure[0]) - half[0] * d_pressure[0]
+        outlet_flow = u * content[-1] * oil[-1] + half[-1] * (pressure[-1] - outlet)
+        d_outlet_flow = (
             u * (d_content[-1] * oil[-1] + content[-1] * d_oil[-1])
             + d_half[-1] * (pressure[-1] - outlet)
             + half[-1] * d_pressure[-1]
         )
-        return entering, d_entering, leaving, d_leaving
+        return inlet_flow, d_inlet_flow, outlet_flow, d_outlet_flow
 
     def _flow_across(
         self, cells: Cells, index: Index, entries: list[tuple[Index, Index, Field]]
     ) -> Field:
         """Return the outflow of each cell across, and append its derivatives to `entries`.
 
-        Rows are scaled as those along x.
+        Rows are scaled like those along x.
         """
         flow, by_own, by_next = self._northern_faces(cells)
         outflow = np.zeros_like(flow)
@@ -385,11 +385,11 @@ class RoughChannel:
     def _northern_faces(self, cells: Cells) -> tuple[Field, Field, Field]:
         """Return the flow through each northern face and its derivatives in both its cells."""
         half, d_half = self._half_cells_across(cells)
-        beyond, d_beyond = np.roll(half, -1, 1), np.roll(d_half, -1, 1)
-        joint = half * beyond / (half + beyond)
+        north, d_north = np.roll(half, -1, 1), np.roll(d_half, -1, 1)
+        joint = half * north / (half + north)
         drop = cells.pressure - np.roll(cells.pressure, -1, 1)
-        by_own = (beyond / (half + beyond)) ** 2 * d_half * drop + joint * cells.d_pressure
-        by_next = (half / (half + beyond)) ** 2 * d_beyond * drop
+        by_own = (north / (half + north)) ** 2 * d_half * drop + joint * cells.d_pressure
+        by_next = (half / (half + north)) ** 2 * d_north * drop
         by_next -= joint * np.roll(cells.d_pressure, -1, 1)
         return joint * drop, by_own, by_next
 

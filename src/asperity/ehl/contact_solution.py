@@ -75,12 +75,12 @@ class FileContents(NamedTuple):
         path, buffer = Path(path), BytesIO()  # in memory: HDF5 crashes on a full disk
         packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
         with h5netcdf.File(buffer, "w") as file:
-            for name, (dimensions, given, attributes) in {
+            for name, (dimensions, data, attributes) in {
                 **self.coordinates,
                 **self.variables,
             }.items():
                 along = (dimensions,) if isinstance(dimensions, str) else dimensions
-                values = np.asarray(given)
+                values = np.asarray(data)
                 for dimension, length in zip(along, values.shape, strict=True):
                     if dimension not in file.dimensions:
                         file.dimensions[dimension] = length
@@ -171,10 +171,10 @@ class ContactSolution:
         BadInput
             if an attribute of the solution has a name that the format uses.
         """
-        taken = sorted({*HEADINGS, *DESCRIBED} & set(self.attributes))
-        if taken:
+        reserved = sorted({*HEADINGS, *DESCRIBED} & set(self.attributes))
+        if reserved:
             raise BadInput(
-                f"attribute {taken[0]!r} of the solution has a name that the run file reserves; "
+                f"attribute {reserved[0]!r} of the solution has a name that the run file reserves; "
                 "rename it"
             )
         coordinates: dict[str, Any] = {
@@ -201,7 +201,7 @@ class ContactSolution:
         if self.viscosity_factor is not None:
             fields["viscosity_factor"] = self.viscosity_factor
         if self.oil is not None:
-            fields |= {name: getattr(self.oil, part) for name, part in OIL.items()}
+            fields |= {name: getattr(self.oil, attribute) for name, attribute in OIL.items()}
         contact = {
             "long_name": "asperity contact",
             "flag_values": np.array([0, 1], np.int8),

@@ -88,7 +88,7 @@ class Oscillation:
     max_krylov_steps: int = 200  # of one round of GMRES
     round_tolerance: float = 3e-5  # relative residual of a round: the limit of single precision
     max_rounds: int = 12
-    # residual ratio of a round above which the next one is taken in double precision ...
+    # residual ratio of a round above which the next one is in double precision ...
     stagnation: float = 0.3
     stagnation_of_tolerance: float = 1.5  # ... or this multiple of its tolerance, if that is more
     # flow under a cell's own pressure over Couette transport of its film, below which oil is stiff

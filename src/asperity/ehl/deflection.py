@@ -46,7 +46,7 @@ class Deflection:
     def __call__(self, pressure: Field) -> Field:
         """Return the displacement V of a pressure P, both dimensionless, shape (nx, ny).
 
-        Computed in the precision of the pressure.
+        It is computed in the precision of the pressure.
         """
         waves = self._waves(pressure)
         waves *= self.spectrum[pressure.dtype == np.float32]
@@ -62,7 +62,7 @@ class Deflection:
     def _waves(self, field: Field) -> np.ndarray:
         """Return the transform of a padded field.
 
-        With a mirror, across y a cosine transform counted from the mirror.
+        With a mirror, it is a cosine transform along y, counted from the mirror.
         """
         long, wide = self.padded
         if self.mirror:
@@ -124,10 +124,10 @@ def deflection(
     else:
         kernel_of = _periodic_kernel if periodic else _bounded_kernel
         padded, row, spectrum = kernel_of(cells, spacing, compliance)
-    both = np.ascontiguousarray(spectrum), spectrum.astype(np.float32)
-    for array in (*both, row):
+    spectra = np.ascontiguousarray(spectrum), spectrum.astype(np.float32)
+    for array in (*spectra, row):
         array.flags.writeable = False
-    return Deflection(cells, padded, both, row, mirror)
+    return Deflection(cells, padded, spectra, row, mirror)
 
 
 # Transform lengths, compliance along one line, and transformed kernel. Aperiodic axes are padded to
@@ -197,25 +197,25 @@ def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
     edges = (np.arange(nx + 1) - 0.5) * dx
     kernel[:, 0] = -np.diff(edges * np.log(np.abs(edges)) - edges)
     wave = np.arange(1, ny // 2 + 1) / ny  # waves per cell
-    beyond = _integral_beyond(wave, edges[1:], dx, dy)
-    beyond *= np.sin(np.pi * wave) * dy / (2.0 * np.pi**2)
-    kernel[:, 1:] = -np.diff(beyond, axis=0)
+    integral = _integral_beyond(wave, edges[1:], dx, dy)
+    integral *= np.sin(np.pi * wave) * dy / (2.0 * np.pi**2)
+    kernel[:, 1:] = -np.diff(integral, axis=0)
     kernel[0, 1:] *= 2.0  # its other half
     return kernel
 
 
 def _integral_beyond(wave: Field, edges: Field, dx: float, dy: float) -> Field:
     """Return the integral of all aliases beyond the centre of the first cell and beyond edges."""
-    beyond = np.zeros((edges.size + 1, wave.size))
+    integral = np.zeros((edges.size + 1, wave.size))
     for alias, weight in _aliases(wave):
-        beyond[0] += (np.pi / 2.0) * weight
+        integral[0] += (np.pi / 2.0) * weight
         wavenumber = alias * (2.0 * np.pi / dy)
-        reached = int(K0_CUTOFF / (wavenumber.min(initial=np.inf) * dx) + 0.5)
-        if reached > 0:
-            argument = np.outer(edges[:reached], wavenumber)
+        count = int(K0_CUTOFF / (wavenumber.min(initial=np.inf) * dx) + 0.5)
+        if count > 0:
+            argument = np.outer(edges[:count], wavenumber)
             row, column = np.nonzero(argument < K0_CUTOFF)
-            beyond[row + 1, column] += weight[column] * _k0_integral(argument[row, column])
-    return beyond
+            integral[row + 1, column] += weight[column] * _k0_integral(argument[row, column])
+    return integral
 
 
 def _aliases(wave: Field) -> Iterator[tuple[Field, Field]]:
@@ -227,12 +227,12 @@ def _aliases(wave: Field) -> Iterator[tuple[Field, Field]]:
     √8)^-ALIASES. Source: H. Cohen, F. Rodriguez Villegas, D. Zagier, Exp. Math. 9 (2000) 3.
     """
     yield wave, 1.0 / wave**2
-    whole = (3.0 + np.sqrt(8.0)) ** ALIASES
-    whole = 0.5 * (whole + 1.0 / whole)
-    term, share = -1.0, -whole
+    total = (3.0 + np.sqrt(8.0)) ** ALIASES
+    total = 0.5 * (total + 1.0 / total)
+    term, factor = -1.0, -total
     for k in range(ALIASES):
-        share = term - share
-        for alias, weight in ((k + 1.0 + wave, -share / whole), (k + 1.0 - wave, share / whole)):
+        factor = term - factor
+        for alias, weight in ((k + 1.0 + wave, -factor / total), (k + 1.0 - wave, factor / total)):
             yield alias, weight / alias**2
         term *= (k + ALIASES) * (k - ALIASES) / ((k + 0.5) * (k + 1.0))
 
@@ -241,10 +241,10 @@ def _k0_integral(argument: Field) -> Field:
     """Return ∫ K₀ from each argument to infinity; arguments up to K0_CUTOFF, of any shape."""
     centre, reach, series = _k0_polynomial()
     inverse = 1.0 / argument.clip(POLYNOMIAL_FROM)
-    place = (inverse - centre) / reach
+    normalised = (inverse - centre) / reach
     integral = np.full(argument.shape, series[-1])
     for coefficient in series[-2::-1]:
-        integral *= place
+        integral *= normalised
         integral += coefficient
     integral *= np.sqrt(inverse) * np.exp(-argument)
     small = argument < POLYNOMIAL_FROM
@@ -263,8 +263,8 @@ def _k0_polynomial() -> tuple[float, float, Field]:
     reach = 0.5 * (1.0 / POLYNOMIAL_FROM - 1.0 / K0_CUTOFF)
     cosh = np.cosh(0.125 * np.arange(40))
 
-    def scaled(place: Any) -> Any:
-        z = 1.0 / (centre + reach * place)
+    def scaled(normalised: Any) -> Any:
+        z = 1.0 / (centre + reach * normalised)
         ordinates = np.exp(-np.outer(z, cosh - 1.0)) / cosh
         return 0.125 * np.sqrt(z) * (ordinates.sum(axis=1) - 0.5 * ordinates[:, 0])
 

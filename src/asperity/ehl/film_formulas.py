@@ -178,7 +178,7 @@ def _point_films(
 def film_fits(conditions: ContactConditions, lubricant: Lubricant) -> tuple[FilmFit, ...]:
     """Return the fits valid in the contact's regime, thickest film first.
 
-    Empty for a contact narrower across rolling than along it, which none of these covers.
+    It is empty for a contact narrower across rolling than along it, which none of these covers.
     """
     if _ratio(conditions) > 1.0:
         return ()

@@ -102,11 +102,11 @@ def auto_grid(
             f"accuracy must lie between 0.0001 and 0.2, got {accuracy:g}; 0.01 is the default"
         )
     texture = texture if texture is not None and texture.sq > 0.0 else None
-    x, given = x or _range_x(conditions, lubricant, texture, accuracy), y
+    x, prescribed_y = x or _range_x(conditions, lubricant, texture, accuracy), y
     y = y or _range_y(conditions, lubricant, texture, accuracy)
     if cells is None:
         cells = _cells(conditions, lubricant, texture, accuracy, (x[1] - x[0], y[1] - y[0]))
-    if given is None and conditions.geometry == "roller":
+    if prescribed_y is None and conditions.geometry == "roller":
         y = _extend_past_ends(conditions, y, cells[1])
     return Grid(cells, (x[0], y[0]), (x[1], y[1]), periodic=(False, conditions.endless))
 
@@ -134,8 +134,8 @@ def flooded_inlet(
 
 def missing_inlet(conditions: ContactConditions, lubricant: Lubricant, begins: float) -> float:
     """Return the share of the inlet pressure built up farther than `begins` [m] from the centre."""
-    x, built = _pressure_build_up(_film(conditions, lubricant))
-    return float(1.0 - np.interp(begins / conditions.hertz.half_widths[0], x, built))
+    x, share = _pressure_build_up(_film(conditions, lubricant))
+    return float(1.0 - np.interp(begins / conditions.hertz.half_widths[0], x, share))
 
 
 def grid_shortfalls(
@@ -177,20 +177,20 @@ def _film(conditions: ContactConditions, lubricant: Lubricant) -> float:
 
 def _flooded_length(film: float, missing: float) -> float:
     """Return the inlet length that misses a share of the pressure."""
-    x, built = _pressure_build_up(film)
-    return float(min(np.interp(1.0 - missing, built, x), MAX_INLET))
+    x, share = _pressure_build_up(film)
+    return float(min(np.interp(1.0 - missing, share, x), MAX_INLET))
 
 
 def _pressure_build_up(film: float) -> tuple[Field, Field]:
-    """Return places before the centre, and the share of inlet pressure built up inside each."""
-    beyond = np.concatenate(
+    """Return positions before the centre and the share of inlet pressure built up inside each."""
+    distance = np.concatenate(
         [np.linspace(0.0, 1.0, 1001) ** 2, np.geomspace(1.0, 50.0 * MAX_INLET, 2000)[1:]]
     )
-    x = 1.0 + beyond
+    x = 1.0 + distance
     gap = line_gap(x, 1.0, 1.0)
     slope = gap / (film + gap) ** 3
-    built = np.concatenate([[0.0], np.cumsum(np.diff(x) * (slope[1:] + slope[:-1]))])
-    return x, built / built[-1]
+    share = np.concatenate([[0.0], np.cumsum(np.diff(x) * (slope[1:] + slope[:-1]))])
+    return x, share / share[-1]
 
 
 def _range_x(
@@ -342,7 +342,7 @@ def _spacing(
 def _line_distance(conditions: ContactConditions, refinement: float) -> float:
     """Return the distance of lines of cells along a roller [m].
 
-    A share of the half-width, the scale of pressure changes at its ends.
+    It is a share of the half-width, the scale of pressure changes at the ends.
     """
     (low, high) = conditions.sliced_load.ends
     a = conditions.hertz.half_widths[0]
@@ -363,23 +363,23 @@ def _cells(
     # under a light load the film is wider than the Hertz zone
     if conditions.geometry == "roller" and texture is None:
         target = min(target[0], MAX_ROLLER_CELLS * max(refinement, 0.5)), target[1]
-    most = MAX_CELLS * max(1.0, ACCURACY / accuracy)
-    if texture is not None and target[0] * target[1] > most:
+    max_cells = MAX_CELLS * max(1.0, ACCURACY / accuracy)
+    if texture is not None and target[0] * target[1] > max_cells:
         fewest = _counts(_spacing(conditions, lubricant, texture, 0.0), extent)
-        target = _reduced(target, fewest, most)
+        target = _reduced(target, fewest, max_cells)
     if texture is not None:  # a coarser grid must be possible for the error estimate
         target = max(target[0], 2.0 * MIN_COARSE_CELLS), max(target[1], 2.0 * MIN_CELLS_SHORT_AXIS)
     return _even(target[0]), _even(target[1])
 
 
 def _reduced(
-    target: tuple[float, float], fewest: tuple[float, float], most: float
+    target: tuple[float, float], fewest: tuple[float, float], max_cells: float
 ) -> tuple[float, float]:
-    """Reduce cells along x and y to a product of about `most`, if possible not below `fewest`."""
+    """Reduce cells along x and y to about `max_cells` in all, if possible not below `fewest`."""
     for _ in range(2):  # if one axis is at its minimum, the other takes the rest
-        fewer = math.sqrt(target[0] * target[1] / most)
+        fewer = math.sqrt(target[0] * target[1] / max_cells)
         target = max(target[0] / fewer, fewest[0]), max(target[1] / fewer, fewest[1])
-    too_many = max(1.0, math.sqrt(target[0] * target[1] / (1.15 * most)))
+    too_many = max(1.0, math.sqrt(target[0] * target[1] / (1.15 * max_cells)))
     return target[0] / too_many, target[1] / too_many
 
 

@@ -79,9 +79,9 @@ def _cubic_weights(coarse: int, fine: int, *, periodic: bool) -> scipy.sparse.cs
 
 def _left_centre(coarse: int, fine: int) -> tuple[Index, Field]:
     """Return the coarse centre left of each fine one, and the offset from it in coarse cells."""
-    place = (np.arange(fine) + 0.5) * (coarse / fine) - 0.5
-    left = np.floor(place).astype(int)
-    return left, np.asarray(place - left)
+    position = (np.arange(fine) + 0.5) * (coarse / fine) - 0.5
+    left = np.floor(position).astype(int)
+    return left, np.asarray(position - left)
 
 
 def _weight_matrix(

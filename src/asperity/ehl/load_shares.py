@@ -23,7 +23,7 @@ def within_ellipse(
 def hertz_zone(conditions: ContactConditions, grid: Grid, share: float = 1.0) -> Mask:
     """Return the cells within a share of the Hertz half-widths, shape (nx, ny).
 
-    At least the central ones.
+    The central ones always belong to it.
     """
     (a, b) = conditions.hertz.half_widths
     (dx, dy) = grid.spacing

@@ -91,7 +91,7 @@ def first_guess(
 def smooth_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
     """Return the minimum film [m] of a smooth piezoviscous-elastic contact by Dowson or Hamrock.
 
-    An initial guess in every regime; report `least_film` instead.
+    It is an initial guess in every regime; report `least_film` instead.
     """
     return least_films(conditions, lubricant)["piezoviscous-elastic"].film
 
@@ -109,10 +109,10 @@ def coarser_in_all_axes(problem: Problem, finest: Problem) -> bool:
 
     Axes of one cell do not count. Only such grids estimate the discretisation error.
     """
-    several = [
-        (few, many) for few, many in zip(problem.cells, finest.cells, strict=True) if many > 1
+    pairs = [
+        (coarse, fine) for coarse, fine in zip(problem.cells, finest.cells, strict=True) if fine > 1
     ]
-    return problem.cells == finest.cells or all(few < many for few, many in several)
+    return problem.cells == finest.cells or all(coarse < fine for coarse, fine in pairs)
 
 
 def usable_levels(
@@ -126,12 +126,12 @@ def usable_levels(
     levels = grid_levels(finest)
     if not finest.uniform or lubricant is None:
         return levels
-    most = (
+    limit = (
         inlet_length(conditions, lubricant)
         / conditions.hertz.half_widths[0]
         / CONTINUATION.min_coarse_inlet_cells
     )
-    return [level for number, level in enumerate(levels) if number < 2 or level.spacing[0] <= most]
+    return [level for number, level in enumerate(levels) if number < 2 or level.spacing[0] <= limit]
 
 
 def _halved(cells: tuple[int, int]) -> tuple[int, int]:

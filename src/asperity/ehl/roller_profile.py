@@ -40,7 +40,7 @@ class RollerProfile:
     def zone(self, x: Field, y: Field, share: float, spacing: tuple[float, float]) -> Mask:
         """Return the cells within `share` of the smooth dry contact by slices, shape (nx, ny).
 
-        At least the central ones.
+        The central ones always belong to it.
         """
         (dx, dy) = spacing
         (low, high) = self.conditions.sliced_load.ends
@@ -62,7 +62,7 @@ class RollerProfile:
     def central_pressure(x: Field, pressure: Field, dx: float) -> Field:
         """Return the largest pressure of every line up to its centre, shape (ny,).
 
-        Excludes the outlet spike.
+        The outlet spike is excluded.
         """
         return np.asarray(pressure[x <= 0.5 * dx].max(axis=0))
 

@@ -100,8 +100,8 @@ def solve_unified(
     """Solve the single-pressure model, or a dry contact; called by `solve_contact`."""
     began = time.perf_counter()
     scales = Scales.from_conditions(conditions, lubricant)
-    whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = reduced_problem(whole)
+    full_problem = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
+    finest = reduced_problem(full_problem)
     elastic = lubricant is None and conditions.hardness is None
     search = (ElasticSearch if elastic else Search)(options, scales.gap, progress)
     if start is None:
@@ -144,8 +144,8 @@ def solve_mixed(
     began = time.perf_counter()
     assert lubricant is not None  # a dry contact has one pressure
     scales = Scales.from_conditions(conditions, lubricant)
-    whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = reduced_problem(whole)
+    full_problem = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
+    finest = reduced_problem(full_problem)
     search = MixedSearch(options, scales.gap, progress)
     if conditions.geometry == "roller":
         search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
@@ -299,11 +299,11 @@ def _check_cap(conditions: ContactConditions, grid: Grid) -> None:
     if conditions.hardness is None:
         return
     x, y = grid.extent
-    most = conditions.hardness * x * (conditions.line_length if conditions.endless else y)
-    if most <= conditions.load:
+    max_load = conditions.hardness * x * (conditions.line_length if conditions.endless else y)
+    if max_load <= conditions.load:
         raise BadInput(
             f"at a hardness of {conditions.hardness / 1e9:.3g} GPa this grid carries at most "
-            f"{most:.3g} N, "
+            f"{max_load:.3g} N, "
             f"less than the load of {conditions.load:.4g} N; lower the load, check the hardness, "
             "or "
             "widen the grid"

@@ -1,6 +1,6 @@
 """Uncertainty of a contact's numbers: 90 % intervals by source, and their combination.
 
-Defines the sources and how they combine; other modules determine their values.
+This module defines the sources and how they combine; other modules determine their values.
 """
 
 import math

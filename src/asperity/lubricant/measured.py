@@ -42,12 +42,12 @@ class MeasuredOil:
                 or not _CELSIUS[low] <= round(celsius, 9) <= _CELSIUS[low + 1]
             ):
                 continue
-            share = (celsius - _CELSIUS[low]) / (_CELSIUS[low + 1] - _CELSIUS[low])
+            weight = (celsius - _CELSIUS[low]) / (_CELSIUS[low + 1] - _CELSIUS[low])
             line = self._line(low)
             return OilSheet(
                 viscosity_40=line(WARM),
                 viscosity_100=line(HOT),
-                alpha=first + share * (last - first),
+                alpha=first + weight * (last - first),
                 measured=f"{self.name}, {SOURCE}",
             )
         lowest = next(

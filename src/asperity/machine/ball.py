@@ -229,11 +229,11 @@ class BallBearing:
         """Return the tangent stiffness, per `elastic` and the larger load, shape (3, 3)."""
         loads, angles = self._balls(elastic * shifts, stiffness)
         approaches = (loads / stiffness) ** (1.0 / EXPONENT)
-        place = np.cos(self.angles)
+        cosines = np.cos(self.angles)
         across = np.cos(angles)
         along = np.sin(angles)
-        normal = np.stack([across * place, along, along * place])
-        tangential = np.stack([-along * place, across, across * place])
+        normal = np.stack([across * cosines, along, along * cosines])
+        tangential = np.stack([-along * cosines, across, across * cosines])
         stiffnesses = (
             EXPONENT * stiffness * np.sqrt(approaches),
             loads / (self.groove_distance + approaches),
@@ -283,7 +283,7 @@ class BallBearing:
         """Return both contacts of each loaded ball."""
         contacts = []
         (loads, contact_angles) = self.loads(pair)
-        for number, (place, load, angle) in enumerate(
+        for number, (position, load, angle) in enumerate(
             zip(self.angles, loads, contact_angles, strict=True)
         ):
             kinematics = self._kinematics(float(angle))
@@ -292,7 +292,7 @@ class BallBearing:
                 contact = MachineContact(
                     name=f"ball {number}, {ring}",
                     bodies=(ring, "ball"),
-                    position=float(place),
+                    position=float(position),
                     load=float(load),
                     geometry="elliptic",
                     radius=radii,
@@ -381,8 +381,8 @@ class BallBearing:
         """Return radial force, axial force and moment over `_arm` [N]."""
         loads, angles = self._balls(shifts, stiffness)
         axial = loads * np.sin(angles)
-        place = np.cos(self.angles)
-        return np.array([(loads * np.cos(angles)) @ place, axial.sum(), axial @ place])
+        cosines = np.cos(self.angles)
+        return np.array([(loads * np.cos(angles)) @ cosines, axial.sum(), axial @ cosines])
 
     def _kinematics(self, angle: float) -> RollingKinematics:
         return RollingKinematics(

@@ -55,9 +55,9 @@ class TwinDisc:
         self._require_speeds()
         require_positive("load", self.load, "N")
         if (self.length is None) == (self.crown_radius is None):
-            both = "both are" if self.length is not None else "neither is"
+            word = "both are" if self.length is not None else "neither is"
             raise BadInput(
-                f"discs have length (cylinders) or crown_radius (one is crowned), {both} given; "
+                f"discs have length (cylinders) or crown_radius (one is crowned), {word} given; "
                 "give one"
             )
         for name, value in (("length", self.length), ("crown_radius", self.crown_radius)):

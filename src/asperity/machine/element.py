@@ -122,7 +122,7 @@ def rotation_hz(speed: float) -> float:
     return speed / (2.0 * math.pi)
 
 
-def require_count(name: str, value: int, least: int) -> None:
-    """Raise BadInput for fewer than `least`."""
-    if value < least:
-        raise BadInput(f"{name} must be at least {least}, got {value}; correct it")
+def require_count(name: str, value: int, minimum: int) -> None:
+    """Raise BadInput for fewer than `minimum`."""
+    if value < minimum:
+        raise BadInput(f"{name} must be at least {minimum}, got {value}; correct it")

@@ -280,11 +280,11 @@ class SpurGear:
                     "raise it"
                 )
         start, end = self._ends
-        for name, other, beyond in (
+        for name, other, interferes in (
             ("wheel", "pinion", start <= 0.0),
             ("pinion", "wheel", end >= self.line_of_action),
         ):
-            if beyond:
+            if interferes:
                 raise BadInput(
                     f"the {name}'s tip reaches below the {other}'s base circle and the teeth "
                     f"cannot mesh; lower the {name}'s tip diameter or raise the {other}'s profile "

@@ -74,10 +74,10 @@ class Rating:
 
 def machine_ratings(case: MachineCase) -> tuple[Rating, ...]:
     """Return the ratings of a bearing or gear pair; none for other machines or without oil."""
-    drawn = [contact for contact in case.contacts if not contact.stands_still]
-    if not case.complete or not drawn:
+    moving = [contact for contact in case.contacts if not contact.stands_still]
+    if not case.complete or not moving:
         return ()
-    stated = case.case(drawn[0])
+    stated = case.case(moving[0])
     if stated.lubricant is None:
         return ()
     if isinstance(case.machine, SpurGear):
@@ -125,7 +125,7 @@ def _bearing_lives(
     kappa: float,
 ) -> tuple[Rating, ...]:
     """Return reference life, equivalent load and modified life of a bearing."""
-    given = case.rating
+    inputs = case.rating
     element: rating.RollingElement = "ball" if isinstance(bearing, BallBearing) else "roller"
     life = _reference_life(case, bearing, capacity)
     power = 3.0 if element == "ball" else 10.0 / 3.0
@@ -135,18 +135,18 @@ def _bearing_lives(
         _machine_rating("equivalent_load_n", equivalent),
     )
     missing = [
-        name for name in ("fatigue_load_limit", "contamination") if getattr(given, name) is None
+        name for name in ("fatigue_load_limit", "contamination") if getattr(inputs, name) is None
     ]
     if missing:
         reason = f"[rating] has no {' and no '.join(missing)}"
         return (*lives, *_missing(("life_factor", "modified_life_s"), reason))
-    assert given.fatigue_load_limit is not None
-    assert given.contamination is not None
+    assert inputs.fatigue_load_limit is not None
+    assert inputs.contamination is not None
     # a_ISO depends on stress: slices and clearance may lengthen the life, but they do not reduce a
     # roller's stress below that of the load
     share = (
-        float(given.contamination)
-        * float(given.fatigue_load_limit)
+        float(inputs.contamination)
+        * float(inputs.fatigue_load_limit)
         / max(equivalent, bearing.radial_load)
     )
     factor = rating.life_factor(element, kappa, share)
@@ -181,7 +181,7 @@ GEAR_KEYS = ("mesh_friction", "rated_bulk_k", "rated_flash_k", "rated_film")
 
 
 def _gear_ratings(case: MachineCase, gears: SpurGear, stated: Case) -> tuple[Rating, ...]:
-    section, given = stated.contents.lubricant, case.rating
+    section, inputs = stated.contents.lubricant, case.rating
     if not isinstance(section, SheetSection):
         return _missing(GEAR_KEYS, "the oil is given by laws, not by a data sheet")
     if "C" not in gears.path:
@@ -190,7 +190,7 @@ def _gear_ratings(case: MachineCase, gears: SpurGear, stated: Case) -> tuple[Rat
         oil = _gear_oil(section.sheet)
     except BadInput as refusal:
         return _missing(GEAR_KEYS, str(refusal))
-    roughness = _mean_ra(stated) if given.roughness_ra is None else float(given.roughness_ra)
+    roughness = _mean_ra(stated) if inputs.roughness_ra is None else float(inputs.roughness_ra)
     if roughness == 0.0:
         return _missing(GEAR_KEYS, "the flanks are smooth")
     ratings = _mesh_ratings(
@@ -285,24 +285,24 @@ def _limits(
     supply: float,
 ) -> tuple[Rating, ...]:
     """Return the safety against micropitting and the margin to scuffing, if limits are given."""
-    given = case.rating
+    inputs = case.rating
     missing = "[rating] has no permissible_film, from a test of the oil"
     safety = _machine_rating("micropitting_safety", None, missing)
-    known = [value for value in film.values() if value is not None]
-    if given.permissible_film is not None and len(known) < len(film):
+    films = [value for value in film.values() if value is not None]
+    if inputs.permissible_film is not None and len(films) < len(film):
         safety = _machine_rating(
             "micropitting_safety", None, "the specific film is not known along the whole path"
         )
-    elif given.permissible_film is not None:
-        safety = _machine_rating("micropitting_safety", min(known) / float(given.permissible_film))
+    elif inputs.permissible_film is not None:
+        safety = _machine_rating("micropitting_safety", min(films) / float(inputs.permissible_film))
     missing = "[rating] has no scuffing_stage, from an FZG test of the oil"
     margin = (
         _machine_rating("scuffing_limit_k", None, missing),
         _machine_rating("scuffing_margin_k", None, missing),
     )
-    if given.scuffing_stage is not None:
+    if inputs.scuffing_stage is not None:
         factor = oil.factor * (1e3 * oil.viscosity(supply)) ** -0.05
-        limit = rating.scuffing_temperature(float(given.scuffing_stage), factor) + 273.15
+        limit = rating.scuffing_temperature(float(inputs.scuffing_stage), factor) + 273.15
         margin = (
             _machine_rating("scuffing_limit_k", limit),
             _machine_rating("scuffing_margin_k", limit - hottest),
@@ -320,9 +320,9 @@ def _mean_ra(stated: Case) -> float:
 
 def _bulk(case: MachineCase, gears: SpurGear, friction: float, supply: float) -> float:
     """Return the bulk temperature of the teeth [K]: as given, or from their losses."""
-    given = case.rating
-    if given.bulk_temperature is not None:
-        return float(given.bulk_temperature)
+    inputs = case.rating
+    if inputs.bulk_temperature is not None:
+        return float(inputs.bulk_temperature)
     path, pitch = gears.path, gears.base_pitch
     parts = (path["E"] - path["C"]) / pitch, (path["C"] - path["A"]) / pitch
     loss = (
@@ -332,7 +332,7 @@ def _bulk(case: MachineCase, gears: SpurGear, friction: float, supply: float) ->
         * rating.loss_factor(parts, gears.contact_ratio, gears.teeth)
     )
     return rating.bulk_temperature(
-        supply, loss, gears.centres, gears.face_width, spray=given.oil_supply == "spray"
+        supply, loss, gears.centres, gears.face_width, spray=inputs.oil_supply == "spray"
     )
 
 
@@ -351,8 +351,8 @@ def _gear_oil(sheet: OilSheet) -> rating.GearOil:
 def warmer_teeth(case: MachineCase, ratings: Sequence[Rating]) -> Iterator[str]:
     """Note that gear contacts are solved at supply temperature although the teeth are warmer."""
     bulk = next((entry.machine_value for entry in ratings if entry.key == "rated_bulk_k"), None)
-    drawn = [contact for contact in case.contacts if not contact.stands_still]
-    section = case.case(drawn[0]).contents.lubricant if bulk is not None else None
+    moving = [contact for contact in case.contacts if not contact.stands_still]
+    section = case.case(moving[0]).contents.lubricant if bulk is not None else None
     if (
         bulk is None
         or not isinstance(section, SheetSection)
@@ -442,8 +442,8 @@ def _over_depth(stress: SubsurfaceStress, slope: float) -> Field:
     largest = []
     for depth in stress.depths:
         levels = stress.tractions.stresses(float(depth), stress.poisson_ratio, cache=False)
-        passing = np.concatenate(
+        paths = np.concatenate(
             [np.swapaxes(levels, 1, 2), np.zeros((6, levels.shape[2], 1))], axis=2
         )
-        largest.append(rating.dang_van(passing, slope))
+        largest.append(rating.dang_van(paths, slope))
     return np.array(largest)

@@ -140,10 +140,10 @@ class MachineResult:
         parts = []
         for rating in self.ratings:
             if rating.key in VERDICT_RATINGS and not rating.reason and not rating.beyond:
-                known = {name: value for name, value in rating.values.items() if value is not None}
-                lowest = min(known, key=lambda name: known[name])
+                values = {name: value for name, value in rating.values.items() if value is not None}
+                lowest = min(values, key=lambda name: values[name])
                 contact = f" at {lowest}" if lowest else ""
-                parts.append(f"{quantity(rating.key).named(known[lowest])}{contact}")
+                parts.append(f"{quantity(rating.key).named(values[lowest])}{contact}")
         return f"; rated {', '.join(parts)}" if parts else ""
 
 
@@ -162,8 +162,8 @@ def _share(row: Row) -> str:
     """Return the load share with its interval, if it has one."""
     entry = quantity("clr")
     low, high = (row.get(end) for end in entry.ends)
-    whole = "" if low is None or high is None else f" ({entry.interval(low, high)})"
-    return f"{entry.text(row['clr'])}{whole}"
+    interval = "" if low is None or high is None else f" ({entry.interval(low, high)})"
+    return f"{entry.text(row['clr'])}{interval}"
 
 
 def condition_row(contact: MachineContact, case: MachineCase) -> Row:

@@ -1,4 +1,4 @@
-"""The paper of Xu et al. (2025): its case, printed numbers, Table 1 and simulated rig."""
+"""The paper of Xu et al. (2025): its case, published numbers, Table 1 and simulated rig."""
 
 import lazy_loader
 

@@ -101,7 +101,7 @@ class Anchor:
 def compare_with_anchors(
     curve: CurveOverSq, anchors: Sequence[Anchor] | None = None
 ) -> pandas.DataFrame:
-    """Return a table with a row per anchor: printed value, ours with 90 % interval, deviation.
+    """Return a table with a row per anchor: published value, ours with 90 % interval, deviation.
 
     `met` is True if the deviation is within the tolerance, and `possible` if it would be for some
     value of the interval. Both are False if the curve has no value (Sq not computed, no stages).
@@ -109,13 +109,13 @@ def compare_with_anchors(
     rows = []
     for anchor in PAPER_ANCHORS if anchors is None else anchors:
         our_value, low, high = anchor.evaluate(curve)
-        ends = [abs(anchor.miss(end)) for end in (low, high) if np.isfinite(end)]
-        crossed = bool(np.isfinite(low) and low <= anchor.value <= high)
+        deviations = [abs(anchor.miss(limit)) for limit in (low, high) if np.isfinite(limit)]
+        contained = bool(np.isfinite(low) and low <= anchor.value <= high)
         miss = anchor.miss(our_value) if np.isfinite(our_value) else np.nan
         fulfilled = bool(np.isfinite(miss) and abs(miss) <= anchor.tolerance)
         sq_um = np.nan if anchor.sq is None else 1e6 * anchor.sq
-        possible = fulfilled or crossed or any(end <= anchor.tolerance for end in ends)
-        described = (
+        possible = fulfilled or contained or any(limit <= anchor.tolerance for limit in deviations)
+        description = (
             anchor.name,
             anchor.quantity,
             sq_um,
@@ -123,12 +123,12 @@ def compare_with_anchors(
             anchor.value,
             anchor.tolerance,
         )
-        rows.append((*described, our_value, low, high, miss, fulfilled, possible, anchor.source))
+        rows.append((*description, our_value, low, high, miss, fulfilled, possible, anchor.source))
     return pandas.DataFrame(rows, columns=list(COMPARED))
 
 
 def rig_prediction(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> pandas.DataFrame:
-    """Return our CRF at the rig's twelve Sq with its spread over seeds, and the printed values."""
+    """Return our CRF at the rig's twelve Sq, its spread over seeds and the published values."""
     table = pandas.DataFrame({"sq_um": SAMPLES_SQ_UM, "sq_std_um": SAMPLES_STD_UM})
     table[["crf_hz", "low", "high"]] = [
         curve.interpolate(1e-6 * sq, quantity) for sq in SAMPLES_SQ_UM
@@ -140,18 +140,18 @@ def rig_prediction(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> pandas
 def rig_deviation(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> dict[str, float]:
     """Return the root mean square deviation of our CRF from the rig's [Hz]; nan outside the curve.
 
-    "ends": over the two printed values. "knee", "smooth": over all twelve Sq, with a bent or a
+    "ends": over the two published values. "knee", "smooth": over all twelve Sq, with a bent or a
     saturating line between those ends; the paper's Fig 13 has no numbers, so that the shape is
     ours.
     """
     predicted = rig_prediction(curve, quantity)
     our_value = predicted["crf_hz"].to_numpy(dtype=float)
     sq = 1e-6 * np.array(SAMPLES_SQ_UM)
-    ends = our_value[[0, -1]] - np.array(CRF_ENDS_HZ)
+    end_deviations = our_value[[0, -1]] - np.array(CRF_ENDS_HZ)
     shapes = {name: our_value - TRENDS[name](sq) for name in ("knee", "smooth")}
     return {
         name: float(np.sqrt(np.mean(deviation**2)))
-        for name, deviation in {"ends": ends, **shapes}.items()
+        for name, deviation in {"ends": end_deviations, **shapes}.items()
     }
 
 

@@ -6,8 +6,8 @@ from asperity.case import Case, load_case
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.paper.numbers import RADIUS, RIG_LOAD
 
-# Section 4's steel: the printed 219.78 GPa as Hertz's modulus would give 4147 Hz at 200 N, half of
-# it 3292 Hz
+# Section 4's steel: the published 219.78 GPa as Hertz's modulus would give 4147 Hz at 200 N, half
+# of it 3292 Hz
 PAIR = ElasticPair((207e9, 207e9), (0.3, 0.3))
 TOLERANCE = 0.1  # relative: the paper prints several values of speed and radius
 
@@ -36,7 +36,7 @@ def rig_case() -> Case:
 
 
 def is_papers_contact(case: Case) -> bool:
-    """Return True if a case is close enough to the paper's rig for its printed numbers to apply."""
+    """Return True if a case is close enough to the paper's rig for the published numbers."""
     conditions = case.conditions
     if conditions.geometry != "line" or case.lubricant is None:
         return False

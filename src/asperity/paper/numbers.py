@@ -1,4 +1,4 @@
-"""Numbers printed by Xu et al., with their place; ours are marked. Wear anchors: anchors.toml."""
+"""Numbers published by Xu et al., with their place; ours are marked. Wear anchors: anchors.toml."""
 
 from dataclasses import dataclass
 

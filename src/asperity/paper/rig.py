@@ -41,7 +41,10 @@ from asperity.paper.rig_recording import (
 
 RigTrend = Literal["knee", "smooth", "constant"]
 
-KNEE_UM, KNEE_HZ = 1.8, 3640.0  # in the printed split; the height is ours (no numbers in the paper)
+KNEE_UM, KNEE_HZ = (
+    1.8,
+    3640.0,
+)  # in the published split; the height is ours (no numbers in the paper)
 SATURATION_UM = 0.8
 CONSTANT_HZ = 3400.0
 MIN_RATE_RATIO = 3.0  # of the sampling rate to the upper end of the search band
@@ -296,9 +299,9 @@ def _measured(samples: int, moments: Sequence[Moment] | None, seed: int) -> tupl
             for um in (SAMPLES_SQ_UM, SAMPLES_STD_UM)
         )
         return sq, std
-    off = PROFILOMETER_STD * np.random.default_rng([seed, samples]).standard_normal(samples)
+    errors = PROFILOMETER_STD * np.random.default_rng([seed, samples]).standard_normal(samples)
     true = np.array([moment.state.sq for moment in moments])
-    return np.maximum(true + off, 0.1 * true), np.full(samples, PROFILOMETER_STD)
+    return np.maximum(true + errors, 0.1 * true), np.full(samples, PROFILOMETER_STD)
 
 
 def _touching(moment: Moment) -> ContactState:

@@ -78,7 +78,7 @@ def write_rig(
 
 def _write_tables(rig: Rig, paths: Sequence[Path], folder: Path) -> None:
     hours_column = () if rig.hours is None else ("hours",)
-    known: list[tuple[str, ...]] = [
+    measured: list[tuple[str, ...]] = [
         ("file", *hours_column, "sq_um", "sq_um_std", "load_n", "speed_hz")
     ]
     truth: list[tuple[str, ...]] = [
@@ -99,7 +99,7 @@ def _write_tables(rig: Rig, paths: Sequence[Path], folder: Path) -> None:
             1e6 * m for m in (recording.sq_m, recording.sq_std_m, recording.true_sq_m)
         )
         hours = () if rig.hours is None else (f"{rig.hours[recording.sample - 1]:.6g}",)
-        known.append(
+        measured.append(
             (
                 path.name,
                 *hours,
@@ -125,7 +125,7 @@ def _write_tables(rig: Rig, paths: Sequence[Path], folder: Path) -> None:
                 *(f"{value:.6g}" for value in values),
             )
         )
-    for name, rows in (("table.csv", known), ("truth.csv", truth)):
+    for name, rows in (("table.csv", measured), ("truth.csv", truth)):
         write_text(folder / name, "".join(",".join(row) + "\n" for row in rows))
 
 

@@ -19,7 +19,7 @@ from asperity.paper.numbers import SHAFT_HZ
 MAINS_HZ = 50.0
 RING_HARMONICS, MAINS_HARMONICS = 40, 20
 LOWPASS = 0.45  # corner of the anti-aliasing filter over the sampling rate
-# resonance of the mounted accelerometer: + 5 % at 10 kHz, as printed
+# resonance of the mounted accelerometer: + 5 % at 10 kHz, as published
 MOUNTED_HZ, MOUNTED_DAMPING = 46e3, 0.02
 FLAT_BELOW_HZ = 100.0  # machine noise decreases with frequency above
 GRID_HZ = 0.25  # frequency grid of densities; the sharpest mode is ten times as wide
@@ -183,7 +183,7 @@ def _draw_scatter(averages: float, size: int, rng: np.random.Generator) -> Field
 def _hann_transform(offset: Field) -> Field:
     """Return the transform of a Hann window of length 1, `offset` cycles from its centre.
 
-    Relative to the peak of a boxcar.
+    It is relative to the peak of a boxcar.
     """
     return np.asarray(
         0.5 * np.sinc(offset) + 0.25 * (np.sinc(offset - 1.0) + np.sinc(offset + 1.0))

@@ -12,11 +12,11 @@ def rig_verdict(rig: Rig) -> str:
     first = rig.recordings[0]
     last = rig.recordings[-1]
     knee = "" if rig.split_sq_m is None else f", with a knee at Sq {rig.split_sq_m * 1e6:g} um"
-    ends = " to ".join(
+    crf_range = " to ".join(
         f"{test.crf_hz:.0f} Hz at Sq {test.sq_m * 1e6:.2f} um" for test in (first, last)
     )
     length = f"{first.duration_s:g} s at {first.rate_hz:g} Hz"
-    return f"{len(rig.recordings)} recordings of {length}: true CRF from {ends}{knee}."
+    return f"{len(rig.recordings)} recordings of {length}: true CRF from {crf_range}{knee}."
 
 
 def rig_scalars(rig: Rig) -> dict[str, Any]:
@@ -31,10 +31,10 @@ def rig_scalars(rig: Rig) -> dict[str, Any]:
 
 
 def table1_verdict(rows: Sequence[Table1Row], preset: str) -> str:
-    """Return one sentence: deviation from the printed CRFs, and printed CRFAs within our range."""
+    """Return one sentence: deviation from published CRFs, and published CRFAs within our range."""
     inside = sum(row.within for row in rows)
     largest = max(abs(row.crf_deviation) for row in rows)
     return (
-        f"Table 1, preset {preset}: CRF within {100 * largest:.2f} % of the printed values, "
-        f"{inside} of {len(rows)} printed CRFAs inside our 5 to 95 % range."
+        f"Table 1, preset {preset}: CRF within {100 * largest:.2f} % of the published values, "
+        f"{inside} of {len(rows)} published CRFAs inside our 5 to 95 % range."
     )

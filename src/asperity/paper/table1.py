@@ -32,7 +32,7 @@ MIN_RECORDS = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table1Row:
-    """Row of Table 1: printed values, and median and 5 to 95 % range of our records; SI."""
+    """Row of Table 1: published values, and median and 5 to 95 % range of our records; SI."""
 
     cutoff_hz: float
     height_m: float
@@ -46,12 +46,12 @@ class Table1Row:
 
     @property
     def crf_deviation(self) -> float:
-        """Relative deviation of our median CRF from the printed one."""
+        """Relative deviation of our median CRF from the published one."""
         return self.crf_hz / self.paper_crf_hz - 1.0
 
     @property
     def within(self) -> bool:
-        """True if the printed CRFA lies in the range."""
+        """True if the published CRFA lies in the range."""
         return self.crfa_low <= self.paper_crfa <= self.crfa_high
 
 
@@ -154,8 +154,8 @@ def _records(
 def highest_point(values: Field, rate_hz: float) -> tuple[float, float]:
     """Return frequency [Hz] and height of the highest line of a raw, zero-padded periodogram.
 
-    The axis is linspace(0, rate/2, n/2), one line too long, as the printed frequencies suggest: 0.4
-    Hz at 3.3 kHz.
+    The axis is linspace(0, rate/2, n/2), one line too long, as the published frequencies suggest:
+    0.4 Hz at 3.3 kHz.
     """
     length = max(MIN_TRANSFORM, 1 << (values.size - 1).bit_length())
     density = (

@@ -123,10 +123,10 @@ def ball_life(loads: Field, rating: float, raceway: BallRaceway) -> float:
     require_positive("dynamic_load_rating", rating, "N")
     inner, outer = raceway.osculation
     grooves = (inner / outer * (2.0 * outer - 1.0) / (2.0 * inner - 1.0)) ** 0.41
-    both = 1.044 * ((1.0 - raceway.ratio) / (1.0 + raceway.ratio)) ** 1.72 * grooves
+    factor = 1.044 * ((1.0 - raceway.ratio) / (1.0 + raceway.ratio)) ** 1.72 * grooves
     per_ball = rating / (loads.size * math.cos(raceway.contact_angle) ** 0.7)
-    rotating = per_ball / 0.407 * (1.0 + both ** (10.0 / 3.0)) ** 0.3
-    stationary = per_ball / 0.389 * (1.0 + both ** (-10.0 / 3.0)) ** 0.3
+    rotating = per_ball / 0.407 * (1.0 + factor ** (10.0 / 3.0)) ** 0.3
+    stationary = per_ball / 0.389 * (1.0 + factor ** (-10.0 / 3.0)) ** 0.3
     damage = (_mean(loads, 3.0) / rotating) ** (10.0 / 3.0) + (
         _mean(loads, 10.0 / 3.0) / stationary
     ) ** (10.0 / 3.0)
@@ -156,10 +156,10 @@ def roller_life(loads: Field, rating: float, ratio: float, *, straight: bool) ->
     """
     require_positive("dynamic_load_rating", rating, "N")
     rollers, slices = loads.shape
-    both = 1.038 * ((1.0 - ratio) / (1.0 + ratio)) ** (143.0 / 108.0)
+    factor = 1.038 * ((1.0 - ratio) / (1.0 + ratio)) ** (143.0 / 108.0)
     per_slice = rating / ROLLER_REDUCTION / rollers * slices ** (-7.0 / 9.0)
-    rotating = per_slice / 0.378 * (1.0 + both**4.5) ** (2.0 / 9.0)
-    stationary = per_slice / 0.364 * (1.0 + both**-4.5) ** (2.0 / 9.0)
+    rotating = per_slice / 0.378 * (1.0 + factor**4.5) ** (2.0 / 9.0)
+    stationary = per_slice / 0.364 * (1.0 + factor**-4.5) ** (2.0 / 9.0)
     weighted = loads * (edge_factors(slices) if straight else 1.0)
     damage = (_mean(weighted, 4.0) / rotating) ** 4.5 + (_mean(weighted, 4.5) / stationary) ** 4.5
     return float(1e6 * np.sum(damage) ** (-8.0 / 9.0))

@@ -1,6 +1,6 @@
 """Check of a recording: length, gaps, clipping, offset, and a machine that was off.
 
-Sample statistics only, gathered while blocks pass to the spectrum.
+Only sample statistics are used, gathered while blocks pass to the spectrum.
 """
 
 from collections.abc import Iterable, Iterator
@@ -111,11 +111,11 @@ class SampleStatistics:
             values, new_gaps = block, 0
             self._in_gap = False
         else:
-            known = np.isfinite(block)
-            edges = np.flatnonzero(known[:-1] & ~known[1:]).size
-            new_gaps = edges + (not known[0] and not self._in_gap)
-            self._in_gap = not bool(known[-1])
-            values = block[known]
+            finite = np.isfinite(block)
+            edges = np.flatnonzero(finite[:-1] & ~finite[1:]).size
+            new_gaps = edges + (not finite[0] and not self._in_gap)
+            self._in_gap = not bool(finite[-1])
+            values = block[finite]
             mean = float(values.mean()) if values.size else 0.0
         self.gaps += new_gaps
         if not values.size:

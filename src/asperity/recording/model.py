@@ -47,7 +47,7 @@ class Channel:
     """One row of samples in a file, not read yet.
 
     `blocks(n)` yields its stored values, n at a time, NaN where samples are missing; problems found
-    while reading are added to the `notes` of the file. None means not stated in the file.
+    while reading are added to the `notes` of the file. None means that the file does not state it.
     """
 
     name: str

@@ -42,10 +42,10 @@ def read(path: Path) -> Contents:
         for label, name, unit in labels:
             if label != clock and label not in dated and not label.startswith("__index"):
                 facts = stated_facts(path.name, table | _decoded(schema.field(label).metadata))
-                known: ChannelFacts = {"unit": unit} if unit else {}
+                column_facts: ChannelFacts = {"unit": unit} if unit else {}
                 blocks = partial(_column, path, label, time_grid, notes)
                 channels.append(
-                    Channel(name=name, blocks=blocks, samples=rows, **(known | rate | facts))
+                    Channel(name=name, blocks=blocks, samples=rows, **(column_facts | rate | facts))
                 )
     return Contents(format="parquet", channels=channels, notes=notes)
 

@@ -272,9 +272,9 @@ def _open_chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRe
 def _stated_facts(path: Path, options: ReadOptions) -> dict[str, Fact]:
     """Return the facts of the sidecar and of the caller, which take precedence."""
     sidecar_facts, sidecar = read_sidecar(path)
-    given = {key: value for key, value in asdict(options).items() if value is not None}
+    stated_options = {key: value for key, value in asdict(options).items() if value is not None}
     return {key: Fact(value, sidecar) for key, value in sidecar_facts.items()} | {
-        key: Fact(value, "command line") for key, value in given.items()
+        key: Fact(value, "command line") for key, value in stated_options.items()
     }
 
 

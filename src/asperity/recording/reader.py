@@ -74,8 +74,8 @@ def stated_facts(name: str, attributes: Mapping[str, object]) -> ChannelFacts:
 
 def rounded_rate(rate: float, rounding: float) -> float:
     """Return the whole number of hertz, if just one lies within the relative `rounding`."""
-    whole = float(round(rate))
-    return whole if whole > 0.0 and abs(whole / rate - 1.0) <= rounding < 0.5 / rate else rate
+    rounded = float(round(rate))
+    return rounded if rounded > 0.0 and abs(rounded / rate - 1.0) <= rounding < 0.5 / rate else rate
 
 
 def parse_time(value: object) -> datetime | None:

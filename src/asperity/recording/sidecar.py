@@ -49,9 +49,9 @@ def is_sidecar(path: Path) -> bool:
 def sidecar_names(name: str) -> list[str]:
     """Return the possible names of a recording's sidecar, in order of precedence."""
     file = Path(name)
-    own = [f"{name}{suffix}" for suffix in SUFFIXES]
-    own += [f"{file.stem}{suffix}" for suffix in SUFFIXES if file.suffix]
-    return [*own, *(f"{FOLDER_WIDE}{suffix}" for suffix in SUFFIXES)]
+    names = [f"{name}{suffix}" for suffix in SUFFIXES]
+    names += [f"{file.stem}{suffix}" for suffix in SUFFIXES if file.suffix]
+    return [*names, *(f"{FOLDER_WIDE}{suffix}" for suffix in SUFFIXES)]
 
 
 def read_sidecar(path: Path) -> tuple[dict[str, object], str]:
@@ -145,10 +145,10 @@ def _number(value: object) -> float | None:
     return value if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
-def _is_band(ends: object) -> bool:
+def _is_band(limits: object) -> bool:
     return (
-        isinstance(ends, list)
-        and len(ends) == 2
-        and all(type(end) in (int, float) for end in ends)
-        and bool(0.0 <= ends[0] < ends[1])
+        isinstance(limits, list)
+        and len(limits) == 2
+        and all(type(end) in (int, float) for end in limits)
+        and bool(0.0 <= limits[0] < limits[1])
     )

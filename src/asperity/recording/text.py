@@ -170,13 +170,13 @@ def _line_by_line(
                     if selected is None:  # a large file has too many
                         table.stamps.append(stamp)
                     values[0] = (stamp - table.stamps[0]).total_seconds()
-            known = [value for value in values if value is not None]
-            if len(values) == table.columns and known:
+            numbers = [value for value in values if value is not None]
+            if len(values) == table.columns and numbers:
                 if bad_line_at is not None:
                     rows.append([np.nan] * table.columns)
                     table.bad_rows += 1
                     bad_line_at = None
-                table.bad_rows += len(known) < len(values)
+                table.bad_rows += len(numbers) < len(values)
                 rows.append([np.nan if value is None else value for value in values])
             elif bad_line_at is not None:
                 return _selected(rows, table, selected), bad_line_at
@@ -216,7 +216,7 @@ def _channels(
         if k == clock_at:
             continue
         unit = table.units[k]
-        known: ChannelFacts = facts | {"unit": unit} if unit else facts
+        column_facts: ChannelFacts = facts | {"unit": unit} if unit else facts
         if open_bytes is None:
             values = fill(rows[:, k])
             blocks = partial(_pieces, values)
@@ -225,7 +225,7 @@ def _channels(
             clock_column = None if "rate_hz" not in clock else clock_at
             blocks = partial(_streamed, open_bytes, table, (k, clock_column), notes)
             samples = None
-        yield Channel(name=prefix + names[k], blocks=blocks, samples=samples, **known)
+        yield Channel(name=prefix + names[k], blocks=blocks, samples=samples, **column_facts)
 
 
 def _clock_facts(table: TextTable, rows: Field, column: int) -> ChannelFacts:
@@ -309,19 +309,19 @@ def _grid_filler(times: Field, prefix: str, notes: list[str]) -> Callable[[Field
 
 def _nearest_places(times: Field, prefix: str, notes: list[str]) -> Callable[[Field], Field]:
     """Return `_grid_filler` for times that are uneven, or do not increase."""
-    known = np.flatnonzero(np.isfinite(times))
-    steps = np.diff(times[known])
+    finite = np.flatnonzero(np.isfinite(times))
+    steps = np.diff(times[finite])
     step = float(np.median(steps))
     gaps = int(np.count_nonzero(steps > _GAP * step))
     if np.any(steps <= 0.0):
         notes.append(f"{prefix}its times do not increase; rows are used in the order of the file")
         return _unchanged
-    elapsed = (times[known] - times[known[0]]) / step
+    elapsed = (times[finite] - times[finite[0]]) / step
     position = np.round(elapsed)
     if gaps and np.all(np.diff(position) > 0) and position[-1] < 2 * times.size:
-        missing = int(position[-1]) + 1 - known.size
+        missing = int(position[-1]) + 1 - finite.size
         notes.append(f"{prefix}{gaps} gaps in its times: {missing} samples are missing")
-        return partial(_placed, known, position.astype(np.int64))
+        return partial(_placed, finite, position.astype(np.int64))
     if gaps:
         notes.append(
             f"{prefix}{gaps} gaps in its times, too many to fill; the spectrum is doubtful"
@@ -331,10 +331,10 @@ def _nearest_places(times: Field, prefix: str, notes: list[str]) -> Callable[[Fi
     return _unchanged
 
 
-def _placed(known: npt.NDArray[np.intp], position: npt.NDArray[np.int64], values: Field) -> Field:
+def _placed(finite: npt.NDArray[np.intp], position: npt.NDArray[np.int64], values: Field) -> Field:
     """Return known values at their positions on the grid, nan in gaps."""
     filled = np.full(int(position[-1]) + 1, np.nan)
-    filled[position] = values[known]
+    filled[position] = values[finite]
     return filled
 
 

@@ -128,7 +128,7 @@ def rate_from_times(column: str, unit: str | None, times: Field) -> ChannelFacts
     if scale is not None:
         rate = 1.0 / (clock.step * scale)
         rounded = rounded_rate(rate, clock.doubt)
-        common_rates = [known for known in _KNOWN if abs(known / rate - 1.0) <= clock.doubt]
+        common_rates = [common for common in _KNOWN if abs(common / rate - 1.0) <= clock.doubt]
         return {
             "rate_hz": common_rates[0] if len(common_rates) == 1 and rounded == rate else rounded,
             "rate_doubt": clock.doubt,

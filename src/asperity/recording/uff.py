@@ -64,7 +64,7 @@ def read(path: Path) -> Contents:
                 )
             else:
                 channels.append(
-                    _channel(path, record, notes, taken=[channel.name for channel in channels])
+                    _channel(path, record, notes, names=[channel.name for channel in channels])
                 )
     if not channels:
         raise UnreadableFile(
@@ -76,29 +76,29 @@ def read(path: Path) -> Contents:
     return Contents(format="uff 58", channels=channels, notes=notes)
 
 
-def _name(record: dict[str, Any], taken: list[str]) -> str:
-    """Return the name of the response or else its node, unique among those taken."""
+def _name(record: dict[str, Any], names: list[str]) -> str:
+    """Return the name of the response or else its node, unique among `names`."""
     label = str(record.get("rsp_ent_name", "")).strip()
     node = f"{record.get('rsp_node', '')}:{record.get('rsp_dir', '')}"
     name = label if label and label != "NONE" else node
-    if name in taken:
-        name = f"{name} {node}" if f"{name} {node}" not in taken else f"{name} {len(taken) + 1}"
+    if name in names:
+        name = f"{name} {node}" if f"{name} {node}" not in names else f"{name} {len(names) + 1}"
     return name
 
 
-def _channel(path: Path, record: dict[str, Any], notes: list[str], taken: list[str]) -> Channel:
+def _channel(path: Path, record: dict[str, Any], notes: list[str], names: list[str]) -> Channel:
     values = record["data"]
     if values.dtype.kind == "c":
         raise ValueError("its time record is complex")
     if int(record["abscissa_spacing"]) != 1:
         raise UnreadableFile(f"{path.name} is sampled unevenly; export it at an even step")
     step = float(record["abscissa_inc"])
-    name = _name(record, taken)
+    name = _name(record, names)
     unit = str(record.get("ordinate_axis_units_lab", "")).strip()
     samples = int(values.size)
-    promised = int(record["num_pts"])
-    if samples < promised:
-        notes.append(f"cut short: {samples} of {promised} samples present")
+    stated = int(record["num_pts"])
+    if samples < stated:
+        notes.append(f"cut short: {samples} of {stated} samples present")
     started = next(
         (time for key in ("id3", "id2", "id4", "id5") if (time := parse_time(record.get(key, "")))),
         None,

@@ -34,9 +34,9 @@ def read(path: Path) -> Contents:
         raise UnreadableFile(
             f"{path.name} states {rate} Hz and {count} channels, which is impossible; {REMEDY}"
         )
-    whole = _stated_frames(path)
-    if whole is not None and frames < whole:
-        notes.append(f"cut short: {frames} of {whole} samples present")
+    stated_frames = _stated_frames(path)
+    if stated_frames is not None and frames < stated_frames:
+        notes.append(f"cut short: {frames} of {stated_frames} samples present")
 
     def blocks(number: int, size: int) -> Iterator[Field]:
         done = 0

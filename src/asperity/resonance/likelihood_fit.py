@@ -34,7 +34,7 @@ def fisher_scoring(
 ) -> tuple[State, bool]:
     """Iterate damped scoring steps; return the final state and whether it converged.
 
-    Converged: no step promises a gain, or none helps at the largest damping.
+    It has converged when no step promises a gain, or none helps at the largest damping.
 
     Parameters
     ----------

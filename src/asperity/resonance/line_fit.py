@@ -144,16 +144,16 @@ class _Likelihood:
 def fit_common_lines(sensors: Sequence[SensorData]) -> CommonLines:
     """Fit every recording's own parameters by damped scoring, bases and transfers held."""
     likelihood = _Likelihood(sensors, *parameter_bounds(sensors[0].blocks))
-    own = np.stack(
+    start = np.stack(
         [np.clip(data.parameters.own, likelihood.lower, likelihood.upper) for data in sensors]
     )
     fitted, _ = fisher_scoring(
-        likelihood.scoring_point(own, likelihood.costs(own)),
+        likelihood.scoring_point(start, likelihood.costs(start)),
         likelihood.propose,
         steps=MOST_STEPS,
         least_damping=1e-7,
         most_damping=1e6,
-        fits=own.shape[1],
+        fits=start.shape[1],
     )
     inverse = np.linalg.inv(fitted.information)
     transfer_effect: list[Field] = [

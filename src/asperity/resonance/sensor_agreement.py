@@ -65,9 +65,9 @@ class SensorFit(NamedTuple):
     def joint(self, sensor: int) -> JointFit:
         """Return the fit of one sensor."""
         data = self.sensors[sensor]
-        own = self.lines.own[sensor]
-        parameters = data.parameters._replace(own=own)
-        return JointFit(parameters, 0.0, np.full_like(own, np.nan), data.transfer_covariance)
+        values = self.lines.own[sensor]
+        parameters = data.parameters._replace(own=values)
+        return JointFit(parameters, 0.0, np.full_like(values, np.nan), data.transfer_covariance)
 
 
 def recordings_with_vibration(
@@ -77,10 +77,10 @@ def recordings_with_vibration(
     return {
         name: [
             number
-            for number, spectrum in enumerate(every)
+            for number, spectrum in enumerate(series)
             if spectrum is not None and not has_no_vibration(spectrum, band_hz)
         ]
-        for name, every in spectra.items()
+        for name, series in spectra.items()
     }
 
 
@@ -112,11 +112,11 @@ def common_error_share(pair: tuple[str, str], fits: Sequence[SensorFit]) -> floa
         if not set(pair) <= set(fit.names):
             continue
         sensitivities, residuals = zip(*(_residuals(fit, name) for name in pair), strict=True)
-        both = sensitivities[0] * sensitivities[1]
-        product += float(np.sum(both * residuals[0] * residuals[1]))
-        powers += [np.sum(both * residual**2) for residual in residuals]
-        weights += float(np.sum(both))
-        squares += float(np.sum(both**2))
+        weight = sensitivities[0] * sensitivities[1]
+        product += float(np.sum(weight * residuals[0] * residuals[1]))
+        powers += [np.sum(weight * residual**2) for residual in residuals]
+        weights += float(np.sum(weight))
+        squares += float(np.sum(weight**2))
     if not np.all(powers > 0.0):
         return np.nan
     return float(np.clip(product / np.sqrt(np.prod(powers)) + np.sqrt(squares) / weights, 0.0, 1.0))

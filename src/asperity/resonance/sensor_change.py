@@ -113,9 +113,9 @@ def _by_recording(blocks: SpectrumBlocks, joint: JointFit) -> tuple[Field, Field
         transfer = shares[0][:, None] * relative_columns(blocks.centre, single)[0]
         weighted = weight[:, None] * transfer
         coupling = shares @ weighted
-        own = (shares * weight) @ shares.T + WEAK_INFORMATION * np.eye(len(shares))
+        block = (shares * weight) @ shares.T + WEAK_INFORMATION * np.eye(len(shares))
         score[row] = weighted_residual[row] @ transfer
-        information[row] = transfer.T @ weighted - coupling.T @ np.linalg.solve(own, coupling)
+        information[row] = transfer.T @ weighted - coupling.T @ np.linalg.solve(block, coupling)
     return score, information
 
 

@@ -69,7 +69,7 @@ class JointJudgement:
         self.by_sensor, self.band_hz = by_sensor, band_hz
         self.rows = recordings_with_vibration(spectra, band_hz)
         self.count = len(next(iter(spectra.values())))
-        self.alone = {name: self._single_sensor(name, every) for name, every in spectra.items()}
+        self.alone = {name: self._single_sensor(name, series) for name, series in spectra.items()}
 
     def judge(self, agreement: Agreement | None = None) -> tuple[SensorLines, Agreement]:
         """Judge every recording; estimate the agreement of the sensors unless it is given."""
@@ -120,12 +120,12 @@ class JointJudgement:
 
     def disagreement(self, number: int) -> str:
         """Describe the different lines that two sensors detect in a recording; empty for none."""
-        found = [
+        detected = [
             (name, line)
-            for name, every in self.alone.items()
-            if (line := every[number]) is not None and line.found
+            for name, lines in self.alone.items()
+            if (line := lines[number]) is not None and line.found
         ]
-        for (name, line), (other_name, other) in combinations(found, 2):
+        for (name, line), (other_name, other) in combinations(detected, 2):
             if lines_differ(line, other):
                 return (
                     f"{SENSORS_DISAGREE}: a line at {line.crf_hz:.0f} ± {line.crf_std:.0f} Hz on "
@@ -137,7 +137,7 @@ class JointJudgement:
         self, name: str, spectra: Sequence[Spectrum | None]
     ) -> tuple[Resonance | None, ...]:
         """Return the resonances of a sensor's own series; None where it has no spectrum."""
-        own = self.by_sensor.get(name)
+        series = self.by_sensor.get(name)
         too_few = no_resonance(
             f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor; this one has "
             "fewer",
@@ -152,7 +152,7 @@ class JointJudgement:
         )
         lines = [None if spectrum is None else no_vibration for spectrum in spectra]
         for row, number in enumerate(self.rows[name]):
-            lines[number] = too_few if own is None else own.resonances[row]
+            lines[number] = too_few if series is None else series.resonances[row]
         return tuple(lines)
 
     def _common_shares(self, fits: Sequence[SensorFit]) -> dict[tuple[str, str], float]:
@@ -167,10 +167,10 @@ class JointJudgement:
         if len(self.by_sensor) == 1:
             return (*self.by_sensor,)
         established = []
-        for name, every in self.alone.items():
-            together = sum(name in names and len(names) > 1 for names in detected_on)
-            detected = sum(line is not None and line.found for line in every)
-            if together >= max(FEWEST_AGREEMENTS, ESTABLISHED_SHARE * detected):
+        for name, lines in self.alone.items():
+            agreements = sum(name in names and len(names) > 1 for names in detected_on)
+            detected = sum(line is not None and line.found for line in lines)
+            if agreements >= max(FEWEST_AGREEMENTS, ESTABLISHED_SHARE * detected):
                 established.append(name)
         return tuple(established)
 
@@ -193,8 +193,8 @@ class JointJudgement:
             )
             coarse = coarser(blocks)
             base = np.exp(np.interp(coarse.centre, blocks.centre, joint.parameters.base))
-            own = lines_at_templates(coarse, base, templates, best)
-            parameters = joint.parameters._replace(own=own)
+            values = lines_at_templates(coarse, base, templates, best)
+            parameters = joint.parameters._replace(own=values)
             sensors.append(SensorData(blocks, parameters, joint.transfer_covariance))
         return SensorFit(names, numbers, sensors, fit_common_lines(sensors), total)
 
@@ -291,10 +291,10 @@ class JointJudgement:
         fitted = np.exp(fit.lines.own[0, row, :3])
         first = fit.sensors[0]
         base = np.exp(fit.lines.own[0, row, 3] + first.parameters.base)
-        stands = self.by_sensor[fit.names[0]].fit.stands
+        keeps_frequency = self.by_sensor[fit.names[0]].fit.stands
         return fitted_resonance(
             fitted,
-            np.where([stands, False, False], np.nan, evidence.std[0, row, :3] * fitted),
+            np.where([keeps_frequency, False, False], np.nan, evidence.std[0, row, :3] * fitted),
             reason=reason,
             band_hz=self.band_hz,
             method="joint",
@@ -318,12 +318,12 @@ class JointJudgement:
     ) -> tuple[Resonance, tuple[str, ...]]:
         """Return the line of a single sensor, provided that the sensor is established."""
         available = {
-            name: own for name, every in self.alone.items() if (own := every[number]) is not None
+            name: fit for name, lines in self.alone.items() if (fit := lines[number]) is not None
         }
-        found = [(name, own) for name, own in available.items() if own.found]
-        if not found:
+        detected = [(name, fit) for name, fit in available.items() if fit.found]
+        if not detected:
             return line, ()
-        name, own = next((pair for pair in found if pair[0] in established), found[0])
+        name, fit = next((pair for pair in detected if pair[0] in established), detected[0])
         if name not in established:
             others = " and ".join(other for other in available if other != name)
             only = (
@@ -332,19 +332,19 @@ class JointJudgement:
                 else "only, and no other sensor has a spectrum of this recording"
             )
             reason = (
-                f"a line at {own.crf_hz:.0f} Hz is detected on {name} {only}: a structural mode "
+                f"a line at {fit.crf_hz:.0f} Hz is detected on {name} {only}: a structural mode "
                 "would look the same"
             )
-            return no_resonance(reason, self.band_hz, "joint", evidence=own.evidence), ()
-        height = (own.crfa, own.crfa_std) if name == next(iter(self.alone)) else (np.nan, np.nan)
+            return no_resonance(reason, self.band_hz, "joint", evidence=fit.evidence), ()
+        height = (fit.crfa, fit.crfa_std) if name == next(iter(self.alone)) else (np.nan, np.nan)
         several = len(self.by_sensor) > 1
         return replace(
-            own,
-            crf_std=own.crf_std * widening,
-            crf_shared_std=own.crf_shared_std * widening,
+            fit,
+            crf_std=fit.crf_std * widening,
+            crf_shared_std=fit.crf_shared_std * widening,
             crfa=height[0],
             crfa_std=height[1],
-            reason=f"{own.reason}, here on {name} only" if several else own.reason,
+            reason=f"{fit.reason}, here on {name} only" if several else fit.reason,
         ), (name,)
 
     def _deviations(
@@ -382,9 +382,9 @@ class JointJudgement:
         joint = self.by_sensor[name].fit.joint
         if self.by_sensor[name].uses_shared:  # their deviations exclude that of the base
             return np.zeros_like(joint.std[rows])
-        own = joint.parameters.own[rows]
+        values = joint.parameters.own[rows]
         base_held = fit_lines(
-            data.blocks, joint.parameters._replace(own=own), data.transfer_covariance
+            data.blocks, joint.parameters._replace(own=values), data.transfer_covariance
         ).std
         return np.asarray(np.sqrt(np.maximum(joint.std[rows] ** 2 - base_held**2, 0.0)))
 
@@ -413,10 +413,10 @@ def _common_chance(fit: SensorFit, pair: tuple[int, int], relative: Sequence[Fie
     (sensor, other) = pair
     weight = np.sqrt(fit.sensors[sensor].blocks.weight * fit.sensors[other].blocks.weight)
     score = (relative[sensor] * weight[:, None]) @ relative[other].swapaxes(1, 2)
-    both = (
+    covariance = (
         inverse[:, :, parameter_indices(sensor)] @ score @ inverse[:, parameter_indices(other), :]
     )
-    return np.asarray(np.einsum("npp->np", both))
+    return np.asarray(np.einsum("npp->np", covariance))
 
 
 def _transfer_std(fit: SensorFit) -> list[Field]:

@@ -93,16 +93,16 @@ def _learn_in_parts(
     first, _ = move
     (before, _), (after, shared) = (
         learn_sensors(
-            {name: every[part] for name, every in spectra.items()},
+            {name: series[part] for name, series in spectra.items()},
             band_hz=band_hz,
-            kept=None if kept is None else {name: every[part] for name, every in kept.items()},
+            kept=None if kept is None else {name: series[part] for name, series in kept.items()},
         )
         for part in (slice(first), slice(first, None))
     )
     lines = SensorLines(
         resonances=before.resonances + after.resonances,
         detected_on=before.detected_on + after.detected_on,
-        alone={name: every + after.alone[name] for name, every in before.alone.items()},
+        alone={name: series + after.alone[name] for name, series in before.alone.items()},
         common=after.common,
         moved=(*before.moved, move, *((first + number, name) for number, name in after.moved)),
     )
@@ -164,15 +164,15 @@ def _sensors_with_enough_recordings(
     usable = {
         name: (
             spectrum
-            for spectrum in every
+            for spectrum in series
             if spectrum is not None and not has_no_vibration(spectrum, band_hz)
         )
-        for name, every in spectra.items()
+        for name, series in spectra.items()
     }
     return [
         name
-        for name, some in usable.items()
-        if len([*islice(some, FEWEST_RECORDINGS)]) == FEWEST_RECORDINGS
+        for name, recordings in usable.items()
+        if len([*islice(recordings, FEWEST_RECORDINGS)]) == FEWEST_RECORDINGS
     ]
 
 

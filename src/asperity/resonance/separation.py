@@ -84,10 +84,10 @@ def fit_to_shared(
     ), cost
 
 
-def _fit_base(blocks: SpectrumBlocks, own: Field, base: Field) -> Field:
+def _fit_base(blocks: SpectrumBlocks, values: Field, base: Field) -> Field:
     """Return the base that fits given lines and gains best, by Fisher scoring in ln B per block."""
-    line = line_densities(blocks.centre, ModelParameters(own, base))
-    gain = np.exp(own[:, 3, None])
+    line = line_densities(blocks.centre, ModelParameters(values, base))
+    gain = np.exp(values[:, 3, None])
     log_base = np.log(base)
     for _ in range(12):
         part = gain * np.exp(log_base)
@@ -115,16 +115,16 @@ def separate(blocks: SpectrumBlocks) -> Separation:
     reference_rows = list(range(recordings))
     if recordings > MAX_RECORDINGS_TOGETHER:
         reference_rows = [
-            round(place) for place in np.linspace(0.0, recordings - 1.0, MAX_RECORDINGS_TOGETHER)
+            round(row) for row in np.linspace(0.0, recordings - 1.0, MAX_RECORDINGS_TOGETHER)
         ]
     joint = _fit_shared(_rows(blocks, reference_rows), _rows(coarse, reference_rows), templates)
     if recordings > len(reference_rows):
-        shared = joint.parameters
-        own = _best_lines(
-            coarse, np.exp(np.interp(coarse.centre, blocks.centre, shared.base)), templates
+        fitted = joint.parameters
+        values = _best_lines(
+            coarse, np.exp(np.interp(coarse.centre, blocks.centre, fitted.base)), templates
         )
-        own[reference_rows] = shared.own
-        joint = fit_lines(blocks, shared._replace(own=own), joint.transfer_covariance)._replace(
+        values[reference_rows] = fitted.own
+        joint = fit_lines(blocks, fitted._replace(own=values), joint.transfer_covariance)._replace(
             step_std=joint.step_std
         )
     template_costs, _ = search(
@@ -145,10 +145,10 @@ def _fit_shared(blocks: SpectrumBlocks, coarse: SpectrumBlocks, templates: Templ
     base = np.exp(np.interp(blocks.centre, coarse.centre, best.parameters.base))
     base = _fit_base(blocks, best.parameters.own, base)
     low, high = parameter_bounds(blocks)
-    passed = unit_transfer(float(np.exp(low[1])), float(np.exp(high[1])))
+    transfer = unit_transfer(float(np.exp(low[1])), float(np.exp(high[1])))
     return _fit_with_evidence(
         blocks,
-        _with_positive_base(blocks, ModelParameters(best.parameters.own, np.log(base), passed)),
+        _with_positive_base(blocks, ModelParameters(best.parameters.own, np.log(base), transfer)),
     )
 
 
@@ -158,9 +158,9 @@ def _best_coarse_fit(coarse: SpectrumBlocks, templates: Templates) -> JointFit:
     for quantile in BASE_QUANTILES:
         base = _first_base(coarse, quantile)
         for _ in range(8):
-            own = _best_lines(coarse, base, templates)
-            base = _fit_base(coarse, own, base)
-        fits.append(_fit_jointly(coarse, ModelParameters(own, np.log(base))))
+            values = _best_lines(coarse, base, templates)
+            base = _fit_base(coarse, values, base)
+        fits.append(_fit_jointly(coarse, ModelParameters(values, np.log(base))))
     return min(fits, key=lambda joint: joint.cost)
 
 
@@ -168,11 +168,11 @@ def _relocate_lines(coarse: SpectrumBlocks, best: JointFit, templates: Templates
     """Move recordings in a local maximum to their best templates, while that improves the fit."""
     for _ in range(3):
         base = best.parameters.base
-        own = _best_lines(coarse, np.exp(base), templates)
-        relocated = np.abs(own[:, 1] - best.parameters.own[:, 1]) > 0.01
+        values = _best_lines(coarse, np.exp(base), templates)
+        relocated = np.abs(values[:, 1] - best.parameters.own[:, 1]) > 0.01
         if not np.any(relocated):
             break
-        start = ModelParameters(np.where(relocated[:, None], own, best.parameters.own), base)
+        start = ModelParameters(np.where(relocated[:, None], values, best.parameters.own), base)
         joint = _fit_jointly(coarse, start)
         if joint.cost >= best.cost - 1e-3:
             break
@@ -183,7 +183,7 @@ def _relocate_lines(coarse: SpectrumBlocks, best: JointFit, templates: Templates
 def _with_positive_base(blocks: SpectrumBlocks, parameters: ModelParameters) -> ModelParameters:
     """Return the parameters with a base that is nowhere zero under a line.
 
-    In its logarithm no step would lead away from zero.
+    In its logarithm, no step would lead away from zero.
     """
     line = line_densities(blocks.centre, parameters)
     smallest = np.min(line / np.exp(parameters.own[:, 3, None]), axis=0)
@@ -193,17 +193,17 @@ def _with_positive_base(blocks: SpectrumBlocks, parameters: ModelParameters) -> 
 def _eliminate_base(point: JointScoringPoint, damping: Field | float) -> tuple[Field, Field, Field]:
     """Return the damped information without the base, that of the base, and their coupling.
 
-    Covers the own parameters and the transfer. Levels of g and B are fixed against one another by Σ
-    ln g = 0.
+    It covers the own parameters and the transfer. Levels of g and B are fixed against one another
+    by Σ ln g = 0.
     """
-    recordings, own, _ = point.own_information.shape
+    recordings, parameters, _ = point.own_information.shape
     base_information = point.base_information * (1.0 + damping)
-    size = recordings * own
+    size = recordings * parameters
     coupling = np.concatenate([point.coupling.reshape(size, -1), point.transfer_coupling])
     reduced = -(coupling / base_information) @ coupling.T
     diagonal = np.einsum("npp->np", point.own_information)
     for i in range(recordings):
-        rows = slice(i * own, (i + 1) * own)
+        rows = slice(i * parameters, (i + 1) * parameters)
         reduced[rows, rows] += point.own_information[i] + damping * np.diag(diagonal[i])
     gauge = np.tile([0.0, 0.0, 0.0, 1.0], recordings)
     reduced[:size, :size] += float(np.mean(diagonal[:, 3])) * np.outer(gauge, gauge) / recordings
@@ -264,8 +264,8 @@ class _Likelihood:
         score = np.concatenate([point.own_score.ravel(), point.transfer_score])
         step = np.linalg.solve(reduced, score - coupling @ (point.base_score / base_information))
         base_step = (point.base_score - coupling.T @ step) / base_information
-        promised = 0.5 * float(step @ score + base_step @ point.base_score)
-        if promised < SMALLEST_GAIN:
+        predicted = 0.5 * float(step @ score + base_step @ point.base_score)
+        if predicted < SMALLEST_GAIN:
             return None
         trial = self.limited_step(state.parameters, step, base_step)
         return np.array([self.cost(trial) < point.cost]), lambda _: self.scoring_point(trial)
@@ -285,9 +285,9 @@ def _fit_jointly(
         most_damping=1e6,
     )
     covariance = np.linalg.inv(_eliminate_base(point, 0.0)[0])
-    own = parameters.own.size
-    std = np.sqrt(np.diag(covariance)[:own]).reshape(parameters.own.shape)
-    return JointFit(parameters, point.cost, std, covariance[own:, own:], step_std)
+    size = parameters.own.size
+    std = np.sqrt(np.diag(covariance)[:size]).reshape(parameters.own.shape)
+    return JointFit(parameters, point.cost, std, covariance[size:, size:], step_std)
 
 
 def _fit_with_evidence(blocks: SpectrumBlocks, start: ModelParameters) -> JointFit:

@@ -177,10 +177,10 @@ def learn_series(
     Where the transfer from contact to sensor changes, the recordings from there on are treated as a
     series of their own.
     """
-    whole = separate_series(spectra, band_hz=band_hz, kept=kept)
-    first = first_moved_recording(whole.blocks, whole.fit.joint)
+    separated = separate_series(spectra, band_hz=band_hz, kept=kept)
+    first = first_moved_recording(separated.blocks, separated.fit.joint)
     if first is None:
-        return LearnedSeries(whole.resonances, whole.shared, ())
+        return LearnedSeries(separated.resonances, separated.shared, ())
     before, after = (
         learn_series(spectra[part], band_hz=band_hz, kept=None if kept is None else kept[part])
         for part in (slice(first), slice(first, None))
@@ -346,27 +346,27 @@ def _line_evidence(blocks: SpectrumBlocks, joint: JointFit) -> tuple[Field, Fiel
 
 def _keeps_place(joint: JointFit, significant: Mask) -> bool:
     """Return whether the line keeps its frequency; the base can then absorb part of its height."""
-    own = joint.parameters.own
-    frequencies = own[significant, 1]
-    widths = 2.0 * np.exp(own[significant, 2])
+    values = joint.parameters.own
+    frequencies = values[significant, 1]
+    widths = 2.0 * np.exp(values[significant, 2])
     return frequencies.size > 0 and float(np.std(frequencies)) < PLACE_SPREAD * float(
         np.median(widths)
     )
 
 
-def _shaped_by_transfer(joint: JointFit, found: Mask) -> bool:
+def _shaped_by_transfer(joint: JointFit, detected: Mask) -> bool:
     """Return whether a line that keeps its frequency is shaped by the transfer.
 
     A change of the machine's spectrum could then look like a line.
     """
     transfer = joint.parameters.transfer
-    if not found.any() or not transfer.coefficients.size:
+    if not detected.any() or not transfer.coefficients.size:
         return False
     transfer_shape = (
         transfer.columns(np.linspace(transfer.low, transfer.high, 10 * SPLINES))[:, 1:]
         @ transfer.coefficients[1:]
     )
-    return _keeps_place(joint, found) and float(np.ptp(transfer_shape)) > TRANSFER_CHANGE
+    return _keeps_place(joint, detected) and float(np.ptp(transfer_shape)) > TRANSFER_CHANGE
 
 
 def _judge_lines(
@@ -377,7 +377,7 @@ def _judge_lines(
     evidence, without_line = _line_evidence(blocks, joint)
     errors = systematic_errors(blocks, joint, fit.statistics)
     std = np.hypot(joint.std, errors.std)[:, :3]
-    way = LINE_KEEPS_PLACE if fit.stands else LINE_MOVES
+    behaviour = LINE_KEEPS_PLACE if fit.stands else LINE_MOVES
     resonances = []
     for i, line in enumerate(_judged_lines(blocks, fit, evidence, std)):
         objection = line_objection(line, band_hz) or _shape_objection(fit, line)
@@ -391,7 +391,7 @@ def _judge_lines(
             resonance = fitted_resonance(
                 fitted[:3],
                 np.where([fit.stands, False, False], np.nan, std[i] * fitted[:3]),
-                reason=f"a line {line.width:.0f} Hz wide {way} (BIC {line.evidence:+.0f})",
+                reason=f"a line {line.width:.0f} Hz wide {behaviour} (BIC {line.evidence:+.0f})",
                 band_hz=band_hz,
                 method="joint",
                 evidence=line.evidence,
@@ -409,8 +409,8 @@ def _judged_lines(
     parameters = fit.joint.parameters
     misfit = relative_residual(blocks, expected_density(blocks, parameters))
     lines = []
-    for i, own in enumerate(parameters.own):
-        _, f0, zeta, _ = (float(value) for value in np.exp(own))
+    for i, values in enumerate(parameters.own):
+        _, f0, zeta, _ = (float(value) for value in np.exp(values))
         rival = best_rival(f0, zeta, fit.template_costs[i], fit.templates)
         f0_std = float(std[i, 1]) * f0
         lines.append(JudgedLine(f0, f0_std, zeta, float(evidence[i]), float(misfit[i]), *rival))

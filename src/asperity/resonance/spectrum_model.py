@@ -115,14 +115,14 @@ def recording_costs(blocks: SpectrumBlocks, parameters: ModelParameters) -> Fiel
     )
 
 
-def _prior(own: Field) -> Field:
-    return np.asarray(0.5 * ((own[:, 2] - np.log(PRIOR_DAMPING)) / PRIOR_DAMPING_STD) ** 2)
+def _prior(values: Field) -> Field:
+    return np.asarray(0.5 * ((values[:, 2] - np.log(PRIOR_DAMPING)) / PRIOR_DAMPING_STD) ** 2)
 
 
 def model_shares(blocks: SpectrumBlocks, parameters: ModelParameters) -> tuple[Field, Field]:
     """Return relative derivatives (recordings, 4, blocks), and the expected density.
 
-    Derivatives of the expected density by ln A, ln f, ln ζ and ln g over the density itself.
+    They are those of the expected density by ln A, ln f, ln ζ and ln g, over the density itself.
     """
     line, by_f0, by_damping = line_densities_and_slopes(blocks.centre, parameters)
     shared = np.exp(parameters.own[:, 3, None] + parameters.base)
@@ -172,8 +172,8 @@ def joint_scoring_point(
 ) -> JointScoringPoint:
     """Return cost, score and information; `prior_information` is that of the transfer."""
     relative, expected = model_shares(blocks, parameters)
-    own, weighted_residual = _line_scoring(blocks, parameters, relative, expected)
-    weighted = own.weighted
+    line_scoring, weighted_residual = _line_scoring(blocks, parameters, relative, expected)
+    weighted = line_scoring.weighted
     shared_part = relative[:, 3]
     transfer_columns = relative[:, 0, :, None] * relative_columns(blocks.centre, parameters)
     coefficients = parameters.transfer.coefficients
@@ -185,8 +185,8 @@ def joint_scoring_point(
     )
     return JointScoringPoint(
         cost=likelihood_cost + 0.5 * float(coefficients @ prior_information @ coefficients),
-        own_score=own.score,
-        own_information=own.information,
+        own_score=line_scoring.score,
+        own_information=line_scoring.information,
         base_score=np.sum(shared_part * weighted_residual, axis=0),
         base_information=np.sum(blocks.weight * shared_part**2, axis=0) + WEAK_INFORMATION,
         coupling=weighted * shared_part[:, None],

@@ -205,8 +205,8 @@ def locked_folder(files: RunFolder, case: Case, **entries: object) -> Iterator[N
     require_writable(folder / MANIFEST)
     try:
         with filelock.FileLock(folder / LOCK, timeout=0):
-            for place in (".", *layout.subfolders):
-                for partial in (folder / place).glob(".*.part"):
+            for directory in (".", *layout.subfolders):
+                for partial in (folder / directory).glob(".*.part"):
                     partial.unlink(missing_ok=True)
             write_json(folder / MANIFEST, _manifest(files, case) | entries)
             yield

@@ -124,18 +124,18 @@ class OscillatingContact:
     def _solve(
         self, frequency_hz: float, tolerance: float, start: OscillationResponse | None
     ) -> DynamicStiffness:
-        answer = self.oscillating.answer(
+        result = self.oscillating.response(
             self.dimensionless_frequency(frequency_hz), tolerance=tolerance, start=start
         )
-        if not answer.left < 2.0 * tolerance:
+        if not result.residual < 2.0 * tolerance:
             raise AsperityError(
                 f"dynamic stiffness did not converge at {frequency_hz:g} Hz: residual "
-                f"{answer.left:.1e} after {answer.steps} steps, required {tolerance:.0e}"
+                f"{result.residual:.1e} after {result.steps} steps, required {tolerance:.0e}"
             )
-        return self._to_stiffness(answer, frequency_hz)
+        return self._to_stiffness(result, frequency_hz)
 
-    def _to_stiffness(self, answer: OscillationResponse, frequency_hz: float) -> DynamicStiffness:
-        response = self._response(complex(answer.total.sum()))
+    def _to_stiffness(self, result: OscillationResponse, frequency_hz: float) -> DynamicStiffness:
+        response = self._response(complex(result.total.sum()))
         omega = 2.0 * math.pi * frequency_hz
         return DynamicStiffness(
             frequency_hz=frequency_hz,
@@ -143,7 +143,7 @@ class OscillatingContact:
             damping=response.imag / omega if omega > 0.0 else math.nan,
             yielded=self.yielded,
             reference_depth=self.depth,
-            residual=answer.left,
+            residual=result.residual,
         )
 
     def _response(self, pressure_sum: complex) -> complex:
@@ -198,7 +198,7 @@ class OscillatingContact:
         while True:
             if sweep.count:
                 responses.append(self._response(sweep.sum))
-                if sweep.left <= (TRIAL_TOLERANCE if roughly else MIN_RESIDUAL) or (
+                if sweep.residual <= (TRIAL_TOLERANCE if roughly else MIN_RESIDUAL) or (
                     not roughly and _stagnated(responses, sweep)
                 ):
                     return responses[-1]
@@ -207,13 +207,13 @@ class OscillatingContact:
 
     def _finish(self, sweep: Shifted, frequency_hz: float) -> DynamicStiffness:
         """Return the result of a sweep, refined by rounds if its true residual is too large."""
-        answer = self.oscillating.swept(sweep)
+        result = self.oscillating.swept(sweep)
         if (
-            answer.left > max(RESIDUAL_MISMATCH * sweep.left, RESONANCE_TOLERANCE)
-            or sweep.left > MONITOR_FROM
+            result.residual > max(RESIDUAL_MISMATCH * sweep.residual, RESONANCE_TOLERANCE)
+            or sweep.residual > MONITOR_FROM
         ):
-            return self._solve(frequency_hz, RESONANCE_TOLERANCE, answer)
-        return self._to_stiffness(answer, frequency_hz)
+            return self._solve(frequency_hz, RESONANCE_TOLERANCE, result)
+        return self._to_stiffness(result, frequency_hz)
 
     def _smooth_stiffness(self) -> float:
         """Return the stiffness of the smooth dry bodies [N/m], the initial guess."""
@@ -304,11 +304,11 @@ def _resonance_hz(stiffness: float, mass: float) -> float:
 def _stagnated(responses: list[complex], sweep: Shifted) -> bool:
     """Return whether k and c have stagnated over the last steps at a sufficient residual."""
     monitored = max(MIN_MONITORED_STEPS, int(MONITORED_SHARE * sweep.count))
-    if sweep.left > MONITOR_FROM or len(responses) < monitored:
+    if sweep.residual > MONITOR_FROM or len(responses) < monitored:
         return False
-    *before, last = responses[-monitored:]
-    damping = max(abs(response.imag - last.imag) for response in before)
-    stiffness = max(abs(response.real - last.real) for response in before)
+    *earlier, last = responses[-monitored:]
+    damping = max(abs(response.imag - last.imag) for response in earlier)
+    stiffness = max(abs(response.real - last.real) for response in earlier)
     return damping <= max(
         STAGNATION * abs(last.imag), MIN_LOSS_FACTOR * abs(last)
     ) and stiffness <= STAGNATION * abs(last.real)

@@ -137,19 +137,19 @@ def _times(nx: int, dx: float, dy: float, drift: float, reach: float) -> tuple[F
     """
     first = FIRST_S * min(dx, dy)
     last = LAST_S * reach
-    ends = np.geomspace(first, last, int(np.ceil(np.log(last / first) / np.log(PANEL_RATIO))) + 1)
+    edges = np.geomspace(first, last, int(np.ceil(np.log(last / first) / np.log(PANEL_RATIO))) + 1)
     if drift != 0.0:
         drifted = [0.5 * dx]
         while drifted[-1] < (nx + 3.0) * dx:
             drifted.append(
                 drifted[-1] + max(0.5 * dx, MAX_DRIFT * math.sqrt(drifted[-1] / abs(drift)))
             )
-        ends = np.concatenate([ends, np.sqrt(np.array(drifted) / abs(drift))])
-    ends = np.concatenate([[0.0], np.unique(ends)])
-    node, share = np.polynomial.legendre.leggauss(NODES)
-    half = np.diff(ends) / 2.0
-    nodes = (ends[:-1] + half)[:, None] + half[:, None] * node
-    return nodes.ravel(), (half[:, None] * share).ravel()
+        edges = np.concatenate([edges, np.sqrt(np.array(drifted) / abs(drift))])
+    edges = np.concatenate([[0.0], np.unique(edges)])
+    node, weight = np.polynomial.legendre.leggauss(NODES)
+    half = np.diff(edges) / 2.0
+    nodes = (edges[:-1] + half)[:, None] + half[:, None] * node
+    return nodes.ravel(), (half[:, None] * weight).ravel()
 
 
 def _gaussian(x: Field, s: Field) -> Field:
@@ -235,9 +235,9 @@ def flash_temperature(
     )
     resistance, exchanging = _film_resistance(solution, thermal)
     bulk_1, bulk_2 = thermal.bulk_rise
-    passed = _heat_across_film(bodies, heat, resistance, exchanging, bulk_2 - bulk_1)
-    into_1 = 0.5 * heat + passed
-    into_2 = 0.5 * heat - passed
+    exchanged = _heat_across_film(bodies, heat, resistance, exchanging, bulk_2 - bulk_1)
+    into_1 = 0.5 * heat + exchanged
+    into_2 = 0.5 * heat - exchanged
     rise_1 = bodies[0](into_1)
     rise_2 = bodies[1](into_2)
     surface_1 = bulk_1 + rise_1

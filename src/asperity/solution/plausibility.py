@@ -188,10 +188,10 @@ def _of_solution(solution: ContactSolution) -> Iterator[str]:
         and (radii := ridge_radii(solution))
         and radii[1] > EDGE_RATIO * radii[0]
     ):
-        here, wider = (f"{1e6 * radius:.2g} um" for radius in radii)
+        narrow, wide = (f"{1e6 * radius:.2g} um" for radius in radii)
         yield (
-            f"The touching ridges are sharp edges: their radius along x is {here} on these cells "
-            f"and {wider} on cells twice as wide. CLR may therefore not converge with the grid; "
+            f"The touching ridges are sharp edges: their radius along x is {narrow} on these cells "
+            f"and {wide} on cells twice as wide. CLR may therefore not converge with the grid; "
             "its interval covers one refinement only."
         )
     if lubricant is not None and np.any(solution.surface.heights):
@@ -236,19 +236,19 @@ def ridge_radii(solution: ContactSolution) -> tuple[float, float] | None:
 def _reached_edges(solution: ContactSolution) -> str:
     """Return the grid edges that the contact reaches, within two cells."""
     touching = solution.in_contact
-    found = [
+    edges = [
         name
         for name, rows in (("inlet edge", touching[:2]), ("outlet edge", touching[-2:]))
         if rows.any()
     ]
-    ends = (
+    reaches_end = (
         max(abs(end) for end in (solution.grid.y[0], solution.grid.y[-1]))
         >= solution.conditions.end
     )
     if (
         not solution.grid.periodic[1]
-        and not ends
+        and not reaches_end
         and (touching[:, :2].any() or touching[:, -2:].any())
     ):
-        found.append("sides")
-    return " and ".join(found)
+        edges.append("sides")
+    return " and ".join(edges)

@@ -195,8 +195,8 @@ def far_from_fits(solution: ContactSolution) -> str | None:
 def _central(solution: ContactSolution, *, at_the_peak: bool) -> tuple[float, float]:
     """Return the central film [m] and the oil density there over the ambient one.
 
-    Mean over the middle tenth of the Hertz zone. In the rigid regimes it is the film under the
-    highest pressure, which the formulas call central there.
+    It is the mean over the middle tenth of the Hertz zone. In the rigid regimes it is the film
+    under the highest pressure, which the formulas call central there.
     """
     middle = hertz_zone(solution.conditions, solution.grid, CENTRE)
     if at_the_peak:

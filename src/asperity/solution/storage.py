@@ -102,11 +102,11 @@ def _history(dataset: "xarray.Dataset") -> tuple[Iteration, ...]:
 def _oil(dataset: "xarray.Dataset") -> Oil | None:
     if not set(OIL) <= set(dataset.variables):
         return None
-    return Oil(**{part: dataset[name].values for name, part in OIL.items()})
+    return Oil(**{attribute: dataset[name].values for name, attribute in OIL.items()})
 
 
 def _convergence(described: dict[str, Any], history: tuple[Iteration, ...]) -> Convergence:
-    rest: dict[str, Any] = {
+    values: dict[str, Any] = {
         name: value for name, value in described.items() if name not in ("status", *ERRORS)
     }
     errors: dict[str, Any] = dict.fromkeys(ERRORS)
@@ -117,4 +117,4 @@ def _convergence(described: dict[str, Any], history: tuple[Iteration, ...]) -> C
         # runs of earlier versions have no `lean`
         lean = Figures(**(half.pop("lean", None) or dict.fromkeys(half, 0.0)))
         errors["discretisation_error"] = GridError(**half, lean=lean)
-    return Convergence(**rest, **errors, status=SolveStatus(described["status"]), history=history)
+    return Convergence(**values, **errors, status=SolveStatus(described["status"]), history=history)

@@ -63,8 +63,8 @@ class StressTensor:
 
     @property
     def _second_invariant(self) -> Field:
-        apart = (self.xx - self.yy) ** 2 + (self.yy - self.zz) ** 2 + (self.zz - self.xx) ** 2
-        return np.asarray(apart / 6.0 + self.xy**2 + self.yz**2 + self.xz**2)
+        differences = (self.xx - self.yy) ** 2 + (self.yy - self.zz) ** 2 + (self.zz - self.xx) ** 2
+        return np.asarray(differences / 6.0 + self.xy**2 + self.yz**2 + self.xz**2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,9 +246,9 @@ def stress_below(
     BadInput
         for fields of another shape than the grid, or invalid depths.
     """
-    for name, given in (("pressure", pressure), ("shear", shear)):
-        if given is not None and given.shape != grid.cells:
-            raise BadInput(f"{name} must have the grid's shape {grid.cells}, got {given.shape}")
+    for name, values in (("pressure", pressure), ("shear", shear)):
+        if values is not None and values.shape != grid.cells:
+            raise BadInput(f"{name} must have the grid's shape {grid.cells}, got {values.shape}")
     depths = _checked_depths(depths)
     tractions = Tractions.from_fields(grid, pressure, shear)
     levels: _Levels = {}
@@ -321,8 +321,7 @@ def _largest_from(
 ) -> Peak:
     """Return the largest of a measure from a depth on, refined between depths by parabolas.
 
-    No refinement within a distance of less than a cell along x, where the cells limit the
-    resolution.
+    Depths are not refined to less than a cell along x, where the cells limit the resolution.
     """
     for _ in range(REFINEMENTS):
         depths = sorted(depth for depth in levels if depth >= min_depth)

@@ -40,7 +40,7 @@ IMAGE_REACH = 1.25  # distance along x [periods] beyond which images along y act
 class Tractions:
     """Transformed tractions on a grid: pressure, and pull along x on the body (None if absent).
 
-    In single precision, like the kernels: stresses to 1e-6, for half the time and memory.
+    They are in single precision, like the kernels: stresses to 1e-6, for half the time and memory.
     """
 
     grid: Grid
@@ -61,17 +61,17 @@ class Tractions:
         influence = _cached_influence if cache and nx * ny <= CACHED_CELLS else _influence
         kernels = influence(self.grid.cells, self.grid.spacing, repeats, depth, poisson_ratio)
         # columns of wavenumbers along y; the inverse transform takes the others as zero
-        reaching = kernels.shape[-1]
+        columns = kernels.shape[-1]
         stresses = np.empty((6, nx, ny), np.float32)
         for component, out in enumerate(stresses):
-            waves = np.zeros((2 * nx, reaching), self.pressure.dtype)
+            waves = np.zeros((2 * nx, columns), self.pressure.dtype)
             for traction, kernel, odd in zip(
                 (self.pressure, self.shear), kernels, ODD_IN_X, strict=True
             ):
                 if traction is not None:
                     turn = np.complex64(1j ** (odd[component] + ODD_IN_Y[component]))
                     _accumulate(
-                        waves, kernel[component], odd[component], turn * traction[:, :reaching]
+                        waves, kernel[component], odd[component], turn * traction[:, :columns]
                     )
             along_x = scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx]
             out[:] = scipy.fft.irfft(along_x, n=ny if repeats else 2 * ny, axis=1)[:, :ny]
@@ -122,8 +122,8 @@ def _influence(
     kernels[..., 0] = _to_waves(_strips(cells[0], spacing[0], depth, nu)[..., None], axis=-2)[
         ..., 0
     ]
-    reaching = int(np.flatnonzero(kernels.any(axis=(0, 1, 2)))[-1]) + 1
-    return kernels[..., :reaching].astype(np.float32)
+    columns = int(np.flatnonzero(kernels.any(axis=(0, 1, 2)))[-1]) + 1
+    return kernels[..., :columns].astype(np.float32)
 
 
 _cached_influence = lru_cache(maxsize=32)(_influence)
@@ -182,9 +182,9 @@ class _Corners(NamedTuple):
         xy = x * y
         r = np.sqrt(xx + yy + zz)
         in_xz, in_yz = xx + zz, yy + zz
-        turned = xy * (xx + yy) / (r + z)
-        angle_x = np.arctan2(turned, xx * r + yy * z)
-        angle_y = np.arctan2(turned, yy * r + xx * z)
+        numerator = xy * (xx + yy) / (r + z)
+        angle_x = np.arctan2(numerator, xx * r + yy * z)
+        angle_y = np.arctan2(numerator, yy * r + xx * z)
         log_x = np.arcsinh(x / np.sqrt(in_yz))
         log_y = np.arcsinh(y / np.sqrt(in_xz))
         return cls(x, y, z, r, in_xz, in_yz, angle_x, angle_y, log_x, log_y)
@@ -229,20 +229,20 @@ def _strips(count: int, dx: float, depth: float, nu: float) -> Field:
     angle = np.arctan2(x, z)
     beside = z * x / square
     below = z * z / square
-    nothing = np.zeros_like(x)
+    zero = np.zeros_like(x)
     edges = np.stack(
         [
             -angle + beside,
             -2.0 * nu * angle,
             -angle - beside,
-            nothing,
-            nothing,
+            zero,
+            zero,
             below,
             -np.log(square) - below,
             -nu * np.log(square),
             below,
-            nothing,
-            nothing,
+            zero,
+            zero,
             -angle + beside,
         ]
     )
@@ -267,10 +267,10 @@ def _images(cells: tuple[int, int], spacing: tuple[float, float], depth: float, 
     rectangles = _rectangles((reach, 2 * ny), spacing, depth, nu)
     kernels = np.zeros((2, 6, nx + 1, ny // 2 + 1))
     for traction, component in np.ndindex(2, 6):
-        given = rectangles[traction, component]
+        rectangle = rectangles[traction, component]
         odd = ODD_IN_Y[component]
-        ahead = given[:, :ny] + given[:, ny:-1]
-        behind = given[:, ny:0:-1] + given[:, :ny:-1]
+        ahead = rectangle[:, :ny] + rectangle[:, ny:-1]
+        behind = rectangle[:, ny:0:-1] + rectangle[:, :ny:-1]
         waves = scipy.fft.rfft(ahead - behind if odd else ahead + behind, axis=1)
         kernels[traction, component, : reach + 1] = waves.imag if odd else waves.real
     return _to_waves(kernels, axis=-2)
@@ -290,19 +290,19 @@ def _waves(cells: tuple[int, int], spacing: tuple[float, float], depth: float, n
     for wrap, columns in _padding_factors(cells, spacing):
         along = np.arange(wrap * nx // 2 + 1) * (2.0 * np.pi / (wrap * nx * dx))
         across = columns * (2.0 * np.pi / (ny * dy))
-        reaching = -np.log(NEGLIGIBLE) / depth
+        cutoff = -np.log(NEGLIGIBLE) / depth
         columns, across, along = (
-            columns[across < reaching],
-            across[across < reaching],
-            along[along < reaching],
+            columns[across < cutoff],
+            across[across < cutoff],
+            along[along < cutoff],
         )
         if columns.size == 0:
             continue
-        found = np.zeros((2, 6, wrap * nx // 2 + 1, columns.size))
-        found[..., : along.size, :] = _aliased(along, across, spacing, depth, nu)
+        waves = np.zeros((2, 6, wrap * nx // 2 + 1, columns.size))
+        waves[..., : along.size, :] = _aliased(along, across, spacing, depth, nu)
         if wrap > 2:  # evaluated on a longer domain with distant images, cut to the padded one
-            found = _to_waves(_to_cells(found)[..., : nx + 1, :], axis=-2)
-        kernels[..., columns] = found
+            waves = _to_waves(_to_cells(waves)[..., : nx + 1, :], axis=-2)
+        kernels[..., columns] = waves
     return kernels
 
 
@@ -401,9 +401,9 @@ def _by_parity(
     out = np.zeros_like(values)
     inner = (slice(None), slice(1, -1)) if axis == -1 else (slice(1, -1), slice(None))
     for traction, component in np.ndindex(2, 6):
-        given = values[traction, component]
+        block = values[traction, component]
         if odd[traction][component]:
-            out[traction, component][inner] = -odd_transform(given[inner], type=1, axis=axis)
+            out[traction, component][inner] = -odd_transform(block[inner], type=1, axis=axis)
         else:
-            out[traction, component] = even_transform(given, type=1, axis=axis)
+            out[traction, component] = even_transform(block, type=1, axis=axis)
     return out

@@ -51,11 +51,11 @@ def bearing_curve(heights: Field) -> BearingCurve:
     >>> f"{np.interp(0.2, curve.share, curve.height) * 1e6:.2f} um at 20 % of the area"
     '0.83 um at 20 % of the area'
     """
-    known = heights[np.isfinite(heights)]
+    finite = heights[np.isfinite(heights)]
     share = np.linspace(0.0, 1.0, _POINTS)
-    ordered = np.sort(known - known.mean(), axis=None)  # np.quantile is fifty times slower
+    ordered = np.sort(finite - finite.mean(), axis=None)  # np.quantile is fifty times slower
     return BearingCurve(
-        share, np.interp((1.0 - share) * (known.size - 1), np.arange(known.size), ordered)
+        share, np.interp((1.0 - share) * (finite.size - 1), np.arange(finite.size), ordered)
     )
 
 

@@ -134,22 +134,22 @@ def level(measured: MeasuredSurface, form: Form) -> tuple[MeasuredSurface, str]:
         The form is unknown, or fewer cells are valid than the form has terms.
     """
     require_choice("form", form, get_args(Form))
-    known = np.isfinite(measured.heights)
-    if np.count_nonzero(known) < 15:
+    finite = np.isfinite(measured.heights)
+    if np.count_nonzero(finite) < 15:
         raise BadInput(
             f"{measured.name} has too few valid heights to remove a {form} form; use form none or "
             "measure again"
         )
-    offset = np.mean(measured.heights[known])  # centimetres in some files: bad for least squares
+    offset = np.mean(measured.heights[finite])  # centimetres in some files: bad for least squares
     heights = measured.heights - offset
     detail = ""
     if form == "cylinder":
-        shape, radius = _cylinder(measured, heights, known)
+        shape, radius = _cylinder(measured, heights, finite)
         detail = f" of {length_text(abs(radius))} radius{'' if radius > 0.0 else ', hollow'},"
     else:
-        shape = _polynomial(heights, known, _DEGREES[form])
+        shape = _polynomial(heights, finite, _DEGREES[form])
     residual = heights - shape
-    levelled = replace(measured, heights=residual - np.mean(residual[known]))
+    levelled = replace(measured, heights=residual - np.mean(residual[finite]))
     if form == "none":
         return levelled, "removed the mean height and no form"
     height = length_text(float(np.ptp(shape)))
@@ -160,15 +160,15 @@ def level(measured: MeasuredSurface, form: Form) -> tuple[MeasuredSurface, str]:
     )
 
 
-def _polynomial(heights: Field, known: Mask, degree: int) -> Field:
+def _polynomial(heights: Field, finite: Mask, degree: int) -> Field:
     x, y = np.meshgrid(*(np.linspace(-1.0, 1.0, n) for n in heights.shape), indexing="ij")
     powers = [(i, total - i) for total in range(degree + 1) for i in range(total, -1, -1)]
     terms = np.stack([x**i * y**j for i, j in powers], axis=-1)
-    coefficients, *_ = np.linalg.lstsq(terms[known], heights[known], rcond=None)
+    coefficients, *_ = np.linalg.lstsq(terms[finite], heights[finite], rcond=None)
     return np.asarray(terms @ coefficients)
 
 
-def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[Field, float]:
+def _cylinder(measured: MeasuredSurface, heights: Field, finite: Mask) -> tuple[Field, float]:
     """Fit a cylinder by least squares of height; return its heights and radius [m] (hollow: < 0).
 
     At the distance w from the axis the height is z0 + t v - sqrt(1 + t^2) (R - sqrt(R^2 - w^2)),
@@ -177,7 +177,7 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
     grid = measured.grid
     scale = max(grid.extent) / 2.0
     x, y = np.meshgrid(grid.x / scale, grid.y / scale, indexing="ij")
-    coarse = np.flatnonzero(known)[:: max(1, np.count_nonzero(known) // _MAX_FIT_POINTS)]
+    coarse = np.flatnonzero(finite)[:: max(1, np.count_nonzero(finite) // _MAX_FIT_POINTS)]
     at_x = x.flat[coarse]
     at_y = y.flat[coarse]
     z = heights.flat[coarse] / scale
@@ -241,25 +241,25 @@ def find_outliers(measured: MeasuredSurface) -> Mask:
 
     Differences are measured in their robust standard deviation over the map.
     """
-    known = np.isfinite(measured.heights)
-    heights = np.where(known, measured.heights, np.nanmedian(measured.heights))
+    finite = np.isfinite(measured.heights)
+    heights = np.where(finite, measured.heights, np.nanmedian(measured.heights))
     size = [1 if axis == measured.uniform else _NEIGHBOURHOOD for axis in range(2)]
     difference = np.abs(
         measured.heights - scipy.ndimage.median_filter(heights, size=size, mode="nearest")
     )
     deviation = 1.4826 * float(np.nanmedian(difference))
     return (
-        np.asarray(known & (np.nan_to_num(difference) > _OUTLIER_THRESHOLD * deviation))
+        np.asarray(finite & (np.nan_to_num(difference) > _OUTLIER_THRESHOLD * deviation))
         if deviation > 0.0
-        else known & False
+        else finite & False
     )
 
 
 def _low_pass(measured: MeasuredSurface, cutoff: float) -> Field:
     """Return the waviness: the Gaussian mean over valid cells, truncated at the edges."""
-    known = np.isfinite(measured.heights)
-    weighted = np.where(known, measured.heights, 0.0)
-    weights = known.astype(np.float64)
+    finite = np.isfinite(measured.heights)
+    weighted = np.where(finite, measured.heights, 0.0)
+    weights = finite.astype(np.float64)
     for axis, pixel in enumerate(measured.grid.spacing):
         if axis != measured.uniform:
             sigma = SIGMA_OVER_CUTOFF * cutoff / pixel
@@ -267,4 +267,4 @@ def _low_pass(measured: MeasuredSurface, cutoff: float) -> Field:
                 scipy.ndimage.gaussian_filter1d(field, sigma, axis=axis, mode="constant")
                 for field in (weighted, weights)
             )
-    return np.where(known, weighted / np.where(known, weights, 1.0), np.nan)
+    return np.where(finite, weighted / np.where(finite, weights, 1.0), np.nan)

@@ -319,9 +319,9 @@ def _filtered_noise(
     waves = np.fft.fft2(noise) * amplitude(*np.ix_(kx, ky)) * _cell_centre_phases(kx, ky, grid)
     waves[0, 0] = 0.0  # zero mean
     resolved = [np.abs(m) < cells / 2.0 for m, cells in zip(modes, grid.cells, strict=True)]
-    kept = np.ix_(*(m[inside] for m, inside in zip(modes, resolved, strict=True)))
+    retained = np.ix_(*(m[inside] for m, inside in zip(modes, resolved, strict=True)))
     spectrum = np.zeros(grid.cells, dtype=complex)
-    spectrum[kept] = waves[np.ix_(*resolved)]
+    spectrum[retained] = waves[np.ix_(*resolved)]
     return Surface.scaled(np.fft.ifft2(spectrum).real, grid, sq)
 
 

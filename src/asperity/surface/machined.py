@@ -100,20 +100,20 @@ def ground_surface(
     )
     steep = abs(np.sin(direction)) > abs(np.cos(direction))
     if steep:  # swap the axes, so that grooves run mainly along x
-        turned = Grid(grid.cells[::-1], grid.lower[::-1], grid.upper[::-1], grid.periodic[::-1])
+        layout = Grid(grid.cells[::-1], grid.lower[::-1], grid.upper[::-1], grid.periodic[::-1])
         direction = np.pi / 2.0 - direction
     else:
-        turned = grid
+        layout = grid
     count = max(
         1,
         round(
             _GROOVES_PER_POINT * grid.extent[0] * grid.extent[1] / (groove_width * groove_length)
         ),
     )
-    centres = rng.random((count, 2)) * turned.extent
+    centres = rng.random((count, 2)) * layout.extent
     root_depths = np.sqrt(rng.exponential(size=count))  # proportional to the widths
     widths = groove_width * root_depths / np.mean(root_depths)
-    field = _cut_grooves(turned, _Grooves(centres, root_depths, widths, groove_length, direction))
+    field = _cut_grooves(layout, _Grooves(centres, root_depths, widths, groove_length, direction))
     return Surface.scaled(field.T if steep else field, grid, sq)
 
 

@@ -116,14 +116,14 @@ class MovingSurfaces:
         """
         surface = (self.first, self.second)[index]
         cells = self.speeds[index] * time / self.grid.spacing[0]
-        whole, part = round(cells), 0.0
-        if abs(cells - whole) >= WHOLE_CELL_TOLERANCE:
-            whole = int(np.floor(cells))
-            part = cells - whole
+        shift, fraction = round(cells), 0.0
+        if abs(cells - shift) >= WHOLE_CELL_TOLERANCE:
+            shift = int(np.floor(cells))
+            fraction = cells - shift
         track = np.zeros(surface.grid.cells)
         track[: self.grid.cells[0]] = field if index == 0 else field[:, ::-1]
-        shifted = np.roll(track, -whole, axis=0)
-        return np.asarray((1.0 - part) * shifted + part * np.roll(shifted, -1, axis=0))
+        shifted = np.roll(track, -shift, axis=0)
+        return np.asarray((1.0 - fraction) * shifted + fraction * np.roll(shifted, -1, axis=0))
 
     def passage_time(self, index: int) -> float:
         """Return the time of one passage of the track of surface 0 or 1 [s]; infinite at rest."""
@@ -145,9 +145,9 @@ class MovingSurfaces:
 
 def shift_periodic(heights: Field, cells: float, spectrum: ComplexField) -> Field:
     """Shift periodic heights by a number of cells along axis 0; `spectrum` is their rfft."""
-    whole = round(cells)
-    if abs(cells - whole) < WHOLE_CELL_TOLERANCE:
-        return np.roll(heights, whole, axis=0)
+    nearest = round(cells)
+    if abs(cells - nearest) < WHOLE_CELL_TOLERANCE:
+        return np.roll(heights, nearest, axis=0)
     count = heights.shape[0]
     wave = np.arange(spectrum.shape[0])
     phase = np.exp(-2j * np.pi * np.mod(wave * (cells / count), 1.0))

@@ -108,9 +108,9 @@ class SurfaceDescription:
 
 def _by_key(parameters: SurfaceParameters | ProfileParameters) -> JsonObject:
     """Return parameters by their keys in the catalogue, where lengths end in _m; None for nan."""
-    known = catalogue()
+    keys = catalogue()
     return {
-        f"{name}_m" if f"{name}_m" in known else name.rstrip("_"): value if value == value else None
+        f"{name}_m" if f"{name}_m" in keys else name.rstrip("_"): value if value == value else None
         for name, value in asdict(parameters).items()
     }
 
@@ -314,16 +314,16 @@ def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]
         n if periodic else scipy.fft.next_fast_len(n + m, real=True)
         for n, m, periodic in zip(grid.cells, reach, grid.periodic, strict=True)
     ]
-    known = np.isfinite(heights)
+    finite = np.isfinite(heights)
     sums = scipy.fft.irfft2(
-        np.abs(scipy.fft.rfft2(np.where(known, heights, 0.0), shape)) ** 2, shape
+        np.abs(scipy.fft.rfft2(np.where(finite, heights, 0.0), shape)) ** 2, shape
     )
     lags = np.ix_(*(np.arange(-m, m + 1) % size for m, size in zip(reach, shape, strict=True)))
-    if known.all():
+    if finite.all():
         pairs = np.outer(*map(_pairs, grid.cells, reach, grid.periodic))
     else:
         pairs = np.rint(
-            scipy.fft.irfft2(np.abs(scipy.fft.rfft2(known.astype(float), shape)) ** 2, shape)
+            scipy.fft.irfft2(np.abs(scipy.fft.rfft2(finite.astype(float), shape)) ** 2, shape)
         )[lags]
     means = np.divide(sums[lags], pairs, out=np.zeros_like(pairs), where=pairs > 0)
     return means / means[reach], reach
@@ -341,13 +341,13 @@ def _pairs(cells: int, reach: int, periodic: bool) -> Field:
 def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:
     """Return Sal, Str, and true if Str is only an upper bound."""
     correlation, middle = _autocorrelation(heights, grid)
-    distances, ends = _decay(
+    distances, lengths = _decay(
         correlation, middle, grid, np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS, _DECAY_THRESHOLD
     )
     if np.isnan(distances).all():
         return float("nan"), float("nan"), False
     shortest = float(np.nanmin(distances))
-    longest = float(np.max(np.where(np.isnan(distances), ends, distances)))
+    longest = float(np.max(np.where(np.isnan(distances), lengths, distances)))
     return shortest, shortest / longest, bool(np.isnan(distances).any())
 
 
@@ -358,15 +358,15 @@ def _decay(
     cosines = np.cos(angles)[:, None] / grid.spacing[0]
     sines = np.sin(angles)[:, None] / grid.spacing[1]
     # a ray ends at the largest lag; its samples are at most half a cell apart
-    ends = 1.0 / np.maximum(np.abs(cosines) / middle[0], np.abs(sines) / middle[1])
-    radii = np.linspace(0.0, 1.0, 4 * max(middle) + 1) * ends
+    lengths = 1.0 / np.maximum(np.abs(cosines) / middle[0], np.abs(sines) / middle[1])
+    radii = np.linspace(0.0, 1.0, 4 * max(middle) + 1) * lengths
     along = scipy.ndimage.map_coordinates(
         correlation,
         [middle[0] + radii * cosines, middle[1] + radii * sines],
         order=3,
         mode="nearest",
     )
-    return _first_below(along, radii, threshold), ends[:, 0]
+    return _first_below(along, radii, threshold), lengths[:, 0]
 
 
 def _first_below(along: Field, radii: Field, threshold: float) -> Field:

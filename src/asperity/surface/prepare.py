@@ -111,12 +111,12 @@ def prepare_surface(
     heights, filling = _fill(heights, levelled, max_missing)
     heights, resampling = _resample(heights, positions, levelled.grid, grid, overlap)
     steps = [*conditioning_steps, fitting, filling, resampling]
-    for axis, (cells, shared) in enumerate(zip(grid.cells, overlap, strict=True)):
-        if shared:
+    for axis, (cells, overlap_cells) in enumerate(zip(grid.cells, overlap, strict=True)):
+        if overlap_cells:
             before = _height_statistics(heights, grid)
-            heights = _blend_ends(heights, axis, cells, shared)
+            heights = _blend_ends(heights, axis, cells, overlap_cells)
             after = _height_statistics(heights, grid)
-            steps.append(_blending_step(axis, shared, levelled, grid, before, after))
+            steps.append(_blending_step(axis, overlap_cells, levelled, grid, before, after))
     heights, scaling = _scale(heights - heights.mean(), sq, measured.name)
     return PreparedSurface(Surface(heights, grid), (*steps, scaling))
 
@@ -154,10 +154,10 @@ def _overlap(measured: MeasuredSurface, grid: Grid) -> tuple[int, ...]:
 def _place_centres(measured: MeasuredSurface, grid: Grid) -> list[tuple[float, float]]:
     """Return centres of parts side by side, relative to the map's centre [m], nearest first."""
     steps, counts = [], []
-    for axis, (side, cell, shared) in enumerate(
+    for axis, (side, cell, overlap_cells) in enumerate(
         zip(grid.extent, grid.spacing, _overlap(measured, grid), strict=True)
     ):
-        step = side + shared * cell
+        step = side + overlap_cells * cell
         extent = measured.grid.extent[axis]
         steps.append(step)
         counts.append(  # to either side
@@ -219,7 +219,7 @@ def _cut(
     """Return the part that resampling needs, mirrored beyond the edges, and its positions [m]."""
     indices: list[npt.NDArray[np.intp]] = []
     positions: list[Field] = []
-    for n, pixel, extent, cell, shared, offset in zip(
+    for n, pixel, extent, cell, overlap_cells, offset in zip(
         measured.grid.cells,
         measured.grid.spacing,
         grid.extent,
@@ -228,7 +228,7 @@ def _cut(
         centre,
         strict=True,
     ):
-        half = (extent + shared * cell) / 2.0
+        half = (extent + overlap_cells * cell) / 2.0
         margin = 1 + int(np.ceil(_LOBES * max(pixel, cell) / pixel))  # range of the sinc
         reach = int(np.ceil(half / pixel)) + margin
         shift = round(offset / pixel)
@@ -265,10 +265,10 @@ def _resample(
 ) -> tuple[Field, str]:
     """Interpolate band-limited along each axis, onto the grid and `overlap` additional cells."""
     shortest = []
-    for axis, (n, shared, pixel, cell) in enumerate(
+    for axis, (n, overlap_cells, pixel, cell) in enumerate(
         zip(grid.cells, overlap, source.spacing, grid.spacing, strict=True)
     ):
-        centres = (np.arange(n + shared) + 0.5 - (n + shared) / 2.0) * cell
+        centres = (np.arange(n + overlap_cells) + 0.5 - (n + overlap_cells) / 2.0) * cell
         step = max(pixel, cell)
         t = (centres[:, None] - positions[axis][None, :]) / step
         weights = np.sinc(t) * np.i0(_KAISER * np.sqrt(np.maximum(1.0 - (t / _LOBES) ** 2, 0.0)))
@@ -284,41 +284,41 @@ def _resample(
     )
 
 
-def _blend_ends(heights: Field, axis: int, cells: int, shared: int) -> Field:
+def _blend_ends(heights: Field, axis: int, cells: int, overlap_cells: int) -> Field:
     """Blend the cells after the last one into the first ones, so that the surface is periodic.
 
     The weights preserve the variance for any correlation rho of the two ends: w1^2 + w2^2 + 2 rho
     w1 w2 = 1.
     """
     rows = np.moveaxis(heights, axis, 0)
-    start = rows[:shared]
-    beyond = rows[cells : cells + shared]
+    start = rows[:overlap_cells]
+    extra = rows[cells : cells + overlap_cells]
     rho = float(
         np.clip(
-            np.mean(start * beyond) / max(np.std(start) * np.std(beyond), np.finfo(float).tiny),
+            np.mean(start * extra) / max(np.std(start) * np.std(extra), np.finfo(float).tiny),
             -0.5,
             1.0,
         )
     )
-    t = (np.arange(shared) + 0.5)[:, None] / shared
-    own = t * t * (3.0 - 2.0 * t)
-    other = 1.0 - own
+    t = (np.arange(overlap_cells) + 0.5)[:, None] / overlap_cells
+    weight = t * t * (3.0 - 2.0 * t)
+    complement = 1.0 - weight
     closed = rows[:cells].copy()
-    closed[:shared] = (own * start + other * beyond) / np.sqrt(
-        own**2 + other**2 + 2.0 * rho * own * other
+    closed[:overlap_cells] = (weight * start + complement * extra) / np.sqrt(
+        weight**2 + complement**2 + 2.0 * rho * weight * complement
     )
     return np.moveaxis(closed, 0, axis)
 
 
 def _blending_step(
     axis: int,
-    shared: int,
+    overlap_cells: int,
     measured: MeasuredSurface,
     grid: Grid,
     before: "_HeightStatistics",
     after: "_HeightStatistics",
 ) -> str:
-    length = shared * grid.spacing[axis]
+    length = overlap_cells * grid.spacing[axis]
     spare = measured.grid.extent[axis] - grid.extent[axis]
     mirrored = "" if spare >= length else ", mirrored beyond the edge of the map,"
     return (

@@ -58,10 +58,10 @@ def profile_parameters(heights: Field, spacing: float) -> ProfileParameters:
     """
     z = heights - np.nanmean(heights)
     rq = float(np.sqrt(np.nanmean(z**2)))
-    known = [section[np.isfinite(section)] for section in np.array_split(z, SECTIONS)]
-    known = [section for section in known if section.size]
-    rp = float(np.mean([section.max() for section in known]))
-    rv = float(np.mean([-section.min() for section in known]))
+    sections = [section[np.isfinite(section)] for section in np.array_split(z, SECTIONS)]
+    sections = [section for section in sections if section.size]
+    rp = float(np.mean([section.max() for section in sections]))
+    rv = float(np.mean([-section.min() for section in sections]))
     core = core_heights(bearing_curve(z))
     return ProfileParameters(
         ra=float(np.nanmean(np.abs(z))),

@@ -186,12 +186,12 @@ def _scales(
     """Return metres per unit of height and per unit of length, from the file or else the caller."""
     convert = surface_topography().Support.UnitConversion.get_unit_conversion_factor
 
-    def metres(given: str) -> float:
+    def metres(unit_name: str) -> float:
         try:
-            return float(convert(given.replace("um", "µm"), "m"))
+            return float(convert(unit_name.replace("um", "µm"), "m"))
         except (ValueError, KeyError) as error:
             raise BadInput(
-                f"{name} cannot have the unit {given!r}; use a length such as nm, um, mm or m"
+                f"{name} cannot have the unit {unit_name!r}; use a length such as nm, um, mm or m"
             ) from error
 
     if stated is not None:
@@ -218,7 +218,7 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
     suffixes = {
         reader.format(): set(reader.file_extensions()) for reader in surface_topography().IO.readers
     }
-    formats = [form for form, known in suffixes.items() if suffix in known]
+    formats = [form for form, extensions in suffixes.items() if suffix in extensions]
     if not formats and suffix not in TABLES:
         result = _try_formats(path, [None])
         if isinstance(result, RawMap):
@@ -294,10 +294,10 @@ def _format_of(path: Path) -> str | None:
             form = str(surface_topography().open_topography(str(path)).format())
         except Exception:  # noqa: BLE001 - as above
             form = ""
-        for known in () if form else ("x3p", "sdf"):
+        for candidate in () if form else ("x3p", "sdf"):
             with suppress(Exception):
-                _LAST_RESORTS[known](path)
-                return known
+                _LAST_RESORTS[candidate](path)
+                return candidate
     return form if form and form not in _UNMARKED | _TEXT else None
 
 

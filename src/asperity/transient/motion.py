@@ -178,10 +178,10 @@ class _TransientContact:
         balance = self._balance(problem, unknowns)
         if not steady:  # cells in dry contact get the contact film
             gap = np.maximum(solution.gap, self.options.contact_film)
-            nothing = np.zeros_like(solution.gap)
+            zero = np.zeros_like(solution.gap)
             solution = replace(solution, gap=gap)
             if self.options.model in TWO_PRESSURES:
-                full = Oil(content=np.ones_like(nothing), pressure=nothing, growth=nothing)
+                full = Oil(content=np.ones_like(zero), pressure=zero, growth=zero)
                 solution = replace(solution, oil=full)
         memory = {} if not steady else {"content_before": balance.content}
         return self._snapshot(0, solution, balance, approach, memory, self.surfaces)
@@ -193,8 +193,8 @@ class _TransientContact:
         if self.flattening:
             surfaces = surfaces.lowered(memory["lowered_first"], memory["lowered_second"])
         surface = surfaces.composite_at(number * self.seconds)
-        whole = self._problem(surface, self._past(memory))
-        problem = _on_one_line(whole) if self.one_line else whole
+        full_problem = self._problem(surface, self._past(memory))
+        problem = _on_one_line(full_problem) if self.one_line else full_problem
         search, step, attempt = self._search(problem, self._initial_guess(memory, problem))
         solution = search.solution(
             step,
@@ -206,13 +206,13 @@ class _TransientContact:
         )
         balance = step.balance
         if self.one_line:
-            across = whole.cells[1]
+            across = full_problem.cells[1]
             unknowns = Pressures(
                 np.repeat(balance.oil_pressure, across, axis=1),
                 np.repeat(balance.pressure, across, axis=1),
                 step.approach,
             )
-            balance = self._balance(whole, unknowns)
+            balance = self._balance(full_problem, unknowns)
         carried_memory = {"content_before": memory["content"]}
         carried_memory |= {name: memory[name] for name in _LOWERED if self.flattening}
         return self._snapshot(number, solution, balance, step.approach, carried_memory, surfaces)
@@ -240,11 +240,11 @@ class _TransientContact:
             return mixed, mixed.continue_from(problem, unknowns), ATTEMPTS[0]
         search = Search(self.options, self.scales.gap, None)
         # if Newton's method fails: at fixed approach, found by bracketing
-        for held in (False, True):
-            step = search.solve_levels([problem], unknowns.total, unknowns.approach, fixed=held)
+        for fixed in (False, True):
+            step = search.solve_levels([problem], unknowns.total, unknowns.approach, fixed=fixed)
             if search.converged(self.options.tolerance):
                 break
-        return search, step, HELD_APPROACH if held else ATTEMPTS[0]
+        return search, step, HELD_APPROACH if fixed else ATTEMPTS[0]
 
     def _balance(self, problem: Problem, unknowns: Pressures) -> Balance | MixedBalance:
         if self.options.model in TWO_PRESSURES:
@@ -332,10 +332,10 @@ class _TransientContact:
             memory=memory,
         )
 
-    def _lowered(self, overlap: Field, before: Memory, time_s: float) -> dict[str, Field]:
+    def _lowered(self, overlap: Field, memory: Memory, time_s: float) -> dict[str, Field]:
         """Return how far both tracks are lowered, after another overlap [m] in the contact."""
         return {
-            name: before.get(name, 0.0)
+            name: memory.get(name, 0.0)
             + self.surfaces.project_on_track(index, self.shares[index] * overlap, time_s)
             for index, name in enumerate(_LOWERED)
         }
@@ -384,10 +384,10 @@ def _powers(balance: Balance | MixedBalance) -> tuple[float, float]:
         * (np.roll(pressure, -1, axis=1) - pressure) ** 2
         * (separated & np.roll(separated, -1, axis=1))
     )
-    ends = 2.0 * (
+    boundary = 2.0 * (
         faces.inlet * pressure[0] ** 2 * separated[0]
         + faces.east[-1] * pressure[-1] ** 2 * separated[-1]
     )
-    flow = float((along.sum() + ends.sum()) / dx**2 + across.sum() / dy**2) * dx * dy
+    flow = float((along.sum() + boundary.sum()) / dx**2 + across.sum() / dy**2) * dx * dy
     total = balance.pressure
     return flow, 0.5 * float((total * problem.deflection(total)).sum()) * dx * dy

@@ -242,29 +242,29 @@ def _moves_at(assessed: _Assessment, x: float) -> bool:
 
 def _averaged_repeats(x: Field, values: Field, rows: Field) -> tuple[Field, list[Field]]:
     """Average values and condition rows over repeats at one x; leave out unknown ones."""
-    known = (
+    finite = (
         np.isfinite(values) & np.isfinite(rows).all(axis=0) if len(rows) else np.isfinite(values)
     )
-    if not known.any():
+    if not finite.any():
         return x[:0], [values[:0], *rows[:, :0]]
-    distinct, index = np.unique(x[known], return_inverse=True)
+    distinct, index = np.unique(x[finite], return_inverse=True)
     repeats = np.bincount(index)
-    return distinct, [np.bincount(index, row[known]) / repeats for row in (values, *rows)]
+    return distinct, [np.bincount(index, row[finite]) / repeats for row in (values, *rows)]
 
 
 def _explained_by_conditions(series: MonitoredSeries, first: int) -> str:
     """Describe a change that operating conditions explain; empty where they do not."""
     _, fitted = series.at_baseline_conditions(first)
     values = np.log(series.values[first:]) if series.relative else series.values[first:]
-    known = np.isfinite(values) & np.isfinite(fitted.rows).all(axis=0)
-    if not fitted.names or known.sum() < BASELINE_POINTS:
+    finite = np.isfinite(values) & np.isfinite(fitted.rows).all(axis=0)
+    if not fitted.names or finite.sum() < BASELINE_POINTS:
         return ""
     change, effect = (
         float(
-            np.median(part[known][-LATEST_RECORDINGS:])
-            - np.median(part[known][:BASELINE_RECORDINGS])
+            np.median(series_values[finite][-LATEST_RECORDINGS:])
+            - np.median(series_values[finite][:BASELINE_RECORDINGS])
         )
-        for part in (values, fitted.effect)
+        for series_values in (values, fitted.effect)
     )
     smallest = series.smallest_change
     if abs(effect) < REPORTED_SHARE * smallest:
@@ -272,7 +272,7 @@ def _explained_by_conditions(series: MonitoredSeries, first: int) -> str:
     if abs(change - effect) > REPORTED_SHARE * max(abs(change), smallest):
         return ""
     words = " and ".join(
-        _condition_change(condition, first, known)
+        _condition_change(condition, first, finite)
         for condition in series.conditions
         if condition.name in fitted.names
     )
@@ -283,11 +283,11 @@ def _explained_by_conditions(series: MonitoredSeries, first: int) -> str:
     )
 
 
-def _condition_change(condition: Condition, first: int, known: Mask) -> str:
+def _condition_change(condition: Condition, first: int, finite: Mask) -> str:
     """Describe how a condition changed from the baseline to the latest recordings."""
-    shown = condition.shown[first:][known]
+    data = condition.shown[first:][finite]
     before, now = (
-        float(np.median(part)) for part in (shown[:BASELINE_RECORDINGS], shown[-LATEST_RECORDINGS:])
+        float(np.median(part)) for part in (data[:BASELINE_RECORDINGS], data[-LATEST_RECORDINGS:])
     )
     return f"{condition.name} from {before:.4g} to {now:.4g} {condition.unit}"
 

@@ -100,15 +100,15 @@ def averaged_points(x: Field, y: Field, y_std: Field, x_std: Field) -> SeriesPoi
         return np.asarray(np.bincount(index, values) / count)
 
     means, centre = mean(y), mean(x)
-    given = mean(y_std**2)
+    variance = mean(y_std**2)
     degrees = y.size - count.size
     if degrees > 0:
         excess = (
             float(np.sum((y - means[index]) ** 2)) / degrees
-            - float(np.sum(given * (count - 1.0))) / degrees
+            - float(np.sum(variance * (count - 1.0))) / degrees
         )
-        given = given + max(excess, 0.0)
-    return SeriesPoints(centre, mean(x_std), means, given / count)
+        variance = variance + max(excess, 0.0)
+    return SeriesPoints(centre, mean(x_std), means, variance / count)
 
 
 def _scatters(points: SeriesPoints) -> Field:
@@ -184,15 +184,15 @@ def _fit(candidate: _Candidate, points: SeriesPoints, scatters: Field) -> ModelF
     )  # (bends, points, linear), the first of them a constant
     mean = float(np.mean(points.y))
     products = _products(columns, points.y - mean)
-    own = np.tile(
+    variance = np.tile(
         points.variance + scatters[:, None] ** 2, (len(CORRELATIONS), 1)
     )  # (scatters, points)
     correlation = np.repeat(CORRELATIONS, scatters.size)
-    precision = _precision(own, correlation)
+    precision = _precision(variance, correlation)
     linear, squares, determinant = _least_squares(precision, products, columns.shape[-1])
     for _ in range(SLOPE_ITERATIONS if np.any(points.x_std > 0.0) else 0):
         steepness = linear @ np.swapaxes(slopes, 1, 2)
-        precision = _precision(own + (steepness * points.x_std) ** 2, correlation)
+        precision = _precision(variance + (steepness * points.x_std) ** 2, correlation)
         linear, squares, determinant = _least_squares(precision, products, columns.shape[-1])
     likelihood = np.log(np.repeat(CORRELATION_PRIOR, scatters.size)) - 0.5 * (
         squares + precision.log_determinant
@@ -256,8 +256,8 @@ def _products(columns: Field, y: Field) -> Field:
 def _least_squares(precision: _Precision, products: Field, size: int) -> tuple[Field, Field, Field]:
     """Solve for `size` columns: coefficients, squared residual, ln det of the information.
 
-    Coefficients have shape (bends, scatters, linear). Eliminates all normal equations at once, y's
-    row last: LAPACK would take thousands of such small systems one by one.
+    Coefficients have shape (bends, scatters, linear). All normal equations are eliminated at once,
+    y's row last: LAPACK would take thousands of such small systems one by one.
     """
     rows = _normal_equations(precision, products, size)
     for i in range(size):
@@ -265,11 +265,11 @@ def _least_squares(precision: _Precision, products: Field, size: int) -> tuple[F
             rows[j, i + 1 :] -= rows[j, i] / rows[i, i] * rows[i, i + 1 :]
     linear = np.empty((*rows.shape[2:], size))
     for i in reversed(range(size)):
-        known = sum(
+        solved_terms = sum(
             (rows[i, j] * linear[..., j] for j in range(i + 1, size)),
             start=np.zeros(rows.shape[2:]),
         )
-        linear[..., i] = (rows[i, size] - known) / rows[i, i]
+        linear[..., i] = (rows[i, size] - solved_terms) / rows[i, i]
     diagonal = np.arange(size)
     return linear, rows[size, size], np.sum(np.log(rows[diagonal, diagonal]), axis=0)
 
@@ -292,9 +292,9 @@ def sudden_bend(x: Field, crfa: Field, x_std: Field, breaks: Field) -> Field:
 
     Smooth growth of CRFA carries no information about the break.
     """
-    known = np.isfinite(crfa) & (crfa > 0.0)
+    finite = np.isfinite(crfa) & (crfa > 0.0)
     points = averaged_points(
-        x[known], np.log(crfa[known]), np.zeros(int(np.sum(known))), x_std[known]
+        x[finite], np.log(crfa[finite]), np.zeros(int(np.sum(finite))), x_std[finite]
     )
     if points.x.size < FEWEST_STAGE_POINTS:
         return np.zeros(breaks.size)

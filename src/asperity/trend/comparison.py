@@ -1,6 +1,6 @@
 """Comparability of the recordings of a series, and the asperity load share implied by CRF.
 
-Knows neither files nor machines: callers describe recordings as `RecordingFacts`.
+This module knows neither files nor machines: callers describe recordings as `RecordingFacts`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -135,25 +135,25 @@ def _differing_numbers(series: Sequence[RecordingFacts]) -> Iterator[str]:
         ),
     )
     for quantity, unit, values, remedy in numbers:
-        known = [
+        stated = [
             (value, facts.name)
             for value, facts in zip(values, series, strict=True)
             if value is not None
         ]
-        if not known:
+        if not stated:
             continue
-        low, high = min(known), max(known)
+        low, high = min(stated), max(stated)
         if high[0] - low[0] > SAME_WITHIN * abs(high[0]):
             yield (
                 f"The {quantity} differs between recordings, from {low[0]:g} {unit} ({low[1]}) to "
                 f"{high[0]:g} {unit} ({high[1]}); {remedy}."
             )
-        if len(known) < len(series):
+        if len(stated) < len(series):
             unknown = next(
                 facts.name for value, facts in zip(values, series, strict=True) if value is None
             )
             yield (
-                f"The {quantity} is stated for {len(known)} of {len(series)} recordings, not for "
+                f"The {quantity} is stated for {len(stated)} of {len(series)} recordings, not for "
                 f"{unknown}."
             )
 

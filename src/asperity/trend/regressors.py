@@ -36,9 +36,9 @@ class Condition:
     shown: Field
     unit: str
 
-    def can_explain(self, known: Mask, change: float) -> bool:
+    def can_explain(self, finite: Mask, change: float) -> bool:
         """Return whether the condition may change the indicator by more than `change`."""
-        return bool(max(-self.low, self.high) * np.ptp(self.values[known]) > change)
+        return bool(max(-self.low, self.high) * np.ptp(self.values[finite]) > change)
 
 
 class ConditionEffect(NamedTuple):
@@ -77,24 +77,24 @@ def fit_conditions(
     conditions : of the same recordings
     smallest_change : change of the indicator worth acting on
     """
-    known = np.isfinite(values)
+    finite = np.isfinite(values)
     for condition in conditions:
-        known = known & np.isfinite(condition.values)
-    if known.sum() < 3:
+        finite = finite & np.isfinite(condition.values)
+    if finite.sum() < 3:
         return NO_CONDITION_EFFECT
     smallest = SMALLEST_SHARE * smallest_change
-    relevant = [condition for condition in conditions if condition.can_explain(known, smallest)]
+    relevant = [condition for condition in conditions if condition.can_explain(finite, smallest)]
     if not relevant:
         return NO_CONDITION_EFFECT
     rows = np.array(
         [
-            condition.values - np.median(condition.values[known][:BASELINE_RECORDINGS])
+            condition.values - np.median(condition.values[finite][:BASELINE_RECORDINGS])
             for condition in relevant
         ]
     )
     low = np.array([condition.low for condition in relevant])
     high = np.array([condition.high for condition in relevant])
-    coefficients, scatter = _fit_differences(values[known], rows[:, known], low, high)
+    coefficients, scatter = _fit_differences(values[finite], rows[:, finite], low, high)
     effect = coefficients @ rows  # nan where a condition is not stated
     names = tuple(condition.name for condition in relevant)
     return ConditionEffect(effect, rows, PRIOR_WIDTH * (high - low), coefficients, names, scatter)

@@ -335,8 +335,8 @@ def _best_log_likelihood(
 
 def _explained_by_row(rows: Field, z: Field) -> Field:
     """Return the sum of squares of z that each row explains."""
-    own = np.sum(rows**2, axis=-1)
-    return np.where(own > TINY, (rows @ z) ** 2 / np.maximum(own, TINY), 0.0)
+    squares = np.sum(rows**2, axis=-1)
+    return np.where(squares > TINY, (rows @ z) ** 2 / np.maximum(squares, TINY), 0.0)
 
 
 def _explained_by_pair(first: Field, second: Field, z: Field) -> Field:
@@ -346,5 +346,5 @@ def _explained_by_pair(first: Field, second: Field, z: Field) -> Field:
     ab = np.sum(first * second, axis=-1)
     p, q = first @ z, second @ z
     determinant = aa * bb - ab**2
-    together = (bb * p**2 - 2.0 * ab * p * q + aa * q**2) / np.maximum(determinant, TINY)
-    return np.where(determinant > 1e-9 * aa * bb, together, 0.0)
+    explained = (bb * p**2 - 2.0 * ab * p * q + aa * q**2) / np.maximum(determinant, TINY)
+    return np.where(determinant > 1e-9 * aa * bb, explained, 0.0)

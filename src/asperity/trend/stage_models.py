@@ -134,8 +134,8 @@ def _break_density(
             for comparison, has_break in zip(comparisons, pattern, strict=True)
             if has_break
         )
-        own = np.exp(log_break - np.max(log_break))
-        density += weight * own / np.sum(own)
+        pattern_density = np.exp(log_break - np.max(log_break))
+        density += weight * pattern_density / np.sum(pattern_density)
     return density / np.sum(density)
 
 

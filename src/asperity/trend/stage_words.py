@@ -91,12 +91,12 @@ def reason_for_no_stage(
 def _no_common_stage(
     outcome: Outcome, series: Sequence[IndicatorSeries], axis: Axis, over: str
 ) -> str:
-    places = " and ".join(
+    breaks = " and ".join(
         f"{SOURCE_NAMES[indicator.indicator]} at {axis.x_at(own_break(comparison)):.3g}"
         for indicator, comparison in zip(series, outcome.comparisons, strict=True)
     )
     return (
-        f"No common stage over {over}: the breaks of {places} are not explained by a common one "
+        f"No common stage over {over}: the breaks of {breaks} are not explained by a common one "
         f"(ΔBIC {outcome.broken - outcome.separate:+.1f} against it)."
     )
 
@@ -141,8 +141,8 @@ def describe_course(
     nearest = int(np.argmin(np.abs(comparison.breaks - split)))
     base, before, change = fit.linear[nearest, int(np.argmax(fit.marginal[nearest]))]
     slopes = (float(before), float(before + change))
-    ends = (split - points.x[0], points.x[-1] - split)
-    rise = slopes[0] * ends[0] + slopes[1] * ends[1]
+    lengths = (split - points.x[0], points.x[-1] - split)
+    rise = slopes[0] * lengths[0] + slopes[1] * lengths[1]
     changes = (
         has_break or comparison.bic[CONSTANT] - min(comparison.bic.values()) >= STRONG_EVIDENCE
     )
@@ -151,7 +151,7 @@ def describe_course(
     if series.indicator == "crf":
         per_x = (slopes[0] / axis.extent, slopes[1] / axis.extent)
         return _crf_course(points, sign, flattens, per_x, axis.unit)
-    levels = (base, base + slopes[0] * ends[0], base + rise)
+    levels = (base, base + slopes[0] * lengths[0], base + rise)
     return _damping_course(points, sign, flattens, levels)
 
 
@@ -183,17 +183,17 @@ def _damping_course(
     mean = float(np.mean(points.y))
     std = float(np.std(points.y, ddof=1))
     first, middle, last = (float(np.exp(-value)) for value in log_levels)
-    ways = [
+    trends = [
         "falls" if after < before else "rises" for before, after in pairwise((first, middle, last))
     ]
-    then = "" if ways[0] == ways[1] else f"{ways[1]} "
+    then = "" if trends[0] == trends[1] else f"{trends[1]} "
     mean_ratio = with_deviation(float(np.exp(-mean)), std * float(np.exp(-mean)))
     return IndicatorCourse(
         sign=sign,
         flattens=flattens,
         mean=f"damping stays at {mean_ratio}",
         way=f"damping {'falls' if sign > 0 else 'rises'}",
-        words=f"damping {ways[0]} from {first:.3g} to {middle:.3g} before the break and {then}to "
+        words=f"damping {trends[0]} from {first:.3g} to {middle:.3g} before the break and {then}to "
         f"{last:.3g} after it"
         if sign
         else "damping does not change",

@@ -1,8 +1,8 @@
 """Stages of wear: a break in the trend of the contact resonance along time or roughness.
 
-Read from CRF, from the damping of its line, or from both together. A broken stick with a Bayesian
-break competes with smooth curves and with no change: on a smooth curve, a stick alone would report
-a precise but false knee. Knows nothing of recordings; docs/theory/indicators.md has the equations.
+They are read from CRF, the damping of its line, or both. A broken stick with a Bayesian break
+competes with smooth curves and with no change: on a smooth curve, a stick alone would report a
+precise but false knee. The module knows no recordings; docs/theory/indicators.md has the equations.
 """
 
 from collections.abc import Callable, Sequence
@@ -173,12 +173,12 @@ def _require_one_length(x: Field, *series: ArrayLike | None) -> None:
 
 
 def _deviations(name: str, value: ArrayLike | None, recordings: int) -> Field:
-    given = np.asarray(0.0 if value is None else value, dtype=float)
-    if given.shape not in ((), (recordings,)):
+    array = np.asarray(0.0 if value is None else value, dtype=float)
+    if array.shape not in ((), (recordings,)):
         raise BadInput(
-            f"{name} must be one number or {recordings}, one per recording, got shape {given.shape}"
+            f"{name} must be one number or {recordings}, one per recording, got shape {array.shape}"
         )
-    deviations = np.broadcast_to(given, recordings)
+    deviations = np.broadcast_to(array, recordings)
     if np.any(deviations[np.isfinite(deviations)] < 0.0):
         raise BadInput(
             f"{name} must be 0 or more, got {np.nanmin(deviations):g}; give standard deviations"
@@ -226,8 +226,8 @@ def _bayesian(
 
 
 def _known_points(series: IndicatorSeries, x: Field, x_std: Field) -> SeriesPoints:
-    known = np.isfinite(series.values)
-    return averaged_points(x[known], series.values[known], series.std[known], x_std[known])
+    finite = np.isfinite(series.values)
+    return averaged_points(x[finite], series.values[finite], series.std[finite], x_std[finite])
 
 
 def _possible_breaks(

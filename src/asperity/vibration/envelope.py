@@ -50,10 +50,10 @@ class Envelope:
             return
         values = np.concatenate(self._waiting)
         size = self.chunk if available >= self.chunk else available
-        whole = values.size // size
-        for chunk in values[: whole * size].reshape(whole, size):
+        count = values.size // size
+        for chunk in values[: count * size].reshape(count, size):
             self._add(chunk)
-        self._waiting = [values[whole * size :]]
+        self._waiting = [values[count * size :]]
 
     def _add(self, chunk: Field) -> None:
         if not np.isfinite(chunk).all():

@@ -90,8 +90,8 @@ def resample_to_constant_speed(
     BadInput
         if the shaft turns at less than a quarter of its mean speed at times.
     """
-    known = np.flatnonzero(np.isfinite(turning.turns))
-    turns = turning.turns[known]
+    finite = np.flatnonzero(np.isfinite(turning.turns))
+    turns = turning.turns[finite]
     step = turning.speed_hz / rate_hz
     slowest = float(np.diff(turns).min())
     if slowest < MIN_SPEED * step:
@@ -99,7 +99,7 @@ def resample_to_constant_speed(
             f"the shaft turns at less than {MIN_SPEED:g} of its mean speed at times; order "
             "tracking is not possible"
         )
-    positions = np.interp(np.arange(turns[0], turns[-1], slowest), turns, known.astype(float))
+    positions = np.interp(np.arange(turns[0], turns[-1], slowest), turns, finite.astype(float))
     oversampled = scipy.signal.resample_poly(values, OVERSAMPLING, 1)
     resampled = scipy.ndimage.map_coordinates(
         oversampled, [OVERSAMPLING * positions], order=3, mode="mirror"
@@ -116,10 +116,10 @@ def _rising(pulses: Field) -> Field:
     (low_level, high_level) = (low + level * (high - low) for level in LEVELS)
     state = np.where(pulses > high_level, 1, np.where(pulses < low_level, -1, 0))
     decided = np.flatnonzero(state)
-    ends = decided[1:][(state[decided[1:]] == 1) & (state[decided[:-1]] == -1)]
+    edges = decided[1:][(state[decided[1:]] == 1) & (state[decided[:-1]] == -1)]
     crossings = []
-    for end in ends:
-        first = end
+    for edge in edges:
+        first = edge
         while pulses[first - 1] > middle:
             first -= 1
         rise = pulses[first] - pulses[first - 1]

@@ -1,6 +1,6 @@
 """Mass on a contact spring over a moving profile, and its acceleration.
 
-Independent of the lubricant: `asperity.coupling` supplies the stiffness,
+Both are independent of the lubricant: `asperity.coupling` supplies the stiffness,
 `asperity.vibration.excitation` the profile. Source: the paper's section 2, with the damping of its
 Eq 5 taken at the angular frequency. docs/theory/vibration.md lists every equation with its function
 and test.
@@ -245,9 +245,9 @@ def _check(profile: Signal, method: ResponseMethod) -> None:
 def _exact(oscillator: ContactOscillator, profile: Signal, output_weights: Field) -> Field:
     """Return output_weights · (r, r') for the compression r = y_i - y by first-order hold.
 
-    Exact to rounding, without cancellation of large terms. Between samples r'' = -(C r' + S r)/m,
-    free; at each sample the profile's slope, and r' with it, jumps by d. So x⁺ = e^(Fh)
-    (x + (0, d)) with x = (r, r'), output in the middle of the jump.
+    It is exact to rounding, without cancellation of large terms. Between samples r'' = -(C r' + S
+    r)/m, free; at each sample the profile's slope, and r' with it, jumps by d. So x⁺ = e^(Fh) (x +
+    (0, d)) with x = (r, r'), output in the middle of the jump.
     """
     denominator, numerator = oscillator._recursion(profile.rate_hz, output_weights)
     jumps = np.zeros(profile.values.size)

@@ -34,8 +34,8 @@ SIZE_CLASSES = 50  # for means over particle sizes
 class WearMark:
     """Groove along x with round ends, lengths in m; a dent if `length` is 0.
 
-    Across, a parabola of `depth` and `width`; on either side a parabolic ridge, half as wide and
-    `ridge` high.
+    Its cross-section is a parabola of `depth` and `width` with a parabolic ridge on either side,
+    half as wide and `ridge` high.
     """
 
     length: float
@@ -78,10 +78,10 @@ class WearMark:
 
     def heights(self, x: Field, y: Field) -> tuple[Field, Field]:
         """Return groove depth and ridge height, both 0 or more [m], at points about the centre."""
-        off = np.hypot(np.maximum(np.abs(x) - 0.5 * self.length, 0.0), y) / (0.5 * self.width)
-        beyond = (off - 1.0 - RIDGE_WIDTH) / RIDGE_WIDTH
-        return self.depth * np.maximum(1.0 - off**2, 0.0), self.ridge * np.maximum(
-            1.0 - beyond**2, 0.0
+        radius = np.hypot(np.maximum(np.abs(x) - 0.5 * self.length, 0.0), y) / (0.5 * self.width)
+        ridge_offset = (radius - 1.0 - RIDGE_WIDTH) / RIDGE_WIDTH
+        return self.depth * np.maximum(1.0 - radius**2, 0.0), self.ridge * np.maximum(
+            1.0 - ridge_offset**2, 0.0
         )
 
 
@@ -157,10 +157,10 @@ class Ploughing(Parametric):
             )
         count = int(passage.rng.poisson(expected))
         sizes = self.sizes(passage.rng.uniform(size=count))
-        places = passage.rng.uniform(lower, upper, size=(count, 2))
+        centres = passage.rng.uniform(lower, upper, size=(count, 2))
         return [
             (self.mark(float(size), film, passage), (float(x), float(y)))
-            for size, (x, y) in zip(sizes, places, strict=True)
+            for size, (x, y) in zip(sizes, centres, strict=True)
             if size > film
         ]
 
@@ -204,11 +204,11 @@ class Ploughing(Parametric):
 def drag_length(passage: Passage) -> float:
     """Return the sliding distance on this body during a passage of the Hertz zone [m]: 2 a |u_s|/u.
 
-    Limited to half the track.
+    It is limited to half the track.
     """
     speed = abs(passage.material.speed)
-    way = 2.0 * passage.half_width * passage.sliding_speed / speed if speed > 0.0 else np.inf
-    return float(min(way, 0.5 * passage.grid.extent[0]))
+    length = 2.0 * passage.half_width * passage.sliding_speed / speed if speed > 0.0 else np.inf
+    return float(min(length, 0.5 * passage.grid.extent[0]))
 
 
 def loaded_columns(passage: Passage) -> slice:
@@ -220,8 +220,8 @@ def loaded_columns(passage: Passage) -> slice:
     if passage.grid.periodic[1]:
         return slice(0, passage.grid.cells[1])
     column_load = np.sum([patch.pressure.sum(axis=0) for patch in passage.patches], axis=0)
-    pressed = np.flatnonzero(column_load > LOADED_SHARE * column_load.max())
-    return slice(int(pressed[0]), int(pressed[-1]) + 1) if pressed.size else slice(0, 0)
+    loaded = np.flatnonzero(column_load > LOADED_SHARE * column_load.max())
+    return slice(int(loaded[0]), int(loaded[-1]) + 1) if loaded.size else slice(0, 0)
 
 
 def track_bounds(grid: Grid, track_cells: slice) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -229,10 +229,10 @@ def track_bounds(grid: Grid, track_cells: slice) -> tuple[tuple[float, float], t
     (left, low) = grid.lower
     (right, high) = grid.upper
     step = grid.spacing[1]
-    whole = track_cells == slice(0, grid.cells[1])
-    return (left, low if whole else low + track_cells.start * step), (
+    full_width = track_cells == slice(0, grid.cells[1])
+    return (left, low if full_width else low + track_cells.start * step), (
         right,
-        high if whole else low + track_cells.stop * step,
+        high if full_width else low + track_cells.stop * step,
     )
 
 

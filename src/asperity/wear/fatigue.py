@@ -60,13 +60,13 @@ class Pits(Parametric):
             )
 
     def __call__(self, passage: Passage) -> Change:
-        """Return the damage of the jump and the pits of failed material."""
+        """Return the damage of the jump and the pits of the failed material."""
         depths = layer_depths(passage.grid, passage.half_width)
         state = passage.state
         damage = np.asarray(state.get("damage", np.zeros((depths.size, *passage.grid.cells))))
         strength = np.asarray(state["strength"]) if "strength" in state else self._strength(passage)
         damage = shift_damage(damage, depths, passage.removed)
-        stressed, left = self._add_damage(damage, depths, strength, passage)
+        stressed, remaining = self._add_damage(damage, depths, strength, passage)
         fullest = float(damage.max())
         failed = damage >= 1.0
         pits, damage = break_out_pits(damage, depths, failed, passage.grid, self.aspect)
@@ -82,7 +82,7 @@ class Pits(Parametric):
             heights_change=-pits,
             state=next_state,
             facts=facts,
-            longest=overrollings_to_failures(left),
+            longest=overrollings_to_failures(remaining),
         )
 
     def _add_damage(
@@ -90,7 +90,7 @@ class Pits(Parametric):
     ) -> tuple[float, Field]:
         """Add the damage of the jump in place; return the largest measure and remaining lives."""
         stressed = 0.0
-        left = np.full(damage.shape, np.inf)
+        remaining = np.full(damage.shape, np.inf)
         for layer, depth in enumerate(depths):
             path = stress_path(
                 passage.patches, passage.grid, float(depth), passage.material.poisson_ratio
@@ -100,8 +100,8 @@ class Pits(Parametric):
             rate = self.damage(measure)
             damage[layer] += passage.jump * rate
             unfailed = (rate > 0.0) & (damage[layer] < 1.0)
-            np.divide(1.0 - damage[layer], rate, out=left[layer], where=unfailed)
-        return stressed, left
+            np.divide(1.0 - damage[layer], rate, out=remaining[layer], where=unfailed)
+        return stressed, remaining
 
     def stress_measure(self, path: Field) -> Field:
         """Return the measure [Pa] of stress paths (6, paths, positions); exact above the limit."""
@@ -159,14 +159,14 @@ class VonMisesPits(Pits):
 FATIGUE: dict[str, type[Pits]] = {"dang-van": DangVanPits, "von-mises": VonMisesPits}
 
 
-def overrollings_to_failures(left: Field) -> float:
+def overrollings_to_failures(remaining: Field) -> float:
     """Return the over-rollings until MAX_FAILED_SHARE more cells fail; at least 1.
 
-    `left` holds the remaining over-rollings of each layer of each cell.
+    `remaining` holds the over-rollings of each layer of each cell.
     """
-    lives = left.min(axis=0).ravel()
-    few = int(MAX_FAILED_SHARE * lives.size)
-    return max(float(np.partition(lives, few)[few]), 1.0)
+    lives = remaining.min(axis=0).ravel()
+    index = int(MAX_FAILED_SHARE * lives.size)
+    return max(float(np.partition(lives, index)[index]), 1.0)
 
 
 def layer_depths(grid: Grid, half_width: float) -> Field:
@@ -185,12 +185,12 @@ def stress_path(
     path = np.zeros((6, grid.cells[0] * grid.cells[1], len(patches) + 1))
     around = Grid(grid.cells, grid.lower, grid.upper, (False, grid.periodic[1]))
     for position, patch in enumerate(patches, start=1):
-        ahead = _to_the_middle(patch.pressure)
-        pressure, shear = (np.roll(field, ahead, axis=0) for field in (patch.pressure, patch.shear))
+        shift = _to_the_middle(patch.pressure)
+        pressure, shear = (np.roll(field, shift, axis=0) for field in (patch.pressure, patch.shear))
         below = solution.Tractions.from_fields(around, pressure, shear).stresses(
             depth, poisson_ratio
         )
-        path[:, :, position] = np.roll(below, -ahead, axis=1).reshape(6, -1)
+        path[:, :, position] = np.roll(below, -shift, axis=1).reshape(6, -1)
     return path
 
 
@@ -200,10 +200,10 @@ def _to_the_middle(pressure: Field) -> int:
     The contact then does not wrap around the ends.
     """
     count = pressure.shape[0]
-    turned = np.exp(2j * np.pi * np.arange(count) / count) @ pressure.sum(axis=1)
-    at = float(np.angle(turned)) / (2.0 * np.pi) * count
-    ahead: int = round((count - 1) / 2 - at)
-    return ahead
+    harmonic = np.exp(2j * np.pi * np.arange(count) / count) @ pressure.sum(axis=1)
+    position = float(np.angle(harmonic)) / (2.0 * np.pi) * count
+    shift: int = round((count - 1) / 2 - position)
+    return shift
 
 
 def shift_damage(damage: Field, depths: Field, removed: Field) -> Field:
@@ -218,9 +218,9 @@ def shift_damage(damage: Field, depths: Field, removed: Field) -> Field:
     extended = np.concatenate([damage, np.zeros_like(damage[:1])])
     depth = np.minimum(depths[:, None, None] + removed, deeper[-1])
     below = np.clip(np.searchsorted(deeper, depth), 1, depths.size)
-    share = np.maximum((depth - deeper[below - 1]) / (deeper[below] - deeper[below - 1]), 0.0)
+    weight = np.maximum((depth - deeper[below - 1]) / (deeper[below] - deeper[below - 1]), 0.0)
     upper, lower = (np.take_along_axis(extended, index, axis=0) for index in (below - 1, below))
-    return np.asarray(upper + share * (lower - upper))
+    return np.asarray(upper + weight * (lower - upper))
 
 
 def break_out_pits(
@@ -238,14 +238,14 @@ def break_out_pits(
     deepest = np.where(failed.any(axis=0), depths.size - 1 - failed[::-1].argmax(axis=0), -1)
     remaining = damage.copy()
     for layer in np.unique(deepest[deepest >= 0]):
-        here = deepest == layer
+        cells = deepest == layer
         bowl, (half_x, half_y) = _bowl(float(depths[layer]), grid, aspect)
-        for i, j in np.argwhere(here):
+        for i, j in np.argwhere(cells):
             rows = _window(int(i), half_x, grid.cells[0], True)
             columns = _window(int(j), half_y, *_along_y(grid))
             inside = np.ix_(rows[0], columns[0])
             pits[inside] = np.maximum(pits[inside], bowl[np.ix_(rows[1], columns[1])])
-        remaining[: layer + 1, here] = damage[layer + 1, here] if layer + 1 < depths.size else 0.0
+        remaining[: layer + 1, cells] = damage[layer + 1, cells] if layer + 1 < depths.size else 0.0
     return pits, shift_damage(remaining, depths, pits)
 
 

@@ -121,12 +121,12 @@ class WearFit:
         """Return one sentence: k with its interval, and the predicted loss in a second test."""
         k = quantity("wear_coefficient")
         second = quantity("second_volume_m3")
-        ends = self.second_volume
+        loss = self.second_volume
         return (
             f"k is {k.text(self.k.median)} (90 % interval {k.number(self.k.low)} to "
             f"{k.text(self.k.high)}); predicted loss in a second test of "
             f"{self.second_load:.4g} N over {self.second_distance:.4g} m: "
-            f"{second.number(ends.low)} to {second.text(ends.high)}."
+            f"{second.number(loss.low)} to {second.text(loss.high)}."
         )
 
 
@@ -145,8 +145,8 @@ def read_friction_trace(
     BadInput
         for a missing column without a substitute, and as `open_channels`.
     """
-    opened = recording.open_channels(path, rate_hz=1.0)  # nothing here depends on time
-    columns = {role: _column(opened, names) for role, names in _COLUMNS.items()}
+    channels = recording.open_channels(path, rate_hz=1.0)  # nothing here depends on time
+    columns = {role: _column(channels, names) for role, names in _COLUMNS.items()}
     name, notes = Path(path).name, []
     mu = columns["coefficient"]
     force = columns["force"]
@@ -161,7 +161,7 @@ def read_friction_trace(
                 "name one mu or FrictionForce"
             )
         mu = force / load
-    distance, laps, radius, error = _way(
+    distance, laps, radius, error = _sliding_path(
         name, columns["distance"], columns["laps"], track_radius, notes
     )
     passed = next(columns[role] for role in ("distance", "laps") if columns[role] is not None)
@@ -183,13 +183,13 @@ def read_friction_trace(
 def _median_load(name: str, mu: Field | None, force: Field | None) -> float:
     if mu is None or force is None:
         raise BadInput(f"{name} lacks a column of coefficient or friction force; state the load")
-    known = np.abs(mu) > 0.01
-    return float(np.median(force[known] / mu[known]))
+    nonzero = np.abs(mu) > 0.01
+    return float(np.median(force[nonzero] / mu[nonzero]))
 
 
-def _column(opened: list[recording.OpenRecording], names: tuple[str, ...]) -> Field | None:
+def _column(channels: list[recording.OpenRecording], names: tuple[str, ...]) -> Field | None:
     """Return the values of the first column whose title matches one of the names."""
-    for column in opened:
+    for column in channels:
         title = column.channel.name.strip().lower()
         if any(title == name or (len(name) > 2 and name in title) for name in names):
             return np.asarray(column.read().values, dtype=float)
@@ -202,7 +202,7 @@ def _end(name: str, label: str, value: float | None) -> float | None:
     return value
 
 
-def _way(
+def _sliding_path(
     name: str, distance: Field | None, laps: Field | None, radius: float | None, notes: list[str]
 ) -> tuple[float, float, float, float]:
     """Return distance [m], laps, radius [m] and the relative mismatch of record and radius."""
@@ -262,7 +262,7 @@ def fit_wear_coefficient(
     rng = np.random.default_rng(seed)
     k = _drawn_coefficients(trace, scar, rng)
     volume = k * trace.load * trace.distance
-    again = k * np.exp(
+    second_test_k = k * np.exp(
         np.sqrt(2.0) * SCATTER * rng.standard_normal(DRAWS)
     )  # the first test scatters about the mean, too
     per_area = 1.0 / (trace.load * trace.laps)
@@ -274,7 +274,7 @@ def fit_wear_coefficient(
         k_all_lost=scar.missing * per_area,
         k_none_lost=max(scar.missing - scar.piled, 0.0) * per_area,
         volume=WearEstimate.from_draws(volume),
-        second_volume=WearEstimate.from_draws(again * load * length),
+        second_volume=WearEstimate.from_draws(second_test_k * load * length),
         second_load=load,
         second_distance=length,
         notes=_notes(trace, scar),
@@ -284,8 +284,8 @@ def fit_wear_coefficient(
 def _drawn_coefficients(trace: FrictionTrace, scar: Scar, rng: np.random.Generator) -> Field:
     """Draw wear coefficients; an unknown share of the material piled up is the disc's own."""
     missing, piled = _drawn_areas(scar, rng)
-    own = rng.uniform(0.0, np.minimum(1.0, missing / np.maximum(piled, np.finfo(float).tiny)))
-    lost = (missing - own * piled) * np.maximum(
+    own_share = rng.uniform(0.0, np.minimum(1.0, missing / np.maximum(piled, np.finfo(float).tiny)))
+    lost = (missing - own_share * piled) * np.maximum(
         1.0 + AREA_SCATTER * rng.standard_normal(DRAWS), 0.0
     )
     error = 1.0 + trace.distance_error * rng.uniform(-1.0, 1.0, DRAWS)
@@ -294,10 +294,10 @@ def _drawn_coefficients(trace: FrictionTrace, scar: Scar, rng: np.random.Generat
 
 def _drawn_areas(scar: Scar, rng: np.random.Generator) -> tuple[Field, Field]:
     """Draw areas missing and piled up [m^2] over evaluation variants and waviness."""
-    way = rng.integers(len(scar.areas), size=DRAWS)
+    variant = rng.integers(len(scar.areas), size=DRAWS)
     table = np.array(
         [(area.missing, area.piled, area.missing_std, area.piled_std) for area in scar.areas]
-    )[way]
+    )[variant]
     missing, piled = (table[:, i] + table[:, i + 2] * rng.standard_normal(DRAWS) for i in (0, 1))
     return np.maximum(missing, 0.0), np.maximum(piled, 0.0)
 

@@ -80,12 +80,12 @@ def find_scar(measured: MeasuredSurface) -> Scar:
     BadInput
         for a profile without a detectable track, or with too few points beside it.
     """
-    known = np.isfinite(measured.profile)
+    finite = np.isfinite(measured.profile)
     spacing = measured.grid.spacing[0 if measured.uniform != 0 else 1]
-    x = (np.arange(known.size) * spacing)[known]
-    z = measured.profile[known]
-    off, roughness = _off_the_bulk(x, z)
-    first, last = _track(x, off, roughness, measured.name)
+    x = (np.arange(finite.size) * spacing)[finite]
+    z = measured.profile[finite]
+    height, roughness = _heights_above_fit(x, z)
+    first, last = _track(x, height, roughness, measured.name)
     edges = float(x[first]), float(x[last])
     width = edges[1] - edges[0]
     untouched = (x < edges[0]) | (x > edges[1])
@@ -99,41 +99,41 @@ def find_scar(measured: MeasuredSurface) -> Scar:
             f"{length_text(x[-1] - x[0])}; measure at least {MIN_POINTS} points across the track "
             "and its own width beside it"
         )
-    ways = tuple(
-        _areas(x, z, edges, ROUGHNESS_LEVEL * roughness, *way)
-        for way in product(DEGREES, REACHES, MARGINS)
+    areas = tuple(
+        _areas(x, z, edges, ROUGHNESS_LEVEL * roughness, *variant)
+        for variant in product(DEGREES, REACHES, MARGINS)
     )
     levelled = z - _old_surface(x, z, edges, DEGREES[0], np.inf)
-    return Scar(edges=edges, areas=ways, heights=levelled, spacing=spacing, roughness=roughness)
+    return Scar(edges=edges, areas=areas, heights=levelled, spacing=spacing, roughness=roughness)
 
 
-def _off_the_bulk(x: Field, z: Field) -> tuple[Field, float]:
+def _heights_above_fit(x: Field, z: Field) -> tuple[Field, float]:
     """Return heights above a robust line fit, and their robust standard deviation."""
     inliers = np.ones(x.size, dtype=bool)
-    off, deviation = z, 0.0
+    height, std = z, 0.0
     for _ in range(_ROUNDS):
-        off = z - np.polynomial.Polynomial.fit(x[inliers], z[inliers], 1)(x)
-        deviation = 1.4826 * float(np.median(np.abs(off[inliers] - np.median(off[inliers]))))
-        selected = np.abs(off) <= OUTLIER_LEVEL * deviation
+        height = z - np.polynomial.Polynomial.fit(x[inliers], z[inliers], 1)(x)
+        std = 1.4826 * float(np.median(np.abs(height[inliers] - np.median(height[inliers]))))
+        selected = np.abs(height) <= OUTLIER_LEVEL * std
         if np.array_equal(selected, inliers) or np.count_nonzero(selected) < MIN_POINTS:
             break
         inliers = selected
-    return off, deviation
+    return height, std
 
 
-def _track(x: Field, off: Field, roughness: float, name: str) -> tuple[int, int]:
+def _track(x: Field, height: Field, roughness: float, name: str) -> tuple[int, int]:
     """Return first and last point of the track: the largest outlying part, gaps closed."""
-    outstanding = np.flatnonzero(np.abs(off) > OUTLIER_LEVEL * roughness)
+    outstanding = np.flatnonzero(np.abs(height) > OUTLIER_LEVEL * roughness)
     if outstanding.size == 0:
         raise BadInput(
             f"{name} shows no track: no point deviates beyond its roughness; measure across the "
             "track"
         )
-    parts = np.split(outstanding, np.flatnonzero(np.diff(outstanding) > 1) + 1)
-    first, last = _close_gaps(x, parts, int(np.argmax([np.abs(off[part]).sum() for part in parts])))
-    quiet = np.flatnonzero(np.abs(off) <= roughness)
-    before = quiet[quiet < first]
-    after = quiet[quiet > last]
+    runs = np.split(outstanding, np.flatnonzero(np.diff(outstanding) > 1) + 1)
+    first, last = _close_gaps(x, runs, int(np.argmax([np.abs(height[run]).sum() for run in runs])))
+    smooth = np.flatnonzero(np.abs(height) <= roughness)
+    before = smooth[smooth < first]
+    after = smooth[smooth > last]
     return int(before[-1]) if before.size else 0, int(after[0]) if after.size else x.size - 1
 
 
@@ -182,8 +182,8 @@ def _areas(
 ) -> ScarAreas:
     width = edges[1] - edges[0]
     widened = edges[0] - margin * width, edges[1] + margin * width
-    off = z - _old_surface(x, z, widened, degree, reach)
-    areas = _below_and_above(x, off, widened)
+    height = z - _old_surface(x, z, widened, degree, reach)
+    areas = _below_and_above(x, height, widened)
     unworn = np.array(
         [
             _below_and_above(x, z - _old_surface(x, z, window, degree, reach, widened), window)
@@ -192,7 +192,7 @@ def _areas(
     ).reshape(-1, 2)
     if not len(unworn):
         return ScarAreas(*areas, 0.0, 0.0)
-    share = float(np.mean(np.abs(off[(x >= widened[0]) & (x <= widened[1])]) < quiet))
+    share = float(np.mean(np.abs(height[(x >= widened[0]) & (x <= widened[1])]) < quiet))
     missing, piled = np.maximum(np.array(areas) - share * unworn.mean(axis=0), 0.0)
     return ScarAreas(float(missing), float(piled), *(float(std) for std in unworn.std(axis=0)))
 
@@ -204,9 +204,9 @@ def _elsewhere(x: Field, edges: tuple[float, float]) -> list[tuple[float, float]
     return [(float(a), float(a + width)) for a in starts if a + width < edges[0] or a > edges[1]]
 
 
-def _below_and_above(x: Field, off: Field, edges: tuple[float, float]) -> tuple[float, float]:
+def _below_and_above(x: Field, height: Field, edges: tuple[float, float]) -> tuple[float, float]:
     inside = (x >= edges[0]) & (x <= edges[1])
     below, above = (
-        np.trapezoid(np.maximum(sign * off[inside], 0.0), x[inside]) for sign in (-1.0, 1.0)
+        np.trapezoid(np.maximum(sign * height[inside], 0.0), x[inside]) for sign in (-1.0, 1.0)
     )
     return float(below), float(above)

@@ -52,17 +52,17 @@ class Scuffing(Parametric):
             load += patch.asperity_pressure
             scuffed += np.where(self.exceeds_limit(patch), patch.asperity_pressure, 0.0)
         share = np.divide(scuffed, load, out=np.zeros_like(load), where=load > 0.0)
-        taken = (self.factor - 1.0) * share * passage.removed
-        most = STEP * max(float(np.std(passage.heights)), passage.loaded_film, LEAST)
-        deepest = float(taken.max())
-        taken *= min(1.0, most / deepest) if deepest > 0.0 else 1.0
+        loss = (self.factor - 1.0) * share * passage.removed
+        limit = STEP * max(float(np.std(passage.heights)), passage.loaded_film, LEAST)
+        deepest = float(loss.max())
+        loss *= min(1.0, limit / deepest) if deepest > 0.0 else 1.0
         facts = {
             "load_share": float(scuffed.sum() / load.sum()) if load.any() else 0.0,
-            "volume_m3": float(taken.sum() * np.prod(passage.grid.spacing)),
+            "volume_m3": float(loss.sum() * np.prod(passage.grid.spacing)),
         }
-        longest = max(passage.jump * most / deepest, 1.0) if deepest > 0.0 else np.inf
+        longest = max(passage.jump * limit / deepest, 1.0) if deepest > 0.0 else np.inf
         return Change(
-            heights_change=-taken, facts=facts, transferred=self.transfer * taken, longest=longest
+            heights_change=-loss, facts=facts, transferred=self.transfer * loss, longest=longest
         )
 
     def exceeds_limit(self, patch: Patch) -> Mask:

@@ -34,16 +34,16 @@ def positions(
     """
     rng = np.random.default_rng([seed, jump])
     along = [np.arange(count), rng.permutation(count)]
-    places = []
+    starts = []
     for body, (length, moving) in enumerate(zip(cells, moves, strict=True)):
         offset = (GOLDEN * (jump + 1) * (body + 1)) % 1.0
-        places.append(
+        starts.append(
             np.floor((along[body] + offset) * length / count).astype(int) % length
             if moving
             else 0 * along[0]
         )
     return tuple(
-        TrackPosition(int(first), int(second)) for first, second in zip(*places, strict=True)
+        TrackPosition(int(first), int(second)) for first, second in zip(*starts, strict=True)
     )
 
 

@@ -29,13 +29,13 @@ class Workspace:
         """Return two arrays of at least `count` rows like `vector`, keeping earlier rows."""
         size = vector.size
         if self.parts[0].dtype != vector.dtype or self.parts[0].size < count * size:
-            before = self.parts
+            previous = self.parts
             self.parts = np.empty(count * size, vector.dtype), np.empty(count * size, vector.dtype)
-            for old, new in zip(before, self.parts, strict=True):
+            for old, new in zip(previous, self.parts, strict=True):
                 if old.dtype == new.dtype:
                     new[: old.size] = old
-        whole = self.parts[0].size // size
-        first, second = (part[: whole * size].reshape(whole, size) for part in self.parts)
+        capacity = self.parts[0].size // size
+        first, second = (part[: capacity * size].reshape(capacity, size) for part in self.parts)
         return first, second
 
 
@@ -65,23 +65,23 @@ def gmres(
         if count + 1 == len(basis):
             basis, corrections = workspace.rows(2 * len(basis), rhs)
         corrections[count] = precondition(basis[count])
-        new = product(corrections[count])
-        before = _norm(new)
-        column, length = _orthogonalise(new, before, basis[: count + 1])
+        vector = product(corrections[count])
+        initial_length = _norm(vector)
+        column, length = _orthogonalise(vector, initial_length, basis[: count + 1])
         if not np.isfinite(length):  # overflow: use the corrections so far
             break
         count += 1
         residual = projection.append(column, length)
-        if residual < tolerance * norm or length < np.finfo(rhs.dtype).eps * before:
+        if residual < tolerance * norm or length < np.finfo(rhs.dtype).eps * initial_length:
             break
-        np.divide(new, length, out=basis[count])
+        np.divide(vector, length, out=basis[count])
     return projection.combine(corrections[:count])
 
 
 def _orthogonalise(vector: Vector, norm: float, basis: Vector) -> tuple[Vector, float]:
     """Make a vector orthogonal to a basis in place; return its overlaps and its new length.
 
-    Twice if most of its `norm` cancels.
+    This is repeated if most of its `norm` cancels.
     """
     overlaps = (basis @ vector.conj()).conj()
     vector -= overlaps @ basis
@@ -177,9 +177,9 @@ class Shifted:
         self._begin()
 
     @property
-    def left(self) -> float:
+    def residual(self) -> float:
         """Relative residual, within this precision."""
-        return _norm(self.rest) / self.size
+        return _norm(self.defect) / self.size
 
     @property
     def sum(self) -> complex:
@@ -191,29 +191,29 @@ class Shifted:
         """True if no further correction can be stored."""
         return self.count == len(self.basis)
 
-    def answer(self) -> Vector:
+    def solution(self) -> Vector:
         """Return the unknowns."""
         return np.asarray(self._combination().astype(self.kind) @ self.corrections[: self.count])
 
     def step(self) -> bool:
         """Add a correction; return False if it is linearly dependent."""
-        before = _norm(self.rest)
-        tried = self.rest / self.kind.type(before) if self.falls else self.basis[self.count - 1]
-        correction = self.precondition(tried)
+        norm = _norm(self.defect)
+        vector = self.defect / self.kind.type(norm) if self.falls else self.basis[self.count - 1]
+        correction = self.precondition(vector)
         rows, stored = self.product(correction)
         if not self._append(self.plus(stored, rows, a=1j * self.frequency)):
             return False
         self.corrections[self.count], self.stored[self.count] = correction, stored
         self.sums.append(complex(correction @ self.bearing))
-        self.count, self.falls = self.count + 1, _norm(self.rest) < KRYLOV.stagnation * before
+        self.count, self.falls = self.count + 1, _norm(self.defect) < KRYLOV.stagnation * norm
         return True
 
     def move(self, frequency: float) -> None:
         """Recombine the corrections for another Ω."""
         count = self.count
-        further = self.kind.type(1j * (frequency - self.frequency))
+        change = self.kind.type(1j * (frequency - self.frequency))
         rows = self.triangle[:count, :count].T.astype(self.kind) @ self.basis[:count]
-        rows += further * self.stored[:count]
+        rows += change * self.stored[:count]
         self.frequency, self.count = frequency, 0
         self._begin()
         for row in rows:
@@ -226,33 +226,33 @@ class Shifted:
     def _begin(self) -> None:
         """Reset the residual."""
         a, b = self.rhs
-        self.rest = a + self.kind.type(1j * self.frequency) * b
-        self.size = _norm(self.rest)
+        self.defect = a + self.kind.type(1j * self.frequency) * b
+        self.size = _norm(self.defect)
         self.falls = True
         self.target: list[complex] = []
 
-    def _append(self, new: Vector) -> bool:
+    def _append(self, vector: Vector) -> bool:
         """Orthogonalise a vector and update the residual; return False if it is dependent."""
         count = self.count
-        known = self.basis[:count].T
-        before = _norm(new)
+        basis = self.basis[:count].T
+        initial_length = _norm(vector)
         column = np.zeros(count, complex)
         for _ in range(2 if count else 0):
-            overlaps = self.times(1.0, known, new, trans=ADJOINT)
-            new = self.times(-1.0, known, overlaps, beta=1.0, y=new, overwrite_y=True)
+            overlaps = self.times(1.0, basis, vector, trans=ADJOINT)
+            vector = self.times(-1.0, basis, overlaps, beta=1.0, y=vector, overwrite_y=True)
             column += overlaps
-            length = _norm(new)
-            if length >= KRYLOV.reorthogonalise_shifted * before:
+            length = _norm(vector)
+            if length >= KRYLOV.reorthogonalise_shifted * initial_length:
                 break
         else:
-            length = _norm(new)
-        if not length > np.finfo(self.kind).eps * before:
+            length = _norm(vector)
+        if not length > np.finfo(self.kind).eps * initial_length:
             return False
         self.triangle[:count, count], self.triangle[count, count] = column, length
-        np.divide(new, length, out=self.basis[count])
-        share = complex(np.vdot(self.basis[count], self.rest))
-        self.rest = self.plus(self.basis[count], self.rest, a=-share)
-        self.target.append(share)
+        np.divide(vector, length, out=self.basis[count])
+        projection = complex(np.vdot(self.basis[count], self.defect))
+        self.defect = self.plus(self.basis[count], self.defect, a=-projection)
+        self.target.append(projection)
         return True
 
     def _combination(self) -> Vector:

@@ -105,7 +105,7 @@ class MixedLinear:
     def storage(self) -> StoredOil | None:
         """Storage of oil; see `asperity.ehl.linear_solvers.single_pressure`.
 
-        Neglects the wedge in the first rows of Lagrangian oil.
+        The wedge is neglected in the first rows of Lagrangian oil.
         """
         past, film = self.balance.problem.past, self.full_film
         if past is None:
@@ -116,39 +116,39 @@ class MixedLinear:
     @cached_property
     def inverse(self) -> tuple[BlockSolver | MultigridSolver, LineRelaxation]:
         """Blocks and lines, built on first use."""
-        stencil, far = self._stencil()
+        stencil, outer = self._stencil()
         weight = np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
-        alike = (
+        multigrid = (
             not self.follows_wedge
             and min(self.cells) >= MIXED_SOLVER.min_multigrid_cells
             and (self.with_limiter or is_firm(self.balance))
         )
-        blocks = (MultigridSolver if alike else BlockSolver)(stencil, weight)
+        blocks = (MultigridSolver if multigrid else BlockSolver)(stencil, weight)
         if self.with_limiter and self.limiter:
             return blocks, LineRelaxation(*self._with_limiter(stencil, *self.limiter))
-        return blocks, LineRelaxation(stencil, far)
+        return blocks, LineRelaxation(stencil, outer)
 
     def _stencil(self) -> tuple[Stencil, OuterNeighbours | None]:
         """Return the stencil, with outer neighbours if it includes the wedge."""
         problem, stencil = self.balance.problem, Stencil(*np.empty((5, *self.cells), self.real))
         state = np.where(self.lubricated, np.int8(LUBRICATED), np.int8(RUPTURED))
         rows, film = self.rows._replace(state=state), self.film.with_fixed_gap(~self.free)
-        own, far = 1.0 / self.rows.contact_scale, None
+        own_compliance, outer = 1.0 / self.rows.contact_scale, None
         equations = rows, film, self.faces, self.oil
         if self.follows_wedge:
-            far = OuterNeighbours(*np.empty((2, *self.cells), self.real))
-            compliances = own, problem.deflection.next_compliance
-            stencils.wedge_stencil(*equations, compliances, problem.spacing, stencil, far)
+            outer = OuterNeighbours(*np.empty((2, *self.cells), self.real))
+            compliances = own_compliance, problem.deflection.next_compliance
+            stencils.wedge_stencil(*equations, compliances, problem.spacing, stencil, outer)
         else:
-            stencils.own_stencil(*equations, own, problem.spacing, stencil)
+            stencils.own_stencil(*equations, own_compliance, problem.spacing, stencil)
         if self.storage is not None:
             by_gap = np.where(self.free, self.storage.by_gap, self.real(0.0))
-            by_pressure = by_gap * self.real(own) + self.storage.by_pressure
+            by_pressure = by_gap * self.real(own_compliance) + self.storage.by_pressure
             stencil.centre[:] += np.where(self.lubricated, by_pressure, 0.0)
         fold_at_mirror(stencil, problem.mirror)
         if self.conserved is not None:
             self._advect_surplus(stencil, self.conserved.surplus_by_oil)
-        return stencil, far
+        return stencil, outer
 
     def _with_limiter(
         self, stencil: Stencil, by_own: Field, by_upstream: Field
@@ -163,14 +163,14 @@ class MixedLinear:
             film.content_by_gap * self.real(1.0 / self.rows.contact_scale)
             + film.content_by_pressure
         )
-        own, upstream = np.zeros_like(content), np.zeros_like(content)  # limited flow, east faces
-        own[1:-1] = (by_own * content)[1:-1] / dx
+        entry, upstream = np.zeros_like(content), np.zeros_like(content)  # limited flow, east faces
+        entry[1:-1] = (by_own * content)[1:-1] / dx
         upstream[1:-1] = by_upstream[1:-1] * content[:-2] / dx
-        far = OuterNeighbours(*np.zeros((2, *self.cells), self.real))
-        stencil.centre[:] += self.scale * own
-        stencil.west[1:] -= self.scale[1:] * (upstream[1:] + own[:-1])
-        far.west[2:] += self.scale[2:] * upstream[1:-1]
-        return stencil, far
+        outer = OuterNeighbours(*np.zeros((2, *self.cells), self.real))
+        stencil.centre[:] += self.scale * entry
+        stencil.west[1:] -= self.scale[1:] * (upstream[1:] + entry[:-1])
+        outer.west[2:] += self.scale[2:] * upstream[1:-1]
+        return stencil, outer
 
     def _advect_surplus(self, stencil: Stencil, by_oil: Field) -> None:
         """Couple cells whose unknown is not a pressure to the next one downstream only."""
@@ -178,8 +178,8 @@ class MixedLinear:
         loose = self.lubricated & ~self.full
         lagrangian = past is not None and past.lagrangian
         wedge = real(0.0 if lagrangian else 1.0 / self.balance.problem.spacing[0])
-        own = wedge + real(0.0 if past is None else past.rate)
-        stencil.centre[loose] = (by_oil * own * scale)[loose]
+        rate = wedge + real(0.0 if past is None else past.rate)
+        stencil.centre[loose] = (by_oil * rate * scale)[loose]
         stencil.west[1:][loose[:-1]] = (-wedge * by_oil[:-1] * scale[1:])[loose[:-1]]
         stencil.west[1:][loose[:-1] & ~self.lubricated[1:]] = 0.0
         stencil.east[:-1][loose[1:]] = 0.0
@@ -245,7 +245,7 @@ class MixedLinear:
         film = self.full_film
         return film.content_by_gap * d_gap + film.content_by_pressure * d_pressure
 
-    def answer(self, wet: Field) -> Field:
+    def precondition(self, wet: Field) -> Field:
         """Return an approximate change of the oil's pressure for a residual of its rows."""
         blocks, lines = self.inverse
         change = blocks(wet)
@@ -256,7 +256,7 @@ class MixedLinear:
     def total(self, d_oil: Field, d_closed: Field) -> Field:
         """Return the change of total pressure.
 
-        That of the oil in free cells, `d_closed` in touching ones.
+        It is that of the oil in free cells and `d_closed` in touching ones.
         """
         return np.where(self.free, self.pressure_of(d_oil), d_closed)
 
@@ -282,7 +282,7 @@ class _Step:
         by_approach = linear.of_gap(
             np.zeros(linear.cells, linear.real), np.ones(linear.cells, linear.real)
         )
-        self.response = self._answered(
+        self.response = self._preconditioned(
             self.joined(np.where(linear.lubricated, by_approach[0], 0.0), by_approach[1], 0.0)
         )
         self.load_response = self._load_change(self.response)
@@ -321,7 +321,7 @@ class _Step:
 
     def precondition(self, rows: Field) -> Field:
         """Apply the approximate inverse."""
-        change = self._answered(rows)
+        change = self._preconditioned(rows)
         if self.approach_is_free:
             d_approach = self.linear.real(
                 (self._load_change(change) - rows[-1] / self.weight) / self.load_response
@@ -348,10 +348,10 @@ class _Step:
         wet = np.where(linear.lubricated, wet, linear.real(0.0))
         return self.joined(wet, closed, float(self.weight * missing))
 
-    def _answered(self, rows: Field) -> Field:
+    def _preconditioned(self, rows: Field) -> Field:
         """Apply the approximate inverse to the oil's rows."""
         change = rows.copy()
-        change[: self.count] = self.linear.answer(self.oil(rows)).ravel()
+        change[: self.count] = self.linear.precondition(self.oil(rows)).ravel()
         return change
 
     def _load_change(self, vector: Field) -> float:
@@ -369,10 +369,10 @@ def flattened_cells(balance: MixedBalance) -> Mask:
     return np.asarray(closed & (balance.solid == CAPPED))
 
 
-def extend_streaks(balance: MixedBalance) -> MixedBalance:
+def extend_lubrication(balance: MixedBalance) -> MixedBalance:
     """Return the balance with flattened cells lubricated as far downstream as oil fills them.
 
-    Otherwise a cell is ruptured until oil has arrived: a streak of closed cells would fill by one
+    Otherwise a cell is ruptured until oil has arrived: a line of closed cells would fill by one
     cell per step.
     """
     problem, rows, residual = balance.problem, balance.rows, balance.oil_residual.copy()
@@ -402,31 +402,31 @@ def newton_step(
     """Return changes of all unknowns that solve the linearised equations and the load to a tenth.
 
     The opening of the wedge is linearised in `settled` cells if the contact is firm, and oil is
-    extended along flattened streaks; neither without `settled`. Steps on one grid may share a GMRES
+    extended along flattened cells; both require `settled`. Steps on one grid may share a GMRES
     `workspace`.
     """
     problem = balance.problem
     steady = not problem.conserve and problem.past is None and problem.fixed is None
     if settled is not None and steady:
-        balance = extend_streaks(balance)
+        balance = extend_lubrication(balance)
     linear = MixedLinear(balance, settled=settled if steady and is_firm(balance) else None)
-    known_oil, known = _known_changes(linear)
+    known_oil, known_total = _known_changes(linear)
     step = _Step(linear)
-    missing = step.load_missing(known)
+    missing = step.load_missing(known_total)
     # all cells ruptured or capped: only the approach can change the load
     if step.load_response == 0.0:
         d_approach = -MIXED_SOLVER.uncoupled_approach_step * float(np.sign(missing))
-        return Pressures(known_oil, known, d_approach / balance.rows.contact_scale)
+        return Pressures(known_oil, known_total, d_approach / balance.rows.contact_scale)
     solved = gmres(
         step.product,
         step.precondition,
-        step.right_side(known_oil, known, missing),
+        step.right_side(known_oil, known_total, missing),
         tolerance=_linear_tolerance(linear),
         max_steps=MIXED_SOLVER.max_krylov_steps,
         workspace=workspace,
     )
     d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), linear.real(0.0))
-    d_total = np.where(linear.free, linear.pressure_of(d_oil) - balance.solid_residual, known)
+    d_total = np.where(linear.free, linear.pressure_of(d_oil) - balance.solid_residual, known_total)
     d_total.ravel()[step.touching] = solved[step.count : -1]
     return Pressures(d_oil, d_total, float(solved[-1]))
 

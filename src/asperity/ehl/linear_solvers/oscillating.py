@@ -33,12 +33,12 @@ Waves: TypeAlias = npt.NDArray[np.complexfloating]
 class OscillationResponse(NamedTuple):
     """Complex amplitudes of oil and total pressure, (nx, ny), per unit of closing approach.
 
-    `left` is the relative residual, `steps` those of GMRES, `unknowns` the solution vector.
+    `residual` is relative, `steps` those of GMRES, `unknowns` the solution vector.
     """
 
     oil: Waves
     total: Waves
-    left: float
+    residual: float
     steps: int
     unknowns: Waves
 
@@ -52,7 +52,7 @@ class _Equations(Protocol):
     def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
         """Return the rows of J and of S for a change of the unknowns and of the approach."""
 
-    def answer(self, rows: Field) -> Field:
+    def precondition(self, rows: Field) -> Field:
         """Apply an approximate inverse of J."""
 
     def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
@@ -76,11 +76,9 @@ class _OnePressure:
         film = balance.film
         wet = balance.rows.state == LUBRICATED
         scale = np.where(wet, balance.rows.fluid_scale, 0.0)
-        nothing = np.zeros_like(scale)
-        self.by_gap = (nothing if film is None else scale * film.content_by_gap).astype(real)
-        self.by_pressure = (nothing if film is None else scale * film.content_by_pressure).astype(
-            real
-        )
+        zero = np.zeros_like(scale)
+        self.by_gap = (zero if film is None else scale * film.content_by_gap).astype(real)
+        self.by_pressure = (zero if film is None else scale * film.content_by_pressure).astype(real)
 
     def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
         d_pressure = vector.reshape(self.cells)
@@ -89,7 +87,7 @@ class _OnePressure:
         stored = self.by_gap * d_gap + self.by_pressure * d_pressure
         return np.where(self.unknown, rows, d_pressure).ravel(), stored.ravel()
 
-    def answer(self, rows: Field) -> Field:
+    def precondition(self, rows: Field) -> Field:
         return self.linear(rows.reshape(self.cells)).ravel()
 
     def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
@@ -141,22 +139,22 @@ class _TwoPressures:
         np.multiply(stored.ravel(), self.weights[: self.count], out=storage[: self.count])
         return rows, storage
 
-    def answer(self, rows: Field) -> Field:
+    def precondition(self, rows: Field) -> Field:
         """Apply Newton's approximate inverse, with cells of known gap solved together.
 
         No cell changes its state here.
         """
         wet, gap_rows = self._split(rows * self.opening_cells)
-        oil = self.linear.answer(wet)
+        oil = self.linear.precondition(wet)
         closed = gap_rows * self.own
         if self.patch is not None:
             lines, deflection = self.patch
             stiff = self.stiff[lines]
-            together = deflection.approximate_inverse(
+            joint = deflection.approximate_inverse(
                 np.where(stiff, self.own * oil[lines], closed[lines])
             )
-            oil[lines] = np.where(stiff, together, oil[lines])
-            closed[lines] = together
+            oil[lines] = np.where(stiff, joint, oil[lines])
+            closed[lines] = joint
         return self._joined(oil, closed)
 
     def _stiff(self) -> Mask:
@@ -218,46 +216,46 @@ class Oscillating:
         self.rough = self.exact if one_line else _equations(balance, np.float32)
         self.by_approach = self.exact.product(np.zeros(self.exact.size), 1.0)
 
-    def answer(
+    def response(
         self, frequency: float, *, tolerance: float, start: OscillationResponse | None = None
     ) -> OscillationResponse:
         """Return the response to a unit approach at the dimensionless angular frequency Ω.
 
-        To a relative residual `tolerance`. `start` is a response at the same frequency: that at
-        another one has the wrong phase in the oil.
+        The relative residual is at most `tolerance`. `start` is a response at the same frequency:
+        that at another one has the wrong phase in the oil.
         """
         steps, solver = 0, self.rough
         rows, stored = self.by_approach
         rhs = rows + 1j * frequency * stored
         size = float(np.linalg.norm(rhs))
         vector = np.zeros(self.exact.size, complex)
-        left = rhs
-        share = 1.0
+        residual = rhs
+        ratio = 1.0
         if start is not None:
             vector = start.unknowns
-            left, share = self._residual(rhs, vector, frequency, size)
+            residual, ratio = self._residual(rhs, vector, frequency, size)
         for _ in range(OSCILLATION.max_rounds):
-            if share <= tolerance:
+            if ratio <= tolerance:
                 break
-            leaving = max(tolerance / share, OSCILLATION.round_tolerance)
-            change, taken = _solved(solver, left, frequency, leaving)
-            left, now = self._residual(rhs, vector + change, frequency, size)
-            steps += taken
+            target = max(tolerance / ratio, OSCILLATION.round_tolerance)
+            change, count = _solved(solver, residual, frequency, target)
+            residual, updated_ratio = self._residual(rhs, vector + change, frequency, size)
+            steps += count
             if (
-                now
+                updated_ratio
                 > min(
-                    max(OSCILLATION.stagnation, OSCILLATION.stagnation_of_tolerance * leaving), 1.0
+                    max(OSCILLATION.stagnation, OSCILLATION.stagnation_of_tolerance * target), 1.0
                 )
-                * share
+                * ratio
             ):
                 if solver is self.exact:
                     break
                 solver = self.exact
-            if now < share:
-                vector, share = vector + change, now
+            if updated_ratio < ratio:
+                vector, ratio = vector + change, updated_ratio
             else:
-                left, share = self._residual(rhs, vector, frequency, size)
-        return OscillationResponse(*self.exact.pressures(vector), share, steps, vector)
+                residual, ratio = self._residual(rhs, vector, frequency, size)
+        return OscillationResponse(*self.exact.pressures(vector), ratio, steps, vector)
 
     def sweep(self, frequency: float) -> Shifted:
         """Start a solve at Ω = `frequency`: one round of GMRES whose Ω may change."""
@@ -265,7 +263,7 @@ class Oscillating:
         kind = np.result_type(equations.real, np.complex64)
         return Shifted(
             lambda vector: _both(equations, vector),
-            lambda vector: np.asarray(_each_part(equations.answer, vector)),
+            lambda vector: np.asarray(_each_part(equations.precondition, vector)),
             (self.by_approach[0].astype(kind), self.by_approach[1].astype(kind)),
             self.load_weights,
             frequency,
@@ -275,10 +273,10 @@ class Oscillating:
     def swept(self, sweep: Shifted) -> OscillationResponse:
         """Return the response of a sweep, with its residual in double precision."""
         rows, stored = self.by_approach
-        vector = sweep.answer().astype(complex)
+        vector = sweep.solution().astype(complex)
         rhs = rows + 1j * sweep.frequency * stored
-        _, share = self._residual(rhs, vector, sweep.frequency, float(np.linalg.norm(rhs)))
-        return OscillationResponse(*self.exact.pressures(vector), share, sweep.count, vector)
+        _, ratio = self._residual(rhs, vector, sweep.frequency, float(np.linalg.norm(rhs)))
+        return OscillationResponse(*self.exact.pressures(vector), ratio, sweep.count, vector)
 
     @cached_property
     def load_weights(self) -> Field:
@@ -289,8 +287,8 @@ class Oscillating:
         self, rhs: Waves, vector: Waves, frequency: float, size: float
     ) -> tuple[Waves, float]:
         """Return the residual and its relative norm."""
-        left = rhs - _product(self.exact, vector, frequency)
-        return left, float(np.linalg.norm(left)) / size
+        residual = rhs - _product(self.exact, vector, frequency)
+        return residual, float(np.linalg.norm(residual)) / size
 
 
 def _equations(balance: Balance | MixedBalance, real: Precision) -> _Equations:
@@ -314,18 +312,18 @@ def _solved(
         return _product(equations, vector, frequency)
 
     def precondition(vector: Waves) -> Waves:
-        return np.asarray(_each_part(equations.answer, vector))
+        return np.asarray(_each_part(equations.precondition, vector))
 
     kind = np.result_type(equations.real, np.complex64)
     scale = float(np.linalg.norm(rhs))
-    found = gmres(
+    solution = gmres(
         product,
         precondition,
         (rhs / scale).astype(kind),
         tolerance=tolerance,
         max_steps=OSCILLATION.max_krylov_steps,
     )
-    return np.asarray(scale * found, dtype=complex), steps
+    return np.asarray(scale * solution, dtype=complex), steps
 
 
 def _product(equations: _Equations, vector: Waves, frequency: float) -> Waves:
@@ -338,9 +336,9 @@ def _each_part(operator: Callable[[Field], Field], vector: Waves) -> Waves:
     """Apply a real linear operator to a complex vector."""
     real = operator(np.ascontiguousarray(vector.real))
     imaginary = operator(np.ascontiguousarray(vector.imag))
-    both = np.empty(real.shape, vector.dtype)
-    both.real, both.imag = real, imaginary
-    return both
+    result = np.empty(real.shape, vector.dtype)
+    result.real, result.imag = real, imaginary
+    return result
 
 
 def _both(equations: _Equations, vector: Waves) -> tuple[Waves, Waves]:
@@ -368,13 +366,15 @@ def elastic(balance: Balance | MixedBalance) -> Balance | MixedBalance:
     Overlapping bodies stay in contact; oil at the cap between separated bodies is ordinary oil.
     """
     state = balance.rows.state
-    closed: Mask = balance.in_contact
+    touching: Mask = balance.in_contact
     if isinstance(balance, MixedBalance):
-        solid = np.where(closed, np.int8(TOUCHING), np.int8(FREE))
+        solid = np.where(touching, np.int8(TOUCHING), np.int8(FREE))
         solid = np.where(balance.solid == CAPPED, solid, balance.solid)
         oil = np.where(state == CAPPED, np.int8(LUBRICATED), state)
         return replace(balance, solid=solid, rows=balance.rows._replace(state=oil))
-    shaken = np.where(closed | (balance.film is None), np.int8(TOUCHING), np.int8(LUBRICATED))
+    elastic_state = np.where(
+        touching | (balance.film is None), np.int8(TOUCHING), np.int8(LUBRICATED)
+    )
     return replace(
-        balance, rows=balance.rows._replace(state=np.where(state == CAPPED, shaken, state))
+        balance, rows=balance.rows._replace(state=np.where(state == CAPPED, elastic_state, state))
     )

@@ -121,19 +121,17 @@ class Linear:
     def _stencil(self) -> Stencil:
         """Return the five-point stencil."""
         stencil = Stencil(*np.empty((5, *self.cells), self.dtype))
-        nothing = np.zeros(self.cells, self.dtype)
-        film = self.film or Film(*[nothing] * 8)
-        faces = self.faces or Faces(
-            nothing, nothing, nothing, nothing, nothing, nothing, nothing[0], nothing[0]
-        )
+        zero = np.zeros(self.cells, self.dtype)
+        film = self.film or Film(*[zero] * 8)
+        faces = self.faces or Faces(zero, zero, zero, zero, zero, zero, zero[0], zero[0])
         problem = self.balance.problem
         compliance = problem.deflection.local_compliance
         stencils.local_stencil(
             self.rows, film, faces, compliance, problem.spacing, self.storing, stencil
         )
         if self.storage is not None:
-            own, neighbour = (self.dtype(compliance[k] - compliance[3]) for k in (0, 1))
-            stencil.centre[:] += self.storage.by_gap * own + self.storage.by_pressure
+            centre, neighbour = (self.dtype(compliance[k] - compliance[3]) for k in (0, 1))
+            stencil.centre[:] += self.storage.by_gap * centre + self.storage.by_pressure
             stencil.west[:] += self.storage.by_gap * neighbour
             stencil.east[:] += self.storage.by_gap * neighbour
         fold_at_mirror(stencil, problem.mirror)
@@ -151,22 +149,20 @@ def fold_at_mirror(stencil: Stencil, mirror: int) -> None:
 class LineRelaxation:
     """Zebra relaxation of a five-point stencil, or a seven-point one with outer neighbours.
 
-    Solves even, odd and even x lines exactly, in turn. Seven-point lines are not diagonally
+    It solves even, odd and even x lines exactly, in turn. Seven-point lines are not diagonally
     dominant.
     """
 
     def __init__(self, stencil: Stencil, far: OuterNeighbours | None = None) -> None:
         nx, ny = stencil.centre.shape
-        nothing = np.empty((0, 0), stencil.centre.dtype)
-        self.stencil, self.far = stencil, far or OuterNeighbours(nothing, nothing)
+        empty = np.empty((0, 0), stencil.centre.dtype)
+        self.stencil, self.far = stencil, far or OuterNeighbours(empty, empty)
         for parity in (0, 1):
             compliance = np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)
-            beyond = (
-                np.empty((2, *compliance.shape[1:]), compliance.dtype)
-                if far
-                else (nothing, nothing)
+            outer = (
+                np.empty((2, *compliance.shape[1:]), compliance.dtype) if far else (empty, empty)
             )
-            lines = line_relaxation.LineFactors(*compliance, *beyond)
+            lines = line_relaxation.LineFactors(*compliance, *outer)
             line_relaxation.factor_lines(
                 stencil, self.far, parity, PRECONDITIONER.min_pivot if far else 0.0, lines
             )
@@ -211,7 +207,7 @@ class BlockSolver:
 class MultigridSolver:
     """Five-point stencil, rows times `weight`, summed over nested two-by-two blocks.
 
-    Relaxed on every level and inverted on the last.
+    It is relaxed on every level and inverted on the last.
     """
 
     def __init__(self, stencil: Stencil, weight: Field) -> None:
@@ -239,11 +235,11 @@ def _allocate_hierarchy(cells: tuple[int, int], dtype: np.dtype) -> GridHierarch
         [(0, 0, 0), *((nx * ny, nx * ((ny + 1) // 2), nx * (ny // 2)) for nx, ny in grids)], axis=0
     )
     count, even, odd = starts[-1]
-    places = np.concatenate([grids, starts[:-1]], axis=1)
+    layout = np.concatenate([grids, starts[:-1]], axis=1)
     cells_of = (count,)
     last = grids[-1][0] * grids[-1][1]
     shapes = [(5, count), cells_of, cells_of, (5, even), (5, odd), cells_of, cells_of, (last, last)]
-    return GridHierarchy._make([places, *(np.empty(shape, dtype) for shape in shapes)])
+    return GridHierarchy._make([layout, *(np.empty(shape, dtype) for shape in shapes)])
 
 
 def _block_size(cells: int) -> int:
@@ -303,22 +299,22 @@ class _Pattern(NamedTuple):
 def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
     """Return the pattern of a grid; cached."""
     columns, rows = _couplings(cells)
-    there = columns >= 0
+    inside = columns >= 0
     size = cells[0] * cells[1]
     model = scipy.sparse.csc_array(
-        (np.where(columns == rows, 5.0, -1.0)[there], (rows[there], columns[there])),
+        (np.where(columns == rows, 5.0, -1.0)[inside], (rows[inside], columns[inside])),
         shape=(size, size),
     )
     fill = scipy.sparse.linalg.splu(
         model, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
     order = np.argsort(fill.perm_c)
-    place = np.empty(size, int)
-    place[order] = np.arange(size)
-    keys = np.where(there, place[columns] * size + place[rows], -1).ravel()
-    entries, position = np.unique(keys[there.ravel()], return_inverse=True)
+    rank = np.empty(size, int)
+    rank[order] = np.arange(size)
+    keys = np.where(inside, rank[columns] * size + rank[rows], -1).ravel()
+    entries, position = np.unique(keys[inside.ravel()], return_inverse=True)
     full = np.full(keys.size, entries.size)  # couplings across the ends are dropped
-    full[there.ravel()] = position
+    full[inside.ravel()] = position
     starts = np.searchsorted(entries, np.arange(size + 1) * size)
     return _Pattern(cells, order, full, (entries % size).astype(np.int32), starts.astype(np.int32))
 

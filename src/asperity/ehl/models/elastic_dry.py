@@ -67,27 +67,27 @@ def elastic_contact(
     Returns pressure (nx, ny), approach, and whether the residual met the tolerance: root mean
     square as a share of p_h.
     """
-    whole = _ContactLines.from_problem(problem)
-    pressure = np.where(whole.inside, np.maximum(pressure, 0.0), 0.0)
-    pressure *= whole.load / pressure.sum()
+    contact = _ContactLines.from_problem(problem)
+    pressure = np.where(contact.inside, np.maximum(pressure, 0.0), 0.0)
+    pressure *= contact.load / pressure.sum()
     steps = ELASTIC_DRY.max_krylov_steps
     for _ in range(ELASTIC_DRY.max_windows):
-        gap, approach, residual = whole.state(pressure)
+        gap, approach, residual = contact.state(pressure)
         if residual < tolerance or steps <= 0:
             break
-        lines, window = whole.window(whole.inside & ((pressure > 0.0) | (gap < 0.0)))
-        found, taken = _solve_window(lines, pressure[window], tolerance, steps)
+        lines, window = contact.window(contact.inside & ((pressure > 0.0) | (gap < 0.0)))
+        window_pressure, steps_taken = _solve_window(lines, pressure[window], tolerance, steps)
         pressure = np.zeros_like(pressure)
-        pressure[window] = found
-        steps -= taken
+        pressure[window] = window_pressure
+        steps -= steps_taken
     return pressure, approach, residual < tolerance
 
 
 def _solve_window(
     lines: _ContactLines, pressure: Field, tolerance: float, max_steps: int
 ) -> tuple[Field, int]:
-    """Return non-negative pressures on some lines, and the conjugate-gradient steps taken."""
-    steps, before = 0, pressure > 0.0
+    """Return non-negative pressures on some lines, and the number of conjugate-gradient steps."""
+    steps, previous = 0, pressure > 0.0
     for _ in range(ELASTIC_DRY.max_active_sets):
         gap, _, residual = lines.state(pressure)
         if residual < tolerance or steps >= max_steps:
@@ -98,27 +98,27 @@ def _solve_window(
         if np.any(settled != pressure):
             settled[touching] += (lines.load - settled.sum()) / count
             gap = lines.undeformed + lines.deflection(settled)
-        changing = np.count_nonzero(touching != before) > ELASTIC_DRY.changing_share * count
-        share = (
+        changing = np.count_nonzero(touching != previous) > ELASTIC_DRY.changing_share * count
+        reduction = (
             ELASTIC_DRY.loose
             if changing
             else ELASTIC_DRY.tight
             if residual > ELASTIC_DRY.final_residual
             else ELASTIC_DRY.exact
         )
-        share = max(share, 0.2 * tolerance / residual)
-        change, _, taken = level_gaps(lines.deflection, touching, gap, share, max_steps - steps)
-        pressure, before, steps = settled + change, touching, steps + taken
+        reduction = max(reduction, 0.2 * tolerance / residual)
+        change, _, inner = level_gaps(lines.deflection, touching, gap, reduction, max_steps - steps)
+        pressure, previous, steps = settled + change, touching, steps + inner
     pressure = np.maximum(pressure, 0.0)
     return pressure * (lines.load / pressure.sum()), steps
 
 
 def level_gaps(
-    deflection: Deflection, touching: Mask, gap: Field, share: float, most: int
+    deflection: Deflection, touching: Mask, gap: Field, reduction: float, max_steps: int
 ) -> tuple[Field, float, int]:
     """Solve for a pressure change of touching cells with zero sum that equalises their gaps.
 
-    To a relative residual `share`. Returns change, mean gap, and the steps taken.
+    Its relative residual is at most `reduction`. Returns change, mean gap and number of steps.
     """
     count = np.float32(np.count_nonzero(touching))
     level = gap[touching].mean()
@@ -127,17 +127,17 @@ def level_gaps(
     direction = residual.copy()
     step = 0
     size = first = float(np.vdot(residual, residual))
-    while size > share**2 * first and step < most:
-        answer = deflection(direction)
-        answer[~touching] = 0.0
-        mean = answer.sum() / count
-        answer -= np.where(touching, mean, np.float32(0.0))
-        length = np.float32(size / float(np.vdot(answer, direction)))
+    while size > reduction**2 * first and step < max_steps:
+        response = deflection(direction)
+        response[~touching] = 0.0
+        mean = response.sum() / count
+        response -= np.where(touching, mean, np.float32(0.0))
+        length = np.float32(size / float(np.vdot(response, direction)))
         change += length * direction
         level += length * mean
-        residual -= length * answer
-        before, size = size, float(np.vdot(residual, residual))
-        direction *= np.float32(size / before)
+        residual -= length * response
+        previous, size = size, float(np.vdot(residual, residual))
+        direction *= np.float32(size / previous)
         direction += residual
         step += 1
     exact = change.astype(float)

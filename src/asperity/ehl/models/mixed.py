@@ -130,8 +130,8 @@ class MixedBalance:
     @property
     def growth(self) -> Field:
         """Permanent opening of the gap by conserved oil at the cap, (nx, ny)."""
-        nothing = np.zeros_like(self.gap)
-        return nothing if self.surplus is None else _growth(self.problem, self.unknowns.oil)
+        zero = np.zeros_like(self.gap)
+        return zero if self.surplus is None else _growth(self.problem, self.unknowns.oil)
 
     @property
     def height(self) -> Field:
@@ -370,32 +370,32 @@ def _surplus(problem: Problem, film: Film, signed: Field) -> tuple[Field, Field]
 
 def _growth(problem: Problem, signed: Field) -> Field:
     """Return the permanent opening of the gap by oil at the cap."""
-    beyond = (
+    excess = (
         np.maximum(signed - problem.p_cap, 0.0)
         if np.isfinite(problem.p_cap)
         else np.zeros_like(signed)
     )
-    return beyond * problem.softness
+    return excess * problem.softness
 
 
 def limiter_slopes(balance: MixedBalance, dtype: Precision) -> tuple[Field, Field]:
     """Return derivatives of the limited correction in the own and, negative, the upstream content.
 
-    The opening of cells is held constant; see `opening_slopes`. Both (nx, ny).
+    The opening of cells is held constant; see `opening_slopes`. Both have shape (nx, ny).
     """
     content = balance.film.content
-    own, by_upstream = np.empty((2, *content.shape), dtype)
+    by_own, by_upstream = np.empty((2, *content.shape), dtype)
     load_sharing.limiter_slopes(
-        balance.limiter, content, upstream_content(balance.problem, content), own, by_upstream
+        balance.limiter, content, upstream_content(balance.problem, content), by_own, by_upstream
     )
-    return own, by_upstream
+    return by_own, by_upstream
 
 
 def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Index, Index, Field]:
     """Return derivatives of the limited correction at eastern faces in the gap of opening cells.
 
-    Faces, cells and slopes of the `moved` cells; faces and cells as flat indices, a cell once for
-    its own face and once for the next one downstream.
+    Returns faces, cells and slopes of the `moved` cells, faces and cells as flat indices: a cell
+    once for its own face and once for the next one downstream.
     """
     problem, (_, ny) = balance.problem, balance.problem.cells
     gap, content, closed = balance.gap, balance.film.content.ravel(), problem.contact_gap
@@ -403,21 +403,21 @@ def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Index, Index, Fi
     faces = np.concatenate([cells, cells + ny])
     inner = (faces >= ny) & (faces < content.size - ny)
     faces, cells = faces[inner], np.tile(cells, 2)[inner]
-    here, upstream = content[faces], content[faces - ny]
+    centre, upstream = content[faces], content[faces - ny]
     other = np.clip(
         (gap.ravel()[np.where(faces == cells, faces - ny, faces)] / closed - 1.0) / OPENING_RANGE,
         0.0,
         1.0,
     )
-    leaning = upstream * here / (upstream**2 + here**2) * (here - upstream)
+    leaning = upstream * centre / (upstream**2 + centre**2) * (centre - upstream)
     return faces, cells, leaning * other / (OPENING_RANGE * closed)
 
 
 class ConservedOil(NamedTuple):
     """Derivatives of the surplus and of the gap where oil is conserved.
 
-    Of the surplus in the signed unknown, everywhere and in cavities; of the permanent opening in
-    the signed unknown; of the surplus in the gap.
+    They are those of the surplus in the signed unknown, everywhere and in cavities, of the
+    permanent opening in the signed unknown, and of the surplus in the gap.
     """
 
     surplus_by_oil: Field

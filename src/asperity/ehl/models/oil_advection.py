@@ -30,7 +30,7 @@ def is_lagrangian(problem: Problem) -> bool:
 def upstream_content(problem: Problem, content: Field) -> Field:
     """Return the content upstream of each cell, (nx, ny).
 
-    For Lagrangian oil one time step earlier.
+    For Lagrangian oil it is that of one time step earlier.
     """
     upstream = np.concatenate([content[:1], content[:-1]])
     if problem.past is not None and problem.past.upstream is not None:
@@ -85,7 +85,7 @@ def limiter_outflow(problem: Problem, content: Field, own: Field, upstream: Fiel
 def advected_outflow(problem: Problem, content: Field) -> Field:
     """Return the outflow of each cell of a content that moves with the oil, (nx, ny).
 
-    Upwind, first order.
+    It is upwind and of first order.
     """
     past, dx = problem.past, problem.spacing[0]
     if past is None or not past.lagrangian:

@@ -108,9 +108,9 @@ def dry_contact(
         if converged or step == max_steps:
             break
         steepest = np.where(free, gap, 0.0)
-        before, size = size, float((steepest**2).sum())
-        share = size / before if keep and before > 0.0 else 0.0
-        direction = np.where(free, steepest + share * direction, 0.0)
+        previous, size = size, float((steepest**2).sum())
+        weight = size / previous if keep and previous > 0.0 else 0.0
+        direction = np.where(free, steepest + weight * direction, 0.0)
         length = _step_length(problem, steepest, direction, free)
         pressure = np.clip(pressure - length * direction, 0.0, cap)
         wrong = inside & _leaves_bound(pressure, gap, cap)
@@ -135,9 +135,9 @@ def _leaves_bound(pressure: Field, gap: Field, cap: float) -> Mask:
 
 def _step_length(problem: Problem, steepest: Field, direction: Field, free: Mask) -> float:
     """Return the step along a direction that minimises the energy at constant load."""
-    answer = problem.deflection(direction)
-    answer -= answer[free].mean() if free.any() else 0.0
-    curvature = float((answer * direction).sum())
+    response = problem.deflection(direction)
+    response -= response[free].mean() if free.any() else 0.0
+    curvature = float((response * direction).sum())
     if not curvature > 0.0:
         return 1.0 / problem.softness
     return float((steepest * direction).sum()) / curvature

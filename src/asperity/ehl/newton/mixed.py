@@ -24,22 +24,22 @@ class _StepProposal(NamedTuple):
 
     balance: MixedBalance
     step: Pressures
-    share: float
+    factor: float
 
     def apply(self, damping: float = 1.0) -> tuple[Pressures, Mask]:
         """Return the unknowns after a damped step, and the cells that then count as free."""
         problem = self.balance.problem
         (_, total, approach) = self.balance.unknowns
-        share = damping * self.share
+        factor = damping * self.factor
         free = self.balance.solid == FREE
-        signed = _updated_oil(self.balance, share * self.step.oil)
+        signed = _updated_oil(self.balance, factor * self.step.oil)
         oil = np.clip(signed, 0.0, problem.p_cap)
-        total = np.where(free, oil, np.clip(total + share * self.step.total, 0.0, problem.p_cap))
+        total = np.where(free, oil, np.clip(total + factor * self.step.total, 0.0, problem.p_cap))
         overloaded = ~free & (oil > total)
         # a cell in deep overlap would alternate between closed and free
         freed = overloaded & (self.balance.solid != CAPPED)
         unknowns = Pressures(
-            np.where(overloaded, total, signed), total, approach + share * self.step.approach
+            np.where(overloaded, total, signed), total, approach + factor * self.step.approach
         )
         return unknowns, freed
 
@@ -59,7 +59,7 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     workspace = Workspace()
     lowest = np.inf
     stagnation = 0
-    share = 1.0
+    damping = 1.0
     stagnated = False
     balance = evaluate(problem, unknowns, second_order=second_order)
     settled_cells = np.zeros(problem.cells, dtype=bool)
@@ -78,8 +78,8 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
             lowest = balance.residual_rms
             stagnation = 0
         elif stagnation == MIXED_NEWTON.stagnation_iterations:
-            lowest, stagnation, share, stagnated = balance.residual_rms, 0, 1.5 - share, True
-        proposal = _StepProposal(balance, limits(step, balance), share)
+            lowest, stagnation, damping, stagnated = balance.residual_rms, 0, 1.5 - damping, True
+        proposal = _StepProposal(balance, limits(step, balance), damping)
         balance = _line_search(proposal, second_order=second_order)
         settled_cells = (
             np.abs(balance.gap - gap) < MIXED_NEWTON.settled_gap_change * problem.contact_gap
@@ -129,18 +129,18 @@ def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance
 def _updated_oil(balance: MixedBalance, step: Field) -> Field:
     """Return the oil unknown after a step within its bounds.
 
-    Where oil is conserved, at most up to the next state.
+    Where oil is conserved, a step leads at most to the next state.
     """
-    before = balance.unknowns.oil
+    current = balance.unknowns.oil
     cap = balance.problem.p_cap
-    signed = before + step
+    signed = current + step
     if balance.surplus is None:
         return np.clip(signed, 0.0, cap)
-    ruptured = before < 0.0
-    pressed = before > cap
+    ruptured = current < 0.0
+    pressed = current > cap
     full = ~ruptured & ~pressed
     signed = np.where(
-        ruptured, np.maximum(signed, MIXED_NEWTON.min_content_share * (1.0 + before) - 1.0), signed
+        ruptured, np.maximum(signed, MIXED_NEWTON.min_content_share * (1.0 + current) - 1.0), signed
     )
     signed = np.where(ruptured & (signed >= 0.0), 0.0, signed)
     signed = np.where(full & (signed < 0.0), -MIXED_NEWTON.state_offset, signed)

@@ -21,7 +21,7 @@ class StepLimit:
     def __init__(
         self, pressure: Field, *, initial: float = np.inf, bound_reversals: bool = True
     ) -> None:
-        self.before, self.longest = np.zeros_like(pressure), np.full_like(pressure, initial)
+        self.previous, self.longest = np.zeros_like(pressure), np.full_like(pressure, initial)
         self.bounds = StepBounds(
             STEP_LIMITS.max_pressure_step, STEP_LIMITS.max_relative_step, bound_reversals
         )
@@ -29,8 +29,8 @@ class StepLimit:
     def __call__(self, step: Field, size: Field) -> Field:
         """Return the limited step; `size` is the magnitude of each cell's pressure."""
         limited = np.empty_like(step)
-        limit_steps(step, size, self.bounds, self.before, self.longest, limited)
-        self.before = step
+        limit_steps(step, size, self.bounds, self.previous, self.longest, limited)
+        self.previous = step
         return limited
 
 
@@ -39,13 +39,13 @@ class ApproachLimit:
 
     def __init__(self, roughness: Field) -> None:
         self.largest = self.current = largest_approach_step(roughness)
-        self.before = 0.0
+        self.previous = 0.0
 
     def __call__(self, step: float) -> float:
         """Return the limited step."""
-        reverses = step * self.before < 0.0 and abs(step) > 0.5 * self.current
+        reverses = step * self.previous < 0.0 and abs(step) > 0.5 * self.current
         grown = min(STEP_LIMITS.approach_growth * self.current, self.largest)
-        self.current, self.before = 0.5 * self.current if reverses else grown, step
+        self.current, self.previous = 0.5 * self.current if reverses else grown, step
         return float(np.clip(step, -self.current, self.current))
 
 

@@ -88,12 +88,12 @@ class Search:
                     problem, pressure, approach, tolerance, from_outside=coarsest
                 )
             else:
-                most = self.options.max_iterations
+                max_steps = self.options.max_iterations
                 if not finest:
-                    most = min(most, CONTINUATION.max_coarse_iterations)
+                    max_steps = min(max_steps, CONTINUATION.max_coarse_iterations)
                 bracket = coarsest and not finest
                 step = self._solve_level(
-                    problem, pressure, approach, tolerance, most, bracket=bracket
+                    problem, pressure, approach, tolerance, max_steps, bracket=bracket
                 )
             pressure, approach = step.balance.pressure, step.approach
             if coarser_in_all_axes(problem, levels[0]):
@@ -111,7 +111,7 @@ class Search:
         pressure: Field,
         approach: float,
         tolerance: float,
-        most: int,
+        max_steps: int,
         *,
         bracket: bool,
     ) -> Step:
@@ -122,15 +122,15 @@ class Search:
         """
         steps = newton(problem, pressure, approach)
         divergence = CONTINUATION.divergence if problem.accurate else np.inf
-        step = self.run(problem, steps, tolerance, most, divergence=divergence)
-        diverged = step.number < most and not (self.converged(tolerance) or self.failed)
+        step = self.run(problem, steps, tolerance, max_steps, divergence=divergence)
+        diverged = step.number < max_steps and not (self.converged(tolerance) or self.failed)
         if problem.accurate and diverged:
             pressure, approach = self.robust_start(problem, pressure, approach)
-            step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
+            step = self.run(problem, newton(problem, pressure, approach), tolerance, max_steps)
         if bracket and not self.converged(CONTINUATION.failed_residual):
             # the load of a capped contact is too nonlinear in the approach for Newton
-            found = self.bracket_approach(problem, pressure, approach, tolerance, from_outside=True)
-            step = found if self.converged(CONTINUATION.failed_residual) else step
+            trial = self.bracket_approach(problem, pressure, approach, tolerance, from_outside=True)
+            step = trial if self.converged(CONTINUATION.failed_residual) else step
         return step
 
     def robust_start(
@@ -138,7 +138,7 @@ class Search:
     ) -> tuple[Field, float]:
         """Return an initial guess for the third-order wedge from a few second-order steps.
 
-        Unchanged if these do not converge.
+        It is unchanged if these do not converge.
         """
         sturdy = replace(problem, accurate=False)
         step = self.run(
@@ -158,34 +158,34 @@ class Search:
         problem: Problem,
         steps: Iterator[Step],
         tolerance: float,
-        most: int,
+        max_steps: int,
         *,
         check_load: bool = True,
         divergence: float = np.inf,
         after: Step | None = None,
     ) -> Step:
-        """Take steps until they meet the tolerance or reach the number `most`.
+        """Take steps until they meet the tolerance or reach the number `max_steps`.
 
-        Stops also where the residual reaches `divergence` times that of the first step, or of the
-        step `after` which they continue.
+        They also end where the residual reaches `divergence` times that of the first step, or of
+        the step `after` which they continue.
         """
         step = next(steps)
-        before = after or step
-        largest_residual = divergence * max(before.balance.residual_rms, CONTINUATION.min_residual)
+        earlier = after or step
+        largest_residual = divergence * max(earlier.balance.residual_rms, CONTINUATION.min_residual)
         while True:
             self._record(problem, step)
             self.failed = step.number > 0 and not np.isfinite(step.change)
             if (
                 self.converged(tolerance, check_load=check_load)
-                or step.number >= most
+                or step.number >= max_steps
                 or self.failed
                 or self.exhausted
             ):
                 break
             if step.balance.residual_rms > largest_residual:
                 break
-            before, step = step, next(steps)
-        self.iteration_error = self._figures(step).abs_difference(self._figures(before))
+            earlier, step = step, next(steps)
+        self.iteration_error = self._figures(step).abs_difference(self._figures(earlier))
         return step
 
     def bracket_approach(
@@ -199,23 +199,23 @@ class Search:
     ) -> Step:
         """Solve at fixed approach, and search the approach that carries the load.
 
-        Slower, but each problem is simpler.
+        This is slower, but each problem is simpler.
         """
         roughness = float(np.std(problem.roughness))
         stride = max(0.5, 0.5 * roughness) if from_outside else max(0.05, 0.05 * roughness)
         approach += 2.0 * roughness if from_outside else 0.0
-        bracket, left = _Bracket(stride), self.options.max_iterations
+        bracket, remaining = _Bracket(stride), self.options.max_iterations
         while True:
             step = self.run(
                 problem,
                 newton(problem, pressure, approach, fixed=True),
                 tolerance,
-                min(left, CONTINUATION.max_fixed_iterations),
+                min(remaining, CONTINUATION.max_fixed_iterations),
                 check_load=False,
             )
-            left -= max(step.number, 1)
+            remaining -= max(step.number, 1)
             pressure = step.balance.pressure
-            if left <= 0 or self.failed or self.converged(tolerance):
+            if remaining <= 0 or self.failed or self.converged(tolerance):
                 return step
             approach = bracket.next_approach(approach, step.balance.load_error)
 
@@ -257,8 +257,8 @@ class Search:
         stopped = SolveStatus.STALLED if self.failed else SolveStatus.OUT_OF_ITERATIONS
         touching = balance.in_contact & (balance.pressure > 0.0)
         pressure, height = (
-            on_all_lines(balance.problem, part, lines)
-            for part in (balance.pressure, balance.height)
+            on_all_lines(balance.problem, field, lines)
+            for field in (balance.pressure, balance.height)
         )
         return ContactSolution(
             conditions=conditions,
@@ -283,15 +283,15 @@ class Search:
     def _figures(self, step: Step) -> Figures:
         """Return the key results of a step."""
         balance = step.balance
-        touching, whole = balance.in_contact & (balance.pressure > 0.0), balance.problem.unfold
-        parts = whole(balance.pressure), whole(touching), whole(balance.height)
-        return figures(balance.problem.unfolded, *parts, self.gap_scale)
+        touching, unfold = balance.in_contact & (balance.pressure > 0.0), balance.problem.unfold
+        fields = unfold(balance.pressure), unfold(touching), unfold(balance.height)
+        return figures(balance.problem.unfolded, *fields, self.gap_scale)
 
     def _record(self, problem: Problem, step: Step) -> None:
         """Record a step and report progress."""
         balance = step.balance
-        left = balance.residual_rms, abs(balance.load_error), step.change
-        iteration = Iteration(problem.all_cells, step.number, *left)
+        residuals = balance.residual_rms, abs(balance.load_error), step.change
+        iteration = Iteration(problem.all_cells, step.number, *residuals)
         self.history.append(iteration)
         self.work += problem.roughness.size if step.number > 0 else 0
         if self.progress:
@@ -318,14 +318,14 @@ class _Bracket:
             self.ends[not side] = self.ends[not side][0], 0.5 * self.ends[not side][1]
         self.last_side = side
         (closer, too_much), (apart, too_little) = self.ends[True], self.ends[False]
-        share = min(max(too_much / (too_much - too_little), 0.02), 0.98)
-        return closer + share * (apart - closer)
+        weight = min(max(too_much / (too_much - too_little), 0.02), 0.98)
+        return closer + weight * (apart - closer)
 
 
 def on_all_lines(problem: Problem, field: AnyField, lines: int) -> AnyField:
     """Expand a field, (nx', ny'), of a reduced problem to so many lines of cells."""
-    whole = problem.unfold(field)
-    return np.repeat(whole, lines // whole.shape[1], axis=1)
+    unfolded = problem.unfold(field)
+    return np.repeat(unfolded, lines // unfolded.shape[1], axis=1)
 
 
 def grid_error(
@@ -353,52 +353,52 @@ def grid_error(
     if len(on_grids) < 2:
         return None
     *before, coarse, fine = on_grids
-    nothing, apart = fine.abs_difference(fine), fine.abs_difference(coarse)
+    zero, shift = fine.abs_difference(fine), fine.abs_difference(coarse)
     figures_of_ends = (
-        (name, [getattr(parts, name) for parts in on_grids])
+        (name, [getattr(results, name) for results in on_grids])
         for name in ("edge_pressure", "end_film")
     )
-    ends = {name: ends_error(found) for name, found in figures_of_ends if None not in found}
+    errors = {name: ends_error(values) for name, values in figures_of_ends if None not in values}
     if before:
-        apart = apart.maximum(
+        shift = shift.maximum(
             coarse.abs_difference(before[-1]).scale(ERROR_ESTIMATE.min_difference)
         )
     if smooth:
-        half, lean = apart if order > 1 else apart.scale(3.0), nothing
+        half, lean = shift if order > 1 else shift.scale(3.0), zero
     else:
-        half, lean = _rough_interval(on_grids, apart, cell, by_first_order)
-        lean = replace(lean, **dict.fromkeys(ends, 0.0))
-    return GridError(**asdict(replace(half, **ends)), lean=lean)
+        half, lean = _rough_interval(on_grids, shift, cell, by_first_order)
+        lean = replace(lean, **dict.fromkeys(errors, 0.0))
+    return GridError(**asdict(replace(half, **errors)), lean=lean)
 
 
 def _rough_interval(
-    on_grids: Sequence[Figures], apart: Figures, cell: float, by_first_order: Figures | None
+    on_grids: Sequence[Figures], shift: Figures, cell: float, by_first_order: Figures | None
 ) -> tuple[Figures, Figures]:
     """Return half the width and the lean of a rough solution's intervals; see `grid_error`."""
     coarse, fine = on_grids[-2:]
-    nothing, share = fine.abs_difference(fine), 1.0
+    zero, share = fine.abs_difference(fine), 1.0
     if by_first_order is not None:
-        apart = apart.maximum(fine.abs_difference(by_first_order))
+        shift = shift.maximum(fine.abs_difference(by_first_order))
         share = ERROR_ESTIMATE.two_order_share
-    half = apart.scale(0.5 * share * (ERROR_ESTIMATE.forward + ERROR_ESTIMATE.backward)).add(
-        replace(nothing, clr=share * ERROR_ESTIMATE.load_share_per_cell * cell**2)
+    half = shift.scale(0.5 * share * (ERROR_ESTIMATE.forward + ERROR_ESTIMATE.backward)).add(
+        replace(zero, clr=share * ERROR_ESTIMATE.load_share_per_cell * cell**2)
     )
-    lean = apart.scale(0.5 * share * (ERROR_ESTIMATE.forward - ERROR_ESTIMATE.backward)).copysign(
+    lean = shift.scale(0.5 * share * (ERROR_ESTIMATE.forward - ERROR_ESTIMATE.backward)).copysign(
         fine.difference(coarse)
     )
     if by_first_order is not None and len(on_grids) > 2:
-        half_clr, lean_clr = _load_share_error(apart.clr, fine.clr - coarse.clr, cell)
+        half_clr, lean_clr = _load_share_error(shift.clr, fine.clr - coarse.clr, cell)
         half, lean = replace(half, clr=half_clr), replace(lean, clr=lean_clr)
     return half, lean
 
 
-def _load_share_error(apart: float, change: float, cell: float) -> tuple[float, float]:
+def _load_share_error(shift: float, change: float, cell: float) -> tuple[float, float]:
     """Return half the width and the lean of the load share's interval from three grids."""
     half = (
-        0.5 * (ERROR_ESTIMATE.load_share_forward + ERROR_ESTIMATE.load_share_backward) * apart
+        0.5 * (ERROR_ESTIMATE.load_share_forward + ERROR_ESTIMATE.load_share_backward) * shift
         + ERROR_ESTIMATE.load_share_per_cell_three * cell**2
     )
-    lean = 0.5 * (ERROR_ESTIMATE.load_share_forward - ERROR_ESTIMATE.load_share_backward) * apart
+    lean = 0.5 * (ERROR_ESTIMATE.load_share_forward - ERROR_ESTIMATE.load_share_backward) * shift
     return half, math.copysign(lean, change)
 
 
@@ -408,39 +408,39 @@ def ends_error(on_grids: Sequence[float]) -> float:
     See `grid_error`.
     """
     *before, coarse, fine = on_grids
-    apart, factor = abs(fine - coarse), ERROR_ESTIMATE.end_factor
+    shift, factor = abs(fine - coarse), ERROR_ESTIMATE.end_factor
     if before:
         earlier = abs(coarse - before[-1])
-        if apart > ERROR_ESTIMATE.end_scatter * abs(fine):
-            shrinks = min(apart / earlier, 1.0) if earlier > 0.0 else 1.0
+        if shift > ERROR_ESTIMATE.end_scatter * abs(fine):
+            shrinks = min(shift / earlier, 1.0) if earlier > 0.0 else 1.0
             factor *= min(
                 max(0.5 * shrinks / max(1.0 - shrinks, 1e-9), 1.0),
                 ERROR_ESTIMATE.max_end_growth,
             )
-        apart = max(apart, ERROR_ESTIMATE.min_difference * earlier)
-    return factor * apart
+        shift = max(shift, ERROR_ESTIMATE.min_difference * earlier)
+    return factor * shift
 
 
 def figures(
     problem: Problem, pressure: Field, touching: Mask, gap: Field, gap_scale: float
 ) -> Figures:
     """Return the key results of dimensionless fields; lengths in the unit of `gap_scale`."""
-    along, ends = problem.form.roller, {}
-    if along is not None:
+    profile, end_values = problem.form.roller, {}
+    if profile is not None:
         dome, film = (
-            along.end_values(problem.y, of)
+            profile.end_values(problem.y, of)
             for of in (
-                along.central_pressure(problem.x, pressure, problem.spacing[0]),
+                profile.central_pressure(problem.x, pressure, problem.spacing[0]),
                 gap.min(axis=0),
             )
         )
         if dome.size:
-            ends = {
+            end_values = {
                 "edge_pressure": float(dome.max()) * problem.p_scale,
                 "end_film": float(film.min()) * gap_scale,
             }
     return Figures(
-        **ends,
+        **end_values,
         car=area_share(touching, problem.zone()),
         clr=carried_share(pressure, touching),
         h_min=float(gap.min()) * gap_scale,

@@ -32,13 +32,13 @@ class DryAndLubricated(NamedTuple):
 def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field, float]:
     """Return pressure and approach without oil, from a `coarser` grid or from Hertz pressure.
 
-    First as elastic bodies, valid if these stay below the cap; then by active sets; if these cycle,
-    by Newton steps from the coarser grid; if those fail, by projected conjugate gradients, and by
+    The bodies are first elastic, which is valid below the cap; then active sets are used; if these
+    cycle, Newton steps from the coarser grid; if those fail, projected conjugate gradients, and
     Newton steps where these do not converge.
     """
     if problem.mirror:
-        whole = None if coarser is None else coarser._replace(total=problem.unfold(coarser.total))
-        pressure, approach = dry_start(problem.unfolded, whole)
+        full = None if coarser is None else coarser._replace(total=problem.unfold(coarser.total))
+        pressure, approach = dry_start(problem.unfolded, full)
         return np.ascontiguousarray(pressure[:, : problem.cells[1]]), approach
     dry = replace(problem, lubricant=None, contact_gap=0.0)
     hertz = problem.form.hertz(problem.x, problem.y)
@@ -99,7 +99,7 @@ def interpolate_unknowns(problem: Problem, unknowns: Pressures) -> Pressures:
 
 
 def roller_start(
-    problem: Problem, before: DryAndLubricated | None, pressure: Field, approach: float
+    problem: Problem, coarser: DryAndLubricated | None, pressure: Field, approach: float
 ) -> tuple[Pressures, Pressures]:
     """Return the dry contact of a smooth roller with ends, and an initial guess.
 
@@ -109,8 +109,8 @@ def roller_start(
     """
     total, distance = dry_start(problem)
     dry = Pressures(total, total, distance)
-    if before is None:
+    if coarser is None:
         film = approach + float((problem.undeformed + problem.deflection(pressure)).min())
         return dry, Pressures(total, total, distance + film)
-    start = before.transfer_to(problem, dry)
+    start = coarser.transfer_to(problem, dry)
     return dry, refine_locally(problem, Pressures(start.total, start.total, start.approach))

@@ -24,14 +24,14 @@ Box = tuple[slice, slice]
 def refine_locally(problem: Problem, unknowns: Pressures) -> Pressures:
     """Solve the worst cells of an initial guess for their surroundings.
 
-    Unchanged if these cells are many.
+    The guess is unchanged if these cells are many.
     """
     balance = evaluate(problem, unknowns, second_order=False)
     oil = unknowns.oil.copy()
     total = unknowns.total.copy()
     for box in _worst_boxes(balance):
-        part, start = _subproblem(balance, box)
-        oil[box], total[box] = _solved(part, start)
+        subproblem, start = _subproblem(balance, box)
+        oil[box], total[box] = _solved(subproblem, start)
     return Pressures(oil, total, unknowns.approach)
 
 
@@ -93,7 +93,7 @@ def _subproblem(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
         else inner,
     ] = False
     factor = problem.viscosity_factor
-    part = replace(
+    subproblem = replace(
         problem,
         lower=(x + along.start * dx, y + across.start * dy),
         roughness=problem.roughness[box],
@@ -101,5 +101,7 @@ def _subproblem(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
         fixed=fixed,
         mirror=mirror,
     )
-    shape = balance.gap[box] - part.deflection(start.total)
-    return replace(part, roughness=part.form.gap(part.x, part.y) - shape), start
+    shape = balance.gap[box] - subproblem.deflection(start.total)
+    return replace(
+        subproblem, roughness=subproblem.form.gap(subproblem.x, subproblem.y) - shape
+    ), start

@@ -80,10 +80,10 @@ class MixedSearch(Search):
         if strategy == FROM_DRY:
             return self.from_dry(levels)
         step = self.coarse_to_fine(levels, guess)
-        # sharp ends take the robust strategy
-        ends = levels[0].form.roller is not None and strategy == COARSE_TO_FINE
+        # sharp ends need the robust strategy
+        sharp_ends = levels[0].form.roller is not None and strategy == COARSE_TO_FINE
         # smooth bodies: oil and asperities never share a cell
-        single_pressure_suffices = self.smooth and not ends
+        single_pressure_suffices = self.smooth and not sharp_ends
         if single_pressure_suffices and not self.converged(self.options.tolerance):
             step = self.from_single_pressure(levels, guess)
         return step
@@ -106,9 +106,9 @@ class MixedSearch(Search):
 
     def continue_from(self, problem: Problem, unknowns: Pressures) -> Step:
         """Solve from a neighbouring solution: second order first, then as from a distant guess."""
-        most = min(self.options.max_iterations, SEARCH.max_second_order_iterations)
+        max_steps = min(self.options.max_iterations, SEARCH.max_second_order_iterations)
         step = self.run(
-            problem, newton(problem, unknowns, second_order=True), self.options.tolerance, most
+            problem, newton(problem, unknowns, second_order=True), self.options.tolerance, max_steps
         )
         return (
             step
@@ -123,9 +123,9 @@ class MixedSearch(Search):
 
         The effect of the order on the results then follows from steps back to first order.
         """
-        tolerance, most = self._targets(problem, coarse=coarse, from_coarse=True)
+        tolerance, max_steps = self._targets(problem, coarse=coarse, from_coarse=True)
         roughly = max(SEARCH.first_order_tolerance, tolerance)
-        soon = min(SEARCH.max_second_order_iterations, most)
+        soon = min(SEARCH.max_second_order_iterations, max_steps)
         if uses_limiter(problem):
             steps = newton(problem, unknowns, second_order=True)
             step = self.run(
@@ -155,20 +155,20 @@ class MixedSearch(Search):
     ) -> tuple[float, int]:
         """Return tolerance and largest number of steps, for the finest or a coarser grid."""
         tolerance = self.options.tolerance
-        most = self.options.max_iterations
+        max_steps = self.options.max_iterations
         if not coarse:
-            return tolerance, most
+            return tolerance, max_steps
         roughly = (
             CONTINUATION.coarse_tolerance
             if problem.accurate or from_coarse
             else 0.5 * SEARCH.first_order_tolerance
         )
-        return max(roughly, tolerance), min(SEARCH.max_error_grid_iterations, most)
+        return max(roughly, tolerance), min(SEARCH.max_error_grid_iterations, max_steps)
 
     def refine_third_order(self, problem: Problem, step: Step) -> tuple[str, Step]:
         """Refine a robust solution of smooth bodies with the third-order wedge.
 
-        Returns strategy and step; the robust ones if this fails.
+        Returns strategy and step, those of the robust solution if this fails.
         """
         history = list(self.history)
         figures = list(self.figures)
@@ -201,7 +201,7 @@ class MixedSearch(Search):
         fail, the `last` resort for conserved oil is the contact with refilled cavities, and then
         the steady contact directly.
         """
-        tolerance, most = self._targets(problem, coarse=coarse)
+        tolerance, max_steps = self._targets(problem, coarse=coarse)
         if problem.conserve or not problem.accurate:
             step = self.march_in_time(problem, unknowns, length)
             if not self.converged(MARCHING.tolerance) and not last:
@@ -210,31 +210,33 @@ class MixedSearch(Search):
                 step = self.from_refilled_cavities(problem, unknowns, length)
             unknowns = unknowns_of(step) if self.converged(MARCHING.tolerance) else unknowns
         if problem.accurate and problem.form.roller is not None:
-            most = min(most, SEARCH.max_roller_iterations)
+            max_steps = min(max_steps, SEARCH.max_roller_iterations)
         if not uses_limiter(problem):
-            return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
+            return self.run(
+                problem, newton(problem, unknowns, second_order=False), tolerance, max_steps
+            )
         step = self._solve_first_order(
-            problem, unknowns, length, min(most, SEARCH.max_first_order_iterations), tolerance
+            problem, unknowns, length, min(max_steps, SEARCH.max_first_order_iterations), tolerance
         )
         if not self.converged(CONTINUATION.failed_residual):
             return step
         self.by_first_order = self._figures(step)
         return self.run(
-            problem, newton(problem, unknowns_of(step), second_order=True), tolerance, most
+            problem, newton(problem, unknowns_of(step), second_order=True), tolerance, max_steps
         )
 
     def _solve_first_order(
-        self, problem: Problem, unknowns: Pressures, length: float, most: int, tolerance: float
+        self, problem: Problem, unknowns: Pressures, length: float, max_steps: int, tolerance: float
     ) -> Step:
         """Solve roughly with the first-order wedge; retry from more accurate time steps."""
         roughly = max(SEARCH.first_order_tolerance, tolerance)
         steps = newton(problem, unknowns, second_order=False)
-        step = self.run(problem, steps, roughly, most, divergence=SEARCH.divergence)
+        step = self.run(problem, steps, roughly, max_steps, divergence=SEARCH.divergence)
         if self.converged(roughly):
             return step
         step = self.march_in_time(problem, unknowns, length, tolerance=SEARCH.first_order_tolerance)
         steps = newton(problem, unknowns_of(step), second_order=False)
-        return self.run(problem, steps, roughly, most)
+        return self.run(problem, steps, roughly, max_steps)
 
     def march_in_time(
         self,
@@ -252,14 +254,14 @@ class MixedSearch(Search):
         """
         length = first
         content = evaluate(problem, unknowns, second_order=False).content
-        most = min(MARCHING.max_newton_steps, self.options.max_iterations)
+        max_steps = min(MARCHING.max_newton_steps, self.options.max_iterations)
         for _ in range(MARCHING.max_steps):
             stepped = replace(problem, past=_implicit_step(problem, length, content))
             step = self.run(
                 stepped,
                 newton(stepped, unknowns, second_order=False),
                 tolerance,
-                most,
+                max_steps,
                 divergence=SEARCH.divergence,
             )
             if self.converged(tolerance):
@@ -385,7 +387,7 @@ class MixedSearch(Search):
     def solve_coarser_grid(self, finest: Problem) -> None:
         """Solve the next coarser grid from dry, to estimate the discretisation error.
 
-        No effect if that fails.
+        There is no effect if that fails.
         """
         levels = grid_levels(finest)
         if len(levels) == 1 or len(self.figures) != 1 or not coarser_in_all_axes(levels[1], finest):
@@ -428,7 +430,7 @@ def _implicit_step(problem: Problem, length: float, content: Field) -> Transient
 def _back_to_first_order(problem: Problem, step: Step) -> Step:
     """Step from the second-order wedge's solution towards the first-order one.
 
-    Until a coarse tolerance is met, or steps no longer change the load share.
+    It ends when a coarse tolerance is met, or steps no longer change the load share.
     """
     previous = back = step
     for back in islice(
@@ -436,12 +438,12 @@ def _back_to_first_order(problem: Problem, step: Step) -> Step:
         SEARCH.max_backward_iterations + 1,
     ):
         if back.number > 0:
-            moved, all_of_it = (
+            change, total_change = (
                 abs(load_share_of(back) - load_share_of(other)) for other in (previous, step)
             )
             if (
                 back.balance.residual_rms < SEARCH.first_order_tolerance
-                or moved < SEARCH.backward_tolerance * all_of_it
+                or change < SEARCH.backward_tolerance * total_change
             ):
                 break
             previous = back

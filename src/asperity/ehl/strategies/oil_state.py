@@ -32,7 +32,7 @@ def pressures_of(solution: ContactSolution, problem: Problem, scales: Scales) ->
 def _signed(oil: Oil, problem: Problem, scales: Scales) -> Field:
     """Return the signed unknown of the oil.
 
-    Missing share below 0, permanent opening above the cap.
+    It is the missing share below 0 and the permanent opening above the cap.
     """
     if not problem.conserve:
         return oil.pressure / scales.pressure

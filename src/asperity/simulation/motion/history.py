@@ -106,15 +106,15 @@ class History:
     def by_pass(self) -> pandas.DataFrame:
         """Return means over each whole pass of the rough surface's track, without the start.
 
-        Of two rough surfaces, the slower one's track counts. Columns as in `table`, `pass` in
-        place of `step`; for cumulative quantities (`time_s`, `track_sq_m`, `flattened_m`,
-        `heat_j`) the value at the end of the pass.
+        Of two rough surfaces, the slower one's track counts. The columns are those of `table`, with
+        `pass` in place of `step`; cumulative quantities (`time_s`, `track_sq_m`, `flattened_m`,
+        `heat_j`) have their value at the end of the pass.
         """
         length = steps_a_pass(self.case, self.case.moving_surfaces())
         moving = self.table[self.table["step"] > 0]
         number = np.ceil(moving["step"] / length - 1e-9).astype(int)
-        whole = moving[number * length <= self.steps + 1e-9]
-        grouped = whole.groupby(number.rename("pass"))
+        complete = moving[number * length <= self.steps + 1e-9]
+        grouped = complete.groupby(number.rename("pass"))
         means: pandas.DataFrame = grouped.mean(numeric_only=True).drop(columns="step").reset_index()
         for column in ("time_s", "track_sq_m", "flattened_m", "heat_j"):
             means[column] = grouped[column].last().to_numpy()
@@ -124,7 +124,7 @@ class History:
     def vibration(self) -> Vibration | None:
         """Vibration of the mean contact of the settled steps.
 
-        None without [vibration], or where its stiffness or excitation requires a solved contact.
+        It is None without [vibration] or where stiffness or excitation requires a solved contact.
         """
         model = self.case.vibration
         case = self.case

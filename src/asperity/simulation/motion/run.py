@@ -70,7 +70,7 @@ def run_history(
     with open_recorder(case, surfaces, last, out, every) as recorder, threadpool_limits(1):
         before = len(recorder.rows)
         if last > recorder.last:
-            taken: Iterator[Snapshot] = model(
+            snapshots: Iterator[Snapshot] = model(
                 case.conditions,
                 case.lubricant,
                 surfaces,
@@ -80,7 +80,7 @@ def run_history(
                 flattening=case.motion.flattening,
                 options=case.options,
             )
-            for snapshot in taken:
+            for snapshot in snapshots:
                 row = step_row(snapshot, case, recorder.rows[-1] if recorder.rows else None)
                 failed = strict and not row["converged"]
                 recorder.record(snapshot, row, failed=failed)

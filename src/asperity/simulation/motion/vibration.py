@@ -192,8 +192,8 @@ def history_vibration(
     if moments < 1:
         raise BadInput(f"moments must be 1 or more, got {moments}; the default is {MOMENTS}")
     surfaces = history.surfaces()
-    taken = _moments(history, surfaces, model, moments)
-    stiffness = taken.stiffness
+    samples = _moments(history, surfaces, model, moments)
+    stiffness = samples.stiffness
     with case.naming("vibration"):
         oscillator = coupling.damped_oscillator(
             float(np.mean(stiffness)), case.conditions.load, model
@@ -207,11 +207,11 @@ def history_vibration(
     vibration = HistoryVibration(
         oscillator=oscillator,
         stiffness=stiffness,
-        moments=taken.steps,
-        unsolved=taken.unsolved,
-        damping=taken.damping,
-        dynamic=taken.dynamic,
-        damping_failure=taken.failure,
+        moments=samples.steps,
+        unsolved=samples.unsolved,
+        damping=samples.damping,
+        dynamic=samples.dynamic,
+        damping_failure=samples.failure,
         spacing_hz=None if period is None else 1.0 / period,
         resonance=no_resonance(objection or "", band_about(f0), model.method),
         coupled=coupled,
@@ -292,9 +292,9 @@ def _fitted_waves(periods: Field, heights: Field, waves: int) -> tuple[Field, fl
     phase = 2.0 * np.pi * np.outer(periods, np.arange(1, waves + 1))
     basis = np.hstack([np.ones((periods.size, 1)), np.cos(phase), np.sin(phase)])
     coefficients: Field = np.linalg.lstsq(basis, heights - heights.mean(), rcond=None)[0]
-    left = float(np.std(heights - basis @ coefficients))
-    varied = float(np.std(heights))
-    return coefficients, left / varied if varied else 0.0
+    remainder = float(np.std(heights - basis @ coefficients))
+    variation = float(np.std(heights))
+    return coefficients, remainder / variation if variation else 0.0
 
 
 def resampled(profile: Signal, rate_hz: float) -> Signal:
@@ -349,13 +349,13 @@ def _moments(
     case = history.case
     rows = history.settled
     spring = Tangent(model.stated.get("reference_depth"))
-    chosen = np.unique(np.linspace(0, len(rows) - 1, moments + 2)[1:-1].round().astype(int))
+    indices = np.unique(np.linspace(0, len(rows) - 1, moments + 2)[1:-1].round().astype(int))
     solved = []
     stiffness = []
-    shaken = []
+    oscillations = []
     unsolved = []
     failure = ""
-    for number, time in zip(rows["step"].iloc[chosen], rows["time_s"].iloc[chosen], strict=True):
+    for number, time in zip(rows["step"].iloc[indices], rows["time_s"].iloc[indices], strict=True):
         try:
             contact = solve_contact(
                 case.conditions,
@@ -367,19 +367,19 @@ def _moments(
                 tangent_stiffness(contact, reference_depth=spring.reference_depth).total
             )
         except NotConverged as unfinished:
-            lost = unfinished
+            error = unfinished
             unsolved.append(int(number))
             continue
         solved.append(int(number))
         damping_ratio, dynamic_stiffness, reason = _oscillating(contact, spring, model.mass)
-        shaken.append((damping_ratio, dynamic_stiffness))
+        oscillations.append((damping_ratio, dynamic_stiffness))
         failure = reason or failure
     if not stiffness:
         reason = (
-            f"the tangent stiffness could not be computed at any of {len(unsolved)} steps: {lost}"
+            f"the tangent stiffness could not be computed at any of {len(unsolved)} steps: {error}"
         )
-        raise NotConverged(lost.solution, reason)
-    damping, dynamic = np.array(shaken).T
+        raise NotConverged(error.solution, reason)
+    damping, dynamic = np.array(oscillations).T
     return _Moments(tuple(solved), np.array(stiffness), damping, dynamic, tuple(unsolved), failure)
 
 
@@ -388,32 +388,32 @@ def _oscillating(
 ) -> tuple[float, float, str]:
     """Return damping ratio and dynamic stiffness of a mass; nan with the reason if undetermined."""
     try:
-        found = OscillatingContact(contact, reference_depth=spring.reference_depth).resonance(mass)
+        result = OscillatingContact(contact, reference_depth=spring.reference_depth).resonance(mass)
     except AsperityError as refusal:  # all other numbers are valid without damping
         return math.nan, math.nan, str(refusal)
-    return found.damping_ratio, found.stiffness, ""
+    return result.damping_ratio, result.stiffness, ""
 
 
 def _mean(values: Field) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.mean(known)) if known.size else math.nan
+    finite = values[np.isfinite(values)]
+    return float(np.mean(finite)) if finite.size else math.nan
 
 
 def _spread(values: Field) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.std(known)) if known.size else math.nan
+    finite = values[np.isfinite(values)]
+    return float(np.std(finite)) if finite.size else math.nan
 
 
 def _resonance(spectrum: Spectrum, f0: float, model: VibrationModel) -> Resonance:
     """Estimate the resonance near f0, if the lines are close enough."""
     band = band_about(f0, float(spectrum.frequency_hz[-1]))
-    apart = spectrum.spacing_hz
-    if (band[1] - band[0]) / apart < FEWEST_LINES + 1:
-        least = math.ceil((FEWEST_LINES + 1) * apart / (band[1] - band[0]))
+    spacing_hz = spectrum.spacing_hz
+    if (band[1] - band[0]) / spacing_hz < FEWEST_LINES + 1:
+        min_factor = math.ceil((FEWEST_LINES + 1) * spacing_hz / (band[1] - band[0]))
         reason = (
-            f"the track repeats: its lines are {apart:.0f} Hz apart, too far to resolve a "
+            f"the track repeats: its lines are {spacing_hz:.0f} Hz apart, too far to resolve a "
             f"resonance near {f0:.0f} Hz"
         )
-        remedy = f"raise motion.track at least {least}-fold"
+        remedy = f"raise motion.track at least {min_factor}-fold"
         return no_resonance(f"{reason}; {remedy}", band, model.method)
     return contact_resonance(spectrum, band_hz=band, method=model.method)

@@ -103,22 +103,22 @@ class PositionSolver:
         On worn plateaus, the default method stalls near the solution with cells that open and
         close in turn; started from the loose solution, all cells converge.
         """
-        most = self.options.max_iterations
-        few = replace(self.options, max_iterations=min(START_ITERATIONS, most))
+        limit = self.options.max_iterations
+        few = replace(self.options, max_iterations=min(START_ITERATIONS, limit))
         if self.lubricant is not None and np.any(surface.heights):
             for tolerance in (
                 value for value in LOOSE_TOLERANCES if value > self.options.tolerance
             ):
                 loose = replace(
-                    self.options, tolerance=tolerance, max_iterations=min(LOOSE_ITERATIONS, most)
+                    self.options, tolerance=tolerance, max_iterations=min(LOOSE_ITERATIONS, limit)
                 )
                 with suppress(AsperityError):  # the regular solve below reports errors
                     guess = ehl.solve_contact(
                         self.conditions, self.lubricant, surface, options=loose, strict=False
                     )
-                    found = self._with_heat(surface, few, replace(guess, options=few), strict=False)
-                    if found.convergence.converged:
-                        return found
+                    trial = self._with_heat(surface, few, replace(guess, options=few), strict=False)
+                    if trial.convergence.converged:
+                        return trial
         return self._with_heat(surface, self.options)
 
     def _with_heat(

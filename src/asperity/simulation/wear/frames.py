@@ -35,11 +35,11 @@ class WearFrame(NamedTuple):
         cls, number: int, hours: float, solutions: Sequence[tuple[TrackPosition, SolvedPosition]]
     ) -> "WearFrame":
         """Return the first position of a jump, in single precision."""
-        place, solved = solutions[0]
+        position, solved = solutions[0]
         gap, pressure = (
             np.asarray(field, dtype=np.float32) for field in (solved.film, solved.pressure)
         )
-        return cls(number, hours, place, gap, pressure, solved.asperity_pressure > 0.0)
+        return cls(number, hours, position, gap, pressure, solved.asperity_pressure > 0.0)
 
     def arrays(self) -> Arrays:
         """Return the arrays to store, by name."""
@@ -55,9 +55,9 @@ class WearFrame(NamedTuple):
     def from_arrays(cls, arrays: Arrays) -> "WearFrame":
         """Rebuild a frame from `arrays`."""
         number, hours, first, second = map(float, arrays["told"])
-        place = TrackPosition(int(first), int(second))
+        position = TrackPosition(int(first), int(second))
         return cls(
-            int(number), hours, place, arrays["gap"], arrays["pressure"], arrays["in_contact"]
+            int(number), hours, position, arrays["gap"], arrays["pressure"], arrays["in_contact"]
         )
 
 

@@ -115,7 +115,7 @@ class WearHistory:
         misses = [abs(self._lost(body) - booked[body]) for body in BODIES]
         scale = [abs(self.worn.booked[body]) + abs(self.worn.mechanical[body]) for body in BODIES]
         return max(
-            (miss / whole for miss, whole in zip(misses, scale, strict=True) if whole > 0.0),
+            (miss / total for miss, total in zip(misses, scale, strict=True) if total > 0.0),
             default=0.0,
         )
 
@@ -145,8 +145,8 @@ class WearHistory:
         )
         if not self.contact.model.only_removal or not same:
             return None
-        known = second if first.k == 0.0 else first
-        return known.low, known.high
+        coefficient = second if first.k == 0.0 else first
+        return coefficient.low, coefficient.high
 
     def values_at(self, hours: float) -> dict[str, float]:
         """Return all quantities at a moment, interpolated linearly between rows.
@@ -174,8 +174,8 @@ class WearHistory:
 
         They are at `hours`, or `count` moments spread evenly. Raises as `values_at`.
         """
-        places = hours or list(np.linspace(0.0, float(self.table["hours"].iloc[-1]), count))
-        return [Moment(float(place), self.state(float(place))) for place in places]
+        times = hours or list(np.linspace(0.0, float(self.table["hours"].iloc[-1]), count))
+        return [Moment(float(time), self.state(float(time))) for time in times]
 
     def interval_by_k(self, key: str) -> "pandas.DataFrame | None":
         """Return a quantity's 90 % interval by k over time: columns `hours`, `low`, `high`.
@@ -189,19 +189,19 @@ class WearHistory:
         slow, fast = self.k_interval
         hours = self.table["hours"].to_numpy(float)
         values = self.table[key].to_numpy(float)
-        ends = []
-        for now in hours:
-            inside = values[(hours >= slow * now) & (hours <= fast * now)]
-            reached_cells = np.append(
-                inside, np.interp([slow * now, min(fast * now, hours[-1])], hours, values)
+        ranges = []
+        for time in hours:
+            inside = values[(hours >= slow * time) & (hours <= fast * time)]
+            candidates = np.append(
+                inside, np.interp([slow * time, min(fast * time, hours[-1])], hours, values)
             )
-            whole = fast * now <= hours[-1] * (1.0 + 1e-12)
-            ends.append(
-                (float(np.min(reached_cells)), float(np.max(reached_cells)))
-                if whole
+            covered = fast * time <= hours[-1] * (1.0 + 1e-12)
+            ranges.append(
+                (float(np.min(candidates)), float(np.max(candidates)))
+                if covered
                 else (math.nan, math.nan)
             )
-        low, high = np.array(ends).T
+        low, high = np.array(ranges).T
         return pandas.DataFrame({"hours": hours, "low": low, "high": high})
 
     def drift(self, key: str, since: float = 0.0, until: float | None = None) -> WearDrift:
@@ -223,18 +223,18 @@ class WearHistory:
             )
         end = float(self.table["hours"].iloc[-1])
         moments = since, end if until is None else until
-        here = self._slope(key, *moments)
-        if here is None:
+        base = self._slope(key, *moments)
+        if base is None:
             raise BadInput(
                 f"a drift of {key} needs {MIN_ROWS} rows with a value, got fewer from "
                 f"{moments[0]:g} to {moments[1]:g} h; choose moments further apart, or a smaller "
                 "wear.step"
             )
-        ends = [sign * here.scatter + here.slope for sign in (-1.0, 1.0)]
+        limits = [sign * base.scatter + base.slope for sign in (-1.0, 1.0)]
         for factor in self.k_interval or ():
-            there = self._slope(key, factor * moments[0], min(factor * moments[1], end)) or here
-            ends += [factor * (there.slope + sign * there.scatter) for sign in (-1.0, 1.0)]
-        return WearDrift(here.slope, min(ends), max(ends))
+            other = self._slope(key, factor * moments[0], min(factor * moments[1], end)) or base
+            limits += [factor * (other.slope + sign * other.scatter) for sign in (-1.0, 1.0)]
+        return WearDrift(base.slope, min(limits), max(limits))
 
     def _slope(self, key: str, since: float, until: float) -> "_Slope | None":
         """Return slope and half its 90 % interval by linear regression; None with too few rows."""
@@ -265,16 +265,16 @@ class WearHistory:
         rows = self.table[self.table["crf_hz"].notna()]
         if len(rows) < 2:
             return None
-        places = np.unique(
+        indices = np.unique(
             np.linspace(0, len(rows) - 1, min(MAX_STAGE_POINTS, len(rows))).round().astype(int)
         )
-        chosen = rows.iloc[places]
-        off = chosen["crf_std_hz"] if bool(chosen["crf_std_hz"].notna().all()) else None
+        selected = rows.iloc[indices]
+        crf_error = selected["crf_std_hz"] if bool(selected["crf_std_hz"].notna().all()) else None
         return split_stages(
-            chosen["hours"],
-            chosen["crf_hz"],
-            chosen["crfa"],
-            errors=StageErrors(crf_hz=off),
+            selected["hours"],
+            selected["crf_hz"],
+            selected["crfa"],
+            errors=StageErrors(crf_hz=crf_error),
             unit="h",
         )
 

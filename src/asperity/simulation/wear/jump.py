@@ -102,7 +102,7 @@ class WearingContact(WearingTracks):
             temperature=temperature,
         )
 
-    def rate(self, worn: WearState, solutions: Solutions, body: int) -> Field:
+    def rate(self, state: WearState, solutions: Solutions, body: int) -> Field:
         """Return the rate of depth loss of a body's track [m/s]."""
         surface = (self.surfaces.first, self.surfaces.second)[body]
         on_track = [
@@ -114,7 +114,7 @@ class WearingContact(WearingTracks):
         depth_rate_factor = self.exposures()[body].depth_rate_factor(surface.grid.extent[0])
         rate = self.model.coefficients[body].k * depth_rate_factor * np.mean(on_track, axis=0)
         if self.bodies[body].speed != 0.0 and is_uniform_along(
-            surface.heights - worn.lowered(body)
+            surface.heights - state.lowered(body)
         ):
             # each point of a uniform track passes every position
             rate = np.broadcast_to(rate.mean(axis=0), rate.shape).copy()
@@ -134,24 +134,24 @@ class WearingContact(WearingTracks):
             / grid.extent[1]
         )
 
-    def seconds(self, worn: WearState, solutions: Solutions) -> float:
+    def seconds(self, state: WearState, solutions: Solutions) -> float:
         """Return the length of the jump from the contacts at those positions [s]."""
-        rates = self.rate(worn, solutions, 0), self.rate(worn, solutions, 1)
+        rates = self.rate(state, solutions, 0), self.rate(state, solutions, 1)
         exposures = self.exposures(solutions)
         spacing = self.surfaces.grid.spacing
-        height = self.model.step * self.height(worn)
+        height = self.model.step * self.height(state)
         modulus = self.case.conditions.pair.reduced_modulus
         longest = longest_jump(exposures, rates, height, self.model.decay, spacing, modulus)
-        longest = min(longest, worn.longest)
-        if self.model.flattening or (worn.number == 0 and self.model.mechanisms):
+        longest = min(longest, state.longest)
+        if self.model.flattening or (state.number == 0 and self.model.mechanisms):
             slowest = min((rate for rate in self.overrolling if rate > 0.0), default=1.0)
             # fast initial changes need short jumps
-            longest = min(longest, max(worn.time, 1.0 / slowest))
-        return self._within_error(worn, rates, exposures, longest)
+            longest = min(longest, max(state.time, 1.0 / slowest))
+        return self._within_error(state, rates, exposures, longest)
 
     def _within_error(
         self,
-        worn: WearState,
+        state: WearState,
         rates: tuple[Field, Field],
         exposures: tuple[Exposure, Exposure],
         longest: float,
@@ -159,44 +159,44 @@ class WearingContact(WearingTracks):
         """Return the longest jump within MAX_JUMP_ERROR of the previous one; solves nothing."""
         if math.isinf(longest):
             return longest
-        if worn.seconds == 0.0:
+        if state.seconds == 0.0:
             return FIRST_JUMP * longest
         seconds = longest
         while seconds > MIN_JUMP * longest:
             if (
-                self._error(worn, self._removed(rates, seconds, exposures), exposures, seconds)
+                self._error(state, self._removed(rates, seconds, exposures), exposures, seconds)
                 <= MAX_JUMP_ERROR
             ):
                 break
             seconds *= JUMP_REDUCTION
         return seconds
 
-    def after_jump(self, worn: WearState, solutions: Solutions, seconds: float) -> WearState:
+    def after_jump(self, state: WearState, solutions: Solutions, seconds: float) -> WearState:
         """Return both bodies after a jump of `seconds` from the contacts at those positions."""
-        rates = self.rate(worn, solutions, 0), self.rate(worn, solutions, 1)
+        rates = self.rate(state, solutions, 0), self.rate(state, solutions, 1)
         exposures = self.exposures(solutions)
         removed = self._removed(rates, seconds, exposures)
         booked = tuple(
-            worn.booked[body] + self.booked_rate(solutions, body) * seconds for body in BODIES
+            state.booked[body] + self.booked_rate(solutions, body) * seconds for body in BODIES
         )
-        lost = worn.worn[0] + removed[0], worn.worn[1] + removed[1]
+        depths = state.worn[0] + removed[0], state.worn[1] + removed[1]
         after = replace(
-            worn,
-            number=worn.number + 1,
-            time=worn.time + seconds,
-            worn=lost,
-            flattened=self._flattening(worn, solutions),
+            state,
+            number=state.number + 1,
+            time=state.time + seconds,
+            worn=depths,
+            flattened=self._flattening(state, solutions),
             booked=(booked[0], booked[1]),
-            error=worn.error + self._error(worn, removed, exposures, seconds),
+            error=state.error + self._error(state, removed, exposures, seconds),
             rates=rates,
             seconds=seconds,
             longest=math.inf,
             facts={},
         )
-        for place, name in enumerate(self.model.mechanisms):
+        for index, name in enumerate(self.model.mechanisms):
             for body in BODIES:
                 after = self._with_mechanism(
-                    worn, after, solutions, removed[body], name, (body, place)
+                    state, after, solutions, removed[body], name, (body, index)
                 )
         return after
 
@@ -211,15 +211,15 @@ class WearingContact(WearingTracks):
         )
         return first, second
 
-    def _flattening(self, worn: WearState, solutions: Solutions) -> tuple[Field, Field]:
+    def _flattening(self, state: WearState, solutions: Solutions) -> tuple[Field, Field]:
         """Return the plastic flattening: deepest overlap of each point, shared by rough bodies."""
         if not self.model.flattening:
-            return worn.flattened
+            return state.flattened
         rough = self.surfaces.rough
         share = 1.0 / max(sum(rough), 1)
         tracks = (self.surfaces.first, self.surfaces.second)
         first, second = (
-            worn.flattened[body]
+            state.flattened[body]
             + share
             * rough[body]
             * np.max(
@@ -236,22 +236,22 @@ class WearingContact(WearingTracks):
 
     def _error(
         self,
-        worn: WearState,
+        state: WearState,
         removed: tuple[Field, Field],
         exposures: tuple[Exposure, Exposure],
         seconds: float,
     ) -> float:
         """Return the relative difference in Sq between two successive jumps and one over both."""
-        if worn.seconds == 0.0:
+        if state.seconds == 0.0:
             return 0.0
         once, twice = (
-            self._removed(worn.rates, long, exposures)
-            for long in (worn.seconds, worn.seconds + seconds)
+            self._removed(state.rates, long, exposures)
+            for long in (state.seconds, state.seconds + seconds)
         )
-        after = replace(worn, worn=(worn.worn[0] + removed[0], worn.worn[1] + removed[1]))
+        after = replace(state, worn=(state.worn[0] + removed[0], state.worn[1] + removed[1]))
         levels = self.levelled(after)
         tracks = [self.track(after, body) for body in BODIES]
-        now = math.hypot(*(surface.sq for surface in levels))
+        sq = math.hypot(*(surface.sq for surface in levels))
         at_once = math.hypot(
             *(
                 float(
@@ -263,11 +263,11 @@ class WearingContact(WearingTracks):
                 for body in BODIES
             )
         )
-        return abs(at_once - now) / self.height(after)
+        return abs(at_once - sq) / self.height(after)
 
     def _with_mechanism(
         self,
-        worn: WearState,
+        state: WearState,
         after: WearState,
         solutions: Solutions,
         removed: Field,
@@ -276,8 +276,8 @@ class WearingContact(WearingTracks):
     ) -> WearState:
         """Return the state after one mechanism of one body."""
         body, _ = which
-        now = self.worn_surfaces(after)
-        surface = (now.first, now.second)[body]
+        surfaces = self.worn_surfaces(after)
+        surface = (surfaces.first, surfaces.second)[body]
         label = f"{name}.{body + 1}"
         passage = Passage(
             body=body,
@@ -288,15 +288,17 @@ class WearingContact(WearingTracks):
             material=self.bodies[body],
             sliding_speed=self.case.conditions.sliding_speed,
             half_width=self.case.conditions.hertz.half_widths[0],
-            overrollings=worn.time * self.overrolling[body],
+            overrollings=state.time * self.overrolling[body],
             jump=after.seconds * self.overrolling[body],
             seconds=after.seconds,
             boundary_friction=self.case.boundary_friction,
-            rng=np.random.default_rng([self.seed, worn.number, *which]),
+            rng=np.random.default_rng([self.seed, state.number, *which]),
             state=after.states.get(label, {}),
         )
         change = self.model.mechanisms[name](passage)
-        return self._with_change(after, change, body, label, [place for place, _ in solutions])
+        return self._with_change(
+            after, change, body, label, [position for position, _ in solutions]
+        )
 
     def _with_change(
         self,
@@ -304,7 +306,7 @@ class WearingContact(WearingTracks):
         change: Change,
         body: int,
         label: str,
-        places: Sequence[TrackPosition],
+        positions: Sequence[TrackPosition],
     ) -> WearState:
         changed = list(after.changed)
         mechanical = list(after.mechanical)
@@ -313,11 +315,12 @@ class WearingContact(WearingTracks):
         if change.transferred is not None and change.transferred.any():
             other = 1 - body
             thinner = self.perimeter(body) / self.perimeter(other)
-            given = thinner * np.mean(
-                [to_other_track(change.transferred, place, body) for place in places], axis=0
+            deposit = thinner * np.mean(
+                [to_other_track(change.transferred, position, body) for position in positions],
+                axis=0,
             )
-            changed[other] = changed[other] + given
-            mechanical[other] -= self.volume(given, other)
+            changed[other] = changed[other] + deposit
+            mechanical[other] -= self.volume(deposit, other)
         states: dict[str, MechanismState] = {**after.states, label: change.state}
         facts: Mapping[str, float] = {
             f"{label}.{key}": float(value) for key, value in change.facts.items()

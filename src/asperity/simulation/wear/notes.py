@@ -17,7 +17,7 @@ ENOUGH_CELLS = 0.8  # of them: the correlation length of a sample scatters
 FEW_JUMPS = 5  # in which a point is sampled at few positions of the contact
 
 
-def history_notes(contact: WearingContact, table: pandas.DataFrame, worn: WearState) -> list[str]:
+def history_notes(contact: WearingContact, table: pandas.DataFrame, state: WearState) -> list[str]:
     """Return the notes that apply to a history with that table and final state."""
     every = (
         cells_note(contact),
@@ -25,7 +25,7 @@ def history_notes(contact: WearingContact, table: pandas.DataFrame, worn: WearSt
         radii_note(contact),
         standing_note(contact),
     )
-    notes = (*every, few_jumps_note(contact, len(table) - 1, worn))
+    notes = (*every, few_jumps_note(contact, len(table) - 1, state))
     return [note for note in notes if note is not None]
 
 
@@ -94,19 +94,19 @@ def radii_note(contact: WearingContact) -> str | None:
 
 def standing_note(contact: WearingContact) -> str | None:
     """Return a note if a body at rest can have no pits or marks although these are requested."""
-    still = [NAMES[body] for body in BODIES if contact.bodies[body].speed == 0.0]
-    passing = [name for name in ("fatigue", "ploughing") if name in contact.model.mechanisms]
-    if not still or not passing:
+    stationary = [NAMES[body] for body in BODIES if contact.bodies[body].speed == 0.0]
+    mechanisms = [name for name in ("fatigue", "ploughing") if name in contact.model.mechanisms]
+    if not stationary or not mechanisms:
         return None
     return (
-        f"The {still[0]} body stands still and is not over-rolled: "
-        f"no {' or '.join(passing)} acts on it."
+        f"The {stationary[0]} body stands still and is not over-rolled: "
+        f"no {' or '.join(mechanisms)} acts on it."
     )
 
 
-def few_jumps_note(contact: WearingContact, jumps: int, worn: WearState) -> str | None:
+def few_jumps_note(contact: WearingContact, jumps: int, state: WearState) -> str | None:
     """Return a note if few jumps sample a passage at few positions."""
-    if jumps >= FEW_JUMPS or len(contact.positions(worn)) == 1:
+    if jumps >= FEW_JUMPS or len(contact.positions(state)) == 1:
         return None
     return (
         f"In {jumps} jumps of {contact.patches} positions, each point was sampled at few positions "

@@ -6,17 +6,17 @@ from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.core.arrays import Field
 from asperity.surface import Surface
 
-WORN_SHARE = 0.01  # of the largest depth: places worn less lie outside the track
+WORN_SHARE = 0.01  # of the largest depth: cells worn less lie outside the track
 
 
-def reached_cells(depth: Field, places: Field, half_width: float) -> slice:
+def reached_cells(depth: Field, points: Field, half_width: float) -> slice:
     """Return the cells of the Hertz zone and the scar; at least the fewest of a surface."""
-    inside = np.flatnonzero((np.abs(places) <= half_width) | (depth > WORN_SHARE * depth.max()))
+    inside = np.flatnonzero((np.abs(points) <= half_width) | (depth > WORN_SHARE * depth.max()))
     first, last = (
-        (int(inside[0]), int(inside[-1])) if inside.size else (places.size // 2, places.size // 2)
+        (int(inside[0]), int(inside[-1])) if inside.size else (points.size // 2, points.size // 2)
     )
     short = max(MIN_CELLS - (last - first + 1), 0)
-    first = min(max(first - (short + 1) // 2, 0), places.size - MIN_CELLS)
+    first = min(max(first - (short + 1) // 2, 0), points.size - MIN_CELLS)
     return slice(first, max(last + (short + 1) // 2 + 1, first + MIN_CELLS))
 
 

@@ -62,18 +62,18 @@ def roughness(surfaces: tuple[Surface, Surface]) -> Row:
     """
     first, second = surfaces
     longer = max(surfaces, key=lambda surface: surface.grid.cells[0]).grid
-    both = Surface(
+    combined = Surface(
         np.resize(first.heights, longer.cells) + np.resize(second.heights, longer.cells)[:, ::-1],
         longer,
     )
     row: Row = {}
-    for surface, name in ((first, 0), (second, 1), (both, None)):
+    for surface, name in ((first, 0), (second, 1), (combined, None)):
         parameters = height_parameters(surface)
         rough = parameters.sq > MIN_SQ
         for key, field in ROUGHNESS.items():
-            known = rough or key not in ("ssk", "sku")
+            defined = rough or key not in ("ssk", "sku")
             row[key if name is None else body_column(key, name)] = (
-                float(getattr(parameters, field)) if known else math.nan
+                float(getattr(parameters, field)) if defined else math.nan
             )
     return row
 
@@ -81,12 +81,12 @@ def roughness(surfaces: tuple[Surface, Surface]) -> Row:
 def load_share(solved: Sequence[SolvedPosition]) -> Uncertainty:
     """Return CLR over the positions, with the grid's uncertainty and the scatter of positions."""
     shares = [position.state.clr for position in solved]
-    own = [position.state.error.clr for position in solved if position.state.error is not None]
+    errors = [position.state.error.clr for position in solved if position.state.error is not None]
 
     def mean(sides: list[Sides | None]) -> Sides | None:
-        known = [both for both in sides if both is not None]
+        valid = [pair for pair in sides if pair is not None]
         below, above = (
-            np.mean(known, axis=0) if known and len(known) == len(sides) else (math.nan, math.nan)
+            np.mean(valid, axis=0) if valid and len(valid) == len(sides) else (math.nan, math.nan)
         )
         return None if math.isnan(below) else (float(below), float(above))
 
@@ -95,8 +95,8 @@ def load_share(solved: Sequence[SolvedPosition]) -> Uncertainty:
     )
     return Uncertainty(
         value=float(np.mean(shares)) if len(shares) > 1 else value,
-        iteration=mean([error.iteration for error in own]),
-        grid=mean([error.grid for error in own]),
+        iteration=mean([error.iteration for error in errors]),
+        grid=mean([error.grid for error in errors]),
         surfaces=scatter,
         range=(0.0, 1.0),
     )
@@ -112,9 +112,9 @@ def contact_row(case: Case, solved: Sequence[SolvedPosition], sq: float) -> Row:
     flashes = [position.flash_temperature for position in solved]
     row: Row = {"sq_m": sq} | _mean_state(solved)
     shares = [position.state.clr for position in solved]
-    off = float(np.std(shares, ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
-    reach = off * float(scipy.special.stdtrit(max(len(shares) - 1, 1), UPPER))
-    of_mean = max(0.0, row["clr"] - reach), min(1.0, row["clr"] + reach)
+    std = float(np.std(shares, ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
+    half_width = std * float(scipy.special.stdtrit(max(len(shares) - 1, 1), UPPER))
+    of_mean = max(0.0, row["clr"] - half_width), min(1.0, row["clr"] + half_width)
     row |= {
         "clr_low": low,
         "clr_high": high,
@@ -125,7 +125,7 @@ def contact_row(case: Case, solved: Sequence[SolvedPosition], sq: float) -> Row:
         ),
         "flash_temperature_max_k": max(flashes) if all(map(math.isfinite, flashes)) else math.nan,
     }
-    return row | _resonance(case, row, off)
+    return row | _resonance(case, row, std)
 
 
 def _mean_state(solved: Sequence[SolvedPosition]) -> Row:
@@ -134,52 +134,52 @@ def _mean_state(solved: Sequence[SolvedPosition]) -> Row:
     for name, key in STATE.items():
         if name == "sq":
             continue
-        known = (getattr(position.state, name) for position in solved)
-        values = [value for value in known if value is not None]
+        attributes = (getattr(position.state, name) for position in solved)
+        values = [value for value in attributes if value is not None]
         row[key] = float(np.mean(values)) if values else math.nan
     return row
 
 
-def _resonance(case: Case, row: Row, off: float) -> Row:
+def _resonance(case: Case, row: Row, clr_std: float) -> Row:
     """Return the mean contact's resonance and the height of its line, in closed form.
 
-    `off` is the standard deviation of the mean CLR.
+    `clr_std` is the standard deviation of the mean CLR.
     """
-    nothing = dict.fromkeys(("crf_hz", "crf_std_hz", *RESONANCE, "crfa"), math.nan)
+    unknown = dict.fromkeys(("crf_hz", "crf_std_hz", *RESONANCE, "crfa"), math.nan)
     model = case.vibration
     conditions = case.conditions
     state = state_of_row(row)
     if model is None or model.needs_solution:
-        return nothing
+        return unknown
     try:
         spring = oscillator(state, conditions, model)
-        below = excitation(state, conditions, model)
+        source = excitation(state, conditions, model)
     except BadInput:  # no asperity contact, or no roughness: no spring, or no excitation
-        return nothing
-    own = np.array(spring.natural_frequency_hz)
+        return unknown
+    frequency_hz = np.array(spring.natural_frequency_hz)
 
     def frequency(clr: float) -> float:
-        known = (
+        resonance = (
             None
             if math.isnan(clr)
             else resonance_at(min(max(clr, 0.0), 1.0), state, conditions, model)
         )
-        return math.nan if known is None else known
+        return math.nan if resonance is None else resonance
 
     return {
-        "crf_hz": float(own),
-        "crf_std_hz": 0.5 * (frequency(state.clr + off) - frequency(state.clr - off)),
+        "crf_hz": float(frequency_hz),
+        "crf_std_hz": 0.5 * (frequency(state.clr + clr_std) - frequency(state.clr - clr_std)),
         **{key: frequency(row[share]) for key, share in RESONANCE.items()},
-        "crfa": float(spring.gain(own) * below.density(own, model.rate_hz)),
+        "crfa": float(spring.gain(frequency_hz) * source.density(frequency_hz, model.rate_hz)),
     }
 
 
 def state_of_row(row: Mapping[str, float]) -> ContactState:
     """Return the mean contact state of a row, without convergence data."""
-    known = {name: float(row[key]) for name, key in STATE.items()}
-    slope = known.pop("contact_slope")
+    values = {name: float(row[key]) for name, key in STATE.items()}
+    slope = values.pop("contact_slope")
     return ContactState(
-        **known,
+        **values,
         lambda_ratio=None,
         reynolds_residual=0.0,
         load_error=0.0,

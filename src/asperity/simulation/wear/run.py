@@ -96,101 +96,101 @@ def _advance(
     if recorder.end is not None and abs(recorder.end.worn.time - end) <= TIME_TOLERANCE * end:
         return 0
     _require_longer(recorder, end)
-    worn = recorder.worn
+    state = recorder.worn
     at_end = False
     computed = 0
     while True:
-        solutions, row = solve_positions(contact, worn, solve)
-        frame = WearFrame.from_solutions(worn.number, worn.time / HOUR, solutions)
+        solutions, row = solve_positions(contact, state, solve)
+        frame = WearFrame.from_solutions(state.number, state.time / HOUR, solutions)
         if not at_end:
             recorder.record(row, frame)
         if progress is not None:
-            progress(WearProgress(worn.time / HOUR, end / HOUR, row))
+            progress(WearProgress(state.time / HOUR, end / HOUR, row))
         if at_end:
-            recorder.finish(worn, row, frame)
+            recorder.finish(state, row, frame)
             return computed
-        seconds = contact.seconds(worn, solutions)
-        at_end = worn.time + seconds >= end * (1.0 - TIME_TOLERANCE)
+        seconds = contact.seconds(state, solutions)
+        at_end = state.time + seconds >= end * (1.0 - TIME_TOLERANCE)
         if at_end:
-            seconds = end - worn.time
-        worn = contact.after_jump(worn, solutions, seconds)
+            seconds = end - state.time
+        state = contact.after_jump(state, solutions, seconds)
         computed += 1
         if not at_end:
-            recorder.save(worn)
+            recorder.save(state)
 
 
 def _require_longer(recorder: WearRecorder, end: float) -> None:
     """Raise BadInput for fewer hours than the folder holds."""
     folder = None if recorder.files is None else recorder.files.path
-    held = max(recorder.worn.time, 0.0 if recorder.end is None else recorder.end.worn.time)
-    if held >= end * (1.0 - TIME_TOLERANCE):
+    duration = max(recorder.worn.time, 0.0 if recorder.end is None else recorder.end.worn.time)
+    if duration >= end * (1.0 - TIME_TOLERANCE):
         raise BadInput(
-            f"{folder} holds {held / HOUR:.6g} h of wear, got {end / HOUR:.6g} h; state at least "
-            "as many hours, or name a new folder"
+            f"{folder} holds {duration / HOUR:.6g} h of wear, got {end / HOUR:.6g} h; state at "
+            "least as many hours, or name a new folder"
         )
 
 
 def solve_positions(
-    contact: WearingContact, worn: WearState, solve: BatchSolver
+    contact: WearingContact, state: WearState, solve: BatchSolver
 ) -> tuple[SolvedPositions, Row]:
     """Solve the contact at every position of the jump; return the solutions and their row."""
-    surfaces = contact.worn_surfaces(worn)
-    places = contact.positions(worn)
-    outcomes = solve([combined_roughness(surfaces, place) for place in places])
+    surfaces = contact.worn_surfaces(state)
+    positions = contact.positions(state)
+    outcomes = solve([combined_roughness(surfaces, position) for position in positions])
     solutions = [
-        (place, outcome)
-        for place, outcome in zip(places, outcomes, strict=True)
+        (position, outcome)
+        for position, outcome in zip(positions, outcomes, strict=True)
         if isinstance(outcome, SolvedPosition)
     ]
     failures = [outcome.reason for outcome in outcomes if isinstance(outcome, FailedPosition)]
-    if len(solutions) < max(1, (len(places) + 1) // 2):
-        when = f"after {worn.time / HOUR:.4g} h"
+    if len(solutions) < max(1, (len(positions) + 1) // 2):
+        when = f"after {state.time / HOUR:.4g} h"
         remedy = "raise solver.tolerance or solver.max_iterations"
-        if len(places) == 1:  # a mean over other positions is not possible
+        if len(positions) == 1:  # a mean over other positions is not possible
             remedy += ", or make the moving body the rough one (motion.rough, or the sign of slip)"
         raise NotConverged(
             None,
-            f"{len(failures)} of {len(places)} contacts could not be solved {when}: "
+            f"{len(failures)} of {len(positions)} contacts could not be solved {when}: "
             f"{failures[0]}; {remedy}",
         )
     if any(solved.at_edge for _, solved in solutions):
         raise AsperityError(
-            f"the contact has grown as wide as its grid after {worn.time / HOUR:.4g} h; state a "
+            f"the contact has grown as wide as its grid after {state.time / HOUR:.4g} h; state a "
             "wider grid.y, in half-widths"
         )
-    return solutions, _row(contact, worn, solutions, len(failures))
+    return solutions, _row(contact, state, solutions, len(failures))
 
 
-def _row(contact: WearingContact, worn: WearState, solutions: SolvedPositions, failed: int) -> Row:
-    rough = roughness(contact.levelled(worn))
-    row: Row = {"jump": worn.number, "hours": worn.time / HOUR}
+def _row(contact: WearingContact, state: WearState, solutions: SolvedPositions, failed: int) -> Row:
+    rough = roughness(contact.levelled(state))
+    row: Row = {"jump": state.number, "hours": state.time / HOUR}
     for body in BODIES:
-        depth = worn.worn[body] - worn.changed[body]
-        track = contact.track(worn, body)
+        depth = state.worn[body] - state.changed[body]
+        track = contact.track(state, body)
         row |= {
-            body_column("overrollings", body): worn.time * contact.overrolling[body],
+            body_column("overrollings", body): state.time * contact.overrolling[body],
             body_column("worn_depth_m", body): float(depth[track].mean()),
             body_column("worn_depth_max_m", body): float(depth.max()),
             body_column("worn_volume_m3", body): contact.volume(depth, body),
-            body_column("flattened_m", body): float(worn.flattened[body][track].mean()),
+            body_column("flattened_m", body): float(state.flattened[body][track].mean()),
         }
     row |= rough
     row |= contact_row(contact.case, [solved for _, solved in solutions], float(rough["sq_m"]))
     return row | {
-        "jump_seconds": worn.seconds,
-        "jump_error": worn.error,
+        "jump_seconds": state.seconds,
+        "jump_error": state.error,
         "failed": failed,
-        **worn.facts,
+        **state.facts,
     }
 
 
 def _require_affordable(contact: WearingContact, end: float) -> None:
     """Refuse wear that needs too many jumps, limited by the decay of its shortest waves."""
-    nothing = (contact.surfaces.first.heights * 0.0,) * 2
+    zero = (contact.surfaces.first.heights * 0.0,) * 2
     grid = contact.case.grid
     modulus = contact.case.conditions.pair.reduced_modulus
     longest = longest_jump(
-        contact.exposures(), nothing, 1.0, contact.model.decay, grid.spacing, modulus
+        contact.exposures(), zero, 1.0, contact.model.decay, grid.spacing, modulus
     )
     jumps = 1.0 if math.isinf(longest) else max(1.0, end / longest)
     require_affordable(

@@ -46,8 +46,8 @@ class WearState:
     @classmethod
     def unworn(cls, surfaces: MovingSurfaces) -> "WearState":
         """Return the state before any wear."""
-        nothing = (np.zeros(surfaces.first.grid.cells), np.zeros(surfaces.second.grid.cells))
-        return cls(worn=nothing, flattened=nothing, changed=nothing, rates=nothing)
+        zero = (np.zeros(surfaces.first.grid.cells), np.zeros(surfaces.second.grid.cells))
+        return cls(worn=zero, flattened=zero, changed=zero, rates=zero)
 
     def lowered(self, body: int) -> Field:
         """Return the depth by which a body's track is lower than at first [m]."""

@@ -88,11 +88,11 @@ class WearRecorder(RunRecorder[Row]):
         if files is None:
             return
         self.end = files.arrays(END, HistoryEnd.from_arrays)
-        worn = files.arrays(MEMORY, WearState.from_arrays)
-        if worn is not None:
-            self.worn, self.rows = worn, _rows(files)
-            self.require_rows(len(self.rows) >= worn.number)
-            self.frames = _frames(files, worn.number)
+        state = files.arrays(MEMORY, WearState.from_arrays)
+        if state is not None:
+            self.worn, self.rows = state, _rows(files)
+            self.require_rows(len(self.rows) >= state.number)
+            self.frames = _frames(files, state.number)
 
     def record(self, row: Row, frame: WearFrame) -> None:
         """Record row and frame of a jump, in place of an earlier one; drop surplus frames."""
@@ -108,25 +108,25 @@ class WearRecorder(RunRecorder[Row]):
         if frame.number in self.frames:
             self.files.write_arrays(_frame_file(frame.number), frame.arrays())
 
-    def save(self, worn: WearState, *, at_once: bool = False) -> None:
+    def save(self, state: WearState, *, at_once: bool = False) -> None:
         """Write rows and the state for the next jump, if due or `at_once`."""
-        self.worn = worn
+        self.worn = state
         if self.files is not None and (at_once or self.is_due):
             table = pyarrow.Table.from_pandas(pandas.DataFrame(self.rows), preserve_index=False)
             self.files.write_rows(table, self.contact.case)
-            self.files.write_arrays(MEMORY, worn.arrays())
+            self.files.write_arrays(MEMORY, state.arrays())
             self.saved_at = time.monotonic()
 
-    def finish(self, worn: WearState, row: Row, frame: WearFrame) -> None:
+    def finish(self, state: WearState, row: Row, frame: WearFrame) -> None:
         """Write the end and the surfaces."""
-        self.end = HistoryEnd(worn, row, frame)
-        self.rows = [*self.rows[: worn.number], row]
+        self.end = HistoryEnd(state, row, frame)
+        self.rows = [*self.rows[: state.number], row]
         if self.files is None:
             return
         self.save(self.worn, at_once=True)
         # an earlier end refers to surfaces that are about to be replaced
         (self.files.path / END).unlink(missing_ok=True)
-        after = self.contact.worn_surfaces(worn)
+        after = self.contact.worn_surfaces(state)
         for name, surfaces in (("before", self.contact.surfaces), ("after", after)):
             _write_both(surfaces, self.files.path / SURFACES, name)
         self.files.write_arrays(END, self.end.arrays())
@@ -158,12 +158,12 @@ def _history(
 ) -> WearHistory:
     """Return the history up to `end`, without rows that a longer run has added."""
     last = end.worn.number
-    before = [frames[number] for number in sorted(frames) if number < last]
+    earlier = [frames[number] for number in sorted(frames) if number < last]
     return WearHistory(
         contact=contact,
         table=pandas.DataFrame([*rows[:last], end.row]),
         worn=end.worn,
-        frames=(*(frame for frame in before if is_kept(frame.number, last)), end.frame),
+        frames=(*(frame for frame in earlier if is_kept(frame.number, last)), end.frame),
         folder=folder,
         path=None if folder is None else folder / LAYOUT.table,
         files=() if folder is None else surface_files(folder),

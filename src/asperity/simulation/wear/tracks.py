@@ -40,8 +40,8 @@ class WearingTracks:
             round_trip = 4.0 * math.pi * conditions.radius_along_rolling
             first, second = (abs(speed) / round_trip for speed in conditions.surface_speeds)
             rates = (first, second)
-        still = [speed == 0.0 for speed in conditions.surface_speeds]
-        return 0.0 if still[0] else rates[0], 0.0 if still[1] else rates[1]
+        stationary = [speed == 0.0 for speed in conditions.surface_speeds]
+        return 0.0 if stationary[0] else rates[0], 0.0 if stationary[1] else rates[1]
 
     @cached_property
     def bodies(self) -> tuple[Body, Body]:
@@ -94,45 +94,45 @@ class WearingTracks:
         """Return the volume [m^3], all round the body, of a depth on its track [m]."""
         return float(depth.mean()) * self.perimeter(body) * self.width
 
-    def worn_surfaces(self, worn: WearState) -> MovingSurfaces:
+    def worn_surfaces(self, state: WearState) -> MovingSurfaces:
         """Return both tracks in their present state."""
-        return self.surfaces.lowered(worn.lowered(0), worn.lowered(1))
+        return self.surfaces.lowered(state.lowered(0), state.lowered(1))
 
-    def track(self, worn: WearState, body: int) -> tuple[slice, slice]:
+    def track(self, state: WearState, body: int) -> tuple[slice, slice]:
         """Return the cells of a body's track in the contact: the Hertz zone, or the larger scar.
 
-        All cells along rolling of a body that moves, and all across in a line contact.
+        It has all cells along rolling of a body that moves, and all across in a line contact.
         """
         along = transverse = slice(None)
         grid = self.surfaces.grid
         half_widths = self.case.conditions.hertz.half_widths
         if self.bodies[body].speed == 0.0:
-            along = reached_cells(worn.worn[body].mean(axis=1), grid.x, half_widths[0])
+            along = reached_cells(state.worn[body].mean(axis=1), grid.x, half_widths[0])
         if not self.case.conditions.endless:
-            both = worn.worn[0].mean(axis=0) + worn.worn[1].mean(axis=0)[::-1]
+            profile = state.worn[0].mean(axis=0) + state.worn[1].mean(axis=0)[::-1]
             transverse = reached_cells(
-                both + both[::-1], 0.5 * (grid.y - grid.y[::-1]), half_widths[1]
+                profile + profile[::-1], 0.5 * (grid.y - grid.y[::-1]), half_widths[1]
             )
         return along, transverse
 
-    def levelled(self, worn: WearState) -> tuple[Surface, Surface]:
+    def levelled(self, state: WearState) -> tuple[Surface, Surface]:
         """Return both tracks' roughness inside the contact, without the form that wear created."""
-        now = self.worn_surfaces(worn)
+        surfaces = self.worn_surfaces(state)
         first, second = (
             cropped(
-                Surface(surface.heights + self._form(worn, body), surface.grid),
-                self.track(worn, body),
+                Surface(surface.heights + self._form(state, body), surface.grid),
+                self.track(state, body),
             )
-            for body, surface in enumerate((now.first, now.second))
+            for body, surface in enumerate((surfaces.first, surfaces.second))
         )
         return first, second
 
-    def _form(self, worn: WearState, body: int) -> Field:
+    def _form(self, state: WearState, body: int) -> Field:
         """Return the worn form: a groove's mean profile, or the long waves of a bounded scar.
 
         If both bodies are smooth, the whole scar is form.
         """
-        lowered = worn.lowered(body)
+        lowered = state.lowered(body)
         endless = self.case.conditions.endless
         moves = self.bodies[body].speed != 0.0
         if endless and moves:
@@ -141,7 +141,7 @@ class WearingTracks:
             return np.broadcast_to(
                 lowered.mean(axis=0 if moves else 1, keepdims=True), lowered.shape
             )
-        scar = worn.worn[body] + worn.flattened[body]
+        scar = state.worn[body] + state.flattened[body]
         if not any(self.surfaces.rough):
             return np.asarray(scar)
         half_width = self.case.conditions.hertz.half_widths[0]
@@ -152,26 +152,28 @@ class WearingTracks:
             )
         )
 
-    def positions(self, worn: WearState) -> tuple[TrackPosition, ...]:
+    def positions(self, state: WearState) -> tuple[TrackPosition, ...]:
         """Return the positions at which the contact is solved in this jump."""
-        now = self.worn_surfaces(worn)
-        tracks = (now.first, now.second)
+        surfaces = self.worn_surfaces(state)
+        tracks = (surfaces.first, surfaces.second)
         # a track that is uniform along rolling needs one position only
         first, second = (
             self.bodies[body].speed != 0.0 and not is_uniform_along(tracks[body].heights)
             for body in BODIES
         )
-        cells = (now.first.grid.cells[0], now.second.grid.cells[0])
+        cells = (surfaces.first.grid.cells[0], surfaces.second.grid.cells[0])
         count = self.patches if first or second else 1
-        return positions(cells, (first, second), count, worn.number, self.seed)
+        return positions(cells, (first, second), count, state.number, self.seed)
 
-    def height(self, worn: WearState) -> float:
+    def height(self, state: WearState) -> float:
         """Return the reference height of steps and errors [m]: composite Sq, with a lower bound.
 
         The bound is MIN_HEIGHT of the approach. The form of a scar is left out for rough bodies.
         """
         conditions = self.case.conditions
-        now = self.worn_surfaces(worn)
-        bodies = self.levelled(worn) if any(self.surfaces.rough) else (now.first, now.second)
+        surfaces = self.worn_surfaces(state)
+        bodies = (
+            self.levelled(state) if any(self.surfaces.rough) else (surfaces.first, surfaces.second)
+        )
         approach = conditions.hertz.half_widths[0] ** 2 / (2.0 * conditions.radius_along_rolling)
         return max(math.hypot(*(surface.sq for surface in bodies)), MIN_HEIGHT * approach)
