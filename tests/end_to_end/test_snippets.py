@@ -103,7 +103,7 @@ def test_a_failing_snippet_is_detected(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(AssertionError, match="no-such-case"):
         run("asperity solve no-such-case.toml", None, capsys)
-    with pytest.raises(AssertionError, match="mark what is no command"):
+    with pytest.raises(AssertionError, match="mark commands of other programs"):
         run("make test", None, capsys)
 
 

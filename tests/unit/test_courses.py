@@ -465,7 +465,7 @@ def test_the_design_bound_keeps_the_load_share_low_in_95_per_cent_of_contacts(se
     assert np.all(np.diff(levers["load_n"].chances) < 0.0)
     assert "composite roughness: at most" in found.sentence()
     json.dumps(found.scalars(), allow_nan=False)
-    with pytest.raises(BadInput, match="--design must be a load share"):
+    with pytest.raises(BadInput, match="`clr` must be a load share"):
         design_contact(forward, z, clr=1.2)
 
 
