@@ -606,7 +606,7 @@ def test_a_6206_under_2_kn():
         (
             BallBearing,
             BALLS | {"axial_load": 10.0, "contact_angle": 0.5, "clearance": 1e-5},
-            "leave one of them out",
+            "give one of them",
         ),
         (BallBearing, BALLS | {"axial_load": -10.0}, "axial_load"),
     ],
