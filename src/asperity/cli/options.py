@@ -1,4 +1,4 @@
-"""Options shared by commands, each declared once, and their evaluation before the work starts."""
+"""Options shared by commands such as `track` and `watch`, each declared once, and their checks."""
 
 from fractions import Fraction
 from pathlib import Path

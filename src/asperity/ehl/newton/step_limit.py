@@ -1,4 +1,4 @@
-"""Step limits of Newton's method, shared by all models.
+"""Step limits of Newton's method, shared by all models; their numbers are in `ehl.controls`.
 
 A cell whose step reverses takes shorter steps, so that a few undecided cells do not stall the
 others; the approach of the bodies is limited in the same way.

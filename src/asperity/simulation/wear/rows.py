@@ -1,4 +1,4 @@
-"""Columns of the wear history: roughness of both bodies, their wear, and the contact."""
+"""Columns of the wear history: roughness of both bodies, wear, contact; time is in `run`."""
 
 import math
 from collections.abc import Mapping, Sequence
