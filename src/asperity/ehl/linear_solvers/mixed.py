@@ -50,7 +50,7 @@ from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 
 class MixedLinear:
-    """Linearisation of a balance: `product` applies it, `answer` approximately inverts it.
+    """Linearisation of a balance: `product` applies it, `precondition` approximately inverts it.
 
     All fields are (nx, ny). `with_limiter` includes the slope limiter of the wedge in the lines,
     for equations solved far closer than to a tenth.
