@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-SLOW = set((HERE / "slow.txt").read_text("utf-8").split())  # files below tests, more than 8 s each
+SLOW = set((HERE / "slow.txt").read_text("utf-8").split())  # files below tests, more than 5 s each
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
