@@ -1,8 +1,7 @@
-"""asperity hears how a lubricated contact wears.
+"""Rough, lubricated contacts: mixed EHL, wear, contact resonance, and its monitoring.
 
-Mixed-EHL contact, load sharing of asperities and oil, contact resonance. The names of a working
-day are reached from here, the rest by their module (`asperity.lubricant.BairWiner`). Each is
-loaded when it is first used, so that `import asperity` costs next to nothing.
+The most used names are exported here, all others by their package (`asperity.lubricant.BairWiner`).
+Each is loaded on first use, so that `import asperity` takes hardly any time.
 """
 
 from typing import Any

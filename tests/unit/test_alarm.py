@@ -196,7 +196,7 @@ def test_an_unobservable_state_is_reported_and_not_called_healthy():
     off = [RecordingStatus()] * 39 + [RecordingStatus("blind", "the machine was off")]
     assert alarm_state(level, off).state == "blind"
     assert alarm_state(level, off).since == 39
-    unseen = [RecordingStatus()] * 38 + [RecordingStatus("cannot-tell", "nothing heard")] * 2
+    unseen = [RecordingStatus()] * 38 + [RecordingStatus("cannot-tell", "no resonance")] * 2
     assert (alarm_state(level, unseen).state, alarm_state(level, unseen).since) == (
         "cannot-tell",
         38,

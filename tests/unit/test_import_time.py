@@ -171,7 +171,7 @@ def test_cached_kernels_load_no_compiler(tmp_path):
 
 def test_a_solve_starts_without_garbage_collection():
     probe = (
-        "import atexit, gc\nfound = []\ngc.callbacks.append(lambda phase, told: found.append(told)"
+        "import atexit, gc\nfound = []\ngc.callbacks.append(lambda phase, info: found.append(info)"
         " if gc.get_threshold()[0] > 10_000 else None)\natexit.register(lambda: print('searched',"
         f" len(found)))\nfrom asperity.cli import main\nmain(['solve', {str(PAPER)!r},"
         f" *{VIBRATED!r}, '--quiet'])"

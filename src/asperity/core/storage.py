@@ -64,6 +64,9 @@ def _verify(path: Path, stated: str | None, content: object, remedy: str) -> Non
 # ------------------------------------------------------------------------------------------
 
 
+CONTENT_ENTRY = "told"  # name of the entry with JSON text, fixed by the format of stored arrays
+
+
 def append_digest(body: bytes) -> bytes:
     """Return the bytes followed by their digest."""
     return body + _MARK + digest(body).encode()

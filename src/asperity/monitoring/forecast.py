@@ -45,7 +45,7 @@ class ForecastResult(Protocol):
 
     @property
     def alarm(self) -> bool:
-        """True if somebody has to act."""
+        """True if action is required."""
 
     def sentence(self) -> str:
         """Return the forecast as a sentence."""

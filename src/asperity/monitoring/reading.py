@@ -20,7 +20,7 @@ import scipy
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.processes import ignore_interrupts
 from asperity.core.signals import Spectrum, averaged_spectrum
-from asperity.core.storage import append_digest, strip_digest
+from asperity.core.storage import CONTENT_ENTRY, append_digest, strip_digest
 from asperity.monitoring.auxiliary_channels import (
     AuxiliaryData,
     bands,
@@ -295,7 +295,8 @@ def pack_reading(reading: Reading) -> bytes:
         names = ("unit", "duration_s", "segment", "window", "resolution_hz", "averages")
         content["spectrum"] = {name: getattr(reading.spectrum, name) for name in names}
     packed = BytesIO()
-    np.savez(packed, density=density, told=np.array(json.dumps(content)))
+    entries: dict[str, Any] = {"density": density, CONTENT_ENTRY: np.array(json.dumps(content))}
+    np.savez(packed, **entries)
     return append_digest(packed.getvalue())
 
 
@@ -312,7 +313,7 @@ def unpack_reading(packed: bytes, name: str) -> Reading:
     try:
         with np.load(body, allow_pickle=False) as stored:
             density = stored["density"]
-            content = json.loads(str(stored["told"]))
+            content = json.loads(str(stored[CONTENT_ENTRY]))
         quality = content.pop("quality")
         spectrum = content.pop("spectrum")
         content["facts"] = {

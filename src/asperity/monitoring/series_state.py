@@ -16,7 +16,7 @@ import numpy as np
 from asperity.core.arrays import Mask
 from asperity.core.errors import UnreadableFile
 from asperity.core.signals import Spectrum
-from asperity.core.storage import append_digest, strip_digest
+from asperity.core.storage import CONTENT_ENTRY, append_digest, strip_digest
 from asperity.resonance import (
     Agreement,
     CleanSpectrum,
@@ -230,7 +230,8 @@ def pack_shared(shared: Shared | SharedBySensors) -> bytes:
             established,
         ]
     packed = BytesIO()
-    np.savez(packed, told=np.array(json.dumps(content)), **arrays)
+    entries: dict[str, Any] = {CONTENT_ENTRY: np.array(json.dumps(content)), **arrays}
+    np.savez(packed, **entries)
     return append_digest(packed.getvalue())
 
 
@@ -240,8 +241,8 @@ def unpack_shared(content: bytes, since: int) -> SeriesMemory:
         with np.load(
             BytesIO(strip_digest(content, "the memory of a series", "it is learned again"))
         ) as stored:
-            state = json.loads(str(stored["told"]))
-            arrays = {name: stored[name] for name in stored.files if name != "told"}
+            state = json.loads(str(stored[CONTENT_ENTRY]))
+            arrays = {name: stored[name] for name in stored.files if name != CONTENT_ENTRY}
     except UnreadableFile:
         return SeriesMemory()
     by_sensor = {}

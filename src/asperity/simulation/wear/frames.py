@@ -15,6 +15,8 @@ from asperity.wear import TrackPosition
 
 MAX_FRAMES = 24  # of a history, besides its end
 
+STATE_ENTRY = "told"  # entry with number, hours and position; name fixed by the file format
+
 
 class WearFrame(NamedTuple):
     """Contact at one position of the tracks at the beginning of a jump: maps on the contact's grid.
@@ -45,7 +47,7 @@ class WearFrame(NamedTuple):
         """Return the arrays to store, by name."""
         numbers = np.array([self.number, self.hours, *self.position], dtype=float)
         return {
-            "told": numbers,  # name in the file format
+            STATE_ENTRY: numbers,
             "gap": self.gap,
             "pressure": self.pressure,
             "in_contact": self.in_contact,
@@ -54,7 +56,7 @@ class WearFrame(NamedTuple):
     @classmethod
     def from_arrays(cls, arrays: Arrays) -> "WearFrame":
         """Rebuild a frame from `arrays`."""
-        number, hours, first, second = map(float, arrays["told"])
+        number, hours, first, second = map(float, arrays[STATE_ENTRY])
         position = TrackPosition(int(first), int(second))
         return cls(
             int(number), hours, position, arrays["gap"], arrays["pressure"], arrays["in_contact"]
