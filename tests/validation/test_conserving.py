@@ -238,7 +238,7 @@ def test_the_approximate_inverse_is_accurate(flattened, monkeypatch):
     newton_step(balance)
     preconditioned = len(products)
     assert preconditioned < 25
-    monkeypatch.setattr(MixedLinear, "answer", lambda _, oil: oil)
+    monkeypatch.setattr(MixedLinear, "precondition", lambda _, wet: wet)
     products.clear()
     newton_step(balance)
     assert len(products) > 2 * preconditioned, preconditioned
