@@ -118,18 +118,21 @@ def light() -> Iterator[str]:
         yield f"| {load_number}, {oil_number} | {shown} | {seconds:.2f} | {' | '.join(off)} |"
 
 
+NAMES = {"central": "central", "least": "minimum"}
+
+
 def soft() -> str:
     case = load_case(SOFT, name="soft")
     assert case.lubricant is not None
     solution, seconds = timed(case.conditions, case.lubricant)
-    fits = [
-        fit for fit in regime_card(solution).fits if fit.source == "Hamrock and Dowson, soft (1978)"
-    ]
-    off = ", ".join(f"{fit.place} film {100.0 * fit.deviation:+.1f} %" for fit in fits)
+    off = ", ".join(
+        f"{NAMES[fit.place]} film {100.0 * fit.deviation:+.1f} % ({fit.source})"
+        for fit in regime_card(solution).fits
+    )
     shown = " x ".join(map(str, solution.grid.cells))
     touching = int(solution.in_contact.sum())
     return (
-        f"Soft ball ({shown} cells, {seconds:.2f} s) against the soft fit: {off}; {touching} cells"
+        f"Soft ball ({shown} cells, {seconds:.2f} s) against the fits: {off}; {touching} cells"
         " touch."
     )
 

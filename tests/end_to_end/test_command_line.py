@@ -26,7 +26,7 @@ KEYS = [
         "load_below_200nm",
         "load_at_floor",
     ),
-    *("cavitated_share", "oil_film_m", "sq_m", "contact_slope"),
+    *("cavitated_share", "oil_film_m", "sq_m", "contact_slope", "rms_slope"),
     *(
         "h_min_m",
         "h_min_error_m",
@@ -37,6 +37,7 @@ KEYS = [
         "lambda_ratio",
     ),
     *("friction_coefficient", "friction_asperity_part", "friction_oil_part", "friction_power_w"),
+    *(f"rolling_friction_{name}" for name in ("coefficient", "force_n", "power_w")),
     *("flash_temperature_max_k", "film_temperature_max_k"),
     *("von_mises_max_pa", "von_mises_depth_m", "von_mises_core_pa", "von_mises_core_depth_m"),
     *("shear_stress_max_pa", "shear_stress_depth_m"),

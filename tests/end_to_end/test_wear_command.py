@@ -24,6 +24,7 @@ KEYS = [
         "worn_volume_interval_m3",
         "worn_depth_m",
         "volume_error",
+        "balance_error",
     ),
     *(
         "jump_error",
@@ -68,7 +69,7 @@ def test_json_has_the_documented_keys(asp, worn_case):
     assert sorted(result) == sorted(KEYS)
     assert result["hours"] == 1.0
     assert result["overrollings"] == pytest.approx([56.25 * 3600.0, 5.0 * 3600.0])
-    assert result["volume_error"] < 1e-9
+    assert result["balance_error"] < 1e-9
     table = pandas.read_parquet(result["table"])
     assert len(table) == result["jumps"] + 1
     for key in ("sq_m", "clr", "crf_hz"):

@@ -324,3 +324,13 @@ def test_a_small_map_has_one_place_and_a_profile_several_along_its_length():
     grid = contact((120, 80), periodic=(False, False))
     assert count_places(measured(rough((130, 90))), grid) == 1
     assert count_places(replace(measured(rough((400, 500))), uniform=1), grid) == 3
+
+
+@pytest.mark.parametrize(("wavelength", "noted"), [(16e-6, False), (2.5e-6, True)])
+def test_a_slope_decided_by_sampling_is_noted(wavelength, noted):
+    """Waves of sixteen pixels keep their slope; those of 2.5 pixels are shorter than three."""
+    pixels = Grid((256, 256), (-128e-6, -128e-6), (128e-6, 128e-6), periodic=(False, False))
+    heights = 1e-7 * np.sin(2.0 * np.pi * pixels.x / wavelength)[:, None] * np.ones(256)
+    half = Grid((200, 200), (-100e-6, -100e-6), (100e-6, 100e-6), periodic=(False, False))
+    steps = prepare_surface(MeasuredSurface(heights, pixels, "waves", "text"), half).steps
+    assert any("sampling decides the slope" in step for step in steps) == noted

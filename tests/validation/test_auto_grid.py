@@ -86,20 +86,34 @@ def test_light_contacts_have_a_fully_flooded_inlet(m, l):  # noqa: E741
     assert films(chosen) == pytest.approx(films(distant_inlet), rel=0.01)
 
 
-def test_a_soft_ball_has_the_film_of_the_soft_fit_and_no_contact():
-    """Hamrock and Dowson (1978). A manual grid of 64 cells gave a load share of 89 %."""
-    case = load_case(SOFT)
-    run = solve_case(case.with_overrides({"surface": "flat"}))
-    solution = run.solution
-    # the next coarser grid has 2 cells across the inlet and a load share of 24 %
-    assert run.determined
-    fits = {
-        fit.place: fit
-        for fit in regime_card(solution).fits
-        if fit.source == "Hamrock and Dowson, soft (1978)"
-    }
-    assert abs(fits["central"].deviation) < 0.05
-    assert abs(fits["least"].deviation) < 0.05
+@pytest.mark.parametrize(
+    ("load", "speed"), [(1.0, 0.1), (0.2, 0.02), (3.0, 0.03), (0.5, 0.3), (5.0, 1.0)]
+)
+def test_soft_balls_have_the_films_of_the_fits_and_no_contact(load, speed):
+    """M 22 to 730. Central: Nijenbanning, Venner and Moes (1994); on finer grids the solved film is
+    2.0 to 8.1 % thinner, but 10 % thinner to 18 % thicker than Hamrock and Dowson's central film of
+    1978. Minimum: Hamrock and Dowson, soft (1978); -4.3 to +5.2 %. A manual grid of 64 cells gave a
+    load share of 89 % at 1 N.
+    """
+    case = load_case(SOFT).with_overrides(
+        {
+            "surface": "flat",
+            "contact.load": f"{load} N",
+            "contact.entrainment_speed": f"{speed} m/s",
+        }
+    )
+    solution = solve_contact(
+        case.conditions, case.lubricant, flat_surface(auto_grid(case.conditions, case.lubricant))
+    )
+    # the next coarser grid has 2 cells across the inlet and a load share of 24 % at 1 N
+    assert grid_shortfalls(case.conditions, case.lubricant, solution.surface) == ()
+    central, least = sorted(regime_card(solution).fits, key=lambda fit: fit.place)
+    assert (central.source, least.source) == (
+        "Nijenbanning, Venner and Moes (1994)",
+        "Hamrock and Dowson, soft (1978)",
+    )
+    assert -0.1 < central.deviation < 0.0
+    assert abs(least.deviation) < 0.07
     assert not solution.in_contact.any()
 
 

@@ -178,6 +178,8 @@ def _point_films(
 def film_fits(conditions: ContactConditions, lubricant: Lubricant) -> tuple[FilmFit, ...]:
     """Return the fits valid in the contact's regime, thickest film first.
 
+    Hamrock and Dowson's central film of soft contacts (1978) is left out: the solved film of balls
+    is 10 % below to 18 % above it (M 20 to 700), 2 to 8 % below the fit for all regimes.
     It is empty for a contact narrower across rolling than along it, which none of these covers.
     """
     if _ratio(conditions) > 1.0:
@@ -198,9 +200,6 @@ def film_fits(conditions: ContactConditions, lubricant: Lubricant) -> tuple[Film
     if not line and regime == "piezoviscous-elastic":
         film = 2.69 * u**0.67 * g**0.53 * w**-0.067 * (1.0 - 0.61 * np.exp(-0.73 * axes))
         fits.append(FilmFit("Hamrock and Dowson (1977)", "central", float(film) * radius))
-    if not line and regime == "isoviscous-elastic":
-        film = 7.32 * u**0.64 * w**-0.22 * (1.0 - 0.72 * np.exp(-0.28 * axes))
-        fits.append(FilmFit("Hamrock and Dowson, soft (1978)", "central", float(film) * radius))
     return tuple(sorted(fits, key=lambda fit: -fit.film))
 
 

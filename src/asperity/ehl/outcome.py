@@ -214,7 +214,8 @@ class ContactState:
     single-pressure model in those where Reynolds' equation does not hold, over the oil transported
     through the zone, u times mean film (0 when dry). The cavity behind the contact is left out: the
     model refills it, which changes nothing upstream. `contact_slope`: mean slope of the undeformed
-    roughness over touching cells (None where none touch). `error`: uncertainty of load share and
+    roughness over touching cells (None where none touch); `rms_slope`: its root mean square
+    gradient in the Hertz zone. `error`: uncertainty of load share and
     resonance (None for a mean over the steps of a history).
     """
 
@@ -232,4 +233,5 @@ class ContactState:
     load_error: float
     mass_flux_imbalance: float
     contact_slope: float | None = None
+    rms_slope: float | None = None
     error: ContactError | None = None

@@ -44,6 +44,7 @@ SOLVED_KEYS = (  # quantities of a solved contact
         "p_max_pa",
         "friction_coefficient",
         "friction_power_w",
+        "rolling_friction_power_w",
         "flash_temperature_max_k",
         "von_mises_core_pa",
     ),

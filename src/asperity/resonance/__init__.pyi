@@ -5,6 +5,7 @@ from .indicators import contact_resonance as contact_resonance
 from .line_removal import CleanSpectrum as CleanSpectrum
 from .line_removal import RemovedTone as RemovedTone
 from .line_removal import remove_lines as remove_lines
+from .resonance import ExcitationShape as ExcitationShape
 from .resonance import Resonance as Resonance
 from .resonance import SamplingFactor as SamplingFactor
 from .resonance import damping_objection as damping_objection

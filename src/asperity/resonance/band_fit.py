@@ -18,13 +18,16 @@ from asperity.resonance.likelihood_fit import (
     SpectrumFit,
     fit_spectrum,
 )
-from asperity.resonance.resonance import SamplingFactor, line_and_slopes
+from asperity.resonance.resonance import ExcitationShape, SamplingFactor, line_and_slopes
 
 MAX_MODES = 8
 START_DAMPINGS = (0.002, 0.007, 0.02, 0.06)
 SAMPLING_FACTOR_ITERATIONS = 3  # each reduces the remaining error tenfold
 MAX_START_BLOCKS = 512  # of the search for initial guesses
 SMALLEST_DAMPING, LARGEST_DAMPING = 1e-5, 0.7  # above 0.7 an oscillator has no peak
+MAX_COEFFICIENTS, MAX_COEFFICIENT = 4, 1e3  # of an excitation's shape
+# of twice ln likelihood by a further coefficient: a bias below two deviations is not noticed
+REFINEMENT_GAIN = 4.0
 # BIC difference, "very strong": Kass and Raftery, J. Am. Stat. Assoc. 90 (1995)
 STRONG_EVIDENCE = 10.0
 
@@ -128,6 +131,36 @@ def fit_line(
     return best
 
 
+def fit_line_and_excitation(
+    band: BandData, spectrum: Spectrum, band_hz: tuple[float, float], start: SpectrumFit
+) -> SpectrumFit:
+    """Refit a line and floor under a free excitation, with as many coefficients as BIC supports.
+
+    The parameters are those of the line, the coefficients of `ExcitationShape`, and the floor;
+    `start` itself is returned where the excitation is white in acceleration.
+    """
+    bounds, leakage = _bounds(1, band_hz), window_leakage(spectrum)
+    penalty = band.bic_penalty / 3.0
+    best = start
+    for count in range(1, MAX_COEFFICIENTS + 1):
+        if best.parameters.size < count + 3:  # neither of the last two orders helped
+            break
+        free = np.full(count, MAX_COEFFICIENT)
+        missing = count + 5 - best.parameters.size
+        trial = fit_spectrum(
+            _free_excitation_model(band.frequency, band.floors, leakage),
+            np.concatenate([best.parameters[:-2], np.zeros(missing), best.parameters[-2:]]),
+            ParameterBounds(np.insert(bounds.lower, 3, -free), np.insert(bounds.upper, 3, free)),
+            band.data,
+        )
+        needed = (
+            REFINEMENT_GAIN * missing if best is not start else penalty * missing + STRONG_EVIDENCE
+        )
+        if trial.converged and 2.0 * (best.cost - trial.cost) > needed:
+            best = trial
+    return best
+
+
 def fit_modes(band: BandData, band_hz: tuple[float, float], leakage: Field) -> SpectrumFit:
     """Add lines one by one at the largest excess and refit all of them, while BIC improves."""
     best = band.floor_only
@@ -191,8 +224,7 @@ def _lines_model(
     and is held constant.
     """
     half_width = leakage.size // 2
-    spacing = (frequency[-1] - frequency[0]) / (frequency.size - 1)
-    extended = frequency[0] + spacing * np.arange(-half_width, frequency.size + half_width)
+    extended = _extended(frequency, half_width)
     factors = None if factor is None else factor(extended)
 
     def model(theta: Field) -> tuple[Field, Field]:
@@ -211,6 +243,33 @@ def _lines_model(
         return expected, np.concatenate([parts.reshape(-1, frequency.size), floors.T]).T
 
     return model
+
+
+def _free_excitation_model(frequency: Field, floors: Field, leakage: Field) -> DensityModel:
+    """Return a model of a line under an excitation of free slope and curvature, over the floor."""
+    extended = _extended(frequency, leakage.size // 2)
+
+    def model(theta: Field) -> tuple[Field, Field]:
+        level, f0, zeta = np.exp(theta[:3])
+        shape = ExcitationShape(tuple(theta[3:-2]))
+        log = np.log(extended / f0)
+        line, by_f0, by_zeta = (
+            level * shape(extended, f0, zeta) * part for part in line_and_slopes(extended, f0, zeta)
+        )
+        by_f0 = by_f0 - shape.steepness(log) * line
+        powers = [log ** (order + 1) * line for order in range(theta.size - 5)]
+        parts = [line, by_f0, by_zeta, *powers]
+        if leakage.size > 1:
+            parts = [np.convolve(part, leakage, "valid") for part in parts]
+        return parts[0] + floors @ theta[-2:], np.concatenate([parts, floors.T]).T
+
+    return model
+
+
+def _extended(frequency: Field, lines: int) -> Field:
+    """Return the frequencies with `lines` more at both ends."""
+    spacing = (frequency[-1] - frequency[0]) / (frequency.size - 1)
+    return np.asarray(frequency[0] + spacing * np.arange(-lines, frequency.size + lines))
 
 
 def window_leakage(spectrum: Spectrum) -> Field:

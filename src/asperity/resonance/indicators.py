@@ -19,11 +19,13 @@ from asperity.resonance.band_fit import (
     band_data,
     fit_floor,
     fit_line,
+    fit_line_and_excitation,
     fit_modes,
     window_leakage,
 )
 from asperity.resonance.likelihood_fit import SpectrumFit, whittle_cost
 from asperity.resonance.resonance import (
+    ExcitationShape,
     Resonance,
     SamplingFactor,
     fitted_resonance,
@@ -54,9 +56,11 @@ def contact_resonance(
     method : "likelihood" fits one oscillator line over a floor and tests it against the floor
         alone; "modes" fits as many lines as the spectrum needs and takes the strongest if it
         dominates; "peak" takes the highest point after the paper's smoothing, without a test
-    sampling_factor : for "likelihood", the effect of sampling on the line where known, as for a
-        simulated record (straight lines between samples, a digital noise filter); not for
-        measurements
+    sampling_factor : for "likelihood", the known effect of excitation and sampling on the line:
+        `ExcitationShape((4.0,))` for a force or displacement that is white, or that of a simulated
+        record (straight lines between samples, a digital noise filter). None: the excitation falls
+        as f^-4 (white in acceleration) unless the spectrum contradicts it (BIC 10); then its slope
+        is fitted, which `reason` states
 
     Raises
     ------
@@ -180,17 +184,32 @@ def _fit_most_likely_line(
     if objection is not None:
         floor = band.floor_at_ends(band.floor_only.parameters)
         return no_resonance(objection, band_hz, "likelihood", floor=floor, evidence=evidence)
+    fit, shape = (
+        (fit, None) if sampling_factor else _with_free_excitation(band, spectrum, band_hz, fit)
+    )
+    line = np.exp(fit.parameters[:3])
     return fitted_resonance(
         line * band.scales,
-        std * band.scales,
+        fit.std[:3] * line * band.scales,
         reason=f"a line {2.0 * line[2] * line[1]:.0f} Hz wide stands out above the floor (BIC "
-        f"{evidence:+.0f})",
+        f"{evidence:+.0f}){'' if shape is None else shape.remark}",
         band_hz=band_hz,
         method="likelihood",
-        floor=band.floor_at_ends(fit.parameters[3:]),
+        floor=band.floor_at_ends(fit.parameters[-2:]),
         evidence=evidence,
-        sampling_factor=sampling_factor,
+        sampling_factor=sampling_factor or shape,
     )
+
+
+def _with_free_excitation(
+    band: BandData, spectrum: Spectrum, band_hz: tuple[float, float], fit: SpectrumFit
+) -> tuple[SpectrumFit, ExcitationShape | None]:
+    """Return the fit under a free excitation and its shape, or `fit` where f^-4 suffices."""
+    free = fit_line_and_excitation(band, spectrum, band_hz, fit)
+    line = np.exp(free.parameters[:3])
+    if free is fit or _objection(line, free.std[:3] * line, spectrum, band_hz):
+        return fit, None
+    return free, ExcitationShape(tuple(map(float, free.parameters[3:-2])))
 
 
 def _below_floor(band_hz: tuple[float, float], evidence: float) -> str:

@@ -15,6 +15,42 @@ class SamplingFactor(Protocol):
         """Return the factor on the line at each frequency [Hz], 1 at f0."""
 
 
+@dataclass(frozen=True, slots=True)
+class ExcitationShape:
+    """Effect on an oscillator line of an excitation that is not white in acceleration.
+
+    The ln of the factor is a polynomial in ln(f/f0), 0 at f0, with `coefficients` from the first
+    power on. The first is the slope: 0 for a profile whose density falls as f^-4, 4 for one that is
+    white in displacement and for a white force.
+    """
+
+    coefficients: tuple[float, ...]
+
+    @property
+    def remark(self) -> str:
+        """Remark on a fitted excitation."""
+        return (
+            f"; the excitation falls as f^{self.coefficients[0] - 4.0:.1f} there, not as f^-4, and "
+            "was fitted; state a known one as sampling_factor"
+        )
+
+    def __call__(self, frequency_hz: Field, f0_hz: float, damping_ratio: float) -> Field:  # noqa: ARG002
+        """Return the factor on the line at each frequency [Hz], 1 at f0."""
+        log = np.log(np.maximum(frequency_hz, 1e-6 * f0_hz) / f0_hz)
+        return np.asarray(
+            np.exp(
+                np.clip(
+                    np.polynomial.polynomial.polyval(log, (0.0, *self.coefficients)), -300.0, 300.0
+                )
+            )
+        )
+
+    def steepness(self, log: Field) -> Field:
+        """Return the derivative of ln factor at ln(f/f0)."""
+        orders = np.arange(1, len(self.coefficients) + 1)
+        return np.asarray(np.polynomial.polynomial.polyval(log, orders * self.coefficients))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resonance:
     """A contact resonance, or the reason why none was found.

@@ -62,7 +62,8 @@ SHORT_GROUPS = tuple(group for group in RUN_GROUPS if group != "virgin")  # of s
 UNCERTAINTY = "uncertainty"  # group of the catalogue: intervals over all surfaces
 ENDS = "ends"  # group of the catalogue: rollers
 DAMPING = "contact_damping_ratio"
-SUMMARY_KEYS = ("clr", "clr_error", "car", "crf_hz", "crf_std_hz")
+ROUGHNESS_KEYS = ("lambda_ratio", "rms_slope")
+SUMMARY_KEYS = ("clr", "clr_error", "car", *ROUGHNESS_KEYS, "crf_hz", "crf_std_hz")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -301,9 +302,11 @@ class Run:
         else:
             regime = "Boundary lubrication" if clr >= BOUNDARY_FROM else "Mixed lubrication"
         load, area = (quantity(key).text(value) for key, value in (("clr", clr), ("car", car)))
+        known = (quantity(key).named(numbers[key]) for key in ROUGHNESS_KEYS if numbers[key])
+        roughness = ", ".join(known)
         shared = (
             f"asperities carry {load} of the load {interval_text('clr', error.clr)} on {area} of "
-            "the Hertz zone"
+            f"the Hertz zone{roughness and f' ({roughness})'}"
         )
         sentence = f"{regime}: {shared}"
         if self.undetermined is not None:

@@ -3,8 +3,11 @@
 The regime is decided in `ehl.film_formulas`; full, mixed or boundary lubrication in `results.run`.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from asperity.core.quantities import quantity
 from asperity.ehl import (
@@ -60,7 +63,8 @@ class RegimeCard:
     Half-widths a and b [m] (only a for a line contact), maximum Hertz pressure [Pa], E' [Pa], the
     dimensionless numbers, the regime, and the film formulas valid there; the last three are None or
     empty for a dry contact. `fits` is also empty for a contact narrower across rolling than along
-    it, which no formula covers.
+    it, which no formula covers. Then the film ratio, and Sdq of the roughness in the Hertz zone, on
+    which CLR depends more.
     """
 
     half_width: float
@@ -70,6 +74,8 @@ class RegimeCard:
     numbers: FilmNumbers | None
     regime: Regime | None
     fits: tuple[FittedFilm, ...]
+    lambda_ratio: float | None
+    rms_slope: float
 
     def to_dict(self) -> dict[str, Any]:
         """Return the card as a dictionary for JSON in SI units; None if undefined."""
@@ -83,6 +89,8 @@ class RegimeCard:
                 for key, name in _NUMBERS.items()
             },
             "regime": self.regime,
+            "lambda_ratio": self.lambda_ratio,
+            "rms_slope": self.rms_slope,
             "fits": [
                 {
                     "source": fit.source,
@@ -109,6 +117,9 @@ class RegimeCard:
             ),
         ]
         rows = [("Hertz zone", ", ".join(hertz))]
+        if self.rms_slope > 0.0:
+            keys = ("rms_slope",) if self.lambda_ratio is None else ("lambda_ratio", "rms_slope")
+            rows.append(("roughness", ", ".join(quantity(key).named(values[key]) for key in keys)))
         if self.numbers is None:
             return rows
         numbers = ", ".join(quantity(key).named(values[key]) for key in _NUMBERS)
@@ -144,6 +155,8 @@ def regime_card(solution: ContactSolution) -> RegimeCard:
         effective_modulus=conditions.pair.effective_modulus,
         numbers=None if lubricant is None else film_numbers(conditions, lubricant),
         regime=regime,
+        lambda_ratio=film_ratio(solution),
+        rms_slope=rms_slope(solution),
         fits=()
         if lubricant is None
         else tuple(
@@ -156,6 +169,20 @@ def regime_card(solution: ContactSolution) -> RegimeCard:
             for fit in film_fits(conditions, lubricant)
         ),
     )
+
+
+def rms_slope(solution: ContactSolution) -> float:
+    """Return the root mean square gradient Sdq of the roughness in the Hertz zone, on the grid."""
+    zone = hertz_zone(solution.conditions, solution.grid)
+    heights = np.where(zone, solution.surface.heights, np.nan)
+    steps = (np.diff(heights, axis=axis) / solution.grid.spacing[axis] for axis in (0, 1))
+    return math.sqrt(sum(float(np.nanmean(step**2)) for step in steps if np.isfinite(step).any()))
+
+
+def film_ratio(solution: ContactSolution) -> float | None:
+    """Return the minimum film of the smooth contact over Sq; None for a dry or smooth contact."""
+    oil, sq = solution.lubricant, solution.surface.sq
+    return least_film(solution.conditions, oil) / sq if oil and sq > 0.0 else None
 
 
 def far_from_fits(solution: ContactSolution) -> str | None:

@@ -11,7 +11,6 @@ from asperity.ehl import (
     ContactState,
     Scales,
     Uncertainty,
-    least_film,
 )
 from asperity.ehl.load_shares import CENTRE, area_share, carried_share
 from asperity.ehl.models.mixed import MixedBalance, evaluate
@@ -20,6 +19,7 @@ from asperity.ehl.outcome import TWO_PRESSURES
 from asperity.ehl.problem_setup import contact_problem, on_one_line
 from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.kernels.reynolds import LUBRICATED
+from asperity.solution.regime import film_ratio, rms_slope
 
 
 def contact_state(solution: ContactSolution) -> ContactState:
@@ -70,8 +70,6 @@ def state_of(solution: ContactSolution, balance: Balance | MixedBalance) -> Cont
     grid = solution.grid
     in_contact = solution.in_contact
     problem = balance.problem
-    sq = solution.surface.sq
-    oil = solution.lubricant
     zone = problem.zone()
     centre = problem.zone(CENTRE)
     dx, dy = problem.spacing
@@ -82,16 +80,17 @@ def state_of(solution: ContactSolution, balance: Balance | MixedBalance) -> Cont
         car_domain=float(in_contact.mean() * _hertz_areas(solution.conditions, grid)),
         clr=carried_share(solution.pressure, in_contact),
         capped_oil_load_ratio=carried_share(solution.pressure, balance.yielded & ~in_contact),
-        sq=sq,
+        sq=solution.surface.sq,
         h_min=float(solution.gap.min()),
         h_central=float(solution.gap[centre].mean()),
         h_mean=float(solution.gap[zone].mean()),
-        lambda_ratio=least_film(solution.conditions, oil) / sq if oil and sq > 0.0 else None,
+        lambda_ratio=film_ratio(solution),
         p_max=float(solution.pressure.max()),
         reynolds_residual=balance.residual_rms,
         load_error=balance.load_error,
         mass_flux_imbalance=float(unbalanced * dx * dy / (carried_oil * width)),
         contact_slope=_contact_slope(solution),
+        rms_slope=rms_slope(solution),
         error=_error(solution),
     )
 

@@ -230,7 +230,7 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
         sp=sp,
         sv=sv,
         sz=sp + sv,
-        sdq=_gradient(heights, surface.grid),
+        sdq=gradient(heights, surface.grid),
         sdr=_developed_area(heights, surface.grid) - 1.0,
         sal=sal,
         str_=texture,
@@ -281,7 +281,8 @@ def _correlation_lengths(
     return float(first), float(second)
 
 
-def _gradient(heights: Field, grid: Grid) -> float:
+def gradient(heights: Field, grid: Grid) -> float:
+    """Return the root mean square gradient Sdq, from differences of neighbouring cells."""
     squares = 0.0
     for axis, (spacing, periodic) in enumerate(zip(grid.spacing, grid.periodic, strict=True)):
         steps = np.roll(heights, -1, axis) - heights if periodic else np.diff(heights, axis=axis)

@@ -8,11 +8,17 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_choice
-from asperity.surface.condition import DEFAULT_CONDITIONING, SurfaceConditioning, condition_surface
+from asperity.surface.condition import (
+    DEFAULT_CONDITIONING,
+    SIGMA_OVER_CUTOFF,
+    SurfaceConditioning,
+    condition_surface,
+)
 from asperity.surface.model import (
     MeasuredSurface,
     Surface,
@@ -20,10 +26,12 @@ from asperity.surface.model import (
     length_text,
     require_roughness,
 )
+from asperity.surface.parameters import gradient
 from asperity.surface.read import surface_topography
 
 FitMode = Literal["crop", "tile"]
 
+MAX_SLOPE_CHANGE = 0.3  # of Sdq by sampling or the shortest third of the waves, above which noted
 _OVERLAP = 1.0 / 8.0  # share of a periodic side over which its ends are blended
 # Windowed sinc: with these settings aliases are below 1e-3, waves longer than 2.3 cells unchanged
 _LOBES = 16  # to either side
@@ -118,7 +126,36 @@ def prepare_surface(
             after = _height_statistics(heights, grid)
             steps.append(_blending_step(axis, overlap_cells, levelled, grid, before, after))
     heights, scaling = _scale(heights - heights.mean(), sq, measured.name)
-    return PreparedSurface(Surface(heights, grid), (*steps, scaling))
+    return _checked(Surface(heights, grid), levelled, (*steps, scaling), scaled=sq is not None)
+
+
+def _checked(
+    surface: Surface, measured: MeasuredSurface, steps: tuple[str, ...], *, scaled: bool
+) -> PreparedSurface:
+    """Return the surface, with a step where filter or sampling decide its slope."""
+    pixels, grid = measured.grid.spacing, surface.grid
+    slope = _height_statistics(surface.heights, grid).sdq
+    if slope == 0.0 or min(measured.grid.cells) < 2:
+        return PreparedSurface(surface, steps)
+    shortest = [3.0 * max(pair) for pair in zip(grid.spacing, pixels, strict=True)]
+    sigmas = np.multiply(shortest, SIGMA_OVER_CUTOFF) / grid.spacing
+    smooth = scipy.ndimage.gaussian_filter(surface.heights, sigmas, mode="nearest")
+    scale = surface.sq / measured.sq if scaled else 1.0
+    values = {
+        f"without waves shorter than {length_text(max(shortest))}": _height_statistics(
+            smooth, grid
+        ).sdq,
+        f"on the map's pixels of {length_text(max(pixels))}": scale
+        * gradient(measured.heights, measured.grid),
+    }
+    if all(abs(value / slope - 1.0) < MAX_SLOPE_CHANGE for value in values.values()):
+        return PreparedSurface(surface, steps)
+    others = " and ".join(f"{value:.3g} {where}" for where, value in values.items())
+    note = (
+        f"sampling decides the slope: Sdq is {slope:.3g} on this grid, {others}; CLR depends on it "
+        "more than on Sq: state s_filter, the shortest wave that counts"
+    )
+    return PreparedSurface(surface, (*steps, note))
 
 
 def _scale(heights: Field, sq: float | None, name: str) -> tuple[Field, str]:

@@ -30,6 +30,7 @@ from asperity.trend import StageErrors, Stages, split_stages
 
 HOUR = 3600.0
 MIN_ROWS = 4  # for a drift
+SAFETY = 1.25  # of error estimates by a second rule (Roache, J. Fluids Eng. 116 (1994) 405)
 MAX_STAGE_POINTS = 60  # for the detection of stages
 ENDS = ("sq_m", "clr", "car", "h_mean_m", "friction_coefficient", "crf_hz", "crfa")
 
@@ -107,6 +108,25 @@ class WearHistory:
 
     @property
     def volume_error(self) -> float:
+        """Relative error of the worn volume by the length of jumps; the larger of both bodies.
+
+        A jump removes at its initial rate. The error is the difference to the trapezoidal rule,
+        times SAFETY, plus `balance_error`; nan in a history of a version without wear rates.
+        """
+        seconds = HOUR * np.diff(self.table["hours"].to_numpy(float))
+        errors = [0.0]
+        for body in BODIES:
+            column = body_column("wear_rate_m3_s", body)
+            if column not in self.table:
+                return math.nan
+            rates = self.table[column].to_numpy(float)
+            removed, change = float(rates[:-1] @ seconds), float(np.diff(rates) @ seconds)
+            if removed != 0.0:  # true for nan
+                errors.append(0.5 * SAFETY * abs(change) / removed)
+        return float(np.max(errors)) + self.balance_error
+
+    @property
+    def balance_error(self) -> float:
         """Relative difference of the lost volume and the booked one; the larger of both bodies.
 
         The booked volume is k times asperity load times sliding distance, and that of mechanisms.
@@ -289,7 +309,8 @@ class WearHistory:
             "worn_volume_m3": list(self.worn_volume),
             "worn_volume_interval_m3": [self.volume_interval(body) for body in BODIES],
             "worn_depth_m": [float(last[body_column("worn_depth_m", body)]) for body in BODIES],
-            "volume_error": self.volume_error,
+            "volume_error": finite_or_none(self.volume_error),
+            "balance_error": self.balance_error,
             "jump_error": self.worn.error,
             "jumps": len(self.table) - 1,
             "computed": self.computed,

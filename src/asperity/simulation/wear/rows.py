@@ -23,6 +23,7 @@ RESONANCE = {  # end of an interval of CRF: the corresponding end of CLR
     "crf_mean_low_hz": "clr_mean_low",
     "crf_mean_high_hz": "clr_mean_high",
 }
+UNITS = ("_m3_s", "_m3", "_m")  # at the end of a column
 MIN_SQ = 1e-15  # [m] below which heights are rounding errors
 
 ROUGHNESS = {  # column: field of HeightParameters
@@ -50,8 +51,8 @@ STATE = {  # field of ContactState: its column
 
 def body_column(key: str, body: int) -> str:
     """Return the column of one body's quantity: `sq_1_m` of `sq_m`."""
-    stem, mark, unit = key.rpartition("_")
-    return f"{stem}_{body + 1}_{unit}" if mark and unit in ("m", "m3") else f"{key}_{body + 1}"
+    unit = next((unit for unit in UNITS if key.endswith(unit)), "")
+    return f"{key.removesuffix(unit)}_{body + 1}{unit}"
 
 
 def roughness(surfaces: tuple[Surface, Surface]) -> Row:

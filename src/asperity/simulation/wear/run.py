@@ -172,6 +172,7 @@ def _row(contact: WearingContact, state: WearState, solutions: SolvedPositions, 
             body_column("worn_depth_m", body): float(depth[track].mean()),
             body_column("worn_depth_max_m", body): float(depth.max()),
             body_column("worn_volume_m3", body): contact.volume(depth, body),
+            body_column("wear_rate_m3_s", body): contact.booked_rate(solutions, body),
             body_column("flattened_m", body): float(state.flattened[body][track].mean()),
         }
     row |= rough
