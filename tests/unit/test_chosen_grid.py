@@ -1,12 +1,15 @@
 """Automatic grid when [grid] is missing or partial, for every kind of surface."""
 
+import math
+import re
+
 import numpy as np
 import pytest
 import x3pio
 
 from asperity.case import load_case
 from asperity.core.errors import BadInput
-from asperity.surface import correlation_lengths
+from asperity.surface import area_text, correlation_lengths, length_text
 from support.paper import contact
 
 A = contact().hertz.half_widths[0]
@@ -108,3 +111,56 @@ def test_a_smooth_line_contact_uses_the_minimum_number_of_rows():
     case = case_of(SURFACES[-1])
     assert case.grid.cells[1] == 8
     assert not case.surface().heights.any()
+
+
+FINE = [  # once reduced below the cells that their roughness needs
+    'kind = "gaussian"\nsq = "20 nm"\ncorrelation_length = ["12 um", "18 um"]\ndirection_deg = 30',
+    'kind = "self-affine"\nsq = "0.02 um"\nhurst = 0.8\ncutoffs = ["14 um", "70 um"]',
+    'kind = "ground"\nsq = "0.02 um"\ngroove_width = "14 um"\ngroove_length = "80 um"',
+    'kind = "sandblasted"\nsq = "0.02 um"\ncrater_radius = "12 um"',
+]
+
+
+def wide_contact(surface):
+    """A contact of 4 by 3 mm, in the oil film of a light, fast ball of aluminium."""
+    text = CONTACT.replace("line", "point").replace('length = "10 mm"\n', "")
+    text = text.replace("5.4 mm", "56 mm").replace("1.91 m/s", "9 m/s").replace("200 GPa", "70 GPa")
+    return text + f"[surface]\n{surface}\n"
+
+
+@pytest.mark.parametrize("surface", FINE)
+def test_the_chosen_grid_represents_its_roughness(tmp_path, surface):
+    path = tmp_path / "wide.toml"
+    path.write_text(wide_contact(surface))
+    case = load_case(path)
+    assert np.prod(case.grid.cells) > 150_000
+    assert case.surface().sq == pytest.approx(2e-8, rel=1e-6)
+
+
+@pytest.mark.parametrize("surface", FINE[:3])
+def test_the_number_of_cells_in_a_refusal_is_enough(tmp_path, surface):
+    path = tmp_path / "wide.toml"
+    path.write_text(wide_contact(surface) + "[grid]\ncells = [128, 96]\n")
+    with pytest.raises(BadInput, match=r"at least \d+ x \d+ cells") as refusal:
+        load_case(path).surface()
+    cells = re.search(r"at least (\d+) x (\d+) cells", str(refusal.value)).groups()
+    path.write_text(path.read_text().replace("[128, 96]", f"[{cells[0]}, {cells[1]}]"))
+    assert load_case(path).surface().sq == pytest.approx(2e-8, rel=1e-6)
+
+
+def test_notes_on_long_correlation_lengths_hold_no_nan(tmp_path):
+    """A sample whose autocorrelation does not decay within the domain has no correlation length."""
+    path = tmp_path / "long.toml"
+    surface = f'kind = "gaussian"\nsq = "1 um"\ncorrelation_length = "{0.45 * 10 * A} m"\nseed = 0'
+    grid = "cells = [48, 48]\nx = [-5.0, 5.0]\ny = [-5.0, 5.0]"
+    path.write_text(f"{CONTACT}[surface]\n{surface}\n[grid]\n{grid}\n")
+    case = load_case(path)
+    assert np.isnan(correlation_lengths(case.surface())).any()
+    (note,) = (note for note in case.surface_notes if "correlation lengths" in note)
+    assert "x unknown um" in note
+    assert not re.search(r"\bnan\b", note)
+
+
+def test_lengths_that_are_not_finite_are_named_in_words():
+    assert length_text(math.nan) == "unknown"
+    assert area_text((math.nan, 2e-6)) == "unknown x 2 um"

@@ -1,8 +1,13 @@
 """Compiled kernels against NumPy references, and the linearisation against differences."""
 
+from importlib import import_module
+from pkgutil import iter_modules
+
 import numpy as np
 import pytest
+from numba.core.dispatcher import Dispatcher
 
+from asperity import kernels
 from asperity.ehl import Options, Scales
 from asperity.ehl.linear_solvers.single_pressure import Linear, MultigridSolver, five_point_pattern
 from asperity.ehl.problem_setup import contact_problem, first_guess
@@ -612,3 +617,22 @@ def test_coarsening_preserves_the_contact(evaluation):
     )
     for name in ("load", "p_cap", "contact_gap", "speed", "p_scale", "lubricant", "lower"):
         assert getattr(coarse, name) == getattr(fine, name)
+
+
+def test_no_kernel_raises_on_a_division_by_zero():
+    """A zero pivot ends a search as not converged; see `asperity.kernels.compiled.njit`."""
+    modules = [
+        import_module(f"asperity.kernels.{module.name}")
+        for module in iter_modules(kernels.__path__)
+    ]
+    compiled = {k for module in modules for k in vars(module).values() if isinstance(k, Dispatcher)}
+    assert len(compiled) > 40
+    assert {kernel.targetoptions["error_model"] for kernel in compiled} == {"numpy"}
+
+
+def test_lines_with_a_zero_pivot_have_an_infinite_inverse(stencil):
+    singular = Stencil(*(np.zeros_like(part) for part in stencil))
+    empty = np.empty((0, 0))
+    lines = line_relaxation.LineFactors(*np.empty((5, CELLS[0], CELLS[1] // 2)), empty, empty)
+    line_relaxation.factor_lines(singular, OuterNeighbours(empty, empty), 0, 0.0, lines)
+    assert np.isinf(lines.inverse[0]).all()

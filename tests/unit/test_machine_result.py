@@ -65,7 +65,7 @@ def test_in_full_film_the_worst_contact_has_the_lowest_film_ratio(gears):
     found = solved(gears, **smooth | {"DE": (0.0, None, 4e-7)})
     assert found.worst["name"] == "DE"
     assert (
-        ": full film; worst is DE, where asperities carry 0.0 % of the load on a film of 0.400"
+        ": full film; worst is DE, where solid contact carries 0.0 % of the load on a film of 0.400"
         in found.verdict()
     )
 

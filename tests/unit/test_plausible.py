@@ -8,8 +8,15 @@ import pytest
 from asperity.contact.conditions import ElasticPair
 from asperity.contact.grid import Grid
 from asperity.ehl import Options, solve_contact
+from asperity.ehl.outcome import Figures, GridError
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
-from asperity.solution import inlet_notes, plausibility_notes, solution_notes
+from asperity.solution import (
+    contact_state,
+    inlet_notes,
+    plausibility_notes,
+    solution_notes,
+    uncertain_films,
+)
 from asperity.solution.plausibility import ridge_radii
 from asperity.surface import Surface, flat_surface, gaussian_surface, ground_surface
 from support.paper import barus, contact, grid, rough
@@ -172,3 +179,16 @@ def test_ridge_radii_of_a_parabola_and_of_an_edge(shape, ratio):
     assert coarse / fine == pytest.approx(ratio)
     assert fine == pytest.approx(0.5 if ratio == 1.0 else domain.spacing[0] / 2e-5)
     assert ridge_radii(replace(all_touching, in_contact=np.zeros(domain.cells, dtype=bool))) is None
+
+
+@pytest.mark.parametrize(("bar", "films"), [(0.14, ()), (0.3, ("minimum film thickness ± 30 %",))])
+def test_a_film_with_a_wide_error_bar_is_not_determined(bar, films):
+    smooth = solve_contact(contact(), barus(), flat_surface(grid((96, 8))))
+    state = contact_state(smooth)
+    none = Figures(car=0.0, clr=0.0, h_min=0.0, h_central=0.0)
+    error = GridError(
+        car=0.0, clr=0.0, h_min=bar * state.h_min, h_central=0.1 * state.h_central, lean=none
+    )
+    convergence = replace(smooth.convergence, iteration_error=none, discretisation_error=error)
+    assert uncertain_films(replace(smooth, convergence=convergence)) == films
+    assert uncertain_films(replace(smooth, convergence=convergence, lubricant=None)) == ()

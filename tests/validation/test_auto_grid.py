@@ -294,3 +294,28 @@ def test_the_solved_film_agrees_with_every_valid_fit():
         assert regime_card(solution).regime == regime
         for fit in regime_card(solution).fits:
             assert abs(fit.deviation) < 0.15, (fit, fit.deviation)
+
+
+@pytest.mark.parametrize(("load", "outlet"), [(0.765, 8.1), (0.1, 30.0)])
+def test_the_outlet_of_a_light_fast_ball_is_bounded_like_its_inlet(load, outlet):
+    """The rigid film of a light ball is thousands of a²/R."""
+    grid, a = light_ball(load, 1.57)
+    assert grid.upper[0] / a == pytest.approx(outlet, abs=0.1)
+    assert grid.lower[0] / a == pytest.approx(-30.0)
+
+
+def test_a_film_that_is_not_thin_against_the_radius_is_refused():
+    with pytest.raises(
+        BadInput, match=r"a film of 55\.8 mm is not thin against the radius of 15 mm"
+    ):
+        light_ball(0.01, 2.0)
+
+
+def light_ball(load, speed):
+    """Return the chosen grid of a light, fast ball and its Hertz radius."""
+    speeds = (speed, speed)
+    ball = contact(geometry="point", radius=0.015, load=load, length=None, surface_speeds=speeds)
+    thick = Lubricant(
+        viscosity=Barus(0.05, 22e-9), density=DowsonHigginson(870.0), rheology=Newtonian()
+    )
+    return auto_grid(ball, thick), ball.hertz.half_widths[0]

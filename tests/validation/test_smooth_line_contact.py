@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from asperity.case import load_case
 from asperity.ehl import Options, solve_contact
+from asperity.ehl.film_formulas import least_films
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.solution import contact_state
 from asperity.surface import flat_surface
@@ -133,3 +135,45 @@ def test_the_film_agrees_with_dowson_and_higginson_within_ten_percent():
     assert film(4)[0] == pytest.approx(
         2.65 * (20e-9 * modulus) ** 0.54 * u**0.7 * w**-0.13 * RADIUS, rel=0.1
     )
+
+
+POLYMER = """[contact]
+geometry = "line"
+radius = "0.59 m"
+load = "3918 N"
+length = "4.322 mm"
+entrainment_speed = "11.5 mm/s"
+[material]
+youngs_modulus = "3.6 GPa"
+poisson_ratio = 0.38
+hardness = "0.25 GPa"
+[lubricant]
+viscosity = {{ law = "roelands", eta0 = "1.07 mPa s", alpha = "7.8 1/GPa" }}
+density = {{ law = "dowson-higginson", rho0 = "870 kg/m^3" }}
+rheology = "newtonian"
+[grid]
+cells = [5520, 16]
+[surface]
+{surface}
+"""
+SURFACES = {
+    "flat": 'kind = "flat"',
+    "ground": 'kind = "ground"\nsq = "14 nm"\ngroove_width = "2 mm"\ngroove_length = "9 mm"\n'
+    "direction_deg = 90\nseed = 41",
+}
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_water_between_polymers_separates_them_under_hertz_pressure(tmp_path, surface):
+    """M = 3700, L = 0.01: a film of 30 nm in a contact 36 mm wide, isoviscous and elastic."""
+    path = tmp_path / "polymer.toml"
+    path.write_text(POLYMER.format(surface=SURFACES[surface]))
+    case = load_case(path)
+    solution = solve_contact(case.conditions, case.lubricant, case.surface())
+    fit = least_films(case.conditions, case.lubricant)["isoviscous-elastic"].film
+    assert solution.convergence.iterations < 10
+    assert not solution.in_contact.any()
+    assert solution.pressure.max() == pytest.approx(case.conditions.hertz.p_max, rel=5e-3)
+    load = solution.pressure.mean() * case.grid.extent[0] * case.conditions.line_length
+    assert load == pytest.approx(case.conditions.load, rel=1e-4)
+    assert solution.gap.min() == pytest.approx(fit, rel=0.05)

@@ -37,6 +37,7 @@ def texture_of(section: SurfaceSection, folder: Path) -> Texture | None:
         lengths=_pairwise(min, first.lengths, second.lengths),
         least=_pairwise(max, first.least, second.least),
         most=_pairwise(min, first.most, second.most),
+        largest_cell=_pairwise(min, first.largest_cell, second.largest_cell),
     )
 
 
@@ -56,24 +57,35 @@ def _correlated(arguments: Arguments) -> Texture:
 
 def _ground(arguments: Arguments) -> Texture:
     grooves = arguments["groove_length"], arguments["groove_width"]
-    return _texture(arguments["sq"], grooves, arguments["direction"], GROOVE)
+    return _texture(arguments["sq"], grooves, arguments["direction"], GROOVE, (1.0, 0.5))
 
 
-def _texture(sq: float, sizes: Pair, direction: float, shares: Pair = (1.0, 1.0)) -> Texture:
+def _texture(
+    sq: float, sizes: Pair, direction: float, shares: Pair = (1.0, 1.0), resolved: Pair = (1.0, 1.0)
+) -> Texture:
     """Return scales along a direction; `shares` of the sizes are correlation lengths.
 
-    The domain holds at least two of each size.
+    The domain holds at least two of each size, and `resolved` of them at least two cells: the
+    condition of `asperity.surface.generate.require_lengths`.
     """
     cosine = abs(math.cos(direction))
     sine = abs(math.sin(direction))
     first = sizes[0] * shares[0]
     second = sizes[1] * shares[1]
+    lengths = (
+        1.0 / math.hypot(cosine / first, sine / second),
+        1.0 / math.hypot(sine / first, cosine / second),
+    )
+    cells = SIZE_MARGIN * max(
+        2.0 / (size * share * math.hypot(along / lengths[0], across / lengths[1]))
+        for size, share, along, across in zip(
+            sizes, resolved, (cosine, sine), (sine, cosine), strict=True
+        )
+    )
     return Texture(
         sq=sq,
-        lengths=(
-            1.0 / math.hypot(cosine / first, sine / second),
-            1.0 / math.hypot(sine / first, cosine / second),
-        ),
+        lengths=lengths,
+        largest_cell=(lengths[0] / cells, lengths[1] / cells),
         least=(
             2.0 * SIZE_MARGIN * max(sizes[0] * cosine, sizes[1] * sine),
             2.0 * SIZE_MARGIN * max(sizes[0] * sine, sizes[1] * cosine),
@@ -85,14 +97,20 @@ def _self_affine(arguments: Arguments) -> Texture:
     """Return half the shortest wavelength as correlation length: the scale to resolve."""
     shortest, longest = arguments["cutoffs"]
     return Texture(
-        sq=arguments["sq"], lengths=(shortest / 2.0,) * 2, least=(SIZE_MARGIN * longest,) * 2
+        sq=arguments["sq"],
+        lengths=(shortest / 2.0,) * 2,
+        least=(SIZE_MARGIN * longest,) * 2,
+        largest_cell=(shortest / (2.0 * SIZE_MARGIN),) * 2,
     )
 
 
 def _sandblasted(arguments: Arguments) -> Texture:
     radius = arguments["crater_radius"]
     return Texture(
-        sq=arguments["sq"], lengths=(CRATER * radius,) * 2, least=(8.0 * SIZE_MARGIN * radius,) * 2
+        sq=arguments["sq"],
+        lengths=(CRATER * radius,) * 2,
+        least=(8.0 * SIZE_MARGIN * radius,) * 2,
+        largest_cell=(radius / (2.0 * SIZE_MARGIN),) * 2,
     )
 
 

@@ -20,7 +20,7 @@ from asperity.case.units import (
     Length,
     Number,
     Pressure,
-    Speed,
+    SpeedOrRest,
     default_amount,
     parse_amount,
 )
@@ -51,7 +51,7 @@ class ContactSection(Section):
     length: Annotated[Length | None, OPTIONAL] = None  # of a line contact or a roller
     shape: Annotated[ShapeSection | None, OPTIONAL] = None  # of a roller along its length
     load: Force
-    entrainment_speed: Speed
+    entrainment_speed: SpeedOrRest  # 0 without a lubricant only
     slip: Number = 0.0  # slide-to-roll ratio (u1 - u2)/entrainment speed
 
 
@@ -151,3 +151,13 @@ class CaseFile(Section):
     motion: Annotated[MotionSection | None, OPTIONAL] = None
     wear: Annotated[WearSection | None, OPTIONAL] = None
     infer: Annotated[InferSection | None, PlainValidator(parse_infer)] = None
+
+    @model_validator(mode="after")
+    def _oil_moves(self) -> Self:
+        if self.lubricant is not None and not self.contact.entrainment_speed > 0.0:
+            raise LocatedError(
+                ("contact", "entrainment_speed"),
+                "must be positive and finite with a lubricant, got "
+                f'"{self.contact.entrainment_speed}"; correct it, or set lubricant = "none"',
+            )
+        return self

@@ -317,6 +317,7 @@ def _paired(value: object) -> object:
 Length: TypeAlias = Annotated[float, amount_in("m")]
 Force: TypeAlias = Annotated[float, amount_in("N")]
 Speed: TypeAlias = Annotated[float, amount_in("m/s")]
+SpeedOrRest: TypeAlias = Annotated[float, amount_in("m/s", 0.0)]
 Pressure: TypeAlias = Annotated[float, amount_in("Pa")]
 Number: TypeAlias = Annotated[float, Strict()]
 Count: TypeAlias = Annotated[PositiveInt, Strict()]

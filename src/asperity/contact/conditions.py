@@ -1,5 +1,6 @@
 """Conditions of a contact: elastic pair, geometry, load and surface speeds."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, get_args
@@ -68,7 +69,7 @@ class ContactConditions:
     Raises
     ------
     BadInput
-        A quantity is not positive, the length is missing, or the entrainment speed is zero.
+        A quantity is not positive, the length is missing, or the entrainment speed is negative.
 
     Examples
     --------
@@ -113,7 +114,8 @@ class ContactConditions:
         self._check_length()
         if self.hardness is not None:
             require_positive("hardness", self.hardness, "Pa")
-        require_positive("entrainment speed", self.entrainment_speed, "m/s")
+        if self.entrainment_speed != 0.0:  # a dry contact may rest
+            require_positive("entrainment speed", self.entrainment_speed, "m/s")
 
     def _check_length(self) -> None:
         subject = f"{with_article(self.geometry)} contact"
@@ -160,7 +162,9 @@ class ContactConditions:
 
     @property
     def slide_to_roll(self) -> float:
-        """Sliding over entrainment speed."""
+        """Sliding over entrainment speed; 0 at rest, infinite where only sliding is left."""
+        if self.entrainment_speed == 0.0:
+            return math.inf if self.sliding_speed else 0.0
         return self.sliding_speed / self.entrainment_speed
 
     @property

@@ -50,6 +50,10 @@ class MixedLinearSolver:
 
     tolerance: float = 0.1  # relative residual of GMRES ...
     tolerance_smooth: float = 0.05  # ... for smooth bodies, whose steps are few and nearly linear
+    # ... for conserved oil between bodies that touch nowhere, if their film is a small difference
+    # of far larger deflections (`thin_film`, a²/R): the cavity's equations dominate the residual
+    tolerance_separated: float = 0.01
+    thin_film: float = 1e-3
     tolerance_conserving: float = 1e-3  # ... for oil conserved along its path ...
     conserving_residual: float = 1e-3  # ... from this residual on: the mass balance is met closer
     max_krylov_steps: int = 60
@@ -158,7 +162,8 @@ class GridContinuation:
     divergence: float = 10.0
     failed_residual: float = 0.1  # a coarse solution with more is no initial guess
     elastic_tolerance: float = 0.1  # of dry elastic bodies, in that of the Newton step after it
-    min_coarse_inlet_cells: float = 2.0  # across the inlet of a smooth line contact: else it closes
+    min_coarse_inlet_cells: float = 2.0  # across the inlet of a line contact: else it closes ...
+    separating_film: float = 1.5  # ... if its film is thicker than so many rms roughnesses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -193,6 +198,7 @@ class MixedSearchControls:
     backward_tolerance: float = 0.2  # ... until a step moves the load share by less of its change
     max_restart_iterations: int = 12  # second order from a coarser grid to `first_order_tolerance`
     max_imbalance: float = 1e-6  # sum of gains and losses over the throughflow, if conserving
+    rounding: float = 1e-12  # residual that is rounding: in a wide inlet it is much oil
     max_smooth_turns: int = 4  # of Newton and local refinement for smooth bodies on a coarse grid
     steps_per_turn: int = 2
     divergence: float = 10.0  # ratio to the initial residual from which steps seldom recover

@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from asperity.contact.conditions import ContactConditions
+from asperity.core.errors import BadInput, require_positive
 from asperity.lubricant import Lubricant
 
 Regime = Literal[
@@ -18,6 +19,7 @@ Regime = Literal[
 ]
 Place = Literal["central", "least"]
 PEAK_TO_MIN_FILM = 1.2257  # rigid cylinder: film under the pressure peak over the minimum
+MAX_FILM_PER_RADIUS = 0.05  # the parabola then misses 2.5 % of a circle's gap
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +125,24 @@ def central_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
     blend = _moes if conditions.long else _nijenbanning
     unit = conditions.radius_along_rolling * (2.0 * numbers.speed) ** 0.5
     return float(blend(films, _ratio(conditions)) * unit)
+
+
+def require_thin_film(conditions: ContactConditions, lubricant: Lubricant | None) -> None:
+    """Raise BadInput without entrainment, or for a film not thin against the smaller radius.
+
+    Reynolds' equation and the parabola in place of a circle hold for thin films: at the edge of the
+    pressure, x² = 2 R h, the parabola misses the share h/(2 R) of a circle's gap.
+    """
+    if lubricant is None:
+        return
+    require_positive("entrainment speed", conditions.entrainment_speed, "m/s")
+    radius = min(conditions.radius_along_rolling, conditions.radius_across_rolling)
+    if (film := central_film(conditions, lubricant)) > MAX_FILM_PER_RADIUS * radius:
+        raise BadInput(
+            f"a film of {film * 1e3:.3g} mm is not thin against the radius of "
+            f"{radius * 1e3:.3g} mm, so that lubrication theory does not hold; raise the load, or "
+            "lower speed or viscosity"
+        )
 
 
 def least_film(conditions: ContactConditions, lubricant: Lubricant) -> float:

@@ -15,7 +15,7 @@ from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.contact.hertz import line_gap
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.ehl.film_formulas import central_film, least_film
+from asperity.ehl.film_formulas import central_film, least_film, require_thin_film
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface, correlation_lengths
@@ -31,7 +31,7 @@ CELLS_IN_CORRELATION = 8.0
 CELLS_IN_CONTACT, MIN_CELLS_IN_CONTACT = 20.0, 16.0  # across the Hertz zone
 CELL_MARGIN = 1.05  # on minimum numbers, against rounding
 SIDE_CELL_RATIO = 0.6  # cells in y over cells in x: side flow varies more slowly
-MAX_INLET = 30.0  # half-widths; for light contacts
+MAX_INLET = MAX_OUTLET = 30.0  # half-widths; for light contacts
 CONTACT_REACH = 5.0  # a rough body touches out to X² = 1 + 5 Sq R/a²: 2.5 Sq above the mean plane
 CORRELATION_LENGTHS = 10.0  # along the modelled length of a line contact
 DRY_FILM_RATIO = 0.05  # below it the film carries no load, and its inlet is not resolved
@@ -44,6 +44,7 @@ LINES_PAST_END = 4  # past a roller's end ...
 MIN_LINES_PER_PAST_END = 24  # ... if the grid has so many times as many lines
 MAX_ROLLER_CELLS = 512.0  # cells along x of a smooth roller
 ROLLER_MARGIN = 0.05  # of a roller's loaded length: the accuracy of slices
+MAX_FILM_ERROR = 0.15  # half-width in the film above which a verdict states it
 MAX_CLR_ERROR = 0.15  # half-width above which mixed and boundary lubrication are indistinguishable
 
 
@@ -56,12 +57,14 @@ class Texture:
     sq : root-mean-square height [m]
     lengths : autocorrelation lengths (decay to 1/e) along x and y [m]; infinite if uniform
     least, most : smallest and largest possible extent along x and y [m]
+    largest_cell : largest cells along x and y that the roughness accepts [m]
     """
 
     sq: float
     lengths: tuple[float, float]
     least: tuple[float, float] = (0.0, 0.0)
     most: tuple[float, float] = (math.inf, math.inf)
+    largest_cell: tuple[float, float] = (math.inf, math.inf)
 
 
 def auto_grid(
@@ -77,12 +80,12 @@ def auto_grid(
     """Return a grid that resolves a contact to a given accuracy.
 
     The inlet begins where at most half of `accuracy` of the inlet's pressure is missing (twice
-    `accuracy` for a rough contact), at most 30 half-widths from the centre; the domain includes
-    asperity contact up to 2.5 Sq above the mean plane. Cells: 4.5 across the inlet length, 9 for a
-    smooth line contact, 5 for a rough contact; 8 along a correlation length; 20 across the Hertz
-    zone; scaled with the root of `accuracy`. A rough contact has at least 96 by 32 cells, so that a
-    coarser grid can estimate its error, and about 130000 at most; `grid_shortfalls` reports grids
-    that are too coarse.
+    `accuracy` for a rough contact); inlet and outlet lie at most 30 half-widths from the centre,
+    unless asperities may touch farther out: the domain includes contact up to 2.5 Sq above the mean
+    plane. Cells: 4.5 across the inlet length, 9 for a smooth line contact, 5 for a rough contact; 8
+    along a correlation length; 20 across the Hertz zone; scaled with the root of `accuracy`. A
+    rough contact has at least 96 by 32 cells, so that a coarser grid can estimate its error, and
+    about 130000 at most, unless its roughness needs more; `grid_shortfalls` reports coarser grids.
 
     Parameters
     ----------
@@ -95,8 +98,9 @@ def auto_grid(
     Raises
     ------
     BadInput
-        for an accuracy that is not between 1e-4 and 0.2.
+        for an accuracy that is not between 1e-4 and 0.2, or a film that is not thin.
     """
+    require_thin_film(conditions, lubricant)
     if not 1e-4 <= accuracy <= 0.2:
         raise BadInput(
             f"accuracy must lie between 0.0001 and 0.2, got {accuracy:g}; 0.01 is the default"
@@ -208,7 +212,7 @@ def _range_x(
         film = _film(conditions, lubricant)
         inlet = max(inlet, 1.6, _flooded_length(film, _missing_share(texture, accuracy)))
         # a rigid cylinder's film ruptures at 0.67 sqrt(film)
-        outlet = max(outlet, math.sqrt(1.3**2 + 1.44 * film))
+        outlet = max(outlet, min(math.sqrt(1.3**2 + 1.44 * film), MAX_OUTLET))
     return _fit_texture(-inlet * a, outlet * a, texture, 0)
 
 
@@ -367,8 +371,11 @@ def _cells(
     if texture is not None and target[0] * target[1] > max_cells:
         fewest = _counts(_spacing(conditions, lubricant, texture, 0.0), extent)
         target = _reduced(target, fewest, max_cells)
-    if texture is not None:  # a coarser grid must be possible for the error estimate
-        target = max(target[0], 2.0 * MIN_COARSE_CELLS), max(target[1], 2.0 * MIN_CELLS_SHORT_AXIS)
+    if texture is not None:
+        accepted = _counts(texture.largest_cell, extent)
+        # a coarser grid must be possible for the error estimate
+        least = 2.0 * MIN_COARSE_CELLS, 2.0 * MIN_CELLS_SHORT_AXIS
+        target = max(target[0], accepted[0], least[0]), max(target[1], accepted[1], least[1])
     return _even(target[0]), _even(target[1])
 
 

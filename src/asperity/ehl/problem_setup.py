@@ -8,7 +8,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.ehl.controls import CONTINUATION
 from asperity.ehl.deflection import MIRROR_BETWEEN, MIRROR_THROUGH
-from asperity.ehl.film_formulas import central_film, least_films
+from asperity.ehl.film_formulas import central_film, least_film, least_films
 from asperity.ehl.grid_design import MIN_CELLS_SHORT_AXIS, MIN_COARSE_CELLS, inlet_length
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, Options
@@ -76,24 +76,22 @@ def first_guess(
     pressure = np.minimum(problem.form.hertz(problem.x, problem.y), problem.p_cap)
     film = 0.0
     if lubricant:
+        # too close, bodies touch where oil should separate them, and remain in contact
         film = smooth_film(conditions, lubricant) / scales.gap
-        # too close, smooth bodies touch where oil should separate them, and remain in contact
-        if not np.any(problem.roughness):
-            film = max(
-                film, least_films(conditions, lubricant)["isoviscous-elastic"].film / scales.gap
-            )
-            if not conditions.long:  # the gap is uniform under Hertz pressure: the central film
-                film = max(film, central_film(conditions, lubricant) / scales.gap)
+        # the gap is uniform under Hertz pressure: the central film
+        if not np.any(problem.roughness) and not conditions.long:
+            film = max(film, central_film(conditions, lubricant) / scales.gap)
     smooth = problem.form.gap(problem.x, problem.y) + problem.deflection(pressure)
     return pressure, film - float(np.min(smooth))
 
 
 def smooth_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
-    """Return the minimum film [m] of a smooth piezoviscous-elastic contact by Dowson or Hamrock.
+    """Return the minimum film [m] of a smooth elastic contact, the thicker of two fits.
 
     It is an initial guess in every regime; report `least_film` instead.
     """
-    return least_films(conditions, lubricant)["piezoviscous-elastic"].film
+    films = least_films(conditions, lubricant)
+    return max(films[regime].film for regime in ("piezoviscous-elastic", "isoviscous-elastic"))
 
 
 def grid_levels(finest: Problem) -> list[Problem]:
@@ -120,11 +118,16 @@ def usable_levels(
 ) -> list[Problem]:
     """Return the levels of a coarse-to-fine solve.
 
-    A smooth line contact needs 2 cells across the inlet: on coarser grids the bodies touch, which
-    is a worse initial guess than Hertz pressure. One coarser level is kept for the error estimate.
+    A line contact whose oil separates the bodies needs 2 cells across the inlet: on coarser grids
+    the bodies touch, which is a worse initial guess than Hertz pressure. One coarser level is kept
+    for the error estimate.
     """
     levels = grid_levels(finest)
-    if not finest.uniform or lubricant is None:
+    if not finest.form.periodic or lubricant is None:
+        return levels
+    gap = Scales.from_conditions(conditions, lubricant).gap
+    separation = CONTINUATION.separating_film * float(np.std(finest.roughness)) * gap
+    if not finest.uniform and least_film(conditions, lubricant) < separation:
         return levels
     limit = (
         inlet_length(conditions, lubricant)

@@ -12,7 +12,7 @@ from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl.contact_solution import ContactSolution
 from asperity.ehl.controls import CONTINUATION, SEARCH
-from asperity.ehl.film_formulas import central_film
+from asperity.ehl.film_formulas import central_film, require_thin_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
@@ -70,6 +70,7 @@ def solve_contact(
     _check_grid(conditions, lubricant, surface)
     if lubricant is not None:
         require_liquid(lubricant.viscosity, conditions.hertz.p_max)
+        require_thin_film(conditions, lubricant)
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
     solve = SOLVERS[options.model if lubricant else PAPER]  # one pressure without oil

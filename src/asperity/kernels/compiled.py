@@ -105,13 +105,14 @@ class _Cache(FunctionCache):
 
 
 def njit(*, cache: bool, **options: Any) -> Callable[[Kernel], Kernel]:
-    """Compile like njit of numba, with a verified cache.
+    """Compile like njit of numba, with a verified cache, and divide like NumPy.
 
+    A division by zero gives inf or nan, which ends a search as not converged, and raises nothing.
     The kernel is compiled without a cache where no folder for it is writable.
     """
 
     def compiled(function: Kernel) -> Kernel:
-        kernel: Any = numba.njit(**options)(function)
+        kernel: Any = numba.njit(error_model="numpy", **options)(function)
         if cache:
             with suppress(RuntimeError):  # no writable folder: every process compiles anew
                 kernel._cache = _Cache(function)

@@ -37,7 +37,7 @@ class ContactBounds(NamedTuple):
     p_cap: float
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def outflow_by_pressure(
     film: Film, faces: Faces, outflow_by_content: float, dx: float, dy: float, out: Field
 ) -> None:
@@ -58,7 +58,7 @@ def outflow_by_pressure(
             )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def limiter(
     content: Field, upstream: Field, gap: Field, closed: float, opening_range: float, out: Field
 ) -> None:
@@ -146,7 +146,7 @@ def fill_contact_rows(
     return any_found
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def mark_sealed(
     cells: CellState, bounds: ContactBounds, solid: Codes, sunk: Mask, scale: Field, sealed: Mask
 ) -> None:
@@ -193,7 +193,7 @@ def fix_film_gap(fixed: Mask, film: Film) -> None:
             film.ambient_by_gap[1, j] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def limiter_slopes(
     limiter: Field, content: Field, upstream: Field, own: Field, by_upstream: Field
 ) -> None:

@@ -106,7 +106,7 @@ def _step(contact: ContactSpring, s: float, h: float, c: float, v: float) -> tup
     return c + h * _fifth_order(c1, c3, c4, c5, c6), v + h * _fifth_order(v1, v3, v4, v5, v6)
 
 
-@njit(cache=True, fastmath={"contract", "nsz"}, error_model="numpy")
+@njit(cache=True, fastmath={"contract", "nsz"})
 def integrate_contact(
     contact: ContactSpring,
     slopes: Field,

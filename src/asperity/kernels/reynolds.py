@@ -99,7 +99,7 @@ class Liquid(NamedTuple):
     exponent: Field
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def fill_film(liquid: Liquid, height: Field, conductance: float, least: float, film: Film) -> None:
     """Fill the cells of `film`.
 
@@ -143,7 +143,7 @@ def _log_mean(own: float, following: float, log_ratio: float) -> tuple[float, fl
     return mean, (own - mean) / log_ratio, (mean - following) / log_ratio
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def face_mobilities(
     film: Film, log_mobility: Field, logarithmic: bool, ends: Mask, faces: Faces
 ) -> None:
@@ -187,7 +187,7 @@ def face_mobilities(
                 faces.north[i, j], own[j], following[j] = _log_mean(eps[i, j], eps[i, jn], ratio)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def net_outflow(
     pressure: Field,
     content: Field,
@@ -392,7 +392,7 @@ def jacobian_product(
             before[j], here[j], d_log[j] = here[j], after[j], d_log_east[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def fluid_diagonal(
     film: Film, faces: Faces, compliance: Field, dx: float, dy: float, out: Field
 ) -> None:

@@ -128,9 +128,11 @@ class MachineResult:
             if self.failures
             else ""
         )
+        smooth = worst["lambda_ratio"] is None
+        bearing = "solid contact carries" if smooth else "asperities carry"
         doubt = "" if worst["determined"] else " (not determined on this grid)"
         return (
-            f"{title}: {_regime(worst)}{part}; worst is {worst['name']}, where asperities carry "
+            f"{title}: {_regime(worst)}{part}; worst is {worst['name']}, where {bearing} "
             f"{_share(worst)} of the load{doubt} on a film of {_film(worst)}"
             f"{self._rated()}{failed}."
         )

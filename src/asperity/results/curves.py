@@ -120,6 +120,8 @@ def stribeck_curve(
     if case.conditions.sliding_speed == 0.0:
         raise BadInput(
             f"{case.source}: contact.slip is 0, so that nothing slides; set it, for instance to 0.1"
+            if case.conditions.entrainment_speed
+            else f"{case.source}: contact.entrainment_speed is 0; give the contact a speed"
         )
     if speeds is None:
         low, high = (share * case.conditions.entrainment_speed for share in SPEED_RANGE)

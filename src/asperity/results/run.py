@@ -48,6 +48,7 @@ from asperity.solution import (
     sharing_by_film,
     solution_notes,
     subsurface_stress,
+    uncertain_films,
     undetermined,
 )
 
@@ -290,7 +291,9 @@ class Run:
         """Return one sentence on the contact's state: means over surfaces with 90 % intervals.
 
         Full film: asperities carry less than 1 % of the load; boundary lubrication: 90 % or more;
-        mixed between. If the grid does not determine CLR, the sentence states so, with the reason.
+        mixed between. Smooth bodies have solid contact, no asperities. If the grid does not
+        determine CLR, the sentence states so, with the reason; likewise a film with an error bar
+        above 15 %.
         """
         numbers = mean_row((self.summary_row, *self.others))
         error = self.error
@@ -304,8 +307,9 @@ class Run:
         load, area = (quantity(key).text(value) for key, value in (("clr", clr), ("car", car)))
         known = (quantity(key).named(numbers[key]) for key in ROUGHNESS_KEYS if numbers[key])
         roughness = ", ".join(known)
+        bearing = "asperities carry" if self.state.sq > 0.0 else "solid contact carries"
         shared = (
-            f"asperities carry {load} of the load {interval_text('clr', error.clr)} on {area} of "
+            f"{bearing} {load} of the load {interval_text('clr', error.clr)} on {area} of "
             f"the Hertz zone{roughness and f' ({roughness})'}"
         )
         sentence = f"{regime}: {shared}"
@@ -315,7 +319,9 @@ class Run:
             )
         if not self.solution.convergence.converged:
             sentence = f"NOT CONVERGED, do not use: {sentence}"
-        return f"{sentence}; {self._ends_text()}{self.resonance_text()}; {basis(error)}."
+        films = () if self.undetermined else uncertain_films(self.solution)
+        doubt = f"film not determined ({', '.join(films)}); " if films else ""
+        return f"{sentence}; {doubt}{self._ends_text()}{self.resonance_text()}; {basis(error)}."
 
     def _ends_text(self) -> str:
         """Return edge pressure and loaded length of a roller; empty for other contacts."""

@@ -15,6 +15,7 @@ from .load_sharing import sharing_by_film as sharing_by_film
 from .plausibility import inlet_notes as inlet_notes
 from .plausibility import plausibility_notes as plausibility_notes
 from .plausibility import solution_notes as solution_notes
+from .plausibility import uncertain_films as uncertain_films
 from .plausibility import undetermined as undetermined
 from .regime import FittedFilm as FittedFilm
 from .regime import RegimeCard as RegimeCard

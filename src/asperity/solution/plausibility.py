@@ -16,11 +16,12 @@ from asperity.ehl import (
     least_film,
     missing_inlet,
 )
-from asperity.ehl.grid_design import CELLS_IN_INLET, MAX_CLR_ERROR
+from asperity.ehl.grid_design import CELLS_IN_INLET, MAX_CLR_ERROR, MAX_FILM_ERROR
 from asperity.ehl.load_shares import carried_share
 from asperity.lubricant import Barus, Lubricant, Roelands
 from asperity.solution.ends import LOADED_END, axial_distribution
 from asperity.solution.regime import far_from_fits
+from asperity.solution.state import contact_state
 
 UNEVEN_LOAD = 1.5  # largest over mean load per length of a roller, from which it is noted
 OIL_ALPHA = 5e-9, 40e-9  # usual pressure-viscosity coefficients of oils [1/Pa]
@@ -88,7 +89,9 @@ def solution_notes(solution: ContactSolution) -> tuple[str, ...]:
 
 def undetermined(solution: ContactSolution, clr: Uncertainty) -> str | None:
     """Return the reason why this grid does not determine CLR (error `clr`); None if it does."""
-    reasons = list(grid_shortfalls(solution.conditions, solution.lubricant, solution.surface))
+    reasons: list[str] = []
+    if not is_below_contact_film(solution):
+        reasons += grid_shortfalls(solution.conditions, solution.lubricant, solution.surface)
     # between smooth bodies the coarser grid has contact because it does not resolve the inlet
     if solution.surface.sq > 0.0:
         if clr.numerical is None:
@@ -99,6 +102,27 @@ def undetermined(solution: ContactSolution, clr: Uncertainty) -> str | None:
             )
             reasons.append(f"its error bar is {bar}, above the limit of {limit}")
     return "; ".join(reasons) or None
+
+
+def uncertain_films(solution: ContactSolution) -> tuple[str, ...]:
+    """Return the films whose error bar is above 15 %, each with its bar; none without oil."""
+    error = solution.convergence.error
+    if error is None or solution.lubricant is None:
+        return ()
+    state, names = contact_state(solution), ("h_min", "h_central")
+    values = ((f"{name}_m", getattr(state, name), getattr(error, name)) for name in names)
+    return tuple(
+        f"{quantity(key).name} ± {100.0 * bar / film:.0f} %"
+        for key, film, bar in values
+        if bar > MAX_FILM_ERROR * film
+    )
+
+
+def is_below_contact_film(solution: ContactSolution) -> bool:
+    """Return True for smooth bodies with a fitted film below the contact film, on any grid."""
+    oil, smooth = solution.lubricant, not np.any(solution.surface.heights)
+    floor = solution.options.contact_film
+    return oil is not None and smooth and least_film(solution.conditions, oil) < floor
 
 
 def _solids(conditions: ContactConditions) -> Iterator[str]:
@@ -169,9 +193,7 @@ def _oil(conditions: ContactConditions, lubricant: Lubricant) -> Iterator[str]:
 
 
 def _of_solution(solution: ContactSolution) -> Iterator[str]:
-    conditions = solution.conditions
-    lubricant = solution.lubricant
-    grid = solution.grid
+    conditions, lubricant = solution.conditions, solution.lubricant
     highest = float(solution.pressure.max())
     modulus = conditions.pair.effective_modulus
     if highest > modulus / MIN_MODULUS_RATIO:
@@ -181,8 +203,7 @@ def _of_solution(solution: ContactSolution) -> Iterator[str]:
         )
     if edges := _reached_edges(solution):
         yield f"The contact reaches the {edges} of the grid and is cut off there. Widen the grid."
-    if shortfalls := grid_shortfalls(conditions, lubricant, solution.surface):
-        yield f"The grid of {grid.cells[0]} x {grid.cells[1]} cells has {'; '.join(shortfalls)}."
+    yield from _of_cells(solution)
     if (
         lubricant is not None
         and (radii := ridge_radii(solution))
@@ -209,6 +230,19 @@ def _of_solution(solution: ContactSolution) -> Iterator[str]:
         yield from profile.undetermined
     if (deviation := far_from_fits(solution)) is not None:
         yield deviation
+
+
+def _of_cells(solution: ContactSolution) -> Iterator[str]:
+    conditions, oil, cells = solution.conditions, solution.lubricant, solution.grid.cells
+    if oil is not None and is_below_contact_film(solution):
+        film, floor = 1e9 * least_film(conditions, oil), 1e9 * solution.options.contact_film
+        yield (
+            f"The film of the smooth bodies, {film:.2g} nm by the fit of its regime, is below the "
+            f"contact film of {floor:.3g} nm. Films below it are not computed: CLR is the load at "
+            "the contact film, not on asperities."
+        )
+    elif shortfalls := grid_shortfalls(conditions, oil, solution.surface):
+        yield f"The grid of {cells[0]} x {cells[1]} cells has {'; '.join(shortfalls)}."
 
 
 def ridge_radii(solution: ContactSolution) -> tuple[float, float] | None:

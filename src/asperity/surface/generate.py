@@ -5,6 +5,7 @@ belongs to the domain, not to its cells: a seed defines one physical surface, sa
 centres of any grid that resolves it. `asperity.surface.machined` models cutting and denting.
 """
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -88,15 +89,26 @@ def require_lengths(
         coarsest = 2.0 / np.hypot(along[0] / grid.spacing[0], along[1] / grid.spacing[1])
         longest = 0.5 / max(along[0] / grid.extent[0], along[1] / grid.extent[1])
         if length < coarsest * (1.0 - 1e-9):
+            finer = _resolving_cells(grid, lengths, direction)
             raise BadInput(
-                f"{subject} must be at least 2 cells, {length_text(coarsest)}, "
-                f"got {length_text(length)}; use more cells or a longer one"
+                f"{subject} must be at least 2 cells, {length_text(coarsest)}, got "
+                f"{length_text(length)}; use at least {finer[0]} x {finer[1]} cells or a longer one"
             )
         if length > longest * (1.0 + 1e-9):
             raise BadInput(
                 f"{subject} must be at most half the domain, {length_text(longest)}, "
                 f"got {length_text(length)}; use a larger domain or a shorter one"
             )
+
+
+def _resolving_cells(grid: Grid, lengths: tuple[float, float], direction: float) -> tuple[int, int]:
+    """Return cells (nx, ny) with 2 cells on each length; an axis that matters to none is kept."""
+    finer, along = list(grid.cells), (abs(np.cos(direction)), abs(np.sin(direction)))
+    for axis, extent in enumerate(grid.extent):
+        for length, share in zip(lengths, along[:: 1 - 2 * axis], strict=True):
+            if share > 1e-9:
+                finer[axis] = max(finer[axis], math.ceil(2.0 * extent / length - 1e-9))
+    return finer[0], finer[1]
 
 
 def _gaussian_spectrum(
@@ -286,10 +298,12 @@ def self_affine_surface(
     coarsest = 2.0 * max(grid.spacing)
     domain = min(grid.extent)
     if not coarsest <= shortest < longest <= domain:
+        finer = _resolving_cells(grid, (shortest, shortest), 0.0) if shortest > 0.0 else grid.cells
         raise BadInput(
             f"cutoffs must rise from at least 2 cells, {length_text(coarsest)}, to at most the "
             f"domain, {length_text(domain)}, got {length_text(shortest)} to "
             f"{length_text(longest)}; change them or the grid"
+            + ("" if shortest >= coarsest else f" to at least {finer[0]} x {finer[1]} cells")
         )
     k_short = 2.0 * np.pi / shortest
     k_long = 2.0 * np.pi / longest

@@ -1,5 +1,6 @@
 """Rough surfaces on a grid, generated and measured."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +9,7 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_positive
 
+UNKNOWN_LENGTH = "unknown"  # as text, of a length that is not finite
 MIN_SQ = 1e-15  # m, the size of an atomic nucleus
 
 
@@ -150,6 +152,8 @@ def length_text(metres: float) -> str:
     >>> length_text(0.25e-3)
     '250 um'
     """
+    if not math.isfinite(metres):
+        return UNKNOWN_LENGTH
     for unit, size in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
         if abs(metres) >= 0.9995 * size:
             return f"{metres / size:.4g} {unit}"
@@ -157,8 +161,10 @@ def length_text(metres: float) -> str:
 
 
 def area_text(metres: tuple[float, float]) -> str:
-    """Format two lengths as a size: 358 x 179 um."""
+    """Format two lengths as a size: 358 x 179 um; unknown ones in words."""
+    longest = max((length for length in metres if math.isfinite(length)), default=0.0)
     unit, size = next(
-        ((u, s) for u, s in (("mm", 1e-3), ("um", 1e-6)) if max(metres) >= s), ("nm", 1e-9)
+        ((u, s) for u, s in (("mm", 1e-3), ("um", 1e-6)) if longest >= s), ("nm", 1e-9)
     )
-    return f"{metres[0] / size:.4g} x {metres[1] / size:.4g} {unit}"
+    numbers = (f"{m / size:.4g}" if math.isfinite(m) else UNKNOWN_LENGTH for m in metres)
+    return f"{' x '.join(numbers)} {unit}"

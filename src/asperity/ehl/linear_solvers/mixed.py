@@ -32,6 +32,7 @@ from asperity.ehl.models.mixed import (
     ConservedOil,
     MixedBalance,
     Pressures,
+    has_thin_film,
     limiter_slopes,
     opening_slopes,
 )
@@ -441,7 +442,9 @@ def _known_changes(linear: MixedLinear) -> tuple[Field, Field]:
 
 def _linear_tolerance(linear: MixedLinear) -> float:
     """Return the tolerance of GMRES."""
-    closely = linear.balance.residual_rms < MIXED_SOLVER.conserving_residual
-    if linear.balance.problem.conserve and linear.lagrangian and closely:
+    conserve, balance = linear.balance.problem.conserve, linear.balance
+    if conserve and linear.lagrangian and balance.residual_rms < MIXED_SOLVER.conserving_residual:
         return MIXED_SOLVER.tolerance_conserving
+    if conserve and not linear.lagrangian and has_thin_film(balance):
+        return MIXED_SOLVER.tolerance_separated
     return MIXED_SOLVER.tolerance_smooth if linear.follows_wedge else MIXED_SOLVER.tolerance

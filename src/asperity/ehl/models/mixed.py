@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Codes, Field, Mask
+from asperity.ehl.controls import MIXED_SOLVER
 from asperity.ehl.grid_transfer import Index
 from asperity.ehl.models.oil_advection import (
     OPENING_RANGE,
@@ -376,6 +377,12 @@ def _growth(problem: Problem, signed: Field) -> Field:
         else np.zeros_like(signed)
     )
     return excess * problem.softness
+
+
+def has_thin_film(balance: MixedBalance) -> bool:
+    """Return True for bodies that touch nowhere, with a film far thinner than their deflection."""
+    least = float(np.min(balance.gap))
+    return 0.0 < least < MIXED_SOLVER.thin_film and bool(np.all(balance.solid == FREE))
 
 
 def limiter_slopes(balance: MixedBalance, dtype: Precision) -> tuple[Field, Field]:

@@ -185,6 +185,8 @@ class Search:
             if step.balance.residual_rms > largest_residual:
                 break
             earlier, step = step, next(steps)
+        if not np.isfinite(step.balance.residual_rms):  # diverged: the last finite solution
+            step = earlier
         self.iteration_error = self._figures(step).abs_difference(self._figures(earlier))
         return step
 

@@ -1,5 +1,6 @@
 """Initial guesses on a grid: the dry contact, or the solution on a coarser grid."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -114,3 +115,17 @@ def roller_start(
         return dry, Pressures(total, total, distance + film)
     start = coarser.transfer_to(problem, dry)
     return dry, refine_locally(problem, Pressures(start.total, start.total, start.approach))
+
+
+def level_guess(
+    problem: Problem,
+    coarser: Pressures | None,
+    guess: Callable[[Problem], tuple[Field, float]],
+) -> Pressures:
+    """Return the unknowns of the next coarser grid on this one; without these, those guessed."""
+    if coarser is None:
+        pressure, approach = guess(problem)
+        return Pressures(pressure, pressure, approach)
+    if problem.cells == coarser.total.shape:
+        return coarser
+    return interpolate_unknowns(problem, coarser)

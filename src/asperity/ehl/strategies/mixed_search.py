@@ -10,7 +10,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.ehl.contact_solution import ContactSolution
 from asperity.ehl.controls import CONTINUATION, MARCHING, SEARCH
-from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
+from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, has_thin_film
 from asperity.ehl.models.oil_advection import uses_limiter
 from asperity.ehl.models.single_pressure import Problem, TransientTerm
 from asperity.ehl.newton.mixed import newton
@@ -25,7 +25,7 @@ from asperity.ehl.strategies.grid_continuation import Search
 from asperity.ehl.strategies.initial_guess import (
     DryAndLubricated,
     dry_start,
-    interpolate_unknowns,
+    level_guess,
     roller_start,
 )
 from asperity.ehl.strategies.local_refinement import refine_locally
@@ -42,11 +42,9 @@ class MixedSearch(Search):
     imbalance = 0.0  # of the last step, where oil is conserved
 
     def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
-        """Return True if the last step met the tolerance.
-
-        At the tolerance of the whole solve, conserved oil must be balanced too.
-        """
-        closely = tolerance <= self.options.tolerance
+        """Return True if the last step met the tolerance; if last, with conserved oil balanced."""
+        rounding = self.history[-1].residual < SEARCH.rounding
+        closely = tolerance <= self.options.tolerance and not rounding
         return super().converged(tolerance, check_load=check_load) and not (
             closely and self.imbalance > SEARCH.max_imbalance
         )
@@ -124,6 +122,10 @@ class MixedSearch(Search):
         The effect of the order on the results then follows from steps back to first order.
         """
         tolerance, max_steps = self._targets(problem, coarse=coarse, from_coarse=True)
+        if problem.conserve and has_thin_film(evaluate(problem, unknowns, second_order=False)):
+            step = self.from_refilled_cavities(problem, unknowns, np.inf)
+            if self.converged(tolerance):
+                return step
         roughly = max(SEARCH.first_order_tolerance, tolerance)
         soon = min(SEARCH.max_second_order_iterations, max_steps)
         if uses_limiter(problem):
@@ -283,10 +285,20 @@ class MixedSearch(Search):
         return step
 
     def from_refilled_cavities(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
-        """Solve for conserved oil from the contact with refilled cavities."""
+        """Solve for conserved oil from the contact with refilled cavities.
+
+        Without time steps, which close thin films, at an infinite `length`.
+        """
         start = Pressures(
             np.clip(unknowns.oil, 0.0, problem.p_cap), unknowns.total, unknowns.approach
         )
+        if length == np.inf:
+            refilled, roughly = replace(problem, conserve=False), CONTINUATION.coarse_tolerance
+            steps = newton(refilled, start, second_order=False)
+            step = self.run(refilled, steps, roughly, SEARCH.max_restart_iterations)
+            steps = newton(problem, unknowns_of(step), second_order=False)
+            limits = (self.options.tolerance, SEARCH.max_second_order_iterations)
+            return self.run(problem, steps, *limits, divergence=SEARCH.divergence)
         step = self.march_in_time(replace(problem, conserve=False), start, length)
         return (
             self.march_in_time(problem, unknowns_of(step), length)
@@ -309,7 +321,7 @@ class MixedSearch(Search):
             if roller:
                 dry, unknowns = roller_start(problem, coarser, *guess(problem))
             else:
-                unknowns = _level_guess(problem, unknowns, guess)
+                unknowns = level_guess(problem, unknowns, guess)
             if problem is levels[0]:
                 step = (
                     self.solve_from_coarse(problem, unknowns)
@@ -401,20 +413,6 @@ class MixedSearch(Search):
         self.history = [*coarse_search.history, *self.history]
         if coarse_search.converged(self.options.tolerance):
             self.figures = [*coarse_search.figures, *self.figures]
-
-
-def _level_guess(
-    problem: Problem,
-    coarser: Pressures | None,
-    guess: Callable[[Problem], tuple[Field, float]],
-) -> Pressures:
-    """Return the unknowns of the next coarser grid on this one; without these, those guessed."""
-    if coarser is None:
-        pressure, approach = guess(problem)
-        return Pressures(pressure, pressure, approach)
-    if problem.cells == coarser.total.shape:
-        return coarser
-    return interpolate_unknowns(problem, coarser)
 
 
 def _implicit_step(problem: Problem, length: float, content: Field) -> TransientTerm:
