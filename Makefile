@@ -4,6 +4,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
+# a process runs whole files, so that it prepares what their tests share once; tests/conftest.py puts slow files first
+BY_FILE := --dist loadfile --no-loadscope-reorder
+
 .PHONY: demo test quick check bench docs installed release attacks clean
 .DEFAULT_GOAL := demo
 
@@ -11,10 +14,10 @@ demo: $(READY)
 	$(BIN)/asperity demo
 
 test: $(READY)
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto $(BY_FILE)
 
 quick: $(READY)
-	$(BIN)/python -m pytest -n auto -q -m "not slow" tests/unit
+	$(BIN)/python -m pytest -n auto $(BY_FILE) -q -m "not slow" tests/unit
 
 check: $(READY)
 	$(BIN)/ruff check .

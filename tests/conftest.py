@@ -1,16 +1,32 @@
-"""Put this folder on the import path for `support`, and mark the slow files that `make quick`
-skips.
+"""Put this folder on the import path for `support`; mark the slow files, which run first and which
+`make quick` skips.
 """
 
+import os
 from pathlib import Path
 
 import pytest
 
+# Every core runs a test already; several threads of BLAS per process would wait for one another
+# and take three times the processor time. Read when numpy is loaded, here and in child processes.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 HERE = Path(__file__).parent
-SLOW = set((HERE / "slow.txt").read_text("utf-8").split())  # files below tests, more than 5 s each
+SLOW = set((HERE / "slow.txt").read_text("utf-8").split())  # files of more than about 10 s
+
+
+@pytest.fixture
+def coarse_search(monkeypatch):
+    """Search for lines on half as many blocks, in a quarter of the time.
+
+    For tests of what is done with resonances; their fit starts from the search.
+    """
+    monkeypatch.setattr("asperity.resonance.template_search.COARSE_BLOCKS", 80)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark tests of slow files, and run these files first, so that processes end together."""
     for item in items:
         if item.path.relative_to(HERE).as_posix() in SLOW:
             item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)

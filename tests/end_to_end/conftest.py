@@ -36,5 +36,6 @@ def small(tmp_path_factory):
     """
     folder = tmp_path_factory.mktemp("infer") / "emulator"
     setting = inference_setting(load_case(CASE).with_overrides(SMALL))
-    with ThreadPoolExecutor(1) as executor:
-        return setting, build_emulator(setting, folder=folder, executor=executor), folder
+    with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(1) as executor:
+        patch.setattr("asperity.inference.emulator.FINER_POINTS", 6)
+        yield setting, build_emulator(setting, folder=folder, executor=executor), folder

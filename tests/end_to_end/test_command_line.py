@@ -11,6 +11,7 @@ import x3pio
 
 from asperity import NotConverged, load_case, load_run, solve_case
 from asperity.core.errors import BadInput
+from asperity.paper import papers_case
 from asperity.solution import OscillatingContact, OwnResonance
 from asperity.surface import flat_surface
 
@@ -265,11 +266,12 @@ def test_ctrl_c_leaves_no_files(asp, monkeypatch, tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["case.toml"]
 
 
-def test_report_writes_a_page_of_one_run_or_several(asp):
+def test_report_writes_a_page_of_one_run_or_several(asp, monkeypatch):
     asp("solve", "case.toml", "--out", "run.nc", "--quiet")
     code, out, _ = asp("report", "run.nc")
     assert code == 0
     assert "run.html" in out
+    monkeypatch.setattr("asperity.report.base.svg", lambda _: "<svg/>")  # the same figures again
     code, out, _ = asp("report", "run.nc", "run.nc", "--out", "two.html", "--json")
     assert code == 0
     assert json.loads(out)["report"] == "two.html"
@@ -298,7 +300,11 @@ def test_a_surface_on_another_grid_is_refused():
         solve_case(case, surface=flat_surface(case.with_overrides({"grid.cells": [32, 32]}).grid))
 
 
-def test_demo_runs_from_case_to_report(asp):
+def test_demo_runs_from_case_to_report(asp, monkeypatch):
+    """On fewer cells than the paper's case; CI runs `make demo` on all."""
+    fewer = papers_case().with_overrides({"grid.cells": [96, 96]}).text
+    assert papers_case().grid.cells == (256, 256)
+    monkeypatch.setattr("asperity.paper.papers_text", lambda: fewer)
     code, out, _ = asp("demo", "--out", "shown")
     assert code == 0
     assert out.startswith("From Sq 0.5 um to 3 um the asperity load share changes from ")
@@ -306,7 +312,7 @@ def test_demo_runs_from_case_to_report(asp):
     names = {"paper.toml", "report.html", "run-sq-0.5um.nc", "run-sq-1.5um.nc", "run-sq-3um.nc"}
     assert {entry.name for entry in Path("shown").iterdir()} == names
     runs = [load_run(f"shown/run-sq-{sq}um.nc") for sq in ("0.5", "1.5", "3")]
-    assert [run.case.grid.cells for run in runs] == [(256, 256)] * 3
+    assert [run.case.grid.cells for run in runs] == [(96, 96)] * 3
     shares = [run.state.clr for run in runs]
     assert shares == sorted(shares)
 

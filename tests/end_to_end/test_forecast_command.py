@@ -13,6 +13,8 @@ from asperity.case import load_case
 from asperity.paper import Disturbance, RigSettings, simulate_rig
 from support.emulated import CASE, SMALL
 
+pytestmark = pytest.mark.usefixtures("coarse_search")
+
 LIMIT = ("--forecast", "clr=0.75")
 QUIET = Disturbance(snr_db=20.0, modes=2)
 

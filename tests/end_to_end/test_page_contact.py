@@ -17,14 +17,10 @@ uploads = pytest.importorskip("asperity.app.uploads", reason="the extra page is 
 
 HOSTILE_NAMES = [
     "<img src=x onerror=window.pwned=1>.x3p",
-    "..%2f..%2fetc%2fpasswd.x3p",
     "$(touch pwned).x3p",
-    "`touch pwned`.x3p",
     "a'; import os; os.system('touch pwned').x3p",
     '"><script>window.pwned=1</script>.x3p',
     "{{7*7}}.x3p",
-    "{file=1}\n[surface].x3p",
-    "-rf .x3p",
     ".." + "x" * 200 + ".x3p",
 ]
 HOSTILE_ADDRESSES = [
@@ -32,12 +28,12 @@ HOSTILE_ADDRESSES = [
     "<img src=x onerror=window.pwned=1>=1",
     'contact.load="><svg onload=window.pwned=1>',
     "dropped=<img src=x onerror=window.pwned=1>",
-    "case=</script><script>window.pwned=1</script>",
     "contact.load={{7*7}}",
     "surface.file=/etc/passwd",
     "contact.load=__import__('os').system('touch pwned')",
     "contact.load=500 N%0d%0aSet-Cookie: a=b",
     "surface.seed=javascript:window.pwned=1",
+    "case=</script><script>window.pwned=1</script>",
 ]
 HOSTILE_HEADERS = [
     {"Host": "evil.example"},
@@ -61,7 +57,11 @@ def browser():
 
 @pytest.fixture(scope="module")
 def server(browser, tmp_path_factory):  # noqa: ARG001 - no server is started without a browser
-    with serving(tmp_path_factory.mktemp("server")) as started:
+    """Serve the default case on fewer cells, which it solves in less time."""
+    folder = tmp_path_factory.mktemp("server")
+    case = default_case().with_overrides({"grid.cells": [96, 64]})
+    (folder / "contact.toml").write_text(case.text, "utf-8")
+    with serving(folder, "contact.toml") as started:
         yield started
 
 
@@ -282,6 +282,7 @@ def test_a_damaged_file_is_refused_in_one_sentence(visit, ring, tmp_path):
 
 
 def test_a_file_name_is_only_shown_as_text(visit, server):
+    """Names that end up in markup in different ways; test_page_server.py tests more."""
     page = visit.solved()
     for number, name in enumerate(HOSTILE_NAMES):
         content = f"no surface {number}".encode() * (number + 1)
@@ -296,9 +297,13 @@ def test_a_file_name_is_only_shown_as_text(visit, server):
 
 
 def test_an_address_only_sets_values(visit, server):
-    for query in HOSTILE_ADDRESSES:
+    *values, other_case = HOSTILE_ADDRESSES
+    for query in ("&".join(values), other_case):
         page = visit.go(f"contact?{query}")
-        page.get_by_text(re.compile("^The link ")).wait_for()
+        notes = page.get_by_text(re.compile("^The link "))
+        notes.first.wait_for()
+        shown = " ".join(notes.all_inner_texts())
+        assert shown.count("The link ") == query.count("&") + 1, shown
         assert page.evaluate("() => window.pwned") is None
         wait_for_value(page, "Load, F", "500 N")
         assert page.get_by_text("root:").count() == 0

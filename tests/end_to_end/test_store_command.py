@@ -144,7 +144,7 @@ def test_a_watch_killed_repeatedly_ends_with_the_same_store(tmp_path, channels):
     store = tmp_path / "killed.db"
     counts = [0]
     total = len(levels) * (1 + bool(channels))
-    while len(counts) < 5 and counts[-1] < total - 6:
+    while len(counts) < 3 and counts[-1] < total - 6:
         process = subprocess.Popen([*command, "killed.db"], cwd=tmp_path)
         while process.poll() is None and (not store.is_file() or _count(store) < counts[-1] + 6):
             time.sleep(0.005)
@@ -410,15 +410,14 @@ def test_a_name_that_is_not_utf_8_is_skipped_and_reported(asp):
     assert "is left out: its name is not UTF-8; rename it" in err
 
 
-@pytest.mark.parametrize("sensors", [1, 2])
-def test_a_killed_watch_ends_with_the_store_of_an_uninterrupted_one(monkeypatch, sensors):
+def test_a_killed_watch_ends_with_the_store_of_an_uninterrupted_one(monkeypatch):
     """Run `python -m benchmarks.hostile` for seconds: an untidy folder, two watches, one of them
-    killed.
+    killed. Two sensors here; `benchmarks.hostile` has one as well.
     """
     from benchmarks import hostile
 
     monkeypatch.setattr(hostile, "PARTS_S", 0.4)
-    lines = hostile.run(0.12, 2, sensors, every=0.2, settle=0.3, say=lambda _: None)
+    lines = hostile.run(0.12, 2, 2, every=0.2, settle=0.3, say=lambda _: None)
     rows = [line.split("|")[1:3] for line in lines if line.startswith("|")]
     values = {name.strip(): value.strip() for name, value in rows}
     assert values["files without an outcome"] == "0"

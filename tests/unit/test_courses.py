@@ -273,12 +273,12 @@ def test_the_forecast_interval_covers_the_crossing_of_a_roughening_contact(setti
 
 
 def test_a_constant_contact_is_not_classed_as_changing(setting, emulator):
-    observations, _ = simulated_series(setting, emulator, np.full(20, 0.55), seed=5)
+    observations, _ = simulated_series(setting, emulator, np.full(12, 0.55), seed=5)
     found = forecast_observations(
         setting, emulator, observations, limit=read_limit("sq=3 um", setting)
     )
     assert (found.change_detected, found.alarm) == (False, False)
-    assert found.sentence().startswith("No change of the contact is detected over 20 visits")
+    assert found.sentence().startswith("No change of the contact is detected over 12 visits")
     assert found.drifting == "sq_m"
     json.dumps(found.scalars(), allow_nan=False)
 

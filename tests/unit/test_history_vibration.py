@@ -283,7 +283,7 @@ def test_without_a_model_or_moments_it_is_refused(history):
         history_vibration(without_vibration)
 
 
-def test_the_command_computes_the_vibration(history, capsys, tmp_path):
+def test_the_command_computes_the_vibration(history, capsys, tmp_path, monkeypatch):
     arguments = [
         "run",
         "examples/paper.toml",
@@ -307,6 +307,7 @@ def test_the_command_computes_the_vibration(history, capsys, tmp_path):
     assert scalars["coupled_crf_hz"] == pytest.approx(vibration.coupled.resonance.crf_hz)
     assert scalars["history_crf_hz"] is None
     assert "motion.track" in scalars["history_crf_reason"]
+    monkeypatch.setattr("asperity.simulation.history_vibration", lambda _: vibration)
     with pytest.raises(SystemExit):
         main([*arguments, "--report", str(tmp_path / "page.html")])
     assert vibration.verdict() in capsys.readouterr().out

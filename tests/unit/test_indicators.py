@@ -138,7 +138,7 @@ def test_the_stated_deviation_is_the_cramer_rao_bound_of_a_lone_line():
 @pytest.mark.parametrize(("window", "segment"), [("boxcar", None), ("hann", None), ("hann", 2000)])
 def test_noise_has_no_resonance_and_the_reason_is_given(window, segment):
     false = 0
-    for seed in range(60):
+    for seed in range(20):
         noise = Signal(np.random.default_rng(seed).standard_normal(16_000), 20e3, "m/s^2")
         resonance = contact_resonance(
             power_spectrum(noise, segment=segment, window=window), band_hz=BAND

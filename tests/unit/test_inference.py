@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import multivariate_normal, norm
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from asperity.case import load_case
 from asperity.contact.grid import Grid
@@ -229,6 +230,22 @@ def test_importance_and_nested_sampling_find_a_known_posterior():
             mean @ mean + noise**2 / variance - 1.0
         ) / np.log(2.0)
         assert sampled.information_bits == pytest.approx(bits, abs=0.25)
+
+
+def test_linear_algebra_of_sampling_uses_one_thread():
+    """Several threads would change the order of summation and, on a busy machine, take longer."""
+    threads = set()
+
+    def target(z):
+        threads.update(
+            pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"
+        )
+        return -0.5 * z[:, 0] ** 2
+
+    pool = Pool(lambda z: z, lambda a, b: np.concatenate([a, b]), lambda a, rows: a[rows], 1, 0)
+    with threadpool_limits(2, "blas"):
+        importance(pool, target)
+    assert threads == {1}
 
 
 def test_information_bits_match_a_narrowed_normal_and_ignore_chance():

@@ -27,6 +27,9 @@ NAMES = {
     "-rf": "rf",
     "x" * 300 + ".csv": "x" * 76 + ".csv",
     "\x00\n": "_",
+    "..%2f..%2fetc%2fpasswd.x3p": "_2f.._2fetc_2fpasswd.x3p",
+    "`touch pwned`.x3p": "_touch_pwned_.x3p",
+    "{file=1}\n[surface].x3p": "_file_1_surface_.x3p",
 }
 
 

@@ -18,6 +18,8 @@ from asperity.study import load_study, plan_study, run_study
 from asperity.vibration import ContactOscillator, acceleration, white_noise
 from support.wearing import FEW, worn_case
 
+pytestmark = pytest.mark.usefixtures("coarse_search")
+
 NO_SESSION = Ticket(-1, 0)
 SMALL = {"grid.cells": [32, 24], "surface.correlation_length": "40 um", "vibration": "none"}
 

@@ -28,26 +28,25 @@ def normalised_errors(judgement):
 def test_a_line_on_both_sensors_is_detected_and_covered_at_the_stated_rate():
     """Through different structures; benchmarks/sensors.py repeats this with 40 series per row."""
     errors = []
-    for seed in range(6):
+    for seed in range(3):
         judgement = resonances_of_sensors(two_sensors(100 + seed, size=0.3), band_hz=BAND)
         assert all(resonance.found for resonance in judgement.resonances)
         assert set(judgement.detected_on) == {("a", "b")}
         errors += normalised_errors(judgement)
-    assert np.mean(np.abs(errors) < NINETY) == pytest.approx(0.9, abs=0.08)
+    assert np.mean(np.abs(errors) < NINETY) == pytest.approx(0.9, abs=0.1)  # two sigma of 36
 
 
 def test_independent_sensors_narrow_an_interval_and_copies_do_not():
     sensors = two_sensors(3, heights=(0.1, 0.1))
     judgement = resonances_of_sensors(sensors, band_hz=BAND)
-    single = resonances_of_sensors({"a": sensors["a"]}, band_hz=BAND)
     with_copy = resonances_of_sensors({"a": sensors["a"], "b": sensors["a"]}, band_hz=BAND)
     ratios = [
         resonance.crf_std / other.crf_std
-        for resonance, other in zip(judgement.resonances, single.resonances, strict=True)
+        for resonance, other in zip(judgement.resonances, judgement.alone["a"], strict=True)
     ]
     ratios_of_copy = [
         resonance.crf_std / other.crf_std
-        for resonance, other in zip(with_copy.resonances, single.resonances, strict=True)
+        for resonance, other in zip(with_copy.resonances, judgement.alone["a"], strict=True)
     ]
     assert np.median(ratios) < 0.9
     assert np.median(ratios_of_copy) == pytest.approx(1.0, abs=0.02)
@@ -64,22 +63,21 @@ def test_a_line_too_weak_for_either_sensor_is_detected_jointly():
 
 
 def test_a_moving_mode_on_one_sensor_is_not_the_contacts():
-    """Three series here, 40 in benchmarks/sensors.py."""
-    for seed in range(3):
-        judgement = resonances_of_sensors(
-            two_sensors(seed, heights=(0.0, 0.0), moving=True), band_hz=BAND
-        )
-        assert all(resonance.found for resonance in judgement.alone["a"])
-        assert not any(resonance.found for resonance in judgement.resonances)
-        assert "detected on a only, not on b" in judgement.resonances[0].reason
+    """One series here, 40 in benchmarks/sensors.py."""
+    judgement = resonances_of_sensors(two_sensors(0, heights=(0.0, 0.0), moving=True), band_hz=BAND)
+    assert all(resonance.found for resonance in judgement.alone["a"])
+    assert not any(resonance.found for resonance in judgement.resonances)
+    assert "detected on a only, not on b" in judgement.resonances[0].reason
 
 
+@pytest.mark.usefixtures("coarse_search")
 def test_contradicting_sensors_give_no_single_result():
     judgement = resonances_of_sensors(two_sensors(1, heights=(0.0, 0.7), moving=True), band_hz=BAND)
     assert all(resonance.reason.startswith(SENSORS_DISAGREE) for resonance in judgement.resonances)
     assert set(judgement.detected_on) == {()}
 
 
+@pytest.mark.usefixtures("coarse_search")
 def test_a_sensor_without_spectra_leaves_the_others_result():
     sensors = two_sensors(2)
     single = resonances_of_sensors({"a": sensors["a"]}, band_hz=BAND)
@@ -92,6 +90,7 @@ def test_a_sensor_without_spectra_leaves_the_others_result():
         resonances_of_sensors({"a": sensors["a"][:3], "b": sensors["b"][:3]}, band_hz=BAND)
 
 
+@pytest.mark.usefixtures("coarse_search")
 def test_one_of_two_consistent_sensors_suffices_for_a_recording():
     sensors = two_sensors(4)
     judgement = resonances_of_sensors(
@@ -104,6 +103,7 @@ def test_one_of_two_consistent_sensors_suffices_for_a_recording():
     assert not any(resonance.found for resonance in undetected.resonances)
 
 
+@pytest.mark.usefixtures("coarse_search")
 def test_a_spectrum_without_vibration_counts_as_missing():
     sensors = two_sensors(4)
     dead = [
@@ -122,11 +122,12 @@ def test_a_spectrum_without_vibration_counts_as_missing():
     assert "no vibration" in judgement.alone["b"][9].reason
 
 
+@pytest.mark.usefixtures("coarse_search")
 def test_a_moved_sensor_splits_the_series_of_all_sensors():
-    """The same recordings four times; from the third time on, b has another structure."""
+    """The same recordings twice; the second time, b has another structure."""
     single = two_sensors(9)
     assert (
-        learn_sensors({name: 4 * spectra for name, spectra in single.items()}, band_hz=BAND)[
+        learn_sensors({name: 2 * spectra for name, spectra in single.items()}, band_hz=BAND)[
             0
         ].moved
         == ()
@@ -141,10 +142,10 @@ def test_a_moved_sensor_splits_the_series_of_all_sensors():
         for spectrum, f0 in zip(single["b"], TRUTH, strict=True)
     ]
     judgement, shared = learn_sensors(
-        {"a": 4 * single["a"], "b": [*2 * single["b"], *2 * moved]}, band_hz=BAND
+        {"a": 2 * single["a"], "b": [*single["b"], *moved]}, band_hz=BAND
     )
-    assert judgement.moved == ((24, "b"),)
-    assert len(judgement.resonances) == len(judgement.alone["b"]) == 4 * TRUTH.size
+    assert judgement.moved == ((12, "b"),)
+    assert len(judgement.resonances) == len(judgement.alone["b"]) == 2 * TRUTH.size
     assert shared.lines({"a": single["a"][-1:], "b": moved[-1:]}).resonances[0].found
 
 
@@ -162,6 +163,7 @@ def test_a_single_sensors_admission_is_independent_of_the_sensor_order(order):
     assert names == ("b",)
 
 
+@pytest.mark.usefixtures("coarse_search")
 def test_heights_refer_to_the_same_sensor_in_any_order():
     sensors = two_sensors(1, heights=(0.7, 0.1))
     first, shared = learn_sensors(sensors, band_hz=BAND)
@@ -174,6 +176,7 @@ def test_heights_refer_to_the_same_sensor_in_any_order():
     assert reordered.detected_on[0] == first.detected_on[0]
 
 
+@pytest.mark.usefixtures("coarse_search")
 def test_a_line_undetected_by_the_first_sensor_has_no_height():
     sensors, other = two_sensors(100, size=0.3), two_sensors(5, heights=(0.0, 0.0))
     judgement = resonances_of_sensors({"c": other["a"], **sensors}, band_hz=BAND)

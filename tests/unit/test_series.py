@@ -80,27 +80,27 @@ def test_a_moving_line_is_separated_from_equally_high_fixed_modes():
 
 def test_a_further_recording_is_judged_with_the_fitted_series():
     """Agrees with the joint fit within its deviations; a spectrum without a line yields none."""
-    truth = 3300.0 + 300.0 * np.random.default_rng(5).standard_normal(60).clip(-1.3, 1.3)
+    truth = 3300.0 + 300.0 * np.random.default_rng(5).standard_normal(36).clip(-1.3, 1.3)
     spectra = series(truth=truth, seed=5)
     joint = series_resonances(spectra, band_hz=BAND)
-    first, shared, moved = learn_series(spectra[:40], band_hz=BAND)
+    first, shared, moved = learn_series(spectra[:24], band_hz=BAND)
     assert moved == ()
     assert [resonance.crf_hz for resonance in first] == [
-        resonance.crf_hz for resonance in series_resonances(spectra[:40], band_hz=BAND)
+        resonance.crf_hz for resonance in series_resonances(spectra[:24], band_hz=BAND)
     ]
-    further = shared.resonances(spectra[40:])
+    further = shared.resonances(spectra[24:])
     differences = [
         (resonance.crf_hz - joint_resonance.crf_hz) / joint_resonance.crf_std
-        for resonance, joint_resonance in zip(further, joint[40:], strict=True)
+        for resonance, joint_resonance in zip(further, joint[24:], strict=True)
     ]
     assert np.max(np.abs(differences)) < 1.0
     errors = [
         (resonance.crf_hz - f) / resonance.crf_std
-        for resonance, f in zip(further, truth[40:], strict=True)
+        for resonance, f in zip(further, truth[24:], strict=True)
     ]
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.6
     assert [resonance.crf_std for resonance in further] == pytest.approx(
-        [resonance.crf_std for resonance in joint[40:]], rel=0.3
+        [resonance.crf_std for resonance in joint[24:]], rel=0.3
     )
     (without_line,) = shared.resonances(series(0.0, truth=truth[:1], seed=6))
     assert not without_line.found
@@ -110,7 +110,7 @@ def test_a_further_recording_is_judged_with_the_fitted_series():
 
 def test_the_fit_scatters_as_its_deviations_state():
     errors = []
-    for seed in range(12):
+    for seed in range(5):
         for resonance, f in zip(
             series_resonances(series(seed=seed), band_hz=BAND), TRUTH, strict=True
         ):
@@ -120,7 +120,9 @@ def test_the_fit_scatters_as_its_deviations_state():
                     (resonance.crfa - 0.7) / resonance.crfa_std,
                 ]
             )
-    assert np.mean(np.abs(errors) < 1.645, axis=0) == pytest.approx(0.9, abs=0.06)
+    assert np.mean(np.abs(errors) < 1.645, axis=0) == pytest.approx(
+        0.9, abs=0.08
+    )  # two sigma of 60
 
 
 @pytest.fixture
@@ -211,7 +213,7 @@ def test_a_line_distorted_by_a_structure_is_covered_by_its_interval():
     """A frequency-dependent transfer shifts the line equally in all recordings."""
     mode = 1.0 + 0.8 * 0.03j / (1.0 - (FREQUENCY / 3150.0) ** 2 + 0.03j * FREQUENCY / 3150.0)
     errors = []
-    for seed in range(6):
+    for seed in range(3):
         truth = TRUTH + 20.0 * np.random.default_rng(seed).standard_normal(TRUTH.size)
         spectra = series(truth=truth, seed=seed, gain=np.abs(mode) ** 2)
         for resonance, f in zip(series_resonances(spectra, band_hz=BAND), truth, strict=True):

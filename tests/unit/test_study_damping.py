@@ -4,8 +4,10 @@ load share.
 
 import numpy as np
 import pytest
+from test_report import texts_of
 from test_study_report import PAPERS, figure_of, page_of, synthetic_study, with_knee, without_maps
 
+from asperity.report import base
 from asperity.report.study.dynamic import clr_correlations, damping_over_roughness, rank_correlation
 from asperity.report.study.page import study_exhibits
 from asperity.report.study.sweep import sweep_exhibits
@@ -65,10 +67,13 @@ def test_the_rank_correlation_agrees_with_spearman():
     assert np.isnan(rank_correlation(table, "contact_resonance_hz"))  # a constant has no ranks
 
 
-def test_only_a_study_with_vibration_shows_damping_on_its_page_and_levels():
+def test_only_a_study_with_vibration_shows_damping_on_its_page_and_levels(monkeypatch):
     result = vibrating()
-    names = [exhibit.name for exhibit in study_exhibits(without_maps(result))]
-    assert names[-2:] == ["damping", "load-share-correlations"]
+    *_, damping, correlations = study_exhibits(without_maps(result))
+    assert (damping.name, correlations.name) == ("damping", "load-share-correlations")
+    assert damping.picture().uri.startswith("data:image/svg+xml,%3Csvg ")
+    assert correlations.picture().uri.startswith("data:image/svg+xml,%3Csvg ")
+    monkeypatch.setattr(base, "svg", texts_of)  # the page's text is of interest below
     summary = curve_from_study(result).summary()
     assert summary["contact_damping_ratio"].to_numpy() == pytest.approx(
         curve_from_study(result).mean("contact_damping_ratio")

@@ -15,14 +15,14 @@ import pandas
 import pytest
 from matplotlib.colors import to_rgb
 from scipy.stats import t as student
-from test_report import Page
+from test_report import Page, texts_of
 
 import asperity
 from asperity.case import load_case
 from asperity.cli import main
 from asperity.core.errors import BadInput
 from asperity.paper import PAPER_ANCHORS, Anchor, is_papers_contact
-from asperity.report import write_study_report
+from asperity.report import base, write_study_report
 from asperity.report.study import contacts
 from asperity.report.study.curve import resonance, rig, shares
 from asperity.report.study.page import render_study_page, study_exhibits
@@ -233,7 +233,8 @@ def test_the_page_states_what_was_computed(page, wear):
     assert wear.plan.case.text in page.text
 
 
-def test_failures_are_reported_and_excluded():
+def test_failures_are_reported_and_excluded(monkeypatch):
+    monkeypatch.setattr(base, "svg", texts_of)
     study = with_knee()
     with_failures = study.table.copy()
     with_failures.loc[3, ["status", "reason", "clr"]] = ["failed", "<b>no</b> surface", 9.0]

@@ -10,6 +10,7 @@ from asperity.core.errors import BadInput
 from asperity.surface import describe_surface
 
 FILES = Path(__file__).parents[2].parent / "shared" / "data" / "surfaces"
+MANY = 120  # python -m benchmarks.attacks damages thousands of files
 UNITS = {"xyz": ("um", "um"), "csv": ("um", "mm"), "txt": ("um", "mm"), "npy": ("um", None)}
 
 
@@ -61,13 +62,13 @@ def damaged(content, rng):
 @pytest.mark.filterwarnings(
     "ignore::pytest.PytestUnraisableExceptionWarning"
 )  # failing readers leave files open
-def test_300_damaged_files_leave_no_traceback(tmp_path, capfd):
+def test_damaged_files_leave_no_traceback(tmp_path, capfd):
     (tmp_path / "good").mkdir()
     (tmp_path / "bad").mkdir()
     small, large = originals(tmp_path / "good")
     rng = np.random.default_rng(20)
     outcomes = []
-    for number in range(300):
+    for number in range(MANY):
         name, content = (
             large[number // 10 % len(large)]
             if large and number % 10 == 0
@@ -82,7 +83,7 @@ def test_300_damaged_files_leave_no_traceback(tmp_path, capfd):
             assert "\n" not in result
             assert len(result) < 400
     read = sum(isinstance(result, float) for _, result in outcomes)
-    assert 20 < read < 280  # some are refused and some are read
+    assert 0.07 * MANY < read < 0.93 * MANY  # some are refused and some are read
     assert capfd.readouterr() == ("", "")
     gc.collect()
 

@@ -14,6 +14,8 @@ from asperity.core.errors import BadInput
 from asperity.monitoring import TrackSettings, track_recordings
 from asperity.report.track.page import render_track_page
 
+pytestmark = pytest.mark.usefixtures("coarse_search")
+
 RATE, F0, SECONDS = 20e3, 3000.0, 8.0
 PLACES = np.arange(1.0, 13.0)
 RATIO = np.exp(np.interp(PLACES, [1.0, 6.5, 12.0], np.log([0.04, 0.014, 0.0132])))

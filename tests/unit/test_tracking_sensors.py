@@ -10,6 +10,8 @@ from asperity.monitoring import TrackSettings, keep_track, store_overview, track
 from asperity.recording import ReadOptions
 from support.sensor_signals import BAND, RATE, TRUTH, sensor_signals
 
+pytestmark = pytest.mark.usefixtures("coarse_search")
+
 
 @pytest.fixture(scope="module")
 def sensor_files(tmp_path_factory):

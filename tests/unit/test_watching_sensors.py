@@ -25,6 +25,8 @@ from asperity.monitoring.simultaneous import TimedRecording, match_times
 from asperity.recording import ReadOptions
 from support.sensor_signals import BAND, RATE, TRUTH, sensor_signals
 
+pytestmark = pytest.mark.usefixtures("coarse_search")
+
 START = datetime(2025, 3, 1, 12, tzinfo=UTC)
 
 

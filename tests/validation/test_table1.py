@@ -23,7 +23,7 @@ def exponent(x, y) -> float:
 
 @pytest.fixture(scope="module")
 def ours():
-    return reproduce_table1(records=120)
+    return reproduce_table1(records=60)
 
 
 def test_the_reference_rows_are_the_twelve_rows_of_the_paper():

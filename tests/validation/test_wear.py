@@ -26,6 +26,7 @@ LINE = {
     "vibration": "none",
     "wear.k": ["1e-17 1/Pa", "3e-17 1/Pa"],
     "wear.overrolling": ["56.25 Hz", "5 Hz"],
+    "wear.patches": 4,
 }
 
 
@@ -177,7 +178,7 @@ def test_the_energy_law_equals_archard_with_k_over_the_boundary_friction():
 
 
 def test_wear_lowers_summits_and_leaves_pits():
-    history = worn(1.0, {"wear.k": ["6e-17 1/Pa", "0 1/Pa"]})
+    history = worn(1.0, {"wear.k": ["6e-17 1/Pa", "0 1/Pa"], "wear.step": 0.1})
     first, last = history.table.iloc[0], history.table.iloc[-1]
     assert last["sq_m"] < 0.98 * first["sq_m"]
     assert last["ssk"] < first["ssk"]
@@ -197,7 +198,7 @@ def test_a_larger_wear_coefficient_accelerates_wear_proportionally():
 
 def test_halving_the_jump_hardly_changes_roughness_and_load_share():
     whole, half = (
-        worn(1.0, {"wear.k": ["3e-17 1/Pa", "0 1/Pa"], "wear.step": step}) for step in (0.04, 0.02)
+        worn(0.4, {"wear.k": ["3e-17 1/Pa", "0 1/Pa"], "wear.step": step}) for step in (0.04, 0.02)
     )
     assert len(half.table) > 1.3 * len(whole.table)
     for key in ("sq_m", "clr"):
@@ -225,7 +226,8 @@ def test_a_measured_surface_runs_in(tmp_path):
     """
     surface = {"file": str(MEASURED), "fit": "tile"}
     surface_less = {key: value for key, value in LINE.items() if not key.startswith("surface")}
-    case = worn_case({**surface_less, "surface": surface, "wear.k": ["2e-16 1/Pa", "0 1/Pa"]})
+    wear = {"wear.k": ["2e-16 1/Pa", "0 1/Pa"], "wear.step": 0.1}
+    case = worn_case({**surface_less, "surface": surface, **wear})
     history = run_wear(case, hours=0.2, out=tmp_path / "worn")
     first, last = history.table.iloc[0], history.table.iloc[-1]
     for path, row in zip(history.files[:2], (first, last), strict=True):

@@ -5,6 +5,8 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from asperity.case import Case
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_choice
@@ -292,7 +294,8 @@ def infer_observations(
     case_point = ObservationPoint(conditions.load, conditions.entrainment_speed)
     forward = ForwardModel(setting, emulator, (case_point, *operating_points(observations)))
     source = _Source(tuple(observations), excluded, notes)
-    return _infer(forward, source, new_pools(forward, seed), sampler, seed)
+    with threadpool_limits(1, "blas"):  # the matrices are too small for several threads
+        return _infer(forward, source, new_pools(forward, seed), sampler, seed)
 
 
 def with_observation(inference: Inference, observation: Observation) -> Inference:
@@ -307,18 +310,24 @@ def with_observation(inference: Inference, observation: Observation) -> Inferenc
     previous = inference.forward
     points = (previous.points[0], *operating_points(observations))
     forward = replace(previous, points=points)
-    pools = dict(inference.pools)
-    if not inference.observations:
-        pools = new_pools(forward, inference.seed)
-    elif len(points) > len(previous.points):
-        pools = with_point(pools, forward, replace(previous, points=points[-1:]))
-    else:
-        pools = {
-            law: pool.with_columns(_predictor(forward, law), pool.outputs)
-            for law, pool in pools.items()
-        }
     source = _Source(observations, inference.excluded, inference.notes)
-    return _infer(forward, source, pools, "importance", inference.seed, prior=inference.prior)
+    with threadpool_limits(1, "blas"):
+        pools = _updated_pools(inference, forward)
+        return _infer(forward, source, pools, "importance", inference.seed, prior=inference.prior)
+
+
+def _updated_pools(inference: Inference, forward: ForwardModel) -> dict[Law, ContactPool]:
+    """Return the draws of an inference with the outputs of `forward`, one observation further."""
+    previous = inference.forward
+    if not inference.observations:
+        return new_pools(forward, inference.seed)
+    pools = dict(inference.pools)
+    if len(forward.points) > len(previous.points):
+        return with_point(pools, forward, replace(previous, points=forward.points[-1:]))
+    return {
+        law: pool.with_columns(_predictor(forward, law), pool.outputs)
+        for law, pool in pools.items()
+    }
 
 
 def _predictor(forward: ForwardModel, law: Law) -> Callable[[Field], ChannelPrediction]:

@@ -11,6 +11,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 from scipy.special import logsumexp, ndtri
+from threadpoolctl import threadpool_limits
 
 from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
@@ -164,16 +165,17 @@ def importance(
     longest : maximum number of rounds to reach `least`
     """
     target: Field = np.empty(0)
-    for number in range(max(rounds, longest) + 1):
-        fresh = pool.take(pool.outputs, slice(len(target), None))
-        target = np.concatenate([target, log_target(fresh)])
-        weights = pool.log_weights(target)
-        deficit = best - (float(logsumexp(weights)) - np.log(pool.drawn))
-        rejected = number >= probed and deficit > HOPELESS
-        done = number >= rounds and (_effective(weights) >= least or deficit > RULED_OUT)
-        if _effective(weights) >= enough or rejected or done or number >= max(rounds, longest):
-            break
-        pool.learn(weights)
+    with threadpool_limits(1, "blas"):  # the matrices are too small for several threads
+        for number in range(max(rounds, longest) + 1):
+            fresh = pool.take(pool.outputs, slice(len(target), None))
+            target = np.concatenate([target, log_target(fresh)])
+            weights = pool.log_weights(target)
+            deficit = best - (float(logsumexp(weights)) - np.log(pool.drawn))
+            rejected = number >= probed and deficit > HOPELESS
+            done = number >= rounds and (_effective(weights) >= least or deficit > RULED_OUT)
+            if _effective(weights) >= enough or rejected or done or number >= max(rounds, longest):
+                break
+            pool.learn(weights)
     peak = float(logsumexp(weights))
     normal = np.exp(weights - peak)
     relative = np.sqrt(max(float(np.sum(normal**2)) - 1.0 / pool.drawn, 0.0))
