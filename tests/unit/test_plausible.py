@@ -190,5 +190,5 @@ def test_a_film_with_a_wide_error_bar_is_not_determined(bar, films):
         car=0.0, clr=0.0, h_min=bar * state.h_min, h_central=0.1 * state.h_central, lean=none
     )
     convergence = replace(smooth.convergence, iteration_error=none, discretisation_error=error)
-    assert uncertain_films(replace(smooth, convergence=convergence)) == films
-    assert uncertain_films(replace(smooth, convergence=convergence, lubricant=None)) == ()
+    assert uncertain_films(replace(smooth, convergence=convergence), state) == films
+    assert uncertain_films(replace(smooth, convergence=convergence, lubricant=None), state) == ()

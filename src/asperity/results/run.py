@@ -319,8 +319,9 @@ class Run:
             )
         if not self.solution.convergence.converged:
             sentence = f"NOT CONVERGED, do not use: {sentence}"
-        films = () if self.undetermined else uncertain_films(self.solution)
-        doubt = f"film not determined ({', '.join(films)}); " if films else ""
+        films, doubt = uncertain_films(self.solution, contact_state(self.solution)), ""
+        if films and self.undetermined is None:
+            doubt = f"film not determined ({', '.join(films)}); "
         return f"{sentence}; {doubt}{self._ends_text()}{self.resonance_text()}; {basis(error)}."
 
     def _ends_text(self) -> str:

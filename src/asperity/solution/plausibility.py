@@ -9,6 +9,7 @@ from asperity.contact.grid import Grid
 from asperity.core.quantities import quantity
 from asperity.ehl import (
     ContactSolution,
+    ContactState,
     Uncertainty,
     flooded_inlet,
     grid_shortfalls,
@@ -21,7 +22,6 @@ from asperity.ehl.load_shares import carried_share
 from asperity.lubricant import Barus, Lubricant, Roelands
 from asperity.solution.ends import LOADED_END, axial_distribution
 from asperity.solution.regime import far_from_fits
-from asperity.solution.state import contact_state
 
 UNEVEN_LOAD = 1.5  # largest over mean load per length of a roller, from which it is noted
 OIL_ALPHA = 5e-9, 40e-9  # usual pressure-viscosity coefficients of oils [1/Pa]
@@ -104,12 +104,12 @@ def undetermined(solution: ContactSolution, clr: Uncertainty) -> str | None:
     return "; ".join(reasons) or None
 
 
-def uncertain_films(solution: ContactSolution) -> tuple[str, ...]:
+def uncertain_films(solution: ContactSolution, state: ContactState) -> tuple[str, ...]:
     """Return the films whose error bar is above 15 %, each with its bar; none without oil."""
     error = solution.convergence.error
     if error is None or solution.lubricant is None:
         return ()
-    state, names = contact_state(solution), ("h_min", "h_central")
+    names = "h_min", "h_central"
     values = ((f"{name}_m", getattr(state, name), getattr(error, name)) for name in names)
     return tuple(
         f"{quantity(key).name} ± {100.0 * bar / film:.0f} %"
