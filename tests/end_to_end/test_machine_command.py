@@ -36,7 +36,8 @@ SOLVED = [  # from the same section, with further keys of a solved contact
         "flash_temperature_max_k",
         "crf_hz",
     ),
-    *("h_min_m", "determined", "p_max_pa", "friction_power_w", "von_mises_core_pa", "reason"),
+    *("h_min_m", "determined", "p_max_pa", "friction_power_w"),
+    *("rolling_friction_power_w", "von_mises_core_pa", "reason"),
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
 ]
 RATING = ["beyond", "formula", "key", "reason", "standard", "validity"]
