@@ -344,7 +344,7 @@ def test_the_stored_names_match_the_layout_version():
     kept = WearState.unworn(case().moving_surfaces()).arrays()
     names = {"worn", "flattened", "changed", "rates"}
     assert set(kept) == {f"{name}_{body}" for name in names for body in (0, 1)} | {"numbers"}
-    assert (store.LAYOUT.version, kept["numbers"].size) == (3, 9)
+    assert (store.LAYOUT.version, kept["numbers"].size) == (4, 9)
 
 
 def test_frames_are_spread_over_the_history(unbroken, tmp_path):

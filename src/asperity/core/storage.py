@@ -64,7 +64,7 @@ def _verify(path: Path, stated: str | None, content: object, remedy: str) -> Non
 # ------------------------------------------------------------------------------------------
 
 
-CONTENT_ENTRY = "told"  # name of the entry with JSON text, fixed by the format of stored arrays
+CONTENT_ENTRY = "content"  # name of the entry with JSON text, beside stored arrays
 
 
 def append_digest(body: bytes) -> bytes:

@@ -162,8 +162,8 @@ class GridContinuation:
     divergence: float = 10.0
     failed_residual: float = 0.1  # a coarse solution with more is no initial guess
     elastic_tolerance: float = 0.1  # of dry elastic bodies, in that of the Newton step after it
-    min_coarse_inlet_cells: float = 2.0  # across the inlet of a line contact: else it closes ...
-    separating_film: float = 1.5  # ... if its film is thicker than so many rms roughnesses
+    min_coarse_inlet_cells: float = 2.0  # across the inlet of a line contact: else it closes
+    separating_film_ratio: float = 1.5  # minimum film over Sq, from which oil separates the bodies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

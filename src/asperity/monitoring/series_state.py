@@ -243,7 +243,7 @@ def unpack_shared(content: bytes, since: int) -> SeriesMemory:
         ) as stored:
             state = json.loads(str(stored[CONTENT_ENTRY]))
             arrays = {name: stored[name] for name in stored.files if name != CONTENT_ENTRY}
-    except UnreadableFile:
+    except (UnreadableFile, KeyError):  # damaged, or of another version
         return SeriesMemory()
     by_sensor = {}
     for number, name in enumerate(state.get("sensors", [])):

@@ -15,8 +15,6 @@ from asperity.wear import TrackPosition
 
 MAX_FRAMES = 24  # of a history, besides its end
 
-STATE_ENTRY = "told"  # entry with number, hours and position; name fixed by the file format
-
 
 class WearFrame(NamedTuple):
     """Contact at one position of the tracks at the beginning of a jump: maps on the contact's grid.
@@ -47,7 +45,7 @@ class WearFrame(NamedTuple):
         """Return the arrays to store, by name."""
         numbers = np.array([self.number, self.hours, *self.position], dtype=float)
         return {
-            STATE_ENTRY: numbers,
+            "numbers": numbers,
             "gap": self.gap,
             "pressure": self.pressure,
             "in_contact": self.in_contact,
@@ -56,7 +54,7 @@ class WearFrame(NamedTuple):
     @classmethod
     def from_arrays(cls, arrays: Arrays) -> "WearFrame":
         """Rebuild a frame from `arrays`."""
-        number, hours, first, second = map(float, arrays[STATE_ENTRY])
+        number, hours, first, second = map(float, arrays["numbers"])
         position = TrackPosition(int(first), int(second))
         return cls(
             int(number), hours, position, arrays["gap"], arrays["pressure"], arrays["in_contact"]
