@@ -148,6 +148,23 @@ def test_the_number_of_cells_in_a_refusal_is_enough(tmp_path, surface):
     assert load_case(path).surface().sq == pytest.approx(2e-8, rel=1e-6)
 
 
+def test_roughness_too_fine_for_a_chosen_grid_is_refused_with_a_remedy(tmp_path):
+    """The factor and the cells of the message suffice."""
+
+    def case(length, cells=""):
+        surface = f'kind = "gaussian"\nsq = "2 nm"\ncorrelation_length = "{length} um"'
+        (tmp_path / "wide.toml").write_text(wide_contact(surface) + cells)
+        return load_case(tmp_path / "wide.toml")
+
+    message = r"needs (\d+) x (\d+) cells, .* make its shortest length (\d\.\d+) times as long"
+    with pytest.raises(BadInput, match=message) as refusal:
+        case(2.0)
+    nx, ny, factor = re.search(message, str(refusal.value)).groups()
+    assert int(nx) * int(ny) > 2_000_000
+    assert np.prod(case(2.0 * float(factor)).grid.cells) <= 2_000_000
+    assert case(2.0, f"[grid]\ncells = [{nx}, {ny}]\n").grid.cells == (int(nx), int(ny))
+
+
 def test_notes_on_long_correlation_lengths_hold_no_nan(tmp_path):
     """A sample whose autocorrelation does not decay within the domain has no correlation length."""
     path = tmp_path / "long.toml"

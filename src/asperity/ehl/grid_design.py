@@ -36,7 +36,8 @@ CONTACT_REACH = 5.0  # a rough body touches out to X² = 1 + 5 Sq R/a²: 2.5 Sq 
 CORRELATION_LENGTHS = 10.0  # along the modelled length of a line contact
 DRY_FILM_RATIO = 0.05  # below it the film carries no load, and its inlet is not resolved
 MIN_FILM_RATIO = 0.3  # in Sq: asperities hold the inlet of a rough contact open by this film
-MAX_CELLS = 130_000  # of a rough contact at ACCURACY
+MAX_CELLS = 130_000  # of a rough contact at ACCURACY ...
+MAX_ROUGH_CELLS = 2_000_000  # ... whose roughness needs more
 # half-widths along a roller's axis, within the limits of ROLLER_LINES
 END_CELL = 0.22
 ROLLER_LINES = 128, 504
@@ -85,7 +86,8 @@ def auto_grid(
     plane. Cells: 4.5 across the inlet length, 9 for a smooth line contact, 5 for a rough contact; 8
     along a correlation length; 20 across the Hertz zone; scaled with the root of `accuracy`. A
     rough contact has at least 96 by 32 cells, so that a coarser grid can estimate its error, and
-    about 130000 at most, unless its roughness needs more; `grid_shortfalls` reports coarser grids.
+    about 130000 at most, or up to 2 million that its roughness needs; `grid_shortfalls` reports
+    coarser grids.
 
     Parameters
     ----------
@@ -98,7 +100,8 @@ def auto_grid(
     Raises
     ------
     BadInput
-        for an accuracy that is not between 1e-4 and 0.2, or a film that is not thin.
+        for an accuracy that is not between 1e-4 and 0.2, a film that is not thin, or roughness that
+        needs more than 2 million cells.
     """
     require_thin_film(conditions, lubricant)
     if not 1e-4 <= accuracy <= 0.2:
@@ -373,10 +376,22 @@ def _cells(
         target = _reduced(target, fewest, max_cells)
     if texture is not None:
         accepted = _counts(texture.largest_cell, extent)
+        _require_affordable(accepted)
         # a coarser grid must be possible for the error estimate
         least = 2.0 * MIN_COARSE_CELLS, 2.0 * MIN_CELLS_SHORT_AXIS
         target = max(target[0], accepted[0], least[0]), max(target[1], accepted[1], least[1])
     return _even(target[0]), _even(target[1])
+
+
+def _require_affordable(cells: tuple[float, float]) -> None:
+    """Raise BadInput for roughness that needs more cells than a chosen grid may have."""
+    if (excess := cells[0] * cells[1] / MAX_ROUGH_CELLS) > 1.0:
+        nx, ny = map(_even, cells)
+        raise BadInput(
+            f"the roughness needs {nx} x {ny} cells, more than the {MAX_ROUGH_CELLS:.0f} of a "
+            f"chosen grid; make its shortest length {1.01 * math.sqrt(excess):.2f} times as long, "
+            f"or state grid.cells = [{nx}, {ny}]"
+        )
 
 
 def _reduced(
