@@ -16,10 +16,7 @@ from asperity.ehl.models.single_pressure import Problem, TransientTerm
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step
 from asperity.ehl.outcome import ATTEMPTS, FROM_DRY
-from asperity.ehl.problem_setup import (
-    coarser_in_all_axes,
-    grid_levels,
-)
+from asperity.ehl.problem_setup import coarser_in_all_axes, grid_levels
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import Search
 from asperity.ehl.strategies.initial_guess import (
@@ -123,7 +120,7 @@ class MixedSearch(Search):
         """
         tolerance, max_steps = self._targets(problem, coarse=coarse, from_coarse=True)
         if problem.conserve and has_thin_film(evaluate(problem, unknowns, second_order=False)):
-            step = self.from_refilled_cavities(problem, unknowns, np.inf)
+            step = self.from_refilled_cavities_directly(problem, unknowns)
             if self.converged(tolerance):
                 return step
         roughly = max(SEARCH.first_order_tolerance, tolerance)
@@ -285,26 +282,24 @@ class MixedSearch(Search):
         return step
 
     def from_refilled_cavities(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
-        """Solve for conserved oil from the contact with refilled cavities.
-
-        Without time steps, which close thin films, at an infinite `length`.
-        """
-        start = Pressures(
-            np.clip(unknowns.oil, 0.0, problem.p_cap), unknowns.total, unknowns.approach
-        )
-        if length == np.inf:
-            refilled, roughly = replace(problem, conserve=False), CONTINUATION.coarse_tolerance
-            steps = newton(refilled, start, second_order=False)
-            step = self.run(refilled, steps, roughly, SEARCH.max_restart_iterations)
-            steps = newton(problem, unknowns_of(step), second_order=False)
-            limits = (self.options.tolerance, SEARCH.max_second_order_iterations)
-            return self.run(problem, steps, *limits, divergence=SEARCH.divergence)
-        step = self.march_in_time(replace(problem, conserve=False), start, length)
+        """Solve for conserved oil from the contact with refilled cavities, in time steps."""
+        refilled, start = _refilled(problem, unknowns)
+        step = self.march_in_time(refilled, start, length)
         return (
             self.march_in_time(problem, unknowns_of(step), length)
             if self.converged(MARCHING.tolerance)
             else step
         )
+
+    def from_refilled_cavities_directly(self, problem: Problem, unknowns: Pressures) -> Step:
+        """Solve for conserved oil from refilled cavities, without time steps: they close films."""
+        refilled, start = _refilled(problem, unknowns)
+        steps = newton(refilled, start, second_order=False)
+        roughly = CONTINUATION.coarse_tolerance
+        step = self.run(refilled, steps, roughly, SEARCH.max_restart_iterations)
+        steps = newton(problem, unknowns_of(step), second_order=False)
+        limits = (self.options.tolerance, SEARCH.max_second_order_iterations)
+        return self.run(problem, steps, *limits, divergence=SEARCH.divergence)
 
     def coarse_to_fine(
         self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
@@ -413,6 +408,12 @@ class MixedSearch(Search):
         self.history = [*coarse_search.history, *self.history]
         if coarse_search.converged(self.options.tolerance):
             self.figures = [*coarse_search.figures, *self.figures]
+
+
+def _refilled(problem: Problem, unknowns: Pressures) -> tuple[Problem, Pressures]:
+    """Return the problem with refilled cavities, and its initial guess from conserved oil."""
+    oil = np.clip(unknowns.oil, 0.0, problem.p_cap)
+    return replace(problem, conserve=False), Pressures(oil, unknowns.total, unknowns.approach)
 
 
 def _implicit_step(problem: Problem, length: float, content: Field) -> TransientTerm:
