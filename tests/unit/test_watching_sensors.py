@@ -6,11 +6,13 @@ import sqlite3
 from contextlib import closing
 from dataclasses import fields
 from datetime import UTC, datetime, timedelta
+from io import BytesIO
 
 import numpy as np
 import pytest
 
 from asperity.core.errors import BadInput
+from asperity.core.storage import append_digest
 from asperity.monitoring import (
     TrackSettings,
     WatchSettings,
@@ -302,6 +304,9 @@ def test_the_learned_state_of_sensors_is_stored_completely(machine, tmp_path):
     assert restored.shared.agreement.established == ("a", "b")
     assert pack_shared(restored.shared) == body
     assert unpack_shared(body[:-40], 3).shared is None
+    other_version = BytesIO()
+    np.savez(other_version, state=np.zeros(1))
+    assert unpack_shared(append_digest(other_version.getvalue()), 3).shared is None
 
 
 def test_a_sensor_option_is_refused_with_several_sensors(machine, tmp_path):
