@@ -91,14 +91,16 @@ def _outflow(balance, pressure, gap):
     mobility = density * gap**3 * eta0 / (problem.speed * oil.viscosity(pascals))
     if isinstance(balance, MixedBalance):
         least = problem.contact_gap**6 / problem.speed / gap.real**3
+        if problem.exact:  # of constant fluidity
+            least = least * (gap / gap.real) ** 3
         mobility = np.where(mobility.real < least, least, mobility)
     ambient = gap[[0, -1]] ** 3 / problem.speed
     content = density * gap
     dx, dy = problem.spacing
     ahead = gap[0] + ((problem.x[0] - dx) ** 2 - problem.x[0] ** 2) / 2.0
-    outflow = net_outflow(
-        pressure, content, mobility, ambient, (ahead + gap[0]) / 2.0, dx, dy, **faces_of(balance)
-    )
+    entering = (ahead + gap[0]) / 2.0
+    scheme = faces_of(balance) | {"height": gap if problem.exact else None}
+    outflow = net_outflow(pressure, content, mobility, ambient, entering, dx, dy, **scheme)
     if isinstance(
         balance, MixedBalance
     ):  # second order, limited at film steps; the degree of opening is fixed

@@ -7,9 +7,22 @@ import numpy as np
 SECOND_ORDER = (0.0, 0.5)
 
 
-def mean(own, following, logarithmic):
-    """Return the arithmetic or logarithmic mean of two mobilities."""
-    return (own - following) / np.log(own / following) if logarithmic else (own + following) / 2.0
+def mean(own, following, logarithmic, gaps=None):
+    """Return the arithmetic or logarithmic mean of two mobilities.
+
+    With both `gaps`, the mobility that is exact for a linear gap and a fluidity that falls
+    exponentially with the pressure: 1 over the mean of h^-3, times the fluidity's logarithmic mean.
+    """
+    if gaps is not None:
+        here, there = gaps
+        inverse_cube = (here + there) / (2.0 * here**2 * there**2)
+        return mean(own / here**3, following / there**3, True) / inverse_cube
+    if not logarithmic:
+        return (own + following) / 2.0
+    ratio = np.log(own / following)
+    alike = np.abs(ratio) < 1e-4
+    nearly = (own + following) / 2.0 * (1.0 - ratio**2 / 12.0)
+    return np.where(alike, nearly, (own - following) / np.where(alike, 1.0, ratio))
 
 
 def faces(
@@ -22,13 +35,18 @@ def faces(
     dy,
     wedge=SECOND_ORDER,
     logarithmic=False,
+    height=None,
 ):
     """Return the fluxes through all x faces, shape (nx + 1, ny), and through the north face of each
     cell.
 
     Complex arguments are allowed. `ambient` is the mobility of the first and the last cells at the
     ambient pressure of the outer faces, `wedge` the weights of the next and of the upstream cell.
+    Faces are exact for a linear gap where `height` is given.
     """
+    along = across = None
+    if height is not None:
+        along, across = (height[:-1], height[1:]), (height, np.roll(height, -1, 1))
     nx = pressure.shape[0]
     couette = np.empty((nx + 1, pressure.shape[1]), dtype=pressure.dtype)
     couette[0] = inlet_content
@@ -39,11 +57,12 @@ def faces(
     poiseuille = np.empty_like(couette)
     poiseuille[0] = -(mobility[0] + ambient[0]) / 2.0 * pressure[0] / (dx / 2.0)
     poiseuille[1:-1] = (
-        -mean(mobility[:-1], mobility[1:], logarithmic) * np.diff(pressure, axis=0) / dx
+        -mean(mobility[:-1], mobility[1:], logarithmic, along) * np.diff(pressure, axis=0) / dx
     )
     poiseuille[-1] = (mobility[-1] + ambient[1]) / 2.0 * pressure[-1] / (dx / 2.0)
     following = np.roll(mobility, -1, 1)
-    north = -mean(mobility, following, logarithmic) * (np.roll(pressure, -1, 1) - pressure) / dy
+    drop = pressure - np.roll(pressure, -1, 1)
+    north = mean(mobility, following, logarithmic, across) * drop / dy
     return couette + poiseuille, north
 
 
@@ -75,8 +94,9 @@ def mass_outflow(solution):
     mobility = np.maximum(
         mobility, oil.density.rho0 * contact_film**6 / h**3 / (12.0 * oil.viscosity.eta0)
     )
+    height = h if np.any(solution.surface.heights) else None
     return net_outflow(
-        p, u * density * h, mobility, at_rest, entering, dx, dy, wedge=(0.0, 0.0)
+        p, u * density * h, mobility, at_rest, entering, dx, dy, wedge=(0.0, 0.0), height=height
     ) + limited_wedge(solution, dx)
 
 

@@ -5,7 +5,7 @@ references.
 import numpy as np
 import pytest
 
-from asperity.kernels import load_sharing, reynolds, step_limits
+from asperity.kernels import face_mobilities, load_sharing, reynolds, step_limits
 from asperity.kernels.load_sharing import FREE, CellState, ContactBounds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Liquid
 
@@ -139,8 +139,9 @@ def test_own_outflow_is_the_derivative_at_fixed_film(rng):
         *(0.1 + rng.random(CELLS) for _ in range(6)),
         *(0.1 + rng.random((2, CELLS[1])) for _ in range(2)),
     )
-    faces = Faces(*np.empty((6, *CELLS)), np.empty(CELLS[1]), np.zeros(2))
-    reynolds.face_mobilities(film, film.mobility, False, np.zeros(CELLS[1], dtype=bool), faces)
+    faces = Faces(*np.empty((6, *CELLS)), np.empty(CELLS[1]), np.zeros(2), *np.empty((4, *CELLS)))
+    ends = np.zeros(CELLS[1], dtype=bool)
+    face_mobilities.face_mobilities(film, np.ones(CELLS), face_mobilities.ARITHMETIC, ends, faces)
     computed, pressure, step = np.empty(CELLS), rng.random(CELLS), 0.5
     load_sharing.outflow_by_pressure(film, faces, 2.5, DX, DY, computed)
     before, after = np.empty((2, *CELLS))
@@ -186,15 +187,16 @@ def test_the_limiter_and_its_slopes(rng):
     )
 
 
-def test_film_mobility_is_that_of_its_oil(rng):
-    """Mobility has a lower bound with zero derivatives."""
+@pytest.mark.parametrize("least_slope", [0.0, 3.0])
+def test_film_mobility_is_that_of_its_oil(rng, least_slope):
+    """Mobility has a lower bound with a stated derivative in the gap and none in the pressure."""
     liquid, height, lower_bound = (
         Liquid(*(0.2 + rng.random((6, *CELLS)))),
         0.2 + rng.random(CELLS),
         0.05,
     )
     film = Film(*np.empty((6, *CELLS)), *np.ones((2, 2, CELLS[1])))
-    reynolds.fill_film(liquid, height, 1.7, lower_bound, film)
+    reynolds.fill_film(liquid, height, 1.7, (lower_bound, least_slope), film)
     mobility = 1.7 * liquid.density * height**3 / (liquid.viscosity * liquid.thinning)
     bounded = mobility < lower_bound / height**3
     assert 0 < bounded.sum() < bounded.size
@@ -204,7 +206,7 @@ def test_film_mobility_is_that_of_its_oil(rng):
         liquid.density,
         liquid.density_slope * height,
         np.maximum(mobility, lower_bound / height**3),
-        np.where(bounded, 0.0, (3.0 + liquid.exponent) / height),
+        np.where(bounded, least_slope, 3.0 + liquid.exponent) / height,
         np.where(bounded, 0.0, by_pressure),
     )
     for computed, reference in zip(film, expected, strict=False):

@@ -36,10 +36,6 @@ def load_share(cells, film_ratio, lengths_per_sq):
     return contact_state(solve_contact(conditions, OIL, surface)).clr
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="mean mobilities of faces drain thin films too fast; docs/theory/mixed.md, Limits",
-)
 def test_the_load_share_of_standing_roughness_agrees_on_a_grid_twice_as_fine():
     coarse, fine = (load_share(cells, 0.5, 40.0) for cells in (64, 128))
     assert coarse == pytest.approx(fine, abs=0.03)

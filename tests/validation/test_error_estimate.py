@@ -98,14 +98,14 @@ def test_errors_of_smooth_mass_conserving_films_are_below_the_first_order_estima
 
 @pytest.mark.parametrize("seed", [10, 11, 14])
 def test_the_first_order_solution_is_iterated_to_convergence(seed):
-    """Sharp elastic roughness. A single iteration of the first-order scheme gave down to a seventh
+    """Sharp roughness. A single iteration of the first-order scheme gave down to a seventh
     of the difference, and intervals missed the finer solution.
     """
     fine = rough(grid((384, 32), y=(-1.0, 1.0)), 0.5e-6, seed=seed, correlation_length=30e-6)
     here = replace(
         fine, grid=grid((96, 32), y=(-1.0, 1.0)), heights=average(fine.heights, (96, 32))
     )
-    slow = contact(hardness=None, speed=0.15)
+    slow = contact(hardness=3e9, speed=0.15)
     error = contact_state(solve_contact(slow, OIL, here)).error.clr
     assert error.low < contact_state(solve_contact(slow, OIL, fine)).clr < error.high
 
@@ -174,7 +174,7 @@ def test_the_mixed_model_estimates_errors_with_the_first_order_wedge(monkeypatch
     found = solved(surface, options=Options(model="mixed"))
     clr, first_order, cell = calls[-1]
     assert clr == pytest.approx(contact_state(found).clr, abs=1e-6)
-    assert abs(first_order - clr) > 0.01
+    assert abs(first_order - clr) > 0.005
     assert cell == pytest.approx(surface.grid.spacing[0] / CONDITIONS.hertz.half_widths[0])
     assert found.convergence.discretisation_error.clr > 0.85 * 2.0 * abs(first_order - clr)
 

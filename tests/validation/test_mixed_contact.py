@@ -254,13 +254,15 @@ def test_an_unfinished_solve_raises_with_its_last_solution():
 
 
 def test_iterations_from_a_coarser_grid_are_not_restarted():
+    """Once with arithmetic mean mobilities, and once more with exact ones."""
     numbers = [
         step.number
         for step in solved(rough(FINE, SQ)).convergence.history
         if step.cells == (128, 128)
     ]
-    assert numbers == list(range(len(numbers)))
-    assert numbers[-1] > 3
+    first = numbers.index(0, 1)
+    assert numbers == [*range(first), *range(len(numbers) - first)]
+    assert first > 4
 
 
 def test_progress_receives_every_iteration_from_coarse_to_fine():

@@ -3,11 +3,13 @@ power balance.
 """
 
 from itertools import islice, pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks.motion import VENNER, contact, waves
 
+from asperity.case import load_case
 from asperity.core.errors import BadInput
 from asperity.ehl import Options, Scales, solve_contact
 from asperity.ehl.problem_setup import contact_problem
@@ -17,25 +19,12 @@ from asperity.surface import MovingSurfaces, Surface, flat_surface
 from asperity.transient import moving_contact
 from support import paper
 
+PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
+
 CELLS = {4.0: 64, 2.0: 64, 1.0: 64, 0.5: 64, 0.25: 128, 0.125: 64}  # cells per half-width
 
 
-@pytest.mark.parametrize(
-    "wavelength",
-    [
-        *(wavelength for wavelength in VENNER if wavelength > 0.125),
-        pytest.param(
-            0.125,
-            marks=pytest.mark.xfail(
-                strict=True,
-                reason=(
-                    "0.917 here, 0.882 in the limit, 5.1 % above the published value,"
-                    " cited second-hand; docs/theory/motion.md"
-                ),
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("wavelength", VENNER)
 def test_the_amplitude_of_moving_waviness_agrees_with_venner_within_5_percent(wavelength):
     assert waves(wavelength, CELLS[wavelength]).central == pytest.approx(
         VENNER[wavelength], rel=0.05
@@ -310,3 +299,21 @@ def test_the_contact_has_the_stated_moes_numbers():
     twice_u = 2.0 * 0.04 * conditions.entrainment_speed / (modulus * radius)
     assert conditions.line_load / (modulus * radius) / np.sqrt(twice_u) == pytest.approx(100.0)
     assert 2.2e-8 * modulus * twice_u**0.25 == pytest.approx(11.0)
+
+
+def test_the_load_share_does_not_depend_on_the_time_step():
+    """Steps of several cells follow the oil too; separate differences gave 0.65, 0.48 and 0.38."""
+    case = load_case(PAPER).with_overrides({"grid.cells": [64, 32]})
+    surfaces, means = case.moving_surfaces(), []
+    for time_step in (1.0, 2.0, 4.0):
+        steps = moving_contact(
+            case.conditions,
+            case.lubricant,
+            surfaces,
+            time_step=time_step,
+            options=Options(tolerance=1e-3),
+        )
+        shares = [step.state.clr for step in islice(steps, int(64 / time_step) + 1)]
+        means.append(np.mean(shares[1:]))
+    assert means[1] == pytest.approx(means[0], abs=0.005)
+    assert means[2] == pytest.approx(means[0], abs=0.02)

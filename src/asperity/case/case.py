@@ -26,6 +26,7 @@ from asperity.ehl import ACCURACY, Options, auto_grid
 from asperity.lubricant import Lubricant, OilFact, OilSheet, Thermal
 from asperity.solution import inlet_notes, plausibility_notes
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
+from asperity.transient import MOST_CELLS, running_cells
 from asperity.wear import WearModel
 
 # default number of surfaces per solution on coarse and on fine grids, to limit computing time
@@ -210,6 +211,41 @@ class Case:
     def motion(self) -> MotionSection:
         """Motion of the roughness."""
         return self.contents.motion or MotionSection()
+
+    @property
+    def is_running(self) -> bool:
+        """True if rough bodies move and the solution is the mean over time of the running contact.
+
+        Otherwise it is that of standing roughness: a smooth or dry contact, a rough body at rest,
+        `contact.roughness = "standing"`, thermal feedback, and roughness that is stored or fixed.
+        """
+        section = self.contents.surface
+        if (
+            self.contents.contact.roughness == "standing"
+            or self.lubricant is None
+            or self.stored is not None
+            or self.thermal.feedback
+        ):
+            return False
+        first, second = (speed != 0.0 for speed in self.conditions.surface_speeds)
+        parts = section.parts
+        if len(parts) > 1:
+            moves = first or second
+        else:
+            moves = {"first": first, "second": second, "both": first or second}[self.motion.rough]
+        return moves and self.surface().sq > 0.0
+
+    def running_cells(self) -> tuple[int, int]:
+        """Return the cells of the running contact's fine grid, at most those of `grid`.
+
+        Raises BadInput for a grid with too few cells for a coarser one to compare with.
+        """
+        texture = texture_of(self.contents.surface, self.folder)
+        assert texture is not None
+        share = ACCURACY / (self.contents.grid.accuracy or ACCURACY)
+        most = round(MOST_CELLS * share)
+        with self.naming("grid"):
+            return running_cells(self.conditions, self.grid, texture.lengths, most)
 
     def moving_surfaces(self) -> MovingSurfaces:
         """Return both bodies' roughness on tracks that repeat along rolling, each at its own speed.

@@ -53,6 +53,8 @@ class ContactSection(Section):
     load: Force
     entrainment_speed: SpeedOrRest  # 0 without a lubricant only
     slip: Number = 0.0  # slide-to-roll ratio (u1 - u2)/entrainment speed
+    # a snapshot of roughness at rest, or the mean over time of roughness that moves with its body
+    roughness: Literal["running", "standing"] = "standing"
 
 
 class MaterialSection(Section):

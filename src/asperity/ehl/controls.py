@@ -42,6 +42,13 @@ class MixedNewton:
     min_damping: float = 0.1  # the line search stops there
     # in contact films: change of gap below which the next step linearises the opening of the wedge
     settled_gap_change: float = 0.1
+    # with exact face mobilities, of one step:
+    max_film_decrease: float = 0.8  # in a cell's film
+    max_pressure_change: float = 2.0  # in a cell's pressure, or in p_h if that is more
+    min_share: float = 1e-3
+    remembered_residuals: int = 6  # the residual may rise to the largest of them
+    least_damping: float = 1.0 / 16.0
+    whole_step_residual: float = 0.1  # below it a step is taken whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +63,9 @@ class MixedLinearSolver:
     thin_film: float = 1e-3
     tolerance_conserving: float = 1e-3  # ... for oil conserved along its path ...
     conserving_residual: float = 1e-3  # ... from this residual on: the mass balance is met closer
+    # ... with exact face mobilities, whose rows differ by more, from this residual on
+    tolerance_exact: float = 1e-2
+    exact_residual: float = 0.1
     max_krylov_steps: int = 60
     coarse_relaxation: float = 2.0  # the coarse correction is too stiff against slow modes
     min_multigrid_cells: int = 64  # along both axes, from which multigrid replaces sparse LU
@@ -204,6 +214,8 @@ class MixedSearchControls:
     divergence: float = 10.0  # ratio to the initial residual from which steps seldom recover
     smooth_coarse_residual: float = 1e-2  # a coarse smooth solution with more is no initial guess
     dry_film_ratio: float = 1.0  # below it the dry contact is the better initial guess
+    max_exact_iterations: int = 80  # with exact face mobilities, from arithmetic means ...
+    guess_tolerance: float = 1e-2  # ... that are solved to this residual
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

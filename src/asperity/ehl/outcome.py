@@ -55,6 +55,7 @@ ATTEMPTS = (
     "at fixed approach, found by bracketing",
 )
 FROM_DRY = "from the dry contact"  # models with two pressures only
+ARITHMETIC = "with arithmetic mean mobilities"  # heated films whose exact ones do not converge
 
 
 class SolveStatus(StrEnum):

@@ -16,7 +16,7 @@ from asperity.ehl.film_formulas import central_film, require_thin_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, PAPER, Options
+from asperity.ehl.outcome import ARITHMETIC, ATTEMPTS, FROM_DRY, PAPER, Options
 from asperity.ehl.problem_setup import (
     contact_problem,
     first_guess,
@@ -25,6 +25,7 @@ from asperity.ehl.problem_setup import (
     usable_levels,
 )
 from asperity.ehl.scales import Scales
+from asperity.ehl.strategies.exact_faces import solve_again
 from asperity.ehl.strategies.grid_continuation import Progress, Search
 from asperity.ehl.strategies.mixed_search import COARSE_TO_FINE, ROBUST, MixedSearch
 from asperity.ehl.strategies.oil_state import pressures_of
@@ -148,41 +149,58 @@ def solve_mixed(
     full_problem = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
     finest = reduced_problem(full_problem)
     search = MixedSearch(options, scales.gap, progress)
+    if start is not None and start.convergence.attempt == ARITHMETIC:
+        search.arithmetic, finest = True, replace(finest, exact=False)
     if conditions.geometry == "roller":
         search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
     if start is not None:
         strategy = COARSE_TO_FINE
         step = search.continue_from(finest, pressures_of(start, finest, scales))
     else:
-        for strategy in _strategies(
-            surface, smooth_film(conditions, lubricant), options.contact_film
-        ):
-            problem = finest if strategy == COARSE_TO_FINE else replace(finest, accurate=False)
-            levels = usable_levels(problem, conditions, lubricant)
-            step = search.solve_by(
-                strategy, levels, lambda on: first_guess(on, conditions, lubricant, scales)
-            )
-            if search.converged(options.tolerance):
-                if (
-                    strategy != COARSE_TO_FINE
-                    and finest.accurate
-                    and finest.form.roller is not None
-                ):
-                    strategy, step = search.refine_third_order(finest, step)
-                search.solve_coarser_grid(finest)
-                break
-            if search.exhausted:
-                break
+        strategy, step = _solve_cold(search, finest, surface, conditions, lubricant)
     solution = search.solution(
         step,
         surface,
         conditions,
         lubricant,
         seconds=time.perf_counter() - began,
-        attempt=strategy,
+        attempt=ARITHMETIC if search.arithmetic else strategy,
         start=start,
     )
     return replace(solution, viscosity_factor=viscosity_factor)
+
+
+def _solve_cold(
+    search: MixedSearch,
+    finest: Problem,
+    surface: Surface,
+    conditions: ContactConditions,
+    lubricant: Lubricant,
+) -> tuple[str, Step]:
+    """Solve without a neighbouring solution; return the strategy and its last step."""
+    options, scales = search.options, Scales.from_conditions(conditions, lubricant)
+    film, robust = smooth_film(conditions, lubricant), replace(finest, exact=False)
+    tolerance, search.is_guess = options.tolerance, finest.exact
+    if finest.exact:
+        tolerance = max(tolerance, SEARCH.guess_tolerance)
+        search.options = replace(options, tolerance=tolerance)
+    for strategy in _strategies(surface, film, options.contact_film):
+        problem = robust if strategy == COARSE_TO_FINE else replace(robust, accurate=False)
+        levels = usable_levels(problem, conditions, lubricant)
+        step = search.solve_by(
+            strategy, levels, lambda on: first_guess(on, conditions, lubricant, scales)
+        )
+        if search.converged(tolerance):
+            if strategy != COARSE_TO_FINE and finest.accurate and finest.form.roller is not None:
+                strategy, step = search.refine_third_order(finest, step)
+            search.solve_coarser_grid(robust)
+            if finest.exact:
+                search.options, search.is_guess = options, False
+                step = solve_again(search, search.solved)
+        if search.converged(options.tolerance) or search.exhausted:
+            break
+    search.options = options
+    return strategy, step
 
 
 def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
@@ -229,7 +247,7 @@ class ElasticSearch(Search):
                 tolerance,
                 options.max_iterations if finest else 0,
             )
-            self.figures.append(self._figures(step))
+            self.figures.append(self.figures_of(step))
         return step
 
 

@@ -20,7 +20,8 @@ class Uncertainty:
     value : best estimate, mean over the solved surfaces
     iteration : from Newton's last step; None where undetermined
     grid : from the cell size; None where undetermined, as on a grid too small to have a coarser one
-    surfaces : from surface to surface of one kind; None where the result is about one surface
+    surfaces : from surface to surface of one kind, of a running contact from the finite time and
+        number of tracks; None where the result is about one surface
     record : from the length of one record; NONE for a number that needs no record
     range : bounds of the number
     """
@@ -81,11 +82,12 @@ class ContactError:
     """Uncertainty of a contact's load share and resonance.
 
     `clr` of the load share, `crf_hz` of the contact resonance (None where not sought or not found);
-    `surfaces` the number of solved surfaces. `choices` names assumptions not covered by the
-    interval.
+    `surfaces` the number of solved surfaces, or of tracks of a `running` contact. `choices` names
+    assumptions not covered by the interval.
     """
 
     clr: Uncertainty
     crf_hz: Uncertainty | None = None
     surfaces: int = 1
     choices: tuple[str, ...] = ()
+    running: bool = False

@@ -2,10 +2,9 @@
 
 x is the first axis and aperiodic with zero pressure on both end faces; y is the second axis and
 periodic. The wedge term is upwind, face value m + a (m_next - m) + b (m - m_upstream): second order
-with (a, b) = (0, 1/2), third with (3/8, 1/8). Poiseuille faces carry the arithmetic mean of two
-node mobilities or their logarithmic mean, which is exact for a viscosity that grows exponentially
-at a given flow; end faces carry the mean of their cell's mobility and its value at zero pressure.
-Knows no units, no lubricant and no tolerance.
+with (a, b) = (0, 1/2), third with (3/8, 1/8). Poiseuille faces carry a mean of two mobilities
+(`kernels.face_mobilities`); end faces carry the mean of their cell's mobility and its value at zero
+pressure. Knows no units, no lubricant and no tolerance.
 """
 
 from typing import NamedTuple
@@ -52,10 +51,11 @@ class Film(NamedTuple):
 class Faces(NamedTuple):
     """Mobility of the east and north face of each cell, with derivatives in both log mobilities.
 
-    The last face to the east is the outlet; `inlet` holds the first one to the west, shape (ny,);
-    `wedge` is (a, b). `behind` is the line of cells north of the last one: the first, where y is
-    periodic, or with a mirror the last or the last but one. With a mirror no Reynolds equation
-    holds in the first line.
+    Those that follow a cell's gap (`..._gap`) differ from those that follow its pressure where the
+    mean is exact, and are the same arrays elsewhere. The last face to the east is the outlet;
+    `inlet` holds the first one to the west, shape (ny,); `wedge` is (a, b). `behind` is the line of
+    cells north of the last one: the first, where y is periodic, or with a mirror the last or the
+    last but one. With a mirror no Reynolds equation holds in the first line.
     """
 
     east: Field
@@ -66,6 +66,10 @@ class Faces(NamedTuple):
     north_by_next: Field
     inlet: Field
     wedge: Field
+    east_by_own_gap: Field
+    east_by_next_gap: Field
+    north_by_own_gap: Field
+    north_by_next_gap: Field
     behind: int = 0
 
 
@@ -100,13 +104,17 @@ class Liquid(NamedTuple):
 
 
 @njit(cache=True)
-def fill_film(liquid: Liquid, height: Field, conductance: float, least: float, film: Film) -> None:
+def fill_film(
+    liquid: Liquid, height: Field, conductance: float, least: tuple[float, float], film: Film
+) -> None:
     """Fill the cells of `film`.
 
     `conductance` is the mobility per content and squared height, times the viscosity. The mobility
-    is at least `least` over the cubed height, and its derivatives are zero there: Newton's method
-    does not converge with its derivative in H.
+    is at least `least[0]` over the cubed height. There its derivative in P is zero, and that of its
+    logarithm in log H is `least[1]`: 0, or 3 for a constant fluidity; Newton's method does not
+    converge with its own, -3.
     """
+    least_mobility, least_slope = least
     nx, ny = height.shape
     for i in range(nx):
         for j in range(ny):
@@ -120,71 +128,17 @@ def fill_film(liquid: Liquid, height: Field, conductance: float, least: float, f
             mobility = (
                 conductance * content * h * h / (liquid.viscosity[i, j] * liquid.thinning[i, j])
             )
-            stiff = mobility * cubed < least
+            stiff = mobility * cubed < least_mobility
             film.content[i, j], film.content_by_gap[i, j], film.content_by_pressure[i, j] = (
                 content,
                 rho,
                 rho_p * h,
             )
-            film.mobility[i, j] = least / cubed if stiff else mobility
-            film.log_mobility_by_gap[i, j] = 0.0 if stiff else (3.0 + exponent) / h
+            film.mobility[i, j] = least_mobility / cubed if stiff else mobility
+            film.log_mobility_by_gap[i, j] = (least_slope if stiff else 3.0 + exponent) / h
             film.log_mobility_by_pressure[i, j] = (
                 0.0 if stiff else rho_p / rho - (1.0 + exponent) * liquid.log_slope[i, j]
             )
-
-
-@njit(cache=True)
-def _log_mean(own: float, following: float, log_ratio: float) -> tuple[float, float, float]:
-    """Return the logarithmic mean of two positive numbers and its slopes in their logarithms."""
-    if abs(log_ratio) < 1e-2:
-        mean = 0.5 * (own + following) * (1.0 - log_ratio * log_ratio / 12.0)
-        return mean, own * (0.5 - log_ratio / 6.0), following * (0.5 + log_ratio / 6.0)
-    mean = (own - following) / log_ratio
-    return mean, (own - mean) / log_ratio, (mean - following) / log_ratio
-
-
-@njit(cache=True)
-def face_mobilities(
-    film: Film, log_mobility: Field, logarithmic: bool, ends: Mask, faces: Faces
-) -> None:
-    """Fill `faces`; `log_mobility` is the natural logarithm of the film's mobility.
-
-    Arithmetic means unless `logarithmic`; north faces of the lines marked in `ends` always take the
-    logarithmic mean.
-    """
-    nx, ny = log_mobility.shape
-    eps = film.mobility
-    for j in range(ny):
-        faces.inlet[j] = 0.5 * (eps[0, j] + film.ambient[0, j])
-    for i in range(nx):
-        own, following = faces.east_by_own[i], faces.east_by_next[i]
-        if i == nx - 1:
-            for j in range(ny):
-                own[j], following[j] = 0.5 * eps[i, j], 0.0
-                faces.east[i, j] = own[j] + 0.5 * film.ambient[1, j]
-        elif logarithmic:
-            for j in range(ny):
-                ratio = log_mobility[i, j] - log_mobility[i + 1, j]
-                faces.east[i, j], own[j], following[j] = _log_mean(eps[i, j], eps[i + 1, j], ratio)
-        else:
-            for j in range(ny):
-                own[j], following[j] = 0.5 * eps[i, j], 0.5 * eps[i + 1, j]
-                faces.east[i, j] = own[j] + following[j]
-        own, following, last = faces.north_by_own[i], faces.north_by_next[i], ny - 1
-        if not logarithmic:
-            for j in range(last):
-                own[j], following[j] = 0.5 * eps[i, j], 0.5 * eps[i, j + 1]
-                faces.north[i, j] = own[j] + following[j]
-            own[last], following[last] = 0.5 * eps[i, last], 0.5 * eps[i, faces.behind]
-            faces.north[i, last] = own[last] + following[last]
-        for j in range(ny):
-            jn = j + 1 if j < last else faces.behind
-            if logarithmic:
-                ratio = log_mobility[i, j] - log_mobility[i, jn]
-                faces.north[i, j], own[j], following[j] = _log_mean(eps[i, j], eps[i, jn], ratio)
-            elif ends[j] and eps[i, j] > 0.0 and eps[i, jn] > 0.0:
-                ratio = np.log(eps[i, j]) - np.log(eps[i, jn])
-                faces.north[i, j], own[j], following[j] = _log_mean(eps[i, j], eps[i, jn], ratio)
 
 
 @njit(cache=True)
@@ -252,7 +206,10 @@ def _through_north(
     faces: Faces, pressure: Field, d_pressure: Field, d_log: Field, i: int, j: int, jn: int
 ) -> float:
     """Return the linearised Poiseuille flow from cell (i, j) to (i, jn)."""
-    d_face = faces.north_by_own[i, j] * d_log[j] + faces.north_by_next[i, j] * d_log[jn]
+    d_face = faces.north_by_own[i, j] * d_log[0, j] + faces.north_by_next[i, j] * d_log[0, jn]
+    d_face += (
+        faces.north_by_own_gap[i, j] * d_log[1, j] + faces.north_by_next_gap[i, j] * d_log[1, jn]
+    )
     d_flow = faces.north[i, j] * (d_pressure[i, j] - d_pressure[i, jn])
     flow: float = d_flow + d_face * (pressure[i, j] - pressure[i, jn])
     return flow
@@ -269,7 +226,10 @@ def _through_east(
     j: int,
 ) -> float:
     """Return the linearised Poiseuille flow from cell (i + 1, j) to (i, j)."""
-    d_face = faces.east_by_own[i, j] * d_log[j] + faces.east_by_next[i, j] * d_log_east[j]
+    d_face = faces.east_by_own[i, j] * d_log[0, j] + faces.east_by_next[i, j] * d_log_east[0, j]
+    d_face += (
+        faces.east_by_own_gap[i, j] * d_log[1, j] + faces.east_by_next_gap[i, j] * d_log_east[1, j]
+    )
     flow: float = faces.east[i, j] * (d_pressure[i + 1, j] - d_pressure[i, j]) + d_face * (
         pressure[i + 1, j] - pressure[i, j]
     )
@@ -283,7 +243,8 @@ def _through_outlet(
     """Return the linearised Poiseuille flow through the outlet over half a cell."""
     i, half = pressure.shape[0] - 1, pressure.dtype.type(0.5)
     d_face = (
-        faces.east_by_own[i, j] * d_log[j] + half * film.ambient_by_gap[1, j] * change.gap[i, j]
+        faces.east_by_own[i, j] * (d_log[0, j] + d_log[1, j])
+        + half * film.ambient_by_gap[1, j] * change.gap[i, j]
     )
     flow: float = faces.east[i, j] * change.pressure[i, j] + d_face * pressure[i, j]
     return flow
@@ -352,7 +313,8 @@ def jacobian_product(
     )
     log_h, log_p = film.log_mobility_by_gap, film.log_mobility_by_pressure
     m_h, m_p = film.content_by_gap, film.content_by_pressure
-    d_log, d_log_east = np.empty(ny, pressure.dtype), np.empty(ny, pressure.dtype)
+    # changes of the log mobility by pressure and by gap
+    d_log, d_log_east = np.empty((2, ny), pressure.dtype), np.empty((2, ny), pressure.dtype)
     before, here, after = (
         np.zeros(ny, pressure.dtype),
         np.empty(ny, pressure.dtype),
@@ -360,18 +322,18 @@ def jacobian_product(
     )
     upstream = np.empty(ny, pressure.dtype)
     for j in range(ny):
-        d_log[j] = log_h[0, j] * d_gap[0, j] + log_p[0, j] * d_pressure[0, j]
+        d_log[0, j], d_log[1, j] = log_p[0, j] * d_pressure[0, j], log_h[0, j] * d_gap[0, j]
         here[j] = m_h[0, j] * d_gap[0, j] + m_p[0, j] * d_pressure[0, j]
-        d_face = half * (film.mobility[0, j] * d_log[j] + film.ambient_by_gap[0, j] * d_gap[0, j])
+        d_face = half * film.mobility[0, j] * (d_log[0, j] + d_log[1, j])
+        d_face += half * film.ambient_by_gap[0, j] * d_gap[0, j]
         crossing = faces.inlet[j] * d_pressure[0, j] + d_face * pressure[0, j]
         upstream[j] = m_h[0, j] * d_gap[0, j] - real(2.0) * over_dx * crossing
     for i in range(nx):
         if i < nx - 1:
             upwind, downwind = (faces.wedge[1], faces.wedge[0]) if i > 0 else (real(0.0), real(0.0))
             for j in range(ny):
-                d_log_east[j] = (
-                    log_h[i + 1, j] * d_gap[i + 1, j] + log_p[i + 1, j] * d_pressure[i + 1, j]
-                )
+                d_log_east[0, j] = log_p[i + 1, j] * d_pressure[i + 1, j]
+                d_log_east[1, j] = log_h[i + 1, j] * d_gap[i + 1, j]
                 after[j] = m_h[i + 1, j] * d_gap[i + 1, j] + m_p[i + 1, j] * d_pressure[i + 1, j]
             for j in range(ny):
                 flux = here[j] + downwind * (after[j] - here[j]) + upwind * (here[j] - before[j])
@@ -389,7 +351,8 @@ def jacobian_product(
         _add_flow_across(faces, pressure, d_pressure, d_log, i, over_dy2, out)
         _scale_row(rows, change, i, real(rows.contact_scale), out)
         for j in range(ny):
-            before[j], here[j], d_log[j] = here[j], after[j], d_log_east[j]
+            before[j], here[j] = here[j], after[j]
+        d_log, d_log_east = d_log_east, d_log
 
 
 @njit(cache=True)
@@ -421,4 +384,4 @@ def convert_precision(out: Field, part: Field, least: float) -> None:
     nx, ny = part.shape
     for i in range(nx):
         for j in range(ny):
-            out[i, j] = part[i, j] if part[i, j] > least else 0.0
+            out[i, j] = part[i, j] if abs(part[i, j]) > least else 0.0

@@ -101,7 +101,10 @@ def _fill_north_slopes(
     across: Field,
     over: Field,
 ) -> None:
-    """Fill the derivatives of the flow through each north face of row `i` in both its cells."""
+    """Fill the derivatives of the flow through each north face of row `i` in both its cells.
+
+    `slope` holds those of the log mobility in pressure, by the pressure itself and by the gap.
+    """
     ny = pressure.shape[1]
     for j in range(ny):
         jn = j + 1 if j < ny - 1 else faces.behind
@@ -109,8 +112,14 @@ def _fill_north_slopes(
             over_dy2 * faces.north[i, j],
             over_dy2 * (pressure[i, j] - pressure[i, jn]),
         )
-        across[j] = through + pressure_gradient * faces.north_by_own[i, j] * slope[j]
-        over[j] = pressure_gradient * faces.north_by_next[i, j] * slope[jn] - through
+        by_own = faces.north_by_own[i, j] * slope[0, j] + faces.north_by_own_gap[i, j] * slope[1, j]
+        by_next = (
+            faces.north_by_next[i, j] * slope[0, jn] + faces.north_by_next_gap[i, j] * slope[1, jn]
+        )
+        across[j], over[j] = (
+            through + pressure_gradient * by_own,
+            pressure_gradient * by_next - through,
+        )
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"}, inline="always")
@@ -157,11 +166,8 @@ def own_stencil(
     nx, ny = pressure.shape
     real = out.centre.dtype.type
     zero, unity, two = real(0.0), real(1.0), real(2.0)
-    over_dx, over_dx2, over_dy2 = (
-        real(1.0 / spacing[0]),
-        real(1.0 / spacing[0] ** 2),
-        real(1.0 / spacing[1] ** 2),
-    )
+    over_dx = real(1.0 / spacing[0])
+    over_dx2, over_dy2 = real(1.0 / spacing[0] ** 2), real(1.0 / spacing[1] ** 2)
     own = real(compliance)
     m_h, m_p, log_h, log_p = (
         film.content_by_gap,
@@ -169,23 +175,32 @@ def own_stencil(
         film.log_mobility_by_gap,
         film.log_mobility_by_pressure,
     )
-    slope, slope_next, carried = np.empty((3, ny), out.centre.dtype)
+    slope, slope_next = np.empty((2, ny), out.centre.dtype), np.empty((2, ny), out.centre.dtype)
+    carried = np.empty(ny, out.centre.dtype)
     # derivatives of the flow through the east, west and north faces in the cells on both sides
     by_here, by_east, by_before, by_west, across, over = np.zeros((6, ny), out.centre.dtype)
     for j in range(ny):
-        slope_next[j] = log_p[0, j] + own * log_h[0, j]
+        slope_next[0, j], slope_next[1, j] = log_p[0, j], own * log_h[0, j]
         by_west[j] = -two * over_dx2 * faces.inlet[j]
     for i in range(nx):
         for j in range(ny):
-            slope[j] = slope_next[j]
+            slope[0, j], slope[1, j] = slope_next[0, j], slope_next[1, j]
             carried[j] = over_dx * (own * m_h[i, j] + m_p[i, j])
         if i < nx - 1:
             for j in range(ny):
-                slope_next[j] = log_p[i + 1, j] + own * log_h[i + 1, j]
+                slope_next[0, j], slope_next[1, j] = log_p[i + 1, j], own * log_h[i + 1, j]
                 through = over_dx2 * faces.east[i, j]
                 pressure_gradient = over_dx2 * (pressure[i, j] - pressure[i + 1, j])
-                by_here[j] = through + pressure_gradient * faces.east_by_own[i, j] * slope[j]
-                by_east[j] = pressure_gradient * faces.east_by_next[i, j] * slope_next[j] - through
+                by_own = (
+                    faces.east_by_own[i, j] * slope[0, j]
+                    + faces.east_by_own_gap[i, j] * slope[1, j]
+                )
+                by_next = (
+                    faces.east_by_next[i, j] * slope_next[0, j]
+                    + faces.east_by_next_gap[i, j] * slope_next[1, j]
+                )
+                by_here[j] = through + pressure_gradient * by_own
+                by_east[j] = pressure_gradient * by_next - through
         else:
             for j in range(ny):
                 by_here[j], by_east[j] = two * over_dx2 * faces.east[i, j], zero
@@ -374,10 +389,14 @@ def _fill_east_slopes(
             pressure_gradient * faces.east_by_own[i, j],
             pressure_gradient * faces.east_by_next[i, j],
         )
+        own_gap, next_gap = (
+            pressure_gradient * faces.east_by_own_gap[i, j],
+            pressure_gradient * faces.east_by_next_gap[i, j],
+        )
         by_gap[0, j], by_pressure[0, j] = -back * m_h[upstream, j], -back * m_p[upstream, j]
-        by_gap[1, j] = (unity - ahead + back) * m_h[i, j] + own * log_h[i, j]
+        by_gap[1, j] = (unity - ahead + back) * m_h[i, j] + own_gap * log_h[i, j]
         by_pressure[1, j] = (unity - ahead + back) * m_p[i, j] + own * log_p[i, j] + through
-        by_gap[2, j] = ahead * m_h[i + 1, j] + following * log_h[i + 1, j]
+        by_gap[2, j] = ahead * m_h[i + 1, j] + next_gap * log_h[i + 1, j]
         by_pressure[2, j] = ahead * m_p[i + 1, j] + following * log_p[i + 1, j] - through
 
 
@@ -403,10 +422,13 @@ def _add_across(
             over_dy2 * faces.north[i, j],
             over_dy2 * (pressure[i, j] - pressure[i, jn]),
         )
-        slope = film.log_mobility_by_pressure[i, j] + own * film.log_mobility_by_gap[i, j]
-        slope_next = film.log_mobility_by_pressure[i, jn] + own * film.log_mobility_by_gap[i, jn]
-        by_own = through + pressure_gradient * faces.north_by_own[i, j] * slope
-        by_next = -through + pressure_gradient * faces.north_by_next[i, j] * slope_next
+        log_p, log_h = film.log_mobility_by_pressure[i], film.log_mobility_by_gap[i]
+        slope = faces.north_by_own[i, j] * log_p[j] + faces.north_by_own_gap[i, j] * own * log_h[j]
+        slope_next = (
+            faces.north_by_next[i, j] * log_p[jn] + faces.north_by_next_gap[i, j] * own * log_h[jn]
+        )
+        by_own = through + pressure_gradient * slope
+        by_next = -through + pressure_gradient * slope_next
         if rows.state[i, j] == LUBRICATED:
             out.centre[i, j] += rows.fluid_scale[i, j] * by_own
             out.north[i, j] += rows.fluid_scale[i, j] * by_next

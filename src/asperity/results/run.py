@@ -3,7 +3,7 @@
 It contains no physics of its own, solves nothing and prints nothing.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,22 +12,24 @@ from typing import TYPE_CHECKING
 from asperity import ehl
 from asperity.case import Case
 from asperity.core.errors import BadInput
-from asperity.core.quantities import lines, quantity, read
+from asperity.core.quantities import Quantity, lines, quantity, read
 from asperity.coupling import Vibration, contact_vibration
 from asperity.ehl import ContactSolution, ContactState
 from asperity.resonance import Resonance
 from asperity.results.determined import Determined
 from asperity.results.dynamic import DynamicCurve, dynamic_curve
 from asperity.results.run_contents import run_contents
+from asperity.results.running import Running, mean_state
 from asperity.results.surface_spread import (
     AVERAGED,
     Row,
     Scalar,
     half_interval,
     mean_row,
+    running_error,
     total_error,
 )
-from asperity.results.uncertainty_text import basis, interval_text
+from asperity.results.uncertainty_text import basis, interval_text, threshold_note
 from asperity.solution import (
     FILMS,
     HOT,
@@ -61,6 +63,7 @@ BOUNDARY_FROM = 0.9
 RUN_GROUPS = (*AVERAGED, "solver")
 SHORT_GROUPS = tuple(group for group in RUN_GROUPS if group != "virgin")  # of short tables
 UNCERTAINTY = "uncertainty"  # group of the catalogue: intervals over all surfaces
+RUNNING = "running"  # group of the catalogue: the running contact beside its snapshot
 ENDS = "ends"  # group of the catalogue: rollers
 DAMPING = "contact_damping_ratio"
 ROUGHNESS_KEYS = ("lambda_ratio", "rms_slope")
@@ -76,6 +79,9 @@ class Run:
     kind: fields, state, vibration and friction are those of the first surface, `scalars` are means
     over all, and `error` states how far a single surface may deviate from them. `groups` of the
     catalogue are available for every surface.
+
+    Where the roughness moves, `running` has the means over time, which are the numbers and the
+    state; fields and own resonance are those of the snapshot at the start, the `solution`.
     """
 
     case: Case
@@ -85,6 +91,7 @@ class Run:
     notes: tuple[str, ...] = ()
     others: tuple[Row, ...] = ()
     groups: tuple[str, ...] = RUN_GROUPS
+    running: Running | None = None
 
     @cached_property
     def _friction_and_heat(self) -> Determined[tuple[Friction, FlashTemperature]]:
@@ -229,7 +236,14 @@ class Run:
 
     def numbers(self, groups: Sequence[str]) -> dict[str, Scalar]:
         """Return the numbers of some groups of the catalogue, with those of a roller's ends."""
-        return read(self, lines(*groups, *([] if self.axial is None else [ENDS])))
+        return self._read(lines(*groups, *([] if self.axial is None else [ENDS])))
+
+    def _read(self, entries: Iterable[Quantity]) -> dict[str, Scalar]:
+        """Return numbers by key: means over time of a running contact, else of the solution."""
+        entries = list(entries)
+        means = {} if self.running is None else self.running.numbers
+        numbers = read(self, [entry for entry in entries if entry.key not in means])
+        return {entry.key: means.get(entry.key, numbers.get(entry.key)) for entry in entries}
 
     @cached_property
     def axial(self) -> AxialDistribution | None:
@@ -238,7 +252,8 @@ class Run:
 
     def scalars(self) -> dict[str, Scalar]:
         """Return all numbers of the run by key, SI: means over surfaces, intervals, solver data."""
-        return mean_row((self.own_scalars, *self.others)) | read(self, lines(UNCERTAINTY))
+        means = mean_row((self.own_scalars, *self.others))
+        return means | read(self, lines(UNCERTAINTY, RUNNING))
 
     @cached_property
     def card(self) -> RegimeCard:
@@ -248,12 +263,23 @@ class Run:
     @cached_property
     def undetermined(self) -> str | None:
         """Reason why this grid does not determine CLR; None if it does."""
-        return undetermined(self.solution, self.error.clr)
+        # the error bar of a running contact compares two grids
+        return undetermined(self.solution, self.error.clr, resolved=self.running is not None)
+
+    @property
+    def converged(self) -> bool:
+        """True if the solution, or nearly every time step of a running contact, is converged."""
+        return self.solution.convergence.converged and getattr(self.running, "converged", True)
 
     @property
     def determined(self) -> bool:
         """True if CLR is converged and resolved, with an error bar below 15 %."""
-        return self.solution.convergence.converged and self.undetermined is None
+        return self.converged and self.undetermined is None
+
+    @property
+    def snapshot_clr(self) -> float:
+        """Load share of standing roughness."""
+        return self.state.clr if self.running is None else self.running.snapshot_clr
 
     def summary(self) -> dict[str, object]:
         """Return the content of `solve --json`: numbers, cells, regime card and notes.
@@ -266,6 +292,7 @@ class Run:
         oil: dict[str, object] = {"oil": {**values, "origins": origins}} if facts else {}
         return {
             **self.scalars(),
+            "roughness": "standing" if self.running is None else "running",
             "cells": list(self.solution.grid.cells),
             "regime_card": self.card.to_dict(),
             **oil,
@@ -295,8 +322,24 @@ class Run:
         determine CLR, the sentence states so, with the reason; likewise a film with an error bar
         above 15 %.
         """
+        regime, shared = self._regime_and_shares()
+        sentence = f"{regime}: {shared}"
+        if self.undetermined is not None:
+            sentence = (
+                f"Grid too coarse, CLR not determined ({self.undetermined}): on this grid {shared}"
+            )
+        if not self.converged:
+            sentence = f"NOT CONVERGED, do not use: {sentence}"
+        films = () if self.solution.lubricant is None else uncertain_films(self.numbers(["film"]))
+        doubt = ""
+        if films and self.undetermined is None:
+            doubt = f"film not determined ({', '.join(films)}); "
+        contact = f"{self._ends_text()}{self.resonance_text()}"
+        return f"{sentence}; {doubt}{contact}; {basis(self.error)}."
+
+    def _regime_and_shares(self) -> tuple[str, str]:
+        """Return the lubrication regime, and the shares of load and area as text."""
         numbers = mean_row((self.summary_row, *self.others))
-        error = self.error
         clr, car = (float(numbers[key]) for key in ("clr", "car"))
         if self.solution.lubricant is None:
             regime = "Dry contact"
@@ -305,24 +348,15 @@ class Run:
         else:
             regime = "Boundary lubrication" if clr >= BOUNDARY_FROM else "Mixed lubrication"
         load, area = (quantity(key).text(value) for key, value in (("clr", clr), ("car", car)))
-        known = (quantity(key).named(numbers[key]) for key in ROUGHNESS_KEYS if numbers[key])
-        roughness = ", ".join(known)
+        roughness = ", ".join(quantity(k).named(numbers[k]) for k in ROUGHNESS_KEYS if numbers[k])
         bearing = "asperities carry" if self.state.sq > 0.0 else "solid contact carries"
         shared = (
-            f"{bearing} {load} of the load {interval_text('clr', error.clr)} on {area} of "
+            f"{bearing} {load} of the load {interval_text('clr', self.error.clr)} on {area} of "
             f"the Hertz zone{roughness and f' ({roughness})'}"
         )
-        sentence = f"{regime}: {shared}"
-        if self.undetermined is not None:
-            sentence = (
-                f"Grid too coarse, CLR not determined ({self.undetermined}): on this grid {shared}"
-            )
-        if not self.solution.convergence.converged:
-            sentence = f"NOT CONVERGED, do not use: {sentence}"
-        films, doubt = uncertain_films(self.solution, contact_state(self.solution)), ""
-        if films and self.undetermined is None:
-            doubt = f"film not determined ({', '.join(films)}); "
-        return f"{sentence}; {doubt}{self._ends_text()}{self.resonance_text()}; {basis(error)}."
+        if self.running is None:
+            return regime, shared
+        return regime, f"{shared}, standing still {quantity('clr').text(self.snapshot_clr)}"
 
     def _ends_text(self) -> str:
         """Return edge pressure and loaded length of a roller; empty for other contacts."""
@@ -344,7 +378,7 @@ class Run:
     @property
     def summary_row(self) -> Row:
         """Numbers of the first surface for the verdict and the intervals; quick to compute."""
-        return read(self, map(quantity, SUMMARY_KEYS))
+        return self._read(map(quantity, SUMMARY_KEYS))
 
     def resonance_text(self) -> str:
         """Return the contact resonance with its interval, or the reason why there is none."""
@@ -378,19 +412,23 @@ def run_of(
     others: Sequence[Row] = (),
     vibration: Vibration | None = None,
     groups: tuple[str, ...] = RUN_GROUPS,
+    running: Running | None = None,
 ) -> Run:
     """Return the run of a solved case; its vibration is computed unless given.
 
-    `others` are the numbers of further surfaces, of these `groups` of the catalogue.
+    `others` are the numbers of further surfaces, of these `groups` of the catalogue; `running` has
+    the means of a running contact whose snapshot is the `solution`.
     """
     state = contact_state(solution)
+    if running is not None:
+        state = mean_state(state, running)
     model = case.vibration
     if model is not None and vibration is None:
         with case.naming("vibration"):
             vibration = contact_vibration(state, case.conditions, model, solution=solution)
     notes = (*notes, *solution_notes(solution))
     if solution.options.model == "conserving":
-        notes = (*notes, _threshold(solution))
+        notes = (*notes, threshold_note(solution))
     if not solution.convergence.converged:
         notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
     rows = tuple(others)
@@ -402,20 +440,11 @@ def run_of(
         notes=notes,
         others=rows,
         groups=groups,
+        running=running,
     )
-    error = total_error(state, (run.summary_row, *others), case.conditions, model, vibration)
+    row, conditions = run.summary_row, case.conditions
+    if running is None:
+        error = total_error(state, (row, *others), conditions, model, vibration)
+    else:
+        error = running_error(state, row, running, conditions, model, vibration)
     return replace(run, state=replace(state, error=error))
-
-
-def _threshold(solution: ContactSolution) -> str:
-    """Return a note on what CLR counts in the conserving model, with shares by film thickness."""
-    sharing = sharing_by_film(solution)
-    shares = ", ".join(
-        f"{100 * share:.0f} % on at most {film * 1e9:.0f} nm"
-        for film, share in zip(sharing.films, sharing.below, strict=True)
-    )
-    return (
-        "Model conserving: CLR and CAR count cells whose elastic bodies touch, even if oil at "
-        f"the cap separates them again. Load by film thickness: {shares}. The share at the "
-        "contact film depends on the grid."
-    )

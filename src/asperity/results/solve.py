@@ -18,6 +18,7 @@ from asperity.core.storage import version_notes
 from asperity.coupling import require_sampling
 from asperity.results.determined import Determined
 from asperity.results.run import RUN_GROUPS, Run, run_of
+from asperity.results.running import TRACKS, Running, run_tracks
 from asperity.results.surface_spread import Row
 from asperity.solution import load_solution, solve_thermal_contact
 from asperity.surface import Surface
@@ -72,10 +73,24 @@ def solve_case(
             )
         case = replace(case, stored=surface)
         surfaces = 1
+    if case.is_running:
+        return _running(case, surfaces, workers, surface_progress, strict, groups)
     count = case.surface_count(surfaces)
     run = _first(case, progress, strict, groups)
     if count == 1 or not run.solution.convergence.converged:
         return run
+    return _with_further_surfaces(run, count, workers, progress, surface_progress)
+
+
+def _with_further_surfaces(
+    run: Run,
+    count: int,
+    workers: int,
+    progress: Callable[[ehl.Iteration], None] | None,
+    surface_progress: SurfaceProgress | None,
+) -> Run:
+    """Return the run with the numbers of `count` surfaces, its own included."""
+    case, groups = run.case, run.groups
     further_cases = [case.on_surface(number) for number in range(1, count)]
     seconds = run.solution.convergence.seconds
     parallel = workers > 1 and seconds * len(further_cases) > MIN_PARALLEL_S
@@ -94,6 +109,45 @@ def solve_case(
     return run_of(
         case, replace(run.solution, attributes=attributes), notes, others, run.vibration, groups
     )
+
+
+def _running(
+    case: Case,
+    tracks: int | None,
+    workers: int,
+    progress: SurfaceProgress | None,
+    strict: bool,
+    groups: tuple[str, ...],
+) -> Run:
+    """Solve a case whose roughness moves: means over time of the running contact."""
+    requested = tracks or case.contents.solver.surfaces
+    count = case.surface_count(requested) if requested else min(TRACKS, case.surface_count())
+    _require_sampling(case)
+    attributes = {"case": case.text, "notes": json.dumps([*case.surface_notes, *case.notes])}
+    try:
+        running, solution, notes = run_tracks(
+            case, tracks=count, workers=workers, progress=progress
+        )
+    except NotConverged as failure:
+        solution = replace(failure.solution, attributes=attributes)
+        if strict:
+            raise NotConverged(solution, str(failure)) from None
+        return run_of(case, solution, (*case.surface_notes, *case.notes), groups=groups)
+    notes = [*case.surface_notes, *case.notes, *notes]
+    attributes |= {"notes": json.dumps(notes), "running": running.to_json()}
+    solution = replace(solution, attributes=attributes)
+    run = run_of(case, solution, notes, groups=groups, running=running)
+    if strict and not run.converged:
+        failed = f"{running.failed} of {running.steps} time steps did not converge"
+        raise NotConverged(solution, f"contact not solved: {failed}")
+    return run
+
+
+def _require_sampling(case: Case) -> None:
+    """Check the sampling of the vibration before the solution, which takes longer."""
+    if case.vibration is not None:
+        with case.naming("vibration"):
+            require_sampling(case.conditions, case.vibration, case.surface().sq)
 
 
 def _collect(
@@ -124,10 +178,7 @@ def _first(
 ) -> Run:
     """Solve a case on its own surface."""
     roughness = case.surface()
-    if case.vibration is not None:
-        with case.naming("vibration"):
-            # check before the solution, which takes longer
-            require_sampling(case.conditions, case.vibration, roughness.sq)
+    _require_sampling(case)
     notes = (*case.surface_notes, *case.notes)
     attributes = {"case": case.text, "notes": json.dumps(notes)}
     try:
@@ -220,17 +271,24 @@ def load_run(path: str | Path) -> Run:
         text = solution.attributes["case"]
         notes = tuple(json.loads(solution.attributes["notes"]))
         others = json.loads(solution.attributes.get("surfaces", "[]"))
-    except (KeyError, ValueError):
+        record = solution.attributes.get("running")
+        running = None if record is None else Running.from_json(record)
+    except (KeyError, TypeError, ValueError):
         raise UnreadableFile(
             f"{path} contains a solution without its case; save the run (Run.save), not the "
             "solution"
         ) from None
     case = load_case(text, folder=path.parent, name=str(path), stored=solution.surface)
-    if (case.conditions, case.grid) != (solution.conditions, solution.grid) or (
-        case.lubricant != solution.lubricant or case.options != solution.options
+    grid, options = case.grid, case.options
+    if running is not None:  # has its own cells and tolerance
+        grid = replace(grid, cells=solution.grid.cells)
+        options = replace(options, tolerance=solution.options.tolerance)
+    if (case.conditions, grid) != (solution.conditions, solution.grid) or (
+        case.lubricant != solution.lubricant or options != solution.options
     ):
         raise UnreadableFile(
             f"{path} contains a case that differs from its solution; solve the case again"
         )
     case = replace(case, stored_notes=tuple(note for note in notes if note not in case.notes))
-    return run_of(case, solution, (*version_notes(solution.versions), *notes), others)
+    notes = (*version_notes(solution.versions), *notes)
+    return run_of(case, solution, notes, others, running=running)

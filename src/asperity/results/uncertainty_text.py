@@ -1,7 +1,8 @@
 """Uncertainty of a contact's numbers as text: in a sentence, and by part for tables."""
 
 from asperity.core.quantities import NO_VALUE, Quantity, quantity
-from asperity.ehl import ContactError, Sides, Uncertainty
+from asperity.ehl import ContactError, ContactSolution, Sides, Uncertainty
+from asperity.solution import sharing_by_film
 
 PARTS = {  # part of an uncertainty: name in tables
     "iteration": "iteration",
@@ -27,6 +28,12 @@ def interval_text(key: str, error: Uncertainty) -> str:
 
 def basis(error: ContactError) -> str:
     """Return the reference of the intervals as text."""
+    if error.running:
+        tracks = "track" if error.surfaces == 1 else "tracks"
+        return (
+            f"mean over time of {error.surfaces} {tracks} of running roughness, 90 % intervals of "
+            "this mean"
+        )
     if error.surfaces == 1:
         return "90 % intervals for this surface"
     return (
@@ -40,24 +47,26 @@ def uncertainty_rows(error: ContactError) -> list[tuple[str, str]]:
     rows = []
     for key, part in (("clr", error.clr), ("crf_hz", error.crf_hz)):
         if part is not None:
-            rows += _rows(quantity(key), part, error.surfaces)
+            rows += _rows(quantity(key), part, error)
     return [*rows, ("assumptions not covered by the intervals", ", ".join(error.choices))]
 
 
-def _rows(entry: Quantity, error: Uncertainty, surfaces: int) -> list[tuple[str, str]]:
+def _rows(entry: Quantity, error: Uncertainty, whole: ContactError) -> list[tuple[str, str]]:
     unknown = error.low is None or error.high is None
     interval = UNDETERMINED if unknown else entry.interval(error.low or 0.0, error.high or 0.0)
     rows = [(f"{entry.short}, 90 % interval", interval)]
     for part, name in PARTS.items():
         sides: Sides | None = getattr(error, part)
         if part == "surfaces" and sides is None:
-            text = "unknown (one surface solved)" if surfaces == 1 else UNDETERMINED
+            text = "unknown (one surface solved)" if whole.surfaces == 1 else UNDETERMINED
         elif sides is None:
             text = f"{UNDETERMINED} ({REASONS[part]})"
         elif sides == (0.0, 0.0) and part == "record":
             continue
         else:
             text = _sides(entry, sides)
+        if part == "surfaces" and whole.running:
+            name = "time and tracks"
         rows.append((f"{entry.short}, {name}", text))
     return rows
 
@@ -66,3 +75,17 @@ def _sides(entry: Quantity, sides: Sides) -> str:
     below, above = (entry.number(side) for side in sides)
     number = f"± {above}" if below == above else f"− {below} + {above}"
     return f"{number} {entry.display}".rstrip() if NO_VALUE not in number else UNDETERMINED
+
+
+def threshold_note(solution: ContactSolution) -> str:
+    """Return a note on what CLR counts in the conserving model, with shares by film thickness."""
+    sharing = sharing_by_film(solution)
+    shares = ", ".join(
+        f"{100 * share:.0f} % on at most {film * 1e9:.0f} nm"
+        for film, share in zip(sharing.films, sharing.below, strict=True)
+    )
+    return (
+        "Model conserving: CLR and CAR count cells whose elastic bodies touch, even if oil at "
+        f"the cap separates them again. Load by film thickness: {shares}. The share at the "
+        "contact film depends on the grid."
+    )

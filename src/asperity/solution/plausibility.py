@@ -1,6 +1,6 @@
 """Plausibility notes on a contact: implausible input and solutions are noted, not refused."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -9,7 +9,6 @@ from asperity.contact.grid import Grid
 from asperity.core.quantities import quantity
 from asperity.ehl import (
     ContactSolution,
-    ContactState,
     Uncertainty,
     flooded_inlet,
     grid_shortfalls,
@@ -19,6 +18,7 @@ from asperity.ehl import (
 )
 from asperity.ehl.grid_design import CELLS_IN_INLET, MAX_CLR_ERROR, MAX_FILM_ERROR
 from asperity.ehl.load_shares import carried_share
+from asperity.ehl.outcome import ARITHMETIC
 from asperity.lubricant import Barus, Lubricant, Roelands
 from asperity.solution.ends import LOADED_END, axial_distribution
 from asperity.solution.regime import far_from_fits
@@ -87,10 +87,15 @@ def solution_notes(solution: ContactSolution) -> tuple[str, ...]:
     return tuple(_of_solution(solution))
 
 
-def undetermined(solution: ContactSolution, clr: Uncertainty) -> str | None:
-    """Return the reason why this grid does not determine CLR (error `clr`); None if it does."""
+def undetermined(
+    solution: ContactSolution, clr: Uncertainty, *, resolved: bool = False
+) -> str | None:
+    """Return the reason why this grid does not determine CLR (error `clr`); None if it does.
+
+    Cells are not judged where they are `resolved`: compared with a coarser grid in all respects.
+    """
     reasons: list[str] = []
-    if not is_below_contact_film(solution):
+    if not resolved and not is_below_contact_film(solution):
         reasons += grid_shortfalls(solution.conditions, solution.lubricant, solution.surface)
     # between smooth bodies the coarser grid has contact because it does not resolve the inlet
     if solution.surface.sq > 0.0:
@@ -104,17 +109,13 @@ def undetermined(solution: ContactSolution, clr: Uncertainty) -> str | None:
     return "; ".join(reasons) or None
 
 
-def uncertain_films(solution: ContactSolution, state: ContactState) -> tuple[str, ...]:
-    """Return the films whose error bar is above 15 %, each with its bar; none without oil."""
-    error = solution.convergence.error
-    if error is None or solution.lubricant is None:
-        return ()
-    names = "h_min", "h_central"
-    values = ((f"{name}_m", getattr(state, name), getattr(error, name)) for name in names)
+def uncertain_films(numbers: Mapping[str, float | None]) -> tuple[str, ...]:
+    """Return the films whose error bar is above 15 %, each with its bar, from numbers by key."""
+    values = ((f"{name}_m", f"{name}_error_m") for name in ("h_min", "h_central"))
     return tuple(
         f"{quantity(key).name} ± {100.0 * bar / film:.0f} %"
-        for key, film, bar in values
-        if bar > MAX_FILM_ERROR * film
+        for key, error in values
+        if (film := numbers[key]) and (bar := numbers[error]) and bar > MAX_FILM_ERROR * film
     )
 
 
@@ -204,6 +205,11 @@ def _of_solution(solution: ContactSolution) -> Iterator[str]:
     if edges := _reached_edges(solution):
         yield f"The contact reaches the {edges} of the grid and is cut off there. Widen the grid."
     yield from _of_cells(solution)
+    if solution.convergence.attempt == ARITHMETIC:
+        yield (
+            "The hot film is solved with arithmetic mean mobilities of the faces between cells, "
+            "which drain thin films too fast: CLR is too high, by up to 0.3 on a coarse grid."
+        )
     if (
         lubricant is not None
         and (radii := ridge_radii(solution))

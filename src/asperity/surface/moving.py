@@ -99,6 +99,22 @@ class MovingSurfaces:
         first, second = (self._heights_at(index, time) for index in (0, 1))
         return Surface(first + second[:, ::-1], self.grid)
 
+    def on_cells(self, cells: tuple[int, int]) -> "MovingSurfaces":
+        """Return the same roughness on fewer cells, without the waves that these do not resolve."""
+        (nx, ny) = self.grid.cells
+
+        def resampled(surface: Surface) -> Surface:
+            track = surface.grid
+            count = (round(track.cells[0] * cells[0] / nx), cells[1])
+            heights = _fewer_periodic(surface.heights, count[0])
+            fewer = _fewer_periodic if track.periodic[1] else _fewer_mirrored
+            return Surface(fewer(heights.T, count[1]).T.copy(), replace(track, cells=count))
+
+        if cells[0] > nx or cells[1] > ny:
+            raise BadInput(f"cells must be at most {self.grid.cells}, got {cells}")
+        grid = replace(self.grid, cells=cells)
+        return MovingSurfaces(resampled(self.first), resampled(self.second), self.speeds, grid)
+
     def lowered(self, first: Field, second: Field) -> "MovingSurfaces":
         """Return the surfaces with the heights of each track lowered by these fields [m]."""
         return MovingSurfaces(
@@ -154,6 +170,23 @@ def shift_periodic(heights: Field, cells: float, spectrum: ComplexField) -> Fiel
     if count % 2 == 0:
         phase[-1] = np.cos(np.pi * cells)  # the Nyquist wave is sampled at its crests only
     return np.asarray(scipy.fft.irfft(spectrum * phase[:, None], n=count, axis=0))
+
+
+def _fewer_periodic(heights: Field, count: int) -> Field:
+    """Return periodic heights at the centres of `count` cells along axis 0."""
+    cells = heights.shape[0]
+    if count == cells:
+        return heights
+    waves = np.arange((count + 1) // 2)  # without the Nyquist wave
+    shift = np.exp(1j * np.pi * waves * (1.0 / count - 1.0 / cells))  # of the cells' centres
+    spectrum = scipy.fft.rfft(heights, axis=0)[: waves.size] * shift[:, None]
+    return np.asarray(scipy.fft.irfft(spectrum * (count / cells), n=count, axis=0))
+
+
+def _fewer_mirrored(heights: Field, count: int) -> Field:
+    """Return heights that need not be periodic at the centres of `count` cells along axis 0."""
+    cosines = scipy.fft.dct(heights, axis=0, norm="forward")[:count]
+    return np.asarray(scipy.fft.idct(cosines, n=count, axis=0, norm="forward"))
 
 
 def track_grid(grid: Grid, lengths: int = 1) -> Grid:

@@ -160,7 +160,10 @@ class _TransientContact:
         # shares of the bodies in the flattening
         self.shares = [float(is_rough) / max(sum(surfaces.rough), 1) for is_rough in surfaces.rough]
         self.attempt = ATTEMPTS[1] if rough else ATTEMPTS[0]  # smooth bodies: the accurate wedge
-        self.follows_oil = rough and time_step == 1.0
+        self.follows_oil = rough and (
+            time_step.is_integer() if self.options.model == MIXED else time_step == 1.0
+        )
+        self.cells = int(time_step)  # that oil travels in a step, if it is followed
         self.moved = _cells_moved(surfaces, self.seconds)
 
     def start(self, *, steady: bool) -> Snapshot:
@@ -258,34 +261,33 @@ class _TransientContact:
         return replace(steady_problem, past=past)
 
     def _past(self, memory: Memory) -> TransientTerm:
-        content = memory["content"]
-        upwinded = self.options.model == MIXED and self.follows_oil
-        first_order = upwinded or self.options.model == CONSERVING
-        if "content_before" in memory and not first_order:
-            previous = memory["content_before"]
-            rate = 1.5
-            previous_weight = -2.0
-            earlier_weight = 0.5
-        else:  # first order: no earlier flow after a start from rest, or upwinding in space
-            previous = content
-            rate = 1.0
-            previous_weight = -1.0
-            earlier_weight = 0.0
-        source = previous_weight * content + earlier_weight * previous
+        content, model = memory["content"], self.options.model
+        if self.follows_oil and model == MIXED:
+            return self._past_along_the_path(memory)
+        rate, source = 1.0, -content
+        if "content_before" in memory and model != CONSERVING:
+            rate, source = 1.5, 0.5 * memory["content_before"] - 2.0 * content
         if not self.follows_oil:
-            return TransientTerm(rate / self.length, source / self.length, self.follows_oil)
-        if self.options.model == CONSERVING:
+            return TransientTerm(rate / self.length, source / self.length, lagrangian=False)
+        if model == CONSERVING:
             source[0], source[1:] = 0.0, -content[:-1]
-            return TransientTerm(rate / self.length, source / self.length, self.follows_oil)
-        source[2:] = previous_weight * content[1:-1] + earlier_weight * previous[:-2]
-        past = TransientTerm(rate / self.length, source / self.length, self.follows_oil)
-        if not upwinded:
-            return past
-        upstream, leant = (
-            np.concatenate([memory[name][:1], memory[name][:-1]]) for name in ("content", "leant")
+        elif rate == 1.0:  # no earlier flow after a start from rest
+            source[2:] = -content[1:-1]
+        else:
+            source[2:] = 0.5 * memory["content_before"][:-2] - 2.0 * content[1:-1]
+        return TransientTerm(rate / self.length, source / self.length, lagrangian=True)
+
+    def _past_along_the_path(self, memory: Memory) -> TransientTerm:
+        """Return the derivative along the oil's path: first order, corrected to the second."""
+        upstream, limiter_correction = (
+            _carried(memory[name], self.cells) for name in ("content", "leant")
         )
-        leant[:2] = 0.0
-        return replace(past, upstream=upstream, limiter_correction=leant)
+        limiter_correction[:2] = 0.0
+        source = -upstream
+        source[:2] = -memory["content"][:2]
+        return TransientTerm(
+            1.0 / self.length, source / self.length, True, upstream, limiter_correction
+        )
 
     def _snapshot(
         self,
@@ -345,6 +347,11 @@ def _cells_moved(surfaces: MovingSurfaces, seconds: float) -> int:
     """Return the number of cells that roughness moves per step (mean of the rough bodies)."""
     speeds = [speed for speed, rough in zip(surfaces.speeds, surfaces.rough, strict=True) if rough]
     return round(sum(speeds) / max(len(speeds), 1) * seconds / surfaces.grid.spacing[0])
+
+
+def _carried(field: Field, cells: int) -> Field:
+    """Return a field carried downstream by whole cells; the first cell's value follows it."""
+    return field[np.maximum(np.arange(len(field)) - cells, 0)]
 
 
 def _oil(balance: Balance | MixedBalance) -> Field:

@@ -6,9 +6,8 @@ treats the oil's rows by blocks and lines, like `asperity.ehl.linear_solvers.sin
 touching cell's row by its own compliance.
 
 Two differences reduce GMRES steps fivefold where oil is stiff. A cell's pressure changes its own
-gap only: oil carries its film downstream unchanged, while the differences of a stencil truncated
-after three cells make it decay. And mobilities are linearised: beside asperities the oil pressure
-varies so strongly from cell to cell that this outweighs the mobilities themselves.
+gap only: oil carries its film downstream unchanged, and a stencil of three cells would damp it. And
+mobilities are linearised: beside asperities this outweighs the mobilities themselves.
 """
 
 from dataclasses import replace
@@ -160,10 +159,8 @@ class MixedLinear:
         there may reduce a cell's own entry to a sixth of its first-order value.
         """
         film, dx = self.film.with_fixed_gap(~self.free), self.real(self.balance.problem.spacing[0])
-        content = (
-            film.content_by_gap * self.real(1.0 / self.rows.contact_scale)
-            + film.content_by_pressure
-        )
+        content = film.content_by_gap * self.real(1.0 / self.rows.contact_scale)
+        content += film.content_by_pressure
         entry, upstream = np.zeros_like(content), np.zeros_like(content)  # limited flow, east faces
         entry[1:-1] = (by_own * content)[1:-1] / dx
         upstream[1:-1] = by_upstream[1:-1] * content[:-2] / dx
@@ -442,9 +439,12 @@ def _known_changes(linear: MixedLinear) -> tuple[Field, Field]:
 
 def _linear_tolerance(linear: MixedLinear) -> float:
     """Return the tolerance of GMRES."""
-    conserve, balance = linear.balance.problem.conserve, linear.balance
-    if conserve and linear.lagrangian and balance.residual_rms < MIXED_SOLVER.conserving_residual:
-        return MIXED_SOLVER.tolerance_conserving
-    if conserve and not linear.lagrangian and has_thin_film(balance):
-        return MIXED_SOLVER.tolerance_separated
+    balance, residual = linear.balance, linear.balance.residual_rms
+    if balance.problem.conserve:
+        if linear.lagrangian and residual < MIXED_SOLVER.conserving_residual:
+            return MIXED_SOLVER.tolerance_conserving
+        if not linear.lagrangian and has_thin_film(balance):
+            return MIXED_SOLVER.tolerance_separated
+    if balance.problem.exact and residual < MIXED_SOLVER.exact_residual:
+        return MIXED_SOLVER.tolerance_exact
     return MIXED_SOLVER.tolerance_smooth if linear.follows_wedge else MIXED_SOLVER.tolerance

@@ -123,7 +123,7 @@ class Linear:
         stencil = Stencil(*np.empty((5, *self.cells), self.dtype))
         zero = np.zeros(self.cells, self.dtype)
         film = self.film or Film(*[zero] * 8)
-        faces = self.faces or Faces(zero, zero, zero, zero, zero, zero, zero[0], zero[0])
+        faces = self.faces or Faces._make([*[zero] * 6, zero[0], zero[0], *[zero] * 4, 0])
         problem = self.balance.problem
         compliance = problem.deflection.local_compliance
         stencils.local_stencil(
@@ -251,13 +251,14 @@ def _block_size(cells: int) -> int:
 def single_faces(faces: Faces, dtype: Precision = np.float32) -> Faces:
     """Convert faces to another precision, with values that would be denormal set to zero."""
     least = PRECONDITIONER.min_mobility * float(max(faces.east.max(), faces.north.max()))
-    *parts, inlet, wedge, behind = faces
-    single = np.empty((len(parts), *faces.east.shape), dtype)
-    for part, out in zip(parts, single, strict=True):
-        reynolds.convert_precision(out, part, least)
-    return Faces._make(
-        [*single, np.where(inlet > least, inlet, 0.0).astype(dtype), wedge.astype(dtype), behind]
-    )
+    # the same array may stand for several parts
+    fields = {id(part): part for part in faces if isinstance(part, np.ndarray) and part.ndim == 2}
+    single = dict(zip(fields, np.empty((len(fields), *faces.east.shape), dtype), strict=True))
+    for number, part in fields.items():
+        reynolds.convert_precision(single[number], part, least)
+    inlet = np.where(faces.inlet > least, faces.inlet, 0.0).astype(dtype)
+    parts = [single.get(id(part), part) for part in faces]
+    return Faces._make(parts)._replace(inlet=inlet, wedge=faces.wedge.astype(dtype))
 
 
 class _Pattern(NamedTuple):

@@ -271,6 +271,8 @@ def _balance(
         oil_residual, state = np.empty_like(cells.gap), np.empty_like(solid)
         load_sharing.fill_oil_rows(cells, bounds, scale, oil_residual, state)
         load_sharing.fix_film_gap(sealed, film)
+        if problem.exact:  # their mobility is that of the contact film
+            film.log_mobility_by_gap[sunk] = 0.0
     else:
         film, scale, oil_residual, state = _conserving_rows(
             problem, flow, flow.surplus_by_oil, sealed

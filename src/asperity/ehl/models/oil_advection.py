@@ -59,14 +59,13 @@ def second_order_outflow(
     """Return the outflow of each cell due to the second order of the wedge, (nx, ny)."""
     if not is_lagrangian(problem):
         return limiter_outflow(problem, content, limiter, limiter)
-    assert problem.past is not None
-    added = limiter * (content - upstream_content(problem, content)) / problem.spacing[0]
-    limiter_correction = problem.past.limiter_correction
-    return (
-        added - limiter_correction / problem.spacing[0]
-        if second_order and limiter_correction is not None
-        else added
-    )
+    past = problem.past
+    assert past is not None
+    added = limiter * (content - upstream_content(problem, content))
+    if second_order and past.limiter_correction is not None:
+        added -= past.limiter_correction
+    added *= past.rate
+    return added
 
 
 def limiter_outflow(problem: Problem, content: Field, own: Field, upstream: Field) -> Field:
@@ -75,8 +74,9 @@ def limiter_outflow(problem: Problem, content: Field, own: Field, upstream: Fiel
     The correction is `own` times a cell's content less `upstream` times that upstream: the limiter
     itself, or its derivatives.
     """
-    if is_lagrangian(problem):
-        return own * content * content.dtype.type(1.0 / problem.spacing[0])
+    past = problem.past
+    if past is not None and past.lagrangian:
+        return own * content * content.dtype.type(past.rate)
     added = np.empty_like(content)
     limited_outflow(content, own, upstream, problem.spacing[0], added)
     return added

@@ -17,7 +17,7 @@ from asperity.ehl.deflection import MIRROR_THROUGH, Deflection, deflection
 from asperity.ehl.grid_transfer import AnyField, average, interpolate, mirror_field
 from asperity.ehl.load_shares import within_ellipse
 from asperity.ehl.roller_profile import BodyShape
-from asperity.kernels import reynolds
+from asperity.kernels import face_mobilities, reynolds
 from asperity.kernels.reynolds import (
     CAPPED,
     LUBRICATED,
@@ -76,10 +76,11 @@ class Problem:
     is the shear rate [1/s]; `viscosity_factor` is the local over the isothermal viscosity, shape
     (nx, ny), None for 1. An aperiodic contact is bounded by lines of cells at ambient pressure, a
     roller by everything outside it. `accurate` selects the third-order wedge and logarithmic mean
-    mobilities, `conserve` mass-conserving cavitation. `past` is the time derivative, None for a
-    steady contact. `fixed` marks cells, (nx, ny), whose pressures are given; the approach is then
-    fixed too. If `mirror` is not 0, cells end at the plane Y = 0, MIRROR_BETWEEN two lines of cells
-    or MIRROR_THROUGH the last one, and the rest is their image.
+    mobilities, `exact` mobilities that are exact for a linear gap, which need a least mobility;
+    `conserve` mass-conserving cavitation. `past` is the time derivative, None if steady. `fixed`
+    marks cells, (nx, ny), of given pressure, at a fixed approach. If `mirror` is not 0, cells end
+    at the plane Y = 0, MIRROR_BETWEEN two lines of cells or MIRROR_THROUGH the last one, and the
+    rest is their image.
     """
 
     form: BodyShape
@@ -95,6 +96,7 @@ class Problem:
     lubricant: Lubricant | None
     viscosity_factor: Field | None = None
     accurate: bool = False
+    exact: bool = False
     conserve: bool = False
     past: TransientTerm | None = None
     fixed: Mask | None = None
@@ -304,19 +306,17 @@ class Problem:
         wedge: tuple[float, float],
         least_mobility: float = 0.0,
     ) -> tuple[Film, Faces, Field, Field]:
-        """Return the flow of an oil pressure and a gap.
-
-        Film, faces, net outflow of each cell, and the inverse of its derivative.
-        """
+        """Return film, faces, net outflow of each cell and the inverse of its derivative."""
         gap = self.filmed(gap)
         height = np.maximum(gap, self.contact_gap)
         film = self._film(pressure, height, oil, least_mobility)
         behind = self.cells[1] - self.mirror if self.mirror else 0
-        parts = [*np.empty((6, *self.cells)), np.empty(self.cells[1]), np.array(wedge), behind]
-        faces, log_mobility = Faces._make(parts), film.mobility
-        if self.accurate:
-            log_mobility = np.log(np.maximum(film.mobility, np.finfo(float).tiny))
-        reynolds.face_mobilities(film, log_mobility, self.accurate, self._ends, faces)
+        east, north = np.empty((2, 3, *self.cells))
+        by_gap = [*np.empty((4, *self.cells))] if self.exact else [*east[1:], *north[1:]]
+        inlet = np.empty(self.cells[1])
+        faces = Faces._make([*east, *north, inlet, np.array(wedge), *by_gap, behind])
+        mean = face_mobilities.MEANS[2 if self.exact else int(self.accurate)]
+        face_mobilities.face_mobilities(film, height, mean, self._ends, faces)
         outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
         entering = self.entering(gap)
         self._fill_outflow(pressure, film, faces, entering, outflow, diagonal)
@@ -338,7 +338,7 @@ class Problem:
             *oil.rheology.thinning(viscosity * self.sliding / height),
         )
         film = Film._make([*np.empty((6, *self.cells)), ambient, 3.0 * ambient / height[[0, -1]]])
-        least = least_mobility * self.contact_gap**3
+        least = least_mobility * self.contact_gap**3, 3.0 if self.exact else 0.0
         reynolds.fill_film(liquid, height, oil.viscosity.eta0 / self.speed, least, film)
         return film
 

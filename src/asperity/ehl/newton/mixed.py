@@ -1,5 +1,6 @@
 """Newton's method on the mixed contact."""
 
+from collections import deque
 from collections.abc import Iterator
 from itertools import count
 from typing import NamedTuple
@@ -44,7 +45,9 @@ class _StepProposal(NamedTuple):
         return unknowns, freed
 
 
-def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iterator[Step]:
+def newton(
+    problem: Problem, unknowns: Pressures, *, second_order: bool, shared: bool | None = None
+) -> Iterator[Step]:
     """Yield the initial guess and then the result of each Newton step.
 
     After a stagnation the Jacobian omits two terms that may cause cycles: ruptured cells downstream
@@ -52,15 +55,14 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
 
     A closed cell whose oil pressure would exceed the total takes the total as its oil pressure and
     is free in the next step: the oil separates the bodies. Cells at the cap are exempt.
+
+    Exact face mobilities are mostly too stiff for limits of single cells: all unknowns take a
+    `shared` part of the step (the default there), such that no film and no pressure changes by more
+    than a share of itself and the residual does not exceed those of the last steps.
     """
-    mean_pressure = problem.mean_pressure
-    change = np.inf
-    limits = _StepLimits(problem, unknowns)
-    workspace = Workspace()
-    lowest = np.inf
-    stagnation = 0
-    damping = 1.0
-    stagnated = False
+    shared = problem.exact if shared is None else shared
+    mean_pressure, change = problem.mean_pressure, np.inf
+    limits, watch, workspace = _StepLimits(problem, unknowns), _ResidualWatch(), Workspace()
     balance = evaluate(problem, unknowns, second_order=second_order)
     settled_cells = np.zeros(problem.cells, dtype=bool)
     for number in count():
@@ -68,22 +70,39 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         gap = balance.gap
         yield Step(number, balance, approach, change)
         try:
-            step = newton_step(balance, None if stagnated else settled_cells, workspace)
+            step = newton_step(balance, None if watch.stagnated else settled_cells, workspace)
         except SingularFactor:  # diverged
             yield Step(number + 1, balance, approach, np.inf)
             return
         change = float(np.mean(np.abs(step.total)) / mean_pressure)
-        stagnation += 1
-        if balance.residual_rms < MIXED_NEWTON.required_decrease * lowest:
-            lowest = balance.residual_rms
-            stagnation = 0
-        elif stagnation == MIXED_NEWTON.stagnation_iterations:
-            lowest, stagnation, damping, stagnated = balance.residual_rms, 0, 1.5 - damping, True
-        proposal = _StepProposal(balance, limits(step, balance), damping)
-        balance = _line_search(proposal, second_order=second_order)
+        watch.add(balance.residual_rms)
+        if shared:
+            proposal = _StepProposal(balance, step, _largest_share(step, balance))
+            balance = _search_below(watch, proposal, second_order=second_order)
+        else:
+            proposal = _StepProposal(balance, limits(step, balance), watch.damping)
+            balance = _line_search(proposal, second_order=second_order)
         settled_cells = (
             np.abs(balance.gap - gap) < MIXED_NEWTON.settled_gap_change * problem.contact_gap
         )
+
+
+class _ResidualWatch:
+    """Residuals of the last steps; the damping changes after steps without a decrease."""
+
+    def __init__(self) -> None:
+        self.last: deque[float] = deque(maxlen=MIXED_NEWTON.remembered_residuals)
+        self.lowest, self.steps, self.damping, self.stagnated = np.inf, 0, 1.0, False
+
+    def add(self, residual: float) -> None:
+        """Add the residual of a step."""
+        self.steps += 1
+        if residual < MIXED_NEWTON.required_decrease * self.lowest:
+            self.lowest, self.steps = residual, 0
+        elif self.steps == MIXED_NEWTON.stagnation_iterations:
+            self.lowest, self.steps, self.damping = residual, 0, 1.5 - self.damping
+            self.stagnated = True
+        self.last.append(residual)
 
 
 class _StepLimits:
@@ -123,6 +142,43 @@ def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance
             or damping <= MIXED_NEWTON.min_damping
         ):
             return balance
+        damping *= 0.5
+
+
+def _largest_share(step: Pressures, balance: MixedBalance) -> float:
+    """Return the largest share of a step at which no film nearly closes and no pressure leaps."""
+    problem, gap, free = balance.problem, balance.gap, balance.solid == FREE
+    d_gap = problem.deflection(step.total) + step.approach
+    closing = np.where(free & (gap > problem.contact_gap), -d_gap / gap, 0.0).max()
+    leaping = np.max(np.abs(step.total) / np.maximum(1.0, balance.unknowns.total))
+    tiny = np.finfo(float).tiny
+    largest = min(
+        1.0,
+        MIXED_NEWTON.max_film_decrease / max(closing, tiny),
+        MIXED_NEWTON.max_pressure_change / max(leaping, tiny),
+    )
+    return float(max(largest, MIXED_NEWTON.min_share))
+
+
+def _search_below(
+    watch: _ResidualWatch, proposal: _StepProposal, *, second_order: bool
+) -> MixedBalance:
+    """Halve a step until its residual is below the last ones; return the best step if none is.
+
+    Near the solution the whole step is taken, unless steps stagnated: a cell that closes passes a
+    higher residual.
+    """
+    problem, bound = proposal.balance.problem, max(watch.last)
+    whole = watch.last[-1] < MIXED_NEWTON.whole_step_residual and not watch.stagnated
+    least = 1.0 if whole else MIXED_NEWTON.least_damping
+    damping, best = 1.0, None
+    while True:
+        unknowns, freed = proposal.apply(damping)
+        balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
+        if best is None or balance.residual_rms < best.residual_rms:
+            best = balance
+        if balance.residual_rms < bound or damping <= least:
+            return best
         damping *= 0.5
 
 

@@ -97,7 +97,7 @@ class Search:
                 )
             pressure, approach = step.balance.pressure, step.approach
             if coarser_in_all_axes(problem, levels[0]):
-                self.figures.append(self._figures(step))
+                self.figures.append(self.figures_of(step))
         return step
 
     def level_tolerance(self, *, finest: bool) -> float:
@@ -187,7 +187,7 @@ class Search:
             earlier, step = step, next(steps)
         if not np.isfinite(step.balance.residual_rms):  # diverged: the last finite solution
             step = earlier
-        self.iteration_error = self._figures(step).abs_difference(self._figures(earlier))
+        self.iteration_error = self.figures_of(step).abs_difference(self.figures_of(earlier))
         return step
 
     def bracket_approach(
@@ -282,7 +282,7 @@ class Search:
             ),
         )
 
-    def _figures(self, step: Step) -> Figures:
+    def figures_of(self, step: Step) -> Figures:
         """Return the key results of a step."""
         balance = step.balance
         touching, unfold = balance.in_contact & (balance.pressure > 0.0), balance.problem.unfold

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 
@@ -18,6 +17,8 @@ from asperity.ehl.newton.single_pressure import Step
 from asperity.ehl.outcome import ATTEMPTS, FROM_DRY
 from asperity.ehl.problem_setup import coarser_in_all_axes, grid_levels
 from asperity.ehl.scales import Scales
+from asperity.ehl.strategies import exact_faces
+from asperity.ehl.strategies.exact_faces import back_to_first_order
 from asperity.ehl.strategies.grid_continuation import Search
 from asperity.ehl.strategies.initial_guess import (
     DryAndLubricated,
@@ -26,7 +27,7 @@ from asperity.ehl.strategies.initial_guess import (
     roller_start,
 )
 from asperity.ehl.strategies.local_refinement import refine_locally
-from asperity.ehl.strategies.oil_state import load_share_of, oil_of, unknowns_of
+from asperity.ehl.strategies.oil_state import oil_of, unknowns_of
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
@@ -37,6 +38,14 @@ class MixedSearch(Search):
     """Strategies of the two-pressure models, with all steps on record."""
 
     imbalance = 0.0  # of the last step, where oil is conserved
+    solved: Sequence[tuple[Problem, Step]] = ()  # of the figures
+    arithmetic = False  # the last step has arithmetic means in place of exact face mobilities
+    is_guess = False  # the solution is only an initial guess for exact face mobilities
+
+    def keep(self, problem: Problem, step: Step) -> None:
+        """Keep the figures of a grid's solution, for the estimate of the discretisation error."""
+        self.figures.append(self.figures_of(step))
+        self.solved = [*self.solved, (problem, step)][-len(self.figures) :]
 
     def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
         """Return True if the last step met the tolerance; if last, with conserved oil balanced."""
@@ -96,11 +105,18 @@ class MixedSearch(Search):
         step = self.continue_from(
             finest, Pressures(step.balance.pressure, step.balance.pressure, step.approach)
         )
-        self.figures.append(self._figures(step))
+        self.figures.append(self.figures_of(step))
         return step
 
     def continue_from(self, problem: Problem, unknowns: Pressures) -> Step:
         """Solve from a neighbouring solution: second order first, then as from a distant guess."""
+        if problem.exact:
+            step = exact_faces.solve(self, problem, unknowns, self.options.tolerance)
+            if self.converged(self.options.tolerance):
+                return step
+            robust = replace(problem, exact=False)
+            step = self.continue_from(robust, unknowns)
+            return exact_faces.solve_again(self, [(robust, step)])
         max_steps = min(self.options.max_iterations, SEARCH.max_second_order_iterations)
         step = self.run(
             problem, newton(problem, unknowns, second_order=True), self.options.tolerance, max_steps
@@ -118,7 +134,7 @@ class MixedSearch(Search):
 
         The effect of the order on the results then follows from steps back to first order.
         """
-        tolerance, max_steps = self._targets(problem, coarse=coarse, from_coarse=True)
+        tolerance, max_steps = self.targets(problem, coarse=coarse, from_coarse=True)
         if problem.conserve and has_thin_film(evaluate(problem, unknowns, second_order=False)):
             step = self.from_refilled_cavities_directly(problem, unknowns)
             if self.converged(tolerance):
@@ -144,12 +160,12 @@ class MixedSearch(Search):
                     after=step,
                 )
             if self.converged(tolerance):
-                if not coarse:
-                    self.by_first_order = self._figures(_back_to_first_order(problem, step))
+                if not coarse and not self.is_guess:
+                    self.by_first_order = self.figures_of(back_to_first_order(problem, step))
                 return step
         return self.solve_from_afar(problem, unknowns, coarse=coarse, last=last)
 
-    def _targets(
+    def targets(
         self, problem: Problem, *, coarse: bool, from_coarse: bool = False
     ) -> tuple[float, int]:
         """Return tolerance and largest number of steps, for the finest or a coarser grid."""
@@ -179,7 +195,7 @@ class MixedSearch(Search):
             SEARCH.max_second_order_iterations,
         )
         if self.converged(self.options.tolerance):
-            self.figures[-1] = self._figures(better)
+            self.figures[-1] = self.figures_of(better)
             return COARSE_TO_FINE, better
         self.history, self.figures, self.iteration_error = history, figures, error
         return ROBUST, step
@@ -200,7 +216,7 @@ class MixedSearch(Search):
         fail, the `last` resort for conserved oil is the contact with refilled cavities, and then
         the steady contact directly.
         """
-        tolerance, max_steps = self._targets(problem, coarse=coarse)
+        tolerance, max_steps = self.targets(problem, coarse=coarse)
         if problem.conserve or not problem.accurate:
             step = self.march_in_time(problem, unknowns, length)
             if not self.converged(MARCHING.tolerance) and not last:
@@ -219,7 +235,7 @@ class MixedSearch(Search):
         )
         if not self.converged(CONTINUATION.failed_residual):
             return step
-        self.by_first_order = self._figures(step)
+        self.by_first_order = self.figures_of(step)
         return self.run(
             problem, newton(problem, unknowns_of(step), second_order=True), tolerance, max_steps
         )
@@ -331,7 +347,7 @@ class MixedSearch(Search):
             if problem is not levels[0] and not self.converged(SEARCH.first_order_tolerance):
                 self.figures = []  # an initial guess, but no solution to compare with
             elif coarser_in_all_axes(problem, levels[0]):
-                self.figures.append(self._figures(step))
+                self.keep(problem, step)
             unknowns = unknowns_of(step)
             coarser = DryAndLubricated(dry, unknowns) if roller else None
         if levels[0].conserve:  # coarser grids do not conserve oil
@@ -377,7 +393,7 @@ class MixedSearch(Search):
                 )
             if finest or self.converged(max(SEARCH.first_order_tolerance, self.options.tolerance)):
                 if coarser_in_all_axes(problem, levels[0]):
-                    self.figures.append(self._figures(step))
+                    self.keep(problem, step)
                 coarser = DryAndLubricated(dry, unknowns_of(step))
             else:
                 self.figures, coarser = [], None
@@ -408,6 +424,7 @@ class MixedSearch(Search):
         self.history = [*coarse_search.history, *self.history]
         if coarse_search.converged(self.options.tolerance):
             self.figures = [*coarse_search.figures, *self.figures]
+            self.solved = [*coarse_search.solved, *self.solved]
 
 
 def _refilled(problem: Problem, unknowns: Pressures) -> tuple[Problem, Pressures]:
@@ -424,26 +441,3 @@ def _implicit_step(problem: Problem, length: float, content: Field) -> Transient
         else problem.past
     )
     return replace(past, rate=past.rate + 1.0 / length, source=past.source - content / length)
-
-
-def _back_to_first_order(problem: Problem, step: Step) -> Step:
-    """Step from the second-order wedge's solution towards the first-order one.
-
-    It ends when a coarse tolerance is met, or steps no longer change the load share.
-    """
-    previous = back = step
-    for back in islice(
-        newton(problem, unknowns_of(step), second_order=False),
-        SEARCH.max_backward_iterations + 1,
-    ):
-        if back.number > 0:
-            change, total_change = (
-                abs(load_share_of(back) - load_share_of(other)) for other in (previous, step)
-            )
-            if (
-                back.balance.residual_rms < SEARCH.first_order_tolerance
-                or change < SEARCH.backward_tolerance * total_change
-            ):
-                break
-            previous = back
-    return back

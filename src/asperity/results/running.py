@@ -1,0 +1,293 @@
+"""Running contact of a case: numbers as means over time, with the snapshot beside them."""
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from asperity.case import Case
+from asperity.core.processes import cores, set_up_worker
+from asperity.core.quantities import Quantity, lines, read
+from asperity.ehl import ContactSolution, ContactState
+from asperity.results.determined import Determined
+from asperity.results.surface_spread import Scalar
+from asperity.solution import (
+    FILMS,
+    FlashTemperature,
+    Friction,
+    LoadSharing,
+    SubsurfaceStress,
+    clr_below,
+    friction,
+    friction_and_heat,
+    sharing_by_film,
+    subsurface_stress,
+)
+from asperity.transient import Series, Snapshot, TimeMean, run_track, settled_from, time_means
+
+TRACKS = 3  # default number of tracks; each holds several contacts
+MOMENTS = 4  # at which heat and stress are evaluated
+EVERY_STEP = ("load", "film", "pressure", "friction")  # groups of the catalogue: at every step
+AT_MOMENTS = ("sharing", "heat", "stress")  # ... at some
+WITHOUT = ("_error", "_error_m")  # keys of error bars, which the grids determine
+MAX_FAILED = 0.02  # share of the time steps that may miss the tolerance
+ERRORS = {"clr": "clr_error", "car": "car_error", "h_min_m": "h_min_error_m"} | {
+    "h_central_m": "h_central_error_m"
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Running:
+    """Running contact: means over time and tracks by catalogue key, SI.
+
+    `clr` is the mean load share with its interval, `snapshot_clr` that of standing roughness at
+    the start of the first track. `cells` are those of the fine grid; `steps` and `failed` time
+    steps were computed and not converged on all grids and tracks. `time_s` and `series` are the
+    load share of the first track over time on the fine grid, the first `cut` passages of
+    `steps_per_passage` steps being cut off.
+    """
+
+    numbers: dict[str, Scalar]
+    clr: TimeMean
+    snapshot_clr: float
+    tracks: int
+    cells: tuple[int, int]
+    steps: int
+    failed: int
+    cut: int
+    steps_per_passage: int
+    time_s: tuple[float, ...]
+    series: tuple[float, ...]
+
+    @property
+    def converged(self) -> bool:
+        """True if nearly all time steps met the tolerance."""
+        return self.failed <= MAX_FAILED * self.steps
+
+    @property
+    def clr_std(self) -> float:
+        """Standard deviation of the load share over time."""
+        return self.clr.deviation
+
+    def to_json(self) -> str:
+        """Return the record as JSON text."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> "Running":
+        """Return the record of a stored run; KeyError, TypeError or ValueError for another text."""
+        values = json.loads(text)
+        for name in ("cells", "time_s", "series"):
+            values[name] = tuple(values[name])
+        return cls(**{**values, "clr": TimeMean(**values["clr"])})
+
+
+@dataclass(frozen=True, slots=True)
+class _Sources:
+    """Attributes of a step that the catalogue's sources refer to."""
+
+    state: ContactState
+    solution: ContactSolution
+    friction: Friction | None = None
+    heat: FlashTemperature | None = None
+    stress: SubsurfaceStress | None = None
+
+    @property
+    def sharing(self) -> LoadSharing:
+        """Load shares by film thickness."""
+        return sharing_by_film(self.solution)
+
+    @property
+    def load_below(self) -> dict[str, float]:
+        """Load share on films no thicker than each of `FILMS`."""
+        return {f"{film * 1e9:.0f}nm": clr_below(self.solution, film) for film in FILMS}
+
+
+def mean_state(state: ContactState, running: Running) -> ContactState:
+    """Return the contact state with the means over time of a running contact."""
+    sources = {entry.source: entry.key for entry in lines(*EVERY_STEP)}
+    means: dict[str, Any] = {
+        field.name: running.numbers[key]
+        for field in fields(state)
+        if (key := sources.get(f"state.{field.name}")) in running.numbers
+    }
+    return replace(state, **means)
+
+
+def run_tracks(
+    case: Case,
+    *,
+    tracks: int,
+    workers: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[Running, ContactSolution, list[str]]:
+    """Return the running contact, its snapshot on the fine grid, and notes.
+
+    Parameters
+    ----------
+    case : case whose rough bodies move
+    tracks : number of tracks, surfaces of the case's kind
+    workers : processes for the tracks after the first; 1 starts none
+    progress : called with the number of time steps done and in total, of the first track
+
+    Raises
+    ------
+    BadInput
+        for tracks that a measured surface does not cover.
+    NotConverged
+        if the snapshot of the first track does not converge.
+    """
+    nx, ny = case.running_cells()
+    coarse_cells = nx // 2, max(1, ny // 2)
+    with _outcomes(case, coarse_cells, tracks, workers) as further:
+        coarse = _track(case, coarse_cells)
+        length = (len(coarse.values) - 1) // coarse.steps_per_passage
+        fine = _track(case, (nx, ny), passages=length, moments=MOMENTS, progress=progress)
+        others = [outcome() for outcome in further]
+    notes = [
+        f"Track {number} of {tracks} is left out: {other.reason.rstrip('.')}."
+        for number, other in enumerate(others, 2)
+        if other.value is None
+    ]
+    all_coarse = [coarse, *(other.value for other in others if other.value is not None)]
+    running = _running(case, all_coarse, fine)
+    if running.failed:
+        notes.append(
+            f"{running.failed} of {running.steps} time steps did not reach the tolerance; the "
+            "means include them."
+        )
+    return running, fine.kept[0].solution, notes
+
+
+def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
+    """Return the running contact of all series."""
+    cuts, everything = [_cut(series) for series in coarse], (*coarse, fine)
+    means = time_means(coarse, cuts, fine)
+    totals: dict[str, Scalar] = {
+        "iterations": sum(series.iterations for series in everything),
+        "seconds": sum(series.seconds for series in everything),
+    }
+    return Running(
+        numbers=_numbers(case, means, fine.kept[1:]) | totals,
+        clr=means["clr"],
+        snapshot_clr=fine.kept[0].state.clr,
+        tracks=len(coarse),
+        cells=fine.cells,
+        steps=sum(len(series.values) - 1 for series in everything),
+        failed=sum(series.failed for series in everything),
+        cut=cuts[0],
+        steps_per_passage=fine.steps_per_passage,
+        time_s=tuple(fine.column("time_s")),
+        series=tuple(fine.column("clr")),
+    )
+
+
+def _cut(series: Series) -> int:
+    """Return the passages to cut off: half where the series is not stationary."""
+    length = (len(series.values) - 1) // series.steps_per_passage
+    return settled_from(series, "clr") or max(1, length // 2)
+
+
+def _track(
+    case: Case,
+    cells: tuple[int, int],
+    *,
+    passages: int | None = None,
+    moments: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Series:
+    """March a case's track on one grid, with one thread for the algebra."""
+    entries = _entries(EVERY_STEP)
+
+    def measure(snapshot: Snapshot) -> dict[str, float]:
+        rubbing = friction(
+            snapshot.solution, boundary_friction=case.boundary_friction, thermal=case.thermal
+        )
+        numbers = read(_Sources(snapshot.state, snapshot.solution, rubbing), entries)
+        values = {key: math.nan if value is None else value for key, value in numbers.items()}
+        return {"time_s": snapshot.time, **values}
+
+    assert case.lubricant is not None
+    with threadpool_limits(1):
+        return run_track(
+            case.conditions,
+            case.lubricant,
+            case.moving_surfaces().on_cells(cells),
+            measure,
+            passages=passages,
+            options=case.options,
+            moments=moments,
+            progress=progress,
+        )
+
+
+def _entries(groups: tuple[str, ...]) -> list[Quantity]:
+    return [entry for entry in lines(*groups) if not entry.key.endswith(WITHOUT)]
+
+
+def _numbers(
+    case: Case, means: dict[str, TimeMean], moments: tuple[Snapshot, ...]
+) -> dict[str, Scalar]:
+    """Return the means of every number, and error bars as differences between the grids."""
+    numbers: dict[str, Scalar] = {
+        key: None if math.isnan(mean.value) else mean.value
+        for key, mean in means.items()
+        if key != "time_s"
+    }
+    clr, car = means["clr"], means["car"]
+    numbers |= {"clr": min(max(clr.value, 0.0), 1.0), "car": max(car.value, 0.0)}
+    numbers |= {error: means[key].grid for key, error in ERRORS.items()}
+    imbalances = [snapshot.state.mass_flux_imbalance for snapshot in moments]
+    numbers["mass_flux_imbalance"] = float(np.mean(imbalances))
+    rows = [Determined.attempt(partial(_at_moment, case, moment)).value for moment in moments]
+    for entry in _entries(AT_MOMENTS):
+        values = [float(value) for row in rows if row and (value := row[entry.key]) is not None]
+        numbers[entry.key] = float(np.mean(values)) if values else None
+    return numbers
+
+
+def _at_moment(case: Case, snapshot: Snapshot) -> dict[str, Scalar]:
+    """Return the numbers that are evaluated at some moments only."""
+    solution = snapshot.solution
+    rubbing, heat = friction_and_heat(
+        solution, boundary_friction=case.boundary_friction, thermal=case.thermal
+    )
+    stress = subsurface_stress(solution, shear=rubbing.shear)
+    sources = _Sources(snapshot.state, solution, rubbing, heat, stress)
+    return read(sources, _entries(AT_MOMENTS))
+
+
+_Outcome = Callable[[], Determined[Series]]
+
+
+@contextmanager
+def _outcomes(
+    case: Case, cells: tuple[int, int], tracks: int, workers: int
+) -> Iterator[list[_Outcome]]:
+    """Yield functions that return the further tracks, computed meanwhile by other processes."""
+    if workers < 2 or tracks < 2:
+        yield [partial(_further_track, case, cells, number) for number in range(1, tracks)]
+        return
+    pool = ProcessPoolExecutor(
+        min(workers - 1, cores(), tracks - 1), get_context("spawn"), set_up_worker
+    )
+    try:
+        futures: list[Future[Determined[Series]]] = [
+            pool.submit(_further_track, case, cells, number) for number in range(1, tracks)
+        ]
+        yield [future.result for future in futures]
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _further_track(case: Case, cells: tuple[int, int], number: int) -> Determined[Series]:
+    """Return a further track on the coarse grid, or the reason why there is none."""
+    return Determined.attempt(lambda: _track(case.on_surface(number), cells))

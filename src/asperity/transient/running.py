@@ -1,0 +1,275 @@
+"""Mean over time of a contact whose roughness moves, with its interval.
+
+The same tracks pass through the contact on two grids, one of half as many cells along each axis.
+Time is counted in passages: the oil crosses the Hertz zone in one. The start is cut off where the
+standard error of the rest is smallest, and the rest is divided into means over one passage each,
+between which all roughness in the contact has been replaced. Sources: K. P. White Jr., Simulation
+69 (1997) 323 (cut); A. M. Law, Simulation Modeling and Analysis, 5th ed. (2015), ch. 9 (batch
+means). The coarse grid is a control variate: it runs on every track, the fine one on the first.
+"""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import stdtrit
+
+from asperity.contact.conditions import ContactConditions
+from asperity.contact.grid import Grid
+from asperity.core.arrays import Field
+from asperity.core.coverage import UPPER
+from asperity.core.errors import BadInput
+from asperity.ehl import Options
+from asperity.ehl.outcome import MIXED
+from asperity.lubricant import Lubricant
+from asperity.surface import MovingSurfaces
+from asperity.transient.motion import Snapshot, moving_contact
+
+PASSAGES, MAX_PASSAGES = 6, 24  # first length of a series, and the largest until it is stationary
+MOST_CELLS = 4608  # of the fine grid at the default accuracy
+CELLS_PER_LENGTH = 8.0  # on the fine grid, as on an automatic grid
+MIN_CELLS_PER_HALF_WIDTH, MIN_CELLS_ACROSS = 8.0, 16.0  # on the fine grid
+# cells that the oil travels in a step; the mixed model follows the oil over several
+TIME_STEP = {MIXED: 2.0}
+TOLERANCE = 1e-3  # of a time step; with a tenth of it the mean CLR changes by less than 0.001
+
+Measure = Callable[[Snapshot], Mapping[str, float]]
+
+
+class Series(NamedTuple):
+    """Numbers of a moving contact at every time step of a track on one grid.
+
+    `values` has a row per step, the steady start first, and a column per number; `failed` counts
+    steps that did not converge, `iterations` all Newton steps, `seconds` their time. `kept` are
+    some of the snapshots.
+    """
+
+    cells: tuple[int, int]
+    steps_per_passage: int
+    names: tuple[str, ...]
+    values: Field
+    failed: int
+    iterations: int
+    seconds: float
+    kept: tuple[Snapshot, ...] = ()
+
+    def column(self, name: str) -> Field:
+        """Return one number over time."""
+        column: Field = self.values[:, self.names.index(name)]
+        return column
+
+    def passages(self, cut: int) -> Field:
+        """Return means over each whole passage after the first `cut` ones, (passages, names)."""
+        steps = self.steps_per_passage
+        settled = self.values[1 + cut * steps :]
+        count = len(settled) // steps
+        means: Field = settled[: count * steps].reshape(count, steps, -1).mean(axis=1)
+        return means
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeMean:
+    """Mean of one number over time and tracks, with parts of its 90 % interval.
+
+    `time` is the half-width due to the finite time and number of tracks, `grid` the difference
+    between both grids, `deviation` the standard deviation over time.
+    """
+
+    value: float
+    time: float
+    grid: float
+    deviation: float
+
+
+def running_cells(
+    conditions: ContactConditions, grid: Grid, lengths: tuple[float, float], most: int
+) -> tuple[int, int]:
+    """Return the fine grid's cells: even numbers, about `most` in all, at most those of `grid`.
+
+    A correlation length (`lengths` [m] along x and y) has equally many cells along both axes, at
+    most `CELLS_PER_LENGTH`. The Hertz zone has at least 16 of them, and 8 of the coarse grid:
+    BadInput if `grid` has fewer.
+    """
+    extents, half_widths = grid.extent, conditions.hertz.half_widths
+    sizes = [extent / length for extent, length in zip(extents, lengths, strict=True)]
+    varied = [size for size in sizes if size > 0.0]  # uniform roughness has an infinite length
+    density = min(CELLS_PER_LENGTH, (most / math.prod(varied)) ** (1.0 / len(varied)))
+    least = [MIN_CELLS_PER_HALF_WIDTH * e / a for e, a in zip(extents, half_widths, strict=True)]
+    if conditions.long:
+        least[1] = MIN_CELLS_ACROSS
+    for axis, fewest, count in zip("xy", least, grid.cells, strict=True):
+        if count < math.ceil(fewest):
+            raise BadInput(
+                f"the grid has {count} cells along {axis}, but running roughness is solved on two "
+                f"grids and needs {math.ceil(fewest)}; use more cells, or contact.roughness = "
+                '"standing"'
+            )
+    nx, ny = (
+        min(2 * math.ceil(0.5 * max(density * size, fewest)), count - count % 2)
+        for size, fewest, count in zip(sizes, least, grid.cells, strict=True)
+    )
+    return nx, ny
+
+
+def run_track(
+    conditions: ContactConditions,
+    lubricant: Lubricant,
+    surfaces: MovingSurfaces,
+    measure: Measure,
+    *,
+    passages: int | None = None,
+    options: Options | None = None,
+    moments: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Series:
+    """March a track through the contact, and return its series.
+
+    Parameters
+    ----------
+    conditions, lubricant, surfaces : the contact, with the roughness of both bodies
+    measure : returns numbers of a step by name, the same names at every step
+    passages : length of the series; by default `PASSAGES`, and half as many more each time until
+        the series of `clr` is stationary, at most `MAX_PASSAGES`
+    options : solver settings; the tolerance is `TOLERANCE` or more
+    moments : snapshots to keep after the first passage, evenly spaced, besides the start
+    progress : called with the number of steps done and in total
+
+    Raises
+    ------
+    BadInput
+        as `moving_contact`.
+    NotConverged
+        if the steady start does not converge.
+    """
+    options = options or Options()
+    options = replace(options, tolerance=max(options.tolerance, TOLERANCE))
+    time_step = TIME_STEP.get(options.model, 1.0)
+    crossing = 2.0 * conditions.hertz.half_widths[0] / surfaces.grid.spacing[0]
+    record = _Record(measure, max(1, round(crossing / time_step)), moments, passages or PASSAGES)
+    for snapshot in moving_contact(
+        conditions, lubricant, surfaces, time_step=time_step, options=options
+    ):
+        record.add(snapshot)
+        if progress is not None:
+            progress(snapshot.number, record.steps)
+        if snapshot.number < record.steps:
+            continue
+        series = record.series(surfaces.grid.cells)
+        complete = passages is not None or record.length >= MAX_PASSAGES
+        if complete or settled_from(series, "clr") is not None:
+            break
+        record.length = min(MAX_PASSAGES, record.length + record.length // 2)
+    return series
+
+
+class _Record:
+    """Numbers of the time steps so far, of `length` passages in all."""
+
+    def __init__(self, measure: Measure, per_passage: int, moments: int, length: int) -> None:
+        self.measure, self.per_passage, self.length = measure, per_passage, length
+        self.began, self.rows, self.names = (
+            time.perf_counter(),
+            list[list[float]](),
+            tuple[str, ...](),
+        )
+        self.failed, self.iterations, self.kept = 0, 0, list[Snapshot]()
+        spaced = np.linspace(per_passage + 1, self.steps, moments).astype(int)
+        self.moments = {0, *spaced} if moments else set[int]()
+
+    @property
+    def steps(self) -> int:
+        """Number of the last time step."""
+        return self.length * self.per_passage
+
+    def add(self, snapshot: Snapshot) -> None:
+        """Add a time step."""
+        numbers, convergence = self.measure(snapshot), snapshot.solution.convergence
+        self.names = (*numbers,)
+        self.rows.append([*numbers.values()])
+        self.failed += not convergence.converged
+        self.iterations += convergence.iterations
+        if snapshot.number in self.moments:
+            self.kept.append(replace(snapshot, memory={}))
+
+    def series(self, cells: tuple[int, int]) -> Series:
+        """Return the series so far."""
+        return Series(
+            cells=cells,
+            steps_per_passage=self.per_passage,
+            names=self.names,
+            values=np.array(self.rows, float),
+            failed=self.failed,
+            iterations=self.iterations,
+            seconds=time.perf_counter() - self.began,
+            kept=tuple(self.kept),
+        )
+
+
+def settled_from(series: Series, name: str) -> int | None:
+    """Return the number of passages to cut off, by one number of a series; None if not stationary.
+
+    The standard error of the mean of the rest is smallest from there; a series whose minimum lies
+    in its second half is not stationary.
+    """
+    steps, values = series.steps_per_passage, series.column(name)[1:]
+    latest = max(1, len(values) // steps // 2)
+    rest = [values[cut * steps :] for cut in range(1, latest + 1)]
+    cut = 1 + int(np.argmin([float(np.var(part)) / len(part) for part in rest]))
+    return None if cut == latest and latest > 1 else cut
+
+
+def time_means(coarse: list[Series], cuts: list[int], fine: Series | None) -> dict[str, TimeMean]:
+    """Return the mean of every number over time and tracks, with its interval.
+
+    Parameters
+    ----------
+    coarse : series of every track on the coarse grid
+    cuts : passages cut off from each
+    fine : series of the first track on the fine grid; None if there is only one grid
+    """
+    blocks = [series.passages(cut) for series, cut in zip(coarse, cuts, strict=True)]
+    pooled, accurate = np.concatenate(blocks), None if fine is None else fine.passages(cuts[0])
+    first = coarse[0] if fine is None else fine
+    settled = first.values[1 + cuts[0] * first.steps_per_passage :]
+    return {
+        name: _time_mean(
+            pooled[:, column],
+            None if accurate is None else (accurate[:, column], blocks[0][:, column]),
+            float(settled[:, column].std()),
+        )
+        for column, name in enumerate(first.names)
+    }
+
+
+def _time_mean(rough: Field, first_track: tuple[Field, Field] | None, deviation: float) -> TimeMean:
+    """Return the mean of passages on the coarse grid, corrected on the fine and coarse first track.
+
+    The mean of the fine grid alone is taken where its interval is narrower.
+    """
+    if first_track is None:
+        return TimeMean(
+            value=float(rough.mean()), time=_half_width([rough]), grid=math.nan, deviation=deviation
+        )
+    accurate, same = first_track
+    count = min(len(accurate), len(same))
+    change = accurate[:count] - same[:count]
+    corrected = float(rough.mean() + change.mean()), _half_width([rough, change])
+    alone = float(accurate.mean()), _half_width([accurate])
+    value, half_width = min(corrected, alone, key=lambda pair: pair[1])
+    grid = abs(float(change.mean()))
+    return TimeMean(value=value, time=half_width, grid=grid, deviation=deviation)
+
+
+def _half_width(parts: list[Field]) -> float:
+    """Return the 90 % half-width of the sum of the parts' means (Welch and Satterthwaite)."""
+    variances = [float(np.var(part, ddof=1)) / len(part) for part in parts]
+    total = sum(variances)
+    if total == 0.0:
+        return 0.0
+    freedom = total**2 / sum(
+        variance**2 / (len(part) - 1) for variance, part in zip(variances, parts, strict=True)
+    )
+    return float(stdtrit(freedom, UPPER)) * math.sqrt(total)

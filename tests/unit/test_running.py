@@ -1,0 +1,140 @@
+"""Running contact: means over time of moving roughness, with their intervals."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.case import load_case
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
+from asperity.results import load_run, solve_case
+from asperity.surface import MovingSurfaces, Surface, flat_surface
+from asperity.transient import Series, running_cells, settled_from, time_means
+
+PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
+RUNNING = {"contact.roughness": "running", "grid.cells": [64, 32]}
+
+
+def series(values, *, steps_per_passage=10):
+    rows = np.stack([np.zeros(len(values)), values], axis=1)
+    return Series((1, 1), steps_per_passage, ("time_s", "clr"), rows, 0, 0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def run():
+    return solve_case(load_case(PAPER).with_overrides(RUNNING), surfaces=2)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_roughness_on_fewer_cells_has_the_heights_of_its_waves(periodic):
+    def surface(cells):
+        grid = Grid(cells, (-2.0, -1.0), (2.0, 1.0), periodic=(True, periodic))
+        x, y = (grid.x[:, None] + 2.0) / 4.0, (grid.y + 1.0) / 2.0
+        across = np.cos(2.0 * np.pi * (3.0 * y + 0.1)) if periodic else np.cos(3.0 * np.pi * y)
+        return Surface(np.cos(2.0 * np.pi * 4.0 * x + 0.3) * across, grid)
+
+    fine, coarse = surface((60, 40)), surface((24, 14))
+    grid = Grid((60, 40), (-2.0, -1.0), (2.0, 1.0), periodic=(False, periodic))
+    moving = MovingSurfaces(fine, flat_surface(fine.grid), (1.0, 1.0), grid)
+    fewer = moving.on_cells((24, 14))
+    np.testing.assert_allclose(fewer.first.heights, coarse.heights, atol=1e-12)
+    assert fewer.grid.cells == (24, 14)
+    with pytest.raises(BadInput, match="at most"):
+        moving.on_cells((64, 40))
+
+
+def test_the_fine_grid_has_equally_many_cells_per_correlation_length():
+    case = load_case(PAPER)
+    assert case.running_cells() == (98, 50)
+    cells = running_cells(case.conditions, case.grid, (40e-6, 10e-6), 4608)
+    lengths = [e / n for e, n in zip(case.grid.extent, cells, strict=True)]
+    assert lengths[0] / lengths[1] == pytest.approx(4.0, rel=0.1)
+    tight = case.with_overrides({"grid.cells": [64, 32]})
+    assert tight.running_cells() == (64, 32)
+    with pytest.raises(BadInput, match=r"48 cells along x, but running roughness .* needs 52"):
+        case.with_overrides({"grid.cells": [48, 32]}).running_cells()
+
+
+def test_the_start_of_a_series_is_cut_off():
+    rng, steps = np.random.default_rng(1), np.arange(121)
+    noise = 0.01 * rng.standard_normal(121)
+    assert settled_from(series(noise), "clr") == 1
+    assert settled_from(series(noise + 0.5 * np.exp(-steps / 8.0)), "clr") in (3, 4)
+    assert settled_from(series(noise + 0.01 * steps), "clr") is None
+
+
+@pytest.mark.parametrize("with_fine", [False, True])
+def test_intervals_cover_the_mean_of_correlated_series(with_fine):
+    """First-order autoregression whose correlation time is a third of a passage."""
+    rng, covered, phi = np.random.default_rng(7), [], math.exp(-0.3)
+
+    def correlated(count):
+        values = np.empty(count)
+        values[0] = rng.standard_normal()
+        for k in range(1, count):
+            values[k] = phi * values[k - 1] + math.sqrt(1.0 - phi**2) * rng.standard_normal()
+        return values
+
+    for _ in range(300):
+        coarse = [correlated(61) for _ in range(3)]
+        fine = None
+        if with_fine:
+            fine = series(0.1 + coarse[0] + 0.3 * correlated(61))
+        mean = time_means([series(values) for values in coarse], [1, 1, 1], fine)["clr"]
+        covered.append(abs(mean.value - (0.1 if with_fine else 0.0)) <= mean.time)
+    assert 0.82 < np.mean(covered) < 0.97
+
+
+def test_the_headline_is_the_mean_over_time(run):
+    running = run.running
+    settled = np.array(running.series)[1 + running.cut * running.steps_per_passage :]
+    numbers = run.summary()
+    assert numbers["roughness"] == "running"
+    assert numbers["clr_std"] == pytest.approx(settled.std())
+    assert numbers["snapshot_clr"] == running.series[0]
+    assert numbers["clr"] == pytest.approx(settled.mean(), abs=running.clr.time + 0.05)
+    assert numbers["clr_low"] < numbers["clr"] < numbers["clr_high"]
+    assert numbers["clr"] > numbers["snapshot_clr"] + 0.05  # 0.66 against 0.51
+    assert numbers["friction_asperity_part"] == pytest.approx(0.15 * numbers["clr"], rel=1e-3)
+    assert run.state.clr == numbers["clr"]
+    verdict = run.verdict()
+    assert "standing still" in verdict
+    assert "mean over time of 2 tracks" in verdict
+
+
+def test_the_interval_covers_twice_as_fine_a_grid(run):
+    """The mean over a passage of the same track on 128 x 64 cells is 0.685."""
+    assert run.error.clr.low < 0.685 < run.error.clr.high
+
+
+def test_a_stored_run_has_the_same_numbers(run, tmp_path):
+    loaded = load_run(run.save(tmp_path / "run.nc"))
+    assert loaded.running == run.running
+    assert json.dumps(loaded.summary()) == json.dumps(run.summary())
+    assert loaded.verdict() == run.verdict()
+
+
+@pytest.mark.parametrize(
+    "still",
+    [
+        {"contact.roughness": "standing"},
+        {"contact.slip": 2.0, "motion.rough": "second"},
+        {"lubricant": "none"},
+        {"surface": "flat"},
+        {"thermal.feedback": True},
+    ],
+)
+def test_a_contact_without_running_roughness_has_a_snapshot(still):
+    case = load_case(PAPER).with_overrides(RUNNING)
+    assert case.is_running
+    assert not case.with_overrides(still).is_running
+
+
+def test_worker_processes_do_not_change_the_numbers():
+    case = load_case(PAPER).with_overrides({**RUNNING, "grid.cells": [52, 26]})
+    alone, together = (solve_case(case, surfaces=2, workers=count) for count in (1, 2))
+    for key in ("clr", "clr_low", "car", "friction_coefficient", "crf_hz"):
+        assert alone.scalars()[key] == together.scalars()[key]
