@@ -25,7 +25,6 @@ from asperity.ehl.problem_setup import (
     usable_levels,
 )
 from asperity.ehl.scales import Scales
-from asperity.ehl.strategies.exact_faces import solve_again
 from asperity.ehl.strategies.grid_continuation import Progress, Search
 from asperity.ehl.strategies.mixed_search import COARSE_TO_FINE, ROBUST, MixedSearch
 from asperity.ehl.strategies.oil_state import pressures_of
@@ -196,7 +195,7 @@ def _solve_cold(
             search.solve_coarser_grid(robust)
             if finest.exact:
                 search.options, search.is_guess = options, False
-                step = solve_again(search, search.solved)
+                step = search.solve_again(search.solved)
         if search.converged(options.tolerance) or search.exhausted:
             break
     search.options = options

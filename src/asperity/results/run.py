@@ -19,14 +19,13 @@ from asperity.resonance import Resonance
 from asperity.results.determined import Determined
 from asperity.results.dynamic import DynamicCurve, dynamic_curve
 from asperity.results.run_contents import run_contents
-from asperity.results.running import Running, mean_state
+from asperity.results.running import Running, mean_state, running_error
 from asperity.results.surface_spread import (
     AVERAGED,
     Row,
     Scalar,
     half_interval,
     mean_row,
-    running_error,
     total_error,
 )
 from asperity.results.uncertainty_text import basis, interval_text, threshold_note

@@ -14,11 +14,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
+from asperity.contact.conditions import ContactConditions
 from asperity.core.processes import cores, set_up_worker
 from asperity.core.quantities import Quantity, lines, read
-from asperity.ehl import ContactSolution, ContactState
+from asperity.coupling import Vibration, VibrationModel
+from asperity.ehl import ContactError, ContactSolution, ContactState, Uncertainty
 from asperity.results.determined import Determined
-from asperity.results.surface_spread import Scalar
+from asperity.results.surface_spread import Row, Scalar, crf_error
 from asperity.solution import (
     FILMS,
     FlashTemperature,
@@ -120,6 +122,32 @@ def mean_state(state: ContactState, running: Running) -> ContactState:
         if (key := sources.get(f"state.{field.name}")) in running.numbers
     }
     return replace(state, **means)
+
+
+def running_error(
+    state: ContactState,
+    row: Row,
+    running: Running,
+    conditions: ContactConditions,
+    model: VibrationModel | None,
+    vibration: Vibration | None,
+) -> ContactError | None:
+    """Return the uncertainty of a running contact's mean load share, and of its resonance."""
+    if state.error is None:
+        return None
+    mean = running.clr
+    grid = None if math.isnan(mean.grid) else (mean.grid, mean.grid)
+    clr = Uncertainty(
+        value=min(max(mean.value, 0.0), 1.0),
+        iteration=(0.0, 0.0),
+        grid=grid,
+        surfaces=(mean.time, mean.time),
+        range=(0.0, 1.0),
+    )
+    crf = None
+    if model is not None and vibration is not None and row["crf_hz"] is not None:
+        crf = crf_error(clr, state, [row], conditions, model, vibration)
+    return replace(state.error, clr=clr, crf_hz=crf, surfaces=running.tracks, running=True)
 
 
 def run_tracks(

@@ -7,7 +7,7 @@ their load share within it. Nothing is solved here.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.special import expit, logit, stdtrit
@@ -17,10 +17,6 @@ from asperity.core.coverage import NORMAL_FACTOR, UPPER
 from asperity.core.quantities import lines
 from asperity.coupling import Vibration, VibrationModel, resonance_at
 from asperity.ehl import ContactError, ContactState, Sides, Uncertainty
-from asperity.ehl.uncertainty import NONE
-
-if TYPE_CHECKING:
-    from asperity.results.running import Running
 
 Scalar = float | int | bool | None
 Row = Mapping[str, Scalar]
@@ -113,34 +109,8 @@ def total_error(
         and vibration is not None
         and any(row["crf_hz"] is not None for row in rows)
     ):
-        crf = _crf_error(clr, state, rows, conditions, model, vibration)
+        crf = crf_error(clr, state, rows, conditions, model, vibration)
     return replace(state.error, clr=clr, crf_hz=crf, surfaces=len(rows))
-
-
-def running_error(
-    state: ContactState,
-    row: Row,
-    running: "Running",
-    conditions: ContactConditions,
-    model: VibrationModel | None,
-    vibration: Vibration | None,
-) -> ContactError | None:
-    """Return the uncertainty of a running contact's mean load share, and of its resonance."""
-    if state.error is None:
-        return None
-    mean = running.clr
-    grid = None if math.isnan(mean.grid) else (mean.grid, mean.grid)
-    clr = Uncertainty(
-        value=min(max(mean.value, 0.0), 1.0),
-        iteration=NONE,
-        grid=grid,
-        surfaces=(mean.time, mean.time),
-        range=(0.0, 1.0),
-    )
-    crf = None
-    if model is not None and vibration is not None and row["crf_hz"] is not None:
-        crf = _crf_error(clr, state, [row], conditions, model, vibration)
-    return replace(state.error, clr=clr, crf_hz=crf, surfaces=running.tracks, running=True)
 
 
 def _clr_error(first: Uncertainty, rows: Sequence[Row]) -> Uncertainty:
@@ -164,7 +134,7 @@ def _clr_error(first: Uncertainty, rows: Sequence[Row]) -> Uncertainty:
     return replace(first, value=mean, grid=grid, surfaces=surfaces)
 
 
-def _crf_error(
+def crf_error(
     clr: Uncertainty,
     state: ContactState,
     rows: Sequence[Row],

@@ -4,58 +4,85 @@ Newton's method needs a close initial guess on exact faces, and the solution wit
 is one: from there it takes 5 to 50 steps.
 """
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
-from typing import TYPE_CHECKING
 
-from asperity.ehl.controls import SEARCH
+from asperity.ehl.controls import CONTINUATION, SEARCH
 from asperity.ehl.models.mixed import Pressures
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step
+from asperity.ehl.strategies.grid_continuation import Search
 from asperity.ehl.strategies.oil_state import load_share_of, unknowns_of
 
-if TYPE_CHECKING:
-    from asperity.ehl.strategies.mixed_search import MixedSearch
 
+class ExactFaceSearch(Search):
+    """Search that solves again on exact faces."""
 
-def solve_again(search: "MixedSearch", solved: Sequence[tuple[Problem, Step]]) -> Step:
-    """Solve the contact again on exact faces, on every grid that is `solved`, coarse to fine.
+    solved: Sequence[tuple[Problem, Step]] = ()  # of the figures
+    arithmetic = False  # the last step has arithmetic means in place of exact face mobilities
+    is_guess = False  # the solution is only an initial guess for exact face mobilities
 
-    Where heat thins the oil a hundredfold from cell to cell this may fail; then the solution with
-    arithmetic means is kept.
-    """
-    search.figures, search.by_first_order = [], None
-    options = search.options
-    for problem, kept in solved:
-        exact, last = replace(problem, exact=True), problem is solved[-1][0]
-        tolerance, _ = search.targets(exact, coarse=not last, from_coarse=True)
-        step = solve(search, exact, unknowns_of(kept), tolerance)
-        if last or search.converged(tolerance):
-            search.keep(exact, step)
-        else:
-            search.figures = []
-    if search.converged(options.tolerance):
-        search.by_first_order = search.figures_of(back_to_first_order(exact, step))
-    elif problem.viscosity_factor is not None:
-        search.arithmetic = True
-        return search.continue_from(replace(problem, exact=False), unknowns_of(kept))
-    return step
+    @abstractmethod
+    def continue_from(self, problem: Problem, unknowns: Pressures) -> Step:
+        """Solve from a neighbouring solution."""
 
+    def keep(self, problem: Problem, step: Step) -> None:
+        """Keep the figures of a grid's solution, for the estimate of the discretisation error."""
+        self.figures.append(self.figures_of(step))
+        self.solved = [*self.solved, (problem, step)][-len(self.figures) :]
 
-def solve(search: "MixedSearch", problem: Problem, unknowns: Pressures, tolerance: float) -> Step:
-    """Solve by shared steps on the second-order wedge, or by cell through the first order."""
-    max_steps = min(SEARCH.max_exact_iterations, search.options.max_iterations)
-    steps = newton(problem, unknowns, second_order=True)
-    step = search.run(problem, steps, tolerance, max_steps)
-    if search.converged(tolerance):
+    def targets(
+        self, problem: Problem, *, coarse: bool, from_coarse: bool = False
+    ) -> tuple[float, int]:
+        """Return tolerance and largest number of steps, for the finest or a coarser grid."""
+        tolerance = self.options.tolerance
+        max_steps = self.options.max_iterations
+        if not coarse:
+            return tolerance, max_steps
+        roughly = (
+            CONTINUATION.coarse_tolerance
+            if problem.accurate or from_coarse
+            else 0.5 * SEARCH.first_order_tolerance
+        )
+        return max(roughly, tolerance), min(SEARCH.max_error_grid_iterations, max_steps)
+
+    def solve_again(self, solved: Sequence[tuple[Problem, Step]]) -> Step:
+        """Solve the contact again on exact faces, on every grid that is `solved`, coarse to fine.
+
+        Where heat thins the oil a hundredfold from cell to cell this may fail; then the solution
+        with arithmetic means is kept.
+        """
+        self.figures, self.by_first_order = [], None
+        for problem, kept in solved:
+            exact, last = replace(problem, exact=True), problem is solved[-1][0]
+            tolerance, _ = self.targets(exact, coarse=not last, from_coarse=True)
+            step = self.solve_exact(exact, unknowns_of(kept), tolerance)
+            if last or self.converged(tolerance):
+                self.keep(exact, step)
+            else:
+                self.figures = []
+        if self.converged(self.options.tolerance):
+            self.by_first_order = self.figures_of(back_to_first_order(exact, step))
+        elif problem.viscosity_factor is not None:
+            self.arithmetic = True
+            return self.continue_from(replace(problem, exact=False), unknowns_of(kept))
         return step
-    roughly = max(SEARCH.first_order_tolerance, tolerance)
-    steps = newton(problem, unknowns, second_order=False, shared=False)
-    step = search.run(problem, steps, roughly, max_steps)
-    steps = newton(problem, unknowns_of(step), second_order=True, shared=False)
-    return search.run(problem, steps, tolerance, max_steps)
+
+    def solve_exact(self, problem: Problem, unknowns: Pressures, tolerance: float) -> Step:
+        """Solve by shared steps on the second-order wedge, or by cell through the first order."""
+        max_steps = min(SEARCH.max_exact_iterations, self.options.max_iterations)
+        steps = newton(problem, unknowns, second_order=True)
+        step = self.run(problem, steps, tolerance, max_steps)
+        if self.converged(tolerance):
+            return step
+        roughly = max(SEARCH.first_order_tolerance, tolerance)
+        steps = newton(problem, unknowns, second_order=False, shared=False)
+        step = self.run(problem, steps, roughly, max_steps)
+        steps = newton(problem, unknowns_of(step), second_order=True, shared=False)
+        return self.run(problem, steps, tolerance, max_steps)
 
 
 def back_to_first_order(problem: Problem, step: Step) -> Step:

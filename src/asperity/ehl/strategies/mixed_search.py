@@ -17,9 +17,7 @@ from asperity.ehl.newton.single_pressure import Step
 from asperity.ehl.outcome import ATTEMPTS, FROM_DRY
 from asperity.ehl.problem_setup import coarser_in_all_axes, grid_levels
 from asperity.ehl.scales import Scales
-from asperity.ehl.strategies import exact_faces
-from asperity.ehl.strategies.exact_faces import back_to_first_order
-from asperity.ehl.strategies.grid_continuation import Search
+from asperity.ehl.strategies.exact_faces import ExactFaceSearch, back_to_first_order
 from asperity.ehl.strategies.initial_guess import (
     DryAndLubricated,
     dry_start,
@@ -34,18 +32,10 @@ from asperity.surface import Surface
 COARSE_TO_FINE, ROBUST = ATTEMPTS[:2]
 
 
-class MixedSearch(Search):
+class MixedSearch(ExactFaceSearch):
     """Strategies of the two-pressure models, with all steps on record."""
 
     imbalance = 0.0  # of the last step, where oil is conserved
-    solved: Sequence[tuple[Problem, Step]] = ()  # of the figures
-    arithmetic = False  # the last step has arithmetic means in place of exact face mobilities
-    is_guess = False  # the solution is only an initial guess for exact face mobilities
-
-    def keep(self, problem: Problem, step: Step) -> None:
-        """Keep the figures of a grid's solution, for the estimate of the discretisation error."""
-        self.figures.append(self.figures_of(step))
-        self.solved = [*self.solved, (problem, step)][-len(self.figures) :]
 
     def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
         """Return True if the last step met the tolerance; if last, with conserved oil balanced."""
@@ -111,12 +101,12 @@ class MixedSearch(Search):
     def continue_from(self, problem: Problem, unknowns: Pressures) -> Step:
         """Solve from a neighbouring solution: second order first, then as from a distant guess."""
         if problem.exact:
-            step = exact_faces.solve(self, problem, unknowns, self.options.tolerance)
+            step = self.solve_exact(problem, unknowns, self.options.tolerance)
             if self.converged(self.options.tolerance):
                 return step
             robust = replace(problem, exact=False)
             step = self.continue_from(robust, unknowns)
-            return exact_faces.solve_again(self, [(robust, step)])
+            return self.solve_again([(robust, step)])
         max_steps = min(self.options.max_iterations, SEARCH.max_second_order_iterations)
         step = self.run(
             problem, newton(problem, unknowns, second_order=True), self.options.tolerance, max_steps
@@ -164,21 +154,6 @@ class MixedSearch(Search):
                     self.by_first_order = self.figures_of(back_to_first_order(problem, step))
                 return step
         return self.solve_from_afar(problem, unknowns, coarse=coarse, last=last)
-
-    def targets(
-        self, problem: Problem, *, coarse: bool, from_coarse: bool = False
-    ) -> tuple[float, int]:
-        """Return tolerance and largest number of steps, for the finest or a coarser grid."""
-        tolerance = self.options.tolerance
-        max_steps = self.options.max_iterations
-        if not coarse:
-            return tolerance, max_steps
-        roughly = (
-            CONTINUATION.coarse_tolerance
-            if problem.accurate or from_coarse
-            else 0.5 * SEARCH.first_order_tolerance
-        )
-        return max(roughly, tolerance), min(SEARCH.max_error_grid_iterations, max_steps)
 
     def refine_third_order(self, problem: Problem, step: Step) -> tuple[str, Step]:
         """Refine a robust solution of smooth bodies with the third-order wedge.
