@@ -158,7 +158,7 @@ def test_every_contact_is_solved_and_stored_once(asp):
 def test_a_contacts_interval_is_that_of_solve(asp):
     """The interval covers several surfaces of one kind."""
     rough = (
-        'surface = { kind = "gaussian", sq = "0.6 um", correlation_length = "20 um", seed = 3 }\n'
+        'surface = { kind = "gaussian", sq = "1.2 um", correlation_length = "20 um", seed = 3 }\n'
     )
     rest = "[grid]\ncells = [96, 48]\n[solver]\nsurfaces = 3\n"
     Path("discs.toml").write_text(rough + DISCS + rest, "utf-8")

@@ -177,7 +177,7 @@ def test_the_interval_of_k_rescales_time(unbroken):
     low, high = unbroken.volume_interval(0)
     assert low < unbroken.worn_volume[0] < high
     later = faster.worn_volume[0]  # also that of k after HOURS * fast
-    assert later < high < 1.25 * later  # wear slows down; the interval extrapolates the last rate
+    assert later < high < 1.75 * later  # wear slows down; the interval extrapolates the last rate
     assert run_wear(case({"wear.flattening": True}), hours=1e-4).interval_by_k("sq_m") is None
 
 

@@ -191,7 +191,7 @@ youngs_modulus = ["200 GPa", "200 GPa"]
 poisson_ratio = [0.3, 0.3]
 [surface]
 kind = "gaussian"
-sq = "1 um"
+sq = "2 um"
 correlation_length = ["40 um", "40 um"]
 seed = 7
 [grid]

@@ -10,9 +10,10 @@ import pytest
 from asperity.case import load_case
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
+from asperity.ehl import running_cells
 from asperity.results import load_run, solve_case
 from asperity.surface import MovingSurfaces, Surface, flat_surface
-from asperity.transient import Series, running_cells, settled_from, time_means
+from asperity.transient import Series, settled_from, time_means
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 RUNNING = {"contact.roughness": "running", "grid.cells": [64, 32]}

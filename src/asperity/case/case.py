@@ -22,11 +22,10 @@ from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.limits import require_affordable
 from asperity.coupling import VibrationModel
-from asperity.ehl import ACCURACY, Options, auto_grid
+from asperity.ehl import ACCURACY, MOST_RUNNING_CELLS, Options, auto_grid, running_cells
 from asperity.lubricant import Lubricant, OilFact, OilSheet, Thermal
 from asperity.solution import inlet_notes, plausibility_notes
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
-from asperity.transient import MOST_CELLS, running_cells
 from asperity.wear import WearModel
 
 # default number of surfaces per solution on coarse and on fine grids, to limit computing time
@@ -243,7 +242,7 @@ class Case:
         texture = texture_of(self.contents.surface, self.folder)
         assert texture is not None
         share = ACCURACY / (self.contents.grid.accuracy or ACCURACY)
-        most = round(MOST_CELLS * share)
+        most = round(MOST_RUNNING_CELLS * share)
         with self.naming("grid"):
             return running_cells(self.conditions, self.grid, texture.lengths, most)
 
