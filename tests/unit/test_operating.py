@@ -189,6 +189,7 @@ entrainment_speed = "1 m/s"
 [material]
 youngs_modulus = ["200 GPa", "200 GPa"]
 poisson_ratio = [0.3, 0.3]
+hardness = "2 GPa"
 [surface]
 kind = "gaussian"
 sq = "2 um"
