@@ -133,7 +133,11 @@ def _running(
         if strict:
             raise NotConverged(solution, str(failure)) from None
         return run_of(case, solution, (*case.surface_notes, *case.notes), groups=groups)
-    notes = [*case.surface_notes, *case.notes, *notes]
+    of_snapshot = (
+        "Maps, distributions and the contact's own resonance are those of the snapshot from which "
+        "the running contact starts, with its roughness standing still."
+    )
+    notes = [*case.surface_notes, *case.notes, of_snapshot, *notes]
     attributes |= {"notes": json.dumps(notes), "running": running.to_json()}
     solution = replace(solution, attributes=attributes)
     run = run_of(case, solution, notes, groups=groups, running=running)
