@@ -63,10 +63,10 @@ def test_track_forecasts_a_crossing_and_raises_an_alarm(asp, series):
     result = json.loads(out)
     assert (code, err) == (3, "")
     assert result["forecast"]["alarm"] is True
-    assert result["forecast"]["limit"] == {"key": "clr", "value": 0.75, "rising": True}
+    assert result["forecast"]["limit"] == {"key": "clr", "value": 0.6, "rising": True}
     assert result["alarm"]["raised_by"] == "forecast"
     assert result["alarm"]["since"].endswith("6.h5")
-    assert result["verdict"].startswith("ALARM since 6.h5: CLR rises above 75.0 % within")
+    assert result["verdict"].startswith("ALARM since 6.h5: CLR rises above 60.0 % within")
     page = Path("track.html").read_text("utf-8")
     assert "CLR rises above" in page
     assert (page.count('id="ahead"'), page.count("its forecast and the limit")) == (1, 1)
