@@ -355,7 +355,7 @@ class Run:
         )
         if self.running is None:
             return regime, shared
-        return regime, f"{shared}, standing still {quantity('clr').text(self.snapshot_clr)}"
+        return regime, f"{shared}, {quantity('clr').text(self.snapshot_clr)} in the snapshot"
 
     def _ends_text(self) -> str:
         """Return edge pressure and loaded length of a roller; empty for other contacts."""

@@ -136,11 +136,10 @@ def running_error(
     if state.error is None:
         return None
     mean = running.clr
-    grid = None if math.isnan(mean.grid) else (mean.grid, mean.grid)
     clr = Uncertainty(
         value=min(max(mean.value, 0.0), 1.0),
         iteration=(0.0, 0.0),
-        grid=grid,
+        grid=(mean.grid, mean.grid),
         surfaces=(mean.time, mean.time),
         range=(0.0, 1.0),
     )
@@ -177,8 +176,7 @@ def run_tracks(
     coarse_cells = nx // 2, max(1, ny // 2)
     with _outcomes(case, coarse_cells, tracks, workers) as further:
         coarse = _track(case, coarse_cells)
-        length = (len(coarse.values) - 1) // coarse.steps_per_passage
-        fine = _track(case, (nx, ny), passages=length, moments=MOMENTS, progress=progress)
+        fine = _track(case, (nx, ny), passages=_length(coarse), moments=MOMENTS, progress=progress)
         others = [outcome() for outcome in further]
     notes = [
         f"Track {number} of {tracks} is left out: {other.reason.rstrip('.')}."
@@ -187,6 +185,12 @@ def run_tracks(
     ]
     all_coarse = [coarse, *(other.value for other in others if other.value is not None)]
     running = _running(case, all_coarse, fine)
+    for number, series in enumerate(all_coarse, 1):
+        if settled_from(series, "clr") is None:
+            notes.append(
+                f"The load share of track {number} is not stationary after {_length(series)} "
+                "passages of the Hertz zone; the mean is that of the second half."
+            )
     if running.failed:
         notes.append(
             f"{running.failed} of {running.steps} time steps did not reach the tolerance; the "
@@ -220,8 +224,12 @@ def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
 
 def _cut(series: Series) -> int:
     """Return the passages to cut off: half where the series is not stationary."""
-    length = (len(series.values) - 1) // series.steps_per_passage
-    return settled_from(series, "clr") or max(1, length // 2)
+    return settled_from(series, "clr") or max(1, _length(series) // 2)
+
+
+def _length(series: Series) -> int:
+    """Return the length of a series in passages of the Hertz zone."""
+    return (len(series.values) - 1) // series.steps_per_passage
 
 
 def _track(

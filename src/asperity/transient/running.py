@@ -186,43 +186,36 @@ def settled_from(series: Series, name: str) -> int | None:
     return None if cut == latest and latest > 1 else cut
 
 
-def time_means(coarse: list[Series], cuts: list[int], fine: Series | None) -> dict[str, TimeMean]:
+def time_means(coarse: list[Series], cuts: list[int], fine: Series) -> dict[str, TimeMean]:
     """Return the mean of every number over time and tracks, with its interval.
 
     Parameters
     ----------
     coarse : series of every track on the coarse grid
     cuts : passages cut off from each
-    fine : series of the first track on the fine grid; None if there is only one grid
+    fine : series of the first track on the fine grid
     """
     blocks = [series.passages(cut) for series, cut in zip(coarse, cuts, strict=True)]
-    pooled, accurate = np.concatenate(blocks), None if fine is None else fine.passages(cuts[0])
-    first = coarse[0] if fine is None else fine
-    settled = first.values[1 + cuts[0] * first.steps_per_passage :]
+    pooled, accurate = np.concatenate(blocks), fine.passages(cuts[0])
+    deviations = fine.values[1 + cuts[0] * fine.steps_per_passage :].std(axis=0)
     return {
         name: _time_mean(
-            pooled[:, column],
-            None if accurate is None else (accurate[:, column], blocks[0][:, column]),
-            float(settled[:, column].std()),
+            pooled[:, column], accurate[:, column], blocks[0][:, column], float(deviations[column])
         )
-        for column, name in enumerate(first.names)
+        for column, name in enumerate(fine.names)
     }
 
 
-def _time_mean(rough: Field, first_track: tuple[Field, Field] | None, deviation: float) -> TimeMean:
-    """Return the mean of passages on the coarse grid, corrected on the fine and coarse first track.
+def _time_mean(coarse: Field, fine: Field, same_track: Field, deviation: float) -> TimeMean:
+    """Return the mean of the passages `coarse`, corrected by those on the first track.
 
-    The mean of the fine grid alone is taken where its interval is narrower.
+    The correction is `fine` less `same_track`, both of the first track. The mean of the fine grid
+    alone is taken where its interval is narrower.
     """
-    if first_track is None:
-        return TimeMean(
-            value=float(rough.mean()), time=_half_width([rough]), grid=math.nan, deviation=deviation
-        )
-    accurate, same = first_track
-    count = min(len(accurate), len(same))
-    change = accurate[:count] - same[:count]
-    corrected = float(rough.mean() + change.mean()), _half_width([rough, change])
-    alone = float(accurate.mean()), _half_width([accurate])
+    count = min(len(fine), len(same_track))
+    change = fine[:count] - same_track[:count]
+    corrected = float(coarse.mean() + change.mean()), _half_width([coarse, change])
+    alone = float(fine.mean()), _half_width([fine])
     value, half_width = min(corrected, alone, key=lambda pair: pair[1])
     grid = abs(float(change.mean()))
     return TimeMean(value=value, time=half_width, grid=grid, deviation=deviation)

@@ -146,16 +146,16 @@ def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance
 
 
 def _largest_share(step: Pressures, balance: MixedBalance) -> float:
-    """Return the largest share of a step at which no film nearly closes and no pressure leaps."""
+    """Return the largest share of a step at which no film and no pressure changes by too much."""
     problem, gap, free = balance.problem, balance.gap, balance.solid == FREE
     d_gap = problem.deflection(step.total) + step.approach
-    closing = np.where(free & (gap > problem.contact_gap), -d_gap / gap, 0.0).max()
-    leaping = np.max(np.abs(step.total) / np.maximum(1.0, balance.unknowns.total))
+    film_decrease = np.where(free & (gap > problem.contact_gap), -d_gap / gap, 0.0).max()
+    pressure_change = np.max(np.abs(step.total) / np.maximum(1.0, balance.unknowns.total))
     tiny = np.finfo(float).tiny
     largest = min(
         1.0,
-        MIXED_NEWTON.max_film_decrease / max(closing, tiny),
-        MIXED_NEWTON.max_pressure_change / max(leaping, tiny),
+        MIXED_NEWTON.max_film_decrease / max(film_decrease, tiny),
+        MIXED_NEWTON.max_pressure_change / max(pressure_change, tiny),
     )
     return float(max(largest, MIXED_NEWTON.min_share))
 
