@@ -96,12 +96,12 @@ def set_up(newest: MutableSequence[int]) -> None:
 
 def _progress_hook(
     ticket: Ticket, seconds: float, steps: float = math.inf
-) -> Callable[[Iteration], None]:
+) -> Callable[[Iteration | None], None]:
     """Return a callback for the solver that stops it at a limit or when superseded."""
     end = time.monotonic() + seconds
     step_numbers = itertools.count(1)
 
-    def check(step: Iteration) -> None:  # noqa: ARG001 - only its occurrence matters
+    def check(step: Iteration | None) -> None:  # noqa: ARG001 - only its occurrence matters
         if next(step_numbers) > steps:
             raise _StepLimitError
         if _newest is not None and ticket.slot >= 0 and _newest[ticket.slot] != ticket.number:
@@ -110,6 +110,12 @@ def _progress_hook(
             raise _TimeLimitError
 
     return check
+
+
+def _solve(ticket: Ticket, case: Case) -> Run:
+    """Solve a case within the time limit."""
+    check = _progress_hook(ticket, TIME_LIMIT_S)
+    return solve_case(case, strict=False, progress=check, surface_progress=lambda *_: check(None))
 
 
 def run_job(work: Callable[..., object], *arguments: object) -> object:
@@ -144,7 +150,7 @@ def solve_fully(ticket: Ticket, case: Case) -> ContactResult:
     """Solve the contact on the grid of its case, with error bars."""
     start = time.perf_counter()
     limit_cells(case.source, case.grid.cells)
-    run = solve_case(case, strict=False, progress=_progress_hook(ticket, TIME_LIMIT_S))
+    run = _solve(ticket, case)
     return result_of_run(run, time.perf_counter() - start)
 
 
@@ -228,7 +234,7 @@ def open_run(path: Path) -> tuple[Case, ContactResult]:
 
 def make_report(ticket: Ticket, case: Case, write: ReportWriter) -> str:
     """Solve the contact and return its HTML report."""
-    run = solve_case(case, strict=False, progress=_progress_hook(ticket, TIME_LIMIT_S))
+    run = _solve(ticket, case)
     with TemporaryDirectory() as folder:
         return write([run], Path(folder) / "report.html").read_text("utf-8")
 

@@ -30,6 +30,9 @@ from asperity.wear import WearModel
 
 # default number of surfaces per solution on coarse and on fine grids, to limit computing time
 DEFAULT_SURFACES, DEFAULT_SURFACES_FINE = 5, 3
+MANY_RUNNING_CELLS = 1200  # of a running contact among many
+DEFAULT_TRACKS = 1  # of a running contact; a generated track holds several contacts
+DEFAULT_TRACKS_MEASURED = 3
 MOST_SURFACES = 1000  # a prediction interval hardly narrows beyond a few dozen
 FINE_GRID = 256 * 256  # cells above which a grid counts as fine
 CELL_BYTES, CELL_S = 800.0, 1e-4  # cost of a cell while a contact is solved
@@ -176,7 +179,7 @@ class Case:
         solver = {
             name: plain(value)
             for name, value in self.contents.solver
-            if name not in ("surfaces", "dynamic")
+            if name not in ("surfaces", "dynamic", "running_cells")
         }
         return Options(model=self.contents.model, **solver)
 
@@ -212,27 +215,37 @@ class Case:
         return self.contents.motion or MotionSection()
 
     @property
-    def is_running(self) -> bool:
-        """True if rough bodies move and the solution is the mean over time of the running contact.
-
-        Otherwise it is that of standing roughness: a smooth or dry contact, a rough body at rest,
-        `contact.roughness = "standing"`, thermal feedback, and roughness that is stored or fixed.
-        """
-        section = self.contents.surface
-        if (
-            self.contents.contact.roughness == "standing"
-            or self.lubricant is None
-            or self.stored is not None
-            or self.thermal.feedback
-        ):
+    def roughness_moves(self) -> bool:
+        """True if a rough body moves through a lubricated contact."""
+        if self.lubricant is None:
             return False
         first, second = (speed != 0.0 for speed in self.conditions.surface_speeds)
-        parts = section.parts
-        if len(parts) > 1:
+        if len(self.contents.surface.parts) > 1:
             moves = first or second
         else:
             moves = {"first": first, "second": second, "both": first or second}[self.motion.rough]
         return moves and self.surface().sq > 0.0
+
+    @property
+    def is_running(self) -> bool:
+        """True if roughness moves and the solution is the mean over time of the running contact.
+
+        Otherwise it is that of standing roughness: `contact.roughness = "standing"`, thermal
+        feedback, roughness that is stored, and contacts without moving roughness.
+        """
+        return (
+            self.contents.contact.roughness == "running"
+            and self.stored is None
+            and not self.thermal.feedback
+            and self.roughness_moves
+        )
+
+    @property
+    def among_many(self) -> "Case":
+        """The case with fewer cells of a running contact, unless it states cells or an accuracy."""
+        if self.contents.solver.running_cells or self.contents.grid.accuracy:
+            return self
+        return self.with_overrides({"solver.running_cells": MANY_RUNNING_CELLS})
 
     def running_cells(self) -> tuple[int, int]:
         """Return the cells of the running contact's fine grid, at most those of `grid`.
@@ -242,12 +255,14 @@ class Case:
         texture = texture_of(self.contents.surface, self.folder)
         assert texture is not None
         share = ACCURACY / (self.contents.grid.accuracy or ACCURACY)
-        most = round(MOST_RUNNING_CELLS * share)
+        most = self.contents.solver.running_cells or round(MOST_RUNNING_CELLS * share)
         with self.naming("grid"):
             return running_cells(self.conditions, self.grid, texture.lengths, most)
 
-    def moving_surfaces(self) -> MovingSurfaces:
+    def moving_surfaces(self, lengths: int = 1) -> MovingSurfaces:
         """Return both bodies' roughness on tracks that repeat along rolling, each at its own speed.
+
+        A track has `motion.track` lengths of the domain, of generated roughness at least `lengths`.
 
         Roughness that is generated, or measured on one surface only, is on the body that
         `motion.rough` names; "both" bodies have independent samples of Sq/√2 each, the first with
@@ -258,7 +273,7 @@ class Case:
         section = self.contents.surface
         rough = self.motion.rough
         speeds = self.conditions.surface_speeds
-        track = track_grid(self.grid, self.motion.track)
+        track = track_grid(self.grid, max(self.motion.track, 1 if self._is_measured else lengths))
         _require_affordable(track)
         with self.naming("surface"):
             if self.stored is not None:
@@ -284,11 +299,7 @@ class Case:
         """
         with self.naming("surface"):
             requested = self.contents.solver.surfaces if count is None else count
-            number = requested or (
-                DEFAULT_SURFACES
-                if self.grid.cells[0] * self.grid.cells[1] <= FINE_GRID
-                else DEFAULT_SURFACES_FINE
-            )
+            number = requested or self._default_surfaces
             if not 1 <= number <= MOST_SURFACES:
                 raise BadInput(
                     f"surfaces must be 1 to {MOST_SURFACES}, got {number}; use asperity study for "
@@ -313,6 +324,18 @@ class Case:
                     "surfaces to solve; solve fewer, or measure a larger map"
                 )
             return number if available is None else min(number, available)
+
+    @property
+    def _is_measured(self) -> bool:
+        parts = self.contents.surface.parts.values()
+        return any(isinstance(part, FileSection) for part in parts)
+
+    @property
+    def _default_surfaces(self) -> int:
+        if self.is_running:
+            return DEFAULT_TRACKS_MEASURED if self._is_measured else DEFAULT_TRACKS
+        nx, ny = self.grid.cells
+        return DEFAULT_SURFACES if nx * ny <= FINE_GRID else DEFAULT_SURFACES_FINE
 
     def on_surface(self, number: int) -> "Case":
         """Return the case on another surface: a later seed or map position; 0 is its own."""

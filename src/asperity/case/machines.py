@@ -56,6 +56,7 @@ Tilt: TypeAlias = Annotated[
     BeforeValidator(lambda value: None if value == "free" else value),
 ]
 MACHINE_TABLES = ("machine", "rating")  # not in the case of a contact
+OF_ALL_CONTACTS = ("roughness",)  # keys of [contact] beside a [machine]
 DIGITS = 10  # of the values of a derived contact
 
 
@@ -212,7 +213,10 @@ class MachineCase:
             for radius in (conditions.radius_along_rolling, conditions.radius_across_rolling)
         ]
         length = {} if conditions.length is None else {"length": _written(conditions.length, "m")}
+        stated = self.tables.get("contact", {})
+        assert isinstance(stated, Mapping)
         return {
+            **stated,
             "geometry": conditions.geometry,
             "radius": radii if conditions.geometry == "elliptic" else radii[0],
             **length,
@@ -266,8 +270,12 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
         raise BadInput(
             f"{source}: has no [machine]; add one, or use asperity solve for a single contact"
         )
-    if "contact" in tables:
-        raise BadInput(f"{source}: has a [machine] and a [contact]; leave one of them out")
+    contact = tables.get("contact", {})
+    if not isinstance(contact, Mapping) or set(contact) - set(OF_ALL_CONTACTS):
+        raise BadInput(
+            f"{source}: has a [machine] and a [contact]; leave one of them out, or only "
+            f"contact.{', '.join(OF_ALL_CONTACTS)}"
+        )
     present = {key: tables[key] for key in _MachineTables.model_fields if key in tables}
     parsed = parse_section(_MachineTables, {"material": STEEL, **present}, source)
     section = parsed.machine

@@ -53,8 +53,8 @@ class ContactSection(Section):
     load: Force
     entrainment_speed: SpeedOrRest  # 0 without a lubricant only
     slip: Number = 0.0  # slide-to-roll ratio (u1 - u2)/entrainment speed
-    # a snapshot of roughness at rest, or the mean over time of roughness that moves with its body
-    roughness: Literal["running", "standing"] = "standing"
+    # mean over time of roughness that moves with its body, or a snapshot of roughness at rest
+    roughness: Literal["running", "standing"] = "running"
 
 
 class MaterialSection(Section):
@@ -112,7 +112,10 @@ class SolverSection(Section):
     dynamic: Annotated[int, Strict()] = (
         0  # frequencies of the dynamic stiffness and damping; 0: none
     )
-    surfaces: Count | None = None  # surfaces per solution; omitted: by the size of the grid
+    # surfaces per solution, or tracks of a running contact; omitted: by the size of the grid, or
+    # one track (three if measured)
+    surfaces: Count | None = None
+    running_cells: Count | None = None  # of a running contact; omitted: 3600 at accuracy 0.01
 
     @field_validator("dynamic")
     @classmethod

@@ -13,6 +13,7 @@ from asperity.cli.options import (
     CaseOrRun,
     Overrides,
     Quiet,
+    StandingRoughness,
     SurfaceFile,
     chosen_case,
     require_output,
@@ -78,10 +79,12 @@ def solve(
         typer.Option(
             metavar="N",
             min=1,
-            help="Surfaces to solve and average (default: 5; fine grids: 3).",
+            help="Surfaces to average (default: 5; fine grids: 3), or running tracks "
+            "(default: 1; measured: 3).",
         ),
     ] = None,
     accuracy: Accuracy = None,
+    snapshot: StandingRoughness = False,
     dynamic: Annotated[
         bool,
         typer.Option(
@@ -95,9 +98,9 @@ def solve(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Solve one contact on several surfaces: film, load sharing, contact resonance, scatter."""
+    """Solve one contact with running roughness: film, load sharing, contact resonance."""
     require_output(out, ".nc")
-    chosen = chosen_case(path, overrides, surface, accuracy)
+    chosen = chosen_case(path, overrides, surface, accuracy, snapshot=snapshot)
     if surfaces is not None:
         chosen = chosen.with_overrides({"solver.surfaces": surfaces})
     if dynamic and not chosen.contents.solver.dynamic:
@@ -109,9 +112,9 @@ def solve(
         run.save(out)
     saved = [] if out is None else [f"Saved in {out}; asperity report {out} writes a page of it"]
     show(run.verdict(), run.summary, run_table(run), saved, as_json=as_json, quiet=quiet)
-    if not run.solution.convergence.converged:
+    if not run.converged:
         location = f"; the unfinished state is in {out}" if out is not None else ""
-        raise AsperityError(f"not converged: {run.solution.convergence.explain()}{location}")
+        raise AsperityError(f"not converged: {run.convergence_text}{location}")
 
 
 def _solve(
@@ -131,7 +134,7 @@ def _solve(
             surfaces=surfaces,
             workers=processes.cores(),
             progress=steps.step,
-            surface_progress=steps.surface,
+            surface_progress=steps.time_step if chosen.is_running else steps.surface,
             strict=False,
             groups=results.RUN_GROUPS if groups is None else groups,
         )
@@ -146,7 +149,7 @@ def run_table(run: "Run") -> Block:
         (quantity("contact_film_m").title, text("contact_film_m", touching)),
         ("cells", " x ".join(map(str, run.solution.grid.cells))),
         *run.card.rows(),
-        ("solver", run.solution.convergence.explain()),
+        ("solver", run.convergence_text),
     ]
     failure = [] if run.friction_failure is None else [f"no friction: {run.friction_failure}"]
     yield from table(rows, (*run.remarks, *failure))

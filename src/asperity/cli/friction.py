@@ -16,6 +16,7 @@ from asperity.cli.options import (
     Overrides,
     Quiet,
     Roughness,
+    StandingRoughness,
     chosen_case,
     require_output,
 )
@@ -40,6 +41,7 @@ def stribeck(
     ] = None,
     sq: Roughness = None,
     overrides: Overrides = None,
+    snapshot: StandingRoughness = False,
     out: OutPicture = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -49,7 +51,9 @@ def stribeck(
     def curve(chosen: "Case", step: "SolverProgress") -> "FrictionCurve":
         return results.stribeck_curve(chosen, speeds=speed, progress=step)
 
-    _friction_command(curve, _cases(path, sq, overrides), out, as_json=as_json, quiet=quiet)
+    _friction_command(
+        curve, _cases(path, sq, overrides, snapshot=snapshot), out, as_json=as_json, quiet=quiet
+    )
 
 
 @app.command()
@@ -64,6 +68,7 @@ def traction(
     ] = None,
     sq: Roughness = None,
     overrides: Overrides = None,
+    snapshot: StandingRoughness = False,
     out: OutPicture = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -73,11 +78,15 @@ def traction(
     def curve(chosen: "Case", step: "SolverProgress") -> "FrictionCurve":
         return results.traction_curve(chosen, slips=slip, progress=step)
 
-    _friction_command(curve, _cases(path, sq, overrides), out, as_json=as_json, quiet=quiet)
+    _friction_command(
+        curve, _cases(path, sq, overrides, snapshot=snapshot), out, as_json=as_json, quiet=quiet
+    )
 
 
-def _cases(path: Path, roughness: list[str] | None, overrides: list[str] | None) -> "list[Case]":
-    chosen = chosen_case(path, overrides)
+def _cases(
+    path: Path, roughness: list[str] | None, overrides: list[str] | None, *, snapshot: bool
+) -> "list[Case]":
+    chosen = chosen_case(path, overrides, snapshot=snapshot)
     return (
         [chosen.with_overrides({"surface.sq": sq}) for sq in roughness] if roughness else [chosen]
     )
@@ -122,7 +131,8 @@ def _friction_command(
 def _points(curve: "FrictionCurve") -> Block:
     """Return a row per point, in the catalogue's units."""
     rows = [asdict(point) for point in curve.points]
-    selected = [quantity(key) for key in rows[0] if key != "converged"]
+    hidden = ("converged", "clr_low", "clr_high")  # the interval stands beside CLR
+    selected = [quantity(key) for key in rows[0] if key not in hidden]
     yield f"  Sq {text('sq_m', curve.sq)}{', with thermal feedback' if curve.feedback else ''}"
     yield from columns(
         [*(entry.label for entry in selected), ""],

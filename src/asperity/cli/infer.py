@@ -25,6 +25,7 @@ from asperity.cli.options import (
     SampleSeed,
     Scale,
     Shaft,
+    StandingRoughness,
     SurfaceFile,
     Unit,
     Workers,
@@ -94,6 +95,7 @@ def infer(
     paths: PathsArgument = None,
     case_file: CaseFileOption = None,
     overrides: Overrides = None,
+    snapshot: StandingRoughness = False,
     surface: SurfaceFile = None,
     table_file: TableFileOption = None,
     emulator: EmulatorFolder = None,
@@ -119,7 +121,7 @@ def infer(
     case_file = _required(
         case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design
     )
-    setting, surface_notes = _setting(case_file, overrides, surface)
+    setting, surface_notes = _setting(case_file, overrides, surface, snapshot=snapshot)
     limit = _limit(forecast, setting, worn)
     history = None if worn is None else simulation.load_wear(worn)
     require_output(page, ".html", option="--report")
@@ -248,10 +250,10 @@ def _forecast(
 
 
 def _setting(
-    path: Path, overrides: list[str] | None, surface: Path | None
+    path: Path, overrides: list[str] | None, surface: Path | None, *, snapshot: bool
 ) -> tuple["Setting", tuple[str, ...]]:
     """Return the setting, with Sq as measured on a surface if one is given, and a note on it."""
-    setting = inference.inference_setting(chosen_case(path, overrides))
+    setting = inference.inference_setting(chosen_case(path, overrides, snapshot=snapshot))
     if surface is None:
         return setting, ()
     setting, note = inference.with_measured_surface(setting, surfaces.read_surface(surface))

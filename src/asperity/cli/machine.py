@@ -9,7 +9,15 @@ import typer
 
 from asperity import case, machines, report
 from asperity.cli.app import app
-from asperity.cli.options import AsJson, OutFolder, Overrides, Quiet, Workers, read_overrides
+from asperity.cli.options import (
+    AsJson,
+    OutFolder,
+    Overrides,
+    Quiet,
+    StandingRoughness,
+    Workers,
+    read_overrides,
+)
 from asperity.cli.output import Block, Row, columns, progress, show, table
 from asperity.cli.study import study_progress
 from asperity.core import files
@@ -51,6 +59,7 @@ def machine_command(
     out: OutFolder = None,
     workers: Workers = None,
     overrides: Overrides = None,
+    snapshot: StandingRoughness = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the contacts' conditions without solving.")
     ] = False,
@@ -58,7 +67,7 @@ def machine_command(
     quiet: Quiet = False,
 ) -> None:
     """Solve every contact of a machine: film, load sharing, friction, temperature."""
-    chosen = case.load_machine(path, read_overrides(overrides))
+    chosen = case.load_machine(path, read_overrides(overrides, snapshot=snapshot))
     if dry_run:
         result = machines.machine_conditions(chosen)
     else:

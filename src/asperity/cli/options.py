@@ -57,6 +57,10 @@ Accuracy = Annotated[
         help="Relative accuracy of the film, such as 0.01; chooses the grid cells.",
     ),
 ]
+StandingRoughness = Annotated[
+    bool,
+    typer.Option("--snapshot", help="Solve for roughness at rest instead of roughness that moves."),
+]
 SurfaceFile = Annotated[
     Path | None,
     typer.Option("--surface", metavar="FILE", help="Measured surface that replaces the case's."),
@@ -254,8 +258,10 @@ def chosen_case(
     overrides: list[str] | None,
     surface: Path | None = None,
     accuracy: float | None = None,
+    *,
+    snapshot: bool = False,
 ) -> "Case":
-    """Return the case of a file or run, with a surface, `--set` values and an accuracy applied."""
+    """Return the case of a file or run, with its options and `--set` values applied."""
     chosen = results.load_run(path).case if path.suffix == ".nc" else case.load_case(path)
     if surface is not None:
         files.require_file(surface)
@@ -265,13 +271,13 @@ def chosen_case(
     replaced: dict[str, object] = {}
     if accuracy is not None:
         replaced = {"grid.cells": "auto", "grid.accuracy": accuracy}
-    replaced |= read_overrides(overrides)
+    replaced |= read_overrides(overrides, snapshot=snapshot)
     return chosen.with_overrides(replaced) if replaced else chosen
 
 
-def read_overrides(overrides: list[str] | None) -> dict[str, object]:
-    """Return keys and values of `--set KEY=VALUE`."""
-    replaced: dict[str, object] = {}
+def read_overrides(overrides: list[str] | None, *, snapshot: bool = False) -> dict[str, object]:
+    """Return keys and values of `--set KEY=VALUE` and `--snapshot`."""
+    replaced: dict[str, object] = {"contact.roughness": "standing"} if snapshot else {}
     for override in overrides or []:
         key, equals, value = override.partition("=")
         if not (equals and key.strip() and value.strip()):

@@ -194,6 +194,10 @@ class SolverSteps:
         self.done, self.total = done, total
         self.display(f"{done} of {total} surfaces", done, total)
 
+    def time_step(self, done: int, total: int) -> None:
+        """Show a time step of a running contact."""
+        self.display(f"time step {done} of {total}", done, total)
+
 
 @contextmanager
 def solver_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[Iteration], None]]":

@@ -16,6 +16,7 @@ from asperity.cli.options import (
     Overrides,
     Page,
     Quiet,
+    StandingRoughness,
     StudyFigures,
     Workers,
     chosen_case,
@@ -69,6 +70,7 @@ def study_command(
     merge: MergeOption = None,
     fields: FieldsOption = None,
     overrides: Overrides = None,
+    snapshot: StandingRoughness = False,
     dry_run: DryRunOption = False,
     page: Page = None,
     figures: StudyFigures = None,
@@ -81,7 +83,7 @@ def study_command(
         raise BadInput("asperity study needs a folder for its cases; state --out DIR")
     if page is not None and not _in_new_folder(page, out):
         require_output(page, ".html", option="--report")
-    plan = study.plan_study(chosen_case(path, overrides))
+    plan = study.plan_study(chosen_case(path, overrides, snapshot=snapshot))
     if dry_run:
         cost = study.estimate_study(plan, out=out, workers=workers, shard=part)
         _show_estimate(plan, cost, as_json=as_json, quiet=quiet)

@@ -16,6 +16,7 @@ from asperity.cli.options import (
     Overrides,
     Page,
     Quiet,
+    StandingRoughness,
     SurfaceFile,
     Unit,
     Workers,
@@ -94,6 +95,7 @@ def wear(
     hours: HoursOption = None,
     surface: SurfaceFile = None,
     overrides: Overrides = None,
+    snapshot: StandingRoughness = False,
     out: OutFolder = None,
     workers: Workers = None,
     page: Page = None,
@@ -132,7 +134,7 @@ def wear(
             "either pair"
         )
     require_output(page, ".html", option="--report")
-    chosen = chosen_case(path, overrides, surface)
+    chosen = chosen_case(path, overrides, surface, snapshot=snapshot)
     history = _simulate(chosen, path.name, hours, out, workers or cores(), quiet=quiet)
     if page is not None:
         report.write_wear_report(history, page)

@@ -303,9 +303,14 @@ def _finer(
     setting: Setting, sobol: Field, home: Path, run: partial[StudyResult]
 ) -> pandas.DataFrame:
     """Solve the first points on twice the cells along each axis, with the same surfaces."""
-    refined = setting.case.with_overrides(
-        {"grid.cells": [2 * count if count > 1 else 1 for count in setting.case.grid.cells]}
-    )
+    case = setting.case.among_many
+    finer: dict[str, object] = {
+        "grid.cells": [2 * count if count > 1 else 1 for count in case.grid.cells]
+    }
+    running_cells = case.contents.solver.running_cells
+    if running_cells:
+        finer["solver.running_cells"] = 4 * running_cells
+    refined = case.with_overrides(finer)
     points = [overrides_at(refined, setting.ranges, shares) for shares in sobol[:FINER_POINTS]]
     plan = plan_points(refined, points, seeds=setting.surfaces, kind="still")
     return run(plan, out=home / FINER).table

@@ -112,7 +112,7 @@ def _load_or_solve(case: Case, path: Path) -> Run:
         stored = load_run(path)
         if stored.case.text == case.text:
             return stored
-    run = solve_case(case, surfaces=None, workers=cores(), strict=False)
+    run = solve_case(case.among_many, surfaces=None, workers=cores(), strict=False)
     run.save(path)
     return run
 
@@ -145,10 +145,9 @@ def _effort(case: Case, max_cells: int) -> JsonObject:
     nx, ny = coarse.grid.cells
     surfaces = DEFAULT_SURFACES if nx * ny <= FINE_CONTACT_GRID else DEFAULT_SURFACES_FINE
     stated = case.contents.solver.surfaces
-    return {
-        **smaller,
-        "solver.surfaces": min(coarse.surface_count(), surfaces) if stated is None else stated,
-    }
+    if stated is None:
+        stated = min(coarse.surface_count(), surfaces)
+    return {**smaller, "solver.surfaces": stated}
 
 
 def _smaller_grid(case: Case, max_cells: int) -> JsonObject:

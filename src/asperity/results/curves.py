@@ -1,6 +1,7 @@
 """Friction curves of a case: over speed (Stribeck) and over the slide-to-roll ratio (traction).
 
-Each point is a solved contact, warm-started from its neighbour; nothing is printed or drawn here.
+Each point is a solved contact: running roughness, or a snapshot that is warm-started from its
+neighbour. Nothing is printed or drawn here.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,6 +13,8 @@ import numpy as np
 from asperity.case import Case
 from asperity.core.errors import BadInput, require_positive
 from asperity.ehl import ContactSolution, Iteration
+from asperity.results.run import Run
+from asperity.results.solve import solve_case
 from asperity.solution import HOT, contact_state, friction_and_heat, solve_thermal_contact
 
 SolverProgress = Callable[[Iteration], None]
@@ -22,6 +25,16 @@ SPEEDS = 13
 SLIP_RANGE = (1e-3, 0.5)
 SLIPS = 14
 MAX_SLIP = 1000.0
+GROUPS = ("load", "film", "friction", "heat")  # of the catalogue, of a point
+RUNNING_KEYS = {  # number of a point: its key in the catalogue
+    "friction_coefficient": "friction_coefficient",
+    "asperity_part": "friction_asperity_part",
+    "oil_part": "friction_oil_part",
+    "h_mean_m": "h_mean_m",
+    "flash_temperature_max_k": "flash_temperature_max_k",
+    "film_temperature_max_k": "film_temperature_max_k",
+    "friction_power_w": "friction_power_w",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +52,8 @@ class FrictionPoint:
     asperity_part: float
     oil_part: float
     clr: float
+    clr_low: float | None
+    clr_high: float | None
     h_mean_m: float
     lambda_ratio: float | None
     flash_temperature_max_k: float
@@ -56,12 +71,14 @@ class FrictionCurve:
     boundary_friction: float
     sq: float  # composite roughness [m]
     feedback: bool  # True if the viscosity is that at the film temperature
+    running: bool  # True if roughness moves at all points where a rough body does
 
     def scalars(self) -> dict[str, object]:
         """Return the curve for `--json`."""
         return {
             "kind": self.kind,
             "sq_m": self.sq,
+            "roughness": "running" if self.running else "standing",
             "boundary_friction": self.boundary_friction,
             "thermal_feedback": self.feedback,
             "points": [asdict(point) for point in self.points],
@@ -173,7 +190,13 @@ def _curve(
         raise BadInput("a curve needs at least one point, got none")
     surface, points = case.surface(), []
     start: ContactSolution | None = None
+    running = False
     for pair in speeds:
+        moving = _at_speeds(case, pair)
+        if moving.is_running:
+            running = True
+            points.append(_running_point(solve_case(moving, strict=False, groups=GROUPS)))
+            continue
         for first in (start, None):  # retry with a cold start if the warm start fails
             solution = solve_thermal_contact(
                 replace(case.conditions, surface_speeds=pair),
@@ -196,6 +219,34 @@ def _curve(
         boundary_friction=case.boundary_friction,
         sq=surface.sq,
         feedback=case.thermal.feedback,
+        running=running,
+    )
+
+
+def _at_speeds(case: Case, pair: tuple[float, float]) -> Case:
+    """Return the case at other surface speeds."""
+    entrainment = 0.5 * (pair[0] + pair[1])
+    return case.among_many.with_overrides(
+        {
+            "contact.entrainment_speed": f"{entrainment!r} m/s",
+            "contact.slip": (pair[0] - pair[1]) / entrainment,
+            "vibration": "none",
+        }
+    )
+
+
+def _running_point(run: Run) -> FrictionPoint:
+    """Return a point of running roughness: means over time."""
+    numbers, conditions, clr = run.numbers(GROUPS), run.case.conditions, run.error.clr
+    return FrictionPoint(
+        entrainment_speed_m_s=conditions.entrainment_speed,
+        slide_to_roll=conditions.slide_to_roll,
+        clr=run.state.clr,
+        clr_low=clr.low,
+        clr_high=clr.high,
+        lambda_ratio=run.state.lambda_ratio,
+        converged=run.converged,
+        **{name: float(numbers[key] or 0.0) for name, key in RUNNING_KEYS.items()},
     )
 
 
@@ -205,6 +256,8 @@ def _point(case: Case, solution: ContactSolution) -> FrictionPoint:
     )
     state = contact_state(solution)
     conditions = solution.conditions
+    assert state.error is not None  # set by contact_state
+    clr = state.error.clr
     return FrictionPoint(
         entrainment_speed_m_s=conditions.entrainment_speed,
         slide_to_roll=conditions.slide_to_roll,
@@ -212,6 +265,8 @@ def _point(case: Case, solution: ContactSolution) -> FrictionPoint:
         asperity_part=friction.asperity_part,
         oil_part=friction.oil_part,
         clr=state.clr,
+        clr_low=clr.low,
+        clr_high=clr.high,
         h_mean_m=state.h_mean,
         lambda_ratio=state.lambda_ratio,
         flash_temperature_max_k=heat.max_k,

@@ -26,4 +26,4 @@ def levels_verdict(runs: Mapping[str, Run]) -> str:
 
 def not_converged(runs: Mapping[str, Run]) -> list[str]:
     """Return the roughness levels whose contacts did not converge."""
-    return [level for level, run in runs.items() if not run.solution.convergence.converged]
+    return [level for level, run in runs.items() if not run.converged]

@@ -271,9 +271,35 @@ class Run:
         return self.solution.convergence.converged and getattr(self.running, "converged", True)
 
     @property
+    def convergence_text(self) -> str:
+        """Outcome of the solver: its steps, or the time steps that did not converge."""
+        running = self.running
+        if running is None or not self.solution.convergence.converged:
+            return self.solution.convergence.explain()
+        return (
+            f"{running.steps - running.failed} of {running.steps} time steps converged, on grids "
+            f"of {running.cells[0]} x {running.cells[1]} cells and half as many along each axis"
+        )
+
+    @property
     def determined(self) -> bool:
         """True if CLR is converged and resolved, with an error bar below 15 %."""
         return self.converged and self.undetermined is None
+
+    @property
+    def film_determined(self) -> bool | None:
+        """True if the solution is converged, with error bars of the films below 15 %.
+
+        None for a dry contact.
+        """
+        if self.solution.lubricant is None:
+            return None
+        return self.converged and not uncertain_films(self.numbers(["film"]))
+
+    @property
+    def is_snapshot(self) -> bool:
+        """True if roughness that moves was solved standing still."""
+        return self.running is None and self.state.sq > 0.0 and self.case.roughness_moves
 
     @property
     def snapshot_clr(self) -> float:
@@ -334,7 +360,7 @@ class Run:
         if films and self.undetermined is None:
             doubt = f"film not determined ({', '.join(films)}); "
         contact = f"{self._ends_text()}{self.resonance_text()}"
-        return f"{sentence}; {doubt}{contact}; {basis(self.error)}."
+        return f"{sentence}; {doubt}{contact}; {basis(self.error, snapshot=self.is_snapshot)}."
 
     def _regime_and_shares(self) -> tuple[str, str]:
         """Return the lubrication regime, and the shares of load and area as text."""

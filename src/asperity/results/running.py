@@ -33,13 +33,21 @@ from asperity.solution import (
     sharing_by_film,
     subsurface_stress,
 )
-from asperity.transient import Series, Snapshot, TimeMean, run_track, settled_from, time_means
+from asperity.transient import (
+    PASSAGES,
+    Series,
+    Snapshot,
+    TimeMean,
+    run_track,
+    settled_from,
+    time_means,
+)
 
-TRACKS = 3  # default number of tracks; each holds several contacts
 MOMENTS = 4  # at which heat and stress are evaluated
 EVERY_STEP = ("load", "film", "pressure", "friction")  # groups of the catalogue: at every step
 AT_MOMENTS = ("sharing", "heat", "stress")  # ... at some
 WITHOUT = ("_error", "_error_m")  # keys of error bars, which the grids determine
+MOST_TRACK_LENGTHS = 8  # of a generated track, in lengths of the domain
 MAX_FAILED = 0.02  # share of the time steps that may miss the tolerance
 ERRORS = {"clr": "clr_error", "car": "car_error", "h_min_m": "h_min_error_m"} | {
     "h_central_m": "h_central_error_m"
@@ -84,9 +92,14 @@ class Running:
         return json.dumps(asdict(self))
 
     @classmethod
-    def from_json(cls, text: str) -> "Running":
-        """Return the record of a stored run; KeyError, TypeError or ValueError for another text."""
+    def from_json(cls, text: str) -> "Running | None":
+        """Return the record of a stored run, None of one that was not solved.
+
+        KeyError, TypeError or ValueError for another text.
+        """
         values = json.loads(text)
+        if values is None:
+            return None
         for name in ("cells", "time_s", "series"):
             values[name] = tuple(values[name])
         return cls(**{**values, "clr": TimeMean(**values["clr"])})
@@ -162,8 +175,8 @@ def run_tracks(
     ----------
     case : case whose rough bodies move
     tracks : number of tracks, surfaces of the case's kind
-    workers : processes for the tracks after the first; 1 starts none
-    progress : called with the number of time steps done and in total, of the first track
+    workers : processes, one of them for the fine grid; 1 starts none
+    progress : called with the number of time steps done and in total, of every track in turn
 
     Raises
     ------
@@ -174,21 +187,27 @@ def run_tracks(
     """
     nx, ny = case.running_cells()
     coarse_cells = nx // 2, max(1, ny // 2)
-    with _outcomes(case, coarse_cells, tracks, workers) as further:
-        coarse = _track(case, coarse_cells)
-        fine = _track(case, (nx, ny), passages=_length(coarse), moments=MOMENTS, progress=progress)
-        others = [outcome() for outcome in further]
+    with _coarse_tracks(case, coarse_cells, tracks, workers, progress) as coarse:
+
+        def first() -> Series:
+            series = coarse[0]().value
+            return _track(case, coarse_cells) if series is None else series  # raises the reason
+
+        fine = _track(
+            case, (nx, ny), passages=lambda: first().length, moments=MOMENTS, progress=progress
+        )
+        own, others = first(), [outcome() for outcome in coarse[1:]]
     notes = [
         f"Track {number} of {tracks} is left out: {other.reason.rstrip('.')}."
         for number, other in enumerate(others, 2)
         if other.value is None
     ]
-    all_coarse = [coarse, *(other.value for other in others if other.value is not None)]
+    all_coarse = [own, *(other.value for other in others if other.value is not None)]
     running = _running(case, all_coarse, fine)
     for number, series in enumerate(all_coarse, 1):
         if settled_from(series, "clr") is None:
             notes.append(
-                f"The load share of track {number} is not stationary after {_length(series)} "
+                f"The load share of track {number} is not stationary after {series.length} "
                 "passages of the Hertz zone; the mean is that of the second half."
             )
     if running.failed:
@@ -224,19 +243,14 @@ def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
 
 def _cut(series: Series) -> int:
     """Return the passages to cut off: half where the series is not stationary."""
-    return settled_from(series, "clr") or max(1, _length(series) // 2)
-
-
-def _length(series: Series) -> int:
-    """Return the length of a series in passages of the Hertz zone."""
-    return (len(series.values) - 1) // series.steps_per_passage
+    return settled_from(series, "clr") or max(1, series.length // 2)
 
 
 def _track(
     case: Case,
     cells: tuple[int, int],
     *,
-    passages: int | None = None,
+    passages: Callable[[], int] | None = None,
     moments: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> Series:
@@ -256,13 +270,21 @@ def _track(
         return run_track(
             case.conditions,
             case.lubricant,
-            case.moving_surfaces().on_cells(cells),
+            case.moving_surfaces(_track_lengths(case)).on_cells(cells),
             measure,
             passages=passages,
             options=case.options,
             moments=moments,
             progress=progress,
         )
+
+
+def _track_lengths(case: Case) -> int:
+    """Return the domain lengths of a track whose roughness does not repeat in `PASSAGES`."""
+    conditions = case.conditions
+    fastest = max(map(abs, conditions.surface_speeds)) / conditions.entrainment_speed
+    zones = case.grid.extent[0] / (2.0 * conditions.hertz.half_widths[0])
+    return min(math.ceil(PASSAGES * fastest / zones), MOST_TRACK_LENGTHS)
 
 
 def _entries(groups: tuple[str, ...]) -> list[Quantity]:
@@ -305,25 +327,39 @@ _Outcome = Callable[[], Determined[Series]]
 
 
 @contextmanager
-def _outcomes(
-    case: Case, cells: tuple[int, int], tracks: int, workers: int
+def _coarse_tracks(
+    case: Case,
+    cells: tuple[int, int],
+    tracks: int,
+    workers: int,
+    progress: Callable[[int, int], None] | None,
 ) -> Iterator[list[_Outcome]]:
-    """Yield functions that return the further tracks, computed meanwhile by other processes."""
-    if workers < 2 or tracks < 2:
-        yield [partial(_further_track, case, cells, number) for number in range(1, tracks)]
+    """Yield functions that return the tracks on the coarse grid.
+
+    Other processes compute them meanwhile, or this one beforehand if it is the only one.
+    """
+    numbers = range(tracks)
+    if workers < 2:
+        series = [_coarse_track(case, cells, number, progress) for number in numbers]
+        yield [partial(series.__getitem__, number) for number in numbers]
         return
     pool = ProcessPoolExecutor(
-        min(workers - 1, cores(), tracks - 1), get_context("spawn"), set_up_worker
+        min(workers - 1, cores(), tracks), get_context("spawn"), set_up_worker
     )
     try:
         futures: list[Future[Determined[Series]]] = [
-            pool.submit(_further_track, case, cells, number) for number in range(1, tracks)
+            pool.submit(_coarse_track, case, cells, number) for number in numbers
         ]
         yield [future.result for future in futures]
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _further_track(case: Case, cells: tuple[int, int], number: int) -> Determined[Series]:
-    """Return a further track on the coarse grid, or the reason why there is none."""
-    return Determined.attempt(lambda: _track(case.on_surface(number), cells))
+def _coarse_track(
+    case: Case,
+    cells: tuple[int, int],
+    number: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> Determined[Series]:
+    """Return a track on the coarse grid, or the reason why there is none."""
+    return Determined.attempt(lambda: _track(case.on_surface(number), cells, progress=progress))

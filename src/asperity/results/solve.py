@@ -18,7 +18,7 @@ from asperity.core.storage import version_notes
 from asperity.coupling import require_sampling
 from asperity.results.determined import Determined
 from asperity.results.run import RUN_GROUPS, Run, run_of
-from asperity.results.running import TRACKS, Running, run_tracks
+from asperity.results.running import Running, run_tracks
 from asperity.results.surface_spread import Row
 from asperity.solution import load_solution, solve_thermal_contact
 from asperity.surface import Surface
@@ -120,24 +120,24 @@ def _running(
     groups: tuple[str, ...],
 ) -> Run:
     """Solve a case whose roughness moves: means over time of the running contact."""
-    requested = tracks or case.contents.solver.surfaces
-    count = case.surface_count(requested) if requested else min(TRACKS, case.surface_count())
+    count = case.surface_count(tracks)
     _require_sampling(case)
-    attributes = {"case": case.text, "notes": json.dumps([*case.surface_notes, *case.notes])}
+    notes = [*case.surface_notes, *case.notes]
+    attributes = {"case": case.text, "notes": json.dumps(notes), "running": json.dumps(None)}
     try:
-        running, solution, notes = run_tracks(
+        running, solution, remarks = run_tracks(
             case, tracks=count, workers=workers, progress=progress
         )
     except NotConverged as failure:
         solution = replace(failure.solution, attributes=attributes)
         if strict:
             raise NotConverged(solution, str(failure)) from None
-        return run_of(case, solution, (*case.surface_notes, *case.notes), groups=groups)
+        return run_of(case, solution, notes, groups=groups)
     of_snapshot = (
         "Maps, distributions and the contact's own resonance are those of the snapshot from which "
         "the running contact starts, with its roughness standing still."
     )
-    notes = [*case.surface_notes, *case.notes, of_snapshot, *notes]
+    notes += [of_snapshot, *remarks]
     attributes |= {"notes": json.dumps(notes), "running": running.to_json()}
     solution = replace(solution, attributes=attributes)
     run = run_of(case, solution, notes, groups=groups, running=running)
@@ -275,16 +275,17 @@ def load_run(path: str | Path) -> Run:
         text = solution.attributes["case"]
         notes = tuple(json.loads(solution.attributes["notes"]))
         others = json.loads(solution.attributes.get("surfaces", "[]"))
-        record = solution.attributes.get("running")
-        running = None if record is None else Running.from_json(record)
+        moving = "running" in solution.attributes
+        running = Running.from_json(solution.attributes["running"]) if moving else None
     except (KeyError, TypeError, ValueError):
         raise UnreadableFile(
             f"{path} contains a solution without its case; save the run (Run.save), not the "
             "solution"
         ) from None
-    case = load_case(text, folder=path.parent, name=str(path), stored=solution.surface)
+    stored = None if moving else solution.surface  # tracks are made or read again
+    case = load_case(text, folder=path.parent, name=str(path), stored=stored)
     grid, options = case.grid, case.options
-    if running is not None:  # has its own cells and tolerance
+    if moving:  # has its own cells and tolerance
         grid = replace(grid, cells=solution.grid.cells)
         options = replace(options, tolerance=solution.options.tolerance)
     if (case.conditions, grid) != (solution.conditions, solution.grid) or (

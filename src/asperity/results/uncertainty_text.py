@@ -26,19 +26,20 @@ def interval_text(key: str, error: Uncertainty) -> str:
     return f"({quantity(key).interval(error.low, error.high)})"
 
 
-def basis(error: ContactError) -> str:
-    """Return the reference of the intervals as text."""
+def basis(error: ContactError, *, snapshot: bool) -> str:
+    """Return the reference of the intervals as text; `snapshot` if roughness moves but stood still."""
     if error.running:
         tracks = "track" if error.surfaces == 1 else "tracks"
         return (
             f"mean over time of {error.surfaces} {tracks} of running roughness, 90 % intervals of "
             "this mean"
         )
+    standing = "snapshot of standing roughness, " if snapshot else ""
     if error.surfaces == 1:
-        return "90 % intervals for this surface"
+        return f"{standing}90 % intervals for this surface"
     return (
-        f"mean of {error.surfaces} surfaces, 90 % prediction intervals for another surface of "
-        "this kind"
+        f"{standing}mean of {error.surfaces} surfaces, 90 % prediction intervals for another "
+        "surface of this kind"
     )
 
 

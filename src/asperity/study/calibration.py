@@ -26,6 +26,7 @@ from asperity.study.execute import StudyProgress, StudyResult, run_study, study_
 from asperity.study.plan import StudyPlan
 from asperity.study.ranges import (
     OPEN_RANGES,
+    STANDING,
     ParameterRange,
     at_cells,
     open_ranges,
@@ -91,7 +92,7 @@ def calibrate(
     workers: int | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> Calibration:
-    """Fit free quantities of a case so that its wear curve meets anchors.
+    """Fit free quantities of a case so that its wear curve meets anchors, with standing roughness.
 
     The misfit is the sum over the `fitted` anchors of (miss/tolerance)^2, on means over surfaces.
 
@@ -213,7 +214,7 @@ def _levels(targets: Sequence[Anchor], levels: Sequence[float] | None) -> tuple[
 
 def _calibrated(case: Case, ranges: Sequence[ParameterRange], best: Field) -> Case:
     """Return the case with the fitted values, its own cells and a [study] of its wear curve."""
-    overrides = overrides_at(case, ranges, best)
+    overrides = {**overrides_at(case, ranges, best), **STANDING}
     overrides.pop("grid.cells", None)
     if case.contents.study is None:
         overrides["study"] = {

@@ -60,7 +60,7 @@ def evaluate(
 ) -> tuple[Row, dict[str, Field]]:
     """Return the row of one case: `status`, `reason` and every scalar, and the requested fields."""
     try:
-        return EVALUATIONS[kind](case.with_overrides(overrides), fields)
+        return EVALUATIONS[kind](case.with_overrides(overrides).among_many, fields)
     except AsperityError as refusal:
         return {"status": FAILED, "reason": str(refusal)}, {}
     except Exception as error:  # an internal error must not lose the other cases
@@ -86,10 +86,9 @@ def _solve(
 
 
 def _status(run: Run) -> Row:
-    convergence = run.solution.convergence
-    if convergence.converged:
+    if run.converged:
         return {"status": DONE, "reason": ""}
-    return {"status": NOT_CONVERGED, "reason": convergence.explain()}
+    return {"status": NOT_CONVERGED, "reason": run.convergence_text}
 
 
 def _solve_surfaces(case: Case, _fields: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:

@@ -103,7 +103,7 @@ def sensitivity(
     workers: int | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> Sensitivity:
-    """Rank the factors that affect the curves over Sq.
+    """Rank the factors that affect the curves over Sq, with standing roughness.
 
     Parameters
     ----------

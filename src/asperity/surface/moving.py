@@ -99,6 +99,21 @@ class MovingSurfaces:
         first, second = (self._heights_at(index, time) for index in (0, 1))
         return Surface(first + second[:, ::-1], self.grid)
 
+    def earlier(self, seconds: float) -> "MovingSurfaces":
+        """Return the surfaces as they were: after these seconds they are as now."""
+        first, second = (
+            Surface(
+                shift_periodic(
+                    surface.heights,
+                    -self.speeds[index] * seconds / self.grid.spacing[0],
+                    self._spectra[index],
+                ),
+                surface.grid,
+            )
+            for index, surface in enumerate((self.first, self.second))
+        )
+        return MovingSurfaces(first, second, self.speeds, self.grid)
+
     def on_cells(self, cells: tuple[int, int]) -> "MovingSurfaces":
         """Return the same roughness on fewer cells, without the waves that these do not resolve."""
         (nx, ny) = self.grid.cells

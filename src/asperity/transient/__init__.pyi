@@ -3,8 +3,10 @@ from .motion import Snapshot as Snapshot
 from .motion import Steps as Steps
 from .motion import moving_contact as moving_contact
 from .motion import step_seconds as step_seconds
+from .running import PASSAGES as PASSAGES
 from .running import Series as Series
 from .running import TimeMean as TimeMean
 from .running import run_track as run_track
 from .running import settled_from as settled_from
+from .running import solve_passage as solve_passage
 from .running import time_means as time_means

@@ -2,10 +2,11 @@
 
 The same tracks pass through the contact on two grids, one of half as many cells along each axis.
 Time is counted in passages: the oil crosses the Hertz zone in one. The start is cut off where the
-standard error of the rest is smallest, and the rest is divided into means over one passage each,
-between which all roughness in the contact has been replaced. Sources: K. P. White Jr., Simulation
-69 (1997) 323 (cut); A. M. Law, Simulation Modeling and Analysis, 5th ed. (2015), ch. 9 (batch
-means). The coarse grid is a control variate: it runs on every track, the fine one on the first.
+standard error of the rest is smallest, and the rest is divided into means over one passage each.
+As many of them are independent as Hertz zones of different roughness have passed. Sources: K. P.
+White Jr., Simulation 69 (1997) 323 (cut); A. M. Law, Simulation Modeling and Analysis, 5th ed.
+(2015), ch. 9 (batch means). The coarse grid is a control variate: it runs on every track, the fine
+one on the first.
 """
 
 import math
@@ -20,16 +21,17 @@ from scipy.special import stdtrit
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.core.coverage import UPPER
-from asperity.ehl import Options
+from asperity.core.errors import NotConverged
+from asperity.ehl import ContactSolution, Options
 from asperity.ehl.outcome import MIXED
 from asperity.lubricant import Lubricant
 from asperity.surface import MovingSurfaces
-from asperity.transient.motion import Snapshot, moving_contact
+from asperity.transient.motion import Snapshot, moving_contact, step_seconds
 
 PASSAGES, MAX_PASSAGES = 6, 24  # first length of a series, and the largest until it is stationary
 # cells that the oil travels in a step; the mixed model follows the oil over several
 TIME_STEP = {MIXED: 2.0}
-TOLERANCE = 1e-3  # of a time step; with a tenth of it the mean CLR changes by less than 0.001
+TOLERANCE = 1e-2  # of a time step; with a tenth of it the mean CLR changes by less than 0.002
 
 Measure = Callable[[Snapshot], Mapping[str, float]]
 
@@ -39,7 +41,8 @@ class Series(NamedTuple):
 
     `values` has a row per step, the steady start first, and a column per number; `failed` counts
     steps that did not converge, `iterations` all Newton steps, `seconds` their time. `kept` are
-    some of the snapshots.
+    some of the snapshots. Per passage, `zones` Hertz zones of roughness pass; those of the track
+    are `track_zones`.
     """
 
     cells: tuple[int, int]
@@ -50,11 +53,18 @@ class Series(NamedTuple):
     iterations: int
     seconds: float
     kept: tuple[Snapshot, ...] = ()
+    zones: float = 1.0
+    track_zones: float = math.inf
 
     def column(self, name: str) -> Field:
         """Return one number over time."""
         column: Field = self.values[:, self.names.index(name)]
         return column
+
+    @property
+    def length(self) -> int:
+        """Length in whole passages."""
+        return (len(self.values) - 1) // self.steps_per_passage
 
     def passages(self, cut: int) -> Field:
         """Return means over each whole passage after the first `cut` ones, (passages, names)."""
@@ -63,6 +73,10 @@ class Series(NamedTuple):
         count = len(settled) // steps
         means: Field = settled[: count * steps].reshape(count, steps, -1).mean(axis=1)
         return means
+
+    def independent(self, passages: int) -> float:
+        """Return how many of some passages have different roughness, at least 1."""
+        return max(1.0, min(passages, passages * self.zones, self.track_zones))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +99,7 @@ def run_track(
     surfaces: MovingSurfaces,
     measure: Measure,
     *,
-    passages: int | None = None,
+    passages: Callable[[], int] | None = None,
     options: Options | None = None,
     moments: int = 0,
     progress: Callable[[int, int], None] | None = None,
@@ -96,8 +110,9 @@ def run_track(
     ----------
     conditions, lubricant, surfaces : the contact, with the roughness of both bodies
     measure : returns numbers of a step by name, the same names at every step
-    passages : length of the series; by default `PASSAGES`, and half as many more each time until
-        the series of `clr` is stationary, at most `MAX_PASSAGES`
+    passages : returns the length of the series, at least `PASSAGES`; called after these. By
+        default half as many more are added until the series of `clr` is stationary, at most
+        `MAX_PASSAGES`
     options : solver settings; the tolerance is `TOLERANCE` or more
     moments : snapshots to keep after the first passage, evenly spaced, besides the start
     progress : called with the number of steps done and in total
@@ -109,11 +124,10 @@ def run_track(
     NotConverged
         if the steady start does not converge.
     """
-    options = options or Options()
-    options = replace(options, tolerance=max(options.tolerance, TOLERANCE))
+    options = _options(options)
     time_step = TIME_STEP.get(options.model, 1.0)
-    crossing = 2.0 * conditions.hertz.half_widths[0] / surfaces.grid.spacing[0]
-    record = _Record(measure, max(1, round(crossing / time_step)), moments, passages or PASSAGES)
+    per_passage = _steps_per_passage(conditions, surfaces, time_step)
+    record = _Record(measure, per_passage, moments, PASSAGES)
     for snapshot in moving_contact(
         conditions, lubricant, surfaces, time_step=time_step, options=options
     ):
@@ -123,11 +137,72 @@ def run_track(
         if snapshot.number < record.steps:
             continue
         series = record.series(surfaces.grid.cells)
-        complete = passages is not None or record.length >= MAX_PASSAGES
-        if complete or settled_from(series, "clr") is not None:
+        length = _length(series) if passages is None else passages()
+        if length <= record.length:
             break
-        record.length = min(MAX_PASSAGES, record.length + record.length // 2)
-    return series
+        record.length = length
+    return series._replace(
+        zones=_fastest_roughness(surfaces) / conditions.entrainment_speed,
+        track_zones=surfaces.first.grid.extent[0] / (2.0 * conditions.hertz.half_widths[0]),
+    )
+
+
+def solve_passage(
+    conditions: ContactConditions,
+    lubricant: Lubricant,
+    surfaces: MovingSurfaces,
+    *,
+    options: Options | None = None,
+) -> ContactSolution:
+    """Return the running contact with its roughness at time 0, a passage after a steady start.
+
+    Raises
+    ------
+    BadInput
+        as `moving_contact`.
+    NotConverged
+        if the start or the last time step does not converge.
+    """
+    options = _options(options)
+    time_step = TIME_STEP.get(options.model, 1.0)
+    steps = _steps_per_passage(conditions, surfaces, time_step)
+    earlier = surfaces.earlier(steps * step_seconds(conditions, surfaces, time_step))
+    for snapshot in moving_contact(
+        conditions, lubricant, earlier, time_step=time_step, options=options
+    ):
+        if snapshot.number == steps:
+            break
+    solution = snapshot.solution
+    if not solution.convergence.converged:
+        raise NotConverged(solution, f"contact not solved: {solution.convergence.explain()}")
+    return solution
+
+
+def _options(options: Options | None) -> Options:
+    """Return the settings of a time step."""
+    options = options or Options()
+    return replace(options, tolerance=max(options.tolerance, TOLERANCE))
+
+
+def _steps_per_passage(
+    conditions: ContactConditions, surfaces: MovingSurfaces, time_step: float
+) -> int:
+    """Return the time steps in which the oil crosses the Hertz zone."""
+    crossing = 2.0 * conditions.hertz.half_widths[0] / surfaces.grid.spacing[0]
+    return max(1, round(crossing / time_step))
+
+
+def _length(series: Series) -> int:
+    """Return the passages that a series needs: those it has if it is stationary, or more."""
+    if settled_from(series, "clr") is not None:
+        return series.length
+    return min(MAX_PASSAGES, series.length + series.length // 2)
+
+
+def _fastest_roughness(surfaces: MovingSurfaces) -> float:
+    """Return the largest speed of a rough body [m/s]."""
+    moving = zip(surfaces.speeds, surfaces.rough, strict=True)
+    return max(abs(speed) for speed, is_rough in moving if is_rough)
 
 
 class _Record:
@@ -196,38 +271,50 @@ def time_means(coarse: list[Series], cuts: list[int], fine: Series) -> dict[str,
     fine : series of the first track on the fine grid
     """
     blocks = [series.passages(cut) for series, cut in zip(coarse, cuts, strict=True)]
+    numbers = [series.independent(len(block)) for series, block in zip(coarse, blocks, strict=True)]
     pooled, accurate = np.concatenate(blocks), fine.passages(cuts[0])
     deviations = fine.values[1 + cuts[0] * fine.steps_per_passage :].std(axis=0)
     return {
         name: _time_mean(
-            pooled[:, column], accurate[:, column], blocks[0][:, column], float(deviations[column])
+            _Sample(pooled[:, column], sum(numbers)),
+            _Sample(accurate[:, column], fine.independent(len(accurate))),
+            blocks[0][:, column],
+            float(deviations[column]),
         )
         for column, name in enumerate(fine.names)
     }
 
 
-def _time_mean(coarse: Field, fine: Field, same_track: Field, deviation: float) -> TimeMean:
+class _Sample(NamedTuple):
+    """Means over passages, of which `independent` ones have different roughness."""
+
+    values: Field
+    independent: float
+
+
+def _time_mean(coarse: _Sample, fine: _Sample, same_track: Field, deviation: float) -> TimeMean:
     """Return the mean of the passages `coarse`, corrected by those on the first track.
 
     The correction is `fine` less `same_track`, both of the first track. The mean of the fine grid
     alone is taken where its interval is narrower.
     """
-    count = min(len(fine), len(same_track))
-    change = fine[:count] - same_track[:count]
-    corrected = float(coarse.mean() + change.mean()), _half_width([coarse, change])
-    alone = float(fine.mean()), _half_width([fine])
+    count = min(len(fine.values), len(same_track))
+    change = fine._replace(values=fine.values[:count] - same_track[:count])
+    means = [float(sample.values.mean()) for sample in (coarse, fine, change)]
+    corrected = means[0] + means[2], _half_width([coarse, change])
+    alone = means[1], _half_width([fine])
     value, half_width = min(corrected, alone, key=lambda pair: pair[1])
-    grid = abs(float(change.mean()))
-    return TimeMean(value=value, time=half_width, grid=grid, deviation=deviation)
+    return TimeMean(value=value, time=half_width, grid=abs(means[2]), deviation=deviation)
 
 
-def _half_width(parts: list[Field]) -> float:
+def _half_width(parts: list[_Sample]) -> float:
     """Return the 90 % half-width of the sum of the parts' means (Welch and Satterthwaite)."""
-    variances = [float(np.var(part, ddof=1)) / len(part) for part in parts]
+    variances = [float(np.var(part.values, ddof=1)) / part.independent for part in parts]
     total = sum(variances)
     if total == 0.0:
         return 0.0
     freedom = total**2 / sum(
-        variance**2 / (len(part) - 1) for variance, part in zip(variances, parts, strict=True)
+        variance**2 / max(part.independent - 1.0, 1.0)
+        for variance, part in zip(variances, parts, strict=True)
     )
     return float(stdtrit(freedom, UPPER)) * math.sqrt(total)

@@ -41,4 +41,5 @@ from .tracks import TrackPosition as TrackPosition
 from .tracks import combined_roughness as combined_roughness
 from .tracks import map_to_track as map_to_track
 from .tracks import positions as positions
+from .tracks import surfaces_at as surfaces_at
 from .tracks import to_other_track as to_other_track

@@ -47,14 +47,18 @@ def positions(
     )
 
 
-def combined_roughness(surfaces: MovingSurfaces, position: TrackPosition) -> Surface:
-    """Return the sum of both bodies' heights on the contact's grid at a position."""
-    length = surfaces.grid.cells[0]
+def surfaces_at(surfaces: MovingSurfaces, position: TrackPosition) -> MovingSurfaces:
+    """Return both bodies' surfaces with their tracks at a position at time 0."""
     first, second = (
-        np.roll(surface.heights, -start, axis=0)[:length]
+        Surface(np.roll(surface.heights, -start, axis=0), surface.grid)
         for surface, start in zip((surfaces.first, surfaces.second), position, strict=True)
     )
-    return Surface(first + second[:, ::-1], surfaces.grid)
+    return MovingSurfaces(first, second, surfaces.speeds, surfaces.grid)
+
+
+def combined_roughness(surfaces: MovingSurfaces, position: TrackPosition) -> Surface:
+    """Return the sum of both bodies' heights on the contact's grid at a position."""
+    return surfaces_at(surfaces, position).composite_at(0.0)
 
 
 def map_to_track(

@@ -1,6 +1,7 @@
 """Solution at one position of the tracks: maps and numbers for wear, here or in worker processes.
 
-Each position is solved from scratch, so neither order nor process changes a number.
+Each position is solved from scratch, so neither order nor process changes a number. Running
+roughness arrives there from a passage of the Hertz zone earlier.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,7 +30,8 @@ from asperity.solution import (
     plastic_overlap,
     solve_thermal_contact,
 )
-from asperity.surface import Surface
+from asperity.surface import MovingSurfaces, Surface
+from asperity.transient import solve_passage
 
 # tolerances of a first solve, whose result starts Newton's method at the case's own tolerance
 LOOSE_TOLERANCES = (5e-2, 1e-2)
@@ -75,6 +77,7 @@ class PositionSolver:
     thermal: Thermal
     boundary_friction: float
     flattening: bool
+    running: bool
 
     @classmethod
     def from_case(cls, case: Case, *, flattening: bool) -> "PositionSolver":
@@ -86,18 +89,25 @@ class PositionSolver:
             thermal=case.thermal,
             boundary_friction=case.boundary_friction,
             flattening=flattening,
+            running=case.is_running,
         )
 
-    def __call__(self, surface: Surface) -> SolvedPosition | FailedPosition:
+    def __call__(self, surfaces: MovingSurfaces) -> SolvedPosition | FailedPosition:
         """Solve the contact; single-threaded, as sums depend on the number of threads."""
         with threadpool_limits(1):
             try:
-                solution = self._solved(surface)
+                solution = self._solved(surfaces)
             except AsperityError as refusal:
                 return FailedPosition(reason=str(refusal).rstrip("."))
             return self._read(solution)
 
-    def _solved(self, surface: Surface) -> ContactSolution:
+    def _solved(self, surfaces: MovingSurfaces) -> ContactSolution:
+        """Return the solution with running or with standing roughness."""
+        if self.running and self.lubricant is not None and any(surfaces.rough):
+            return solve_passage(self.conditions, self.lubricant, surfaces, options=self.options)
+        return self._standing(surfaces.composite_at(0.0))
+
+    def _standing(self, surface: Surface) -> ContactSolution:
         """Solve loosely first, then to the tolerance from there.
 
         On worn plateaus, the default method stalls near the solution with cells that open and
@@ -171,7 +181,7 @@ class PositionSolver:
 class BatchSolver(Protocol):
     """Solver of several positions at once."""
 
-    def __call__(self, surfaces: Sequence[Surface]) -> list[SolvedPosition | FailedPosition]:
+    def __call__(self, surfaces: Sequence[MovingSurfaces]) -> list[SolvedPosition | FailedPosition]:
         """Return the results in the order of the surfaces."""
         ...
 
@@ -187,7 +197,7 @@ def position_solvers(solver: PositionSolver, workers: int) -> Iterator[BatchSolv
         return
     pool = ProcessPoolExecutor(min(workers, cores()), get_context("spawn"), set_up_worker)
 
-    def solve(surfaces: Sequence[Surface]) -> list[SolvedPosition | FailedPosition]:
+    def solve(surfaces: Sequence[MovingSurfaces]) -> list[SolvedPosition | FailedPosition]:
         try:
             return list(pool.map(solver, surfaces))
         except BrokenExecutor:

@@ -23,7 +23,7 @@ from asperity.simulation.wear.state import WearState
 from asperity.simulation.wear.store import WearRecorder, open_recorder
 from asperity.simulation.wear.tracks import BODIES
 from asperity.surface import MovingSurfaces
-from asperity.wear import TrackPosition, combined_roughness, longest_jump
+from asperity.wear import TrackPosition, longest_jump, surfaces_at
 
 CELL_S = 2e-5  # computing time of a position, per cell [s]
 TIME_TOLERANCE = 1e-12  # relative, of equal times
@@ -136,7 +136,7 @@ def solve_positions(
     """Solve the contact at every position of the jump; return the solutions and their row."""
     surfaces = contact.worn_surfaces(state)
     positions = contact.positions(state)
-    outcomes = solve([combined_roughness(surfaces, position) for position in positions])
+    outcomes = solve([surfaces_at(surfaces, position) for position in positions])
     solutions = [
         (position, outcome)
         for position, outcome in zip(positions, outcomes, strict=True)
