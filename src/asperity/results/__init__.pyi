@@ -17,6 +17,7 @@ from .run import SHORT_GROUPS as SHORT_GROUPS
 from .run import UNCERTAINTY as UNCERTAINTY
 from .run import Run as Run
 from .running import Running as Running
+from .running import running_surfaces as running_surfaces
 from .solve import SurfaceProgress as SurfaceProgress
 from .solve import load_run as load_run
 from .solve import solve_case as solve_case

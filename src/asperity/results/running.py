@@ -33,6 +33,7 @@ from asperity.solution import (
     sharing_by_film,
     subsurface_stress,
 )
+from asperity.surface import MovingSurfaces
 from asperity.transient import (
     PASSAGES,
     Series,
@@ -47,7 +48,7 @@ MOMENTS = 4  # at which heat and stress are evaluated
 EVERY_STEP = ("load", "film", "pressure", "friction")  # groups of the catalogue: at every step
 AT_MOMENTS = ("sharing", "heat", "stress")  # ... at some
 WITHOUT = ("_error", "_error_m")  # keys of error bars, which the grids determine
-MOST_TRACK_LENGTHS = 8  # of a generated track, in lengths of the domain
+MOST_TRACK_LENGTHS = 16  # of a generated track, in lengths of the domain
 MAX_FAILED = 0.02  # share of the time steps that may miss the tolerance
 ERRORS = {"clr": "clr_error", "car": "car_error", "h_min_m": "h_min_error_m"} | {
     "h_central_m": "h_central_error_m"
@@ -270,7 +271,7 @@ def _track(
         return run_track(
             case.conditions,
             case.lubricant,
-            case.moving_surfaces(_track_lengths(case)).on_cells(cells),
+            running_surfaces(case).on_cells(cells),
             measure,
             passages=passages,
             options=case.options,
@@ -279,12 +280,12 @@ def _track(
         )
 
 
-def _track_lengths(case: Case) -> int:
-    """Return the domain lengths of a track whose roughness does not repeat in `PASSAGES`."""
+def running_surfaces(case: Case, passages: int = PASSAGES) -> MovingSurfaces:
+    """Return both bodies' roughness; generated tracks do not repeat within some passages."""
     conditions = case.conditions
     fastest = max(map(abs, conditions.surface_speeds)) / conditions.entrainment_speed
     zones = case.grid.extent[0] / (2.0 * conditions.hertz.half_widths[0])
-    return min(math.ceil(PASSAGES * fastest / zones), MOST_TRACK_LENGTHS)
+    return case.moving_surfaces(min(math.ceil(passages * fastest / zones), MOST_TRACK_LENGTHS))
 
 
 def _entries(groups: tuple[str, ...]) -> list[Quantity]:

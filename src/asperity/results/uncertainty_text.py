@@ -27,7 +27,7 @@ def interval_text(key: str, error: Uncertainty) -> str:
 
 
 def basis(error: ContactError, *, snapshot: bool) -> str:
-    """Return the reference of the intervals as text; `snapshot` if roughness moves but stood still."""
+    """Return the reference of the intervals as text; `snapshot`: moving roughness stood still."""
     if error.running:
         tracks = "track" if error.surfaces == 1 else "tracks"
         return (
