@@ -55,7 +55,8 @@ def run_json(*arguments: str) -> dict[str, Any]:
 
 
 def solved(*overrides: str, case: str = "paper.toml") -> dict[str, Any]:
-    return run_json("solve", str(EXAMPLES / case), "--surfaces", "1", *_set(overrides))
+    words = ("--surfaces", "1", "--snapshot")
+    return run_json("solve", str(EXAMPLES / case), *words, *_set(overrides))
 
 
 def elliptic() -> dict[str, Any]:
@@ -72,6 +73,7 @@ def elliptic() -> dict[str, Any]:
         "case.toml",
         "--surfaces",
         "1",
+        "--snapshot",
         *_set(("grid.cells=[48, 48]", "thermal.feedback=true")),
     )
 
@@ -85,6 +87,7 @@ def study() -> dict[str, Any]:
         "study",
         "--workers",
         "1",
+        "--snapshot",
         *_set((*SMALL, *swept)),
     )
     return {**output, "rows": _rows(Path("study/table.parquet"))}
@@ -137,6 +140,7 @@ def measured() -> dict[str, Any]:
 
 def curves() -> dict[str, Any]:
     case, small = str(EXAMPLES / "paper.toml"), _set(("grid.cells=[48, 32]",))
+    small = (*small, "--snapshot")
     speeds = ("--speed", "0.2", "--speed", "2", "--sq", "0.5 um")
     return {
         "stribeck": run_json("stribeck", case, *speeds, *small),
@@ -146,6 +150,9 @@ def curves() -> dict[str, Any]:
 
 CASES: dict[str, Callable[[], dict[str, Any]]] = {
     "paper": lambda: solved(*SMALL),
+    "running": lambda: run_json(
+        "solve", str(EXAMPLES / "paper.toml"), *_set(("grid.cells=[64, 32]",))
+    ),
     "paper-model": lambda: solved(*SMALL, "model=paper"),
     "smooth": lambda: solved(*SMALL, 'surface={kind="flat"}'),
     "printed-preset": lambda: solved(*SMALL, "vibration.preset=paper", "surface.sq=2.5 um"),

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,17 +12,18 @@ from asperity.case import load_case
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
 from asperity.ehl import running_cells
-from asperity.results import load_run, solve_case
+from asperity.results import load_run, running_surfaces, solve_case
+from asperity.solution import contact_state
 from asperity.surface import MovingSurfaces, Surface, flat_surface
-from asperity.transient import Series, settled_from, time_means
+from asperity.transient import Series, settled_from, solve_passage, time_means
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
-RUNNING = {"contact.roughness": "running", "grid.cells": [64, 32]}
+RUNNING = {"grid.cells": [64, 32]}
 
 
-def series(values, *, steps_per_passage=10):
+def series(values, *, steps_per_passage=10, **zones):
     rows = np.stack([np.zeros(len(values)), values], axis=1)
-    return Series((1, 1), steps_per_passage, ("time_s", "clr"), rows, 0, 0, 0.0)
+    return Series((1, 1), steps_per_passage, ("time_s", "clr"), rows, 0, 0, 0.0, **zones)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +51,7 @@ def test_roughness_on_fewer_cells_has_the_heights_of_its_waves(periodic):
 
 def test_the_fine_grid_has_equally_many_cells_per_correlation_length():
     case = load_case(PAPER)
-    assert case.running_cells() == (98, 50)
+    assert case.running_cells() == (86, 44)
     cells = running_cells(case.conditions, case.grid, (40e-6, 10e-6), 4608)
     lengths = [e / n for e, n in zip(case.grid.extent, cells, strict=True)]
     assert lengths[0] / lengths[1] == pytest.approx(4.0, rel=0.1)
@@ -57,6 +59,13 @@ def test_the_fine_grid_has_equally_many_cells_per_correlation_length():
     assert tight.running_cells() == (64, 32)
     with pytest.raises(BadInput, match=r"48 cells along x, but running roughness .* needs 52"):
         case.with_overrides({"grid.cells": [48, 32]}).running_cells()
+
+
+def test_one_contact_among_many_has_fewer_cells_unless_it_states_how_many():
+    case = load_case(PAPER)
+    assert math.prod(case.among_many.running_cells()) < 0.5 * math.prod(case.running_cells())
+    stated = case.with_overrides({"solver.running_cells": 2000})
+    assert stated.among_many.running_cells() == stated.running_cells() == (64, 32)
 
 
 def test_the_start_of_a_series_is_cut_off():
@@ -86,6 +95,40 @@ def test_intervals_cover_the_mean_of_correlated_series():
     assert 0.82 < np.mean(covered) < 0.97
 
 
+def test_passages_of_repeated_or_slow_roughness_are_not_independent():
+    """A track of two Hertz zones; a body at a quarter of the oil's speed."""
+    rng, zeros = np.random.default_rng(3), np.zeros(10)
+    once = 0.1 * rng.standard_normal(20)
+    values = np.concatenate([zeros, zeros[:1], once, once, once])
+    new, repeated = series(values), series(values, track_zones=2.0)
+    assert new.independent(6) == 6.0
+    assert repeated.independent(6) == 2.0
+    assert series(values, zones=0.25).independent(6) == 1.5
+    wide, narrow = (time_means([part], [1], part)["clr"].time for part in (repeated, new))
+    assert wide > 4.0 * narrow
+
+
+def test_tracks_of_generated_roughness_do_not_repeat():
+    case = load_case(PAPER).with_overrides(RUNNING)
+    fast, slow = (
+        running_surfaces(case.with_overrides({"contact.slip": slip})) for slip in (1.0, 0.0)
+    )
+    zone = 2.0 * case.conditions.hertz.half_widths[0]
+    assert fast.first.grid.extent[0] >= 6.0 * 1.5 * zone
+    assert 6.0 * zone <= slow.first.grid.extent[0] < fast.first.grid.extent[0]
+
+
+@pytest.mark.parametrize("speeds", [(1.0, 0.0), (1.3, 0.6)])
+def test_earlier_surfaces_arrive_as_they_are_now(speeds):
+    grid = Grid((60, 8), (-2.0, -1.0), (2.0, 1.0), periodic=(True, True))
+    x = (grid.x[:, None] + 2.0) / 4.0 + np.zeros(8)
+    first, second = (Surface(np.cos(2.0 * np.pi * k * x), grid) for k in (3, 7))
+    now = MovingSurfaces(first, second, speeds, replace(grid, periodic=(False, True)))
+    np.testing.assert_allclose(
+        now.earlier(0.37).composite_at(0.37).heights, now.composite_at(0.0).heights, atol=1e-12
+    )
+
+
 def test_the_headline_is_the_mean_over_time(run):
     running = run.running
     settled = np.array(running.series)[1 + running.cut * running.steps_per_passage :]
@@ -101,6 +144,32 @@ def test_the_headline_is_the_mean_over_time(run):
     verdict = run.verdict()
     assert "in the snapshot" in verdict
     assert "mean over time of 2 tracks" in verdict
+
+
+def test_a_passage_ends_within_the_interval_of_the_mean(run):
+    """Single moments scatter by the standard deviation over time."""
+    case = load_case(PAPER).with_overrides(RUNNING)
+    solution = solve_passage(
+        case.conditions, case.lubricant, case.moving_surfaces(), options=case.options
+    )
+    assert solution.convergence.converged
+    clr = contact_state(solution).clr
+    assert abs(clr - run.state.clr) < 3.0 * run.running.clr_std
+    assert clr > run.snapshot_clr
+
+
+def test_a_snapshot_says_so():
+    case = load_case(PAPER).with_overrides({**RUNNING, "contact.roughness": "standing"})
+    snapshot = solve_case(case)
+    assert "snapshot of standing roughness, 90 % intervals for this surface" in snapshot.verdict()
+    assert snapshot.summary()["roughness"] == "standing"
+    at_rest = solve_case(case.with_overrides({"contact.slip": 2.0, "motion.rough": "second"}))
+    assert "standing roughness" not in at_rest.verdict()
+
+
+def test_a_stored_running_contact_is_solved_again_to_the_same_numbers(run, tmp_path):
+    again = solve_case(load_run(run.save(tmp_path / "run.nc")).case, surfaces=2)
+    assert again.state.clr == run.state.clr
 
 
 def test_the_interval_covers_twice_as_fine_a_grid(run):

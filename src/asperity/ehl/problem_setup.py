@@ -11,7 +11,7 @@ from asperity.ehl.deflection import MIRROR_BETWEEN, MIRROR_THROUGH
 from asperity.ehl.film_formulas import central_film, least_film, least_films
 from asperity.ehl.grid_design import MIN_CELLS_SHORT_AXIS, MIN_COARSE_CELLS, inlet_length
 from asperity.ehl.models.single_pressure import Problem
-from asperity.ehl.outcome import ARITHMETIC, ATTEMPTS, CONSERVING, MIXED, Options
+from asperity.ehl.outcome import ARITHMETIC, ATTEMPTS, CONSERVING, TWO_PRESSURES, Options
 from asperity.ehl.roller_profile import BodyShape, RollerProfile
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
@@ -49,7 +49,7 @@ def contact_problem(
         accurate=attempt == ATTEMPTS[0]
         and not np.any(surface.heights)
         and options.model != CONSERVING,
-        exact=options.model == MIXED
+        exact=options.model in TWO_PRESSURES
         and lubricant is not None
         and attempt != ARITHMETIC
         and bool(np.any(surface.heights)),

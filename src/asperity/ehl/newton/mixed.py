@@ -57,10 +57,11 @@ def newton(
     is free in the next step: the oil separates the bodies. Cells at the cap are exempt.
 
     Exact face mobilities are mostly too stiff for limits of single cells: all unknowns take a
-    `shared` part of the step (the default there), such that no film and no pressure changes by more
-    than a share of itself and the residual does not exceed those of the last steps.
+    `shared` part of the step (the default there, but not where oil is conserved), such that no film
+    and no pressure changes by more than a share of itself and the residual does not exceed those of
+    the last steps.
     """
-    shared = problem.exact if shared is None else shared
+    shared = problem.exact and not problem.conserve if shared is None else shared
     mean_pressure, change = problem.mean_pressure, np.inf
     limits, watch, workspace = _StepLimits(problem, unknowns), _ResidualWatch(), Workspace()
     balance = evaluate(problem, unknowns, second_order=second_order)
