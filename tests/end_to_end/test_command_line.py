@@ -42,7 +42,7 @@ KEYS = [
     *("flash_temperature_max_k", "film_temperature_max_k"),
     *("von_mises_max_pa", "von_mises_depth_m", "von_mises_core_pa", "von_mises_core_depth_m"),
     *("shear_stress_max_pa", "shear_stress_depth_m"),
-    *("cells", "notes", "regime_card", "determined"),
+    *("cells", "notes", "regime_card", "determined", "film_determined"),
     *(
         "converged",
         "iterations",
@@ -100,9 +100,9 @@ def test_quantities_not_shown_are_not_computed(asp, monkeypatch):
 
 
 def test_the_verdict_comes_first_and_is_the_only_output_of_quiet(asp):
-    code, out, _ = asp("solve", "case.toml")
+    code, out, _ = asp("solve", "case.toml", "--snapshot")
     assert code == 0
-    scalars = json.loads(asp("solve", "case.toml", "--json")[1])
+    scalars = json.loads(asp("solve", "case.toml", "--snapshot", "--json")[1])
     coarse = (
         "Grid too coarse, CLR not determined (3.3 cells along the correlation length in x, where 4"
         " are needed; "
@@ -113,7 +113,9 @@ def test_the_verdict_comes_first_and_is_the_only_output_of_quiet(asp):
     assert f"{100 * scalars['clr']:.1f} % of the load (± not determined" in out.splitlines()[0]
     assert f"on {100 * scalars['car']:.1f} % of the Hertz zone" in out.splitlines()[0]
     assert f"resonance at {scalars['crf_hz']:.0f} Hz (± not determined" in out.splitlines()[0]
-    assert asp("solve", "case.toml", "--quiet")[1:] == (out.splitlines()[0] + "\n", "")
+    assert "; snapshot of standing roughness, 90 % intervals" in out.splitlines()[0]
+    quiet = asp("solve", "case.toml", "--snapshot", "--quiet")
+    assert quiet[1:] == (out.splitlines()[0] + "\n", "")
 
 
 def test_a_required_accuracy_sets_the_cells_and_keeps_the_domain(asp):
@@ -132,7 +134,7 @@ def test_a_required_accuracy_sets_the_cells_and_keeps_the_domain(asp):
 
 
 def test_several_surfaces_are_solved_and_stored(asp):
-    quick = ("--set", "grid.cells=[48, 48]", "--set", "vibration.duration=0.2 s")
+    quick = ("--set", "grid.cells=[48, 48]", "--set", "vibration.duration=0.2 s", "--snapshot")
     code, out, _ = asp("solve", "case.toml", "--surfaces", "2", "--out", "run.nc", "--json", *quick)
     assert code == 0
     assert json.loads(out)["surfaces"] == 2
@@ -181,7 +183,9 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
     Path("maps").mkdir()
     heights = 1e-6 * np.random.default_rng(5).standard_normal((60, 40)).repeat(8, 0).repeat(8, 1)
     x3pio.write("maps/ring.x3p", heights.T, x_scale=2e-6, y_scale=2e-6)
-    code, out, _ = asp("solve", "case.toml", "--surface", "maps/ring.x3p", "--out", "run.nc")
+    measured = ("solve", "case.toml", "--surface", "maps/ring.x3p")
+    assert asp(*measured, "--out", "running.nc", "--quiet")[0] == 0
+    code, out, _ = asp(*measured, "--snapshot", "--out", "run.nc")
     assert code == 0
     assert "note: removed a quadratic form" in out
     first = load_run("run.nc")
@@ -193,6 +197,10 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
     assert any("removed a quadratic form" in note for note in first.notes)
     assert "note: removed a quadratic form" in asp("solve", "run.nc", "--out", "again.nc")[1]
     assert load_run("again.nc").notes == first.notes
+    # a running contact can be read and reported without its map, but solved only with it
+    assert asp("report", "running.nc")[0] == 0
+    code, _, err = asp("solve", "running.nc")
+    assert (code, "maps/ring.x3p" in err) == (2, True)
 
 
 def test_set_changes_the_case(asp):
@@ -256,12 +264,16 @@ def test_a_solve_that_does_not_converge_is_reported_and_stored(asp):
     assert unfinished.value.solution.attributes["case"] == stored.case.text
 
 
-def test_ctrl_c_leaves_no_files(asp, monkeypatch, tmp_path):
+@pytest.mark.parametrize(
+    ("words", "inside"),
+    [([], "results.running.run_track"), (["--snapshot"], "results.solve.solve_thermal_contact")],
+)
+def test_ctrl_c_leaves_no_files(asp, monkeypatch, tmp_path, words, inside):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("asperity.results.solve.solve_thermal_contact", interrupted)
-    code, out, err = asp("solve", "case.toml", "--out", "run.nc")
+    monkeypatch.setattr(f"asperity.{inside}", interrupted)
+    code, out, err = asp("solve", "case.toml", "--out", "run.nc", *words)
     assert (code, out) == (1, "")
     assert err.startswith("error: interrupted")
     assert [entry.name for entry in tmp_path.iterdir()] == ["case.toml"]

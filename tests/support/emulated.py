@@ -16,6 +16,7 @@ from asperity.inference.outputs import OUTPUTS
 CASE = Path(__file__).parents[2] / "examples" / "infer.toml"
 POINTS = 64  # a power of two
 SMALL = {  # a few small contacts
+    "contact.roughness": "standing",
     "surface.correlation_length": "40 um",
     "infer": {
         "points": 16,

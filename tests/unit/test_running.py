@@ -11,7 +11,7 @@ import pytest
 from asperity.case import load_case
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
-from asperity.ehl import running_cells
+from asperity.ehl import half_as_many, running_cells
 from asperity.results import load_run, running_surfaces, solve_case
 from asperity.solution import contact_state
 from asperity.surface import MovingSurfaces, Surface, flat_surface
@@ -57,8 +57,18 @@ def test_the_fine_grid_has_equally_many_cells_per_correlation_length():
     assert lengths[0] / lengths[1] == pytest.approx(4.0, rel=0.1)
     tight = case.with_overrides({"grid.cells": [64, 32]})
     assert tight.running_cells() == (64, 32)
-    with pytest.raises(BadInput, match=r"48 cells along x, but running roughness .* needs 52"):
-        case.with_overrides({"grid.cells": [48, 32]}).running_cells()
+    assert half_as_many(tight.conditions, tight.grid, (64, 32)) == (32, 16)
+    assert half_as_many(tight.conditions, tight.grid, (48, 32)) is None
+
+
+def test_a_grid_too_coarse_for_another_leaves_clr_undetermined():
+    case = load_case(PAPER).with_overrides({"grid.cells": [48, 24]})
+    run = solve_case(case)
+    assert (run.running.cells, run.running.clr.grid, run.running.tracks) == ((48, 24), None, 1)
+    assert "no coarser grid is available to estimate its error" in run.verdict()
+    numbers = run.scalars()
+    assert (numbers["determined"], numbers["clr_low"], numbers["clr_error"]) == (False, None, None)
+    assert numbers["sq_m"] == pytest.approx(1e-6)
 
 
 def test_one_contact_among_many_has_fewer_cells_unless_it_states_how_many():

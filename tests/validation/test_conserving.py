@@ -242,7 +242,7 @@ def test_the_linearisation_is_exact_away_from_state_boundaries(flattened):
 
 
 def test_the_approximate_inverse_is_accurate(flattened, monkeypatch):
-    """GMRES reduces the residual in a few iterations with it, and needs half as many more without."""
+    """GMRES takes a few iterations with it, and half as many more without."""
     point = unknowns_of(flattened)
     perturbed = Pressures(
         np.where(point.oil > 0.0, 1.2 * point.oil, point.oil), point.total, point.approach - 0.3

@@ -248,16 +248,12 @@ class Case:
         return self.with_overrides({"solver.running_cells": MANY_RUNNING_CELLS})
 
     def running_cells(self) -> tuple[int, int]:
-        """Return the cells of the running contact's fine grid, at most those of `grid`.
-
-        Raises BadInput for a grid with too few cells for a coarser one to compare with.
-        """
+        """Return the cells of the running contact's fine grid, at most those of `grid`."""
         texture = texture_of(self.contents.surface, self.folder)
         assert texture is not None
         share = ACCURACY / (self.contents.grid.accuracy or ACCURACY)
         most = self.contents.solver.running_cells or round(MOST_RUNNING_CELLS * share)
-        with self.naming("grid"):
-            return running_cells(self.conditions, self.grid, texture.lengths, most)
+        return running_cells(self.conditions, self.grid, texture.lengths, most)
 
     def moving_surfaces(self, lengths: int = 1) -> MovingSurfaces:
         """Return both bodies' roughness on tracks that repeat along rolling, each at its own speed.

@@ -30,6 +30,7 @@ from .outcome import Options as Options
 from .outcome import SolveStatus as SolveStatus
 from .outcome import Start as Start
 from .running_grid import MOST_RUNNING_CELLS as MOST_RUNNING_CELLS
+from .running_grid import half_as_many as half_as_many
 from .running_grid import running_cells as running_cells
 from .scales import Scales as Scales
 from .solve import solve_contact as solve_contact

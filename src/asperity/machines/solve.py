@@ -108,11 +108,12 @@ def solve_machine(
 
 def _load_or_solve(case: Case, path: Path) -> Run:
     """Return a contact with its fields, loaded from `path` or solved and saved there."""
+    case = case.among_many
     if path.exists():
         stored = load_run(path)
         if stored.case.text == case.text:
             return stored
-    run = solve_case(case.among_many, surfaces=None, workers=cores(), strict=False)
+    run = solve_case(case, surfaces=None, workers=cores(), strict=False)
     run.save(path)
     return run
 

@@ -257,7 +257,12 @@ class Run:
     @cached_property
     def card(self) -> RegimeCard:
         """Regime card: kind of contact, and comparison with published film formulas."""
-        return regime_card(self.solution)
+        card = regime_card(self.solution)
+        if self.running is None:
+            return card
+        slope = self.state.rms_slope
+        assert slope is not None  # of a rough contact
+        return replace(card, lambda_ratio=self.state.lambda_ratio, rms_slope=slope)
 
     @cached_property
     def undetermined(self) -> str | None:

@@ -18,7 +18,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.processes import cores, set_up_worker
 from asperity.core.quantities import Quantity, lines, read
 from asperity.coupling import Vibration, VibrationModel
-from asperity.ehl import ContactError, ContactSolution, ContactState, Uncertainty
+from asperity.ehl import ContactError, ContactSolution, ContactState, Uncertainty, half_as_many
 from asperity.results.determined import Determined
 from asperity.results.surface_spread import Row, Scalar, crf_error
 from asperity.solution import (
@@ -153,7 +153,7 @@ def running_error(
     clr = Uncertainty(
         value=min(max(mean.value, 0.0), 1.0),
         iteration=(0.0, 0.0),
-        grid=(mean.grid, mean.grid),
+        grid=None if mean.grid is None else (mean.grid, mean.grid),
         surfaces=(mean.time, mean.time),
         range=(0.0, 1.0),
     )
@@ -186,18 +186,21 @@ def run_tracks(
     NotConverged
         if the snapshot of the first track does not converge.
     """
-    nx, ny = case.running_cells()
-    coarse_cells = nx // 2, max(1, ny // 2)
-    with _coarse_tracks(case, coarse_cells, tracks, workers, progress) as coarse:
+    cells = case.running_cells()
+    coarse_cells = half_as_many(case.conditions, case.grid, cells)
+    # without a coarse grid, all tracks but the first are on the fine one
+    numbers = range(0 if coarse_cells else 1, tracks)
+    further_cells = coarse_cells or cells
+    with _further_tracks(case, further_cells, numbers, workers, progress) as further:
 
         def first() -> Series:
-            series = coarse[0]().value
-            return _track(case, coarse_cells) if series is None else series  # raises the reason
+            series = further[0]().value
+            return _track(case, further_cells) if series is None else series  # raises the reason
 
-        fine = _track(
-            case, (nx, ny), passages=lambda: first().length, moments=MOMENTS, progress=progress
-        )
-        own, others = first(), [outcome() for outcome in coarse[1:]]
+        length = (lambda: first().length) if coarse_cells else None
+        fine = _track(case, cells, passages=length, moments=MOMENTS, progress=progress)
+        own = first() if coarse_cells else fine
+        others = [outcome() for number, outcome in further.items() if number > 0]
     notes = [
         f"Track {number} of {tracks} is left out: {other.reason.rstrip('.')}."
         for number, other in enumerate(others, 2)
@@ -301,7 +304,9 @@ def _numbers(
         for key, mean in means.items()
         if key != "time_s"
     }
-    clr, car = means["clr"], means["car"]
+    clr, car, sq = means["clr"], means["car"], case.surface().sq
+    # of the roughness itself, not of its waves that the cells resolve
+    numbers |= {"sq_m": sq, "lambda_ratio": means["lambda_ratio"].value * means["sq_m"].value / sq}
     numbers |= {"clr": min(max(clr.value, 0.0), 1.0), "car": max(car.value, 0.0)}
     numbers |= {error: means[key].grid for key, error in ERRORS.items()}
     imbalances = [snapshot.state.mass_flux_imbalance for snapshot in moments]
@@ -328,39 +333,38 @@ _Outcome = Callable[[], Determined[Series]]
 
 
 @contextmanager
-def _coarse_tracks(
+def _further_tracks(
     case: Case,
     cells: tuple[int, int],
-    tracks: int,
+    numbers: range,
     workers: int,
     progress: Callable[[int, int], None] | None,
-) -> Iterator[list[_Outcome]]:
-    """Yield functions that return the tracks on the coarse grid.
+) -> Iterator[dict[int, _Outcome]]:
+    """Yield a function per track that returns it on the coarse grid.
 
     Other processes compute them meanwhile, or this one beforehand if it is the only one.
     """
-    numbers = range(tracks)
-    if workers < 2:
-        series = [_coarse_track(case, cells, number, progress) for number in numbers]
-        yield [partial(series.__getitem__, number) for number in numbers]
+    if workers < 2 or not numbers:
+        series = {number: _further_track(case, cells, number, progress) for number in numbers}
+        yield {number: partial(series.__getitem__, number) for number in numbers}
         return
     pool = ProcessPoolExecutor(
-        min(workers - 1, cores(), tracks), get_context("spawn"), set_up_worker
+        min(workers - 1, cores(), len(numbers)), get_context("spawn"), set_up_worker
     )
     try:
-        futures: list[Future[Determined[Series]]] = [
-            pool.submit(_coarse_track, case, cells, number) for number in numbers
-        ]
-        yield [future.result for future in futures]
+        futures: dict[int, Future[Determined[Series]]] = {
+            number: pool.submit(_further_track, case, cells, number) for number in numbers
+        }
+        yield {number: future.result for number, future in futures.items()}
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _coarse_track(
+def _further_track(
     case: Case,
     cells: tuple[int, int],
     number: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> Determined[Series]:
-    """Return a track on the coarse grid, or the reason why there is none."""
+    """Return a track, or the reason why there is none."""
     return Determined.attempt(lambda: _track(case.on_surface(number), cells, progress=progress))

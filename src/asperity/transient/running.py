@@ -84,12 +84,12 @@ class TimeMean:
     """Mean of one number over time and tracks, with parts of its 90 % interval.
 
     `time` is the half-width due to the finite time and number of tracks, `grid` the difference
-    between both grids, `deviation` the standard deviation over time.
+    between both grids (None without a coarse one), `deviation` the standard deviation over time.
     """
 
     value: float
     time: float
-    grid: float
+    grid: float | None
     deviation: float
 
 
@@ -266,13 +266,14 @@ def time_means(coarse: list[Series], cuts: list[int], fine: Series) -> dict[str,
 
     Parameters
     ----------
-    coarse : series of every track on the coarse grid
+    coarse : series of every track on the coarse grid, or on the fine one if there is no other
     cuts : passages cut off from each
-    fine : series of the first track on the fine grid
+    fine : series of the first track on the fine grid, the same as the first one without others
     """
     blocks = [series.passages(cut) for series, cut in zip(coarse, cuts, strict=True)]
     numbers = [series.independent(len(block)) for series, block in zip(coarse, blocks, strict=True)]
     pooled, accurate = np.concatenate(blocks), fine.passages(cuts[0])
+    one_grid = fine is coarse[0]
     deviations = fine.values[1 + cuts[0] * fine.steps_per_passage :].std(axis=0)
     return {
         name: _time_mean(
@@ -280,6 +281,7 @@ def time_means(coarse: list[Series], cuts: list[int], fine: Series) -> dict[str,
             _Sample(accurate[:, column], fine.independent(len(accurate))),
             blocks[0][:, column],
             float(deviations[column]),
+            one_grid=one_grid,
         )
         for column, name in enumerate(fine.names)
     }
@@ -292,7 +294,9 @@ class _Sample(NamedTuple):
     independent: float
 
 
-def _time_mean(coarse: _Sample, fine: _Sample, same_track: Field, deviation: float) -> TimeMean:
+def _time_mean(
+    coarse: _Sample, fine: _Sample, same_track: Field, deviation: float, *, one_grid: bool
+) -> TimeMean:
     """Return the mean of the passages `coarse`, corrected by those on the first track.
 
     The correction is `fine` less `same_track`, both of the first track. The mean of the fine grid
@@ -304,7 +308,8 @@ def _time_mean(coarse: _Sample, fine: _Sample, same_track: Field, deviation: flo
     corrected = means[0] + means[2], _half_width([coarse, change])
     alone = means[1], _half_width([fine])
     value, half_width = min(corrected, alone, key=lambda pair: pair[1])
-    return TimeMean(value=value, time=half_width, grid=abs(means[2]), deviation=deviation)
+    grid = None if one_grid else abs(means[2])
+    return TimeMean(value=value, time=half_width, grid=grid, deviation=deviation)
 
 
 def _half_width(parts: list[_Sample]) -> float:

@@ -69,6 +69,10 @@ class _StepSources:
         return self.snapshot.state
 
     @property
+    def converged(self) -> bool:
+        return self.solution.convergence.converged
+
+    @property
     def contact_force(self) -> float:
         return self.state.clr * self.case.conditions.load
 
