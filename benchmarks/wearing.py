@@ -34,7 +34,7 @@ from asperity.simulation import (
 )
 from asperity.simulation.wear.rows import load_share
 from asperity.surface.read import surface_topography
-from asperity.wear import combined_roughness, positions
+from asperity.wear import positions, surfaces_at
 from benchmarks.unfinished import stamp
 
 ROOT = Path(__file__).parents[1]
@@ -169,7 +169,7 @@ def solved_at(history: WearHistory, count: int, seed: int) -> list[SolvedPositio
     surfaces = history.final_surfaces
     cells = (surfaces.first.grid.cells[0], surfaces.second.grid.cells[0])
     places = positions(cells, ageing.surfaces.rough, count, 0, seed)
-    solutions = (ageing.solver(combined_roughness(surfaces, place)) for place in places)
+    solutions = (ageing.solver(surfaces_at(surfaces, place)) for place in places)
     return [solution for solution in solutions if isinstance(solution, SolvedPosition)]
 
 

@@ -113,7 +113,7 @@ def tile(page, name="CLR"):
 def wait_for_change(page, text, name="CLR"):
     """Wait until a tile shows another text that does not belong to a coarse solution."""
     expect(tile(page, name)).not_to_have_text(text, use_inner_text=True)
-    expect(tile(page, name)).not_to_contain_text("coarse solution")
+    expect(tile(page, name)).not_to_contain_text("coarse snapshot")
 
 
 def wait_for_share(page, text):

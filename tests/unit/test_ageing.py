@@ -23,7 +23,7 @@ from asperity.simulation.wear.frames import is_kept
 from asperity.simulation.wear.state import WearState
 from asperity.surface import height_parameters
 from asperity.surface.read import surface_topography
-from asperity.wear import combined_roughness
+from asperity.wear import surfaces_at
 from support.wearing import CASE, POINT, worn_case
 
 HOURS = 1.0
@@ -358,9 +358,7 @@ def test_frames_are_spread_over_the_history(unbroken, tmp_path):
         unbroken.table["hours"][number] for number in numbers
     ]
     first = unbroken.frames[0]
-    first_solution = unbroken.contact.solver(
-        combined_roughness(unbroken.initial_surfaces, first.position)
-    )
+    first_solution = unbroken.contact.solver(surfaces_at(unbroken.initial_surfaces, first.position))
     np.testing.assert_array_equal(first.pressure, first_solution.pressure.astype(np.float32))
     np.testing.assert_array_equal(first.in_contact, first_solution.asperity_pressure > 0.0)
     kept = run_wear(case(), hours=0.5, out=tmp_path / "worn")

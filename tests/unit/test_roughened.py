@@ -9,7 +9,7 @@ import pytest
 from asperity import BadInput
 from asperity.simulation.wear.jump import WearingContact
 from asperity.simulation.wear.state import WearState
-from asperity.wear import combined_roughness
+from asperity.wear import surfaces_at
 from support.wearing import worn_case
 
 GENTLE = {"motion.rough": "second", "wear.k": "1e-17 1/Pa", "wear.patches": 3}
@@ -35,7 +35,7 @@ def solved():
     model = wear_model()
     worn = WearState.unworn(model.surfaces)
     return [
-        (place, model.solver(combined_roughness(model.worn_surfaces(worn), place)))
+        (place, model.solver(surfaces_at(model.worn_surfaces(worn), place)))
         for place in model.positions(worn)
     ]
 

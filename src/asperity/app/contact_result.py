@@ -14,7 +14,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import Grid
 from asperity.contact.hertz import ellipse_pressure
 from asperity.core.arrays import Field, Mask
-from asperity.core.quantities import NO_VALUE, Quantity, lines, quantity, read
+from asperity.core.quantities import NO_VALUE, Quantity, lines, quantity
 from asperity.ehl import ContactSolution, ContactState, hertz_zone
 from asperity.results import UNCERTAINTY, Run
 from asperity.solution import contact_state
@@ -133,7 +133,7 @@ class ContactResult(ContactMaps):
         if value is None:
             return ""
         if self.coarse:
-            return "coarse solution"
+            return "coarse snapshot"
         if entry.ends[0] in self.row:
             low, high = (self.row.get(end) for end in entry.ends)
             if low is None or high is None or not self.determined:
@@ -155,7 +155,7 @@ def numbers_of(run: Run) -> Numbers:
     """Return the numbers of a run that the page shows, with their uncertainties."""
     tiles = [quantity(key) for key in TILES]
     deviations = [quantity(entry.deviation) for entry in tiles if entry.deviation]
-    return read(run, [*tiles, *deviations, quantity("sq_m"), *lines(UNCERTAINTY)])
+    return run.quantities([*tiles, *deviations, quantity("sq_m"), *lines(UNCERTAINTY)])
 
 
 def result_of_run(run: Run, seconds: float) -> ContactResult:
@@ -168,6 +168,8 @@ def result_of_run(run: Run, seconds: float) -> ContactResult:
         run.case.text,
         numbers_of(run),
         coarse=False,
+        converged=run.converged,
+        explained=run.convergence_text,
         determined=run.determined,
         verdict=run.verdict(),
         notes=tuple(notes),
@@ -184,6 +186,8 @@ def coarse_result(solution: ContactSolution, text: str, seconds: float) -> Conta
         text,
         {"clr": state.clr, "car": state.car, "h_central_m": state.h_central, "sq_m": state.sq},
         coarse=True,
+        converged=solution.convergence.converged,
+        explained=solution.convergence.explain(),
         determined=False,
         verdict="",
         notes=(),
@@ -203,15 +207,7 @@ def _build_result(
         solution.in_contact,
         solution.cavitated,
     )
-    convergence = solution.convergence
-    return ContactResult(
-        text=text,
-        row=row,
-        converged=convergence.converged,
-        explained=convergence.explain(),
-        **maps,
-        **fields,
-    )
+    return ContactResult(text=text, row=row, **maps, **fields)
 
 
 def map_fields(

@@ -235,9 +235,9 @@ class Run:
 
     def numbers(self, groups: Sequence[str]) -> dict[str, Scalar]:
         """Return the numbers of some groups of the catalogue, with those of a roller's ends."""
-        return self._read(lines(*groups, *([] if self.axial is None else [ENDS])))
+        return self.quantities(lines(*groups, *([] if self.axial is None else [ENDS])))
 
-    def _read(self, entries: Iterable[Quantity]) -> dict[str, Scalar]:
+    def quantities(self, entries: Iterable[Quantity]) -> dict[str, Scalar]:
         """Return numbers by key: means over time of a running contact, else of the solution."""
         entries = list(entries)
         means = {} if self.running is None else self.running.numbers
@@ -408,7 +408,7 @@ class Run:
     @property
     def summary_row(self) -> Row:
         """Numbers of the first surface for the verdict and the intervals; quick to compute."""
-        return self._read(map(quantity, SUMMARY_KEYS))
+        return self.quantities(map(quantity, SUMMARY_KEYS))
 
     def resonance_text(self) -> str:
         """Return the contact resonance with its interval, or the reason why there is none."""
