@@ -70,8 +70,17 @@ def test_traction_rises_from_zero_to_its_limit(asp):
     assert Path("curve.png").read_bytes().startswith(PNG)
 
 
+def test_a_traction_curve_of_running_roughness_depends_on_its_speed(case):
+    """The rough body is the first, faster one; both slips have intervals."""
+    curve = traction_curve(case, slips=[0.3, 2.0])
+    slow, fast = curve.points
+    assert curve.scalars()["roughness"] == "running"
+    assert all(point.converged for point in curve.points)
+    assert fast.clr != pytest.approx(slow.clr, abs=1e-3)
+
+
 def test_a_traction_curve_in_python(case):
-    seen = []
+    case, seen = case.with_overrides({"contact.roughness": "standing"}), []
     curve = traction_curve(case, slips=[0.3, 0.0, 0.001], progress=seen.append)
     slips = [point.slide_to_roll for point in curve.points]
     assert slips == pytest.approx([0.0, 0.001, 0.3])

@@ -13,6 +13,7 @@ from asperity.simulation.wear.contact import PositionSolver, SolvedPosition
 from asperity.simulation.wear.jump import WearingContact
 from asperity.simulation.wear.notes import ENOUGH_CELLS, RECOMMENDED_CELLS, cells_note
 from asperity.surface import correlation_lengths
+from asperity.transient import solve_passage
 from asperity.wear import TrackPosition, combined_roughness
 from support.wearing import worn_case
 
@@ -20,6 +21,7 @@ ROUGH: dict[str, object] = {
     "surface.correlation_length": "30 um",
     "grid.cells": [96, 32],
     "grid.y": [-1.0, 1.0],
+    "contact.roughness": "standing",
 }
 
 
@@ -28,7 +30,7 @@ def solver_of(case: Case) -> PositionSolver:
 
 
 def solved(case: Case) -> SolvedPosition:
-    position = solver_of(case)(case.surface())
+    position = solver_of(case)(case.moving_surfaces())
     assert isinstance(position, SolvedPosition)
     return position
 
@@ -47,6 +49,16 @@ def test_a_position_equals_the_contact_with_its_interval():
     assert state.error.clr.grid == pytest.approx(
         reference.error.clr.grid, rel=0.1
     )  # the coarse grid's estimate is stored
+
+
+def test_a_position_of_running_roughness_is_reached_after_a_passage():
+    case = worn_case({**ROUGH, "contact.roughness": "running"})
+    solved_after = solve_passage(
+        case.conditions, case.lubricant, case.moving_surfaces(), options=case.options
+    )
+    np.testing.assert_array_equal(solved(case).pressure, solved_after.pressure)
+    standing = solved(worn_case(ROUGH)).state.clr
+    assert solved(case).state.clr > standing + 0.05
 
 
 def test_a_failed_warm_start_is_retried_from_scratch(monkeypatch):

@@ -168,7 +168,7 @@ def test_a_passage_ends_within_the_interval_of_the_mean(run):
     assert clr > run.snapshot_clr
 
 
-def test_a_snapshot_says_so():
+def test_a_snapshot_is_named_in_the_verdict():
     case = load_case(PAPER).with_overrides({**RUNNING, "contact.roughness": "standing"})
     snapshot = solve_case(case)
     assert "snapshot of standing roughness, 90 % intervals for this surface" in snapshot.verdict()

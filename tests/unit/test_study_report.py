@@ -42,7 +42,9 @@ from asperity.study import (
 )
 
 PAPERS = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
-SMALL = PAPERS.with_overrides({"grid.cells": "[48, 32]", "surface.correlation_length": "40 um"})
+SMALL = PAPERS.with_overrides(
+    {"grid.cells": "[48, 32]", "surface.correlation_length": "40 um"}
+).with_overrides({"contact.roughness": "standing"})
 LEVELS_UM = (0.75, 1.0, 2.0, 3.5)
 PRINTED_CAR = {
     0.5: 5.57,

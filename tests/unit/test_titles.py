@@ -44,7 +44,12 @@ def curve():
         for u in (0.5, 1.0, 2.0)
     )
     return FrictionCurve(
-        kind="stribeck", points=points, boundary_friction=0.15, sq=0.3e-6, feedback=True
+        kind="stribeck",
+        points=points,
+        boundary_friction=0.15,
+        sq=0.3e-6,
+        feedback=True,
+        running=False,
     )
 
 

@@ -14,7 +14,12 @@ from asperity.cli.contact import run_table
 from asperity.ehl import Uncertainty
 from asperity.results import prediction_interval
 
-PAPER = files("asperity.paper").joinpath("paper.toml").read_text("utf-8")
+PAPER = (
+    files("asperity.paper")
+    .joinpath("paper.toml")
+    .read_text("utf-8")
+    .replace("[contact]", '[contact]\nroughness = "standing"', 1)
+)
 WITHOUT_COARSE_GRID = {
     "grid.cells": [48, 48],
     "vibration.duration": "0.2 s",

@@ -56,9 +56,9 @@ def mean_between(mobility, h, other, other_h):
     """
     fluidity, other_fluidity = mobility / h**3, other / other_h**3
     ratio = np.log(fluidity / other_fluidity)
-    near = np.abs(ratio) < 1e-6
+    equal = np.abs(ratio) < 1e-6
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(near, fluidity, (fluidity - other_fluidity) / ratio)
+        mean = np.where(equal, fluidity, (fluidity - other_fluidity) / ratio)
     return mean * 2.0 * h**2 * other_h**2 / (h + other_h)
 
 

@@ -96,12 +96,12 @@ def set_up(newest: MutableSequence[int]) -> None:
 
 def _progress_hook(
     ticket: Ticket, seconds: float, steps: float = math.inf
-) -> Callable[[Iteration | None], None]:
+) -> Callable[[Iteration], None]:
     """Return a callback for the solver that stops it at a limit or when superseded."""
     end = time.monotonic() + seconds
     step_numbers = itertools.count(1)
 
-    def check(step: Iteration | None) -> None:  # noqa: ARG001 - only its occurrence matters
+    def check(step: Iteration) -> None:  # noqa: ARG001 - only its occurrence matters
         if next(step_numbers) > steps:
             raise _StepLimitError
         if _newest is not None and ticket.slot >= 0 and _newest[ticket.slot] != ticket.number:
@@ -114,8 +114,7 @@ def _progress_hook(
 
 def _solve(ticket: Ticket, case: Case) -> Run:
     """Solve a case within the time limit."""
-    check = _progress_hook(ticket, TIME_LIMIT_S)
-    return solve_case(case, strict=False, progress=check, surface_progress=lambda *_: check(None))
+    return solve_case(case, strict=False, progress=_progress_hook(ticket, TIME_LIMIT_S))
 
 
 def run_job(work: Callable[..., object], *arguments: object) -> object:

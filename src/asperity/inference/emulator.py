@@ -307,8 +307,7 @@ def _finer(
     finer: dict[str, object] = {
         "grid.cells": [2 * count if count > 1 else 1 for count in case.grid.cells]
     }
-    running_cells = case.contents.solver.running_cells
-    if running_cells:
+    if running_cells := case.contents.solver.running_cells:
         finer["solver.running_cells"] = 4 * running_cells
     refined = case.with_overrides(finer)
     points = [overrides_at(refined, setting.ranges, shares) for shares in sobol[:FINER_POINTS]]

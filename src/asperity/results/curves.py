@@ -127,7 +127,7 @@ def stribeck_curve(
     Parameters
     ----------
     speeds : entrainment speeds [m/s]; default 13 from a hundredth of the case's to ten times it
-    progress : called after every solver iteration
+    progress : called after every solver iteration, or time step of running roughness
 
     Raises
     ------
@@ -162,7 +162,7 @@ def traction_curve(
     Parameters
     ----------
     slips : slide-to-roll ratios, not negative; default 0 and 14 from 0.001 to 0.5
-    progress : called after every solver iteration
+    progress : called after every solver iteration, or time step of running roughness
 
     Raises
     ------
@@ -195,7 +195,8 @@ def _curve(
         moving = _at_speeds(case, pair)
         if moving.is_running:
             running = True
-            points.append(_running_point(solve_case(moving, strict=False, groups=GROUPS)))
+            run = solve_case(moving, strict=False, groups=GROUPS, progress=progress)
+            points.append(_running_point(run))
             continue
         for first in (start, None):  # retry with a cold start if the warm start fails
             solution = solve_thermal_contact(

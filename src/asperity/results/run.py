@@ -13,22 +13,21 @@ from asperity import ehl
 from asperity.case import Case
 from asperity.core.errors import BadInput
 from asperity.core.quantities import Quantity, lines, quantity, read
-from asperity.coupling import Vibration, contact_vibration
+from asperity.coupling import Vibration
 from asperity.ehl import ContactSolution, ContactState
 from asperity.resonance import Resonance
 from asperity.results.determined import Determined
 from asperity.results.dynamic import DynamicCurve, dynamic_curve
 from asperity.results.run_contents import run_contents
-from asperity.results.running import Running, mean_state, running_error
+from asperity.results.running import Running
 from asperity.results.surface_spread import (
     AVERAGED,
     Row,
     Scalar,
     half_interval,
     mean_row,
-    total_error,
 )
-from asperity.results.uncertainty_text import basis, interval_text, threshold_note
+from asperity.results.uncertainty_text import basis, interval_text
 from asperity.solution import (
     FILMS,
     HOT,
@@ -42,12 +41,10 @@ from asperity.solution import (
     SubsurfaceStress,
     axial_distribution,
     clr_below,
-    contact_state,
     friction_and_heat,
     own_resonance,
     regime_card,
     sharing_by_film,
-    solution_notes,
     subsurface_stress,
     uncertain_films,
     undetermined,
@@ -433,48 +430,3 @@ class Run:
     def save(self, path: str | Path) -> Path:
         """Save the run with its case as one netCDF file (atomically), and return the path."""
         return self.contents().save(path)
-
-
-def run_of(
-    case: Case,
-    solution: ContactSolution,
-    notes: Sequence[str],
-    others: Sequence[Row] = (),
-    vibration: Vibration | None = None,
-    groups: tuple[str, ...] = RUN_GROUPS,
-    running: Running | None = None,
-) -> Run:
-    """Return the run of a solved case; its vibration is computed unless given.
-
-    `others` are the numbers of further surfaces, of these `groups` of the catalogue; `running` has
-    the means of a running contact whose snapshot is the `solution`.
-    """
-    state = contact_state(solution)
-    if running is not None:
-        state = mean_state(state, running)
-    model = case.vibration
-    if model is not None and vibration is None:
-        with case.naming("vibration"):
-            vibration = contact_vibration(state, case.conditions, model, solution=solution)
-    notes = (*notes, *solution_notes(solution))
-    if solution.options.model == "conserving":
-        notes = (*notes, threshold_note(solution))
-    if not solution.convergence.converged:
-        notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
-    rows = tuple(others)
-    run = Run(
-        case=case,
-        solution=solution,
-        state=state,
-        vibration=vibration,
-        notes=notes,
-        others=rows,
-        groups=groups,
-        running=running,
-    )
-    row, conditions = run.summary_row, case.conditions
-    if running is None:
-        error = total_error(state, (row, *others), conditions, model, vibration)
-    else:
-        error = running_error(state, row, running, conditions, model, vibration)
-    return replace(run, state=replace(state, error=error))

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from multiprocessing import get_context
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -18,7 +18,14 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.processes import cores, set_up_worker
 from asperity.core.quantities import Quantity, lines, read
 from asperity.coupling import Vibration, VibrationModel
-from asperity.ehl import ContactError, ContactSolution, ContactState, Uncertainty, half_as_many
+from asperity.ehl import (
+    ContactError,
+    ContactSolution,
+    ContactState,
+    Iteration,
+    Uncertainty,
+    half_as_many,
+)
 from asperity.results.determined import Determined
 from asperity.results.surface_spread import Row, Scalar, crf_error
 from asperity.solution import (
@@ -106,6 +113,16 @@ class Running:
         return cls(**{**values, "clr": TimeMean(**values["clr"])})
 
 
+class TrackProgress(NamedTuple):
+    """Callbacks of a time step: with its last iteration, and with steps done and in total."""
+
+    iteration: Callable[[Iteration], None] | None = None
+    steps: Callable[[int, int], None] | None = None
+
+
+NO_PROGRESS = TrackProgress()
+
+
 @dataclass(frozen=True, slots=True)
 class _Sources:
     """Attributes of a step that the catalogue's sources refer to."""
@@ -168,7 +185,7 @@ def run_tracks(
     *,
     tracks: int,
     workers: int = 1,
-    progress: Callable[[int, int], None] | None = None,
+    progress: TrackProgress = NO_PROGRESS,
 ) -> tuple[Running, ContactSolution, list[str]]:
     """Return the running contact, its snapshot on the fine grid, and notes.
 
@@ -177,7 +194,7 @@ def run_tracks(
     case : case whose rough bodies move
     tracks : number of tracks, surfaces of the case's kind
     workers : processes, one of them for the fine grid; 1 starts none
-    progress : called with the number of time steps done and in total, of every track in turn
+    progress : callbacks, after every time step of the tracks that this process computes in turn
 
     Raises
     ------
@@ -201,14 +218,19 @@ def run_tracks(
         fine = _track(case, cells, passages=length, moments=MOMENTS, progress=progress)
         own = first() if coarse_cells else fine
         others = [outcome() for number, outcome in further.items() if number > 0]
+    all_coarse = [own, *(other.value for other in others if other.value is not None)]
+    running = _running(case, all_coarse, fine)
+    return running, fine.kept[0].solution, _notes(running, all_coarse, others)
+
+
+def _notes(running: Running, coarse: list[Series], others: list[Determined[Series]]) -> list[str]:
+    """Return notes on tracks that failed or are not stationary, and on failed time steps."""
     notes = [
-        f"Track {number} of {tracks} is left out: {other.reason.rstrip('.')}."
+        f"Track {number} of {len(others) + 1} is left out: {other.reason.rstrip('.')}."
         for number, other in enumerate(others, 2)
         if other.value is None
     ]
-    all_coarse = [own, *(other.value for other in others if other.value is not None)]
-    running = _running(case, all_coarse, fine)
-    for number, series in enumerate(all_coarse, 1):
+    for number, series in enumerate(coarse, 1):
         if settled_from(series, "clr") is None:
             notes.append(
                 f"The load share of track {number} is not stationary after {series.length} "
@@ -219,7 +241,7 @@ def run_tracks(
             f"{running.failed} of {running.steps} time steps did not reach the tolerance; the "
             "means include them."
         )
-    return running, fine.kept[0].solution, notes
+    return notes
 
 
 def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
@@ -256,12 +278,14 @@ def _track(
     *,
     passages: Callable[[], int] | None = None,
     moments: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: TrackProgress = NO_PROGRESS,
 ) -> Series:
     """March a case's track on one grid, with one thread for the algebra."""
     entries = _entries(EVERY_STEP)
 
     def measure(snapshot: Snapshot) -> dict[str, float]:
+        if progress.iteration is not None:
+            progress.iteration(snapshot.solution.convergence.history[-1])
         rubbing = friction(
             snapshot.solution, boundary_friction=case.boundary_friction, thermal=case.thermal
         )
@@ -279,7 +303,7 @@ def _track(
             passages=passages,
             options=case.options,
             moments=moments,
-            progress=progress,
+            progress=progress.steps,
         )
 
 
@@ -338,7 +362,7 @@ def _further_tracks(
     cells: tuple[int, int],
     numbers: range,
     workers: int,
-    progress: Callable[[int, int], None] | None,
+    progress: TrackProgress,
 ) -> Iterator[dict[int, _Outcome]]:
     """Yield a function per track that returns it on the coarse grid.
 
@@ -364,7 +388,7 @@ def _further_track(
     case: Case,
     cells: tuple[int, int],
     number: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: TrackProgress = NO_PROGRESS,
 ) -> Determined[Series]:
     """Return a track, or the reason why there is none."""
     return Determined.attempt(lambda: _track(case.on_surface(number), cells, progress=progress))

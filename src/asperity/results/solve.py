@@ -1,7 +1,7 @@
 """Solving of cases, on one or several surfaces, and loading of stored runs."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from multiprocessing import get_context
@@ -15,12 +15,14 @@ from asperity.case import Case, load_case
 from asperity.core.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.core.processes import cores, set_up_worker
 from asperity.core.storage import version_notes
-from asperity.coupling import require_sampling
+from asperity.coupling import Vibration, contact_vibration, require_sampling
+from asperity.ehl import ContactSolution
 from asperity.results.determined import Determined
-from asperity.results.run import RUN_GROUPS, Run, run_of
-from asperity.results.running import Running, run_tracks
-from asperity.results.surface_spread import Row
-from asperity.solution import load_solution, solve_thermal_contact
+from asperity.results.run import RUN_GROUPS, Run
+from asperity.results.running import Running, TrackProgress, mean_state, run_tracks, running_error
+from asperity.results.surface_spread import Row, total_error
+from asperity.results.uncertainty_text import threshold_note
+from asperity.solution import contact_state, load_solution, solution_notes, solve_thermal_contact
 from asperity.surface import Surface
 
 MIN_PARALLEL_S = 8.0  # work below which starting processes takes longer than it saves
@@ -49,8 +51,9 @@ def solve_case(
         places of a measured map; None: as the case's [solver] states, or else `Case.surface_count`.
         One if a `surface` is given or the case has only one
     workers : processes for the surfaces after the first, started if worthwhile; 1 starts none
-    progress : called after every solver iteration in this process
-    surface_progress : called with the number of surfaces done and in total
+    progress : called after every solver iteration in this process; for running roughness, after
+        every time step
+    surface_progress : called with the number of surfaces, or of time steps, done and in total
     strict : raise if the first surface does not converge; otherwise the run states it. Other
         surfaces that fail are omitted, with a note
     groups : groups of the catalogue that are evaluated on every surface
@@ -74,7 +77,8 @@ def solve_case(
         case = replace(case, stored=surface)
         surfaces = 1
     if case.is_running:
-        return _running(case, surfaces, workers, surface_progress, strict, groups)
+        steps = TrackProgress(progress, surface_progress)
+        return _running(case, surfaces, workers, steps, strict, groups)
     count = case.surface_count(surfaces)
     run = _first(case, progress, strict, groups)
     if count == 1 or not run.solution.convergence.converged:
@@ -115,7 +119,7 @@ def _running(
     case: Case,
     tracks: int | None,
     workers: int,
-    progress: SurfaceProgress | None,
+    progress: TrackProgress,
     strict: bool,
     groups: tuple[str, ...],
 ) -> Run:
@@ -257,6 +261,51 @@ def _in_processes(
         ) from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
+
+
+def run_of(
+    case: Case,
+    solution: ContactSolution,
+    notes: Sequence[str],
+    others: Sequence[Row] = (),
+    vibration: Vibration | None = None,
+    groups: tuple[str, ...] = RUN_GROUPS,
+    running: Running | None = None,
+) -> Run:
+    """Return the run of a solved case; its vibration is computed unless given.
+
+    `others` are the numbers of further surfaces, of these `groups` of the catalogue; `running` has
+    the means of a running contact whose snapshot is the `solution`.
+    """
+    state = contact_state(solution)
+    if running is not None:
+        state = mean_state(state, running)
+    model = case.vibration
+    if model is not None and vibration is None:
+        with case.naming("vibration"):
+            vibration = contact_vibration(state, case.conditions, model, solution=solution)
+    notes = (*notes, *solution_notes(solution))
+    if solution.options.model == "conserving":
+        notes = (*notes, threshold_note(solution))
+    if not solution.convergence.converged:
+        notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
+    rows = tuple(others)
+    run = Run(
+        case=case,
+        solution=solution,
+        state=state,
+        vibration=vibration,
+        notes=notes,
+        others=rows,
+        groups=groups,
+        running=running,
+    )
+    row, conditions = run.summary_row, case.conditions
+    if running is None:
+        error = total_error(state, (row, *others), conditions, model, vibration)
+    else:
+        error = running_error(state, row, running, conditions, model, vibration)
+    return replace(run, state=replace(state, error=error))
 
 
 def load_run(path: str | Path) -> Run:

@@ -74,7 +74,7 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
         snapshot=any(run.is_snapshot for run in runs),
         running=any(run.running is not None for run in runs),
         newtonian=any(oil is not None and isinstance(oil.rheology, Newtonian) for oil in oils),
-        alone=any(run.error.surfaces == 1 and run.state.sq > 0.0 for run in runs),
+        alone=_has_one_surface(runs),
         isothermal=any(run.solution.lubricant and not run.case.thermal.feedback for run in runs),
         sphere=any(
             run.case.vibration and run.case.vibration.stiffness_law.point_spring for run in runs
@@ -82,6 +82,13 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
         line=any(run.solution.conditions.long for run in runs),
         ends=ends,
         oil_limits=_oil_limits(runs),
+    )
+
+
+def _has_one_surface(runs: Sequence[Run]) -> bool:
+    """Return True if scatter over surfaces is missing in the intervals of a run."""
+    return any(
+        run.error.surfaces == 1 and run.state.sq > 0.0 and run.running is None for run in runs
     )
 
 
