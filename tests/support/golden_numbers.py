@@ -59,6 +59,11 @@ def solved(*overrides: str, case: str = "paper.toml") -> dict[str, Any]:
     return run_json("solve", str(EXAMPLES / case), *words, *_set(overrides))
 
 
+def running() -> dict[str, Any]:
+    output = run_json("solve", str(EXAMPLES / "paper.toml"), *_set(("grid.cells=[64, 32]",)))
+    return {key: value for key, value in output.items() if key not in RESIDUALS}
+
+
 def elliptic() -> dict[str, Any]:
     text = (EXAMPLES / "ball-on-disc.toml").read_text("utf-8")
     text = text.replace('geometry = "point"', 'geometry = "elliptic"').replace(
@@ -150,9 +155,7 @@ def curves() -> dict[str, Any]:
 
 CASES: dict[str, Callable[[], dict[str, Any]]] = {
     "paper": lambda: solved(*SMALL),
-    "running": lambda: run_json(
-        "solve", str(EXAMPLES / "paper.toml"), *_set(("grid.cells=[64, 32]",))
-    ),
+    "running": running,
     "paper-model": lambda: solved(*SMALL, "model=paper"),
     "smooth": lambda: solved(*SMALL, 'surface={kind="flat"}'),
     "printed-preset": lambda: solved(*SMALL, "vibration.preset=paper", "surface.sq=2.5 um"),

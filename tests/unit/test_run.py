@@ -139,7 +139,7 @@ def test_each_surface_vibrates_once(run, monkeypatch):
         calls.append(contact)
         return contact_vibration(*contact, **solved)
 
-    monkeypatch.setattr(results, "contact_vibration", record_call)
+    monkeypatch.setattr("asperity.results.solve.contact_vibration", record_call)
     several = solve_case(run.case.with_overrides({"vibration": MASS}), surfaces=3)
     assert len(calls) == 3
     assert (
