@@ -192,8 +192,7 @@ def _curve(
     start: ContactSolution | None = None
     running = False
     for pair in speeds:
-        moving = _at_speeds(case, pair)
-        if moving.is_running:
+        if (moving := _running_case(case, pair)) is not None:
             running = True
             run = solve_case(moving, strict=False, groups=GROUPS, progress=progress)
             points.append(_running_point(run))
@@ -224,16 +223,19 @@ def _curve(
     )
 
 
-def _at_speeds(case: Case, pair: tuple[float, float]) -> Case:
-    """Return the case at other surface speeds."""
+def _running_case(case: Case, pair: tuple[float, float]) -> Case | None:
+    """Return the case at other surface speeds if roughness moves there, otherwise None."""
     entrainment = 0.5 * (pair[0] + pair[1])
-    return case.among_many.with_overrides(
+    if entrainment == 0.0:  # without oil
+        return None
+    moving = case.among_many.with_overrides(
         {
             "contact.entrainment_speed": f"{entrainment!r} m/s",
             "contact.slip": (pair[0] - pair[1]) / entrainment,
             "vibration": "none",
         }
     )
+    return moving if moving.is_running else None
 
 
 def _running_point(run: Run) -> FrictionPoint:

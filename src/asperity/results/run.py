@@ -278,9 +278,10 @@ class Run:
         running = self.running
         if running is None or not self.solution.convergence.converged:
             return self.solution.convergence.explain()
+        coarse = "" if running.clr.grid is None else " and half as many along each axis"
         return (
-            f"{running.steps - running.failed} of {running.steps} time steps converged, on grids "
-            f"of {running.cells[0]} x {running.cells[1]} cells and half as many along each axis"
+            f"{running.steps - running.failed} of {running.steps} time steps converged, on "
+            f"{running.cells[0]} x {running.cells[1]} cells{coarse}"
         )
 
     @property
