@@ -182,6 +182,17 @@ def test_a_stored_running_contact_is_solved_again_to_the_same_numbers(run, tmp_p
     assert again.state.clr == run.state.clr
 
 
+def test_rolling_friction_of_faint_running_roughness_is_that_of_a_smooth_contact(run):
+    """By the flow's dissipation and by the sum of (h/2) dp/dx; 8 % apart on this grid."""
+    faint = load_case(PAPER).with_overrides({**RUNNING, "surface.sq": "5 nm"})
+    standing = faint.with_overrides({"contact.roughness": "standing"})
+    running, still = (
+        solve_case(case).scalars()["rolling_friction_coefficient"] for case in (faint, standing)
+    )
+    assert running == pytest.approx(still, rel=0.1)
+    assert 0.2 * running < run.scalars()["rolling_friction_coefficient"] < 2.0 * running
+
+
 def test_the_interval_covers_twice_as_fine_a_grid(run):
     """The mean over a passage of the same track on 128 x 64 cells is 0.685."""
     assert run.error.clr.low < 0.685 < run.error.clr.high

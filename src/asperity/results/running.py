@@ -291,7 +291,7 @@ def _track(
         )
         numbers = read(_Sources(snapshot.state, snapshot.solution, rubbing), entries)
         values = {key: math.nan if value is None else value for key, value in numbers.items()}
-        return {"time_s": snapshot.time, **values}
+        return {"time_s": snapshot.time, **values, **_rolling_friction(snapshot)}
 
     assert case.lubricant is not None
     with threadpool_limits(1):
@@ -313,6 +313,21 @@ def running_surfaces(case: Case, passages: int = PASSAGES) -> MovingSurfaces:
     fastest = max(map(abs, conditions.surface_speeds)) / conditions.entrainment_speed
     zones = case.grid.extent[0] / (2.0 * conditions.hertz.half_widths[0])
     return case.moving_surfaces(min(math.ceil(passages * fastest / zones), MOST_TRACK_LENGTHS))
+
+
+def _rolling_friction(snapshot: Snapshot) -> dict[str, float]:
+    """Return the rolling friction that dissipates the power of the pressure-driven flow.
+
+    On moving roughness the pressure also works on slopes, on which the sum of (h/2) dp/dx has no
+    bearing; over time the work on both bodies is what the flow dissipates.
+    """
+    conditions, power = snapshot.solution.conditions, snapshot.flow_power
+    force = power / (2.0 * conditions.entrainment_speed)
+    return {
+        "rolling_friction_power_w": power,
+        "rolling_friction_force_n": force,
+        "rolling_friction_coefficient": force / conditions.load,
+    }
 
 
 def _entries(groups: tuple[str, ...]) -> list[Quantity]:

@@ -48,9 +48,9 @@ def cells_note(contact: WearingContact) -> str | None:
     stated = " by ".join("many" if math.isnan(count) else f"{count:.2g}" for count in along)
     return (
         f"The roughness has {stated} cells along its correlation lengths; "
-        f"{RECOMMENDED_CELLS:g} are recommended. With fewer cells, CLR and wear rate come out too "
-        "high (examples/wear.toml starts with a CLR of 0.71, 0.64 and 0.60 on 64, 128 and 256 "
-        f'cells); state grid.cells = {recommended}, or "auto".'
+        f"{RECOMMENDED_CELLS:g} are recommended. With fewer cells, CLR and wear rate depend on the "
+        "grid (examples/wear.toml starts with a CLR of 0.70 and 0.72 on 64 and 128 cells); state "
+        f'grid.cells = {recommended}, or "auto".'
     )
 
 
