@@ -105,17 +105,32 @@ def test_intervals_cover_the_mean_of_correlated_series():
     assert 0.82 < np.mean(covered) < 0.97
 
 
-def test_passages_of_repeated_or_slow_roughness_are_not_independent():
-    """A track of two Hertz zones; a body at a quarter of the oil's speed."""
-    rng, zeros = np.random.default_rng(3), np.zeros(10)
-    once = 0.1 * rng.standard_normal(20)
-    values = np.concatenate([zeros, zeros[:1], once, once, once])
-    new, repeated = series(values), series(values, track_zones=2.0)
-    assert new.independent(6) == 6.0
-    assert repeated.independent(6) == 2.0
-    assert series(values, zones=0.25).independent(6) == 1.5
-    wide, narrow = (time_means([part], [1], part)["clr"].time for part in (repeated, new))
-    assert wide > 4.0 * narrow
+def test_the_mean_of_a_moving_window_has_the_stated_scatter():
+    """White noise averaged over a Hertz zone, as a contact averages its roughness."""
+    rng, covered = np.random.default_rng(5), []
+    for _ in range(400):
+        noise = np.concatenate([[0.0], np.cumsum(rng.standard_normal(200))])
+        part = series(noise[20:] - noise[:-20], steps_per_passage=20)
+        mean = time_means([part], [1], part)["clr"]
+        covered.append(abs(mean.value) <= mean.time)
+    assert 0.88 < np.mean(covered) < 0.97
+
+
+def test_the_scatter_of_slow_roughness_is_not_determined():
+    values = 0.1 * np.random.default_rng(3).standard_normal(61)
+    assert math.isfinite(time_means([series(values)], [1], series(values))["clr"].time)
+    slow = series(values, zones=0.25)
+    assert time_means([slow], [1], slow)["clr"].time == math.inf
+
+
+def test_repeated_tracks_scatter_by_their_means():
+    values = [0.1 * n + 0.001 * np.random.default_rng(n).standard_normal(61) for n in range(3)]
+    repeated = [series(part, track_zones=2.0) for part in values]
+    mean = time_means(repeated, [1, 1, 1], repeated[0])["clr"]
+    assert mean.value == pytest.approx(0.1, abs=1e-3)
+    assert mean.time == pytest.approx(2.92 * 0.1 / math.sqrt(3.0), rel=0.02)  # Student's t
+    new = [series(part) for part in values]
+    assert time_means(new, [1, 1, 1], new[0])["clr"].time < 0.1 * mean.time
 
 
 def test_tracks_of_generated_roughness_do_not_repeat():

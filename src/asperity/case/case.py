@@ -30,6 +30,7 @@ from asperity.wear import WearModel
 
 # default number of surfaces per solution on coarse and on fine grids, to limit computing time
 DEFAULT_SURFACES, DEFAULT_SURFACES_FINE = 5, 3
+MOST_RUNNING_SLIP = 4.0
 MANY_RUNNING_CELLS = 1200  # of a running contact among many
 DEFAULT_TRACKS = 1  # of a running contact; a generated track holds several contacts
 DEFAULT_TRACKS_MEASURED = 3
@@ -231,12 +232,14 @@ class Case:
         """True if roughness moves and the solution is the mean over time of the running contact.
 
         Otherwise it is that of standing roughness: `contact.roughness = "standing"`, thermal
-        feedback, roughness that is stored, and contacts without moving roughness.
+        feedback, roughness that is stored, a slide-to-roll ratio above `MOST_RUNNING_SLIP`, where
+        roughness would pass over cells unseen, and contacts without moving roughness.
         """
         return (
             self.contents.contact.roughness == "running"
             and self.stored is None
             and not self.thermal.feedback
+            and abs(self.conditions.slide_to_roll) <= MOST_RUNNING_SLIP
             and self.roughness_moves
         )
 
@@ -254,6 +257,11 @@ class Case:
         share = ACCURACY / (self.contents.grid.accuracy or ACCURACY)
         most = self.contents.solver.running_cells or round(MOST_RUNNING_CELLS * share)
         return running_cells(self.conditions, self.grid, texture.lengths, most)
+
+    @property
+    def solved_cells(self) -> tuple[int, int]:
+        """Cells of the finest grid on which the contact is solved."""
+        return self.running_cells() if self.is_running else self.grid.cells
 
     def moving_surfaces(self, lengths: int = 1) -> MovingSurfaces:
         """Return both bodies' roughness on tracks that repeat along rolling, each at its own speed.

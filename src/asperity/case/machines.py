@@ -201,12 +201,6 @@ class MachineCase:
         return tomli_w.dumps(dict(self.tables))
 
     @property
-    def stands_still(self) -> bool:
-        """True if the contacts are solved with standing roughness."""
-        contact = self.tables.get("contact", {})
-        return isinstance(contact, Mapping) and contact.get("roughness") == "standing"
-
-    @property
     def complete(self) -> bool:
         """True if the case states all that a contact needs to be solved."""
         return {"lubricant", "surface"} <= set(self.tables)

@@ -386,7 +386,7 @@ def moving_roughness(
         if rough == "both":
             raise BadInput(
                 f'motion.rough = "both" needs two surfaces, got {section.file} only; state the '
-                "other as surface.second"
+                'other as surface.second, or set contact.roughness = "standing"'
             )
         surface = section.prepare(track, folder).surface
     else:

@@ -6,6 +6,7 @@ scatter between patches, which it averages. The emulator's error is found by cro
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
@@ -199,7 +200,7 @@ def build_emulator(
         failed,
         home,
         float(table["seconds"].sum()),
-        setting.case.grid.cells,
+        setting.case.among_many.solved_cells,
         _grid_errors(result.table, finer),
         int(np.sum(means.points >= len(sobol))),
     )
@@ -304,12 +305,9 @@ def _finer(
 ) -> pandas.DataFrame:
     """Solve the first points on twice the cells along each axis, with the same surfaces."""
     case = setting.case.among_many
-    finer: dict[str, object] = {
-        "grid.cells": [2 * count if count > 1 else 1 for count in case.grid.cells]
-    }
-    if running_cells := case.contents.solver.running_cells:
-        finer["solver.running_cells"] = 4 * running_cells
-    refined = case.with_overrides(finer)
+    doubled = [2 * count if count > 1 else 1 for count in case.grid.cells]
+    fourfold = {"solver.running_cells": 4 * math.prod(case.solved_cells)}
+    refined = case.with_overrides({"grid.cells": doubled, **fourfold})
     points = [overrides_at(refined, setting.ranges, shares) for shares in sobol[:FINER_POINTS]]
     plan = plan_points(refined, points, seeds=setting.surfaces, kind="still")
     return run(plan, out=home / FINER).table

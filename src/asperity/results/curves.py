@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from asperity.case import Case
-from asperity.core.errors import BadInput, require_positive
+from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.ehl import ContactSolution, Iteration
 from asperity.results.run import Run
 from asperity.results.solve import solve_case
@@ -241,6 +241,12 @@ def _running_case(case: Case, pair: tuple[float, float]) -> Case | None:
 def _running_point(run: Run) -> FrictionPoint:
     """Return a point of running roughness: means over time."""
     numbers, conditions, clr = run.numbers(GROUPS), run.case.conditions, run.error.clr
+    values = {name: numbers[key] for name, key in RUNNING_KEYS.items()}
+    if missing := [name for name, value in values.items() if value is None]:
+        raise AsperityError(
+            f"{missing[0]} at {conditions.entrainment_speed:.4g} m/s could not be computed; leave "
+            'that point out, or set contact.roughness = "standing"'
+        )
     return FrictionPoint(
         entrainment_speed_m_s=conditions.entrainment_speed,
         slide_to_roll=conditions.slide_to_roll,
@@ -249,7 +255,7 @@ def _running_point(run: Run) -> FrictionPoint:
         clr_high=clr.high,
         lambda_ratio=run.state.lambda_ratio,
         converged=run.converged,
-        **{name: float(numbers[key] or 0.0) for name, key in RUNNING_KEYS.items()},
+        **{name: float(value) for name, value in values.items() if value is not None},
     )
 
 

@@ -302,7 +302,8 @@ class Run:
     @property
     def is_snapshot(self) -> bool:
         """True if roughness that moves was solved standing still."""
-        return self.running is None and self.state.sq > 0.0 and self.case.roughness_moves
+        moved = "running" in self.solution.attributes  # also if its start failed
+        return not moved and self.state.sq > 0.0 and self.case.roughness_moves
 
     @property
     def snapshot_clr(self) -> float:

@@ -210,26 +210,33 @@ def run_tracks(
     further_cells = coarse_cells or cells
     with _further_tracks(case, further_cells, numbers, workers, progress) as further:
 
-        def first() -> Series:
-            series = further[0]().value
-            return _track(case, further_cells) if series is None else series  # raises the reason
+        def length() -> int:
+            series = further[0]().value if coarse_cells else None
+            return 0 if series is None else series.length
 
-        length = (lambda: first().length) if coarse_cells else None
-        fine = _track(case, cells, passages=length, moments=MOMENTS, progress=progress)
-        own = first() if coarse_cells else fine
+        fine = _track(
+            case, cells, passages=length if coarse_cells else None, keep=True, progress=progress
+        )
+        own = further[0]() if coarse_cells else Determined(fine)
         others = [outcome() for number, outcome in further.items() if number > 0]
-    all_coarse = [own, *(other.value for other in others if other.value is not None)]
-    running = _running(case, all_coarse, fine)
-    return running, fine.kept[0].solution, _notes(running, all_coarse, others)
+    if own.value is None:  # without the coarse grid, the other tracks cannot be corrected
+        everything = [fine]
+    else:
+        everything = [own.value, *(other.value for other in others if other.value is not None)]
+    running = _running(case, everything, fine)
+    return running, fine.kept[0].solution, _notes(running, everything, [own, *others])
 
 
-def _notes(running: Running, coarse: list[Series], others: list[Determined[Series]]) -> list[str]:
+def _notes(running: Running, coarse: list[Series], outcomes: list[Determined[Series]]) -> list[str]:
     """Return notes on tracks that failed or are not stationary, and on failed time steps."""
     notes = [
-        f"Track {number} of {len(others) + 1} is left out: {other.reason.rstrip('.')}."
-        for number, other in enumerate(others, 2)
-        if other.value is None
+        f"Track {number} of {len(outcomes)} is left out: {outcome.reason.rstrip('.')}."
+        for number, outcome in enumerate(outcomes, 1)
+        if outcome.value is None and number > 1
     ]
+    if outcomes[0].value is None:
+        reason = outcomes[0].reason.rstrip(".")
+        notes.append(f"The error due to the cells is not determined on a coarser grid: {reason}.")
     for number, series in enumerate(coarse, 1):
         if settled_from(series, "clr") is None:
             notes.append(
@@ -253,8 +260,8 @@ def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
         "seconds": sum(series.seconds for series in everything),
     }
     return Running(
-        numbers=_numbers(case, means, fine.kept[1:]) | totals,
-        clr=means["clr"],
+        numbers=_numbers(case, means, _moments(fine, cuts[0])) | totals,
+        clr=replace(means["clr"], time=min(means["clr"].time, 1.0)),  # the range of a share
         snapshot_clr=fine.kept[0].state.clr,
         tracks=len(coarse),
         cells=fine.cells,
@@ -267,6 +274,13 @@ def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
     )
 
 
+def _moments(fine: Series, cut: int) -> list[Snapshot]:
+    """Return `MOMENTS` evenly spaced ends of passages after the first `cut` ones."""
+    settled = [snapshot for snapshot in fine.kept if snapshot.number > cut * fine.steps_per_passage]
+    spaced = np.linspace(0, len(settled) - 1, min(MOMENTS, len(settled))).round().astype(int)
+    return [settled[index] for index in spaced]
+
+
 def _cut(series: Series) -> int:
     """Return the passages to cut off: half where the series is not stationary."""
     return settled_from(series, "clr") or max(1, series.length // 2)
@@ -277,7 +291,7 @@ def _track(
     cells: tuple[int, int],
     *,
     passages: Callable[[], int] | None = None,
-    moments: int = 0,
+    keep: bool = False,
     progress: TrackProgress = NO_PROGRESS,
 ) -> Series:
     """March a case's track on one grid, with one thread for the algebra."""
@@ -302,7 +316,7 @@ def _track(
             measure,
             passages=passages,
             options=case.options,
-            moments=moments,
+            keep=keep,
             progress=progress.steps,
         )
 
@@ -334,9 +348,7 @@ def _entries(groups: tuple[str, ...]) -> list[Quantity]:
     return [entry for entry in lines(*groups) if not entry.key.endswith(WITHOUT)]
 
 
-def _numbers(
-    case: Case, means: dict[str, TimeMean], moments: tuple[Snapshot, ...]
-) -> dict[str, Scalar]:
+def _numbers(case: Case, means: dict[str, TimeMean], moments: list[Snapshot]) -> dict[str, Scalar]:
     """Return the means of every number, and error bars as differences between the grids."""
     numbers: dict[str, Scalar] = {
         key: None if math.isnan(mean.value) else mean.value
@@ -344,7 +356,7 @@ def _numbers(
         if key != "time_s"
     }
     clr, car, sq = means["clr"], means["car"], case.surface().sq
-    # of the roughness itself, not of its waves that the cells resolve
+    # of the full roughness, not of the part that the cells resolve
     numbers |= {"sq_m": sq, "lambda_ratio": means["lambda_ratio"].value * means["sq_m"].value / sq}
     numbers |= {"clr": min(max(clr.value, 0.0), 1.0), "car": max(car.value, 0.0)}
     numbers |= {error: means[key].grid for key, error in ERRORS.items()}

@@ -331,7 +331,7 @@ def load_run(path: str | Path) -> Run:
             f"{path} contains a solution without its case; save the run (Run.save), not the "
             "solution"
         ) from None
-    stored = None if moving else solution.surface  # tracks are made or read again
+    stored = None if moving else solution.surface  # tracks are generated or read again
     case = load_case(text, folder=path.parent, name=str(path), stored=stored)
     grid, options = case.grid, case.options
     if moving:  # has its own cells and tolerance

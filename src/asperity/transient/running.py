@@ -3,7 +3,7 @@
 The same tracks pass through the contact on two grids, one of half as many cells along each axis.
 Time is counted in passages: the oil crosses the Hertz zone in one. The start is cut off where the
 standard error of the rest is smallest, and the rest is divided into means over one passage each.
-As many of them are independent as Hertz zones of different roughness have passed. Sources: K. P.
+Adjacent ones share roughness, and a slow body's many do. Sources: K. P.
 White Jr., Simulation 69 (1997) 323 (cut); A. M. Law, Simulation Modeling and Analysis, 5th ed.
 (2015), ch. 9 (batch means). The coarse grid is a control variate: it runs on every track, the fine
 one on the first.
@@ -31,6 +31,11 @@ from asperity.transient.motion import Snapshot, moving_contact, step_seconds
 PASSAGES, MAX_PASSAGES = 6, 24  # first length of a series, and the largest until it is stationary
 # cells that the oil travels in a step; the mixed model follows the oil over several
 TIME_STEP = {MIXED: 2.0}
+MOST_SLID = 2.0  # cells that roughness moves relative to the oil in such a step; one cell beyond
+# The numbers of a moment average over the Hertz zone, so that adjacent passages, which share
+# roughness, correlate by 1/4 and the variance of their mean is 1.5 times that of independent ones.
+SHARED = 1.5
+MIN_INDEPENDENT = 1.5  # values, below which a series says nothing about the scatter of its mean
 TOLERANCE = 1e-2  # of a time step; with a tenth of it the mean CLR changes by less than 0.002
 
 Measure = Callable[[Snapshot], Mapping[str, float]]
@@ -75,8 +80,12 @@ class Series(NamedTuple):
         return means
 
     def independent(self, passages: int) -> float:
-        """Return how many of some passages have different roughness, at least 1."""
-        return max(1.0, min(passages, passages * self.zones, self.track_zones))
+        """Return how many independent values have the same scatter as some passages' mean."""
+        return passages * min(1.0, self.zones) / SHARED
+
+    def repeats(self, passages: int) -> bool:
+        """Return True if the track repeats within some passages."""
+        return passages * self.zones > self.track_zones
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +110,7 @@ def run_track(
     *,
     passages: Callable[[], int] | None = None,
     options: Options | None = None,
-    moments: int = 0,
+    keep: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Series:
     """March a track through the contact, and return its series.
@@ -114,7 +123,7 @@ def run_track(
         default half as many more are added until the series of `clr` is stationary, at most
         `MAX_PASSAGES`
     options : solver settings; the tolerance is `TOLERANCE` or more
-    moments : snapshots to keep after the first passage, evenly spaced, besides the start
+    keep : keep the snapshots of the start and of the end of every passage
     progress : called with the number of steps done and in total
 
     Raises
@@ -125,9 +134,11 @@ def run_track(
         if the steady start does not converge.
     """
     options = _options(options)
-    time_step = TIME_STEP.get(options.model, 1.0)
+    time_step = _time_step(conditions, options)
     per_passage = _steps_per_passage(conditions, surfaces, time_step)
-    record = _Record(measure, per_passage, moments, PASSAGES)
+    zones = _slowest_roughness(surfaces) / conditions.entrainment_speed
+    length = min(MAX_PASSAGES, math.ceil(PASSAGES / min(1.0, max(zones, 0.1))))
+    record = _Record(measure, per_passage, length, keep=keep)
     for snapshot in moving_contact(
         conditions, lubricant, surfaces, time_step=time_step, options=options
     ):
@@ -137,12 +148,12 @@ def run_track(
         if snapshot.number < record.steps:
             continue
         series = record.series(surfaces.grid.cells)
-        length = _length(series) if passages is None else passages()
-        if length <= record.length:
+        longer = _length(series) if passages is None else passages()
+        if longer <= record.length:
             break
-        record.length = length
+        record.length = longer
     return series._replace(
-        zones=_fastest_roughness(surfaces) / conditions.entrainment_speed,
+        zones=zones,
         track_zones=surfaces.first.grid.extent[0] / (2.0 * conditions.hertz.half_widths[0]),
     )
 
@@ -164,7 +175,7 @@ def solve_passage(
         if the start or the last time step does not converge.
     """
     options = _options(options)
-    time_step = TIME_STEP.get(options.model, 1.0)
+    time_step = _time_step(conditions, options)
     steps = _steps_per_passage(conditions, surfaces, time_step)
     earlier = surfaces.earlier(steps * step_seconds(conditions, surfaces, time_step))
     for snapshot in moving_contact(
@@ -184,6 +195,13 @@ def _options(options: Options | None) -> Options:
     return replace(options, tolerance=max(options.tolerance, TOLERANCE))
 
 
+def _time_step(conditions: ContactConditions, options: Options) -> float:
+    """Return the time step in cells of the oil's path."""
+    longest = TIME_STEP.get(options.model, 1.0)
+    slid = 0.5 * abs(conditions.slide_to_roll) * longest
+    return longest if slid <= MOST_SLID else 1.0
+
+
 def _steps_per_passage(
     conditions: ContactConditions, surfaces: MovingSurfaces, time_step: float
 ) -> int:
@@ -199,25 +217,23 @@ def _length(series: Series) -> int:
     return min(MAX_PASSAGES, series.length + series.length // 2)
 
 
-def _fastest_roughness(surfaces: MovingSurfaces) -> float:
-    """Return the largest speed of a rough body [m/s]."""
-    moving = zip(surfaces.speeds, surfaces.rough, strict=True)
-    return max(abs(speed) for speed, is_rough in moving if is_rough)
+def _slowest_roughness(surfaces: MovingSurfaces) -> float:
+    """Return the smallest speed of a rough body that moves [m/s]."""
+    bodies = zip(surfaces.speeds, surfaces.rough, strict=True)
+    return min((abs(speed) for speed, is_rough in bodies if is_rough and speed), default=0.0)
 
 
 class _Record:
     """Numbers of the time steps so far, of `length` passages in all."""
 
-    def __init__(self, measure: Measure, per_passage: int, moments: int, length: int) -> None:
-        self.measure, self.per_passage, self.length = measure, per_passage, length
+    def __init__(self, measure: Measure, per_passage: int, length: int, *, keep: bool) -> None:
+        self.measure, self.per_passage, self.length, self.keep = measure, per_passage, length, keep
         self.began, self.rows, self.names = (
             time.perf_counter(),
             list[list[float]](),
             tuple[str, ...](),
         )
         self.failed, self.iterations, self.kept = 0, 0, list[Snapshot]()
-        spaced = np.linspace(per_passage + 1, self.steps, moments).astype(int)
-        self.moments = {0, *spaced} if moments else set[int]()
 
     @property
     def steps(self) -> int:
@@ -231,7 +247,7 @@ class _Record:
         self.rows.append([*numbers.values()])
         self.failed += not convergence.converged
         self.iterations += convergence.iterations
-        if snapshot.number in self.moments:
+        if self.keep and snapshot.number % self.per_passage == 0:
             self.kept.append(replace(snapshot, memory={}))
 
     def series(self, cells: tuple[int, int]) -> Series:
@@ -264,6 +280,10 @@ def settled_from(series: Series, name: str) -> int | None:
 def time_means(coarse: list[Series], cuts: list[int], fine: Series) -> dict[str, TimeMean]:
     """Return the mean of every number over time and tracks, with its interval.
 
+    They are means of the fine grid on one track, or of the coarse grid on several tracks, corrected
+    by the difference between both grids on the first. Of tracks that repeat, the scatter is that
+    between their means; one that repeats stands for itself.
+
     Parameters
     ----------
     coarse : series of every track on the coarse grid, or on the fine one if there is no other
@@ -271,55 +291,65 @@ def time_means(coarse: list[Series], cuts: list[int], fine: Series) -> dict[str,
     fine : series of the first track on the fine grid, the same as the first one without others
     """
     blocks = [series.passages(cut) for series, cut in zip(coarse, cuts, strict=True)]
-    numbers = [series.independent(len(block)) for series, block in zip(coarse, blocks, strict=True)]
-    pooled, accurate = np.concatenate(blocks), fine.passages(cuts[0])
-    one_grid = fine is coarse[0]
+    accurate = fine.passages(cuts[0])
+    count = min(len(accurate), len(blocks[0]))
+    change = accurate[:count] - blocks[0][:count]
+    grid = None if fine is coarse[0] else np.abs(change.mean(axis=0))
+    if len(coarse) == 1:
+        parts = [_Sample(accurate, fine.independent(len(accurate)))]
+    elif any(series.repeats(len(block)) for series, block in zip(coarse, blocks, strict=True)):
+        means_of_tracks = np.array([block.mean(axis=0) for block in blocks])
+        parts = [_Sample(means_of_tracks + change.mean(axis=0), len(coarse))]
+    else:
+        parts = _corrected(coarse, blocks, change)
+    means, half_widths = sum(part.values.mean(axis=0) for part in parts), _half_widths(parts)
     deviations = fine.values[1 + cuts[0] * fine.steps_per_passage :].std(axis=0)
     return {
-        name: _time_mean(
-            _Sample(pooled[:, column], sum(numbers)),
-            _Sample(accurate[:, column], fine.independent(len(accurate))),
-            blocks[0][:, column],
-            float(deviations[column]),
-            one_grid=one_grid,
+        name: TimeMean(
+            value=float(means[column]),
+            time=float(half_widths[column]),
+            grid=None if grid is None else float(grid[column]),
+            deviation=float(deviations[column]),
         )
         for column, name in enumerate(fine.names)
     }
 
 
 class _Sample(NamedTuple):
-    """Means over passages, of which `independent` ones have different roughness."""
+    """Independent part of a mean: values of passages, (passages, names), `independent` of them."""
 
     values: Field
     independent: float
 
 
-def _time_mean(
-    coarse: _Sample, fine: _Sample, same_track: Field, deviation: float, *, one_grid: bool
-) -> TimeMean:
-    """Return the mean of the passages `coarse`, corrected by those on the first track.
+def _corrected(coarse: list[Series], blocks: list[Field], change: Field) -> list[_Sample]:
+    """Return the parts of the coarse tracks' mean, weighted by their independent passages.
 
-    The correction is `fine` less `same_track`, both of the first track. The mean of the fine grid
-    alone is taken where its interval is narrower.
+    The first track's part includes the difference between both grids.
     """
-    count = min(len(fine.values), len(same_track))
-    change = fine._replace(values=fine.values[:count] - same_track[:count])
-    means = [float(sample.values.mean()) for sample in (coarse, fine, change)]
-    corrected = means[0] + means[2], _half_width([coarse, change])
-    alone = means[1], _half_width([fine])
-    value, half_width = min(corrected, alone, key=lambda pair: pair[1])
-    grid = None if one_grid else abs(means[2])
-    return TimeMean(value=value, time=half_width, grid=grid, deviation=deviation)
+    numbers = [series.independent(len(block)) for series, block in zip(coarse, blocks, strict=True)]
+    weights = [number / sum(numbers) for number in numbers]
+    first = weights[0] * blocks[0][: len(change)] + change
+    others = zip(weights[1:], blocks[1:], numbers[1:], strict=True)
+    return [
+        _Sample(first, numbers[0]),
+        *(_Sample(weight * block, number) for weight, block, number in others),
+    ]
 
 
-def _half_width(parts: list[_Sample]) -> float:
-    """Return the 90 % half-width of the sum of the parts' means (Welch and Satterthwaite)."""
-    variances = [float(np.var(part.values, ddof=1)) / part.independent for part in parts]
-    total = sum(variances)
-    if total == 0.0:
-        return 0.0
-    freedom = total**2 / sum(
-        variance**2 / max(part.independent - 1.0, 1.0)
-        for variance, part in zip(variances, parts, strict=True)
-    )
-    return float(stdtrit(freedom, UPPER)) * math.sqrt(total)
+def _half_widths(parts: list[_Sample]) -> Field:
+    """Return the 90 % half-widths of the sum of the parts' means (Welch and Satterthwaite).
+
+    Infinite if a part has fewer than `MIN_INDEPENDENT` independent passages.
+    """
+    columns = parts[0].values.shape[1]
+    if any(part.independent < MIN_INDEPENDENT for part in parts):
+        return np.full(columns, math.inf)
+    freedoms = np.array([part.independent - 1.0 for part in parts])[:, None]
+    # of correlated values, the mean square about their mean is too small by (m - 1)/m
+    variances = np.array([part.values.var(axis=0) for part in parts]) / freedoms
+    total = variances.sum(axis=0)
+    weights = (variances**2 / freedoms).sum(axis=0)
+    freedom = np.divide(total**2, weights, out=np.ones(columns), where=weights > 0.0)
+    half_widths: Field = stdtrit(freedom, UPPER) * np.sqrt(total)
+    return half_widths

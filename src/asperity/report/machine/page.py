@@ -63,7 +63,7 @@ def _page(result: MachineResult, opened: str | None) -> str:
         "machine/page.html.j2",
         title=result.case.machine.title(),
         result=result,
-        standing=result.case.stands_still,
+        standing=result.run is not None and result.run.is_snapshot,
         failures=result.failures,
         tiles=[
             tile(quantity(key), result.worst) for key in TILES if result.worst.get(key) is not None

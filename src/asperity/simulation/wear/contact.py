@@ -1,7 +1,7 @@
 """Solution at one position of the tracks: maps and numbers for wear, here or in worker processes.
 
-Each position is solved from scratch, so neither order nor process changes a number. Running
-roughness arrives there from a passage of the Hertz zone earlier.
+Each position is solved from scratch, so neither order nor process changes a number. With moving
+roughness it is reached one passage of the Hertz zone after a steady start.
 """
 
 from collections.abc import Iterator, Sequence
