@@ -295,13 +295,7 @@ def time_means(coarse: list[Series], cuts: list[int], fine: Series) -> dict[str,
     count = min(len(accurate), len(blocks[0]))
     change = accurate[:count] - blocks[0][:count]
     grid = None if fine is coarse[0] else np.abs(change.mean(axis=0))
-    if len(coarse) == 1:
-        parts = [_Sample(accurate, fine.independent(len(accurate)))]
-    elif any(series.repeats(len(block)) for series, block in zip(coarse, blocks, strict=True)):
-        means_of_tracks = np.array([block.mean(axis=0) for block in blocks])
-        parts = [_Sample(means_of_tracks + change.mean(axis=0), len(coarse))]
-    else:
-        parts = _corrected(coarse, blocks, change)
+    parts = _parts(coarse, blocks, fine, accurate, change)
     means, half_widths = sum(part.values.mean(axis=0) for part in parts), _half_widths(parts)
     deviations = fine.values[1 + cuts[0] * fine.steps_per_passage :].std(axis=0)
     return {
@@ -320,6 +314,22 @@ class _Sample(NamedTuple):
 
     values: Field
     independent: float
+
+
+def _parts(
+    coarse: list[Series], blocks: list[Field], fine: Series, accurate: Field, change: Field
+) -> list[_Sample]:
+    """Return the independent parts of the mean over time and tracks.
+
+    `blocks` and `accurate` are the means over passages on both grids, `change` their difference on
+    the first track.
+    """
+    if len(coarse) == 1:
+        return [_Sample(accurate, fine.independent(len(accurate)))]
+    if any(series.repeats(len(block)) for series, block in zip(coarse, blocks, strict=True)):
+        means_of_tracks = np.array([block.mean(axis=0) for block in blocks])
+        return [_Sample(means_of_tracks + change.mean(axis=0), len(coarse))]
+    return _corrected(coarse, blocks, change)
 
 
 def _corrected(coarse: list[Series], blocks: list[Field], change: Field) -> list[_Sample]:
