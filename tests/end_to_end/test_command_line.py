@@ -184,7 +184,8 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
     heights = 1e-6 * np.random.default_rng(5).standard_normal((60, 40)).repeat(8, 0).repeat(8, 1)
     x3pio.write("maps/ring.x3p", heights.T, x_scale=2e-6, y_scale=2e-6)
     measured = ("solve", "case.toml", "--surface", "maps/ring.x3p")
-    assert asp(*measured, "--out", "running.nc", "--quiet")[0] == 0
+    chosen = ("--set", "grid={}", "--set", "solver.running_cells=1200")
+    assert asp(*measured, *chosen, "--out", "running.nc", "--quiet")[0] == 0
     code, out, _ = asp(*measured, "--snapshot", "--out", "run.nc")
     assert code == 0
     assert "note: removed a quadratic form" in out

@@ -333,16 +333,19 @@ def load_run(path: str | Path) -> Run:
         ) from None
     stored = None if moving else solution.surface  # tracks are generated or read again
     case = load_case(text, folder=path.parent, name=str(path), stored=stored)
-    grid, options = case.grid, case.options
-    if moving:  # has its own cells and tolerance
-        grid = replace(grid, cells=solution.grid.cells)
+    grid, options = solution.grid, case.options
+    if moving:  # has its own cells and tolerance; a chosen grid would read the measurement again
         options = replace(options, tolerance=solution.options.tolerance)
+    else:
+        grid = case.grid
     if (case.conditions, grid) != (solution.conditions, solution.grid) or (
         case.lubricant != solution.lubricant or options != solution.options
     ):
         raise UnreadableFile(
             f"{path} contains a case that differs from its solution; solve the case again"
         )
-    case = replace(case, stored_notes=tuple(note for note in notes if note not in case.notes))
+    if not moving:
+        own_notes = case.notes
+        case = replace(case, stored_notes=tuple(note for note in notes if note not in own_notes))
     notes = (*version_notes(solution.versions), *notes)
     return run_of(case, solution, notes, others, running=running)
