@@ -15,7 +15,8 @@ from asperity.paper import papers_case
 from asperity.solution import OscillatingContact, OwnResonance
 from asperity.surface import flat_surface
 
-PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PAPER = (EXAMPLES / "paper.toml").read_text("utf-8")
 # keys of design.md, section 4: errors, load on capped oil, parts of friction, shear and the
 # deviations of both
 KEYS = [
@@ -202,6 +203,38 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
     assert asp("report", "running.nc")[0] == 0
     code, _, err = asp("solve", "running.nc")
     assert (code, "maps/ring.x3p" in err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("command", "taken_by"),
+    [
+        (["solve", "case.toml"], "results.solve_case"),
+        (["study", "case.toml", "--out", "sweep"], "study.plan_study"),
+        (["stribeck", "case.toml"], "results.stribeck_curve"),
+        (["traction", "case.toml"], "results.traction_curve"),
+        (["wear", "case.toml", "--hours", "1"], "simulation.run_wear"),
+        (["infer", "--case", "case.toml", "--design", "0.3"], "inference.inference_setting"),
+        (["machine", "machine.toml", "--dry-run"], "machines.machine_conditions"),
+    ],
+)
+@pytest.mark.parametrize("snapshot", [True, False])
+def test_roughness_moves_unless_a_snapshot_is_requested(
+    asp, monkeypatch, command, taken_by, snapshot
+):
+    text = (EXAMPLES / "fzg-c.toml").read_text("utf-8")
+    Path("machine.toml").write_text(text, "utf-8")
+    seen = []
+
+    def take(chosen, *_, **__):
+        seen.append(chosen)
+        raise BadInput("seen")
+
+    monkeypatch.setattr(f"asperity.{taken_by}", take)
+    assert asp(*command, *(["--snapshot"] if snapshot else []))[0] == 2
+    (chosen,) = seen
+    if command[0] == "machine":
+        chosen = chosen.case(chosen.contacts[0])
+    assert chosen.is_running is not snapshot
 
 
 def test_set_changes_the_case(asp):

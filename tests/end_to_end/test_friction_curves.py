@@ -72,9 +72,9 @@ def test_traction_rises_from_zero_to_its_limit(asp):
 
 def test_a_traction_curve_of_running_roughness_depends_on_its_speed(case):
     """The rough body is the first, faster one; both slips have intervals."""
-    curve = traction_curve(case, slips=[0.3, 2.0])
-    slow, fast = curve.points
-    assert curve.scalars()["roughness"] == "running"
+    curve = traction_curve(case, slips=[0.3, 2.0, 5.0])
+    slow, fast, opposite = curve.points
+    assert [slow.roughness, fast.roughness, opposite.roughness] == [*2 * ["running"], "standing"]
     assert all(point.converged for point in curve.points)
     assert fast.clr != pytest.approx(slow.clr, abs=1e-3)
 

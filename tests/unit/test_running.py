@@ -3,7 +3,9 @@
 import json
 import math
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +13,12 @@ import pytest
 from asperity.case import load_case
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
-from asperity.ehl import half_as_many, running_cells
+from asperity.ehl import half_as_many, least_film, running_cells
 from asperity.results import load_run, running_surfaces, solve_case
+from asperity.results.running import _moments
 from asperity.solution import contact_state
 from asperity.surface import MovingSurfaces, Surface, flat_surface
-from asperity.transient import Series, settled_from, solve_passage, time_means
+from asperity.transient import Series, run_track, settled_from, solve_passage, time_means
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 RUNNING = {"grid.cells": [64, 32]}
@@ -65,6 +68,7 @@ def test_a_grid_too_coarse_for_another_leaves_clr_undetermined():
     case = load_case(PAPER).with_overrides({"grid.cells": [48, 24]})
     run = solve_case(case)
     assert (run.running.cells, run.running.clr.grid, run.running.tracks) == ((48, 24), None, 1)
+    assert run.running.steps == len(run.running.series) - 1  # of one grid, counted once
     assert "no coarser grid is available to estimate its error" in run.verdict()
     numbers = run.scalars()
     assert (numbers["determined"], numbers["clr_low"], numbers["clr_error"]) == (False, None, None)
@@ -133,6 +137,48 @@ def test_repeated_tracks_scatter_by_their_means():
     assert time_means(new, [1, 1, 1], new[0])["clr"].time < 0.1 * mean.time
 
 
+@pytest.mark.parametrize(
+    ("slip", "rough", "time_step", "length"),
+    [
+        (0.2, "first", 2.0, 6),
+        (1.0, "first", 2.0, 6),
+        (3.0, "first", 1.0, 6),  # the roughness moves fast relative to the oil
+        (1.0, "second", 2.0, 12),  # at half the oil's speed
+        (1.9, "second", 2.0, 24),
+    ],
+)
+def test_steps_and_length_of_a_series_follow_the_speed_of_the_roughness(
+    monkeypatch, slip, rough, time_step, length
+):
+    case = load_case(PAPER).with_overrides(
+        {"grid.cells": [64, 32], "contact.slip": slip, "motion.rough": rough}
+    )
+    steps, noise = [], np.random.default_rng(2)
+    converged = SimpleNamespace(convergence=SimpleNamespace(converged=True, iterations=1))
+
+    def march(*_, time_step, **__):
+        steps.append(time_step)
+        for number in count():
+            yield SimpleNamespace(number=number, solution=converged)
+
+    monkeypatch.setattr("asperity.transient.running.moving_contact", march)
+    surfaces = case.moving_surfaces()
+    measured = run_track(
+        case.conditions, case.lubricant, surfaces, lambda _: {"clr": noise.standard_normal()}
+    )
+    assert (steps, measured.length) == ([time_step], length)
+
+
+def test_moments_of_heat_and_stress_are_after_the_cut():
+    kept = tuple(SimpleNamespace(number=number) for number in range(0, 130, 10))
+    assert [moment.number for moment in _moments(series(np.zeros(121))._replace(kept=kept), 6)] == [
+        70,
+        90,
+        100,
+        120,
+    ]
+
+
 def test_tracks_of_generated_roughness_do_not_repeat():
     case = load_case(PAPER).with_overrides(RUNNING)
     fast, slow = (
@@ -166,8 +212,13 @@ def test_the_headline_is_the_mean_over_time(run):
     assert numbers["clr"] > numbers["snapshot_clr"] + 0.05  # 0.66 against 0.51
     assert numbers["friction_asperity_part"] == pytest.approx(0.15 * numbers["clr"], rel=1e-3)
     assert run.state.clr == numbers["clr"]
+    # of the full roughness, not of the part of a track that is in the contact on its cells
+    conditions, oil = run.case.conditions, run.case.lubricant
+    assert run.solution.surface.sq != pytest.approx(1e-6, rel=0.01)
+    assert numbers["sq_m"] == pytest.approx(1e-6)
+    assert numbers["lambda_ratio"] == pytest.approx(least_film(conditions, oil) / 1e-6)
     verdict = run.verdict()
-    assert "in the snapshot" in verdict
+    assert "% in a snapshot of standing roughness; " in verdict
     assert "mean over time of 2 tracks" in verdict
 
 
@@ -228,6 +279,7 @@ def test_a_stored_run_has_the_same_numbers(run, tmp_path):
         {"lubricant": "none"},
         {"surface": "flat"},
         {"thermal.feedback": True},
+        {"contact.slip": 4.1},
     ],
 )
 def test_a_contact_without_running_roughness_has_a_snapshot(still):

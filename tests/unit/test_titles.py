@@ -49,7 +49,6 @@ def curve():
         boundary_friction=0.15,
         sq=0.3e-6,
         feedback=True,
-        running=False,
     )
 
 

@@ -30,7 +30,7 @@ from asperity.wear import WearModel
 
 # default number of surfaces per solution on coarse and on fine grids, to limit computing time
 DEFAULT_SURFACES, DEFAULT_SURFACES_FINE = 5, 3
-MOST_RUNNING_SLIP = 4.0
+MOST_RUNNING_SLIP = 4.0  # roughness moves two cells relative to the oil in a time step of one
 MANY_RUNNING_CELLS = 1200  # of a running contact among many
 DEFAULT_TRACKS = 1  # of a running contact; a generated track holds several contacts
 DEFAULT_TRACKS_MEASURED = 3
@@ -232,8 +232,8 @@ class Case:
         """True if roughness moves and the solution is the mean over time of the running contact.
 
         Otherwise it is that of standing roughness: `contact.roughness = "standing"`, thermal
-        feedback, roughness that is stored, a slide-to-roll ratio above `MOST_RUNNING_SLIP`, where
-        roughness would pass over cells unseen, and contacts without moving roughness.
+        feedback, roughness that is stored, a slide-to-roll ratio above `MOST_RUNNING_SLIP`, whose
+        motion the time steps do not resolve, and contacts without moving roughness.
         """
         return (
             self.contents.contact.roughness == "running"

@@ -131,7 +131,7 @@ def _friction_command(
 def _points(curve: "FrictionCurve") -> Block:
     """Return a row per point, in the catalogue's units."""
     rows = [asdict(point) for point in curve.points]
-    hidden = ("converged", "clr_low", "clr_high")  # the interval stands beside CLR
+    hidden = ("converged", "roughness", "clr_low", "clr_high")  # the interval stands beside CLR
     selected = [quantity(key) for key in rows[0] if key not in hidden]
     yield f"  Sq {text('sq_m', curve.sq)}{', with thermal feedback' if curve.feedback else ''}"
     yield from columns(
@@ -139,7 +139,7 @@ def _points(curve: "FrictionCurve") -> Block:
         (
             [
                 *(entry.number_in(row) for entry in selected),
-                "" if row["converged"] else "NOT CONVERGED",
+                row["roughness"] if row["converged"] else "NOT CONVERGED",
             ]
             for row in rows
         ),

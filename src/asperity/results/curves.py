@@ -19,6 +19,7 @@ from asperity.solution import HOT, contact_state, friction_and_heat, solve_therm
 
 SolverProgress = Callable[[Iteration], None]
 FrictionCurveKind = Literal["stribeck", "traction"]
+RoughnessMotion = Literal["running", "standing"]
 
 SPEED_RANGE = (0.01, 10.0)  # over the case's entrainment speed
 SPEEDS = 13
@@ -43,7 +44,8 @@ class FrictionPoint:
 
     `friction_coefficient` = `asperity_part` + `oil_part`; `lambda_ratio` is None for a smooth or
     dry contact; temperatures are rises [K], `flash_temperature_max_k` that of the hotter surface.
-    Points that did not converge must not be used.
+    `roughness` is "running" for means over time of moving roughness. Points that did not converge
+    must not be used.
     """
 
     entrainment_speed_m_s: float
@@ -59,6 +61,7 @@ class FrictionPoint:
     flash_temperature_max_k: float
     film_temperature_max_k: float
     friction_power_w: float
+    roughness: RoughnessMotion
     converged: bool
 
 
@@ -71,14 +74,12 @@ class FrictionCurve:
     boundary_friction: float
     sq: float  # composite roughness [m]
     feedback: bool  # True if the viscosity is that at the film temperature
-    running: bool  # True if roughness moves at all points where a rough body does
 
     def scalars(self) -> dict[str, object]:
         """Return the curve for `--json`."""
         return {
             "kind": self.kind,
             "sq_m": self.sq,
-            "roughness": "running" if self.running else "standing",
             "boundary_friction": self.boundary_friction,
             "thermal_feedback": self.feedback,
             "points": [asdict(point) for point in self.points],
@@ -190,10 +191,8 @@ def _curve(
         raise BadInput("a curve needs at least one point, got none")
     surface, points = case.surface(), []
     start: ContactSolution | None = None
-    running = False
     for pair in speeds:
         if (moving := _running_case(case, pair)) is not None:
-            running = True
             run = solve_case(moving, strict=False, groups=GROUPS, progress=progress)
             points.append(_running_point(run))
             continue
@@ -219,7 +218,6 @@ def _curve(
         boundary_friction=case.boundary_friction,
         sq=surface.sq,
         feedback=case.thermal.feedback,
-        running=running,
     )
 
 
@@ -254,6 +252,7 @@ def _running_point(run: Run) -> FrictionPoint:
         clr_low=clr.low,
         clr_high=clr.high,
         lambda_ratio=run.state.lambda_ratio,
+        roughness="running",
         converged=run.converged,
         **{name: float(value) for name, value in values.items() if value is not None},
     )
@@ -281,5 +280,6 @@ def _point(case: Case, solution: ContactSolution) -> FrictionPoint:
         flash_temperature_max_k=heat.max_k,
         film_temperature_max_k=heat.film_max_k,
         friction_power_w=friction.power,
+        roughness="standing",
         converged=solution.convergence.converged,
     )

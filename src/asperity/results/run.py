@@ -385,7 +385,8 @@ class Run:
         )
         if self.running is None:
             return regime, shared
-        return regime, f"{shared}, {quantity('clr').text(self.snapshot_clr)} in the snapshot"
+        standing = quantity("clr").text(self.snapshot_clr)
+        return regime, f"{shared}, {standing} in a snapshot of standing roughness"
 
     def _ends_text(self) -> str:
         """Return edge pressure and loaded length of a roller; empty for other contacts."""

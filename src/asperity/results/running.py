@@ -25,6 +25,7 @@ from asperity.ehl import (
     Iteration,
     Uncertainty,
     half_as_many,
+    least_film,
 )
 from asperity.results.determined import Determined
 from asperity.results.surface_spread import Row, Scalar, crf_error
@@ -253,7 +254,8 @@ def _notes(running: Running, coarse: list[Series], outcomes: list[Determined[Ser
 
 def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
     """Return the running contact of all series."""
-    cuts, everything = [_cut(series) for series in coarse], (*coarse, fine)
+    cuts = [_cut(series) for series in coarse]
+    everything = coarse if fine is coarse[0] else [*coarse, fine]
     means = time_means(coarse, cuts, fine)
     totals: dict[str, Scalar] = {
         "iterations": sum(series.iterations for series in everything),
@@ -355,9 +357,11 @@ def _numbers(case: Case, means: dict[str, TimeMean], moments: list[Snapshot]) ->
         for key, mean in means.items()
         if key != "time_s"
     }
+    assert case.lubricant is not None
     clr, car, sq = means["clr"], means["car"], case.surface().sq
+    film = least_film(case.conditions, case.lubricant)
     # of the full roughness, not of the part that the cells resolve
-    numbers |= {"sq_m": sq, "lambda_ratio": means["lambda_ratio"].value * means["sq_m"].value / sq}
+    numbers |= {"sq_m": sq, "lambda_ratio": film / sq}
     numbers |= {"clr": min(max(clr.value, 0.0), 1.0), "car": max(car.value, 0.0)}
     numbers |= {error: means[key].grid for key, error in ERRORS.items()}
     imbalances = [snapshot.state.mass_flux_imbalance for snapshot in moments]

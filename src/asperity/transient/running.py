@@ -3,10 +3,10 @@
 The same tracks pass through the contact on two grids, one of half as many cells along each axis.
 Time is counted in passages: the oil crosses the Hertz zone in one. The start is cut off where the
 standard error of the rest is smallest, and the rest is divided into means over one passage each.
-Adjacent ones share roughness, and a slow body's many do. Sources: K. P.
-White Jr., Simulation 69 (1997) 323 (cut); A. M. Law, Simulation Modeling and Analysis, 5th ed.
-(2015), ch. 9 (batch means). The coarse grid is a control variate: it runs on every track, the fine
-one on the first.
+Adjacent passages share roughness and are correlated, as are many passages of a slow body. Sources:
+K. P. White Jr., Simulation 69 (1997) 323 (cut); A. M. Law, Simulation Modeling and Analysis, 5th
+ed. (2015), ch. 9 (batch means). With several tracks the coarse grid is a control variate: it runs
+on every track, the fine one on the first.
 """
 
 import math
@@ -31,10 +31,10 @@ from asperity.transient.motion import Snapshot, moving_contact, step_seconds
 PASSAGES, MAX_PASSAGES = 6, 24  # first length of a series, and the largest until it is stationary
 # cells that the oil travels in a step; the mixed model follows the oil over several
 TIME_STEP = {MIXED: 2.0}
-MOST_SLID = 2.0  # cells that roughness moves relative to the oil in such a step; one cell beyond
+MAX_SLIDING_CELLS = 2.0  # of roughness relative to the oil in such a step; beyond, one-cell steps
 # The numbers of a moment average over the Hertz zone, so that adjacent passages, which share
 # roughness, correlate by 1/4 and the variance of their mean is 1.5 times that of independent ones.
-SHARED = 1.5
+VARIANCE_RATIO = 1.5
 MIN_INDEPENDENT = 1.5  # values, below which a series says nothing about the scatter of its mean
 TOLERANCE = 1e-2  # of a time step; with a tenth of it the mean CLR changes by less than 0.002
 
@@ -81,7 +81,7 @@ class Series(NamedTuple):
 
     def independent(self, passages: int) -> float:
         """Return how many independent values have the same scatter as some passages' mean."""
-        return passages * min(1.0, self.zones) / SHARED
+        return passages * min(1.0, self.zones) / VARIANCE_RATIO
 
     def repeats(self, passages: int) -> bool:
         """Return True if the track repeats within some passages."""
@@ -199,7 +199,7 @@ def _time_step(conditions: ContactConditions, options: Options) -> float:
     """Return the time step in cells of the oil's path."""
     longest = TIME_STEP.get(options.model, 1.0)
     slid = 0.5 * abs(conditions.slide_to_roll) * longest
-    return longest if slid <= MOST_SLID else 1.0
+    return longest if slid <= MAX_SLIDING_CELLS else 1.0
 
 
 def _steps_per_passage(
