@@ -1,23 +1,29 @@
-"""Compare four studies with the paper's published values: `python -m benchmarks.anchors [CELLS]`.
+"""Compare studies with the paper's published values: `python -m benchmarks.anchors`.
 
-Default: examples/paper.toml with its own model and with the paper's. As published: the domain in
-the paper, which starves the film. Calibrated: the free parameters that fit the anchors best
-(docs/theory/calibration.md). The last two use the paper's model.
+Running and standing: examples/paper.toml with running roughness and with snapshots. The others are
+snapshots with the paper's model: the same case; the domain in the paper, which starves the film;
+the free parameters that fit the anchors best (docs/theory/calibration.md).
+
+`--curves FILE` writes CAR, CLR, CRF and CRFA over roughness as CSV, a row per study and level.
 """
 
-import sys
+import argparse
 from pathlib import Path
+
+import pandas
 
 from asperity.case import load_case
 from asperity.paper import PAPER_ANCHORS, compare_with_anchors, rig_deviation
 from asperity.study import WearCurve, curve_from_study, plan_study, run_study, study_executor
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
+SNAPSHOT = {"contact.roughness": "standing"}
 CASES = {
-    "default": ("paper.toml", "mixed"),
-    "default, the paper's model": ("paper.toml", "paper"),
-    "as published": ("paper-as-printed.toml", "paper"),
-    "calibrated": ("paper-calibrated.toml", "paper"),
+    "running": ("paper.toml", {}),
+    "standing": ("paper.toml", SNAPSHOT),
+    "standing, the paper's model": ("paper.toml", {**SNAPSHOT, "model": "paper"}),
+    "as published": ("paper-as-printed.toml", {**SNAPSHOT, "model": "paper"}),
+    "calibrated": ("paper-calibrated.toml", {**SNAPSHOT, "model": "paper"}),
 }
 PERCENT = ("car", "car_domain", "clr")
 
@@ -30,19 +36,23 @@ def shown(quantity: str, value: float) -> str:
     return f"{value:.2f} um" if quantity == "split" else f"{value:.0f} Hz"
 
 
-def curves(cells: int | None) -> dict[str, WearCurve]:
+def curves(names: list[str]) -> dict[str, WearCurve]:
     found = {}
     with study_executor() as executor:
-        for name, (file, model) in CASES.items():
-            case = load_case(EXAMPLES / file).with_overrides({"model": model})
-            if cells is not None:
-                case = case.with_overrides({"grid.cells": [cells, cells]})
+        for name in names:
+            file, overrides = CASES[name]
+            case = load_case(EXAMPLES / file).with_overrides(overrides)
             found[name] = curve_from_study(run_study(plan_study(case), executor=executor))
     return found
 
 
-def print_anchors(cells: int | None = None) -> None:
-    found = curves(cells)
+def write_curves(found: dict[str, WearCurve], path: Path) -> None:
+    """Write the studies' summaries."""
+    tables = [curve.summary().assign(study=name) for name, curve in found.items()]
+    pandas.concat(tables).to_csv(path, index=False, float_format="%.4g")
+
+
+def print_anchors(found: dict[str, WearCurve]) -> None:
     print("\n| anchor | published | " + " | ".join(found) + " |")
     print("|---|---|" + "---|" * len(found))
     tables = {
@@ -79,4 +89,11 @@ def print_anchors(cells: int | None = None) -> None:
 
 
 if __name__ == "__main__":
-    print_anchors(int(sys.argv[1]) if len(sys.argv) > 1 else None)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", action="append", choices=CASES)
+    parser.add_argument("--curves", type=Path)
+    chosen = parser.parse_args()
+    studies = curves(chosen.only or list(CASES))
+    print_anchors(studies)
+    if chosen.curves is not None:
+        write_curves(studies, chosen.curves)

@@ -22,6 +22,7 @@ of the film, and the permanent opening of the gap by oil at the cap.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -72,7 +73,7 @@ class Pressures(NamedTuple):
     approach: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MixedBalance:
     """A problem evaluated at two pressures: gap, residuals, and terms of the linearisation.
 
@@ -159,7 +160,7 @@ class MixedBalance:
         """Relative excess of the pressure over the load."""
         return self.problem.load_error(self.pressure)
 
-    @property
+    @cached_property
     def residual_rms(self) -> float:
         """Root mean square of both equations, as a share of p_h."""
         return float(np.sqrt(np.mean(self.oil_residual**2) + np.mean(self.solid_residual**2)))

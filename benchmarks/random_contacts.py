@@ -1,0 +1,189 @@
+"""Six hundred random contacts as the commands solve them: refusals, convergence and time.
+
+Line, ball and ellipse on automatic grids; Hertz pressure 0.3 to 2.5 GPa, radius 2 to 50 mm, film
+ratio 0.1 to 3 (set by the speed), Sq 0.05 to 1 um, correlation length 12 to 120 Sq, pressure cap
+2 to 8 GPa or none, slide-to-roll ratio 0 to 2, the roughness on the first, the second or both
+bodies. Each is solved with the cells of a study's point, running where a rough body moves.
+
+`python -m benchmarks.random_contacts [COUNT [FIRST]]` prints a row for each, and a summary. With
+`--grids` it solves the first COUNT contacts of mixed lubrication (CLR 0.02 to 0.98) on the default
+cells of `solve` and on 1.41 times as many along both axes.
+"""
+
+import math
+import sys
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass
+from time import process_time
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from asperity.case import Case, case_template, load_case
+from asperity.core.errors import AsperityError, BadInput, NotConverged
+from asperity.ehl import least_film
+from asperity.results import solve_case
+
+COUNT = 600
+KINDS = ("line", "point", "elliptic")
+FILM_OF_SPEED = 0.68  # exponent, to find the speed of a film
+SOLVED, REFUSED, UNSOLVED, FAILED = "solved", "refused", "not converged", "traceback"
+TRIAL_CELLS, MIXED, SOON = 600, (0.02, 0.98), 10.0  # of the mixed contacts; CPU time [s]
+REFERENCE_LOAD = 100.0  # N, to find the load of a Hertz pressure
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of a contact: kind, CPU time [s], load share if determined, and a remark."""
+
+    kind: str
+    seconds: float
+    clr: float | None = None
+    remark: str = ""
+
+
+def overrides(number: int) -> tuple[dict[str, object], float, float]:
+    """Return a contact's case keys, its Hertz pressure [Pa] and its film ratio."""
+    rng = np.random.default_rng([38, number])
+
+    def between(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(math.log(low), math.log(high))))
+
+    geometry, radius, sq = KINDS[number % 3], between(2e-3, 50e-3), between(0.05e-6, 1e-6)
+    length = sq * between(12.0, 120.0)
+    cap = [None, between(2e9, 8e9)][int(rng.random() < 0.75)]
+    keys: dict[str, object] = {
+        "contact.geometry": geometry,
+        "contact.radius": f"{radius} m",
+        "contact.load": f"{REFERENCE_LOAD} N",
+        "contact.slip": [0.0, 2.0, float(rng.uniform(0.0, 2.0))][number // 3 % 3],
+        "material.hardness": "none" if cap is None else f"{cap} Pa",
+        "lubricant.viscosity.eta0": f"{between(3e-3, 0.3)} Pa s",
+        "lubricant.viscosity.alpha": f"{rng.uniform(10.0, 25.0)} 1/GPa",
+        "surface.sq": f"{sq} m",
+        "surface.correlation_length": [f"{length} m", f"{length * between(1.0, 4.0)} m"],
+        "surface.seed": number,
+        "motion.rough": ("first", "second", "both")[number // 9 % 3],
+    }
+    if geometry == "elliptic":
+        keys["contact.radius"] = [f"{radius} m", f"{radius * between(1.5, 20.0)} m"]
+    return keys, between(0.3e9, 2.5e9), between(0.1, 3.0)
+
+
+def contact(number: int) -> Case:
+    """Return a contact, with the load and the speed of its Hertz pressure and film ratio."""
+    keys, pressure, film_ratio = overrides(number)
+    text = case_template("line").partition("[vibration]")[0]
+    if keys["contact.geometry"] != "line":
+        text = text.replace('length = "10 mm"', "# length").replace('"line"', '"point"')
+    case = load_case(text).with_overrides(keys)
+    power = 2.0 if keys["contact.geometry"] == "line" else 3.0
+    load = REFERENCE_LOAD * (pressure / case.conditions.hertz.p_max) ** power
+    speed = 1.0
+    for _ in range(60):
+        case = case.with_overrides(
+            {"contact.load": f"{load} N", "contact.entrainment_speed": f"{speed} m/s"}
+        )
+        assert case.lubricant is not None
+        sq = float(str(keys["surface.sq"]).split()[0])
+        factor = film_ratio * sq / least_film(case.conditions, case.lubricant)
+        if abs(factor - 1.0) < 1e-3:
+            break
+        speed *= factor ** (1.0 / FILM_OF_SPEED)
+    return case
+
+
+def outcome(number: int) -> Outcome:
+    """Solve a contact."""
+    began = process_time()
+    try:
+        case = contact(number).among_many
+        run = solve_case(case, surfaces=None, strict=True)
+    except NotConverged as error:
+        return Outcome(UNSOLVED, process_time() - began, remark=str(error))
+    except BadInput as error:
+        return Outcome(REFUSED, process_time() - began, remark=str(error))
+    except AsperityError as error:
+        return Outcome(FAILED, process_time() - began, remark=f"{type(error).__name__}: {error}")
+    except Exception:  # noqa: BLE001 - counted, whatever it is
+        last = traceback.format_exc().strip().splitlines()[-1]
+        return Outcome(FAILED, process_time() - began, remark=last)
+    return Outcome(SOLVED, process_time() - began, run.state.clr, run.undetermined or "")
+
+
+def rows(count: int, first: int = 0) -> Iterator[str]:
+    """Yield a row for each contact, then the summary."""
+    outcomes = []
+    yield "| contact | outcome | CPU [s] | CLR | remark |"
+    yield "|---|---|---|---|---|"
+    for number in range(first, first + count):
+        with threadpool_limits(1):
+            result = outcome(number)
+        outcomes.append(result)
+        clr = "" if result.clr is None else f"{result.clr:.3f}"
+        yield f"| {number} | {result.kind} | {result.seconds:.1f} | {clr} | {result.remark} |"
+    yield ""
+    seconds = np.array([result.seconds for result in outcomes])
+    counts = {
+        kind: sum(result.kind == kind for result in outcomes)
+        for kind in (SOLVED, REFUSED, UNSOLVED, FAILED)
+    }
+    counts["solved but CLR not determined"] = sum(
+        result.kind == SOLVED and bool(result.remark) for result in outcomes
+    )
+    listed = ", ".join(f"{number} {kind}" for kind, number in counts.items())
+    quantiles = np.quantile(seconds, (0.5, 0.9, 0.99))
+    yield (
+        f"Of {count} contacts: {listed}. CPU time: median {quantiles[0]:.1f} s, 90 % within "
+        f"{quantiles[1]:.1f} s, 99 % within {quantiles[2]:.1f} s, longest {seconds.max():.1f} s."
+    )
+
+
+def grid_rows(count: int, first: int = 0) -> Iterator[str]:
+    """Yield a row for each of the first mixed contacts: default cells, and a finer grid."""
+    yield "| contact | cells | CLR (90 % interval) | determined | CPU [s] | cells | CLR | change |"
+    yield "|---|---|---|---|---|---|---|---|"
+    known, number = 0, first
+    changes: list[float] = []
+    while len(changes) < count:
+        with threadpool_limits(1):
+            case = contact(number)
+            number += 1
+            coarse = solve_case(
+                case.with_overrides({"solver.running_cells": TRIAL_CELLS}),
+                surfaces=None,
+                strict=False,
+            )
+            if not MIXED[0] < coarse.state.clr < MIXED[1]:
+                continue
+            began = process_time()
+            run = solve_case(case, surfaces=None, strict=False)
+            seconds = process_time() - began
+            cells = 2 * run.solution.grid.cells[0] * run.solution.grid.cells[1]
+            finer = solve_case(
+                case.with_overrides({"solver.running_cells": cells}), surfaces=None, strict=False
+            )
+        clr = run.error.clr
+        changes.append(finer.state.clr - run.state.clr)
+        quick = run.determined and seconds <= SOON
+        known += quick
+        yield (
+            f"| {number - 1} | {run.solution.grid.cells} | {run.state.clr:.3f} "
+            f"({clr.low} to {clr.high}) | "
+            f"{'yes' if run.determined else run.undetermined or 'not converged'} | {seconds:.1f} | "
+            f"{finer.solution.grid.cells} | {finer.state.clr:.3f} | {changes[-1]:+.3f} |"
+        )
+    yield ""
+    yield (
+        f"Determined within {SOON:g} s: {known} of {count}. Change on the finer grid: mean "
+        f"{np.mean(changes):+.3f}, mean absolute {np.mean(np.abs(changes)):.3f}, largest "
+        f"{np.abs(changes).max():.3f}."
+    )
+
+
+if __name__ == "__main__":
+    given = [int(text) for text in sys.argv[1:] if text != "--grids"]
+    table = grid_rows if "--grids" in sys.argv else rows
+    for line in table(*(given or [COUNT])):
+        print(line, flush=True)
