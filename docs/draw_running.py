@@ -16,10 +16,10 @@ from asperity.report.style import BLUE, DASHED, GREEN, GREY, ON_PAGE, VERMILION,
 
 DOCS = Path(__file__).parent
 LOAD_SHARE, LEVELS = (DOCS / "measured" / name for name in ("load-share.csv", "paper-levels.csv"))
-SOLVED = (
-    ("snapshot", "snapshot, mixed", GREY, "s"),
-    ("running", "running, mixed", BLUE, "o"),
-    ("conserving", "running, conserving", GREEN, "^"),
+SOLVED = (  # column, label, colour, marker, and shift along the film ratio for legible intervals
+    ("snapshot", "snapshot, mixed", GREY, "s", 0.02),
+    ("running", "running, mixed", BLUE, "o", 0.0),
+    ("conserving", "running, conserving", GREEN, "^", -0.02),
 )
 LAWS = (
     ("masjedi_khonsari", "Masjedi and Khonsari", DASHED),
@@ -43,13 +43,14 @@ def load_share(path: Path = LOAD_SHARE) -> Figure:
     for axes, ratio in zip(drawn.subplots(1, len(ratios), sharey=True), ratios, strict=True):
         rows = table[table["lengths_per_sq"] == ratio]
         x = rows["film_ratio"]
-        for key, label, colour, marker in SOLVED:
+        for key, label, colour, marker, shift in SOLVED:
             middle, low, high = (rows[key + end] for end in ("", "_low", "_high"))
             span = np.nan_to_num(np.maximum([middle - low, high - middle], 0.0))
-            axes.errorbar(x, middle, span, color=colour, marker=marker, capsize=2, label=label)
+            style = {"color": colour, "marker": marker, "markersize": 5.0, "clip_on": False}
+            axes.errorbar(x + shift, middle, span, capsize=2.0, label=label, **style)
         for key, label, stroke in LAWS:
             axes.plot(x, rows[key], color=VERMILION, linestyle=stroke, label=label)
-        axes.set_title(f"l/Sq {ratio:.0f}, Sdq {rows['sdq'].mean():.2g}")
+        axes.set_title(f"l/Sq {ratio:.0f}, Sdq {rows['sdq'].mean():.3f}")
         axes.set_xlabel("film ratio Λ")
         axes.set_ylim(0.0, 1.0)
     first: Axes = drawn.axes[0]

@@ -115,7 +115,7 @@ class SolverSection(Section):
     # surfaces per solution, or tracks of a running contact; omitted: by the size of the grid, or
     # one track (three if measured)
     surfaces: Count | None = None
-    running_cells: Count | None = None  # of a running contact; omitted: 3600 at accuracy 0.01
+    running_cells: Count | None = None  # of a running contact; omitted: 3200 at accuracy 0.01
 
     @field_validator("dynamic")
     @classmethod

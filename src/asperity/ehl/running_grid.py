@@ -5,7 +5,7 @@ import math
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import Grid
 
-MOST_RUNNING_CELLS = 3600  # of the fine grid at the default accuracy
+MOST_RUNNING_CELLS = 3200  # of the fine grid at the default accuracy
 CELLS_PER_LENGTH = 8.0  # on the fine grid, as on an automatic grid
 MIN_CELLS_PER_HALF_WIDTH, MIN_CELLS_ACROSS = 8.0, 16.0  # on a fine grid with a coarser one
 
