@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.motion import VENNER, contact, waves
+from benchmarks.motion import VENNER, contact, master_curve, waves
 
 from asperity.case import load_case
 from asperity.core.errors import BadInput
@@ -29,6 +29,14 @@ def test_the_amplitude_of_moving_waviness_agrees_with_venner_within_5_percent(wa
     assert waves(wavelength, CELLS[wavelength]).central == pytest.approx(
         VENNER[wavelength], rel=0.05
     )
+
+
+@pytest.mark.parametrize(("oil", "tolerance"), [(5.0, 0.16), (11.0, 0.06)])
+def test_short_waves_follow_the_master_curve_of_two_oils(oil, tolerance):
+    """The curve is fitted to many contacts; it states no scatter."""
+    for wavelength in (0.5, 0.25):
+        amplitude = waves(wavelength, CELLS[wavelength], oil=oil).central
+        assert amplitude == pytest.approx(master_curve(wavelength, oil), rel=tolerance)
 
 
 def test_the_amplitude_ratio_of_low_waves_does_not_depend_on_their_height():
