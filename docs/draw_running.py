@@ -80,7 +80,8 @@ def levels(path: Path = LEVELS) -> Figure:
         axes.set_xlabel("Sq [um]")
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0.0 if key != "crf_sound_hz" else None)
-    drawn.axes[0].legend()
+    drawn.axes[1].legend(loc="lower right")
+    drawn.align_ylabels()
     return drawn
 
 
