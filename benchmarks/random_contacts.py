@@ -1,9 +1,9 @@
 """Six hundred random contacts as the commands solve them: refusals, convergence and time.
 
 Line, ball and ellipse on automatic grids; Hertz pressure 0.3 to 2.5 GPa, radius 2 to 50 mm, film
-ratio 0.1 to 3 (set by the speed), Sq 0.05 to 1 um, correlation length 12 to 120 Sq, pressure cap
-2 to 8 GPa or none, slide-to-roll ratio 0 to 2, the roughness on the first, the second or both
-bodies. Each is solved with the cells of a study's point, running where a rough body moves.
+ratio 0.1 to 3 (set by the speed), correlation length 1/30 to 1/2 of the half-width and 12 to 120
+Sq, pressure cap 2 to 8 GPa or none, slide-to-roll ratio 0 to 2, the roughness on the first, the
+second or both bodies. All are running contacts, solved with the cells of a study's point.
 
 `python -m benchmarks.random_contacts [COUNT [FIRST]]` prints a row for each, and a summary. With
 `--grids` it solves the first COUNT contacts of mixed lubrication (CLR 0.02 to 0.98) on the default
@@ -15,6 +15,7 @@ import sys
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from time import process_time
 
 import numpy as np
@@ -23,7 +24,7 @@ from threadpoolctl import threadpool_limits
 from asperity.case import Case, case_template, load_case
 from asperity.core.errors import AsperityError, BadInput, NotConverged
 from asperity.ehl import least_film
-from asperity.results import solve_case
+from asperity.results import Run, solve_case
 
 COUNT = 600
 KINDS = ("line", "point", "elliptic")
@@ -43,50 +44,47 @@ class Outcome:
     remark: str = ""
 
 
-def overrides(number: int) -> tuple[dict[str, object], float, float]:
-    """Return a contact's case keys, its Hertz pressure [Pa] and its film ratio."""
+def _between(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(math.log(low), math.log(high))))
+
+
+def contact(number: int) -> Case:
+    """Return a contact, with the load and the speed of its Hertz pressure and film ratio."""
     rng = np.random.default_rng([38, number])
-
-    def between(low: float, high: float) -> float:
-        return float(np.exp(rng.uniform(math.log(low), math.log(high))))
-
-    geometry, radius, sq = KINDS[number % 3], between(2e-3, 50e-3), between(0.05e-6, 1e-6)
-    length = sq * between(12.0, 120.0)
+    between = partial(_between, rng)
+    geometry, radius = KINDS[number % 3], between(2e-3, 50e-3)
     cap = [None, between(2e9, 8e9)][int(rng.random() < 0.75)]
     keys: dict[str, object] = {
         "contact.geometry": geometry,
         "contact.radius": f"{radius} m",
         "contact.load": f"{REFERENCE_LOAD} N",
-        "contact.slip": [0.0, 2.0, float(rng.uniform(0.0, 2.0))][number // 3 % 3],
+        "contact.slip": [0.0, 1.0, float(rng.uniform(0.0, 2.0))][number // 3 % 3],
         "material.hardness": "none" if cap is None else f"{cap} Pa",
         "lubricant.viscosity.eta0": f"{between(3e-3, 0.3)} Pa s",
         "lubricant.viscosity.alpha": f"{rng.uniform(10.0, 25.0)} 1/GPa",
-        "surface.sq": f"{sq} m",
-        "surface.correlation_length": [f"{length} m", f"{length * between(1.0, 4.0)} m"],
         "surface.seed": number,
         "motion.rough": ("first", "second", "both")[number // 9 % 3],
     }
     if geometry == "elliptic":
         keys["contact.radius"] = [f"{radius} m", f"{radius * between(1.5, 20.0)} m"]
-    return keys, between(0.3e9, 2.5e9), between(0.1, 3.0)
-
-
-def contact(number: int) -> Case:
-    """Return a contact, with the load and the speed of its Hertz pressure and film ratio."""
-    keys, pressure, film_ratio = overrides(number)
     text = case_template("line").partition("[vibration]")[0]
     if keys["contact.geometry"] != "line":
         text = text.replace('length = "10 mm"', "# length").replace('"line"', '"point"')
     case = load_case(text).with_overrides(keys)
-    power = 2.0 if keys["contact.geometry"] == "line" else 3.0
-    load = REFERENCE_LOAD * (pressure / case.conditions.hertz.p_max) ** power
-    speed = 1.0
+    power = 2.0 if geometry == "line" else 3.0
+    load = REFERENCE_LOAD * (between(0.3e9, 2.5e9) / case.conditions.hertz.p_max) ** power
+    case = case.with_overrides({"contact.load": f"{load} N"})
+    length = case.conditions.hertz.half_widths[0] / between(2.0, 30.0)
+    sq, film_ratio, speed = length / between(12.0, 120.0), between(0.1, 3.0), 1.0
+    case = case.with_overrides(
+        {
+            "surface.sq": f"{sq} m",
+            "surface.correlation_length": [f"{length} m", f"{length * between(1.0, 4.0)} m"],
+        }
+    )
     for _ in range(60):
-        case = case.with_overrides(
-            {"contact.load": f"{load} N", "contact.entrainment_speed": f"{speed} m/s"}
-        )
+        case = case.with_overrides({"contact.entrainment_speed": f"{speed} m/s"})
         assert case.lubricant is not None
-        sq = float(str(keys["surface.sq"]).split()[0])
         factor = film_ratio * sq / least_film(case.conditions, case.lubricant)
         if abs(factor - 1.0) < 1e-3:
             break
@@ -140,6 +138,21 @@ def rows(count: int, first: int = 0) -> Iterator[str]:
     )
 
 
+def _on_two_grids(case: Case) -> tuple[Run, float, Run] | None:
+    """Return a mixed contact on default cells, its CPU time, and on a finer grid."""
+
+    def solved(cells: int | None) -> Run:
+        chosen = case if cells is None else case.with_overrides({"solver.running_cells": cells})
+        return solve_case(chosen, surfaces=None, strict=False)
+
+    if not MIXED[0] < solved(TRIAL_CELLS).state.clr < MIXED[1]:
+        return None
+    began = process_time()
+    run = solved(None)
+    seconds = process_time() - began
+    return run, seconds, solved(2 * math.prod(run.solution.grid.cells))
+
+
 def grid_rows(count: int, first: int = 0) -> Iterator[str]:
     """Yield a row for each of the first mixed contacts: default cells, and a finer grid."""
     yield "| contact | cells | CLR (90 % interval) | determined | CPU [s] | cells | CLR | change |"
@@ -147,27 +160,19 @@ def grid_rows(count: int, first: int = 0) -> Iterator[str]:
     known, number = 0, first
     changes: list[float] = []
     while len(changes) < count:
-        with threadpool_limits(1):
-            case = contact(number)
-            number += 1
-            coarse = solve_case(
-                case.with_overrides({"solver.running_cells": TRIAL_CELLS}),
-                surfaces=None,
-                strict=False,
-            )
-            if not MIXED[0] < coarse.state.clr < MIXED[1]:
-                continue
-            began = process_time()
-            run = solve_case(case, surfaces=None, strict=False)
-            seconds = process_time() - began
-            cells = 2 * run.solution.grid.cells[0] * run.solution.grid.cells[1]
-            finer = solve_case(
-                case.with_overrides({"solver.running_cells": cells}), surfaces=None, strict=False
-            )
+        number += 1
+        try:
+            with threadpool_limits(1):
+                pair = _on_two_grids(contact(number - 1))
+        except AsperityError as error:
+            yield f"| {number - 1} | {error} | | | | | | |"
+            continue
+        if pair is None:
+            continue
+        run, seconds, finer = pair
         clr = run.error.clr
         changes.append(finer.state.clr - run.state.clr)
-        quick = run.determined and seconds <= SOON
-        known += quick
+        known += run.determined and seconds <= SOON
         yield (
             f"| {number - 1} | {run.solution.grid.cells} | {run.state.clr:.3f} "
             f"({clr.low} to {clr.high}) | "
