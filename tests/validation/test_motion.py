@@ -2,6 +2,7 @@
 power balance.
 """
 
+from dataclasses import replace
 from itertools import islice, pairwise
 from pathlib import Path
 
@@ -84,6 +85,22 @@ def test_a_stationary_contact_remains_at_its_steady_solution(time_step):
             step.solution.pressure, snapshot.pressure, atol=1e-5 * conditions.hertz.p_max
         )
         assert step.state.clr == pytest.approx(contact_state(snapshot).clr, abs=1e-5)
+
+
+@pytest.mark.parametrize(("time_step", "tolerance"), [(1.0, 1e-4), (2.0, 2e-3)])
+def test_roughness_of_a_body_at_rest_gives_the_snapshot(time_step, tolerance):
+    """At a slide-to-roll ratio of 2, running and standing roughness are the same problem."""
+    on, tight = paper.grid((64, 64)), Options(tolerance=1e-7)
+    conditions = paper.contact(hardness=2e9)
+    fast = 2.0 * conditions.entrainment_speed
+    conditions = replace(conditions, surface_speeds=(fast, 0.0))
+    surface = paper.rough(on, 1e-6)
+    standing = MovingSurfaces.one_rough(surface, conditions.surface_speeds, first=False)
+    steps = moving_contact(conditions, paper.barus(), standing, options=tight, time_step=time_step)
+    *_, last = islice(steps, 33)
+    snapshot = contact_state(solve_contact(conditions, paper.barus(), surface, options=tight))
+    assert 0.2 < snapshot.clr < 0.9
+    assert last.state.clr == pytest.approx(snapshot.clr, abs=tolerance)
 
 
 def test_a_smooth_contact_with_moving_surfaces_remains_steady():
