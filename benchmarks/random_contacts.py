@@ -5,9 +5,7 @@ ratio 0.1 to 3 (set by the speed), correlation length 1/30 to 1/2 of the half-wi
 Sq, pressure cap 2 to 8 GPa or none, slide-to-roll ratio 0 to 2, the roughness on the first, the
 second or both bodies. All are running contacts, solved with the cells of a study's point.
 
-`python -m benchmarks.random_contacts [COUNT [FIRST]]` prints a row for each, and a summary. With
-`--grids` it solves the first COUNT contacts of mixed lubrication (CLR 0.02 to 0.98) on the default
-cells of `solve` and on 1.41 times as many along both axes.
+`python -m benchmarks.random_contacts [COUNT [FIRST]]` prints a row for each, and a summary.
 """
 
 import math
@@ -24,13 +22,12 @@ from threadpoolctl import threadpool_limits
 from asperity.case import Case, case_template, load_case
 from asperity.core.errors import AsperityError, BadInput, NotConverged
 from asperity.ehl import least_film
-from asperity.results import Run, solve_case
+from asperity.results import solve_case
 
 COUNT = 600
 KINDS = ("line", "point", "elliptic")
 FILM_OF_SPEED = 0.68  # exponent, to find the speed of a film
 SOLVED, REFUSED, UNSOLVED, FAILED = "solved", "refused", "not converged", "traceback"
-TRIAL_CELLS, MIXED, SOON = 600, (0.02, 0.98), 10.0  # of the mixed contacts; CPU time [s]
 REFERENCE_LOAD = 100.0  # N, to find the load of a Hertz pressure
 
 
@@ -138,57 +135,6 @@ def rows(count: int, first: int = 0) -> Iterator[str]:
     )
 
 
-def _on_two_grids(case: Case) -> tuple[Run, float, Run] | None:
-    """Return a mixed contact on default cells, its CPU time, and on a finer grid."""
-
-    def solved(cells: int | None) -> Run:
-        chosen = case if cells is None else case.with_overrides({"solver.running_cells": cells})
-        return solve_case(chosen, surfaces=None, strict=False)
-
-    if not MIXED[0] < solved(TRIAL_CELLS).state.clr < MIXED[1]:
-        return None
-    began = process_time()
-    run = solved(None)
-    seconds = process_time() - began
-    return run, seconds, solved(2 * math.prod(run.solution.grid.cells))
-
-
-def grid_rows(count: int, first: int = 0) -> Iterator[str]:
-    """Yield a row for each of the first mixed contacts: default cells, and a finer grid."""
-    yield "| contact | cells | CLR (90 % interval) | determined | CPU [s] | cells | CLR | change |"
-    yield "|---|---|---|---|---|---|---|---|"
-    known, number = 0, first
-    changes: list[float] = []
-    while len(changes) < count:
-        number += 1
-        try:
-            with threadpool_limits(1):
-                pair = _on_two_grids(contact(number - 1))
-        except AsperityError as error:
-            yield f"| {number - 1} | {error} | | | | | | |"
-            continue
-        if pair is None:
-            continue
-        run, seconds, finer = pair
-        clr = run.error.clr
-        changes.append(finer.state.clr - run.state.clr)
-        known += run.determined and seconds <= SOON
-        yield (
-            f"| {number - 1} | {run.solution.grid.cells} | {run.state.clr:.3f} "
-            f"({clr.low} to {clr.high}) | "
-            f"{'yes' if run.determined else run.undetermined or 'not converged'} | {seconds:.1f} | "
-            f"{finer.solution.grid.cells} | {finer.state.clr:.3f} | {changes[-1]:+.3f} |"
-        )
-    yield ""
-    yield (
-        f"Determined within {SOON:g} s: {known} of {count}. Change on the finer grid: mean "
-        f"{np.mean(changes):+.3f}, mean absolute {np.mean(np.abs(changes)):.3f}, largest "
-        f"{np.abs(changes).max():.3f}."
-    )
-
-
 if __name__ == "__main__":
-    given = [int(text) for text in sys.argv[1:] if text != "--grids"]
-    table = grid_rows if "--grids" in sys.argv else rows
-    for line in table(*(given or [COUNT])):
+    for line in rows(*([int(text) for text in sys.argv[1:]] or [COUNT])):
         print(line, flush=True)

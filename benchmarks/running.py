@@ -8,6 +8,9 @@ many cells along both axes, with steps half as long.
 `--grids` marches the same track on three grids, each with 1.41 times the cells along both axes of
 the one before, with the models mixed and conserving, and with steps half as long on the middle one
 (the conserving model with twice as many cells along rolling, as its steps are one cell).
+
+`--mixed` takes the first contacts of mixed lubrication (CLR 0.02 to 0.98), and compares the default
+solution with that on 1.41 times as many cells along both axes.
 """
 
 import argparse
@@ -33,6 +36,7 @@ LONG = 10  # passages of the reference
 CLOSE = 0.03
 FILM_OF_SPEED = 0.68  # exponent, to find the speed of a film
 PASSAGES, CUT = 6, 2  # of the study of grids
+TRIAL_CELLS, MIXED, SOON = 600, (0.02, 0.98), 10.0  # of mixed contacts; CPU time [s]
 # finest grid over the default one along each axis (conserving costs more), and time steps [cells]
 MODELS: dict[ContactModel, tuple[float, float]] = {
     "mixed": (math.sqrt(2.0), 2.0),
@@ -214,12 +218,66 @@ def grid_rows(first: int, count: int) -> Iterator[str]:
         yield f"| {' | '.join(row)} |"
 
 
+def _on_two_grids(case: Case) -> tuple[Run, float, Run] | None:
+    """Return a mixed contact on default cells, its CPU time, and on a finer grid."""
+
+    def solved(cells: int | None) -> Run:
+        chosen = case if cells is None else case.with_overrides({"solver.running_cells": cells})
+        return solve_case(chosen, surfaces=None, strict=False)
+
+    if not MIXED[0] < solved(TRIAL_CELLS).state.clr < MIXED[1]:
+        return None
+    began = process_time()
+    run = solved(None)
+    seconds = process_time() - began
+    return run, seconds, solved(2 * math.prod(run.solution.grid.cells))
+
+
+def mixed_rows(count: int, first: int = 0) -> Iterator[str]:
+    """Yield a row for each of the first mixed contacts: default cells, and 1.41 times as many."""
+    yield "| film ratio | l/Sq | slip | CLR (90 % interval) | determined | CPU [s] | CLR | change |"
+    yield "|---|---|---|---|---|---|---|---|"
+    known = 0
+    changes: list[float] = []
+    for sample in islice(samples(first + 5 * count), first, None):
+        if len(changes) == count:
+            break
+        with threadpool_limits(1):
+            pair = _on_two_grids(sample.case())
+        if pair is None:
+            continue
+        run, seconds, finer = pair
+        clr = run.error.clr
+        assert clr.low is not None
+        assert clr.high is not None
+        changes.append(finer.state.clr - run.state.clr)
+        known += run.determined and seconds <= SOON
+        yield (
+            f"| {sample.film_ratio:.2f} | {sample.lengths_per_sq:.0f} | {sample.slip:g} | "
+            f"{run.state.clr:.3f} ({clr.low:.3f} to {clr.high:.3f}) | "
+            f"{'yes' if run.determined else run.undetermined or 'not converged'} | {seconds:.1f} | "
+            f"{finer.state.clr:.3f} | {changes[-1]:+.3f} |"
+        )
+    yield ""
+    yield (
+        f"Determined within {SOON:g} s: {known} of {count}. Change on the finer grid: mean "
+        f"{np.mean(changes):+.3f}, mean absolute {np.mean(np.abs(changes)):.3f}, largest "
+        f"{np.abs(changes).max():.3f}."
+    )
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=COUNT)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--grids", action="store_true")
+    parser.add_argument("--mixed", action="store_true")
     chosen = parser.parse_args()
-    table = grid_rows(chosen.first, chosen.count) if chosen.grids else rows(chosen.count)
+    if chosen.grids:
+        table = grid_rows(chosen.first, chosen.count)
+    elif chosen.mixed:
+        table = mixed_rows(chosen.count, chosen.first)
+    else:
+        table = rows(chosen.count)
     for line in table:
         print(line, flush=True)
