@@ -3,13 +3,14 @@
 Line, ball and ellipse on automatic grids; Hertz pressure 0.3 to 2.5 GPa, radius 2 to 50 mm, film
 ratio 0.1 to 3 (set by the speed), correlation length 1/30 to 1/2 of the half-width and 12 to 120
 Sq, pressure cap 2 to 8 GPa or none, slide-to-roll ratio 0 to 2, the roughness on the first, the
-second or both bodies. All are running contacts, solved with the cells of a study's point.
+second or both bodies. All are running contacts, solved on the default cells of `solve` unless
+`--cells` states other ones.
 
-`python -m benchmarks.random_contacts [COUNT [FIRST]]` prints a row for each, and a summary.
+`python -m benchmarks.random_contacts` prints a row for each contact, and a summary.
 """
 
+import argparse
 import math
-import sys
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -89,11 +90,13 @@ def contact(number: int) -> Case:
     return case
 
 
-def outcome(number: int) -> Outcome:
+def outcome(number: int, cells: int | None) -> Outcome:
     """Solve a contact."""
     began = process_time()
     try:
-        case = contact(number).among_many
+        case = contact(number)
+        if cells is not None:
+            case = case.with_overrides({"solver.running_cells": cells})
         run = solve_case(case, surfaces=None, strict=True)
     except NotConverged as error:
         return Outcome(UNSOLVED, process_time() - began, remark=str(error))
@@ -107,14 +110,14 @@ def outcome(number: int) -> Outcome:
     return Outcome(SOLVED, process_time() - began, run.state.clr, run.undetermined or "")
 
 
-def rows(count: int, first: int = 0) -> Iterator[str]:
+def rows(count: int, first: int = 0, cells: int | None = None) -> Iterator[str]:
     """Yield a row for each contact, then the summary."""
     outcomes = []
     yield "| contact | outcome | CPU [s] | CLR | remark |"
     yield "|---|---|---|---|---|"
     for number in range(first, first + count):
         with threadpool_limits(1):
-            result = outcome(number)
+            result = outcome(number, cells)
         outcomes.append(result)
         clr = "" if result.clr is None else f"{result.clr:.3f}"
         yield f"| {number} | {result.kind} | {result.seconds:.1f} | {clr} | {result.remark} |"
@@ -136,5 +139,10 @@ def rows(count: int, first: int = 0) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    for line in rows(*([int(text) for text in sys.argv[1:]] or [COUNT])):
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=COUNT)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--cells", type=int)
+    chosen = parser.parse_args()
+    for line in rows(chosen.count, chosen.first, chosen.cells):
         print(line, flush=True)
