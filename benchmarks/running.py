@@ -1,7 +1,7 @@
 """Running contacts: load share and its interval, against longer tracks on grids twice as fine.
 
 Twenty random line contacts in the domain of the paper's: film ratio 0.2 to 1.5, correlation length
-20 to 100 Sq, slide-to-roll ratio 0, 0.2, 1 and 2 (the rough body moves), half of them with a
+20 to 100 Sq, slide-to-roll ratio 0, 0.2, 1 and 2 (the faster body is rough), twelve of them with a
 pressure cap of 2 GPa. The reference marches another track, of ten passages, on a grid of twice as
 many cells along both axes, with steps half as long.
 
@@ -234,8 +234,8 @@ def _on_two_grids(case: Case) -> tuple[Run, float, Run] | None:
 
 
 def mixed_rows(count: int, first: int = 0) -> Iterator[str]:
-    """Yield a row for each of the first mixed contacts: default cells, and 1.41 times as many."""
-    yield "| film ratio | l/Sq | slip | CLR (90 % interval) | determined | CPU [s] | CLR | change |"
+    """Yield a row per mixed contact: default grid, and 1.41 times the cells along each axis."""
+    yield "| film ratio | l/Sq | slip | CLR (90 %) | determined | CPU [s] | finer | change |"
     yield "|---|---|---|---|---|---|---|---|"
     known = 0
     changes: list[float] = []
