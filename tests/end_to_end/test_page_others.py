@@ -162,5 +162,5 @@ def test_remote_users_need_the_password(browser, tmp_path):
         page.locator("input[type=password]").fill("long enough")
         page.keyboard.press("Enter")
         page.get_by_role("textbox", name="Load, F").wait_for()
-        page.get_by_text("Solved on 86 × 44 cells").wait_for()  # the default case
+        page.get_by_text("Solved on 80 × 40 cells").wait_for()  # the default case
         visit.close()
