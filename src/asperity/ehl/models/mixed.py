@@ -195,8 +195,7 @@ def evaluate(
     `freed` cells count as free whatever their gap, and so do opened ones, whose unknowns are
     changed where necessary.
     """
-    gap = problem.undeformed + problem.deflection(unknowns.total)
-    gap += unknowns.approach
+    gap = problem.undeformed + problem.deflection(unknowns.total) + unknowns.approach
     flow, opening = _flow(problem, unknowns, gap, second_order), np.empty(gap.shape, dtype=bool)
     freed = np.zeros(gap.shape, dtype=bool) if freed is None else freed
     if load_sharing.mark_opening(flow.cells, _bounds(problem), opening):
