@@ -89,7 +89,7 @@ def samples(count: int, seed: int = 14) -> Iterator[Sample]:
         power = 2.0 if geometry == "line" else 3.0
         pressed = replace(slow, load=100.0 * (rng.uniform(1e9, 2.5e9) / slow.hertz.p_max) ** power)
         film = np.exp(rng.uniform(np.log(0.1), np.log(2.0))) * sq
-        speed = scipy.optimize.brentq(_film_over, 1e-6, 1e4, args=(pressed, oil, film))
+        speed = scipy.optimize.brentq(log_film_over, 1e-6, 1e4, args=(pressed, oil, film))
         a = pressed.hertz.half_widths[0]
         length = a / rng.uniform(3.0, 12.0)
         lengths = length, length * rng.uniform(1.0, 4.0)
@@ -98,7 +98,9 @@ def samples(count: int, seed: int = 14) -> Iterator[Sample]:
         yield Sample(conditions, oil, Texture(sq=sq, lengths=lengths, least=least), number)
 
 
-def _film_over(speed: float, conditions: ContactConditions, oil: Lubricant, film: float) -> float:
+def log_film_over(
+    speed: float, conditions: ContactConditions, oil: Lubricant, film: float
+) -> float:
     return float(np.log(least_film(replace(conditions, surface_speeds=(speed, speed)), oil) / film))
 
 

@@ -46,7 +46,7 @@ def masjedi_khonsari(case: Case) -> float:
     """Return the asperities' share of the load of a line contact (statistical roughness).
 
     Source: Masjedi and Khonsari, J. Tribol. 134 (2012) 011503, the asperity load ratio in percent;
-    0.01 < V < 0.03, roughness up to 5e-5 of the radius.
+    hardness over modulus 0.01 to 0.03, roughness up to 5e-5 of the radius.
     """
     assert case.lubricant is not None
     conditions = case.conditions

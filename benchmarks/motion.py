@@ -37,9 +37,9 @@ DOMAIN = (-2.5, 1.5)  # half-widths
 CROSSING = 1.4  # travel in half-widths before the amplitude is measured, over one wavelength more
 
 
-def master_curve(wavelength: float, oil: float = L) -> float:
+def master_curve(wavelength: float, moes_oil: float = L) -> float:
     """Return the curve fitted to such results, of λ/b M^(3/4)/L^(1/2) (same paper)."""
-    r = wavelength * M**0.75 / oil**0.5
+    r = wavelength * M**0.75 / moes_oil**0.5
     return 1.0 / (1.0 + 0.125 * r + 0.04 * r**2)
 
 
@@ -82,10 +82,10 @@ def waves(
     cells_per_b: int,
     time_step: float = 1.0,
     share: float = 0.1,
-    oil: float = L,
+    moes_oil: float = L,
 ) -> Waves:
     """Run a wave of `share` of the smooth film through the contact; lengths in half-widths."""
-    conditions, (left, right) = contact(l=oil), DOMAIN
+    conditions, (left, right) = contact(l=moes_oil), DOMAIN
     b = conditions.hertz.half_widths[0]
     period = round(wavelength * cells_per_b)
     cells = -(-round((right - left) * cells_per_b) // period) * period  # the track repeats

@@ -1,10 +1,10 @@
-"""Six hundred random contacts as the commands solve them: refusals, convergence and time.
+"""Robustness: six hundred random running contacts, their refusals, convergence and time.
 
 Line, ball and ellipse on automatic grids; Hertz pressure 0.3 to 2.5 GPa, radius 2 to 50 mm, film
 ratio 0.1 to 3 (set by the speed), correlation length 1/30 to 1/2 of the half-width and 12 to 120
 Sq, pressure cap 2 to 8 GPa or none, slide-to-roll ratio 0 to 2, the roughness on the first, the
-second or both bodies. All are running contacts, solved on the default cells of `solve` unless
-`--cells` states other ones.
+second or both bodies. They are solved on the default cells of `solve` unless `--cells` states
+other ones.
 
 `python -m benchmarks.random_contacts` prints a row for each contact, and a summary.
 """
@@ -22,19 +22,18 @@ from threadpoolctl import threadpool_limits
 
 from asperity.case import Case, case_template, load_case
 from asperity.core.errors import AsperityError, BadInput, NotConverged
-from asperity.ehl import least_film
 from asperity.results import solve_case
+from benchmarks.running import at_film_ratio
 
 COUNT = 600
 KINDS = ("line", "point", "elliptic")
-FILM_OF_SPEED = 0.68  # exponent, to find the speed of a film
-SOLVED, REFUSED, UNSOLVED, FAILED = "solved", "refused", "not converged", "traceback"
+SOLVED, REFUSED, UNSOLVED, FAILED = "solved", "refused", "not converged", "internal error"
 REFERENCE_LOAD = 100.0  # N, to find the load of a Hertz pressure
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a contact: kind, CPU time [s], load share if determined, and a remark."""
+    """Result of a contact: kind, CPU time [s], load share if solved, and a remark."""
 
     kind: str
     seconds: float
@@ -73,21 +72,14 @@ def contact(number: int) -> Case:
     load = REFERENCE_LOAD * (between(0.3e9, 2.5e9) / case.conditions.hertz.p_max) ** power
     case = case.with_overrides({"contact.load": f"{load} N"})
     length = case.conditions.hertz.half_widths[0] / between(2.0, 30.0)
-    sq, film_ratio, speed = length / between(12.0, 120.0), between(0.1, 3.0), 1.0
+    sq = length / between(12.0, 120.0)
     case = case.with_overrides(
         {
             "surface.sq": f"{sq} m",
             "surface.correlation_length": [f"{length} m", f"{length * between(1.0, 4.0)} m"],
         }
     )
-    for _ in range(60):
-        case = case.with_overrides({"contact.entrainment_speed": f"{speed} m/s"})
-        assert case.lubricant is not None
-        factor = film_ratio * sq / least_film(case.conditions, case.lubricant)
-        if abs(factor - 1.0) < 1e-3:
-            break
-        speed *= factor ** (1.0 / FILM_OF_SPEED)
-    return case
+    return at_film_ratio(case, sq, between(0.1, 3.0))
 
 
 def outcome(number: int, cells: int | None) -> Outcome:

@@ -21,27 +21,36 @@ from itertools import islice
 from time import process_time
 
 import numpy as np
+import scipy
 from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
 from asperity.core.errors import AsperityError
-from asperity.ehl import ContactModel, least_film
+from asperity.ehl import ContactModel
 from asperity.results import Run, running_surfaces, solve_case
 from asperity.transient import moving_contact, run_track
+from benchmarks.chosen_grids import log_film_over
 from benchmarks.roughness_levels import paper_case
 
 COUNT = 20
 SLIPS = (0.0, 0.2, 1.0, 2.0)
 LONG = 10  # passages of the reference
 CLOSE = 0.03
-FILM_OF_SPEED = 0.68  # exponent, to find the speed of a film
 PASSAGES, CUT = 6, 2  # of the study of grids
-TRIAL_CELLS, MIXED, SOON = 600, (0.02, 0.98), 10.0  # of mixed contacts; CPU time [s]
+TRIAL_CELLS, MIXED_SHARES = 600, (0.02, 0.98)  # of mixed contacts
+CPU_LIMIT = 10.0  # s
 # finest grid over the default one along each axis (conserving costs more), and time steps [cells]
 MODELS: dict[ContactModel, tuple[float, float]] = {
     "mixed": (math.sqrt(2.0), 2.0),
     "conserving": (1.0, 1.0),
 }
+
+
+def at_film_ratio(case: Case, sq: float, film_ratio: float) -> Case:
+    """Return a case at the speed at which the film is `film_ratio` times Sq [m]."""
+    arguments = case.conditions, case.lubricant, film_ratio * sq
+    speed = scipy.optimize.brentq(log_film_over, 1e-6, 1e4, args=arguments)
+    return case.with_overrides({"contact.entrainment_speed": f"{speed} m/s"})
 
 
 @dataclass(frozen=True)
@@ -57,25 +66,18 @@ class Sample:
 
     def case(self) -> Case:
         """Return the case, at the speed that gives the film ratio."""
-        sq, speed = self.length / self.lengths_per_sq, 1.91
-        for _ in range(20):
-            case = paper_case(1.0, self.seed, 256).with_overrides(
-                {
-                    "contact.roughness": "running",
-                    "contact.entrainment_speed": f"{speed} m/s",
-                    "contact.slip": self.slip,
-                    "surface.sq": f"{sq} m",
-                    "surface.correlation_length": f"{self.length} m",
-                    "material.hardness": "2 GPa" if self.capped else "20 GPa",
-                    "grid.cells": [256, 128],
-                }
-            )
-            assert case.lubricant is not None
-            factor = self.film_ratio * sq / least_film(case.conditions, case.lubricant)
-            if abs(factor - 1.0) < 1e-3:
-                break
-            speed *= factor ** (1.0 / FILM_OF_SPEED)
-        return case
+        sq = self.length / self.lengths_per_sq
+        case = paper_case(1.0, self.seed, 256).with_overrides(
+            {
+                "contact.roughness": "running",
+                "contact.slip": self.slip,
+                "surface.sq": f"{sq} m",
+                "surface.correlation_length": f"{self.length} m",
+                "material.hardness": "2 GPa" if self.capped else "20 GPa",
+                "grid.cells": [256, 128],
+            }
+        )
+        return at_film_ratio(case, sq, self.film_ratio)
 
 
 def samples(count: int = COUNT) -> Iterator[Sample]:
@@ -225,7 +227,7 @@ def _on_two_grids(case: Case) -> tuple[Run, float, Run] | None:
         chosen = case if cells is None else case.with_overrides({"solver.running_cells": cells})
         return solve_case(chosen, surfaces=None, strict=False)
 
-    if not MIXED[0] < solved(TRIAL_CELLS).state.clr < MIXED[1]:
+    if not MIXED_SHARES[0] < solved(TRIAL_CELLS).state.clr < MIXED_SHARES[1]:
         return None
     began = process_time()
     run = solved(None)
@@ -251,7 +253,7 @@ def mixed_rows(count: int, first: int = 0) -> Iterator[str]:
         assert clr.low is not None
         assert clr.high is not None
         changes.append(finer.state.clr - run.state.clr)
-        known += run.determined and seconds <= SOON
+        known += run.determined and seconds <= CPU_LIMIT
         yield (
             f"| {sample.film_ratio:.2f} | {sample.lengths_per_sq:.0f} | {sample.slip:g} | "
             f"{run.state.clr:.3f} ({clr.low:.3f} to {clr.high:.3f}) | "
@@ -260,7 +262,7 @@ def mixed_rows(count: int, first: int = 0) -> Iterator[str]:
         )
     yield ""
     yield (
-        f"Determined within {SOON:g} s: {known} of {count}. Change on the finer grid: mean "
+        f"Determined within {CPU_LIMIT:g} s: {known} of {count}. Change on the finer grid: mean "
         f"{np.mean(changes):+.3f}, mean absolute {np.mean(np.abs(changes)):.3f}, largest "
         f"{np.abs(changes).max():.3f}."
     )

@@ -206,7 +206,7 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
 
 
 @pytest.mark.parametrize(
-    ("command", "taken_by"),
+    ("command", "solver"),
     [
         (["solve", "case.toml"], "results.solve_case"),
         (["study", "case.toml", "--out", "sweep"], "study.plan_study"),
@@ -219,19 +219,19 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
 )
 @pytest.mark.parametrize("snapshot", [True, False])
 def test_roughness_moves_unless_a_snapshot_is_requested(
-    asp, monkeypatch, command, taken_by, snapshot
+    asp, monkeypatch, command, solver, snapshot
 ):
     text = (EXAMPLES / "fzg-c.toml").read_text("utf-8")
     Path("machine.toml").write_text(text, "utf-8")
-    seen = []
+    captured = []
 
-    def take(chosen, *_, **__):
-        seen.append(chosen)
-        raise BadInput("seen")
+    def capture(chosen, *_, **__):
+        captured.append(chosen)
+        raise BadInput("captured")
 
-    monkeypatch.setattr(f"asperity.{taken_by}", take)
+    monkeypatch.setattr(f"asperity.{solver}", capture)
     assert asp(*command, *(["--snapshot"] if snapshot else []))[0] == 2
-    (chosen,) = seen
+    (chosen,) = captured
     if command[0] == "machine":
         chosen = chosen.case(chosen.contacts[0])
     assert chosen.is_running is not snapshot

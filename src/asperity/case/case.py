@@ -30,8 +30,9 @@ from asperity.wear import WearModel
 
 # default number of surfaces per solution on coarse and on fine grids, to limit computing time
 DEFAULT_SURFACES, DEFAULT_SURFACES_FINE = 5, 3
-MOST_RUNNING_SLIP = 4.0  # roughness moves two cells relative to the oil in a time step of one
-MANY_RUNNING_CELLS = 1200  # of a running contact among many
+# above it, roughness moves more than two cells relative to the oil in a one-cell time step
+MOST_RUNNING_SLIP = 4.0
+MANY_RUNNING_CELLS = 1200  # of the fine grid in studies, machines and friction curves
 DEFAULT_TRACKS = 1  # of a running contact; a generated track holds several contacts
 DEFAULT_TRACKS_MEASURED = 3
 MOST_SURFACES = 1000  # a prediction interval hardly narrows beyond a few dozen
