@@ -207,7 +207,9 @@ class MixedSearchControls:
     max_backward_iterations: int = 20  # from second order back to first, for the error estimate ...
     backward_tolerance: float = 0.2  # ... until a step moves the load share by less of its change
     max_restart_iterations: int = 12  # second order from a coarser grid to `first_order_tolerance`
-    max_imbalance: float = 1e-6  # sum of gains and losses over the throughflow, if conserving
+    # sum of gains and losses over the throughflow, if conserving ...
+    max_imbalance: float = 1e-6
+    imbalance_to_tolerance: float = 1e-2  # ... or this share of the tolerance, if that is more
     rounding: float = 1e-12  # residual that is rounding: in a wide inlet it is much oil
     max_smooth_turns: int = 4  # of Newton and local refinement for smooth bodies on a coarse grid
     steps_per_turn: int = 2
@@ -215,7 +217,8 @@ class MixedSearchControls:
     smooth_coarse_residual: float = 1e-2  # a coarse smooth solution with more is no initial guess
     dry_film_ratio: float = 1.0  # below it the dry contact is the better initial guess
     max_exact_iterations: int = 80  # with exact face mobilities, from arithmetic means ...
-    guess_tolerance: float = 1e-2  # ... that are solved to this residual
+    max_time_step_iterations: int = 30  # ... or from the time step before
+    guess_tolerance: float = 1e-2  # of the solution with arithmetic means
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

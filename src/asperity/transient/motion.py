@@ -161,7 +161,7 @@ class _TransientContact:
         self.shares = [float(is_rough) / max(sum(surfaces.rough), 1) for is_rough in surfaces.rough]
         self.attempt = ATTEMPTS[1] if rough else ATTEMPTS[0]  # smooth bodies: the accurate wedge
         self.follows_oil = rough and (
-            time_step.is_integer() if self.options.model == MIXED else time_step == 1.0
+            time_step.is_integer() if self.options.model in TWO_PRESSURES else time_step == 1.0
         )
         self.cells = int(time_step)  # that oil travels in a step, if it is followed
         self.moved = _cells_moved(surfaces, self.seconds)
@@ -270,7 +270,7 @@ class _TransientContact:
         if not self.follows_oil:
             return TransientTerm(rate / self.length, source / self.length, lagrangian=False)
         if model == CONSERVING:
-            source[0], source[1:] = 0.0, -content[:-1]
+            source[: self.cells], source[self.cells :] = 0.0, -content[: -self.cells]
         elif rate == 1.0:  # no earlier flow after a start from rest
             source[2:] = -content[1:-1]
         else:

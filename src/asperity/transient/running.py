@@ -23,14 +23,13 @@ from asperity.core.arrays import Field
 from asperity.core.coverage import UPPER
 from asperity.core.errors import NotConverged
 from asperity.ehl import ContactSolution, Options
-from asperity.ehl.outcome import MIXED
+from asperity.ehl.outcome import TWO_PRESSURES
 from asperity.lubricant import Lubricant
 from asperity.surface import MovingSurfaces
 from asperity.transient.motion import Snapshot, moving_contact, step_seconds
 
 PASSAGES, MAX_PASSAGES = 6, 24  # first length of a series, and the largest until it is stationary
-# cells that the oil travels in a step; the mixed model follows the oil over several
-TIME_STEP = {MIXED: 2.0}
+TIME_STEP = 2.0  # cells that the oil travels in a step, if the model follows it over several
 MAX_SLIDING_CELLS = 2.0  # of roughness relative to the oil in such a step; beyond, one-cell steps
 # The numbers of a moment average over the Hertz zone, so that adjacent passages, which share
 # roughness, correlate by 1/4 and the variance of their mean is 1.5 times that of independent ones.
@@ -197,7 +196,7 @@ def _options(options: Options | None) -> Options:
 
 def _time_step(conditions: ContactConditions, options: Options) -> float:
     """Return the time step in cells of the oil's path."""
-    longest = TIME_STEP.get(options.model, 1.0)
+    longest = TIME_STEP if options.model in TWO_PRESSURES else 1.0
     slid = 0.5 * abs(conditions.slide_to_roll) * longest
     return longest if slid <= MAX_SLIDING_CELLS else 1.0
 

@@ -318,8 +318,7 @@ class Problem:
         mean = face_mobilities.MEANS[2 if self.exact else int(self.accurate)]
         face_mobilities.face_mobilities(film, height, mean, self._ends, faces)
         outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
-        entering = self.entering(gap)
-        self._fill_outflow(pressure, film, faces, entering, outflow, diagonal)
+        self._fill_outflow(pressure, film, faces, gap, outflow, diagonal)
         return film, faces, outflow, 1.0 / diagonal
 
     def _film(self, pressure: Field, height: Field, oil: Lubricant, least_mobility: float) -> Film:
@@ -347,19 +346,23 @@ class Problem:
 
         The inlet is at ambient pressure, where the relative density is 1.
         """
-        x, dx = self.x[0], self.spacing[0]
-        # one cell before the inlet
-        ahead = np.maximum(gap[0] + ((x - dx) ** 2 - x**2) / 2.0, self.contact_gap)
+        (ahead,) = self._before_inlet(gap, 1)
         if self.conserve:  # upwind
-            return np.asarray(ahead)
+            return ahead
         return np.asarray(0.5 * (ahead + np.maximum(gap[0], self.contact_gap)))
+
+    def _before_inlet(self, gap: Field, cells: int) -> Field:
+        """Return the content of the cells before the inlet, furthest first, (cells, ny)."""
+        first, dx = self.x[0], self.spacing[0]
+        x = first + dx * np.arange(-cells, 0)[:, None]
+        return np.maximum(gap[0] + (x**2 - first**2) / 2.0, self.contact_gap)
 
     def _fill_outflow(
         self,
         pressure: Field,
         film: Film,
         faces: Faces,
-        entering: Field,
+        gap: Field,
         outflow: Field,
         diagonal: Field,
     ) -> None:
@@ -370,11 +373,14 @@ class Problem:
             nothing = np.zeros_like(content)
             reynolds.net_outflow(pressure, nothing, faces, nothing[0], dx, dy, outflow)
             reynolds.fluid_diagonal(film.without_wedge, faces, compliance, dx, dy, diagonal)
-            outflow[0] -= entering / dx
-            if not self.conserve:  # conserved oil is Lagrangian from before the inlet on
-                outflow[0] += content[0] / dx
+            if self.conserve:  # Lagrangian from before the inlet on
+                before_inlet = self._before_inlet(gap, round(1.0 / (past.rate * dx)))
+                outflow[: len(before_inlet)] -= past.rate * before_inlet
+            else:
+                outflow[0] += (content[0] - self.entering(gap)) / dx
                 outflow[1] += (1.0 + faces.wedge[1]) * (content[1] - content[0]) / dx
         else:
+            entering = self.entering(gap)
             reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
             reynolds.fluid_diagonal(film, faces, compliance, dx, dy, diagonal)
         if past is None:

@@ -41,8 +41,9 @@ class MixedSearch(ExactFaceSearch):
         """Return True if the last step met the tolerance; if last, with conserved oil balanced."""
         rounding = self.history[-1].residual < SEARCH.rounding
         closely = tolerance <= self.options.tolerance and not rounding
+        allowed = max(SEARCH.max_imbalance, SEARCH.imbalance_to_tolerance * tolerance)
         return super().converged(tolerance, check_load=check_load) and not (
-            closely and self.imbalance > SEARCH.max_imbalance
+            closely and self.imbalance > allowed
         )
 
     def solution(
