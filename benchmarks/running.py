@@ -6,8 +6,8 @@ pressure cap of 2 GPa. The reference marches another track, of ten passages, on 
 many cells along both axes, with steps half as long.
 
 `--grids` marches the same track on three grids, each with 1.41 times the cells along both axes of
-the one before, with the models mixed and conserving, and with steps half as long on the middle one
-(the conserving model with twice as many cells along rolling, as its steps are one cell).
+the one before (the middle one is the default), with the models mixed and conserving, and with steps
+half as long on the middle one.
 
 `--mixed` takes the first contacts of mixed lubrication (CLR 0.02 to 0.98), and compares the default
 solution with that on 1.41 times as many cells along both axes.
@@ -39,11 +39,8 @@ CLOSE = 0.03
 PASSAGES, CUT = 6, 2  # of the study of grids
 TRIAL_CELLS, MIXED_SHARES = 600, (0.02, 0.98)  # of mixed contacts
 CPU_LIMIT = 10.0  # s
-# finest grid over the default one along each axis (conserving costs more), and time steps [cells]
-MODELS: dict[ContactModel, tuple[float, float]] = {
-    "mixed": (math.sqrt(2.0), 2.0),
-    "conserving": (1.0, 1.0),
-}
+MODELS: tuple[ContactModel, ...] = ("mixed", "conserving")
+TIME_STEP = 2.0  # cells
 
 
 def at_film_ratio(case: Case, sq: float, film_ratio: float) -> Case:
@@ -180,18 +177,14 @@ def study_of_grids(case: Case, model: ContactModel) -> Iterator[str]:
     to find an order.
     """
     began = process_time()
-    finest, step = MODELS[model]
+    nx, ny = case.running_cells()
     shapes = [
-        (round(finest * nx / factor / 2) * 2, round(finest * ny / factor / 2) * 2)
-        for factor in (2.0, math.sqrt(2.0), 1.0)
-        for nx, ny in [case.running_cells()]
+        (round(nx * factor / 2) * 2, round(ny * factor / 2) * 2)
+        for factor in (math.sqrt(0.5), 1.0, math.sqrt(2.0))
     ]
-    shares = [mean_share(case, model, cells, step) for cells in shapes]
+    shares = [mean_share(case, model, cells, TIME_STEP) for cells in shapes]
     limit = shares[2] + (shares[2] - shares[0])
-    # a step of a cell is the shortest that follows the oil: the conserving model needs more cells
-    nx, ny = shapes[1]
-    shorter = {"mixed": ((nx, ny), 1.0), "conserving": ((2 * nx, ny), 1.0)}[model]
-    half_step = mean_share(case, model, *shorter)
+    half_step = mean_share(case, model, shapes[1], 0.5 * TIME_STEP)
     yield from (f"{share:.3f}" for share in (*shares, limit, half_step))
     yield f"{process_time() - began:.0f}"
 

@@ -346,7 +346,7 @@ class Problem:
 
         The inlet is at ambient pressure, where the relative density is 1.
         """
-        (ahead,) = self._before_inlet(gap, 1)
+        ahead: Field = self._before_inlet(gap, 1)[0]
         if self.conserve:  # upwind
             return ahead
         return np.asarray(0.5 * (ahead + np.maximum(gap[0], self.contact_gap)))
@@ -355,7 +355,7 @@ class Problem:
         """Return the content of the cells before the inlet, furthest first, (cells, ny)."""
         first, dx = self.x[0], self.spacing[0]
         x = first + dx * np.arange(-cells, 0)[:, None]
-        return np.maximum(gap[0] + (x**2 - first**2) / 2.0, self.contact_gap)
+        return np.asarray(np.maximum(gap[0] + (x**2 - first**2) / 2.0, self.contact_gap))
 
     def _fill_outflow(
         self,
