@@ -16,13 +16,13 @@ import pytest
 from asperity import read_surface, run_wear
 from asperity.core.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.core.storage import read_with_digest, write_with_digest
+from asperity.core.third_party import surface_topography
 from asperity.paper import RigSettings, simulate_rig, write_rig
 from asperity.simulation import WearHistory, WearProgress, body_column, folder, load_wear
 from asperity.simulation.wear import frames, store
 from asperity.simulation.wear.frames import is_kept
 from asperity.simulation.wear.state import WearState
 from asperity.surface import height_parameters
-from asperity.surface.read import surface_topography
 from asperity.wear import surfaces_at
 from support.wearing import CASE, POINT, worn_case
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from asperity.case import load_case
+from asperity.case import case_template, load_case
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
 from asperity.ehl import half_as_many, least_film, running_cells
@@ -73,6 +73,28 @@ def test_a_grid_too_coarse_for_another_leaves_clr_undetermined():
     numbers = run.scalars()
     assert (numbers["determined"], numbers["clr_low"], numbers["clr_error"]) == (False, None, None)
     assert numbers["sq_m"] == pytest.approx(1e-6)
+
+
+def test_only_standing_roughness_is_said_to_carry_too_little():
+    """The snapshot at the start of a running contact may carry as little: it is not the answer."""
+    changes = {
+        "contact.load": "500 N",
+        "contact.entrainment_speed": "0.3 m/s",
+        "contact.slip": 0.0,
+        "surface.sq": "0.45 um",
+        "surface.correlation_length": ["36 um", "72 um"],
+        "grid.cells": [48, 24],
+        "solver.running_cells": 600,
+    }
+    case = load_case(case_template("line")).with_overrides(changes)
+    standing, running = (
+        solve_case(case.with_overrides({"contact.roughness": roughness}), surfaces=1)
+        for roughness in ("standing", "running")
+    )
+    assert standing.state.clr < 0.01 < running.state.clr
+    remark = "asperities carry almost no load"
+    assert sum(remark in note for note in standing.notes) == 1
+    assert not any(remark in note for note in running.notes)
 
 
 def test_one_contact_among_many_has_fewer_cells_unless_it_states_how_many():

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import BadInput, UnreadableFile
-from asperity.core.third_party import suppress_output
+from asperity.core.third_party import suppress_output, surface_topography
 from asperity.surface import read_surface
-from asperity.surface.read import surface_topography
 
 
 def xyz(path, cells=(20, 12), pixel=(2.0, 3.0)):
@@ -80,9 +79,20 @@ def test_a_file_without_units_requires_them_as_arguments(tmp_path):
     assert measured.heights[7, 3] == pytest.approx(307e-9)
 
 
-def test_units_stated_in_a_file_are_not_overridden(x3p):
-    with pytest.raises(BadInput, match="states its own unit"):
-        read_surface(x3p[0], unit="um", lateral_unit="um")
+def test_stated_units_and_pixel_replace_those_of_the_file_with_a_note(x3p):
+    path, _ = x3p
+    plain = read_surface(path)
+    corrected = read_surface(path, unit="mm", lateral_unit="mm")  # the file states metres
+    np.testing.assert_allclose(corrected.heights, 1e-3 * plain.heights, rtol=1e-12)
+    assert corrected.grid.spacing == pytest.approx([1e-3 * size for size in plain.grid.spacing])
+    assert [note for note in corrected.notes if "although the file states m" in note] == [
+        "heights are read in mm, although the file states m",
+        "lengths along x and y are read in mm, although the file states m",
+    ]
+    stated = read_surface(path, pixel=3e-6)
+    assert stated.grid.spacing == pytest.approx((3e-6, 3e-6))
+    np.testing.assert_array_equal(stated.heights, plain.heights)
+    assert any("not the 2e-06 of the file" in note for note in stated.notes)
 
 
 def test_a_unit_other_than_a_length_is_refused(tmp_path):
@@ -90,12 +100,14 @@ def test_a_unit_other_than_a_length_is_refused(tmp_path):
         read_surface(xyz(tmp_path / "points.txt"), unit="furlong", lateral_unit="um")
 
 
-@pytest.mark.parametrize("unit", ["km", "pm"])
-def test_an_implausible_pixel_is_noted(tmp_path, unit):
-    measured = read_surface(
-        xyz(tmp_path / "points.txt", pixel=(2.0, 2.0)), unit="um", lateral_unit=unit
-    )
-    assert sum("check the lateral unit" in note for note in measured.notes) == 2
+@pytest.mark.parametrize(("unit", "pixel"), [("mm", 2e-3), ("pm", 2e-12)])
+def test_an_implausible_pixel_needs_a_confirmation(tmp_path, unit, pixel):
+    path = xyz(tmp_path / "points.txt", pixel=(2.0, 2.0))
+    with pytest.raises(BadInput, match=r"pixel of .* implausible .* or confirm by pixel"):
+        read_surface(path, unit="um", lateral_unit=unit)
+    confirmed = read_surface(path, unit="um", pixel=pixel)
+    assert confirmed.grid.spacing == pytest.approx((pixel, pixel))
+    assert sum("few maps have one" in note for note in confirmed.notes) == 2
 
 
 def assert_refused(path, message):
@@ -199,8 +211,8 @@ TABLES = {
 def test_columns_are_read_with_any_separator(tmp_path, table):
     name, text = TABLES[table]
     (tmp_path / name).write_text(text)
-    measured = read_surface(tmp_path / name, unit="um", lateral_unit="mm")
-    assert measured.grid.spacing[0] == pytest.approx(1e-3)
+    measured = read_surface(tmp_path / name, unit="um", lateral_unit="um")
+    assert measured.grid.spacing[0] == pytest.approx(1e-6)
     np.testing.assert_allclose(measured.profile, 1e-6 * (10.0 * np.arange(12) + 0.25), atol=1e-12)
 
 
@@ -214,14 +226,11 @@ def test_unevenly_spaced_points_are_interpolated_and_noted(tmp_path):
 
 @pytest.mark.parametrize("name", ["bare.txt", "bare.csv", "bare.npy"])
 def test_a_matrix_of_heights_requires_the_pixel_size(tmp_path, name):
-    heights = hills((12, 9)) * 1e6
+    rows = hills((12, 9)).T[::-1] * 1e6  # the first row is the top
     if name == "bare.npy":
-        np.save(tmp_path / name, heights)
+        np.save(tmp_path / name, rows)
     else:
         separator = "," if name == "bare.csv" else " "
-        rows = heights.T[
-            ::-1
-        ]  # the first line of a file is the top, the first column of an array the bottom
         (tmp_path / name).write_text(
             "\n".join(separator.join(f"{z:.9f}" for z in row) for row in rows)
         )
@@ -232,11 +241,6 @@ def test_a_matrix_of_heights_requires_the_pixel_size(tmp_path, name):
     measured = read_surface(tmp_path / name, unit="um", pixel=(2e-6, 3e-6))
     assert measured.grid.spacing == pytest.approx((2e-6, 3e-6))
     np.testing.assert_allclose(measured.heights, hills((12, 9)), atol=1e-14)
-
-
-def test_a_pixel_size_stated_in_the_file_is_not_overridden(x3p):
-    with pytest.raises(BadInput, match="states its own pixel"):
-        read_surface(x3p[0], pixel=1e-6)
 
 
 def test_implausibly_steep_heights_are_noted(tmp_path):

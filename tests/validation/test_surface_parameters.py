@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.contact.grid import Grid
+from asperity.core.third_party import surface_topography
 from asperity.surface import (
     MeasuredSurface,
     Surface,
@@ -12,7 +13,6 @@ from asperity.surface import (
     self_affine_surface,
 )
 from asperity.surface import surface_parameters as parameters
-from asperity.surface.read import surface_topography
 
 BOTH, NEITHER = (True, True), (False, False)
 

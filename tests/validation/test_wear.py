@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from asperity import run_wear
+from asperity.core.third_party import surface_topography
 from asperity.simulation import WearHistory
 from asperity.surface import MovingSurfaces, Surface
-from asperity.surface.read import surface_topography
 from support.wearing import DRY, POINT, worn_case
 
 MEASURED = Path(__file__).parents[2].parent / "shared" / "data" / "surfaces" / "milled_1.opd"

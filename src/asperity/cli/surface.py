@@ -141,6 +141,8 @@ def _parameters(description: "SurfaceDescription", *, named: bool) -> Block:
         else surface.length_text(measured.grid.extent[0])
     )
     rows: list[Row] = [("format", measured.format), ("size", size)]
+    if of_map:
+        rows.append(("orientation", f"rolling along {description.levelled.rolling_along}"))
     profile = () if of_map else map(description.symbol, select("profile"))
     rows += (
         known_rows(values, "film", "surface")

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
+from types import ModuleType
 
 MAX_LENGTH = 100  # characters of an error message
 _CONTROL_CHARACTERS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
@@ -43,3 +44,12 @@ def first_line(reason: object) -> str:
 def printable(text: str) -> str:
     """Replace terminal control characters, as names of files and channels are untrusted."""
     return _CONTROL_CHARACTERS.sub("?", text)
+
+
+def surface_topography() -> ModuleType:
+    """Import SurfaceTopography without its warning about missing MPI."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ImportWarning)
+        import SurfaceTopography
+    module: ModuleType = SurfaceTopography
+    return module

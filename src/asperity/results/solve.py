@@ -284,7 +284,7 @@ def run_of(
     if model is not None and vibration is None:
         with case.naming("vibration"):
             vibration = contact_vibration(state, case.conditions, model, solution=solution)
-    notes = (*notes, *solution_notes(solution))
+    notes = (*notes, *solution_notes(solution, standing=running is None))
     if solution.options.model == "conserving":
         notes = (*notes, threshold_note(solution))
     if not solution.convergence.converged:

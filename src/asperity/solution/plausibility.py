@@ -82,9 +82,12 @@ def inlet_notes(
     return ()
 
 
-def solution_notes(solution: ContactSolution) -> tuple[str, ...]:
-    """Return notes on a solution: pressure, grid edges, resolution, deviation from formulas."""
-    return tuple(_of_solution(solution))
+def solution_notes(solution: ContactSolution, *, standing: bool = True) -> tuple[str, ...]:
+    """Return notes on a solution: pressure, grid edges, resolution, deviation from formulas.
+
+    `standing` is False if the solution is the start of a contact whose roughness moves.
+    """
+    return tuple(_of_solution(solution, standing=standing))
 
 
 def undetermined(
@@ -193,7 +196,7 @@ def _oil(conditions: ContactConditions, lubricant: Lubricant) -> Iterator[str]:
         )
 
 
-def _of_solution(solution: ContactSolution) -> Iterator[str]:
+def _of_solution(solution: ContactSolution, *, standing: bool) -> Iterator[str]:
     conditions, lubricant = solution.conditions, solution.lubricant
     highest = float(solution.pressure.max())
     modulus = conditions.pair.effective_modulus
@@ -221,7 +224,7 @@ def _of_solution(solution: ContactSolution) -> Iterator[str]:
             f"and {wide} on cells twice as wide. CLR may therefore not converge with the grid; "
             "its interval covers one refinement only."
         )
-    if lubricant is not None and np.any(solution.surface.heights):
+    if standing and lubricant is not None and np.any(solution.surface.heights):
         ratio = least_film(conditions, lubricant) / solution.surface.sq
         if (
             ratio < THIN_FILM_RATIO
@@ -230,7 +233,7 @@ def _of_solution(solution: ContactSolution) -> Iterator[str]:
             yield (
                 f"The film ratio of {ratio:.2g} indicates mixed or boundary lubrication, but the "
                 "asperities carry almost no load: oil that flows past stationary roughness "
-                "flattens it. Moving roughness may differ; check with asperity run."
+                "flattens it. Moving roughness may carry more: contact.roughness = running."
             )
     if (profile := axial_distribution(solution)) is not None:
         yield from profile.undetermined

@@ -34,6 +34,7 @@ from .prepare import prepare_surface as prepare_surface
 from .profile import ProfileParameters as ProfileParameters
 from .profile import profile_parameters as profile_parameters
 from .read import read_surface as read_surface
+from .read import surface_from_array as surface_from_array
 from .spectrum import SurfaceSpectrum as SurfaceSpectrum
 from .spectrum import surface_spectrum as surface_spectrum
 from .write import write_surface as write_surface

@@ -140,7 +140,7 @@ def level(measured: MeasuredSurface, form: Form) -> tuple[MeasuredSurface, str]:
             f"{measured.name} has too few valid heights to remove a {form} form; use form none or "
             "measure again"
         )
-    offset = np.mean(measured.heights[finite])  # centimetres in some files: bad for least squares
+    offset = np.median(measured.heights[finite])  # centimetres in some files: bad for least squares
     heights = measured.heights - offset
     detail = ""
     if form == "cylinder":

@@ -76,6 +76,8 @@ class MeasuredSurface:
     `heights` [m] have shape (nx, ny), nan for missing cells; `grid` is centred on zero and not
     periodic. `name` and `format` are those of the file; `notes` are warnings, a sentence each.
     `uniform` is the axis along which a profile is extended unchanged; None for a map.
+    `rolling_along` is the direction in the file that became x, the rolling direction: `x`, or
+    `columns` of a table.
 
     Raises
     ------
@@ -89,6 +91,7 @@ class MeasuredSurface:
     format: str
     notes: tuple[str, ...] = ()
     uniform: int | None = None
+    rolling_along: str = "x"
 
     def __post_init__(self) -> None:
         if self.heights.shape != self.grid.cells:
@@ -134,8 +137,15 @@ class MeasuredSurface:
         )
         uniform = None if self.uniform is None else 1 - self.uniform
         return replace(
-            self, heights=np.ascontiguousarray(self.heights[:, ::-1].T), grid=grid, uniform=uniform
+            self,
+            heights=np.ascontiguousarray(self.heights[:, ::-1].T),
+            grid=grid,
+            uniform=uniform,
+            rolling_along=_ACROSS[self.rolling_along],
         )
+
+
+_ACROSS = {"x": "y", "y": "x", "columns": "rows", "rows": "columns"}
 
 
 def flat_surface(grid: Grid) -> Surface:

@@ -97,6 +97,7 @@ class SurfaceDescription:
             "pixel_m": list(self.measured.grid.spacing),
             "size_m": list(self.measured.grid.extent),
             "missing": self.measured.missing,
+            "rolling_along": self.levelled.rolling_along,
             **_by_key(self.parameters),
             "profile": None
             if self.profile is None

@@ -13,6 +13,7 @@ import scipy
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_choice
+from asperity.core.third_party import surface_topography
 from asperity.surface.condition import (
     DEFAULT_CONDITIONING,
     SIGMA_OVER_CUTOFF,
@@ -27,7 +28,6 @@ from asperity.surface.model import (
     require_roughness,
 )
 from asperity.surface.parameters import gradient
-from asperity.surface.read import surface_topography
 
 FitMode = Literal["crop", "tile"]
 

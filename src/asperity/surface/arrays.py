@@ -1,0 +1,144 @@
+"""Heights from arrays: of NumPy and xarray, in npy, npz and netCDF files.
+
+An array without names of its axes is a table: a row per y, a column per x, as in text files. With
+axes named x and y these decide, and coordinates along them give the pixel.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asperity.core.errors import UnreadableFile
+from asperity.core.third_party import first_line
+from asperity.surface.raw_map import RawMap, map_of_rows
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class NotForXarray(Exception):
+    """Raised for a netCDF file of SurfaceTopography, whose own reader knows it better."""
+
+
+_HEIGHT_NAMES = {"heights", "height", "topography", "z"}
+_EVEN = 0.01  # deviation of a coordinate from even steps, over the mean step
+
+
+def read_npy(path: Path) -> RawMap:
+    """Read heights from .npy."""
+    return array_map(path.name, _loaded(path), "npy")
+
+
+def read_npz(path: Path) -> RawMap:
+    """Read heights from .npz, with coordinates if it holds arrays x and y."""
+    import xarray
+
+    with _loaded(path) as content:
+        arrays = {name: np.asarray(content[name]) for name in content.files}
+    name = _heights_name(path.name, {key: array.ndim for key, array in arrays.items()})
+    rows = arrays[name]
+    x, y = arrays.get("x"), arrays.get("y")
+    if x is None or y is None or (y.shape, x.shape) != ((rows.shape[0],), (rows.shape[1],)):
+        return array_map(path.name, rows, "npz")
+    named = xarray.DataArray(rows, dims=("y", "x"), coords={"x": x, "y": y})
+    return array_map(path.name, named, "npz")
+
+
+def read_netcdf(path: Path) -> RawMap:
+    """Read heights from netCDF as xarray writes it.
+
+    Raises
+    ------
+    NotForXarray
+        SurfaceTopography wrote the file.
+    """
+    import xarray
+
+    with xarray.open_dataset(path) as dataset:
+        if any("length" in dataset[axis].attrs for axis in ("x", "y") if axis in dataset):
+            raise NotForXarray
+        name = _heights_name(path.name, {str(key): dataset[key].ndim for key in dataset.data_vars})
+        return array_map(path.name, dataset[name].load(), "netCDF")
+
+
+def array_map(name: str, heights: "np.ndarray | xarray.DataArray", form: str) -> RawMap:
+    """Return the map of an array of heights, in `unit` if it is an xarray with one.
+
+    Raises
+    ------
+    UnreadableFile
+        It has no two axes, is not of real numbers, or its coordinates are not evenly spaced.
+    """
+    if np.ndim(heights) != 2 or np.asarray(heights).dtype.kind not in "fiu":
+        raise UnreadableFile(
+            f"{name} holds an array of {np.ndim(heights)} axes and type {np.asarray(heights).dtype}"
+            "; give heights along x and y"
+        )
+    if isinstance(heights, np.ndarray):
+        return map_of_rows(heights.astype(np.float64), form)
+    if {str(dim).lower() for dim in heights.dims} == {"x", "y"}:
+        return _named_map(name, heights.transpose(*sorted(heights.dims, key=str)), form)
+    table = map_of_rows(np.asarray(heights, dtype=np.float64), form)
+    return replace(table, unit=_unit(heights.attrs))
+
+
+def _named_map(name: str, heights: "xarray.DataArray", form: str) -> RawMap:
+    """Return the map of heights along the axes x and y, in this order."""
+    pixel, units = [], []
+    for dim in heights.dims:
+        if dim not in heights.coords:
+            continue
+        coordinate = heights.coords[dim]
+        steps = np.diff(np.asarray(coordinate, dtype=np.float64))
+        step = steps.mean() if steps.size else np.nan
+        if not step or not np.max(np.abs(steps - step)) < _EVEN * abs(step):
+            raise UnreadableFile(
+                f"{name} has a coordinate {dim} that is not evenly spaced; interpolate it onto "
+                "even steps"
+            )
+        heights = heights.sortby(dim)
+        pixel.append(abs(float(step)))
+        units.append(_unit(coordinate.attrs))
+    if len(pixel) == 2 and units[0] != units[1]:
+        raise UnreadableFile(
+            f"{name} states x in {units[0] or 'no unit'} and y in {units[1] or 'no unit'}; give "
+            "both one unit"
+        )
+    return RawMap(
+        heights=np.ascontiguousarray(heights, dtype=np.float64),
+        pixel=(pixel[0], pixel[1]) if len(pixel) == 2 else None,
+        format=form,
+        unit=_unit(heights.attrs),
+        lateral_unit=units[0] if len(pixel) == 2 else None,
+    )
+
+
+def _unit(attributes: Mapping[Any, Any]) -> str | None:
+    unit = attributes.get("units", attributes.get("unit"))
+    return None if unit is None else str(unit)
+
+
+def _heights_name(file: str, axes: Mapping[str, int]) -> str:
+    """Return the name of the only map among arrays, or of the one named like heights."""
+    maps = [name for name, count in axes.items() if count == 2]
+    named = [name for name in maps if name.lower() in _HEIGHT_NAMES]
+    if len(maps) == 1 or len(named) == 1:
+        return (named or maps)[0]
+    listed = ", ".join(sorted(maps)) or "none"
+    raise UnreadableFile(
+        f"{file} must hold one map, or one named heights, got maps: {listed}; export one"
+    )
+
+
+def _loaded(path: Path) -> Any:
+    """Load an npy or npz file."""
+    try:
+        return np.load(path, allow_pickle=False)
+    except Exception as error:
+        raise UnreadableFile(
+            f"{path.name} is no readable {path.suffix} file ({first_line(error)}); export it again "
+            "with numpy"
+        ) from error
