@@ -31,6 +31,8 @@ def test_a_difference_is_detected():
     )
     assert differences({"load_error": 2e-9}, {"load_error": -3e-8}, 2e-3) == []
     assert len(differences({"load_error": 2e-9}, {"load_error": 2e-4}, 2e-3)) == 1
+    assert differences({"a": {"iterations": 20}}, {"a": {"iterations": 23}}, 2e-3) == []
+    assert len(differences({"a": {"iterations": 20}}, {"a": {"iterations": 25}}, 2e-3)) == 1
     assert differences(then, {"rows": []}, 2e-3) == [
         ".rows: [{'clr': 0.5, 'found': True, 'reason': None}] is now []"
     ]

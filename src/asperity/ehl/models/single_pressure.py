@@ -317,8 +317,7 @@ class Problem:
         faces = Faces._make([*east, *north, inlet, np.array(wedge), *by_gap, behind])
         mean = face_mobilities.MEANS[2 if self.exact else int(self.accurate)]
         face_mobilities.face_mobilities(film, height, mean, self._ends, faces)
-        outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
-        self._fill_outflow(pressure, film, faces, gap, outflow, diagonal)
+        outflow, diagonal = self._outflow(pressure, film, faces, gap)
         return film, faces, outflow, 1.0 / diagonal
 
     def _film(self, pressure: Field, height: Field, oil: Lubricant, least_mobility: float) -> Film:
@@ -357,16 +356,11 @@ class Problem:
         x = first + dx * np.arange(-cells, 0)[:, None]
         return np.asarray(np.maximum(gap[0] + (x**2 - first**2) / 2.0, self.contact_gap))
 
-    def _fill_outflow(
-        self,
-        pressure: Field,
-        film: Film,
-        faces: Faces,
-        gap: Field,
-        outflow: Field,
-        diagonal: Field,
-    ) -> None:
-        """Fill the net outflow and its diagonal."""
+    def _outflow(
+        self, pressure: Field, film: Film, faces: Faces, gap: Field
+    ) -> tuple[Field, Field]:
+        """Return the net outflow of each cell and its derivative in the cell's own pressure."""
+        outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
         (dx, dy), past, content = self.spacing, self.past, film.content
         compliance = self.deflection.local_compliance
         if past is not None and past.lagrangian:
@@ -383,11 +377,11 @@ class Problem:
             entering = self.entering(gap)
             reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
             reynolds.fluid_diagonal(film, faces, compliance, dx, dy, diagonal)
-        if past is None:
-            return
-        outflow += past.rate * content + past.source
-        # compliance less that of far cells, as in a touching cell: stored oil is as stiff
-        diagonal += past.rate * (film.content_by_gap * self.softness + film.content_by_pressure)
+        if past is not None:
+            outflow += past.rate * content + past.source
+            # compliance less that of far cells, as in a touching cell: stored oil is as stiff
+            diagonal += past.rate * (film.content_by_gap * self.softness + film.content_by_pressure)
+        return outflow, diagonal
 
 
 @dataclass(frozen=True, slots=True)

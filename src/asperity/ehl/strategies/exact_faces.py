@@ -74,8 +74,8 @@ class ExactFaceSearch(Search):
     def solve_exact(self, problem: Problem, unknowns: Pressures, tolerance: float) -> Step:
         """Solve by shared steps on the second-order wedge, or by cell through the first order."""
         max_steps = min(SEARCH.max_exact_iterations, self.options.max_iterations)
-        in_time = problem.past is not None
-        soon = min(SEARCH.max_time_step_iterations, max_steps) if in_time else max_steps
+        steady = problem.past is None
+        soon = max_steps if steady else min(SEARCH.max_time_step_iterations, max_steps)
         steps = newton(problem, unknowns, second_order=True)
         step = self.run(problem, steps, tolerance, soon)
         if self.converged(tolerance):
