@@ -17,7 +17,8 @@ PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8
 def asp(tmp_path, monkeypatch, capsys):
     """Return a function that runs a command beside a small case: exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
-    alone = PAPER.replace("[256, 256]", "[64, 64]").replace("[solver]", "[solver]\nsurfaces = 1")
+    few = "[solver]\nsurfaces = 1\nrunning_cells = 600"
+    alone = PAPER.replace("[256, 256]", "[64, 64]").replace("[solver]", few)
     Path("case.toml").write_text(alone, "utf-8")
 
     def run(*arguments: str) -> tuple[int, str, str]:

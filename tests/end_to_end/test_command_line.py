@@ -349,7 +349,8 @@ def test_a_surface_on_another_grid_is_refused():
 
 def test_demo_runs_from_case_to_report(asp, monkeypatch):
     """On fewer cells than the paper's case; CI runs `make demo` on all."""
-    fewer = papers_case().with_overrides({"grid.cells": [96, 96]}).text
+    few = {"grid.cells": [96, 96], "solver.running_cells": 600}
+    fewer = papers_case().with_overrides(few).text
     assert papers_case().grid.cells == (256, 256)
     monkeypatch.setattr("asperity.paper.papers_text", lambda: fewer)
     code, out, _ = asp("demo", "--out", "shown")

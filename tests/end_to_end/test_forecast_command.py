@@ -161,7 +161,7 @@ def test_infer_forecasts_with_a_wear_history_and_a_measured_surface(asp, series)
         "--workers",
         "1",
     )
-    assert asp("wear", "wear.toml", "--hours", "1", "--out", "worn", *coarse)[0] == 0
+    assert asp("wear", "wear.toml", "--hours", "1", "--out", "worn", "--snapshot", *coarse)[0] == 0
     code, out, _ = asp("infer", *series, *LIMIT, "--worn", "worn", "--json")
     expected = json.loads(out)["forecast"]
     assert code == 3

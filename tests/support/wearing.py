@@ -11,6 +11,7 @@ length = "10 mm"
 load = "500 N"
 entrainment_speed = "1.91 m/s"
 slip = 0.2
+roughness = "standing"
 [material]
 youngs_modulus = "200 GPa"
 poisson_ratio = 0.3

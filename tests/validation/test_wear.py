@@ -68,8 +68,9 @@ def test_worn_volume_is_k_times_load_times_sliding_distance(rough):
         )
 
 
-def test_depth_per_passage_is_k_times_line_load_times_sliding_over_surface_speed():
-    history = worn(0.01)
+@pytest.mark.parametrize("roughness", ["standing", "running"])
+def test_depth_per_passage_is_k_times_line_load_times_sliding_over_surface_speed(roughness):
+    history = worn(0.01, {"contact.roughness": roughness})
     assert len(history.table) == 2  # a single jump, at the pressure of the initial surfaces
     conditions, clr = history.case.conditions, float(history.table["clr"].iloc[0])
     assert 0.1 < clr < 0.99  # the oil carries part of the load
@@ -211,10 +212,7 @@ def test_the_error_of_the_volume_covers_the_length_of_jumps():
     """Halving `step` from 0.1 to 0.0125 lowers the volume by 3.5 %: a jump removes at its initial
     rate, while wear slows down. The last two steps extrapolate to 4.0 % below the first.
     """
-    whole, half = (
-        run_wear(worn_case({"wear.step": step, "contact.roughness": "standing"}), hours=0.3)
-        for step in (0.1, 0.05)
-    )
+    whole, half = (run_wear(worn_case({"wear.step": step}), hours=0.3) for step in (0.1, 0.05))
     reference = 8.451e-12  # from steps of 0.025 and 0.0125
     for history in (whole, half):
         high = history.worn_volume[0] / reference - 1.0
