@@ -12,8 +12,8 @@ import pytest
 
 from asperity.case import case_template, load_case
 from asperity.contact.grid import Grid
-from asperity.core.errors import BadInput
-from asperity.ehl import half_as_many, least_film, running_cells
+from asperity.core.errors import BadInput, NotConverged
+from asperity.ehl import half_as_many, least_film, running_cells, solve_contact
 from asperity.results import load_run, running_surfaces, solve_case
 from asperity.results.running import _moments
 from asperity.solution import contact_state
@@ -95,6 +95,33 @@ def test_only_standing_roughness_is_said_to_carry_too_little():
     remark = "asperities carry almost no load"
     assert sum(remark in note for note in standing.notes) == 1
     assert not any(remark in note for note in running.notes)
+
+
+def test_a_start_that_does_not_converge_does_not_change_the_mean(run, monkeypatch, tmp_path):
+    """Each time step has the oil of the one before, and the start is cut off."""
+
+    def of_few_steps(*arguments, options, **more):
+        return solve_contact(*arguments, options=replace(options, max_iterations=2), **more)
+
+    monkeypatch.setattr("asperity.transient.motion.solve_contact", of_few_steps)
+    approximate = solve_case(run.case, surfaces=2)
+    assert approximate.converged
+    assert approximate.running.failed == 0
+    assert approximate.running.clr.value == pytest.approx(run.running.clr.value, abs=0.01)
+    assert run.snapshot_clr is not None
+    assert approximate.snapshot_clr is None
+    assert approximate.scalars()["snapshot_clr"] is None
+    assert "not determined in a snapshot of standing roughness" in approximate.verdict()
+    assert any("those of its last moment" in note for note in approximate.notes)
+    approximate.save(tmp_path / "run.nc")
+    assert load_run(tmp_path / "run.nc").summary() == approximate.summary()
+
+
+def test_a_contact_whose_time_steps_fail_ends_after_one_passage():
+    hopeless = load_case(PAPER).with_overrides(RUNNING | {"solver.max_iterations": 1})
+    with pytest.raises(NotConverged, match="contact not solved: out of iterations") as caught:
+        solve_case(hopeless)
+    assert not caught.value.solution.convergence.converged
 
 
 def test_one_contact_among_many_has_fewer_cells_unless_it_states_how_many():

@@ -12,6 +12,7 @@ from .lubricant import SheetSection as SheetSection
 from .machines import MachineCase as MachineCase
 from .machines import has_machine as has_machine
 from .machines import load_machine as load_machine
+from .materials import MaterialSection as MaterialSection
 from .messages import Section as Section
 from .messages import parse_section as parse_section
 from .ratings import RatingSection as RatingSection
@@ -19,7 +20,6 @@ from .roller_shape import ShapeSection as ShapeSection
 from .sections import CaseFile as CaseFile
 from .sections import ContactSection as ContactSection
 from .sections import GridSection as GridSection
-from .sections import MaterialSection as MaterialSection
 from .sections import MotionSection as MotionSection
 from .sections import SolverSection as SolverSection
 from .study import RangeSection as RangeSection

@@ -12,9 +12,10 @@ import tomli_w
 from pydantic import BeforeValidator, PlainValidator
 
 from asperity.case.case import Case
+from asperity.case.materials import MaterialSection
 from asperity.case.messages import Section, choose, parse_section
 from asperity.case.ratings import RatingSection
-from asperity.case.sections import CaseFile, MaterialSection
+from asperity.case.sections import CaseFile
 from asperity.case.text import Tables, parse_toml, read_text, replaced
 from asperity.case.units import (
     OPTIONAL,
@@ -30,6 +31,7 @@ from asperity.case.units import (
     plain,
 )
 from asperity.contact.conditions import ElasticPair
+from asperity.contact.materials import material
 from asperity.core.documents import Table
 from asperity.core.errors import BadInput
 from asperity.machine import (
@@ -154,7 +156,7 @@ def _sections() -> dict[str, type[Section]]:
     return {kind: section for kind, (section, _) in MACHINES.items()}
 
 
-STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3}  # default of [material]
+GEAR_STEEL, BEARING_STEEL = "case-hardened steel", "through-hardened bearing steel"
 
 
 class _MachineTables(Section):
@@ -169,13 +171,15 @@ class _MachineTables(Section):
 class MachineCase:
     """Machine as its case file states it; created by `load_machine`.
 
-    `tables` are the file's, `folder` is the base of surface files, `source` the name of the case in
-    messages. `rating` has further data for rating standards.
+    `hardness` [Pa] bounds the pressure, None for elastic bodies. `tables` are the file's, `folder`
+    is the base of surface files, `source` the name of the case in messages. `rating` has further
+    data for rating standards.
     """
 
     tables: Table
     machine: Machine
     pair: ElasticPair
+    hardness: float | None
     rating: RatingSection
     folder: Path = field(compare=False, repr=False)
     source: str = field(compare=False)
@@ -188,12 +192,20 @@ class MachineCase:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes for a reader of the contacts, one sentence each."""
-        assumed = (
-            ()
-            if "material" in self.tables
-            else ("Both bodies are assumed to be steel, E 206 GPa and ν 0.3.",)
+        notes = self.machine.notes(self.pair)
+        if "material" in self.tables:
+            return notes
+        assumed = material(self.default_material)
+        return (
+            *notes,
+            f"Both bodies are assumed to be {assumed.name}: E {assumed.youngs_modulus / 1e9:g} "
+            f"GPa, ν {assumed.poisson_ratio:g}, hardness {assumed.hardness / 1e9:g} GPa.",
         )
-        return (*self.machine.notes(self.pair), *assumed)
+
+    @property
+    def default_material(self) -> str:
+        """Name of the material of both bodies if the case states none."""
+        return _default_material(self.machine)
 
     @property
     def text(self) -> str:
@@ -229,7 +241,7 @@ class MachineCase:
     def case(self, contact: MachineContact) -> Case:
         """Return the case of one of the contacts; BadInput as `load_case`."""
         sections = {key: table for key, table in self.tables.items() if key not in MACHINE_TABLES}
-        tables = {"material": STEEL, **sections}
+        tables = {"material": {"name": self.default_material}, **sections}
         contents = parse_section(
             CaseFile, {**tables, "contact": self.contact_table(contact)}, self.source
         )
@@ -277,23 +289,31 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
             f"contact.{', '.join(OF_ALL_CONTACTS)}"
         )
     present = {key: tables[key] for key in _MachineTables.model_fields if key in tables}
-    parsed = parse_section(_MachineTables, {"material": STEEL, **present}, source)
+    steel = {"name": BEARING_STEEL}  # elastic constants are those of any steel
+    parsed = parse_section(_MachineTables, {"material": steel, **present}, source)
     section = parsed.machine
-    material = parsed.material
-    pair = ElasticPair(plain(material.youngs_modulus), material.poisson_ratio)
+    stated = parsed.material
+    pair = ElasticPair(plain(stated.youngs_modulus), stated.poisson_ratio)
     arguments = {
         name: plain(getattr(section, name)) for name in type(section).model_fields if name != "kind"
     }
     try:
         machine = MACHINES[section.kind][1](**arguments)
         parsed.rating.require_applicable(section.kind)
-        machine_case = MachineCase(tables, machine, pair, parsed.rating, folder, source)
+        hardness = plain(stated.hardness)
+        if "material" not in tables:
+            hardness = material(_default_material(machine)).hardness
+        machine_case = MachineCase(tables, machine, pair, hardness, parsed.rating, folder, source)
         drawn = [contact for contact in machine_case.contacts if not contact.stands_still]
     except BadInput as refusal:
         raise BadInput(f"{source}: machine: {refusal}") from None
     if machine_case.complete and drawn:
         machine_case.case(drawn[0])  # checks the remaining tables
     return machine_case
+
+
+def _default_material(machine: Machine) -> str:
+    return GEAR_STEEL if isinstance(machine, SpurGear) else BEARING_STEEL
 
 
 def _written(value: float, unit: str) -> str:

@@ -1,5 +1,6 @@
 """Sections of a case file, in its order."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PlainValidator, Strict, field_validator, model_validator
@@ -7,19 +8,18 @@ from pydantic import Field, PlainValidator, Strict, field_validator, model_valid
 from asperity.case.infer import InferSection, parse_infer
 from asperity.case.laws import LubricantSection, ThermalSection
 from asperity.case.lubricant import SheetSection, parse_lubricant
+from asperity.case.materials import MaterialSection, with_named_solids
 from asperity.case.messages import LocatedError, Section, quoted
 from asperity.case.roller_shape import ShapeSection
 from asperity.case.study import StudySection, parse_study
 from asperity.case.surfaces import RoughBody, SurfaceSection, parse_surface
 from asperity.case.units import (
     OPTIONAL,
-    PAIRED,
     Amount,
     Count,
     Force,
     Length,
     Number,
-    Pressure,
     SpeedOrRest,
     default_amount,
     parse_amount,
@@ -29,7 +29,6 @@ from asperity.case.wear import WearSection
 from asperity.contact.conditions import Geometry
 from asperity.core.errors import BadInput
 from asperity.ehl import MAX_CELLS_PER_TIME_STEP, ContactModel, Options, Start
-from asperity.solution import BOUNDARY_FRICTION
 
 MAX_FREQUENCIES = 200  # of the dynamic stiffness
 
@@ -55,15 +54,6 @@ class ContactSection(Section):
     slip: Number = 0.0  # slide-to-roll ratio (u1 - u2)/entrainment speed
     # mean over time of roughness that moves with its body, or a snapshot of roughness at rest
     roughness: Literal["running", "standing"] = "running"
-
-
-class MaterialSection(Section):
-    """[material]: the two bodies."""
-
-    youngs_modulus: Annotated[tuple[Pressure, Pressure], PAIRED]
-    poisson_ratio: Annotated[tuple[Number, Number], PAIRED]
-    hardness: Annotated[Pressure | None, OPTIONAL] = None
-    boundary_friction: Annotated[float, Strict(), Field(ge=0.0, le=2.0)] = BOUNDARY_FRICTION
 
 
 def _parse_cells(value: object) -> Literal["auto"] | tuple[int, int]:
@@ -156,6 +146,11 @@ class CaseFile(Section):
     motion: Annotated[MotionSection | None, OPTIONAL] = None
     wear: Annotated[WearSection | None, OPTIONAL] = None
     infer: Annotated[InferSection | None, PlainValidator(parse_infer)] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_solids(cls, tables: object) -> object:
+        return with_named_solids(tables) if isinstance(tables, Mapping) else tables
 
     @model_validator(mode="after")
     def _oil_moves(self) -> Self:

@@ -12,6 +12,7 @@ import tomli_w
 
 from asperity.case.infer import InferSection
 from asperity.case.lubricant import SheetSection
+from asperity.case.materials import NAMED, NAMED_THERMAL
 from asperity.case.messages import Section, parse_section, quoted
 from asperity.case.sections import CaseFile
 from asperity.case.study import StudySection
@@ -54,6 +55,8 @@ def restated(contents: CaseFile) -> str:
     tables = _plain(contents)
     if contents.lubricant is None:
         tables["lubricant"] = "none"
+    if contents.material.name is not None and contents.material.hardness is None:
+        tables["material"]["hardness"] = "none"  # its name would determine it
     if isinstance(contents.lubricant, SheetSection):  # determines these values
         for key in contents.thermal.defaulted:
             del tables["thermal"][key]
@@ -75,8 +78,13 @@ copyreg.pickle(CaseFile, _as_text)
 def replaced(tables: Tables, overrides: Mapping[str, object], source: str) -> Tables:
     """Return the tables with values replaced by dotted keys; text is parsed as TOML if possible.
 
-    `vibration.preset` replaces all keys that presets determine. Raises BadInput for an invalid key.
+    `vibration.preset` and `material.name` replace all keys that they determine. Raises BadInput
+    for an invalid key.
     """
+    if "material.name" in overrides:
+        for section, keys in (("material", NAMED), ("thermal", NAMED_THERMAL)):
+            for key in keys:
+                tables.get(section, {}).pop(key, None)
     if "vibration.preset" in overrides:  # values of the old preset would override the new one
         for choice in preset_keys():
             tables.get("vibration", {}).pop(choice, None)

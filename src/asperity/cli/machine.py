@@ -44,6 +44,8 @@ SOLVED = (
     "lambda_ratio",
     "clr",
     "car",
+    "p_max_pa",
+    "von_mises_core_pa",
     "friction_coefficient",
     "flash_temperature_max_k",
     "crf_hz",

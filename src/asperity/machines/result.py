@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from asperity.case import MachineCase
+from asperity.contact.materials import material
 from asperity.core.quantities import quantity
 from asperity.machine import MachineContact
 from asperity.machines.ratings import DangVan, Rating, dang_van_below, machine_ratings, warmer_teeth
@@ -14,6 +15,7 @@ from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW, Run
 
 STATIC_LIMIT = 4.2e9  # Hertz pressure of hardened bearing steel, ISO 76 [Pa]
 STEEL_FROM = 180e9  # Young's modulus of both bodies from which the limit applies [Pa]
+YIELD_RATIO = 3.0  # hardness over yield stress (D. Tabor, The Hardness of Metals, 1951)
 Row: TypeAlias = dict[str, Any]  # conditions and numbers of a contact by key
 VERDICT_RATINGS = ("viscosity_ratio", "life_factor", "rated_film", "scuffing_margin_k")
 
@@ -73,9 +75,34 @@ class MachineResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on the contacts, one sentence each."""
-        return (*self.case.notes, *self._yielding(), *warmer_teeth(self.case, self.ratings))
+        yielding = *self._above_static_limit(), *self._above_hardness()
+        return (*self.case.notes, *yielding, *warmer_teeth(self.case, self.ratings))
 
-    def _yielding(self) -> Iterator[str]:
+    def _above_hardness(self) -> Iterator[str]:
+        """Warn of stresses that the bodies do not bear, in solved contacts."""
+        hardness = self.case.hardness
+        steel = material(self.case.default_material)
+        solved = [row for row in self.rows if row.get("p_max_pa") is not None]
+        if not solved:
+            return
+        pressed = max(solved, key=lambda row: row["p_max_pa"])
+        stressed = max(solved, key=lambda row: row["von_mises_core_pa"] or 0.0)
+        pressure, stress = pressed["p_max_pa"], stressed["von_mises_core_pa"] or 0.0
+        limit, unit = (hardness or steel.hardness), quantity("p_max_pa")
+        if hardness is None and pressure > limit:
+            yield (
+                f"The maximum pressure of {unit.text(pressure)} at {pressed['name']} is above "
+                f"{unit.text(limit)}, the hardness of {steel.name}: asperities yield. State "
+                "material.hardness, or material.name."
+            )
+        if stress > limit / YIELD_RATIO:
+            yield (
+                f"The von Mises stress of {unit.text(stress)} below the surface at "
+                f"{stressed['name']} is above {unit.text(limit / YIELD_RATIO)}, about the yield "
+                f"stress at a hardness of {unit.text(limit)}: the body deforms plastically."
+            )
+
+    def _above_static_limit(self) -> Iterator[str]:
         """Warn of a Hertz pressure above the static limit of steel."""
         highest = max(self.rows, key=lambda row: row["p_hertz_pa"])
         steel = min(self.case.pair.youngs_moduli) > STEEL_FROM

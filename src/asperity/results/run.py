@@ -306,8 +306,8 @@ class Run:
         return not moved and self.state.sq > 0.0 and self.case.roughness_moves
 
     @property
-    def snapshot_clr(self) -> float:
-        """Load share of standing roughness."""
+    def snapshot_clr(self) -> float | None:
+        """Load share of standing roughness; None if that did not converge."""
         return self.state.clr if self.running is None else self.running.snapshot_clr
 
     def summary(self) -> dict[str, object]:
@@ -385,7 +385,9 @@ class Run:
         )
         if self.running is None:
             return regime, shared
-        standing = quantity("clr").text(self.snapshot_clr)
+        standing = "not determined"
+        if self.snapshot_clr is not None:
+            standing = quantity("clr").text(self.snapshot_clr)
         return regime, f"{shared}, {standing} in a snapshot of standing roughness"
 
     def _ends_text(self) -> str:

@@ -58,6 +58,15 @@ AT_MOMENTS = ("sharing", "heat", "stress")  # ... at some
 WITHOUT = ("_error", "_error_m")  # keys of error bars, which the grids determine
 MOST_TRACK_LENGTHS = 16  # of a generated track, in lengths of the domain
 MAX_FAILED = 0.02  # share of the time steps that may miss the tolerance
+_FROM_START = (
+    "Maps, distributions and the contact's own resonance are those of the snapshot from which the "
+    "running contact starts, with its roughness standing still."
+)
+_FROM_END = (
+    "The contact with standing roughness did not converge, so that the running contact starts from "
+    "an approximation; maps, distributions and the contact's own resonance are those of its last "
+    "moment."
+)
 ERRORS = {"clr": "clr_error", "car": "car_error", "h_min_m": "h_min_error_m"} | {
     "h_central_m": "h_central_error_m"
 }
@@ -68,15 +77,15 @@ class Running:
     """Running contact: means over time and tracks by catalogue key, SI.
 
     `clr` is the mean load share with its interval, `snapshot_clr` that of standing roughness at
-    the start of the first track. `cells` are those of the fine grid; `steps` and `failed` time
-    steps were computed and not converged on all grids and tracks. `time_s` and `series` are the
-    load share of the first track over time on the fine grid, the first `cut` passages of
-    `steps_per_passage` steps being cut off.
+    the start of the first track, None if that did not converge. `cells` are those of the fine grid;
+    `steps` and `failed` time steps were computed and not converged on all grids and tracks.
+    `time_s` and `series` are the load share of the first track over time on the fine grid, the
+    first `cut` passages of `steps_per_passage` steps being cut off.
     """
 
     numbers: dict[str, Scalar]
     clr: TimeMean
-    snapshot_clr: float
+    snapshot_clr: float | None
     tracks: int
     cells: tuple[int, int]
     steps: int
@@ -188,7 +197,9 @@ def run_tracks(
     workers: int = 1,
     progress: TrackProgress = NO_PROGRESS,
 ) -> tuple[Running, ContactSolution, list[str]]:
-    """Return the running contact, its snapshot on the fine grid, and notes.
+    """Return the running contact, a moment of it on the fine grid, and notes.
+
+    The moment is the start, with standing roughness, or the last one if that did not converge.
 
     Parameters
     ----------
@@ -202,7 +213,7 @@ def run_tracks(
     BadInput
         for tracks that a measured surface does not cover.
     NotConverged
-        if the snapshot of the first track does not converge.
+        if most time steps do not converge.
     """
     cells = case.running_cells()
     coarse_cells = half_as_many(case.conditions, case.grid, cells)
@@ -225,12 +236,14 @@ def run_tracks(
     else:
         everything = [own.value, *(other.value for other in others if other.value is not None)]
     running = _running(case, everything, fine)
-    return running, fine.kept[0].solution, _notes(running, everything, [own, *others])
+    moment = fine.kept[0 if running.snapshot_clr is not None else -1].solution
+    return running, moment, _notes(running, everything, [own, *others])
 
 
 def _notes(running: Running, coarse: list[Series], outcomes: list[Determined[Series]]) -> list[str]:
     """Return notes on tracks that failed or are not stationary, and on failed time steps."""
-    notes = [
+    notes = [_FROM_START if running.snapshot_clr is not None else _FROM_END]
+    notes += [
         f"Track {number} of {len(outcomes)} is left out: {outcome.reason.rstrip('.')}."
         for number, outcome in enumerate(outcomes, 1)
         if outcome.value is None and number > 1
@@ -256,7 +269,7 @@ def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
     """Return the running contact of all series."""
     cuts = [_cut(series) for series in coarse]
     everything = coarse if fine is coarse[0] else [*coarse, fine]
-    means = time_means(coarse, cuts, fine)
+    means, start = time_means(coarse, cuts, fine), fine.kept[0]
     totals: dict[str, Scalar] = {
         "iterations": sum(series.iterations for series in everything),
         "seconds": sum(series.seconds for series in everything),
@@ -264,7 +277,7 @@ def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
     return Running(
         numbers=_numbers(case, means, _moments(fine, cuts[0])) | totals,
         clr=replace(means["clr"], time=min(means["clr"].time, 1.0)),  # the range of a share
-        snapshot_clr=fine.kept[0].state.clr,
+        snapshot_clr=start.state.clr if start.solution.convergence.converged else None,
         tracks=len(coarse),
         cells=fine.cells,
         steps=sum(len(series.values) - 1 for series in everything),

@@ -137,11 +137,7 @@ def _running(
         if strict:
             raise NotConverged(solution, str(failure)) from None
         return run_of(case, solution, notes, groups=groups)
-    of_snapshot = (
-        "Maps, distributions and the contact's own resonance are those of the snapshot from which "
-        "the running contact starts, with its roughness standing still."
-    )
-    notes += [of_snapshot, *remarks]
+    notes += remarks
     attributes |= {"notes": json.dumps(notes), "running": running.to_json()}
     solution = replace(solution, attributes=attributes)
     run = run_of(case, solution, notes, groups=groups, running=running)

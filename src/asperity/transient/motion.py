@@ -83,6 +83,7 @@ def moving_contact(
     time_step: float = 1.0,
     flattening: bool = False,
     options: Options | None = None,
+    strict: bool = True,
 ) -> Iterator[Snapshot]:
     """Yield the contact at time 0 and after each time step, without end.
 
@@ -97,6 +98,7 @@ def moving_contact(
     flattening : lower the rough surface permanently by the overlap that the pressure cap permits
         (half each if both are rough)
     options : solver settings of every step; default `Options()`
+    strict : raise if the initial solution does not converge; otherwise march from its last iterate
 
     A step that does not converge is yielded, marked in `solution.convergence`, and the next step
     starts from it.
@@ -107,7 +109,7 @@ def moving_contact(
         for a time step that is not positive or longer than 8 cells, an unknown start, and as
         `solve_contact`.
     NotConverged
-        if the initial solution does not converge.
+        if `strict` and the initial solution does not converge.
     """
     require_positive("time step", time_step, "cells")
     if time_step > MAX_CELLS_PER_TIME_STEP:
@@ -122,7 +124,7 @@ def moving_contact(
         conditions, lubricant, surfaces, options or Options(), time_step, flattening
     )
     if resume is None:
-        first = contact.start(steady=start == "steady")
+        first = contact.start(steady=start == "steady", strict=strict)
         yield first
         resume = first.memory
     for number in count(int(resume["number"]) + 1):
@@ -166,11 +168,11 @@ class _TransientContact:
         self.cells = int(time_step)  # that oil travels in a step, if it is followed
         self.moved = _cells_moved(surfaces, self.seconds)
 
-    def start(self, *, steady: bool) -> Snapshot:
+    def start(self, *, steady: bool, strict: bool) -> Snapshot:
         """Return the snapshot at time 0, from a steady contact (`steady`) or from rest."""
         surface = self.surfaces.composite_at(0.0)
         oil = self.lubricant if steady else None
-        solution = solve_contact(self.conditions, oil, surface, options=self.options)
+        solution = solve_contact(self.conditions, oil, surface, options=self.options, strict=strict)
         solution = replace(solution, lubricant=self.lubricant)
         approach = solution.rigid_approach / self.scales.gap
         pressure = solution.pressure / self.scales.pressure

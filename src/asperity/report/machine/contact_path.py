@@ -23,6 +23,7 @@ SOLVED = (  # key of a row, and of the quantity that formats it
     ("friction_coefficient", "friction_coefficient"),
     ("friction_power_w", "friction_power_w"),
     ("flash_temperature_max_k", "flash_temperature_max_k"),
+    ("p_max_pa", "p_max_pa"),
     ("von_mises_core_pa", "von_mises_core_pa"),
     ("crf_hz", "crf_hz"),
 )
