@@ -133,7 +133,10 @@ def test_good_surfaces_are_shown_beside_a_bad_one(asp):
     [
         (("surface", "ground.x3p", "--form", "sphere"), "form must be one of"),
         (("surface", "ground.x3p", "--l-filter", "3"), "--l-filter must be a length"),
-        (("surface", "ground.x3p", "--pixel", "2 um"), "states its own pixel"),
+        (
+            ("surface", "ground.x3p", "--pixel", "2 um", "--lateral-unit", "um"),
+            "leave out --pixel or",
+        ),
         (("surface", "line.csv"), "give unit"),
     ],
 )

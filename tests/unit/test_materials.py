@@ -97,7 +97,7 @@ def test_an_unknown_name_is_refused(name, message):
         case(name)
 
 
-def test_a_machine_without_material_has_hardened_steel_and_says_so(tmp_path):
+def test_a_machine_without_material_has_hardened_steel_with_a_note(tmp_path):
     (tmp_path / "gears.toml").write_text(GEARS, "utf-8")
     gears = load_machine(tmp_path / "gears.toml")
     assert gears.hardness == 6.8e9

@@ -75,7 +75,7 @@ def test_a_grid_too_coarse_for_another_leaves_clr_undetermined():
     assert numbers["sq_m"] == pytest.approx(1e-6)
 
 
-def test_only_standing_roughness_is_said_to_carry_too_little():
+def test_the_note_on_too_little_load_is_for_standing_roughness_only():
     """The snapshot at the start of a running contact may carry as little: it is not the answer."""
     changes = {
         "contact.load": "500 N",

@@ -11,7 +11,7 @@ from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl import Options, Scales, SolveStatus, solve_contact
 from asperity.ehl.linear_solvers.mixed import MixedLinear, newton_step
 from asperity.ehl.models.mixed import Pressures, evaluate
-from asperity.ehl.models.single_pressure import TransientTerm
+from asperity.ehl.models.transient_term import TransientTerm
 from asperity.ehl.problem_setup import contact_problem
 from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.solution import clr_below, contact_state, load_solution, sharing_by_film

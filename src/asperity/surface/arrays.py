@@ -4,10 +4,10 @@ An array without names of its axes is a table: a row per y, a column per x, as i
 axes named x and y these decide, and coordinates along them give the pixel.
 """
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,24 +27,17 @@ _HEIGHT_NAMES = {"heights", "height", "topography", "z"}
 _EVEN = 0.01  # deviation of a coordinate from even steps, over the mean step
 
 
-def read_npy(path: Path) -> RawMap:
-    """Read heights from .npy."""
-    return array_map(path.name, _loaded(path), "npy")
-
-
-def read_npz(path: Path) -> RawMap:
-    """Read heights from .npz, with coordinates if it holds arrays x and y."""
+def read_numpy(path: Path) -> RawMap:
+    """Read heights from .npy, or from .npz, with coordinates if that holds arrays x and y."""
     import xarray
 
-    with _loaded(path) as content:
-        arrays = {name: np.asarray(content[name]) for name in content.files}
+    arrays, form = _loaded(path), path.suffix.lower().removeprefix(".")
     name = _heights_name(path.name, {key: array.ndim for key, array in arrays.items()})
-    rows = arrays[name]
-    x, y = arrays.get("x"), arrays.get("y")
-    if x is None or y is None or (y.shape, x.shape) != ((rows.shape[0],), (rows.shape[1],)):
-        return array_map(path.name, rows, "npz")
+    rows, x, y = arrays[name], arrays.get("x"), arrays.get("y")
+    if x is None or y is None or (y.size, x.size) != rows.shape:
+        return array_map(path.name, rows, form)
     named = xarray.DataArray(rows, dims=("y", "x"), coords={"x": x, "y": y})
-    return array_map(path.name, named, "npz")
+    return array_map(path.name, named, form)
 
 
 def read_netcdf(path: Path) -> RawMap:
@@ -116,7 +109,7 @@ def _named_map(name: str, heights: "xarray.DataArray", form: str) -> RawMap:
     )
 
 
-def _unit(attributes: Mapping[Any, Any]) -> str | None:
+def _unit(attributes: Mapping[Hashable, object]) -> str | None:
     unit = attributes.get("units", attributes.get("unit"))
     return None if unit is None else str(unit)
 
@@ -133,10 +126,14 @@ def _heights_name(file: str, axes: Mapping[str, int]) -> str:
     )
 
 
-def _loaded(path: Path) -> Any:
-    """Load an npy or npz file."""
+def _loaded(path: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of an npy or npz file by name."""
     try:
-        return np.load(path, allow_pickle=False)
+        content = np.load(path, allow_pickle=False)
+        if isinstance(content, np.ndarray):
+            return {"heights": content}
+        with content:
+            return {name: np.asarray(content[name]) for name in content.files}
     except Exception as error:
         raise UnreadableFile(
             f"{path.name} is no readable {path.suffix} file ({first_line(error)}); export it again "

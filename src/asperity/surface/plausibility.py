@@ -40,10 +40,11 @@ def to_metres(
     sizes: tuple[float, float] | None,
 ) -> MeasuredSurface:
     """Return the surface of a file's or an array's content in metres."""
-    height_scale, sizes, overridden = _sizes(name, raw, unit, lateral_unit, sizes)
+    replaced = _replaced(raw, unit, lateral_unit, sizes)
+    height_scale, sizes = _sizes(name, raw, unit, lateral_unit, sizes)
     heights = np.where(np.isfinite(raw.heights), raw.heights, np.nan) * height_scale
     _require_possible(name, heights, sizes)
-    notes = raw.notes + overridden + _drop_impossible(heights)
+    notes = raw.notes + replaced + _drop_impossible(heights)
     uniform = 1 if heights.shape[1] == 1 else None
     if uniform:
         heights, sizes = np.repeat(heights, MIN_CELLS, axis=1), (sizes[0], sizes[0])
@@ -94,46 +95,59 @@ def _sizes(
     unit: str | None,
     lateral_unit: str | None,
     pixel: tuple[float, float] | None,
-) -> tuple[float, tuple[float, float], tuple[str, ...]]:
-    """Return metres per unit of height, the pixel [m], and notes on what the caller overrides."""
-    notes = [
-        f"{what} are read in {stated}, although the file states {original}"
-        for what, stated, original in (
-            ("heights", unit, raw.unit),
-            ("lengths along x and y", lateral_unit, raw.lateral_unit),
-        )
-        if None not in (stated, original) and stated != original
-    ]
-    height_unit, length_unit = unit or raw.unit, lateral_unit or raw.lateral_unit
+) -> tuple[float, tuple[float, float]]:
+    """Return metres per unit of height and the pixel [m]."""
     if raw.pixel is None and pixel is None:
         raise BadInput(f"{name} holds heights without a pixel size; give pixel, their distance")
     if pixel is not None and lateral_unit is not None:
         raise BadInput(
             f"{name} has a stated pixel, which is in metres; leave out pixel or lateral_unit"
         )
+    height_unit, length_unit = unit or raw.unit, lateral_unit or raw.lateral_unit
     if height_unit is None or (length_unit is None and pixel is None):
         raise BadInput(
             f"{name} states no units; give unit (of the heights) and lateral_unit, such as "
             "`unit` um `lateral_unit` mm, or surface.unit in a case"
         )
     height_scale = _metres(name, height_unit, stated=unit is not None)
-    if raw.pixel is None or pixel is not None:
-        assert pixel is not None
-        if raw.pixel is not None:
-            notes.append(f"the pixel is the stated one, not the {raw.pixel[0]:g} of the file")
-        return height_scale, pixel, tuple(notes)
+    if pixel is not None:
+        return height_scale, pixel
+    assert raw.pixel is not None
     assert length_unit is not None
     scale = _metres(name, length_unit, stated=lateral_unit is not None)
     sizes = (raw.pixel[0] * scale, raw.pixel[1] * scale)
-    overridden = lateral_unit is not None and raw.lateral_unit is not None
+    if lateral_unit is None or raw.lateral_unit is None:
+        _require_plausible(name, sizes)
+    return height_scale, sizes
+
+
+def _require_plausible(name: str, sizes: tuple[float, float]) -> None:
+    """Refuse an implausible pixel that is not confirmed."""
     smallest, largest = _PLAUSIBLE_PIXEL
     for axis, size in zip("xy", sizes, strict=True):
-        if not overridden and not smallest <= size <= largest:
+        if not smallest <= size <= largest:
             raise BadInput(
                 f"{name} has a pixel of {length_text(size)} along {axis}, implausible for a "
                 "roughness map; give the correct lateral_unit, or confirm by pixel"
             )
-    return height_scale, sizes, tuple(notes)
+
+
+def _replaced(
+    raw: RawMap,
+    unit: str | None,
+    lateral_unit: str | None,
+    pixel: tuple[float, float] | None,
+) -> tuple[str, ...]:
+    """Return notes on values of the file that the caller replaces."""
+    units = ("heights", unit, raw.unit), ("lengths along x and y", lateral_unit, raw.lateral_unit)
+    notes = [
+        f"{quantity} are read in {stated}, although the file states {original}"
+        for quantity, stated, original in units
+        if None not in (stated, original) and stated != original
+    ]
+    if pixel is not None and raw.pixel is not None:
+        notes.append(f"the pixel is the stated one, not the {raw.pixel[0]:g} of the file")
+    return tuple(notes)
 
 
 def _metres(name: str, unit: str, *, stated: bool) -> float:

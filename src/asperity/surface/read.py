@@ -20,7 +20,7 @@ from asperity.core.files import require_file
 from asperity.core.limits import require_unpacked
 from asperity.core.sandbox import read_in_subprocess
 from asperity.core.third_party import first_line, suppress_output, surface_topography
-from asperity.surface.arrays import NotForXarray, array_map, read_netcdf, read_npy, read_npz
+from asperity.surface.arrays import NotForXarray, array_map, read_netcdf, read_numpy
 from asperity.surface.model import MeasuredSurface
 from asperity.surface.plausibility import REMEDY, to_metres
 from asperity.surface.points import map_of_points
@@ -138,7 +138,6 @@ def _pair(pixel: float | tuple[float, float] | None) -> tuple[float, float] | No
 def _read(path: Path, *, matrix: bool) -> RawMap:
     """Read a file with the readers of its suffix, or by its content if the suffix is unknown."""
     start = _first_bytes(path)
-    name = path.name
     suffix = path.suffix.lower().removeprefix(".")
     if suffix in _ARRAYS:
         with suppress(NotForXarray):
@@ -147,11 +146,15 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
         return read_wyko(path)
     if suffix in TABLES and _TRIBOMETER.search(start):
         raise UnreadableFile(
-            f"{name} holds results of a tribometer (traction, speed), no heights; give a map or "
-            "profile of the surface"
+            f"{path.name} holds results of a tribometer (traction, speed), no heights; give a map "
+            "or profile of the surface"
         )
-    if matrix and suffix in TABLES:
-        return _table(path)
+    return _table(path) if matrix and suffix in TABLES else _instrument_map(path, suffix)
+
+
+def _instrument_map(path: Path, suffix: str) -> RawMap:
+    """Read a map in an instrument's format."""
+    name = path.name
     suffixes = {
         reader.format(): set(reader.file_extensions()) for reader in surface_topography().IO.readers
     }
@@ -319,8 +322,8 @@ _LAST_RESORTS: dict[str, Callable[[Path], RawMap]] = {
     **dict.fromkeys(TABLES, _table),
 }
 _ARRAYS: dict[str, Callable[[Path], RawMap]] = {
-    "npy": read_npy,
-    "npz": read_npz,
+    "npy": read_numpy,
+    "npz": read_numpy,
     "nc": read_netcdf,
     "cdf": read_netcdf,
 }

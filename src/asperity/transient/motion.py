@@ -29,7 +29,8 @@ from asperity.ehl import (
     solve_contact,
 )
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
-from asperity.ehl.models.single_pressure import Balance, Problem, TransientTerm
+from asperity.ehl.models.single_pressure import Balance, Problem
+from asperity.ehl.models.transient_term import TransientTerm
 from asperity.ehl.newton.single_pressure import Step
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, MIXED, TWO_PRESSURES
 from asperity.ehl.problem_setup import contact_problem
@@ -83,7 +84,6 @@ def moving_contact(
     time_step: float = 1.0,
     flattening: bool = False,
     options: Options | None = None,
-    strict: bool = True,
 ) -> Iterator[Snapshot]:
     """Yield the contact at time 0 and after each time step, without end.
 
@@ -98,18 +98,15 @@ def moving_contact(
     flattening : lower the rough surface permanently by the overlap that the pressure cap permits
         (half each if both are rough)
     options : solver settings of every step; default `Options()`
-    strict : raise if the initial solution does not converge; otherwise march from its last iterate
 
-    A step that does not converge is yielded, marked in `solution.convergence`, and the next step
-    starts from it.
+    A step that does not converge, the first included, is yielded, marked in `solution.convergence`,
+    and the next step starts from it.
 
     Raises
     ------
     BadInput
         for a time step that is not positive or longer than 8 cells, an unknown start, and as
         `solve_contact`.
-    NotConverged
-        if `strict` and the initial solution does not converge.
     """
     require_positive("time step", time_step, "cells")
     if time_step > MAX_CELLS_PER_TIME_STEP:
@@ -124,7 +121,7 @@ def moving_contact(
         conditions, lubricant, surfaces, options or Options(), time_step, flattening
     )
     if resume is None:
-        first = contact.start(steady=start == "steady", strict=strict)
+        first = contact.start(steady=start == "steady")
         yield first
         resume = first.memory
     for number in count(int(resume["number"]) + 1):
@@ -168,11 +165,11 @@ class _TransientContact:
         self.cells = int(time_step)  # that oil travels in a step, if it is followed
         self.moved = _cells_moved(surfaces, self.seconds)
 
-    def start(self, *, steady: bool, strict: bool) -> Snapshot:
+    def start(self, *, steady: bool) -> Snapshot:
         """Return the snapshot at time 0, from a steady contact (`steady`) or from rest."""
         surface = self.surfaces.composite_at(0.0)
         oil = self.lubricant if steady else None
-        solution = solve_contact(self.conditions, oil, surface, options=self.options, strict=strict)
+        solution = solve_contact(self.conditions, oil, surface, options=self.options, strict=False)
         solution = replace(solution, lubricant=self.lubricant)
         approach = solution.rigid_approach / self.scales.gap
         pressure = solution.pressure / self.scales.pressure

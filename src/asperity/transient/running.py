@@ -141,7 +141,7 @@ def run_track(
     length = min(MAX_PASSAGES, math.ceil(PASSAGES / min(1.0, max(zones, 0.1))))
     record = _Record(measure, per_passage, length, keep=keep)
     for snapshot in moving_contact(
-        conditions, lubricant, surfaces, time_step=time_step, options=options, strict=False
+        conditions, lubricant, surfaces, time_step=time_step, options=options
     ):
         record.add(snapshot)
         if snapshot.number == per_passage and record.failed > MAX_FIRST_FAILED * per_passage:
@@ -182,7 +182,7 @@ def solve_passage(
     steps = _steps_per_passage(conditions, surfaces, time_step)
     earlier = surfaces.earlier(steps * step_seconds(conditions, surfaces, time_step))
     for snapshot in moving_contact(
-        conditions, lubricant, earlier, time_step=time_step, options=options, strict=False
+        conditions, lubricant, earlier, time_step=time_step, options=options
     ):
         if snapshot.number == steps:
             break

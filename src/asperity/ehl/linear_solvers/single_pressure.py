@@ -15,7 +15,8 @@ from asperity.core.arrays import Field
 from asperity.ehl.controls import PRECONDITIONER
 from asperity.ehl.deflection import MIRROR_BETWEEN
 from asperity.ehl.grid_transfer import Index
-from asperity.ehl.models.single_pressure import Balance, Precision, TransientTerm
+from asperity.ehl.models.single_pressure import Balance, Precision
+from asperity.ehl.models.transient_term import TransientTerm
 from asperity.kernels import line_relaxation, multigrid, reynolds, stencils
 from asperity.kernels.multigrid import GridHierarchy
 from asperity.kernels.reynolds import LUBRICATED, Faces, Film

@@ -16,6 +16,7 @@ from asperity.core.arrays import Codes, Field, Mask
 from asperity.ehl.deflection import MIRROR_THROUGH, Deflection, deflection
 from asperity.ehl.grid_transfer import AnyField, average, interpolate, mirror_field
 from asperity.ehl.load_shares import within_ellipse
+from asperity.ehl.models.transient_term import TransientTerm
 from asperity.ehl.roller_profile import BodyShape
 from asperity.kernels import face_mobilities, reynolds
 from asperity.kernels.reynolds import (
@@ -36,34 +37,6 @@ CLOSED_WITHIN = 0.01  # of the contact film, above which a gap still counts as c
 SYMMETRY_TOLERANCE = 1e-6  # relative, about Y = 0: far below the solver's tolerance
 # wedge weights of the next and the upstream cell; high orders fail on some rough surfaces
 THIRD_ORDER, SECOND_ORDER, FIRST_ORDER = (0.375, 0.125), (0.0, 0.5), (0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class TransientTerm:
-    """Time derivative in the oil's balance: `rate` times its content, plus `source`, (nx, ny).
-
-    With `lagrangian`, oil is balanced along its path, so that `source` includes the wedge (unless
-    oil is conserved, not in the first two rows of cells, which have no upstream path). Then
-    `limiter_correction` is the second-order correction of the wedge one cell upstream and one step
-    before, and `upstream` the content there; None where the source is of second order already.
-    """
-
-    rate: float
-    source: Field
-    lagrangian: bool
-    upstream: Field | None = None
-    limiter_correction: Field | None = None
-
-    @property
-    def on_one_line(self) -> "TransientTerm":
-        """The same on the first line of cells, for a problem uniform along y."""
-        parts = (
-            None if part is None else part[:, :1]
-            for part in (self.source, self.upstream, self.limiter_correction)
-        )
-        source, upstream, limiter_correction = parts
-        assert source is not None
-        return TransientTerm(self.rate, source, self.lagrangian, upstream, limiter_correction)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -361,27 +334,34 @@ class Problem:
     ) -> tuple[Field, Field]:
         """Return the net outflow of each cell and its derivative in the cell's own pressure."""
         outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
-        (dx, dy), past, content = self.spacing, self.past, film.content
+        past, content, spacing = self.past, film.content, self.spacing
         compliance = self.deflection.local_compliance
         if past is not None and past.lagrangian:
             nothing = np.zeros_like(content)
-            reynolds.net_outflow(pressure, nothing, faces, nothing[0], dx, dy, outflow)
-            reynolds.fluid_diagonal(film.without_wedge, faces, compliance, dx, dy, diagonal)
-            if self.conserve:  # Lagrangian from before the inlet on
-                before_inlet = self._before_inlet(gap, round(1.0 / (past.rate * dx)))
-                outflow[: len(before_inlet)] -= past.rate * before_inlet
-            else:
-                outflow[0] += (content[0] - self.entering(gap)) / dx
-                outflow[1] += (1.0 + faces.wedge[1]) * (content[1] - content[0]) / dx
+            reynolds.net_outflow(pressure, nothing, faces, nothing[0], *spacing, outflow)
+            reynolds.fluid_diagonal(film.without_wedge, faces, compliance, *spacing, diagonal)
+            self._add_inflow(past.rate, content, faces, gap, outflow)
         else:
             entering = self.entering(gap)
-            reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
-            reynolds.fluid_diagonal(film, faces, compliance, dx, dy, diagonal)
+            reynolds.net_outflow(pressure, content, faces, entering, *spacing, outflow)
+            reynolds.fluid_diagonal(film, faces, compliance, *spacing, diagonal)
         if past is not None:
             outflow += past.rate * content + past.source
             # compliance less that of far cells, as in a touching cell: stored oil is as stiff
             diagonal += past.rate * (film.content_by_gap * self.softness + film.content_by_pressure)
         return outflow, diagonal
+
+    def _add_inflow(
+        self, rate: float, content: Field, faces: Faces, gap: Field, outflow: Field
+    ) -> None:
+        """Add the oil that enters at the inlet to the outflow of oil balanced along its path."""
+        dx = self.spacing[0]
+        if self.conserve:  # along its path from before the inlet on
+            before_inlet = self._before_inlet(gap, round(1.0 / (rate * dx)))
+            outflow[: len(before_inlet)] -= rate * before_inlet
+        else:
+            outflow[0] += (content[0] - self.entering(gap)) / dx
+            outflow[1] += (1.0 + faces.wedge[1]) * (content[1] - content[0]) / dx
 
 
 @dataclass(frozen=True, slots=True)

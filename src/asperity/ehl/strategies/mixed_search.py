@@ -11,7 +11,8 @@ from asperity.ehl.contact_solution import ContactSolution
 from asperity.ehl.controls import CONTINUATION, MARCHING, SEARCH
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, has_thin_film
 from asperity.ehl.models.oil_advection import uses_limiter
-from asperity.ehl.models.single_pressure import Problem, TransientTerm
+from asperity.ehl.models.single_pressure import Problem
+from asperity.ehl.models.transient_term import TransientTerm
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step
 from asperity.ehl.outcome import ATTEMPTS, FROM_DRY
