@@ -104,7 +104,7 @@ def test_a_file_of_several_maps_must_name_the_heights(tmp_path):
         read_surface(tmp_path / "two.npz", unit="um", pixel=DX)
     np.savez(tmp_path / "two.npz", heights=ROWS, quality=ROWS)
     assert read_surface(tmp_path / "two.npz", unit="um", pixel=DX).missing == 0.0
-    with pytest.raises(BadInput, match="give pixel"):
+    with pytest.raises(BadInput, match="give `pixel`"):
         read_surface(tmp_path / "two.npz", unit="um")
 
 

@@ -103,7 +103,7 @@ def test_a_unit_other_than_a_length_is_refused(tmp_path):
 @pytest.mark.parametrize(("unit", "pixel"), [("mm", 2e-3), ("pm", 2e-12)])
 def test_an_implausible_pixel_needs_a_confirmation(tmp_path, unit, pixel):
     path = xyz(tmp_path / "points.txt", pixel=(2.0, 2.0))
-    with pytest.raises(BadInput, match=r"pixel of .* implausible .* or confirm by pixel"):
+    with pytest.raises(BadInput, match=r"pixel of .* implausible .* or confirm by `pixel`"):
         read_surface(path, unit="um", lateral_unit=unit)
     confirmed = read_surface(path, unit="um", pixel=pixel)
     assert confirmed.grid.spacing == pytest.approx((pixel, pixel))
@@ -234,7 +234,7 @@ def test_a_matrix_of_heights_requires_the_pixel_size(tmp_path, name):
         (tmp_path / name).write_text(
             "\n".join(separator.join(f"{z:.9f}" for z in row) for row in rows)
         )
-    with pytest.raises(BadInput, match="give pixel"):
+    with pytest.raises(BadInput, match="give `pixel`"):
         read_surface(tmp_path / name, unit="um")
     with pytest.raises(BadInput, match="give unit"):
         read_surface(tmp_path / name, pixel=2e-6)

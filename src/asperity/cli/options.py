@@ -316,6 +316,7 @@ _OPTIONS = {
     "method": "--method",
     "out": "--out",
     "overdue_after_s": "--expect",
+    "pixel": "--pixel",
     "rate_hz": "--rate",
     "scale": "--scale",
     "table": "--table",

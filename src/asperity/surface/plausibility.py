@@ -98,10 +98,13 @@ def _sizes(
 ) -> tuple[float, tuple[float, float]]:
     """Return metres per unit of height and the pixel [m]."""
     if raw.pixel is None and pixel is None:
-        raise BadInput(f"{name} holds heights without a pixel size; give pixel, their distance")
+        raise BadInput(
+            f"{name} holds heights without a pixel size; give `pixel`, their distance, or "
+            "surface.pixel in a case"
+        )
     if pixel is not None and lateral_unit is not None:
         raise BadInput(
-            f"{name} has a stated pixel, which is in metres; leave out pixel or lateral_unit"
+            f"{name} has a stated pixel, which is in metres; leave out `pixel` or `lateral_unit`"
         )
     height_unit, length_unit = unit or raw.unit, lateral_unit or raw.lateral_unit
     if height_unit is None or (length_unit is None and pixel is None):
@@ -128,7 +131,7 @@ def _require_plausible(name: str, sizes: tuple[float, float]) -> None:
         if not smallest <= size <= largest:
             raise BadInput(
                 f"{name} has a pixel of {length_text(size)} along {axis}, implausible for a "
-                "roughness map; give the correct lateral_unit, or confirm by pixel"
+                "roughness map; give the correct `lateral_unit`, or confirm by `pixel`"
             )
 
 
