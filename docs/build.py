@@ -28,6 +28,7 @@ BESIDE = {
     "SECURITY.md": "security.md",
 }
 LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
+TABLE = re.compile(r"^(:file: )(\S+)()$", re.MULTILINE)  # of a csv-table
 ERRORS = STAGE / "images" / "benchmark-error.png"  # drawn from the csv of the last `make bench`
 MATHJAX = ("sphinx-mathjax-offline", "tex-svg.js")  # package, and its file that draws equations
 REST = "<!-- the rest -->"  # replaced by the pages that no other list of pages names
@@ -44,6 +45,7 @@ def sources() -> Iterator[Path]:
     yield from (ROOT / name for name in BESIDE)
     yield from (ROOT / "examples").glob("*.toml")
     yield ROOT / "benchmark" / "certified.csv"
+    yield ROOT / "src" / "asperity" / "contact" / "materials.csv"
     yield from (
         path for path in DOCS.rglob("*") if path.is_file() and "__pycache__" not in path.parts
     )
@@ -61,7 +63,7 @@ def relinked(path: Path) -> str:
         return f"{link[1]}{os.path.relpath(there, here)}{hash_}{anchor}{link[3]}"
 
     parts = re.split(r"(^```.*?^```)", path.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
-    return "".join(part if part.startswith("```") else LINK.sub(leading, part) for part in parts)
+    return "".join((TABLE if part.startswith("```") else LINK).sub(leading, part) for part in parts)
 
 
 def mathjax() -> Path:

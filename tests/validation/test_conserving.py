@@ -370,7 +370,7 @@ def test_every_step_balances_its_oil(cells):
     ends.
     """
     x0, (dx, _) = ON.lower[0] + ON.spacing[0] / 2.0, ON.spacing
-    entering = x0 - dx * np.arange(1, cells + 1)[:, None]
+    x = x0 + dx * np.arange(cells)[:, None]
     before = None
     surface = rough(ON, 1.5e-6, correlation_length=40e-6)
     for snapshot in islice(moving(surface, time_step=float(cells)), 6):
@@ -378,7 +378,7 @@ def test_every_step_balances_its_oil(cells):
         assert solution.convergence.converged
         held, driven_out = oil_carried(solution)
         if before is not None:
-            ahead = solution.gap[0] + (entering**2 - x0**2) / (2.0 * RADIUS)
+            ahead = solution.gap[:cells] + ((x - cells * dx) ** 2 - x**2) / (2.0 * RADIUS)
             gained = (held - before).sum() * dx
             out = (before[-cells:].sum() - ahead.sum()) * dx + driven_out.sum() * cells * dx / 1.91
             assert abs(gained + out) < 1e-6 * ahead.sum() * dx

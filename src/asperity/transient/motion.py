@@ -274,7 +274,9 @@ class _TransientContact:
             source[2:] = -content[1:-1]
         else:
             source[2:] = 0.5 * memory["content_before"][:-2] - 2.0 * content[1:-1]
-        return TransientTerm(rate / self.length, source / self.length, lagrangian=True)
+        return TransientTerm(
+            rate / self.length, source / self.length, lagrangian=True, cells=self.cells
+        )
 
     def _past_along_the_path(self, memory: Memory) -> TransientTerm:
         """Return the derivative along the oil's path: first order, corrected to the second."""

@@ -324,10 +324,13 @@ class Problem:
         return np.asarray(0.5 * (ahead + np.maximum(gap[0], self.contact_gap)))
 
     def _before_inlet(self, gap: Field, cells: int) -> Field:
-        """Return the content of the cells before the inlet, furthest first, (cells, ny)."""
-        first, dx = self.x[0], self.spacing[0]
-        x = first + dx * np.arange(-cells, 0)[:, None]
-        return np.asarray(np.maximum(gap[0] + (x**2 - first**2) / 2.0, self.contact_gap))
+        """Return the content some cells upstream of as many first rows, (cells, ny).
+
+        Each parcel of oil has the roughness of its row, which moves with it.
+        """
+        x = self.x[:cells, None]
+        before = x - cells * self.spacing[0]
+        return np.asarray(np.maximum(gap[:cells] + (before**2 - x**2) / 2.0, self.contact_gap))
 
     def _outflow(
         self, pressure: Field, film: Film, faces: Faces, gap: Field
@@ -340,7 +343,7 @@ class Problem:
             nothing = np.zeros_like(content)
             reynolds.net_outflow(pressure, nothing, faces, nothing[0], *spacing, outflow)
             reynolds.fluid_diagonal(film.without_wedge, faces, compliance, *spacing, diagonal)
-            self._add_inflow(past.rate, content, faces, gap, outflow)
+            self._add_inflow(past.cells, content, faces, gap, outflow)
         else:
             entering = self.entering(gap)
             reynolds.net_outflow(pressure, content, faces, entering, *spacing, outflow)
@@ -352,13 +355,12 @@ class Problem:
         return outflow, diagonal
 
     def _add_inflow(
-        self, rate: float, content: Field, faces: Faces, gap: Field, outflow: Field
+        self, cells: int, content: Field, faces: Faces, gap: Field, outflow: Field
     ) -> None:
         """Add the oil that enters at the inlet to the outflow of oil balanced along its path."""
         dx = self.spacing[0]
         if self.conserve:  # along its path from before the inlet on
-            before_inlet = self._before_inlet(gap, round(1.0 / (rate * dx)))
-            outflow[: len(before_inlet)] -= rate * before_inlet
+            outflow[:cells] -= self._before_inlet(gap, cells) / (cells * dx)
         else:
             outflow[0] += (content[0] - self.entering(gap)) / dx
             outflow[1] += (1.0 + faces.wedge[1]) * (content[1] - content[0]) / dx

@@ -1,6 +1,6 @@
 """Time derivative in the balance of the oil."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from asperity.core.arrays import Field
 
@@ -13,6 +13,7 @@ class TransientTerm:
     oil is conserved, not in the first two rows of cells, which have no upstream path). Then
     `limiter_correction` is the second-order correction of the wedge one cell upstream and one step
     before, and `upstream` the content there; None where the source is of second order already.
+    The path of one step is `cells` long.
     """
 
     rate: float
@@ -20,14 +21,12 @@ class TransientTerm:
     lagrangian: bool
     upstream: Field | None = None
     limiter_correction: Field | None = None
+    cells: int = 1
 
     @property
     def on_one_line(self) -> "TransientTerm":
         """The same on the first line of cells, for a problem uniform along y."""
-        parts = (
-            None if part is None else part[:, :1]
-            for part in (self.source, self.upstream, self.limiter_correction)
-        )
-        source, upstream, limiter_correction = parts
-        assert source is not None
-        return TransientTerm(self.rate, source, self.lagrangian, upstream, limiter_correction)
+        fields = ("source", "upstream", "limiter_correction")
+        parts = {name: getattr(self, name) for name in fields}
+        first = {name: part[:, :1] for name, part in parts.items() if part is not None}
+        return replace(self, **first)
