@@ -140,8 +140,9 @@ def rows(count: int) -> Iterator[str]:
         held = clr.low - scatter <= finer <= clr.high + scatter
         change = abs(finer - run.state.clr)
         inside, close, known = inside + held, close + (change <= CLOSE), known + 1
+        standing = "–" if run.snapshot_clr is None else f"{run.snapshot_clr:.3f}"
         yield (
-            f"| {label} | {run.snapshot_clr:.3f} | {run.state.clr:.3f} ({clr.low:.3f} to "
+            f"| {label} | {standing} | {run.state.clr:.3f} ({clr.low:.3f} to "
             f"{clr.high:.3f}) | {run.running.clr_std:.3f} | {finer:.3f} ± {scatter:.3f} | "
             f"{'yes' if held else 'no'} | {change:.3f} | {between - began:.1f}, "
             f"{process_time() - between:.1f} |"

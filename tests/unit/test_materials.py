@@ -43,7 +43,7 @@ def test_every_material_is_possible_and_has_a_source(name):
         (62, 746, "through-hardened bearing steel"),
         (60, 697, "case-hardened steel"),
         (50, 513, "quenched 45 steel"),
-        (31, 306, "quenched and tempered steel"),
+        (31, 310, "quenched and tempered steel"),
     ],
 )
 def test_hardness_of_steel_is_that_of_its_rockwell_number(hrc, hv, name):

@@ -18,7 +18,14 @@ from asperity.results import load_run, running_surfaces, solve_case
 from asperity.results.running import _moments
 from asperity.solution import contact_state
 from asperity.surface import MovingSurfaces, Surface, flat_surface
-from asperity.transient import Series, run_track, settled_from, solve_passage, time_means
+from asperity.transient import (
+    Series,
+    moving_contact,
+    run_track,
+    settled_from,
+    solve_passage,
+    time_means,
+)
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 RUNNING = {"grid.cells": [64, 32]}
@@ -115,6 +122,31 @@ def test_a_start_that_does_not_converge_does_not_change_the_mean(run, monkeypatc
     assert any("those of its last moment" in note for note in approximate.notes)
     approximate.save(tmp_path / "run.nc")
     assert load_run(tmp_path / "run.nc").summary() == approximate.summary()
+
+
+@pytest.mark.parametrize("failing", [12, 2])
+def test_a_passage_with_failed_steps_is_refused_with_a_failed_solution(monkeypatch, failing):
+    """Also if its last step converges."""
+
+    def steps(*arguments, **more):
+        for snapshot in moving_contact(*arguments, **more):
+            solution = snapshot.solution
+            if 0 < snapshot.number <= failing:
+                failed = replace(solution.convergence, status="out of iterations")
+                solution = replace(solution, convergence=failed)
+            yield replace(snapshot, solution=solution)
+
+    monkeypatch.setattr("asperity.transient.running.moving_contact", steps)
+    case = load_case(PAPER).with_overrides(RUNNING | {"grid.cells": [48, 24]})
+    if failing == 2:
+        assert solve_case(case, strict=False).running.failed == 2
+        return
+    with pytest.raises(NotConverged) as caught:
+        solve_case(case)
+    assert not caught.value.solution.convergence.converged
+    run = solve_case(case, strict=False)
+    assert (run.converged, run.running) == (False, None)
+    assert run.verdict().startswith("NOT CONVERGED")
 
 
 def test_a_contact_whose_time_steps_fail_ends_after_one_passage():

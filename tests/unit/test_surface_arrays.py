@@ -87,7 +87,7 @@ def test_units_of_coordinates_and_heights_are_those_of_the_array():
     ("array", "message"),
     [
         (labelled(x_unit="um", y_unit="mm"), "x in um and y in mm; give both one unit"),
-        (labelled(height_unit="%"), "values in %, no heights; export its height"),
+        (labelled(height_unit="%"), "values in %, not heights; export its height"),
         (labelled().assign_coords(x=np.arange(32.0) ** 2), "x that is not evenly spaced"),
         (np.zeros((8, 8, 3)), "3 axes"),
         (np.full((8, 8), "a"), "type <U1"),
@@ -141,6 +141,58 @@ def test_scattered_points_are_interpolated(tmp_path):
     assert any("interpolated linearly" in note for note in surface.notes)
 
 
+@pytest.mark.parametrize(
+    ("change", "missing", "note"),
+    [
+        (lambda p: p[(p[:, 0] != 20.0) & (p[:, 0] != 22.0)], 2 * 24, None),
+        (lambda p: np.r_[p, p[:3]], 0, "3 points repeat others"),
+        (lambda p: np.where(np.arange(len(p))[:, None] == 7, [*p[7, :2], np.nan], p), 1, None),
+        (lambda p: p[::-1], 0, None),
+    ],
+    ids=["two columns missing", "repeated points", "a height that is no number", "backwards"],
+)
+def test_imperfect_lists_of_points_keep_their_grid(tmp_path, change, missing, note):
+    np.savetxt(tmp_path / "list.xyz", change(points()), fmt="%.12g")
+    surface = read_surface(tmp_path / "list.xyz", unit="um", lateral_unit="um")
+    assert surface.grid.spacing == pytest.approx((DX, DY))
+    found = np.isfinite(surface.heights)
+    assert (~found).sum() == missing
+    np.testing.assert_allclose(surface.heights[found], 1e-6 * ROWS[::-1].T[found], atol=1e-16)
+    if note is not None:
+        assert sum(note in other for other in surface.notes) == 1
+    assert not any("off any regular grid" in other for other in surface.notes)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda p: np.r_[p, [[1e9, 5.0, 0.0]]], "too narrow for a map; .* delete stray points"),
+        (lambda p: p * [1.0, 0.0, 1.0], "32 complete points .* too few for a map"),
+        (lambda p: np.c_[p[:, 0] + 64.0 * p[:, 1] / 3.0, p[:, 1] * 1e-6, p[:, 2]], "too narrow"),
+    ],
+)
+def test_lists_of_points_that_are_no_map_are_refused(tmp_path, change, message):
+    np.savetxt(tmp_path / "list.xyz", change(points()), fmt="%.12g")
+    with pytest.raises(UnreadableFile, match=message):
+        read_surface(tmp_path / "list.xyz", unit="um", lateral_unit="um")
+
+
+def test_masked_and_unlabelled_arrays_are_read_like_tables(tmp_path):
+    plain = surface_from_array(ROWS, unit="um", pixel=DX).heights
+    masked = surface_from_array(np.ma.masked_greater(ROWS, 2.0), unit="um", pixel=DX)
+    np.testing.assert_array_equal(np.isnan(masked.heights), 1e6 * plain > 2.0)
+    for dims in (("y", "x"), ("Y", "x"), ("row", "column")):
+        array = xarray.DataArray(ROWS, dims=dims)
+        np.testing.assert_array_equal(surface_from_array(array, unit="um", pixel=DX).heights, plain)
+    headed = "# Width: 64 um\n# Height: 72 um\n# Value units: um\n"
+    rows = "\n".join("\t".join(f"{height:.12f}" for height in row) for row in ROWS)
+    (tmp_path / "headed.txt").write_text(headed + rows)
+    np.testing.assert_allclose(read_surface(tmp_path / "headed.txt").heights, plain, atol=1e-16)
+    np.savez(tmp_path / "x-first.npz", heights=ROWS.T, x=np.arange(32.0), y=np.arange(24.0))
+    with pytest.raises(UnreadableFile, match="store it with a row per y and a column per x"):
+        read_surface(tmp_path / "x-first.npz", unit="um", lateral_unit="um")
+
+
 def with_holes(share):
     rows = ROWS.copy()
     rows.ravel()[: int(share * rows.size)] = np.nan
@@ -176,6 +228,7 @@ def test_wyko_text_is_read_in_waves(tmp_path):
     lines = ["\t".join(f"{wave:.9f}" for wave in column) for column in waves]
     lines[4] = "Bad" + lines[4][lines[4].index("\t") :]
     (tmp_path / "map.asc").write_text(header + "\n".join(lines) + "\n")
+    lines[5] += "\t"
     surface = read_surface(tmp_path / "map.asc")
     expected = 1e-6 * ROWS.T
     expected[4, 0] = np.nan
@@ -189,5 +242,10 @@ def test_wyko_text_is_read_in_waves(tmp_path):
 def test_results_of_a_tribometer_are_named(tmp_path):
     rows = "".join(f"{i},{0.05 - 1e-4 * i:.4f},{50 + i}\n" for i in range(30))
     (tmp_path / "mtm.csv").write_text(f"Speed (mm/s),Traction Coefficient,SRR (%)\n{rows}")
-    with pytest.raises(UnreadableFile, match="results of a tribometer"):
+    with pytest.raises(UnreadableFile, match="contains tribometer results"):
         read_surface(tmp_path / "mtm.csv", unit="um", lateral_unit="um")
+
+
+def test_a_map_of_a_wear_scar_is_read(tmp_path):
+    np.savetxt(tmp_path / "scar.txt", ROWS, header="wear scar, traction test at 2 N")
+    assert read_surface(tmp_path / "scar.txt", unit="um", pixel=DX).missing == 0.0

@@ -92,7 +92,9 @@ def test_stated_units_and_pixel_replace_those_of_the_file_with_a_note(x3p):
     stated = read_surface(path, pixel=3e-6)
     assert stated.grid.spacing == pytest.approx((3e-6, 3e-6))
     np.testing.assert_array_equal(stated.heights, plain.heights)
-    assert any("not the 2e-06 of the file" in note for note in stated.notes)
+    assert any("not that of the file, 2e-06 x " in note for note in stated.notes)
+    same = read_surface(path, unit="meter", lateral_unit=" m")
+    assert same.notes == plain.notes
 
 
 def test_a_unit_other_than_a_length_is_refused(tmp_path):
@@ -103,11 +105,11 @@ def test_a_unit_other_than_a_length_is_refused(tmp_path):
 @pytest.mark.parametrize(("unit", "pixel"), [("mm", 2e-3), ("pm", 2e-12)])
 def test_an_implausible_pixel_needs_a_confirmation(tmp_path, unit, pixel):
     path = xyz(tmp_path / "points.txt", pixel=(2.0, 2.0))
-    with pytest.raises(BadInput, match=r"pixel of .* implausible .* or confirm by `pixel`"):
+    with pytest.raises(BadInput, match=r"pixel of .* implausible .* or confirm it with `pixel`"):
         read_surface(path, unit="um", lateral_unit=unit)
     confirmed = read_surface(path, unit="um", pixel=pixel)
     assert confirmed.grid.spacing == pytest.approx((pixel, pixel))
-    assert sum("few maps have one" in note for note in confirmed.notes) == 2
+    assert sum("unusual for a roughness map" in note for note in confirmed.notes) == 2
 
 
 def assert_refused(path, message):

@@ -385,6 +385,23 @@ def test_every_step_balances_its_oil(cells):
         before = held
 
 
+def test_the_inflow_of_moving_oil_does_not_depend_on_a_further_time_step():
+    """Pseudo-time steps of the fall-back add their rate to that of the motion."""
+    problem = contact_problem(contact(), barus(), flat_surface(ON), OPTIONS)
+    dx, nothing = problem.spacing[0], np.zeros(problem.cells)
+    start = Pressures(nothing, nothing, 8.0)
+    outflows = []
+    for further in (0.0, 1.0 / dx, 40.0 / dx):
+        past = TransientTerm(0.5 / dx + further, nothing, lagrangian=True, cells=2)
+        balance = evaluate(replace(problem, past=past), start, second_order=False)
+        outflows.append(balance.outflow - (0.5 / dx + further) * balance.content)
+    for outflow in outflows:
+        np.testing.assert_allclose(outflow, outflows[0], atol=1e-9 * np.abs(outflows[0]).max() / dx)
+    x = problem.x[:2, None]
+    entering = 8.0 + (x - 2.0 * dx) ** 2 / 2.0
+    np.testing.assert_allclose(outflows[0][:2], -entering / (2.0 * dx) * np.ones_like(nothing[:2]))
+
+
 @pytest.mark.parametrize("cells", [1, 2])
 def test_oil_behind_the_contact_is_convected_unchanged(cells):
     """At ambient pressure m_i^n = m_(i-c)^(n-1) with steps of c cells, whatever the roughness."""

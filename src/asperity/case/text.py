@@ -83,8 +83,9 @@ def replaced(tables: Tables, overrides: Mapping[str, object], source: str) -> Ta
     """
     if "material.name" in overrides:
         for section, keys in (("material", NAMED), ("thermal", NAMED_THERMAL)):
-            for key in keys:
-                tables.get(section, {}).pop(key, None)
+            if isinstance(table := tables.get(section), dict):
+                for key in keys:
+                    table.pop(key, None)
     if "vibration.preset" in overrides:  # values of the old preset would override the new one
         for choice in preset_keys():
             tables.get("vibration", {}).pop(choice, None)

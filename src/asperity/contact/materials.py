@@ -12,6 +12,8 @@ from importlib.resources import files
 
 from asperity.core.errors import BadInput
 
+MAX_QUOTED = 40  # characters of an unknown name in a message
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
@@ -56,9 +58,12 @@ def material(name: str) -> Material:
     known = materials()
     if name in known:
         return known[name]
-    matches = get_close_matches(name.lower(), known, n=1)
-    remedy = f'did you mean "{matches[0]}"?' if matches else f"known are {', '.join(known)}"
-    raise BadInput(f'must be a named material, got "{name}"; {remedy}')
+    folded = {other.lower(): other for other in known}
+    matches = get_close_matches(name.lower(), folded, n=1)
+    remedy = f"known are {', '.join(known)}"
+    if matches:
+        remedy = f'did you mean "{folded[matches[0]]}"?'
+    raise BadInput(f'must be a named material, got "{name[:MAX_QUOTED]}"; {remedy}')
 
 
 def _material(row: dict[str, str]) -> Material:

@@ -14,7 +14,7 @@ from asperity.machines.ratings import DangVan, Rating, dang_van_below, machine_r
 from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW, Run
 
 STATIC_LIMIT = 4.2e9  # Hertz pressure of hardened bearing steel, ISO 76 [Pa]
-STEEL_FROM = 180e9  # Young's modulus of both bodies from which the limit applies [Pa]
+STEEL_MODULI = 180e9, 230e9  # Young's moduli of steels [Pa]
 YIELD_RATIO = 3.0  # hardness over yield stress (D. Tabor, The Hardness of Metals, 1951)
 Row: TypeAlias = dict[str, Any]  # conditions and numbers of a contact by key
 VERDICT_RATINGS = ("viscosity_ratio", "life_factor", "rated_film", "scuffing_margin_k")
@@ -79,11 +79,12 @@ class MachineResult:
         return (*self.case.notes, *yielding, *warmer_teeth(self.case, self.ratings))
 
     def _above_hardness(self) -> Iterator[str]:
-        """Warn of stresses that the bodies do not bear, in solved contacts."""
+        """Warn of stresses above the strength of steel bodies, in solved contacts."""
         hardness = self.case.hardness
         steel = material(self.case.default_material)
         solved = [row for row in self.rows if row.get("p_max_pa") is not None]
-        if not solved:
+        low, high = STEEL_MODULI
+        if not solved or not all(low < modulus < high for modulus in self.case.pair.youngs_moduli):
             return
         pressed = max(solved, key=lambda row: row["p_max_pa"])
         stressed = max(solved, key=lambda row: row["von_mises_core_pa"] or 0.0)
@@ -92,8 +93,8 @@ class MachineResult:
         if hardness is None and pressure > limit:
             yield (
                 f"The maximum pressure of {unit.text(pressure)} at {pressed['name']} is above "
-                f"{unit.text(limit)}, the hardness of {steel.name}: asperities yield. State "
-                "material.hardness, or material.name."
+                f"{unit.text(limit)}, the hardness of {steel.name}: asperities would yield. State "
+                "material.hardness if they do."
             )
         if stress > limit / YIELD_RATIO:
             yield (
@@ -105,7 +106,7 @@ class MachineResult:
     def _above_static_limit(self) -> Iterator[str]:
         """Warn of a Hertz pressure above the static limit of steel."""
         highest = max(self.rows, key=lambda row: row["p_hertz_pa"])
-        steel = min(self.case.pair.youngs_moduli) > STEEL_FROM
+        steel = min(self.case.pair.youngs_moduli) > STEEL_MODULI[0]
         if steel and highest["p_hertz_pa"] > STATIC_LIMIT:
             pressure, limit = (
                 quantity("hertz_pressure_pa").text(p) for p in (highest["p_hertz_pa"], STATIC_LIMIT)

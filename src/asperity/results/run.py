@@ -77,7 +77,8 @@ class Run:
     catalogue are available for every surface.
 
     Where the roughness moves, `running` has the means over time, which are the numbers and the
-    state; fields and own resonance are those of the snapshot at the start, the `solution`.
+    state; fields and own resonance are those of the `solution`: the snapshot at the start, or the
+    last moment, without own resonance, if that did not converge.
     """
 
     case: Case
@@ -160,6 +161,8 @@ class Run:
             return Determined(None, "no mass is stated; add [vibration]")
         if not self.solution.convergence.converged:
             return Determined(None, "the contact is not solved")
+        if self.snapshot_clr is None:
+            return Determined(None, "the contact with standing roughness did not converge")
         return Determined.attempt(lambda: own_resonance(self.solution, model.mass))
 
     @property

@@ -64,8 +64,8 @@ _FROM_START = (
 )
 _FROM_END = (
     "The contact with standing roughness did not converge, so that the running contact starts from "
-    "an approximation; maps, distributions and the contact's own resonance are those of its last "
-    "moment."
+    "an approximation. Maps and distributions are those of its last moment; the contact's own "
+    "resonance is not determined."
 )
 ERRORS = {"clr": "clr_error", "car": "car_error", "h_min_m": "h_min_error_m"} | {
     "h_central_m": "h_central_error_m"
@@ -236,8 +236,14 @@ def run_tracks(
     else:
         everything = [own.value, *(other.value for other in others if other.value is not None)]
     running = _running(case, everything, fine)
-    moment = fine.kept[0 if running.snapshot_clr is not None else -1].solution
-    return running, moment, _notes(running, everything, [own, *others])
+    return running, _moment(fine), _notes(running, everything, [own, *others])
+
+
+def _moment(fine: Series) -> ContactSolution:
+    """Return the start if it converged, or else the last moment that did."""
+    kept = [snapshot.solution for snapshot in fine.kept]
+    order = (kept[0], *reversed(kept))
+    return next((solution for solution in order if solution.convergence.converged), kept[-1])
 
 
 def _notes(running: Running, coarse: list[Series], outcomes: list[Determined[Series]]) -> list[str]:

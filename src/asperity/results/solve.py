@@ -271,7 +271,7 @@ def run_of(
     """Return the run of a solved case; its vibration is computed unless given.
 
     `others` are the numbers of further surfaces, of these `groups` of the catalogue; `running` has
-    the means of a running contact whose snapshot is the `solution`.
+    the means of a running contact of which the `solution` is a moment.
     """
     state = contact_state(solution)
     if running is not None:

@@ -1,7 +1,7 @@
 """Heights from arrays: of NumPy and xarray, in npy, npz and netCDF files.
 
-An array without names of its axes is a table: a row per y, a column per x, as in text files. With
-axes named x and y these decide, and coordinates along them give the pixel.
+An array without names of its axes is a table: a row per y, a column per x, as in text files. Axes
+named x and y determine the orientation, and coordinates along them give the pixel.
 """
 
 from collections.abc import Hashable, Mapping
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class NotForXarray(Exception):
-    """Raised for a netCDF file of SurfaceTopography, whose own reader knows it better."""
+    """Raised for a netCDF file of SurfaceTopography, which its own reader handles."""
 
 
 _HEIGHT_NAMES = {"heights", "height", "topography", "z"}
@@ -34,8 +34,13 @@ def read_numpy(path: Path) -> RawMap:
     arrays, form = _loaded(path), path.suffix.lower().removeprefix(".")
     name = _heights_name(path.name, {key: array.ndim for key, array in arrays.items()})
     rows, x, y = arrays[name], arrays.get("x"), arrays.get("y")
-    if x is None or y is None or (y.size, x.size) != rows.shape:
+    if x is None or y is None:
         return array_map(path.name, rows, form)
+    if (y.size, x.size) != rows.shape:
+        raise UnreadableFile(
+            f"{path.name} holds {name} of shape {rows.shape}, but {x.size} x and {y.size} y; store "
+            "it with a row per y and a column per x"
+        )
     named = xarray.DataArray(rows, dims=("y", "x"), coords={"x": x, "y": y})
     return array_map(path.name, named, form)
 
@@ -71,9 +76,10 @@ def array_map(name: str, heights: "np.ndarray | xarray.DataArray", form: str) ->
             "; give heights along x and y"
         )
     if isinstance(heights, np.ndarray):
-        return map_of_rows(heights.astype(np.float64), form)
+        return map_of_rows(np.ma.filled(np.ma.asarray(heights, dtype=np.float64), np.nan), form)
     if {str(dim).lower() for dim in heights.dims} == {"x", "y"}:
-        return _named_map(name, heights.transpose(*sorted(heights.dims, key=str)), form)
+        ordered = sorted(heights.dims, key=lambda dim: str(dim).lower())
+        return _named_map(name, heights.transpose(*ordered), form)
     table = map_of_rows(np.asarray(heights, dtype=np.float64), form)
     return replace(table, unit=_unit(heights.attrs))
 
@@ -81,12 +87,14 @@ def array_map(name: str, heights: "np.ndarray | xarray.DataArray", form: str) ->
 def _named_map(name: str, heights: "xarray.DataArray", form: str) -> RawMap:
     """Return the map of heights along the axes x and y, in this order."""
     pixel, units = [], []
+    if heights.dims[1] not in heights.coords:  # as in a table, the first row is the largest y
+        heights = heights[:, ::-1]
     for dim in heights.dims:
         if dim not in heights.coords:
             continue
         coordinate = heights.coords[dim]
         steps = np.diff(np.asarray(coordinate, dtype=np.float64))
-        step = steps.mean() if steps.size else np.nan
+        step = steps.mean() if steps.size else 0.0
         if not step or not np.max(np.abs(steps - step)) < _EVEN * abs(step):
             raise UnreadableFile(
                 f"{name} has a coordinate {dim} that is not evenly spaced; interpolate it onto "
@@ -134,8 +142,10 @@ def _loaded(path: Path) -> dict[str, np.ndarray]:
             return {"heights": content}
         with content:
             return {name: np.asarray(content[name]) for name in content.files}
+    except MemoryError:
+        raise
     except Exception as error:
         raise UnreadableFile(
-            f"{path.name} is no readable {path.suffix} file ({first_line(error)}); export it again "
-            "with numpy"
+            f"{path.name} is not a readable {path.suffix} file ({first_line(error)}); export "
+            "it again with numpy"
         ) from error

@@ -16,7 +16,8 @@ _POSSIBLE_LENGTH = 1e-15, 1e6  # [m]; other lengths indicate a damaged file
 _PLAUSIBLE_SLOPE = 3.0  # median over neighbours, 72 degrees
 _PLAUSIBLE_PIXEL = 1e-9, 1e-4  # [m]; other pixels need a confirmation
 _REPORTED_MISSING = 0.05
-_COARSE_LEVELS = 0.1  # distance of digitised heights over Sq
+_COARSE_LEVELS = 0.1  # distance of digitised heights over Sq ...
+_FEW_LEVELS = 0.2  # ... where there are so few of them, over the number of heights
 # names of units beside those of SurfaceTopography
 _UNIT_NAMES = {
     "metre": "m",
@@ -131,7 +132,7 @@ def _require_plausible(name: str, sizes: tuple[float, float]) -> None:
         if not smallest <= size <= largest:
             raise BadInput(
                 f"{name} has a pixel of {length_text(size)} along {axis}, implausible for a "
-                "roughness map; give the correct `lateral_unit`, or confirm by `pixel`"
+                "roughness map; give the correct `lateral_unit`, or confirm it with `pixel`"
             )
 
 
@@ -146,27 +147,39 @@ def _replaced(
     notes = [
         f"{quantity} are read in {stated}, although the file states {original}"
         for quantity, stated, original in units
-        if None not in (stated, original) and stated != original
+        if stated is not None and original is not None and _length(stated) != _length(original)
     ]
     if pixel is not None and raw.pixel is not None:
-        notes.append(f"the pixel is the stated one, not the {raw.pixel[0]:g} of the file")
+        own = f"{raw.pixel[0]:g} x {raw.pixel[1]:g} {raw.lateral_unit or ''}".rstrip()
+        notes.append(f"the pixel is the stated one, not that of the file, {own}")
     return tuple(notes)
 
 
 def _metres(name: str, unit: str, *, stated: bool) -> float:
     """Return the length of a unit [m], `stated` by the caller or found in the file."""
+    length = _length(unit)
+    if length is not None:
+        return length
+    if stated:
+        raise BadInput(
+            f"{name} cannot have the unit {unit!r}; use a length such as nm, um, mm or m"
+        )
+    raise UnreadableFile(
+        f"{name} holds values in {unit}, not heights; export its height (topography) channel, or "
+        "give `unit` if they are heights"
+    )
+
+
+def _length(unit: str) -> float | None:
+    """Return the length of a unit [m]; None for another unit."""
     convert = surface_topography().Support.UnitConversion.get_unit_conversion_factor
+    plain = unit.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
+    word = plain.lower()
+    name = _UNIT_NAMES.get(word) or _UNIT_NAMES.get(word.removesuffix("s"))
     try:
-        return float(convert(_UNIT_NAMES.get(unit.strip().lower(), unit.replace("um", "µm")), "m"))
-    except (ValueError, KeyError) as error:
-        if stated:
-            raise BadInput(
-                f"{name} cannot have the unit {unit!r}; use a length such as nm, um, mm or m"
-            ) from error
-        raise UnreadableFile(
-            f"{name} holds values in {unit}, no heights; export its height (topography) channel, "
-            "or give unit if they are heights"
-        ) from error
+        return float(convert(name or plain.replace("um", "\N{MICRO SIGN}m"), "m"))
+    except (ValueError, KeyError):
+        return None
 
 
 def _warnings(pixel: tuple[float, float], heights: Field) -> Iterator[str]:
@@ -180,7 +193,10 @@ def _warnings(pixel: tuple[float, float], heights: Field) -> Iterator[str]:
         )
     for axis, size in zip("xy", pixel, strict=True):
         if not smallest <= size <= largest:
-            yield f"the pixel along {axis} is {length_text(size)}, as stated; few maps have one"
+            yield (
+                f"the pixel along {axis} is {length_text(size)}, as stated, which is unusual for a "
+                "roughness map"
+            )
     valid = heights[np.isfinite(heights)]
     levels = np.unique(valid)
     missing = 1.0 - valid.size / heights.size
@@ -191,7 +207,9 @@ def _warnings(pixel: tuple[float, float], heights: Field) -> Iterator[str]:
         )
     if levels.size == 1:
         yield "all heights are equal; nothing was measured, or the channel is the wrong one"
-    elif (step := float(np.median(np.diff(levels)))) > _COARSE_LEVELS * np.std(valid):
+    elif levels.size < _FEW_LEVELS * valid.size and (
+        step := float(np.median(np.diff(levels)))
+    ) > _COARSE_LEVELS * np.std(valid):
         yield (
             f"the heights have only {levels.size} levels, {length_text(step)} apart; gradients and "
             "summits below this resolution are artefacts"

@@ -1,4 +1,4 @@
-"""Content of a surface file before units and plausibility are settled."""
+"""Content of a surface file before conversion of units and checks."""
 
 from dataclasses import dataclass
 

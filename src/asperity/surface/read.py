@@ -35,7 +35,10 @@ if TYPE_CHECKING:
     import xarray
 
 _HEADER_BYTES = 4096
-_TRIBOMETER = re.compile(rb"traction|slide.{0,3}roll|wear scar|friction coeff", re.IGNORECASE)
+_NUMBERS = re.compile(r"[\d\s.,;:+\-eE]+")
+_TRIBOMETER = re.compile(
+    r"\b(traction|friction) (coeff|force)|slide.{0,3}roll|\bSRR\b", re.IGNORECASE
+)
 _TEXT = {"xyz", "asc"}  # columns of numbers, in files of any name
 _UNMARKED = {"nms", "hgt"}  # accept nearly any bytes, so that they are tried only by file name
 _STEP_TOLERANCE = 0.01  # deviation of a profile's steps, over the mean step, that is reported
@@ -58,7 +61,7 @@ def read_surface(
     path : file in any format of SurfaceTopography, x3pio or sdfio, an array (npy, npz, netCDF), or
         a text table: two columns are a profile, three a list of points, more a matrix of heights.
         Matrices and arrays have a row per y, the largest first, and a column per x, the rolling
-        direction; in netCDF the axes named x and y decide
+        direction; in netCDF axes named x and y determine the orientation
     unit, lateral_unit : units of the heights and of x and y, such as "um" and "mm", for files
         without units, or in place of a file's own
     pixel : distance of neighbouring heights [m], one number or (dx, dy), for a matrix of heights,
@@ -144,12 +147,22 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
             return _ARRAYS[suffix](path)
     if start.startswith(WYKO_START):
         return read_wyko(path)
-    if suffix in TABLES and _TRIBOMETER.search(start):
+    if suffix in TABLES and _TRIBOMETER.search(_heading(start)):
         raise UnreadableFile(
-            f"{path.name} holds results of a tribometer (traction, speed), no heights; give a map "
+            f"{path.name} contains tribometer results (traction, speed), not heights; give a map "
             "or profile of the surface"
         )
     return _table(path) if matrix and suffix in TABLES else _instrument_map(path, suffix)
+
+
+def _heading(start: bytes) -> str:
+    """Return the line above the first numbers of a table: the names of its columns."""
+    before = ""
+    for line in start.decode("latin-1").splitlines():
+        if line.strip() and _NUMBERS.fullmatch(line):
+            return before
+        before = line
+    return ""
 
 
 def _instrument_map(path: Path, suffix: str) -> RawMap:
@@ -176,7 +189,7 @@ def _instrument_map(path: Path, suffix: str) -> RawMap:
             f"{name} has the suffix .{suffix} but its content looks like {actual}; {remedy}"
         ) from result
     raise UnreadableFile(
-        f"{name} is no readable .{suffix} file ({_cause(result)}); {REMEDY}"
+        f"{name} is not a readable .{suffix} file ({_cause(result)}); {REMEDY}"
     ) from result
 
 
@@ -248,30 +261,31 @@ def _topography(path: Path, form: str | None) -> RawMap:
         reader = surface_topography().open_topography(str(path), format=form)
         if form is None and reader.format() in _UNMARKED:
             raise UnreadableFile(f"{path.name} is in no format that can be read; {REMEDY}")
+        form = str(reader.format())
         channel = reader.default_channel
         if channel.dim == 1:
             line = reader.topography()
             x, z = line.positions_and_heights()
-            return _profile(path, x, z, str(reader.format()), line.unit)
+            return _profile(path, x, z, form, line.unit)
         bare = channel.physical_sizes is None
-        if bare and reader.format() in _TEXT:
+        if bare and form in _TEXT:
             raise ValueError("a table without header")  # points may look like a matrix
         topography = (
             reader.topography(physical_sizes=channel.nb_grid_pts) if bare else reader.topography()
         )
         heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
-        (width, length) = topography.physical_sizes
-        unit = topography.unit
-    pixel = None if bare else (float(width) / heights.shape[0], float(length) / heights.shape[1])
+        pixel = None if bare else (float(topography.pixel_size[0]), float(topography.pixel_size[1]))
+    if form == "asc":  # SurfaceTopography takes the first row as the smallest y
+        heights = heights[:, ::-1]
     maps = [other.name for other in reader.channels if other.dim == 2]
     if len(maps) > 1:
         notes.append(f"of the {len(maps)} maps in the file, the first, {channel.name!r}, was read")
     return RawMap(
         heights=heights,
         pixel=pixel,
-        format=str(reader.format()),
-        unit=unit,
-        lateral_unit=unit,
+        format=form,
+        unit=topography.unit,
+        lateral_unit=topography.unit,
         notes=tuple(notes),
     )
 

@@ -29,13 +29,9 @@ def read_wyko(path: Path) -> RawMap:
         cells = int(header["X Size"]), int(header["Y Size"])
         millimetres, aspect = float(header["Pixel_size"]), float(header.get("Aspect", 1.0))
         nanometres = float(header["Wavelength"]) / float(header.get("Mult", 1.0))
-        heights = np.array(
-            [
-                [_number(text) for text in line.split("\t")]
-                for line in lines[start + 1 :][: cells[0]]
-            ]
-        ).reshape(cells)
-    except (KeyError, ValueError) as error:
+        rows = [line.split("\t")[: cells[1]] for line in lines[start + 1 :][: cells[0]]]
+        heights = np.array([[_number(text) for text in row] for row in rows]).reshape(cells)
+    except (KeyError, ValueError, ZeroDivisionError) as error:
         raise UnreadableFile(
             f"{path.name} is a damaged Wyko text file ({error}); export it again"
         ) from error

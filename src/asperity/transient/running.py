@@ -131,8 +131,8 @@ def run_track(
     BadInput
         as `moving_contact`.
     NotConverged
-        if most steps of the first passage do not converge. The steady start need not: each step
-        has the oil of the one before, and the start is cut off.
+        if half of the first passage does not converge. The steady start may be unconverged,
+        because each step starts from the oil of the one before, and the start is cut off.
     """
     options = _options(options)
     time_step = _time_step(conditions, options)
@@ -144,8 +144,8 @@ def run_track(
         conditions, lubricant, surfaces, time_step=time_step, options=options
     ):
         record.add(snapshot)
-        if snapshot.number == per_passage and record.failed > MAX_FIRST_FAILED * per_passage:
-            raise _not_converged(snapshot.solution)
+        if record.last_failed is not None and snapshot.number <= per_passage:
+            _require_progress(record.last_failed, record.failed, per_passage)
         if progress is not None:
             progress(snapshot.number, record.steps)
         if snapshot.number < record.steps:
@@ -175,20 +175,34 @@ def solve_passage(
     BadInput
         as `moving_contact`.
     NotConverged
-        if the last time step does not converge.
+        if the last time step, or half of them, do not converge.
     """
     options = _options(options)
     time_step = _time_step(conditions, options)
-    steps = _steps_per_passage(conditions, surfaces, time_step)
-    earlier = surfaces.earlier(steps * step_seconds(conditions, surfaces, time_step))
-    for snapshot in moving_contact(
-        conditions, lubricant, earlier, time_step=time_step, options=options
-    ):
-        if snapshot.number == steps:
-            break
-    if not snapshot.solution.convergence.converged:
-        raise _not_converged(snapshot.solution)
-    return snapshot.solution
+    per_passage = _steps_per_passage(conditions, surfaces, time_step)
+    for passages in (1, 2):  # a start that does not converge takes one more to be forgotten
+        steps, failed = passages * per_passage, 0
+        earlier = surfaces.earlier(steps * step_seconds(conditions, surfaces, time_step))
+        for snapshot in moving_contact(
+            conditions, lubricant, earlier, time_step=time_step, options=options
+        ):
+            converged = snapshot.solution.convergence.converged
+            if passages == 1 and snapshot.number == 0 and not converged:
+                break
+            failed += snapshot.number > 0 and not converged
+            if not converged:
+                _require_progress(snapshot.solution, failed, steps)
+            if snapshot.number == steps:
+                if not converged:
+                    raise _not_converged(snapshot.solution)
+                return snapshot.solution
+    raise AssertionError("unreachable")
+
+
+def _require_progress(failed: ContactSolution, count: int, steps: int) -> None:
+    """Raise NotConverged if the last solution that failed is not finite, or half of them fail."""
+    if count > MAX_FIRST_FAILED * steps or not np.isfinite(failed.pressure).all():
+        raise _not_converged(failed)
 
 
 def _not_converged(solution: ContactSolution) -> NotConverged:
@@ -240,6 +254,7 @@ class _Record:
             tuple[str, ...](),
         )
         self.failed, self.iterations, self.kept = 0, 0, list[Snapshot]()
+        self.last_failed: ContactSolution | None = None
 
     @property
     def steps(self) -> int:
@@ -252,6 +267,8 @@ class _Record:
         self.names = (*numbers,)
         self.rows.append([*numbers.values()])
         self.failed += snapshot.number > 0 and not convergence.converged
+        if not convergence.converged:
+            self.last_failed = snapshot.solution
         self.iterations += convergence.iterations
         if self.keep and snapshot.number % self.per_passage == 0:
             self.kept.append(replace(snapshot, memory={}))

@@ -75,9 +75,9 @@ class ExactFaceSearch(Search):
         """Solve by shared steps on the second-order wedge, or by cell through the first order."""
         max_steps = min(SEARCH.max_exact_iterations, self.options.max_iterations)
         steady = problem.past is None
-        soon = max_steps if steady else min(SEARCH.max_time_step_iterations, max_steps)
+        first_limit = max_steps if steady else min(SEARCH.max_time_step_iterations, max_steps)
         steps = newton(problem, unknowns, second_order=True)
-        step = self.run(problem, steps, tolerance, soon)
+        step = self.run(problem, steps, tolerance, first_limit)
         if self.converged(tolerance):
             return step
         roughly = max(SEARCH.first_order_tolerance, tolerance)

@@ -72,7 +72,7 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
         numbers=[entry for group in groups for entry in select(group)],
         conditions=conditions_table(runs),
         snapshot=any(run.is_snapshot for run in runs),
-        running=any(run.running is not None for run in runs),
+        moment=_moment(runs),
         newtonian=any(oil is not None and isinstance(oil.rheology, Newtonian) for oil in oils),
         alone=_has_one_surface(runs),
         isothermal=any(run.solution.lubricant and not run.case.thermal.feedback for run in runs),
@@ -83,6 +83,14 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
         ends=ends,
         oil_limits=_oil_limits(runs),
     )
+
+
+def _moment(runs: Sequence[Run]) -> str | None:
+    """Return the moment of running contacts that maps show; None without running contacts."""
+    if all(run.running is None for run in runs):
+        return None
+    solved = all(run.snapshot_clr is not None for run in runs)
+    return "the snapshot from which it starts" if solved else "its last moment"
 
 
 def _has_one_surface(runs: Sequence[Run]) -> bool:
