@@ -59,7 +59,8 @@ def browser():
 def server(browser, tmp_path_factory):  # noqa: ARG001 - no server is started without a browser
     """Serve the default case on fewer cells, which it solves in less time."""
     folder = tmp_path_factory.mktemp("server")
-    case = default_case().with_overrides({"grid.cells": [96, 64]})
+    few = {"grid.cells": [96, 64], "solver.running_cells": 600}
+    case = default_case().with_overrides(few)
     (folder / "contact.toml").write_text(case.text, "utf-8")
     with serving(folder, "contact.toml") as started:
         yield started
