@@ -88,7 +88,7 @@ def _is_by_contact(rating: Rating) -> bool:
 def _bars_note(result: MachineResult) -> str:
     low, high = quantity("clr").ends
     drawn = any(row.get(low) is not None and row.get(high) is not None for row in result.rows)
-    return " Bars: 90 % intervals from surfaces, grid and iteration." if drawn else ""
+    return " Bars: 90 % intervals." if drawn else ""
 
 
 def _series(result: MachineResult) -> dict[str, list[Numbers]]:
