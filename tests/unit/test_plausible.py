@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 
+from asperity.case import load_case
 from asperity.contact.conditions import ElasticPair
 from asperity.contact.grid import Grid
-from asperity.ehl import Options, solve_contact
+from asperity.ehl import Options, least_film, rigid_film_loss, solve_contact
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
+from asperity.results import solve_case
 from asperity.solution import (
     inlet_notes,
     plausibility_notes,
@@ -186,3 +189,58 @@ def test_a_film_with_a_wide_error_bar_is_not_determined(bar, films):
     assert uncertain_films({**numbers, "h_central_m": 2e-7, "h_central_error_m": 2e-8}) == films
     unknown = {"h_central_m": 2e-7, "h_central_error_m": None}
     assert uncertain_films({**numbers, **unknown}) == films
+
+
+LIGHT_BALL = """
+[contact]
+geometry = "point"
+radius = "15 mm"
+load = "0.765 N"
+entrainment_speed = "1.57 m/s"
+[material]
+youngs_modulus = "210 GPa"
+poisson_ratio = 0.3
+[lubricant]
+viscosity = { law = "barus", eta0 = "50 cP", alpha = "22 1/GPa" }
+density = { law = "incompressible", rho0 = "870 kg/m^3" }
+rheology = "newtonian"
+[surface]
+kind = "flat"
+[grid]
+cells = [224, 304]
+"""
+
+
+def test_the_film_of_a_light_ball_is_not_determined_on_a_small_grid():
+    """Its load converges only as the inverse of the grid's size."""
+    case = load_case(LIGHT_BALL)
+    run = solve_case(case)
+    formula, loss = (
+        function(case.conditions, case.lubricant, *more)
+        for function, more in ((least_film, ()), (rigid_film_loss, (case.grid,)))
+    )
+    assert 0.4 < run.state.h_min / formula < 0.55
+    assert loss == pytest.approx(0.6, abs=0.05)
+    assert run.film_determined is False
+    assert "film not determined (the grid is too small for so light a contact)" in run.verdict()
+    notes = [note for note in run.notes if "too thin" in note or "inlet" in note]
+    assert "pressure builds up over many times sqrt(2 R h) = 386 um" in notes[0]
+    assert [note.endswith("the inlet is starved.") for note in notes[1:]] == [True]
+
+
+def test_the_load_of_a_rigid_ball_within_a_grid_is_the_integral_of_its_pressure():
+    case = load_case(LIGHT_BALL)
+    film = least_film(case.conditions, case.lubricant)
+    length = np.sqrt(2.0 * 15e-3 * film)
+
+    def pressure(s):
+        return s**2 / (1.0 + s**2) ** 2
+
+    whole = scipy.integrate.quad(pressure, 0.0, np.inf)[0]
+    for reach in (0.5, 3.0, 40.0):
+        within = Grid((16, 16), (-reach * length,) * 2, (reach * length,) * 2, (False, False))
+        share = scipy.integrate.quad(pressure, 0.0, reach)[0] / whole
+        loss = rigid_film_loss(case.conditions, case.lubricant, within)
+        assert loss == pytest.approx(1.0 - share**2, rel=1e-6)
+    heavy = case.with_overrides({"contact.load": "10 N"})
+    assert rigid_film_loss(heavy.conditions, heavy.lubricant, heavy.grid) == 0.0

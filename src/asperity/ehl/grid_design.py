@@ -15,7 +15,12 @@ from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.contact.hertz import line_gap
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.ehl.film_formulas import central_film, least_film, require_thin_film
+from asperity.ehl.film_formulas import (
+    central_film,
+    least_film,
+    lubrication_regime,
+    require_thin_film,
+)
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface, correlation_lengths
@@ -143,6 +148,26 @@ def missing_inlet(conditions: ContactConditions, lubricant: Lubricant, begins: f
     """Return the share of the inlet pressure built up farther than `begins` [m] from the centre."""
     x, share = _pressure_build_up(_film(conditions, lubricant))
     return float(1.0 - np.interp(begins / conditions.hertz.half_widths[0], x, share))
+
+
+def rigid_film_loss(conditions: ContactConditions, lubricant: Lubricant, grid: Grid) -> float:
+    """Return the share of its film that a rigid, isoviscous ball loses on a bounded grid.
+
+    Its pressure, proportional to x/h² in the gap h, builds up over the length sqrt(2 R h₀); the
+    load within s lengths is ∫ s²/(1 + s²)² ds, which converges only as 1/s, and the film falls as
+    the inverse square of the load. Zero in other regimes and for line contacts. Source: P. L.
+    Kapitza, Zh. Tekh. Fiz. 25 (1955) 747.
+    """
+    bounded = conditions.geometry in ("point", "elliptic")
+    if not bounded or lubrication_regime(conditions, lubricant) != "isoviscous-rigid":
+        return 0.0
+    film = least_film(conditions, lubricant)
+    reach = min(
+        -grid.lower[0] / math.sqrt(2.0 * conditions.radius_along_rolling * film),
+        grid.upper[1] / math.sqrt(2.0 * conditions.radius_across_rolling * film),
+    )
+    load = (math.atan(reach) - reach / (1.0 + reach**2)) / (0.5 * math.pi)
+    return 1.0 - load**2
 
 
 def grid_shortfalls(

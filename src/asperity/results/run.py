@@ -293,6 +293,13 @@ class Run:
         return self.converged and self.undetermined is None
 
     @property
+    def _uncertain_films(self) -> tuple[str, ...]:
+        """Films that are not determined, each with the reason."""
+        if self.solution.lubricant is None:
+            return ()
+        return uncertain_films(self.numbers(["film"]), self.solution)
+
+    @property
     def film_determined(self) -> bool | None:
         """True if the solution is converged, with error bars of the films below 15 %.
 
@@ -300,7 +307,7 @@ class Run:
         """
         if self.solution.lubricant is None:
             return None
-        return self.converged and not uncertain_films(self.numbers(["film"]))
+        return self.converged and not self._uncertain_films
 
     @property
     def is_snapshot(self) -> bool:
@@ -362,7 +369,7 @@ class Run:
             )
         if not self.converged:
             sentence = f"NOT CONVERGED, do not use: {sentence}"
-        films = () if self.solution.lubricant is None else uncertain_films(self.numbers(["film"]))
+        films = self._uncertain_films
         doubt = ""
         if films and self.undetermined is None:
             doubt = f"film not determined ({', '.join(films)}); "

@@ -15,6 +15,7 @@ from asperity.ehl import (
     inlet_length,
     least_film,
     missing_inlet,
+    rigid_film_loss,
 )
 from asperity.ehl.grid_design import CELLS_IN_INLET, MAX_CLR_ERROR, MAX_FILM_ERROR
 from asperity.ehl.load_shares import carried_share
@@ -58,6 +59,14 @@ def inlet_notes(
     """
     if lubricant is None:
         return ()
+    if (rigid := rigid_film_loss(conditions, lubricant, grid)) > MIN_STARVATION:
+        film = least_film(conditions, lubricant)
+        length = np.sqrt(2.0 * conditions.radius_along_rolling * film)
+        return (
+            f"The grid is too small for so light a contact, whose pressure builds up over many "
+            f"times sqrt(2 R h) = {1e6 * length:.3g} um: the film is about {100.0 * rigid:.2g} % "
+            f"too thin. Use the formula of its regime, {1e6 * film:.3g} um.",
+        )
     a = conditions.hertz.half_widths[0]
     inlet_start = -grid.lower[0]
     loss = FILM_LOSS_PER_PRESSURE_LOSS * missing_inlet(conditions, lubricant, inlet_start)
@@ -112,8 +121,20 @@ def undetermined(
     return "; ".join(reasons) or None
 
 
-def uncertain_films(numbers: Mapping[str, float | None]) -> tuple[str, ...]:
-    """Return the films whose error bar is above 15 %, each with its bar, from numbers by key."""
+def uncertain_films(
+    numbers: Mapping[str, float | None], solution: ContactSolution | None = None
+) -> tuple[str, ...]:
+    """Return the films whose error bar is above 15 %, each with its bar, from numbers by key.
+
+    Or else the reason, if the grid of a solution is so small that the film is as much too thin.
+    """
+    oil = None if solution is None else solution.lubricant
+    if (
+        solution is not None
+        and oil is not None
+        and (rigid_film_loss(solution.conditions, oil, solution.grid) > MAX_FILM_ERROR)
+    ):
+        return ("the grid is too small for so light a contact",)
     values = ((f"{name}_m", f"{name}_error_m") for name in ("h_min", "h_central"))
     return tuple(
         f"{quantity(key).name} ± {100.0 * bar / film:.0f} %"

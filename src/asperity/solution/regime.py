@@ -21,6 +21,7 @@ from asperity.ehl import (
     inlet_length,
     least_film,
     lubrication_regime,
+    rigid_film_loss,
 )
 from asperity.ehl.film_formulas import Place
 from asperity.ehl.grid_design import MIN_CELLS_IN_INLET
@@ -208,7 +209,7 @@ def far_from_fits(solution: ContactSolution) -> str | None:
         f"the grid has {length / cell:.2g} cells across the inlet"
         if length < MIN_CELLS_IN_INLET * cell
         else "the inlet is starved"
-        if inlet_start < flooded
+        if inlet_start < flooded or rigid_film_loss(conditions, lubricant, solution.grid) > 0.05
         else "the grid is fine enough and the inlet flooded; the formula may not cover this contact"
     )
     return (
