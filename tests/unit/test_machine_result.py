@@ -134,3 +134,27 @@ def test_a_contact_without_entrainment_states_the_reason(gears, monkeypatch):
     monkeypatch.setitem(vars(flat), "contacts", (opposed,))
     with pytest.raises(BadInput, match="no contact entrains oil"):
         solve_machine(flat)
+
+
+def stressed(gears, *, pressure, stress, **changes):
+    """Return the notes on strength, with a maximum pressure and a von Mises stress [Pa] at B."""
+    gears = gears.with_overrides(changes)
+    rows = [
+        {**row, "p_max_pa": 1e9, "von_mises_core_pa": 0.5e9, "reason": ""}
+        for row in machine_conditions(gears).rows
+    ]
+    rows[2] |= {"p_max_pa": pressure, "von_mises_core_pa": stress}
+    notes = MachineResult(gears, tuple(rows), True, 1.0).notes
+    return [note for note in notes if "maximum pressure" in note or "von Mises" in note]
+
+
+def test_stresses_above_the_strength_of_steel_are_noted(gears):
+    """The yield stress is a third of the hardness (Tabor): 2.27 GPa of 6.8 GPa."""
+    assert stressed(gears, pressure=6.8e9, stress=2.2e9) == []
+    (yielding,) = stressed(gears, pressure=6.8e9, stress=2.3e9)
+    assert "2.300 GPa below the surface at B is above 2.267 GPa" in yielding
+    elastic = {"material": {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3, "hardness": "none"}}
+    (above,) = stressed(gears, pressure=8e9, stress=1e9, **elastic)
+    assert "8.000 GPa at B is above 6.800 GPa, the hardness of case-hardened steel" in above
+    ceramic = {"material": {"name": "silicon nitride", "hardness": "none"}}
+    assert stressed(gears, pressure=9e9, stress=4e9, **ceramic) == []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy
 
-from asperity.case import load_case
+from asperity.case import case_template, load_case
 from asperity.contact.conditions import ElasticPair
 from asperity.contact.grid import Grid
 from asperity.ehl import Options, least_film, rigid_film_loss, solve_contact
@@ -191,29 +191,25 @@ def test_a_film_with_a_wide_error_bar_is_not_determined(bar, films):
     assert uncertain_films({**numbers, **unknown}) == films
 
 
-LIGHT_BALL = """
-[contact]
-geometry = "point"
-radius = "15 mm"
-load = "0.765 N"
-entrainment_speed = "1.57 m/s"
-[material]
-youngs_modulus = "210 GPa"
-poisson_ratio = 0.3
-[lubricant]
-viscosity = { law = "barus", eta0 = "50 cP", alpha = "22 1/GPa" }
-density = { law = "incompressible", rho0 = "870 kg/m^3" }
-rheology = "newtonian"
-[surface]
-kind = "flat"
-[grid]
-cells = [224, 304]
-"""
+LIGHT_BALL = {
+    "contact.radius": "15 mm",
+    "contact.load": "0.765 N",
+    "contact.entrainment_speed": "1.57 m/s",
+    "contact.slip": 0.0,
+    "material.youngs_modulus": "210 GPa",
+    "material.hardness": "none",
+    "lubricant.viscosity": {"law": "barus", "eta0": "50 cP", "alpha": "22 1/GPa"},
+    "lubricant.density": {"law": "incompressible", "rho0": "870 kg/m^3"},
+    "lubricant.rheology": "newtonian",
+    "surface": "flat",
+    "vibration": "none",
+    "grid": {"cells": [224, 304]},
+}
 
 
 def test_the_film_of_a_light_ball_is_not_determined_on_a_small_grid():
     """Its load converges only as the inverse of the grid's size."""
-    case = load_case(LIGHT_BALL)
+    case = load_case(case_template("point")).with_overrides(LIGHT_BALL)
     run = solve_case(case)
     formula, loss = (
         function(case.conditions, case.lubricant, *more)
@@ -229,7 +225,7 @@ def test_the_film_of_a_light_ball_is_not_determined_on_a_small_grid():
 
 
 def test_the_load_of_a_rigid_ball_within_a_grid_is_the_integral_of_its_pressure():
-    case = load_case(LIGHT_BALL)
+    case = load_case(case_template("point")).with_overrides(LIGHT_BALL)
     film = least_film(case.conditions, case.lubricant)
     length = np.sqrt(2.0 * 15e-3 * film)
 

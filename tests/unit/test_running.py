@@ -3,7 +3,7 @@
 import json
 import math
 from dataclasses import replace
-from itertools import count
+from itertools import count, islice
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,6 +26,7 @@ from asperity.transient import (
     solve_passage,
     time_means,
 )
+from asperity.transient.motion import step_seconds
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 RUNNING = {"grid.cells": [64, 32]}
@@ -147,6 +148,28 @@ def test_a_passage_with_failed_steps_is_refused_with_a_failed_solution(monkeypat
     run = solve_case(case, strict=False)
     assert (run.converged, run.running) == (False, None)
     assert run.verdict().startswith("NOT CONVERGED")
+
+
+def test_a_passage_from_a_start_that_does_not_converge_begins_one_earlier(monkeypatch):
+    case = load_case(PAPER).with_overrides(RUNNING | {"grid.cells": [48, 24]})
+    surfaces = running_surfaces(case).on_cells((48, 24))
+    steps = 2 * round(case.conditions.hertz.half_widths[0] / surfaces.grid.spacing[0])
+    options = replace(case.options, tolerance=1e-2)
+    step = {"time_step": 2.0, "options": options}
+    earlier = surfaces.earlier(steps * step_seconds(case.conditions, surfaces, 2.0))
+    *_, last = islice(moving_contact(case.conditions, case.lubricant, earlier, **step), steps + 1)
+    expected, starts = last.solution, []
+
+    def of_few_steps(*contact, options, **more):
+        starts.append(contact[2])
+        return solve_contact(*contact, options=replace(options, max_iterations=2), **more)
+
+    monkeypatch.setattr("asperity.transient.motion.solve_contact", of_few_steps)
+    found = solve_passage(case.conditions, case.lubricant, surfaces, options=case.options)
+    assert len(starts) == 2  # one passage before, then two
+    assert not np.allclose(starts[0].heights, starts[1].heights)
+    np.testing.assert_allclose(found.surface.heights, expected.surface.heights, atol=1e-15)
+    assert contact_state(found).clr == pytest.approx(contact_state(expected).clr, abs=0.02)
 
 
 def test_a_contact_whose_time_steps_fail_ends_after_one_passage():

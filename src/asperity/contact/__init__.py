@@ -1,1 +1,1 @@
-"""The contact that is posed: operating conditions, Hertz theory, roller shapes, the grid."""
+"""Operating conditions of the contact, named materials, Hertz theory, roller shapes, the grid."""

@@ -13,6 +13,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -181,28 +182,30 @@ def solve_passage(
     time_step = _time_step(conditions, options)
     per_passage = _steps_per_passage(conditions, surfaces, time_step)
     for passages in (1, 2):  # a start that does not converge takes one more to be forgotten
-        steps, failed = passages * per_passage, 0
+        steps = passages * per_passage
         earlier = surfaces.earlier(steps * step_seconds(conditions, surfaces, time_step))
-        for snapshot in moving_contact(
+        snapshots = moving_contact(
             conditions, lubricant, earlier, time_step=time_step, options=options
-        ):
-            converged = snapshot.solution.convergence.converged
-            if passages == 1 and snapshot.number == 0 and not converged:
-                break
-            failed += snapshot.number > 0 and not converged
-            if not converged:
-                _require_progress(snapshot.solution, failed, steps)
-            if snapshot.number == steps:
-                if not converged:
-                    raise _not_converged(snapshot.solution)
-                return snapshot.solution
-    raise AssertionError("unreachable")
+        )
+        last = next(snapshots).solution
+        if last.convergence.converged:
+            break
+    _require_progress(last, 0, steps)
+    failed = 0
+    for snapshot in islice(snapshots, steps):
+        last = snapshot.solution
+        if not last.convergence.converged:
+            failed += 1
+            _require_progress(last, failed, steps)
+    if not last.convergence.converged:
+        raise _not_converged(last)
+    return last
 
 
-def _require_progress(failed: ContactSolution, count: int, steps: int) -> None:
-    """Raise NotConverged if the last solution that failed is not finite, or half of them fail."""
-    if count > MAX_FIRST_FAILED * steps or not np.isfinite(failed.pressure).all():
-        raise _not_converged(failed)
+def _require_progress(solution: ContactSolution, failed: int, steps: int) -> None:
+    """Raise NotConverged if a solution is not finite, or more than half of the steps failed."""
+    if failed > MAX_FIRST_FAILED * steps or not np.isfinite(solution.pressure).all():
+        raise _not_converged(solution)
 
 
 def _not_converged(solution: ContactSolution) -> NotConverged:
