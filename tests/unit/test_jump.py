@@ -1,7 +1,7 @@
 """Length of a wear jump and the wear within it, for synthetic contacts without a solver."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pandas
@@ -16,6 +16,7 @@ from asperity.simulation.wear.notes import few_jumps_note, grooves_note, radii_n
 from asperity.simulation.wear.rows import body_column, contact_row, roughness
 from asperity.simulation.wear.run import _row
 from asperity.simulation.wear.state import WearState
+from asperity.solution import Friction
 from asperity.surface import Surface
 from asperity.wear import TrackPosition
 from asperity.wear.laws import GAS_CONSTANT
@@ -61,7 +62,7 @@ def loaded_position(
         overlap=None,
         temperatures=(np.full(grid.cells, temperature_rise), np.full(grid.cells, temperature_rise)),
         state=STATE,
-        friction_coefficient=0.1,
+        friction=Friction(**{field.name: 0.1 for field in fields(Friction)}),
         flash_temperature=temperature_rise,
         at_edge=False,
     )

@@ -95,7 +95,7 @@ def test_gears_are_rated_with_their_own_values():
     sheet = OilSheet(grade="VG 220")
     oil = GearOil(
         lambda kelvin: sheet.walther(kelvin) * sheet.density(kelvin),
-        lambda kelvin: ESTIMATORS["iso"](sheet, kelvin),
+        lambda kelvin: ESTIMATORS["iso"].law(sheet, kelvin),
         "mineral",
     )
     friction = 0.045 * (265.1 / 33.8289e-3 / 14.0 / (6.3492 * 8.3820)) ** 0.2

@@ -216,7 +216,7 @@ def gear_oil(sheet=VG_220):
     """Extrapolates above 150 degC, which a flash of microseconds reaches."""
     return GearOil(
         lambda kelvin: sheet.walther(kelvin) * sheet.density(kelvin),
-        lambda kelvin: ESTIMATORS["iso"](sheet, kelvin),
+        lambda kelvin: ESTIMATORS["iso"].law(sheet, kelvin),
         "mineral",
     )
 

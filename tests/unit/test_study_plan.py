@@ -128,7 +128,7 @@ REFUSED = [
     ({"sq": {"from": "2 um", "to": "1 um", "step": "1 um"}}, "study.sq must be ascending"),
     ({"sq": ["1 N"]}, "surface.sq must be a length"),
     ({"sq": ["1 foobar"]}, 'got "1 foobar", whose unit is unknown'),
-    ({"sq": [1]}, "got the bare number 1"),
+    ({"sq": ["1"]}, "got the bare number 1"),
     ({"sq": []}, "study.sq must be a list of values or a range"),
     ({"sq": ["1 um"], "surface": {"sq": ["2 um"]}}, "sweeps one quantity twice"),
     ({"kind": "solve"}, "study varies nothing"),
@@ -211,3 +211,9 @@ def test_a_change_of_one_swept_surface_file_changes_only_its_case_id(paper, tmp_
     after = [case.id for case in planned(measured, **study).cases]
     assert before[0] == after[0]
     assert before[1] != after[1]
+
+
+def test_values_in_a_file_need_their_unit(paper):
+    text = paper.text.split("[study]")[0] + "[study]\nsq = [1.0]\n"
+    with pytest.raises(BadInput, match="got the bare number 1"):
+        plan_study(load_case(text))

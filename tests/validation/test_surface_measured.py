@@ -112,6 +112,7 @@ def test_the_milled_surface_covers_the_paper_contact():
         "resampled",
         "blended",
         "removed",
+        "has",
     ]
     assert prepare_surface(
         read_surface(FILES / "milled_1.opd"), paper_grid(), sq=1e-6

@@ -14,7 +14,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import Grid
 from asperity.contact.hertz import ellipse_pressure
 from asperity.core.arrays import Field, Mask
-from asperity.core.quantities import NO_VALUE, Quantity, lines, quantity
+from asperity.core.quantities import NO_VALUE, UNKNOWN, Quantity, lines, quantity
 from asperity.ehl import ContactSolution, ContactState, hertz_zone
 from asperity.results import UNCERTAINTY, Run
 from asperity.solution import contact_state
@@ -30,7 +30,6 @@ TILES = (
     "crfa",
 )
 OPEN, TOUCHING, CAVITATED = 0, 1, 2  # state of a cell
-NOT_DETERMINED = "± not determined"
 BY_FORMULA = ("lambda_ratio",)  # tiles that do not depend on a solution
 MAX_POINTS = 500  # of a curve of the spectrum
 GAP_PERCENTILE = 99.0  # of the Hertz zone, where the colours of a film map end
@@ -137,18 +136,18 @@ class ContactResult(ContactMaps):
         if entry.ends[0] in self.row:
             low, high = (self.row.get(end) for end in entry.ends)
             if low is None or high is None or not self.determined:
-                return NOT_DETERMINED
+                return UNKNOWN
             return entry.interval(low, high)
         if entry.deviation:
             deviation = self.row.get(entry.deviation)
             if deviation is None:
-                return NOT_DETERMINED
+                return UNKNOWN
             bounded = entry.clipped_interval(value, deviation)
             if bounded is not None:
                 return entry.interval(*bounded)
             _, _, spread = entry.number(value, deviation).partition(" ± ")
             return f"± {spread.rstrip(')')} {entry.display}".rstrip() if spread else ""
-        return "" if entry.key in BY_FORMULA else NOT_DETERMINED
+        return "" if entry.key in BY_FORMULA else UNKNOWN
 
 
 def numbers_of(run: Run) -> Numbers:

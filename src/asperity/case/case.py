@@ -374,9 +374,10 @@ class Case:
     def with_overrides(self, overrides: Mapping[str, object]) -> "Case":
         """Return the case with values replaced, such as `{"contact.load": "400 N"}`.
 
-        Text is parsed as a TOML value if possible, and used as it is otherwise. Stored roughness
-        is kept as long as neither the surface nor the grid changes. `vibration.preset` replaces
-        all values that presets determine. Raises BadInput as for a case file.
+        Numbers are in SI: `{"contact.load": 400.0}`; those in text need their unit. Text is parsed
+        as a TOML value if possible, and used as it is otherwise. Stored roughness is kept as long
+        as neither the surface nor the grid changes. `vibration.preset` replaces all values that
+        presets determine. Raises BadInput as for a case file.
         """
         tables = replaced(parse_toml(self.text, self.source), overrides, self.source)
         case = Case(parse_section(CaseFile, tables, self.source), self.folder, self.source)

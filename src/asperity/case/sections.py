@@ -63,9 +63,9 @@ def _parse_cells(value: object) -> Literal["auto"] | tuple[int, int]:
     if not isinstance(value, list | tuple) or len(value) != 2:
         raise BadInput(f'must be a list of two such as [256, 128], or "auto", got {quoted(value)}')
     for index, count in enumerate(value):
-        if type(count) is not int:
+        if not isinstance(count, int) or isinstance(count, bool):
             raise LocatedError((index,), f"must be a whole number, got {quoted(count)}")
-    return value[0], value[1]
+    return int(value[0]), int(value[1])
 
 
 class GridSection(Section):

@@ -12,15 +12,18 @@ from asperity.core.errors import BadInput
 
 def _parse_seeds(value: object) -> int | tuple[int, ...]:
     """Parse the number of seeds, or a list of seeds."""
-    if type(value) is int and value >= 1:
-        return value
-    if (
-        isinstance(value, list | tuple)
-        and value
-        and all(type(seed) is int and seed >= 0 for seed in value)
-    ):
-        return tuple(value)
+    if isinstance(value, list | tuple) and value:
+        if all(
+            isinstance(seed, int) and not isinstance(seed, bool) and seed >= 0 for seed in value
+        ):
+            return tuple(map(int, value))
+    elif isinstance(value, int) and not isinstance(value, bool) and value >= 1:
+        return int(value)
     raise BadInput(f"must be 1 or more, or a list of seeds such as [1, 2, 3], got {quoted(value)}")
+
+
+def _is_whole(value: object, least: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= least
 
 
 StudyKind = Literal["solve", "vibrate", "shake"]

@@ -6,6 +6,7 @@ other modules use SI only.
 
 import math
 import re
+from collections.abc import Mapping
 from decimal import Decimal
 from functools import cache, lru_cache, partial
 from tokenize import TokenError
@@ -115,6 +116,26 @@ class Amount(float):
         return float(self), self.text
 
 
+class SiFloat(float):
+    """Number that a program states, in SI where its key has a unit."""
+
+
+class SiInt(int):
+    """Whole number that a program states, in SI where its key has a unit."""
+
+
+def in_si(value: object) -> object:
+    """Return a value with all numbers in it marked as SI."""
+    if isinstance(value, Mapping):
+        return {key: in_si(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [in_si(part) for part in value]
+    if isinstance(value, bool | Amount):
+        return value
+    kind = SiInt if isinstance(value, int) else SiFloat
+    return kind(value) if isinstance(value, int | float) else value
+
+
 def plain(value: object) -> Any:
     """Return floats without the text they were written in, also in pairs."""
     if isinstance(value, tuple):
@@ -194,6 +215,7 @@ def parse_amount(unit: str, value: object, least: float = TINY) -> Amount:
     expected = f'must be {measure} such as "{example}"'
     if isinstance(value, Amount):
         return value
+    value = _as_text(value, unit)
     if isinstance(value, int | float) and not isinstance(value, bool):
         raise BadInput(f"{expected}, got the bare number {value}; add its unit")
     parts = _split(value)
@@ -214,6 +236,13 @@ def parse_amount(unit: str, value: object, least: float = TINY) -> Amount:
         allowed = "positive and finite" if least == TINY else "finite and not negative"
         raise BadInput(f"must be {allowed}, got {quoted(value)}; correct its sign or value")
     return Amount(si, f"{number} {unit_text}")
+
+
+def _as_text(value: object, unit: str) -> object:
+    """Return a number that a program states as text in an SI unit; others unchanged."""
+    if isinstance(value, SiFloat | SiInt):
+        return default_amount(float(value), unit).text
+    return value
 
 
 def read_amount(name: str, unit: str, text: str) -> float:

@@ -145,7 +145,7 @@ def run_table(run: "Run") -> Block:
     touching = 0.0 if run.solution.lubricant is None else run.solution.options.contact_film
     rows = [
         *known_rows(run.scalars()),
-        *results.uncertainty_rows(run.error),
+        *results.uncertainty_rows(run.error, run.friction_interval),
         (quantity("contact_film_m").title, text("contact_film_m", touching)),
         ("cells", " x ".join(map(str, run.solution.grid.cells))),
         *run.card.rows(),

@@ -131,7 +131,8 @@ def _friction_command(
 def _points(curve: "FrictionCurve") -> Block:
     """Return a row per point, in the catalogue's units."""
     rows = [asdict(point) for point in curve.points]
-    hidden = ("converged", "roughness", "clr_low", "clr_high")  # the interval stands beside CLR
+    ends = [end for key in ("clr", "friction_coefficient") for end in quantity(key).ends]
+    hidden = ("converged", "roughness", *ends)  # intervals stand beside their numbers
     selected = [quantity(key) for key in rows[0] if key not in hidden]
     yield f"  Sq {text('sq_m', curve.sq)}{', with thermal feedback' if curve.feedback else ''}"
     yield from columns(

@@ -1,7 +1,8 @@
 """`asperity run`: simulate the moving roughness of a case; resumable."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -129,6 +130,19 @@ def _saved(moved: "History", page: Path | None) -> Block:
     yield from written("Report", page)
 
 
+def _means(values: Mapping[str, object]) -> Iterator[Row]:
+    """Yield means with deviations over time and initial values, and the interval of friction."""
+    for entry in catalogue().values():
+        if f"{entry.key}_std" not in values or f"{entry.key}_start" not in values:
+            continue
+        mean = replace(entry, deviation=f"{entry.key}_std").text_in(
+            {key: value for key, value in values.items() if key not in entry.ends}
+        )
+        yield entry.title, f"{mean} (start {entry.number(values[f'{entry.key}_start'])})"
+        if entry.ends[0] in values:
+            yield f"{entry.short}, 90 % interval by the oil", entry.text_in(values)
+
+
 def _history_table(moved: "History") -> Block:
     """Return means over the settled steps with their deviations, and initial values."""
     values = moved.scalars()
@@ -145,12 +159,7 @@ def _history_table(moved: "History") -> Block:
         ),
         (f"means and deviations, from step {values['settled_from_step']}", ""),
     ]
-    for entry in catalogue().values():
-        if f"{entry.key}_std" in values and f"{entry.key}_start" in values:
-            mean = entry.text(values[entry.key], values[f"{entry.key}_std"])
-            rows.append(
-                (entry.title, f"{mean} (start {entry.number(values[f'{entry.key}_start'])})")
-            )
+    rows += _means(values)
     passes = values.get("passes", [])
     for lap in passes[:: max(1, len(passes) - 1)]:
         selected = [quantity(key) for key in ("clr", "car", "track_sq_m")]

@@ -231,12 +231,11 @@ def _fitted(fitted: "WearFit") -> Block:
 
 def _contact(history: "WearHistory") -> Block:
     """Return the initial and final values of the composite surface and the contact."""
-    first = history.table.iloc[0]
-    last = history.final_values
+    first, last = history.row_at(0), history.row_at(-1)
     rows = [
         (
             quantity(key).title,
-            quantity(key).number(first[key]),
+            quantity(key).number_in(first),
             quantity(key).number_in(last),
             quantity(key).display,
         )

@@ -17,6 +17,7 @@ from asperity.core.documents import Table
 from asperity.core.errors import require_positive
 
 NO_VALUE = "–"
+UNKNOWN = "± not determined"  # interval of a number
 BOUNDED = ("load", "film")  # groups of non-negative quantities: shares and film thicknesses
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # display units per SI unit; any other display unit is the SI unit itself
@@ -155,8 +156,9 @@ class Quantity:
         """Format its number in a row of a run or table: "61.3 (44 to 78)", or "61.3 ± 2.4".
 
         A quantity with keys for an interval shows no deviation, which is only a part of the
-        uncertainty. A share or film thickness whose deviation exceeds the physical range shows the
-        clipped interval: "0.2 (0.0 to 7.1)".
+        uncertainty; without values for them the interval is "± not determined". A share or film
+        thickness whose deviation exceeds the physical range shows the clipped interval: "0.2 (0.0
+        to 7.1)".
         """
         value = values.get(self.key)
         (low, high) = (_as_float(values.get(end)) for end in self.ends)
@@ -168,8 +170,10 @@ class Quantity:
                 if clipped is None
                 else f"{self.number(value)} ({self._span(*clipped)})"
             )
-        if value is None or low is None or high is None:
+        if value is None or low == high == value:
             return self.number(value)
+        if low is None or high is None:
+            return f"{self.number(value)} ({UNKNOWN})"
         return f"{self.number(value)} ({self._span(low, high)})"
 
     def clipped_interval(
@@ -190,8 +194,12 @@ class Quantity:
 
     def text_in(self, values: Table) -> str:
         """Format its number in a row with its unit: "61.3 (44 to 78) %"."""
-        number = self.number_in(values)
-        return number if number == NO_VALUE or not self.display else f"{number} {self.display}"
+        number, unknown = self.number_in(values), f" ({UNKNOWN})"
+        if number == NO_VALUE or not self.display:
+            return number
+        if number.endswith(unknown):
+            return f"{number.removesuffix(unknown)} {self.display}{unknown}"
+        return f"{number} {self.display}"
 
 
 def _as_float(value: object) -> float | None:

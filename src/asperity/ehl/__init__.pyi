@@ -4,6 +4,9 @@ from .cavitation import solve_film as solve_film
 from .contact_solution import ContactSolution as ContactSolution
 from .contact_solution import FileContents as FileContents
 from .contact_solution import Oil as Oil
+from .far_pressure import film_loss as film_loss
+from .far_pressure import flooded_reach as flooded_reach
+from .far_pressure import loss_beyond_body as loss_beyond_body
 from .film_formulas import FilmFit as FilmFit
 from .film_formulas import FilmNumbers as FilmNumbers
 from .film_formulas import Regime as Regime
@@ -18,7 +21,6 @@ from .grid_design import flooded_inlet as flooded_inlet
 from .grid_design import grid_shortfalls as grid_shortfalls
 from .grid_design import inlet_length as inlet_length
 from .grid_design import missing_inlet as missing_inlet
-from .grid_design import rigid_film_loss as rigid_film_loss
 from .load_shares import hertz_zone as hertz_zone
 from .outcome import MAX_CELLS_PER_TIME_STEP as MAX_CELLS_PER_TIME_STEP
 from .outcome import ContactModel as ContactModel

@@ -15,12 +15,14 @@ from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.contact.hertz import line_gap
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.ehl.film_formulas import (
-    central_film,
-    least_film,
-    lubrication_regime,
-    require_thin_film,
+from asperity.ehl.far_pressure import (
+    CELLS_IN_LENGTH,
+    CELLS_IN_LIGHT_ZONE,
+    OUTLET_LENGTHS,
+    build_up_lengths,
+    flooded_reach,
 )
+from asperity.ehl.film_formulas import central_film, least_film, require_thin_film
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface, correlation_lengths
@@ -37,6 +39,7 @@ CELLS_IN_CONTACT, MIN_CELLS_IN_CONTACT = 20.0, 16.0  # across the Hertz zone
 CELL_MARGIN = 1.05  # on minimum numbers, against rounding
 SIDE_CELL_RATIO = 0.6  # cells in y over cells in x: side flow varies more slowly
 MAX_INLET = MAX_OUTLET = 30.0  # half-widths; for light contacts
+LIGHT = 20.0  # half-widths over which the pressure of a light, smooth contact extends
 CONTACT_REACH = 5.0  # a rough body touches out to X² = 1 + 5 Sq R/a²: 2.5 Sq above the mean plane
 CORRELATION_LENGTHS = 10.0  # along the modelled length of a line contact
 DRY_FILM_RATIO = 0.05  # below it the film carries no load, and its inlet is not resolved
@@ -87,12 +90,13 @@ def auto_grid(
 
     The inlet begins where at most half of `accuracy` of the inlet's pressure is missing (twice
     `accuracy` for a rough contact); inlet and outlet lie at most 30 half-widths from the centre,
-    unless asperities may touch farther out: the domain includes contact up to 2.5 Sq above the mean
-    plane. Cells: 4.5 across the inlet length, 9 for a smooth line contact, 5 for a rough contact; 8
-    along a correlation length; 20 across the Hertz zone; scaled with the root of `accuracy`. A
-    rough contact has at least 96 by 32 cells, so that a coarser grid can estimate its error, and
-    about 130000 at most, or up to 2 million that its roughness needs; `grid_shortfalls` reports
-    coarser grids.
+    unless a smooth contact is so light that the pressure beyond carries a share of it
+    (`flooded_reach`), or asperities may touch farther out: the domain includes contact up to 2.5 Sq
+    above the mean plane. Cells: 4.5 across the inlet length, 9 for a smooth line contact, 5 for a
+    rough contact; 8 along a correlation length; 20 across the Hertz zone (16 at most of a light
+    contact); scaled with the root of `accuracy`. A rough contact has at least 96 by 32 cells, so
+    that a coarser grid can estimate its error, and about 130000 at most, or up to 2 million that
+    its roughness needs; `grid_shortfalls` reports coarser grids.
 
     Parameters
     ----------
@@ -148,26 +152,6 @@ def missing_inlet(conditions: ContactConditions, lubricant: Lubricant, begins: f
     """Return the share of the inlet pressure built up farther than `begins` [m] from the centre."""
     x, share = _pressure_build_up(_film(conditions, lubricant))
     return float(1.0 - np.interp(begins / conditions.hertz.half_widths[0], x, share))
-
-
-def rigid_film_loss(conditions: ContactConditions, lubricant: Lubricant, grid: Grid) -> float:
-    """Return the share of its film that a rigid, isoviscous ball loses on a bounded grid.
-
-    Its pressure, proportional to x/h² in the gap h, builds up over the length sqrt(2 R h₀); the
-    load within s lengths is ∫ s²/(1 + s²)² ds, which converges only as 1/s, and the film falls as
-    the inverse square of the load. Zero in other regimes and for line contacts. Source: P. L.
-    Kapitza, Zh. Tekh. Fiz. 25 (1955) 747.
-    """
-    bounded = conditions.geometry in ("point", "elliptic")
-    if not bounded or lubrication_regime(conditions, lubricant) != "isoviscous-rigid":
-        return 0.0
-    film = least_film(conditions, lubricant)
-    reach = min(
-        -grid.lower[0] / math.sqrt(2.0 * conditions.radius_along_rolling * film),
-        grid.upper[1] / math.sqrt(2.0 * conditions.radius_across_rolling * film),
-    )
-    load = (math.atan(reach) - reach / (1.0 + reach**2)) / (0.5 * math.pi)
-    return 1.0 - load**2
 
 
 def grid_shortfalls(
@@ -241,6 +225,9 @@ def _range_x(
         inlet = max(inlet, 1.6, _flooded_length(film, _missing_share(texture, accuracy)))
         # a rigid cylinder's film ruptures at 0.67 sqrt(film)
         outlet = max(outlet, min(math.sqrt(1.3**2 + 1.44 * film), MAX_OUTLET))
+        if texture is None:
+            inlet = max(inlet, flooded_reach(conditions, lubricant)[0] / a)
+            outlet = max(outlet, OUTLET_LENGTHS * build_up_lengths(conditions, lubricant)[0] / a)
     return _fit_texture(-inlet * a, outlet * a, texture, 0)
 
 
@@ -272,6 +259,8 @@ def _range_y(
         reach = max(
             reach, 1.0 + sides * (_flooded_length(film, _missing_share(texture, accuracy)) - 1.0)
         )
+        if texture is None:
+            reach = max(reach, flooded_reach(conditions, lubricant)[1] / b)
     return _fit_texture(-reach * b, reach * b, texture, 1)
 
 
@@ -352,17 +341,33 @@ def _spacing(
 
     A refinement of 0 gives the coarsest acceptable cells.
     """
+    lengths = build_up_lengths(conditions, lubricant)
+    if texture is None and lengths[0] > 0.0:
+        cells = CELLS_IN_LENGTH * refinement
+        return lengths[0] / cells, lengths[1] / cells
+    return _spacing_about_hertz(conditions, lubricant, texture, refinement)
+
+
+def _spacing_about_hertz(
+    conditions: ContactConditions,
+    lubricant: Lubricant | None,
+    texture: Texture | None,
+    refinement: float,
+) -> tuple[float, float]:
+    """Return the cell sizes [m] of a contact whose pressure is about that of Hertz."""
     (a, b) = conditions.hertz.half_widths
-    line = conditions.endless
     dx = dy = 2.0 / max(CELLS_IN_CONTACT * refinement, MIN_CELLS_IN_CONTACT)
     if lubricant is not None:
         inlet = inlet_length(conditions, lubricant, 0.0 if texture is None else texture.sq) / a
-        kind = "rough" if texture is not None else "smooth line" if line else "smooth"
+        kind = "rough" if texture is not None else "smooth line" if conditions.endless else "smooth"
         across = max(CELLS_IN_INLET[kind] * refinement, CELL_MARGIN * MIN_CELLS_IN_INLET)
         dx = min(dx, inlet / across)
         dy = min(dy, inlet / across / SIDE_CELL_RATIO)
+        if texture is None and flooded_reach(conditions, lubricant)[0] > LIGHT * a:
+            least = 2.0 / (CELLS_IN_LIGHT_ZONE * refinement)
+            dx, dy = max(dx, least), max(dy, least)
     # a line contact varies along y by its roughness only
-    dx, dy = dx * a, math.inf if line else dy * b
+    dx, dy = dx * a, math.inf if conditions.endless else dy * b
     if conditions.geometry == "roller":
         dy = _line_distance(conditions, refinement)
     if texture is not None:

@@ -1,5 +1,6 @@
 """Setup of the dimensionless problem: grid levels and initial guess."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.ehl.controls import CONTINUATION
 from asperity.ehl.deflection import MIRROR_BETWEEN, MIRROR_THROUGH
+from asperity.ehl.far_pressure import build_up_lengths, rigid_pressure
 from asperity.ehl.film_formulas import central_film, least_film, least_films
 from asperity.ehl.grid_design import MIN_CELLS_SHORT_AXIS, MIN_COARSE_CELLS, inlet_length
 from asperity.ehl.models.single_pressure import Problem
@@ -77,6 +79,7 @@ def first_guess(
     problem: Problem, conditions: ContactConditions, lubricant: Lubricant | None, scales: Scales
 ) -> tuple[Field, float]:
     """Return Hertz pressure and an approach that leaves the film of a smooth contact."""
+    shape = problem.form.gap(problem.x, problem.y)
     pressure = np.minimum(problem.form.hertz(problem.x, problem.y), problem.p_cap)
     film = 0.0
     if lubricant:
@@ -85,7 +88,13 @@ def first_guess(
         # the gap is uniform under Hertz pressure: the central film
         if not np.any(problem.roughness) and not conditions.long:
             film = max(film, central_film(conditions, lubricant) / scales.gap)
-    smooth = problem.form.gap(problem.x, problem.y) + problem.deflection(pressure)
+        if build_up_lengths(conditions, lubricant)[0] > 0.0 and not np.any(problem.roughness):
+            film = least_film(conditions, lubricant) / scales.gap
+            pressure = rigid_pressure(problem.x[:, None], film + shape - float(np.min(shape)))
+            pressure *= problem.load / (
+                problem.sum_over_cells(pressure) * math.prod(problem.spacing)
+            )
+    smooth = shape + problem.deflection(pressure)
     return pressure, film - float(np.min(smooth))
 
 
@@ -127,6 +136,9 @@ def usable_levels(
     for the error estimate.
     """
     levels = grid_levels(finest)
+    length = build_up_lengths(conditions, lubricant)[0] / conditions.hertz.half_widths[0]
+    if length > 0.0 and not np.any(finest.roughness):
+        return [level for level in levels if level is finest or level.spacing[0] <= length]
     if not finest.form.periodic or lubricant is None:
         return levels
     gap = Scales.from_conditions(conditions, lubricant).gap

@@ -12,6 +12,7 @@ from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl.contact_solution import ContactSolution
 from asperity.ehl.controls import CONTINUATION, SEARCH
+from asperity.ehl.far_pressure import build_up_lengths
 from asperity.ehl.film_formulas import central_film, require_thin_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
@@ -289,6 +290,9 @@ def _check_grid(
             f"periodic={grid.periodic}"
         )
     a, b = conditions.hertz.half_widths
+    light = (0.0, 0.0)
+    if not np.any(surface.heights):
+        light = build_up_lengths(conditions, lubricant)
     if conditions.geometry == "roller":
         if lubricant is not None:
             _check_weight(conditions, lubricant)
@@ -303,11 +307,12 @@ def _check_grid(
                 "least "
                 f"1.2 Hertz half-widths ({1.2 * half * 1e6:.4g} um) to both sides; widen it"
             )
-        if spacing > 0.25 * half:
+        loaded = max(half, light[index])
+        if spacing > 0.25 * loaded:
             raise BadInput(
                 f"cells of {spacing * 1e6:.3g} um along {axis} leave fewer than 8 across the "
                 "contact of "
-                f"{2.0 * half * 1e6:.3g} um; use more cells"
+                f"{2.0 * loaded * 1e6:.3g} um; use more cells"
             )
     _check_cap(conditions, grid)
 

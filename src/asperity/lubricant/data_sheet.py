@@ -8,10 +8,11 @@ import re
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.errors import BadInput, require_choice, require_positive
 from asperity.lubricant.density import DowsonHigginson
 from asperity.lubricant.friction import ZERO_CELSIUS, BairWiner, FrictionLaw
-from asperity.lubricant.model import Lubricant
+from asperity.lubricant.model import STATED_ALPHA_ERROR, Lubricant
 from asperity.lubricant.pressure_viscosity import ESTIMATORS, BaseOil, Estimator
 from asperity.lubricant.rheology import Newtonian, RheologyLaw
 from asperity.lubricant.viscosity import Barus, Roelands
@@ -225,13 +226,22 @@ class OilSheet:
         return self.kinematic_viscosity(temperature) * self.density(temperature)
 
     def pressure_viscosity(self, temperature: float) -> float:
-        """Return alpha [1/Pa] at a temperature [K], given or estimated.
+        """Return alpha [1/Pa] at a temperature [K], the slope at ambient pressure.
+
+        It is given or estimated.
 
         Raises BadInput for an oil too thin for the estimate.
         """
         if self.alpha is not None:
             return self.alpha
         return self.estimator(self, temperature)
+
+    @property
+    def alpha_error(self) -> float:
+        """Half of the 90 % interval of alpha, relative."""
+        if self.alpha is not None:
+            return STATED_ALPHA_ERROR
+        return 0.5 * NORMAL_FACTOR * self.estimator.spread_of(self.base)
 
     @property
     def estimator(self) -> Estimator:
@@ -257,6 +267,7 @@ class OilSheet:
             density=DowsonHigginson(self.density(temperature)),
             rheology=rheology or Newtonian(),
             friction=friction or BairWiner(),
+            alpha_error=self.alpha_error,
         )
 
 

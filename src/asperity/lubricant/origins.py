@@ -87,9 +87,11 @@ def _alpha(oil: OilSheet, temperature: float) -> OilFact:
     if oil.alpha is not None:
         return OilFact("oil_alpha_1_pa", alpha, "given")
     estimator = oil.estimator
-    spread = f"± {100.0 * estimator.spread:.0f} %" if oil.base == "mineral" else "spread unknown"
+    spread = f"± {100.0 * estimator.spread_of(oil.base):.0f} %"
+    assumed = "" if oil.base == "mineral" else " assumed"
+    slope = "" if estimator.share == 1.0 else f" over {estimator.share:g}"
     return OilFact(
-        "oil_alpha_1_pa", alpha, "estimated", f"{estimator.title}, {spread}, {estimator.definition}"
+        "oil_alpha_1_pa", alpha, "estimated", f"{estimator.title}{slope}, {spread}{assumed}"
     )
 
 
@@ -106,8 +108,8 @@ def _notes(oil: OilSheet, temperature: float) -> Iterator[str]:
     if oil.alpha is None and oil.base != "mineral":
         yield (
             f"Alpha of base {oil.base} is estimated with constants on which sources differ and "
-            "which were not compared with measurements; the film thickness scales with about its "
-            "square root: give a measured alpha."
+            "which were not compared with measurements. The film thickness scales with about its "
+            "square root, friction can change with its fourth power: give a measured alpha."
         )
     if oil.alpha is None and oil.viscosity(temperature) > MAX_COMPARED_VISCOSITY:
         yield (

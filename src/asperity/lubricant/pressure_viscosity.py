@@ -1,9 +1,9 @@
 """Estimators of the pressure-viscosity coefficient from data sheets, with their validity.
 
-Estimates of the slope at ambient pressure are higher than those of an effective value in the
-contact; each estimator states its definition. Spreads are twice the root-mean-square deviation from
-four measured mineral oils of high viscosity index (`measured`), at the worst of 30, 60 and 100 °C.
-docs/theory/oils.md has the table.
+All give the slope of ln η at ambient pressure, on which the laws of viscosity, film and friction
+are based. Gold's and ISO's published values are effective ones in the contact, a quarter lower.
+Spreads are twice the root-mean-square deviation from four measured mineral oils of high viscosity
+index (`measured`), at the worst of 30, 60 and 100 °C. docs/theory/oils.md has the table.
 """
 
 import math
@@ -30,8 +30,8 @@ _ISO: dict[BaseOil, tuple[float, float]] = {
     "pao": (14.66, 0.0507),
     "polyglycol": (13.92, 0.1572),
 }
-AMBIENT_SLOPE = "slope at ambient pressure"
-EFFECTIVE = "effective value in the contact, about 25 % below the slope at ambient pressure"
+EFFECTIVE = 0.75  # an effective value in the contact over the slope at ambient pressure
+OTHER_BASES = 0.4  # assumed spread: that of Gold for mineral oils, and 0.2 between sources
 
 
 class OilProperties(Protocol):
@@ -88,22 +88,26 @@ class Estimator:
     Parameters
     ----------
     title : citation
-    law : alpha of an oil at a temperature [K]
-    definition : slope at ambient pressure or effective value
+    law : published alpha of an oil at a temperature [K]
     spread : two relative standard deviations of mineral oils of high viscosity index
     min_viscosity : lower limit of validity, kinematic [m^2/s]
     bases : base oils with known constants
+    share : published alpha over the slope at ambient pressure
     """
 
     title: str
     law: Callable[[OilProperties, float], float]
-    definition: str
     spread: float
     min_viscosity: float
     bases: tuple[BaseOil, ...] = ("mineral",)
+    share: float = 1.0
+
+    def spread_of(self, base: BaseOil) -> float:
+        """Return two relative standard deviations for a base oil."""
+        return self.spread if base == "mineral" else OTHER_BASES
 
     def __call__(self, oil: OilProperties, temperature: float) -> float:
-        """Return alpha [1/Pa]; BadInput outside the range of validity.
+        """Return the slope at ambient pressure [1/Pa]; BadInput outside the range of validity.
 
         The estimate is also invalid where it falls with decreasing temperature.
         """
@@ -126,45 +130,42 @@ class Estimator:
                 "mm^2/s), where its alpha falls with decreasing temperature; give alpha, or use "
                 "another alpha_estimate"
             )
-        return alpha
+        return alpha / self.share
 
 
 ESTIMATORS: dict[str, Estimator] = {
     "roelands": Estimator(
         title=f"Roelands with Z {ROELANDS_Z}",
         law=_roelands,
-        definition=AMBIENT_SLOPE,
         spread=0.2,
         min_viscosity=2.0 * MM2,
     ),
     "so-klaus": Estimator(
         title="So and Klaus (1980)",
         law=_so_klaus,
-        definition=AMBIENT_SLOPE,
         spread=0.5,
         min_viscosity=1.0 * MM2,
     ),
     "wooster": Estimator(
         title="Wooster",
         law=_wooster,
-        definition=AMBIENT_SLOPE,
         spread=0.25,
         min_viscosity=2.0 * MM2,
     ),
     "gold": Estimator(
         title="Gold",
         law=_gold,
-        definition=EFFECTIVE,
-        spread=0.45,
+        spread=0.35,
         min_viscosity=2.0 * MM2,
         bases=tuple(_GOLD),
+        share=EFFECTIVE,
     ),
     "iso": Estimator(
         title="ISO/TR 15144-1",
         law=_iso,
-        definition=EFFECTIVE,
-        spread=0.4,
+        spread=0.3,
         min_viscosity=2.0 * MM2,
         bases=tuple(_ISO),
+        share=EFFECTIVE,
     ),
 }

@@ -43,6 +43,8 @@ SOLVED_KEYS = (  # quantities of a solved contact
     *(
         "p_max_pa",
         "friction_coefficient",
+        "friction_coefficient_low",
+        "friction_coefficient_high",
         "friction_power_w",
         "rolling_friction_power_w",
         "flash_temperature_max_k",

@@ -18,7 +18,7 @@ from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from asperity.core.files import atomic_write, require_writable
-from asperity.core.quantities import Quantity, in_print, quantity
+from asperity.core.quantities import UNKNOWN, Quantity, in_print, quantity
 from asperity.paper import CITATION
 from asperity.report.style import ON_PAGE, ON_PAPER, ON_PHONE, Medium, svg, write_figure
 
@@ -120,6 +120,8 @@ def tile(quantity: Quantity, row: Numbers) -> Tile:
             quantity.number(row[quantity.key]),
             f"({quantity.interval(low, high)})",
         )
+    if quantity.ends[0] in row and row[quantity.key] is not None:
+        return Tile(heading(quantity), quantity.number(row[quantity.key]), UNKNOWN)
     value, _, deviation = quantity.number_in(row).partition(" ± ")
     if value.startswith("("):  # the power of ten of both
         deviation, _, power = deviation.partition(")")

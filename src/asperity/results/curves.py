@@ -1,21 +1,21 @@
 """Friction curves of a case: over speed (Stribeck) and over the slide-to-roll ratio (traction).
 
-Each point is a solved contact: running roughness, or a snapshot that is warm-started from its
-neighbour. Nothing is printed or drawn here.
+Each point is a solved contact. Nothing is printed or drawn here.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Literal
 
 import numpy as np
 
 from asperity.case import Case
 from asperity.core.errors import AsperityError, BadInput, require_positive
-from asperity.ehl import ContactSolution, Iteration
+from asperity.core.quantities import quantity
+from asperity.ehl import Iteration
 from asperity.results.run import Run
 from asperity.results.solve import solve_case
-from asperity.solution import HOT, contact_state, friction_and_heat, solve_thermal_contact
+from asperity.solution import HOT
 
 SolverProgress = Callable[[Iteration], None]
 FrictionCurveKind = Literal["stribeck", "traction"]
@@ -27,7 +27,7 @@ SLIP_RANGE = (1e-3, 0.5)
 SLIPS = 14
 MAX_SLIP = 1000.0
 GROUPS = ("load", "film", "friction", "heat")  # of the catalogue, of a point
-RUNNING_KEYS = {  # number of a point: its key in the catalogue
+POINT_KEYS = {  # number of a point: its key in the catalogue
     "friction_coefficient": "friction_coefficient",
     "asperity_part": "friction_asperity_part",
     "oil_part": "friction_oil_part",
@@ -51,6 +51,8 @@ class FrictionPoint:
     entrainment_speed_m_s: float
     slide_to_roll: float
     friction_coefficient: float
+    friction_coefficient_low: float | None
+    friction_coefficient_high: float | None
     asperity_part: float
     oil_part: float
     clr: float
@@ -63,6 +65,11 @@ class FrictionPoint:
     friction_power_w: float
     roughness: RoughnessMotion
     converged: bool
+
+    @property
+    def friction_text(self) -> str:
+        """Friction coefficient with its interval."""
+        return quantity("friction_coefficient").text_in(asdict(self))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,14 +98,14 @@ class FrictionCurve:
         last = self.points[-1]
         if self.kind == "stribeck":
             sentence = (
-                f"The friction coefficient changes from {first.friction_coefficient:.4f} at "
-                f"{first.entrainment_speed_m_s:.3g} m/s to {last.friction_coefficient:.4f} at "
+                f"The friction coefficient changes from {first.friction_text} at "
+                f"{first.entrainment_speed_m_s:.3g} m/s to {last.friction_text} at "
                 f"{last.entrainment_speed_m_s:.3g} m/s"
             )
         else:
             highest = max(self.points, key=lambda point: point.friction_coefficient)
             sentence = (
-                f"The largest friction coefficient is {highest.friction_coefficient:.4f}, at a "
+                f"The largest friction coefficient is {highest.friction_text}, at a "
                 f"slide-to-roll ratio of {100 * highest.slide_to_roll:.3g} %"
             )
         sentence += f" (Sq {1e6 * self.sq:.3g} um, boundary friction {self.boundary_friction:g})."
@@ -146,11 +153,8 @@ def stribeck_curve(
         speeds = [float(speed) for speed in np.geomspace(low, high, SPEEDS)]
     for speed in speeds:
         require_positive("entrainment speed", speed, "m/s")
-    first, second = (
-        speed / case.conditions.entrainment_speed for speed in case.conditions.surface_speeds
-    )
-    pairs = [(first * speed, second * speed) for speed in sorted(speeds, reverse=True)]
-    return _curve(case, "stribeck", pairs, progress)  # descending from full film: best warm starts
+    points = [{"contact.entrainment_speed": f"{speed!r} m/s"} for speed in sorted(speeds)]
+    return _curve(case, "stribeck", points, progress)
 
 
 def traction_curve(
@@ -175,111 +179,54 @@ def traction_curve(
     for slip in slips:
         if not 0.0 <= slip <= MAX_SLIP:
             raise BadInput(f"slide-to-roll ratio must be between 0 and {MAX_SLIP:g}, got {slip:g}")
-    speed = case.conditions.entrainment_speed
-    pairs = [(speed * (1.0 + slip / 2.0), speed * (1.0 - slip / 2.0)) for slip in sorted(slips)]
-    return _curve(case, "traction", pairs, progress)
+    points = [{"contact.slip": slip} for slip in sorted(slips)]
+    return _curve(case, "traction", points, progress)
 
 
 def _curve(
     case: Case,
     kind: FrictionCurveKind,
-    speeds: Sequence[tuple[float, float]],
+    points: Sequence[Mapping[str, object]],
     progress: SolverProgress | None,
 ) -> FrictionCurve:
-    """Solve the contacts at these surface speeds, each from the previous converged point."""
-    if not speeds:
+    """Solve the case with the overrides of each point."""
+    if not points:
         raise BadInput("a curve needs at least one point, got none")
-    surface, points = case.surface(), []
-    start: ContactSolution | None = None
-    for pair in speeds:
-        if (moving := _running_case(case, pair)) is not None:
-            run = solve_case(moving, strict=False, groups=GROUPS, progress=progress)
-            points.append(_running_point(run))
-            continue
-        for first in (start, None):  # retry with a cold start if the warm start fails
-            solution = solve_thermal_contact(
-                replace(case.conditions, surface_speeds=pair),
-                case.lubricant,
-                surface,
-                boundary_friction=case.boundary_friction,
-                thermal=case.thermal,
-                options=case.options,
-                start=first,
-                strict=False,
-                progress=progress,
-            )
-            if solution.convergence.converged or first is None:
-                break
-        start = solution if solution.convergence.converged else None
-        points.append(_point(case, solution))
+    case = case.among_many.with_overrides({"vibration": "none", "solver.surfaces": 1})
+    runs = (
+        solve_case(case.with_overrides(point), strict=False, groups=GROUPS, progress=progress)
+        for point in points
+    )
     return FrictionCurve(
         kind=kind,
-        points=tuple(points if kind == "traction" else points[::-1]),
+        points=tuple(map(_point, runs)),
         boundary_friction=case.boundary_friction,
-        sq=surface.sq,
+        sq=case.surface().sq,
         feedback=case.thermal.feedback,
     )
 
 
-def _running_case(case: Case, pair: tuple[float, float]) -> Case | None:
-    """Return the case at other surface speeds if roughness moves there, otherwise None."""
-    entrainment = 0.5 * (pair[0] + pair[1])
-    if entrainment == 0.0:  # without oil
-        return None
-    moving = case.among_many.with_overrides(
-        {
-            "contact.entrainment_speed": f"{entrainment!r} m/s",
-            "contact.slip": (pair[0] - pair[1]) / entrainment,
-            "vibration": "none",
-        }
-    )
-    return moving if moving.is_running else None
-
-
-def _running_point(run: Run) -> FrictionPoint:
-    """Return a point of running roughness: means over time."""
-    numbers, conditions, clr = run.numbers(GROUPS), run.case.conditions, run.error.clr
-    values = {name: numbers[key] for name, key in RUNNING_KEYS.items()}
+def _point(run: Run) -> FrictionPoint:
+    """Return a point of a curve: means over time if the roughness runs."""
+    numbers, conditions, clr = run.numbers(GROUPS), run.solution.conditions, run.error.clr
+    values = {name: numbers[key] for name, key in POINT_KEYS.items()}
     if missing := [name for name, value in values.items() if value is None]:
         raise AsperityError(
             f"{missing[0]} at {conditions.entrainment_speed:.4g} m/s could not be computed; leave "
             'that point out, or set contact.roughness = "standing"'
         )
+    interval = run.friction_interval
+    assert interval is not None  # with friction
     return FrictionPoint(
         entrainment_speed_m_s=conditions.entrainment_speed,
         slide_to_roll=conditions.slide_to_roll,
+        friction_coefficient_low=interval.low,
+        friction_coefficient_high=interval.high,
         clr=run.state.clr,
         clr_low=clr.low,
         clr_high=clr.high,
         lambda_ratio=run.state.lambda_ratio,
-        roughness="running",
+        roughness="standing" if run.running is None else "running",
         converged=run.converged,
         **{name: float(value) for name, value in values.items() if value is not None},
-    )
-
-
-def _point(case: Case, solution: ContactSolution) -> FrictionPoint:
-    friction, heat = friction_and_heat(
-        solution, boundary_friction=case.boundary_friction, thermal=case.thermal
-    )
-    state = contact_state(solution)
-    conditions = solution.conditions
-    assert state.error is not None  # set by contact_state
-    clr = state.error.clr
-    return FrictionPoint(
-        entrainment_speed_m_s=conditions.entrainment_speed,
-        slide_to_roll=conditions.slide_to_roll,
-        friction_coefficient=friction.coefficient,
-        asperity_part=friction.asperity_part,
-        oil_part=friction.oil_part,
-        clr=state.clr,
-        clr_low=clr.low,
-        clr_high=clr.high,
-        h_mean_m=state.h_mean,
-        lambda_ratio=state.lambda_ratio,
-        flash_temperature_max_k=heat.max_k,
-        film_temperature_max_k=heat.film_max_k,
-        friction_power_w=friction.power,
-        roughness="standing",
-        converged=solution.convergence.converged,
     )

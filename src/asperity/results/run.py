@@ -18,16 +18,15 @@ from asperity.ehl import ContactSolution, ContactState
 from asperity.resonance import Resonance
 from asperity.results.determined import Determined
 from asperity.results.dynamic import DynamicCurve, dynamic_curve
+from asperity.results.friction_interval import (
+    FrictionInterval,
+    friction_interval,
+    numerical_error,
+)
 from asperity.results.run_contents import run_contents
 from asperity.results.running import Running
-from asperity.results.surface_spread import (
-    AVERAGED,
-    Row,
-    Scalar,
-    half_interval,
-    mean_row,
-)
-from asperity.results.uncertainty_text import basis, interval_text
+from asperity.results.surface_spread import AVERAGED, Row, Scalar, half_interval, mean_row
+from asperity.results.uncertainty_text import basis, ends_text, interval_text
 from asperity.solution import (
     FILMS,
     HOT,
@@ -106,6 +105,18 @@ class Run:
         """Friction with the case's boundary friction, oil and [thermal]; None if it failed."""
         determined = self._friction_and_heat.value
         return None if determined is None else determined[0]
+
+    @property
+    def friction_error(self) -> float | None:
+        """Error of friction due to those of load share and film of the solution."""
+        if self.friction is None:
+            return None
+        return numerical_error(self.friction, self.solution, self.state.clr)
+
+    @cached_property
+    def friction_interval(self) -> FrictionInterval | None:
+        """Interval of friction over all surfaces; None if it was not computed."""
+        return friction_interval((self.own_scalars, *self.others))
 
     @property
     def heat(self) -> FlashTemperature | None:
@@ -373,7 +384,8 @@ class Run:
         doubt = ""
         if films and self.undetermined is None:
             doubt = f"film not determined ({', '.join(films)}); "
-        contact = f"{self._ends_text()}{self.resonance_text()}"
+        ends = "" if self.axial is None else ends_text(self.axial, self.numbers([]), self.solution)
+        contact = f"{ends}{self.resonance_text()}"
         return f"{sentence}; {doubt}{contact}; {basis(self.error, snapshot=self.is_snapshot)}."
 
     def _regime_and_shares(self) -> tuple[str, str]:
@@ -399,23 +411,6 @@ class Run:
         if self.snapshot_clr is not None:
             standing = quantity("clr").text(self.snapshot_clr)
         return regime, f"{shared}, {standing} in a snapshot of standing roughness"
-
-    def _ends_text(self) -> str:
-        """Return edge pressure and loaded length of a roller; empty for other contacts."""
-        if self.axial is None:
-            return ""
-        numbers = self.numbers([])
-        edge = quantity("edge_pressure_pa")
-        pressure = self.axial.edge_pressure
-        middle = quantity("middle_pressure_pa").named(numbers["middle_pressure_pa"])
-        if pressure is None:
-            text = f"no {edge.name} (outside the grid)"
-        elif pressure.value is None:
-            text = f"{edge.name} not determined, {middle}"
-        else:
-            hertz = pressure.value / self.solution.conditions.hertz.p_max
-            text = f"{edge.short} {edge.text_in(numbers)}, {hertz:.2f} times that of a uniform load"
-        return f"{text}, {quantity('loaded_share').named(numbers['loaded_share'])}; "
 
     @property
     def summary_row(self) -> Row:

@@ -279,6 +279,7 @@ def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
     totals: dict[str, Scalar] = {
         "iterations": sum(series.iterations for series in everything),
         "seconds": sum(series.seconds for series in everything),
+        "friction_error": _error(means["friction_coefficient"]),
     }
     return Running(
         numbers=_numbers(case, means, _moments(fine, cuts[0])) | totals,
@@ -293,6 +294,11 @@ def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
         time_s=tuple(fine.column("time_s")),
         series=tuple(fine.column("clr")),
     )
+
+
+def _error(mean: TimeMean) -> float | None:
+    """Return the error of a mean by cells and finite time; None without a coarse grid."""
+    return None if mean.grid is None else math.hypot(mean.grid, mean.time)
 
 
 def _moments(fine: Series, cut: int) -> list[Snapshot]:

@@ -2,7 +2,9 @@
 
 from asperity.core.quantities import NO_VALUE, Quantity, quantity
 from asperity.ehl import ContactError, ContactSolution, Sides, Uncertainty
-from asperity.solution import sharing_by_film
+from asperity.results.friction_interval import FrictionInterval
+from asperity.results.surface_spread import Row
+from asperity.solution import AxialDistribution, sharing_by_film
 
 PARTS = {  # part of an uncertainty: name in tables
     "iteration": "iteration",
@@ -43,13 +45,32 @@ def basis(error: ContactError, *, snapshot: bool) -> str:
     )
 
 
-def uncertainty_rows(error: ContactError) -> list[tuple[str, str]]:
-    """Return table rows: intervals of CLR and CRF, their parts, and assumptions not covered."""
+def uncertainty_rows(
+    error: ContactError, friction: FrictionInterval | None = None
+) -> list[tuple[str, str]]:
+    """Return table rows: intervals of CLR, CRF and friction by part, and assumptions."""
     rows = []
     for key, part in (("clr", error.clr), ("crf_hz", error.crf_hz)):
         if part is not None:
             rows += _rows(quantity(key), part, error)
+    if friction is not None and friction.value > 0.0:
+        rows += _friction_rows(friction)
     return [*rows, ("assumptions not covered by the intervals", ", ".join(error.choices))]
+
+
+def _friction_rows(friction: FrictionInterval) -> list[tuple[str, str]]:
+    entry = quantity("friction_coefficient")
+    low, high = friction.low, friction.high
+    interval = UNDETERMINED if low is None or high is None else entry.interval(low, high)
+    cells = friction.numerical
+    rows = [
+        ("90 % interval", interval),
+        ("oil under pressure and shear", _sides(entry, friction.oil)),
+        ("viscosity of the cold oil", _sides(entry, (friction.heat, 0.0))),
+        ("cell size and iteration", UNDETERMINED if cells is None else _sides(entry, (cells,) * 2)),
+        ("surface to surface", _sides(entry, friction.surfaces)),
+    ]
+    return [(f"{entry.short}, {name}", text) for name, text in rows]
 
 
 def _rows(entry: Quantity, error: Uncertainty, whole: ContactError) -> list[tuple[str, str]]:
@@ -90,3 +111,18 @@ def threshold_note(solution: ContactSolution) -> str:
         f"the cap separates them again. Load by film thickness: {shares}. The share at the "
         "contact film depends on the grid."
     )
+
+
+def ends_text(axial: AxialDistribution, numbers: Row, solution: ContactSolution) -> str:
+    """Return edge pressure and loaded length of a roller, as the start of a sentence."""
+    edge = quantity("edge_pressure_pa")
+    pressure = axial.edge_pressure
+    middle = quantity("middle_pressure_pa").named(numbers["middle_pressure_pa"])
+    if pressure is None:
+        text = f"no {edge.name} (outside the grid)"
+    elif pressure.value is None:
+        text = f"{edge.name} not determined, {middle}"
+    else:
+        hertz = pressure.value / solution.conditions.hertz.p_max
+        text = f"{edge.short} {edge.text_in(numbers)}, {hertz:.2f} times that of a uniform load"
+    return f"{text}, {quantity('loaded_share').named(numbers['loaded_share'])}; "

@@ -10,12 +10,14 @@ from asperity.core.quantities import quantity
 from asperity.ehl import (
     ContactSolution,
     Uncertainty,
+    film_loss,
     flooded_inlet,
+    flooded_reach,
     grid_shortfalls,
     inlet_length,
     least_film,
+    loss_beyond_body,
     missing_inlet,
-    rigid_film_loss,
 )
 from asperity.ehl.grid_design import CELLS_IN_INLET, MAX_CLR_ERROR, MAX_FILM_ERROR
 from asperity.ehl.load_shares import carried_share
@@ -59,36 +61,52 @@ def inlet_notes(
     """
     if lubricant is None:
         return ()
-    if (rigid := rigid_film_loss(conditions, lubricant, grid)) > MIN_STARVATION:
-        film = least_film(conditions, lubricant)
-        length = np.sqrt(2.0 * conditions.radius_along_rolling * film)
-        return (
-            f"The grid is too small for so light a contact, whose pressure builds up over many "
-            f"times sqrt(2 R h) = {1e6 * length:.3g} um: the film is about {100.0 * rigid:.2g} % "
-            f"too thin. Use the formula of its regime, {1e6 * film:.3g} um.",
-        )
     a = conditions.hertz.half_widths[0]
     inlet_start = -grid.lower[0]
-    loss = FILM_LOSS_PER_PRESSURE_LOSS * missing_inlet(conditions, lubricant, inlet_start)
-    flooded = flooded_inlet(conditions, lubricant) / a
+    reach = flooded_reach(conditions, lubricant)
+    flooded = max(flooded_inlet(conditions, lubricant), reach[0]) / a
     length = inlet_length(conditions, lubricant)
-    fully_flooded = 1.0 + 3.06 * (length / a) ** (1.5 * 0.58)
-    if loss > MIN_STARVATION:
+    fully_flooded = f"m* = {1.0 + 3.06 * (length / a) ** (1.5 * 0.58):.2g}"
+    present = f"The inlet of {inlet_start / a:.3g} half-widths is"
+    loss, beyond = _starvation(conditions, lubricant, grid), _beyond_body(conditions, lubricant)
+    if loss > MIN_STARVATION and not (beyond and reach[0] <= 1.01 * inlet_start):
+        sides = _sides(reach[1], grid.upper[1], conditions.hertz.half_widths[-1])
         return (
-            f"The inlet of {inlet_start / a:.3g} half-widths is starved: the film is about "
-            f"{100.0 * loss:.2g} % too thin. A flooded inlet needs {flooded:.3g} half-widths (m* "
-            f"= {fully_flooded:.2g}); start grid.x at {-flooded:.3g} unless starvation is "
-            "intended.",
+            f"{present} starved: the film is about {100.0 * loss:.2g} % too thin. A flooded inlet "
+            f"needs {flooded:.3g} half-widths ({fully_flooded}); start grid.x at {-flooded:.3g}"
+            f"{sides} unless starvation is intended.",
         )
-    cells = length / grid.spacing[0]
-    if inlet_start > 2.0 * max(flooded, 1.6) * a and cells < CELLS_IN_INLET["rough"]:
-        sufficient = max(flooded, 1.6)
-        return (
-            f"The inlet of {inlet_start / a:.3g} half-widths is longer than necessary (m* = "
-            f"{fully_flooded:.2g}): starting grid.x at {-sufficient:.3g} gives more than the "
-            f"present {cells:.2g} cells where the film forms.",
-        )
-    return ()
+    if beyond:
+        return (beyond,)
+    sufficient, cells = max(flooded, 1.6), length / grid.spacing[0]
+    if inlet_start <= 2.0 * sufficient * a or cells >= CELLS_IN_INLET["rough"]:
+        return ()
+    return (
+        f"{present} longer than necessary ({fully_flooded}): starting grid.x at "
+        f"{-sufficient:.3g} gives more than the present {cells:.2g} cells where the film forms.",
+    )
+
+
+def _starvation(conditions: ContactConditions, lubricant: Lubricant, grid: Grid) -> float:
+    """Return the share of the film lost by the ends of the grid."""
+    inlet = missing_inlet(conditions, lubricant, -grid.lower[0])
+    return max(FILM_LOSS_PER_PRESSURE_LOSS * inlet, film_loss(conditions, lubricant, grid))
+
+
+def _sides(needed: float, reached: float, half_width: float) -> str:
+    return f" and grid.y at {-needed / half_width:.3g}" if needed > reached else ""
+
+
+def _beyond_body(conditions: ContactConditions, lubricant: Lubricant) -> str:
+    """Return a note on pressure beyond the body; empty if it matters little."""
+    beyond = loss_beyond_body(conditions, lubricant)
+    if beyond <= MIN_STARVATION:
+        return ""
+    return (
+        "The body counts as an endless paraboloid, as in film formulas: about "
+        f"{100.0 * beyond:.2g} % of the film is due to pressure beyond its radius, where a real "
+        "body ends."
+    )
 
 
 def solution_notes(solution: ContactSolution, *, standing: bool = True) -> tuple[str, ...]:
@@ -132,15 +150,24 @@ def uncertain_films(
     if (
         solution is not None
         and oil is not None
-        and (rigid_film_loss(solution.conditions, oil, solution.grid) > MAX_FILM_ERROR)
+        and (reason := _cut_off(solution.conditions, oil, solution.grid))
     ):
-        return ("the grid is too small for so light a contact",)
+        return (reason,)
     values = ((f"{name}_m", f"{name}_error_m") for name in ("h_min", "h_central"))
     return tuple(
         f"{quantity(key).name} ± {100.0 * bar / film:.0f} %"
         for key, error in values
         if (film := numbers[key]) and (bar := numbers[error]) and bar > MAX_FILM_ERROR * film
     )
+
+
+def _cut_off(conditions: ContactConditions, oil: Lubricant, grid: Grid) -> str:
+    """Return the reason why a light contact's film is not determined; empty if it is."""
+    if loss_beyond_body(conditions, oil) > MAX_FILM_ERROR:
+        return "the pressure of so light a contact reaches beyond the body"
+    if film_loss(conditions, oil, grid) > MAX_FILM_ERROR:
+        return "the grid is too small for so light a contact"
+    return ""
 
 
 def is_below_contact_film(solution: ContactSolution) -> bool:

@@ -15,13 +15,14 @@ from asperity.ehl import (
     FilmNumbers,
     Regime,
     film_fits,
+    film_loss,
     film_numbers,
     flooded_inlet,
     hertz_zone,
     inlet_length,
     least_film,
+    loss_beyond_body,
     lubrication_regime,
-    rigid_film_loss,
 )
 from asperity.ehl.film_formulas import Place
 from asperity.ehl.grid_design import MIN_CELLS_IN_INLET
@@ -195,6 +196,7 @@ def far_from_fits(solution: ContactSolution) -> str | None:
         lubricant is None
         or solution.in_contact.any()
         or least_film(conditions, lubricant) < FULL_FILM * sq
+        or loss_beyond_body(conditions, lubricant) > MAX_DEVIATION
     ):
         return None
     central = [fit for fit in regime_card(solution).fits if fit.place == "central"]
@@ -209,7 +211,7 @@ def far_from_fits(solution: ContactSolution) -> str | None:
         f"the grid has {length / cell:.2g} cells across the inlet"
         if length < MIN_CELLS_IN_INLET * cell
         else "the inlet is starved"
-        if inlet_start < flooded or rigid_film_loss(conditions, lubricant, solution.grid) > 0.05
+        if inlet_start < flooded or film_loss(conditions, lubricant, solution.grid) > 0.05
         else "the grid is fine enough and the inlet flooded; the formula may not cover this contact"
     )
     return (

@@ -46,8 +46,9 @@ def friction_and_heat(
     """
     thermal = thermal or Thermal()
     if not thermal.feedback or solution.lubricant is None:
-        friction_result = friction(solution, boundary_friction=boundary_friction, thermal=thermal)
-        return friction_result, flash_temperature(solution, friction_result, thermal=thermal)
+        cold = friction(solution, boundary_friction=boundary_friction, thermal=thermal)
+        heat = flash_temperature(solution, cold, thermal=thermal)
+        return _with_heat_below(solution, cold, heat, thermal), heat
     rise: Field = np.zeros(solution.grid.cells)
     mixer = Mixer()
     for _ in range(MAX_ROUNDS):
@@ -72,6 +73,21 @@ def friction_and_heat(
         f"friction and temperature did not converge: {residual:.2g} K change after {MAX_ROUNDS} "
         "iterations; switch thermal feedback off, or use a friction law with a limiting stress"
     )
+
+
+def _with_heat_below(
+    solution: ContactSolution, cold: Friction, heat: FlashTemperature, thermal: Thermal
+) -> Friction:
+    """Return the friction of cold oil with the part that the warming of the film takes away."""
+    if solution.lubricant is None or not np.any(heat.film):
+        return cold
+    warm = friction(
+        solution,
+        boundary_friction=cold.boundary_friction,
+        thermal=thermal,
+        film_temperature=thermal.ambient + np.maximum(heat.film, 0.0),
+    )
+    return replace(cold, heat_below=max(cold.oil_part - warm.oil_part, 0.0))
 
 
 class SolveSettings(TypedDict, total=False):

@@ -4,18 +4,27 @@ A film's shear stress on its surfaces is τ ± (h/2) dp/dx. τ, at mid-film, is 
 rate Δu/h and acts on the bodies in opposite directions. The second part, of the pressure gradient,
 follows from the balance of forces across the film for any oil and acts on both bodies alike: its
 sum is the rolling friction. The heat contains the first part only.
+
+The friction of oil is far more uncertain than its film: at contact pressure the viscosity changes
+with the exponential of the pressure-viscosity coefficient, and no data sheet states the stress at
+which an oil yields. `Friction` has both as parts of a 90 % interval.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.ehl import ContactSolution
-from asperity.lubricant import ShearedFilm, Thermal
+from asperity.lubricant import EyringShear, NewtonianShear, ShearedFilm, Thermal
 
 BOUNDARY_FRICTION = 0.15  # the paper's Table 2
+# Halves of 90 % intervals:
+LAW_ERROR = 0.2  # of ln(eta/eta0) by Roelands' law up to 1 GPa, that of squalane (Bair 2006)
+STRESS_FACTOR = 1.5  # on the stress scale of a friction law; tau0 of mineral oils: 4 to 9 MPa
+TYPICAL_EYRING_STRESS = 5e6  # [Pa] at which oils deviate from Newton's law
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +36,11 @@ class Friction:
     opposite on body 2): negative if body 1 is the faster one. `shear_force` [N] is its sum over the
     whole contact, for a line contact over its length; `power` [W] is the heat generated, |shear
     force| times sliding speed. All these are zero in pure rolling.
+
+    `oil_below` and `oil_above` are the 90 % error of the coefficient due to the oil: its
+    pressure-viscosity coefficient, the law of its viscosity at contact pressure, and the stress
+    scale of its friction law. `heat_below` is the friction that the warming of the film would
+    take away where the viscosity is that of the cold oil.
 
     `rolling_force` [N] is the sum of (h/2) dp/dx over the film, which opposes the motion of each
     body (per body; negative: it drives them), `rolling_coefficient` this force over load, and
@@ -43,6 +57,9 @@ class Friction:
     rolling_force: float
     rolling_coefficient: float
     rolling_power: float
+    oil_below: float = 0.0
+    oil_above: float = 0.0
+    heat_below: float = 0.0
 
 
 def friction(
@@ -71,14 +88,16 @@ def friction(
     conditions = solution.conditions
     sliding = conditions.surface_speeds[0] - conditions.surface_speeds[1]
     stress: Field = np.zeros(solution.grid.cells)
-    if sliding != 0.0:
-        stress = _oil_stress(solution, thermal, film_temperature)
-        stress[solution.in_contact] = boundary_friction * solution.pressure[solution.in_contact]
     pressure_sum = float(solution.pressure.sum())
+    below = above = 0.0
+    if sliding != 0.0:
+        if (film := _sheared_film(solution, thermal, film_temperature)) is not None:
+            stress = _oil_stress(solution, film)
+            below, above = (side / pressure_sum for side in _oil_error(solution, film))
+        stress[solution.in_contact] = boundary_friction * solution.pressure[solution.in_contact]
     asperity_part = float(stress[solution.in_contact].sum()) / pressure_sum
     oil_part = float(stress[~solution.in_contact].sum()) / pressure_sum
     force = (asperity_part + oil_part) * conditions.load
-    rolling = _rolling_coefficient(solution)
     return Friction(
         coefficient=asperity_part + oil_part,
         asperity_part=asperity_part,
@@ -87,9 +106,9 @@ def friction(
         shear_force=-float(np.sign(sliding)) * force,
         power=force * abs(sliding),
         boundary_friction=boundary_friction,
-        rolling_force=rolling * conditions.load,
-        rolling_coefficient=rolling,
-        rolling_power=2.0 * rolling * conditions.load * conditions.entrainment_speed,
+        oil_below=below,
+        oil_above=above,
+        **_rolling(solution),
     )
 
 
@@ -117,28 +136,75 @@ def _check(
         )
 
 
-def _oil_stress(
+def _sheared_film(
     solution: ContactSolution, thermal: Thermal, film_temperature: Field | None
-) -> Field:
-    """Return the shear stress of the oil [Pa], not negative; zero where the oil is cavitated."""
+) -> ShearedFilm | None:
+    """Return the sheared film, None for a dry contact."""
     oil = solution.lubricant
     conditions = solution.conditions
     if oil is None:
-        return np.zeros(solution.grid.cells)
+        return None
     viscosity = oil.viscosity(solution.pressure)
     if film_temperature is not None:
         viscosity = viscosity * warm_factor(solution, thermal, film_temperature)
     elif solution.viscosity_factor is not None:
         viscosity = viscosity * solution.viscosity_factor
     ambient: Field = np.full(solution.grid.cells, thermal.ambient)
-    film = ShearedFilm(
+    return ShearedFilm(
         rate=conditions.sliding_speed / solution.gap,
         viscosity=viscosity,
         pressure=solution.pressure,
         temperature=ambient if film_temperature is None else film_temperature,
         transit=solution.grid.spacing[0] / conditions.entrainment_speed,
     )
-    return np.where(solution.cavitated, 0.0, oil.friction(film))
+
+
+def _oil_stress(
+    solution: ContactSolution, film: ShearedFilm, *, exponent: float = 1.0, scale: float = 1.0
+) -> Field:
+    """Return the shear stress of the oil [Pa], not negative; zero where the oil is cavitated.
+
+    `exponent` multiplies ln(η/η₀) under pressure, `scale` the stresses of the friction law: any
+    law, a function of stress over such a scale, gives `scale` times its stress at η/`scale`.
+    """
+    oil = solution.lubricant
+    assert oil is not None
+    thickening = np.log(oil.viscosity(solution.pressure) / oil.viscosity.eta0)
+    viscosity = film.viscosity * np.exp((exponent - 1.0) * thickening) / scale
+    stress = scale * oil.friction(replace(film, viscosity=viscosity))
+    return np.where(solution.cavitated, 0.0, stress)
+
+
+def _oil_error(solution: ContactSolution, film: ShearedFilm) -> tuple[float, float]:
+    """Return the error below and above the sum of the oil's shear stress [Pa]."""
+    oil = solution.lubricant
+    assert oil is not None
+    open_cells = ~solution.in_contact
+    exponent = math.hypot(oil.alpha_error, LAW_ERROR)
+    changes = [
+        {"exponent": 1.0 - exponent},
+        {"exponent": 1.0 + exponent},
+        {"scale": 1.0 / STRESS_FACTOR},
+        {"scale": STRESS_FACTOR},
+    ]
+    stresses = [_oil_stress(solution, film, **change) for change in changes]
+    if isinstance(oil.friction, NewtonianShear):
+        thin = EyringShear(TYPICAL_EYRING_STRESS)(film)
+        stresses[2] = np.where(solution.cavitated, 0.0, thin)
+    total = float(_oil_stress(solution, film)[open_cells].sum())
+    less, more, weak, strong = (abs(float(stress[open_cells].sum()) - total) for stress in stresses)
+    return min(math.hypot(less, weak), total), math.hypot(more, strong)
+
+
+def _rolling(solution: ContactSolution) -> dict[str, float]:
+    """Return force, coefficient and power of rolling friction by field of `Friction`."""
+    load, speed = solution.conditions.load, solution.conditions.entrainment_speed
+    coefficient = _rolling_coefficient(solution)
+    return {
+        "rolling_force": coefficient * load,
+        "rolling_coefficient": coefficient,
+        "rolling_power": 2.0 * coefficient * load * speed,
+    }
 
 
 def _rolling_coefficient(solution: ContactSolution) -> float:

@@ -20,6 +20,7 @@ from asperity.surface.read import read_surface
 
 _DECAY_THRESHOLD = 0.2  # ISO 25178-2: autocorrelation that defines Sal and Str
 _DIRECTIONS = 180  # rays over half a turn; the autocorrelation is symmetric
+NO_LAY = 0.5  # Str from which a texture counts as isotropic (ISO 25178-2, note)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,8 @@ class SurfaceParameters:
     cells; `sdr` developed interfacial area ratio. Spatial: `sal` shortest distance over which the
     autocorrelation falls to 0.2 [m]; `str_` ratio of the shortest to the longest such distance (1
     isotropic, towards 0 with a lay). If the autocorrelation stays above 0.2 within half the map in
-    some direction, `str_` is an upper bound and `str_bounded` is true. Functional: core height
+    some direction, `str_` is an upper bound and `str_bounded` is true. `lay_deg` direction of the
+    longest distance from x towards y [degrees], nan for `str_` above 0.5. Functional: core height
     `sk`, reduced peak height `spk`, reduced pit depth `svk` [m], and the material ratios `smr1`,
     `smr2` of the core, 0 to 1. `ssk`, `sku`, `sal` and `str_` of a flat surface are nan, as are
     `sal` and `str_` without decay.
@@ -50,6 +52,7 @@ class SurfaceParameters:
     sal: float
     str_: float
     str_bounded: bool
+    lay_deg: float
     sk: float
     spk: float
     svk: float
@@ -222,8 +225,9 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
             sal=nan,
             str_=nan,
             str_bounded=False,
+            lay_deg=nan,
         )
-    sal, texture, bounded = _texture(heights, surface.grid)
+    sal, texture, bounded, lay = _texture(heights, surface.grid)
     sp = float(np.nanmax(heights))
     sv = -float(np.nanmin(heights))
     return SurfaceParameters(
@@ -236,7 +240,17 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
         sal=sal,
         str_=texture,
         str_bounded=bounded,
+        lay_deg=lay,
     )
+
+
+def lay_text(surface: Surface) -> str:
+    """Return the direction of a surface's lay as text."""
+    _, texture, bounded, lay = _texture(surface.heights, surface.grid, directions=36)
+    ratio = f"Str {'below ' if bounded else ''}{texture:.2g}"
+    if np.isnan(lay):
+        return f"has no lay ({ratio})"
+    return f"has its lay at {abs(lay):.0f} degrees from rolling ({ratio})"
 
 
 def distinct_heights(surface: Surface | MeasuredSurface) -> Field:
@@ -340,17 +354,25 @@ def _pairs(cells: int, reach: int, periodic: bool) -> Field:
     )
 
 
-def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:
-    """Return Sal, Str, and true if Str is only an upper bound."""
+def _texture(
+    heights: Field, grid: Grid, directions: int = _DIRECTIONS
+) -> tuple[float, float, bool, float]:
+    """Return Sal, Str, true if Str is only an upper bound, and the lay [degrees] or nan."""
+    nan = float("nan")
     correlation, middle = _autocorrelation(heights, grid)
-    distances, lengths = _decay(
-        correlation, middle, grid, np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS, _DECAY_THRESHOLD
-    )
-    if np.isnan(distances).all():
-        return float("nan"), float("nan"), False
+    angles = np.arange(directions) * np.pi / directions
+    distances, lengths = _decay(correlation, middle, grid, angles, _DECAY_THRESHOLD)
+    unbounded = np.isnan(distances)
+    if unbounded.all():
+        return nan, nan, False, nan
     shortest = float(np.nanmin(distances))
-    longest = float(np.max(np.where(np.isnan(distances), lengths, distances)))
-    return shortest, shortest / longest, bool(np.isnan(distances).any())
+    longest = float(np.max(np.where(unbounded, lengths, distances)))
+    texture = shortest / longest
+    # the mean direction of the longest decays, as axes: twice the angle
+    far = unbounded if unbounded.any() else distances > (1.0 - 1e-9) * longest
+    axis = 0.5 * float(np.angle(np.exp(2j * angles[far]).sum()))
+    lay = float(np.degrees(axis)) if texture < NO_LAY else nan
+    return shortest, texture, bool(unbounded.any()), lay
 
 
 def _decay(

@@ -27,7 +27,7 @@ from asperity.surface.model import (
     length_text,
     require_roughness,
 )
-from asperity.surface.parameters import gradient
+from asperity.surface.parameters import gradient, lay_text
 
 FitMode = Literal["crop", "tile"]
 
@@ -132,7 +132,9 @@ def prepare_surface(
 def _checked(
     surface: Surface, measured: MeasuredSurface, steps: tuple[str, ...], *, scaled: bool
 ) -> PreparedSurface:
-    """Return the surface, with a step where filter or sampling decide its slope."""
+    """Return the surface, with its lay, and a step where filter or sampling decide its slope."""
+    if measured.uniform is None and surface.sq > 0.0:
+        steps = (*steps, lay_text(surface))
     pixels, grid = measured.grid.spacing, surface.grid
     slope = _height_statistics(surface.heights, grid).sdq
     if slope == 0.0 or min(measured.grid.cells) < 2:

@@ -63,8 +63,9 @@ def newton(
     """
     shared = problem.exact and not problem.conserve if shared is None else shared
     mean_pressure, change = problem.mean_pressure, np.inf
-    limits, watch, workspace = _StepLimits(problem, unknowns), _ResidualWatch(), Workspace()
     balance = evaluate(problem, unknowns, second_order=second_order)
+    limits = _StepLimits(problem, unknowns, float(balance.gap.min()))
+    watch, workspace = _ResidualWatch(), Workspace()
     settled_cells = np.zeros(problem.cells, dtype=bool)
     for number in count():
         approach = balance.unknowns.approach
@@ -109,9 +110,9 @@ class _ResidualWatch:
 class _StepLimits:
     """Step limits of oil pressure, total pressure and approach; the oil of closed cells is free."""
 
-    def __init__(self, problem: Problem, unknowns: Pressures) -> None:
+    def __init__(self, problem: Problem, unknowns: Pressures, film: float) -> None:
         self.oil, self.total = (StepLimit(unknowns.total) for _ in range(2))
-        self.approach = ApproachLimit(problem.roughness)
+        self.approach = ApproachLimit(problem.roughness, film)
 
     def __call__(self, step: Pressures, balance: MixedBalance) -> Pressures:
         """Return the limited step."""

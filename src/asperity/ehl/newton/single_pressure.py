@@ -60,7 +60,8 @@ def newton(
     """
     mean_pressure = problem.mean_pressure
     limit = StepLimit(pressure, initial=STEP_LIMITS.max_pressure_step, bound_reversals=False)
-    approach_limit = ApproachLimit(problem.roughness)
+    film = float(problem.evaluate(pressure, approach).gap.min())
+    approach_limit = ApproachLimit(problem.roughness, film)
     lowest = np.inf
     stagnation = 0
     attempt = 0

@@ -35,10 +35,13 @@ class StepLimit:
 
 
 class ApproachLimit:
-    """Largest change of the approach; grows without reversals, halves with them."""
+    """Largest change of the approach; grows without reversals, halves with them.
 
-    def __init__(self, roughness: Field) -> None:
-        self.largest = self.current = largest_approach_step(roughness)
+    It is a share of the largest of a²/R, the roughness, and the `film` of a light contact.
+    """
+
+    def __init__(self, roughness: Field, film: float) -> None:
+        self.largest = self.current = largest_approach_step(roughness, film)
         self.previous = 0.0
 
     def __call__(self, step: float) -> float:
@@ -49,6 +52,6 @@ class ApproachLimit:
         return float(np.clip(step, -self.current, self.current))
 
 
-def largest_approach_step(roughness: Field) -> float:
-    """Return the largest step of the approach on a roughness, both in a²/R."""
-    return STEP_LIMITS.max_approach_step * max(1.0, float(np.std(roughness)))
+def largest_approach_step(roughness: Field, film: float) -> float:
+    """Return the largest step of the approach on a roughness and film, all in a²/R."""
+    return STEP_LIMITS.max_approach_step * max(1.0, float(np.std(roughness)), film)

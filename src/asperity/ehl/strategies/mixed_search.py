@@ -392,6 +392,8 @@ class MixedSearch(ExactFaceSearch):
         levels = grid_levels(finest)
         if len(levels) == 1 or len(self.figures) != 1 or not coarser_in_all_axes(levels[1], finest):
             return
+        if not np.any(levels[1].form.hertz(levels[1].x, levels[1].y)):
+            return  # no dry contact on such cells
         coarse_search = MixedSearch(
             replace(self.options, max_iterations=SEARCH.max_error_grid_iterations),
             self.gap_scale,

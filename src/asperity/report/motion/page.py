@@ -99,9 +99,10 @@ def _script_data(history: History, scale: animated_maps.Ranges, ends: tuple[floa
 
 def _caption(history: History, number: int) -> str:
     """Describe a step: number, time, CLR, CAR and friction."""
-    row = history.table[history.table["step"] == number].iloc[0]
+    table = history.table
+    row = table[table["step"] == number].to_dict("records")[0]
     values = [quantity(key).named(row[key]) for key in ("clr", "car")]
-    friction = quantity("friction_coefficient").number(row["friction_coefficient"])
+    friction = quantity("friction_coefficient").number_in({str(key): row[key] for key in row})
     time = quantity("time_s").text(row["time_s"])
     return in_print(
         f"step {number} of {history.steps}, {time}: {', '.join(values)}, friction {friction}"

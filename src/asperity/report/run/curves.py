@@ -7,10 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
 from asperity.report.drawing import display, name_axes
 from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, VERMILION
-from asperity.results import FrictionCurve
+from asperity.results import FrictionCurve, FrictionPoint
 
 STYLES = ((BLUE, "-", "o"), (VERMILION, "--", "s"), (GREEN, "-.", "^"), (GREY, ":", "D"))
 ABSCISSA = {"stribeck": "entrainment_speed_m_s", "traction": "slide_to_roll"}
@@ -61,6 +62,7 @@ def _draw_panel(axes: Axes, curves: Sequence[FrictionCurve], key: str, name: str
     single = len(curves) == 1
     for number, curve in enumerate(curves):
         _draw(axes, curve, key, name if single else _name(curve), *STYLES[number % len(STYLES)])
+        _shade_interval(axes, curve, key, STYLES[number % len(STYLES)][0])
         for part, label, line_style in PARTS[key] if single else ():
             _draw(axes, curve, part, label, *line_style)
     abscissa = ABSCISSA[curves[0].kind]
@@ -71,6 +73,20 @@ def _draw_panel(axes: Axes, curves: Sequence[FrictionCurve], key: str, name: str
     axes.set_ylim(0.0, None)
 
 
+def _shade_interval(axes: Axes, curve: FrictionCurve, key: str, colour: str) -> None:
+    """Shade the 90 % interval of a quantity that has one."""
+    points = [point for point in curve.points if point.converged]
+    ends = [[getattr(point, end, None) for point in points] for end in quantity(key).ends]
+    if all(value is not None for end in ends for value in end):
+        x = display(ABSCISSA[curve.kind], _column(points, ABSCISSA[curve.kind]))
+        low, high = (np.array(end, float) for end in ends)
+        axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0.0)
+
+
+def _column(points: Sequence[FrictionPoint], name: str) -> Field:
+    return np.array([getattr(point, name) for point in points], float)
+
+
 def _name(curve: FrictionCurve) -> str:
     return quantity("sq_m").named(curve.sq) + (", thermal feedback" if curve.feedback else "")
 
@@ -79,8 +95,8 @@ def _draw(
     axes: Axes, curve: FrictionCurve, name: str, label: str, colour: str, style: str, marker: str
 ) -> None:
     abscissa = ABSCISSA[curve.kind]
-    x = display(abscissa, np.array([getattr(point, abscissa) for point in curve.points]))
-    y = np.array([getattr(point, name) for point in curve.points])
+    x = display(abscissa, _column(curve.points, abscissa))
+    y = _column(curve.points, name)
     converged = np.array([point.converged for point in curve.points])
     axes.plot(
         x,

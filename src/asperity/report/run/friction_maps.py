@@ -13,7 +13,7 @@ from asperity.report.base import Exhibit
 from asperity.report.drawing import display, name_axes, one_panel
 from asperity.report.maps import colour_bar, map_drawer, map_figure
 from asperity.report.style import BLUE, DASHED, GREEN, VERMILION, Medium, Style
-from asperity.results import Run
+from asperity.results import FrictionInterval, Run
 from asperity.solution import FlashTemperature, Friction, hertz_stress
 
 SECTION_DEPTH = 1.6  # half-widths: extent of the section in depth and to both sides
@@ -23,7 +23,7 @@ SECTION_ROWS = 160
 def traction_map(run: Run, friction: Friction) -> Exhibit:
     """Map the shear stress; a square-root colour scale keeps the oil's part visible."""
     values = np.abs(friction.shear)
-    coefficient = quantity("friction_coefficient").text(friction.coefficient)
+    coefficient = FrictionInterval.of_oil(friction).text
     top = float(display("shear", values).max()) or 1.0
     ticks = [float(f"{share * top:.2g}") for share in (0.0, 0.04, 0.16, 0.36, 0.64, 0.98)]
     title = f"Shear stress (square-root scale), friction {coefficient}"

@@ -143,7 +143,7 @@ def _view(run: Run, number: int, numbered: bool) -> _RunView:
         convergence=run.solution.convergence,
         tiles=[tile(quantity(key), scalars) for key in TILES],
         pictures=[exhibit.picture() for exhibit in _exhibits(run)],
-        uncertainties=uncertainty_rows(run.error),
+        uncertainties=uncertainty_rows(run.error, run.friction_interval),
         notes=[*run.remarks, *_missing_exhibits(run)],
     )
 

@@ -37,12 +37,7 @@ def resonance_against_roughness(points: Points, full_load_crf_hz: float | None) 
     @one_panel(3.1)
     def draw(axes: Axes) -> None:
         _draw(axes, points, "crf_hz", "-o", VERMILION, f"{line.short}, 90 % interval")
-        for point in points:
-            crf, low, high = (point[key] for key in ("crf_hz", "crf_low_hz", "crf_high_hz"))
-            if crf is not None and low is not None and high is not None:
-                sq = display("sq_m", point["sq_m"])
-                bars = [[max(crf - low, 0.0)], [max(high - crf, 0.0)]]
-                axes.errorbar(sq, crf, bars, color=VERMILION, capsize=5, linewidth=1.0, zorder=1)
+        _draw_intervals(axes, points, "crf_hz", VERMILION)
         if full_load_crf_hz is not None:
             label = "CRF at full load"
             axes.axhline(full_load_crf_hz, color="black", linestyle=":", linewidth=1.0, label=label)
@@ -63,6 +58,7 @@ def friction_against_roughness(points: Points) -> Exhibit:
     @one_panel(3.1)
     def draw(axes: Axes) -> None:
         _draw(axes, points, "friction_coefficient", "-o", "black")
+        _draw_intervals(axes, points, "friction_coefficient", "black")
         _draw(axes, points, "friction_asperity_part", "--s", VERMILION)
         _draw(axes, points, "friction_oil_part", ":^", BLUE)
         axes.set(ylabel=quantity("friction_coefficient").label, title="Friction", ylim=(0.0, None))
@@ -70,7 +66,7 @@ def friction_against_roughness(points: Points) -> Exhibit:
     return Exhibit(
         "friction-against-roughness",
         draw,
-        "Friction coefficient, with the parts of asperities and oil.",
+        "Friction coefficient with its 90 % interval, and the parts of asperities and oil.",
         _values_text(points, "friction_coefficient"),
     )
 
@@ -96,6 +92,16 @@ def _draw(axes: Axes, points: Points, key: str, style: str, colour: str, label: 
     all_sq = [display("sq_m", point["sq_m"]) for point in points]
     margin = max(0.06 * (max(all_sq) - min(all_sq)), 0.1 * max(all_sq)) or 0.5
     name_axes(axes, "sq_m", xlim=(min(all_sq) - margin, max(all_sq) + margin))
+
+
+def _draw_intervals(axes: Axes, points: Points, key: str, colour: str) -> None:
+    """Draw the 90 % intervals of a scalar over Sq."""
+    for point in points:
+        value, low, high = (point[name] for name in (key, *quantity(key).ends))
+        if value is not None and low is not None and high is not None:
+            sq = display("sq_m", point["sq_m"])
+            bars = [[max(value - low, 0.0)], [max(high - value, 0.0)]]
+            axes.errorbar(sq, value, bars, color=colour, capsize=5, linewidth=1.0, zorder=1)
 
 
 def _unconverged_note(points: Points) -> str:

@@ -75,9 +75,7 @@ def render_wear_page(history: WearHistory) -> str:
         "wear/page.html.j2",
         title="Wear of a contact",
         history=history,
-        tiles=[
-            tile(quantity(key), history.final_values) for key in TILES if last[key] == last[key]
-        ],
+        tiles=[tile(quantity(key), history.row_at(-1)) for key in TILES if last[key] == last[key]],
         resonance=_resonance(history),
         maps=animated_maps.animated_maps(history.case, scale),
         curves=exhibits.curves(history).picture(),

@@ -11,6 +11,7 @@ import pandas
 
 from asperity.case import Case
 from asperity.core.arrays import Field, Mask, finite_or_none
+from asperity.core.quantities import quantity
 from asperity.coupling import Vibration, contact_vibration
 from asperity.ehl import ContactState
 from asperity.simulation.motion.rows import mean_state
@@ -164,6 +165,8 @@ class History:
             scalars[key] = finite_or_none(rows[key].mean())
             scalars[f"{key}_std"] = finite_or_none(rows[key].std(ddof=0))
             scalars[f"{key}_start"] = finite_or_none(first[key])
+        for key in quantity("friction_coefficient").ends:
+            scalars[key] = finite_or_none(rows[key].mean())
         if self.case.motion.flattening:
             passes = self.by_pass()[list(OVER_PASSES)].astype(object)
             scalars["passes"] = passes.where(passes.notna(), None).to_dict("records")

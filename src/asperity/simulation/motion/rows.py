@@ -9,6 +9,7 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity, read
 from asperity.coupling import oscillator
 from asperity.ehl import ContactSolution, ContactState
+from asperity.results import FrictionInterval
 from asperity.solution import Friction, friction
 from asperity.transient import Snapshot
 
@@ -36,6 +37,8 @@ COLUMNS = (
     *STATE,
     "contact_force_n",
     "friction_coefficient",
+    "friction_coefficient_low",
+    "friction_coefficient_high",
     "friction_asperity_part",
     "friction_oil_part",
     "friction_power_w",
@@ -75,6 +78,11 @@ class _StepSources:
     @property
     def contact_force(self) -> float:
         return self.state.clr * self.case.conditions.load
+
+    @property
+    def friction_interval(self) -> FrictionInterval:
+        """Interval of one step; that of the means contains the scatter over time."""
+        return FrictionInterval.of_oil(self.friction)
 
     @property
     def resonance_hz(self) -> float:

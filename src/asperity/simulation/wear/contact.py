@@ -55,7 +55,7 @@ class SolvedPosition:
     overlap: Field | None
     temperatures: tuple[Field, Field] | None
     state: ContactState
-    friction_coefficient: float
+    friction: Friction
     flash_temperature: float
     at_edge: bool
 
@@ -171,7 +171,7 @@ class PositionSolver:
             overlap=np.array(plastic_overlap(solution)) if self.flattening else None,
             temperatures=temperatures,
             state=contact_state(solution),
-            friction_coefficient=rubbing.coefficient,
+            friction=rubbing,
             flash_temperature=flash,
             # a scar as wide as the grid; cells at the rim carry no load
             at_edge=not endless and bool(asperity_pressure[:, [1, -2]].any()),

@@ -139,12 +139,10 @@ class WearHistory:
             default=0.0,
         )
 
-    @property
-    def final_values(self) -> dict[str, float | None]:
-        """Last row by column; None for unknown values."""
-        return {
-            str(key): finite_or_none(float(value)) for key, value in self.table.iloc[-1].items()
-        }
+    def row_at(self, row: int) -> dict[str, float | None]:
+        """Return a row by column, -1 the last; None for unknown values."""
+        values = self.table.iloc[row].items()
+        return {str(key): finite_or_none(float(value)) for key, value in values}
 
     @property
     def failed(self) -> int:
@@ -331,17 +329,16 @@ class WearHistory:
 
     def verdict(self) -> str:
         """Return one sentence: worn depths, and changes of Sq, CLR and CRF."""
-        first = self.table.iloc[0]
-        last = self.table.iloc[-1]
+        first, last = self.row_at(0), self.row_at(-1)
         depths = " and ".join(
             quantity("worn_depth_m").text(last[body_column("worn_depth_m", body)])
             for body in BODIES
         )
         changes = ", ".join(
-            f"{quantity(key).short} {quantity(key).number(first[key])} to "
-            f"{quantity(key).text(last[key])}"
+            f"{quantity(key).short} {quantity(key).number_in(first)} to "
+            f"{quantity(key).text_in(last)}"
             for key in ("sq_m", "clr", "crf_hz")
-            if math.isfinite(float(last[key])) and math.isfinite(float(first[key]))
+            if last[key] is not None and first[key] is not None
         )
         return f"After {self.hours:.4g} h the bodies have worn by {depths}: {changes}."
 

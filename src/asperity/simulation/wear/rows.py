@@ -11,7 +11,7 @@ from asperity.core.coverage import UPPER
 from asperity.core.errors import BadInput
 from asperity.coupling import excitation, oscillator, resonance_at
 from asperity.ehl import ContactState, Sides, Uncertainty
-from asperity.results import prediction_interval
+from asperity.results import FrictionInterval, prediction_interval
 from asperity.simulation.wear.contact import SolvedPosition
 from asperity.surface import Surface, height_parameters
 
@@ -121,12 +121,30 @@ def contact_row(case: Case, solved: Sequence[SolvedPosition], sq: float) -> Row:
         "clr_high": high,
         "clr_mean_low": of_mean[0] if len(shares) > 1 else math.nan,
         "clr_mean_high": of_mean[1] if len(shares) > 1 else math.nan,
-        "friction_coefficient": float(
-            np.mean([position.friction_coefficient for position in solved])
-        ),
+        **_friction(solved),
         "flash_temperature_max_k": max(flashes) if all(map(math.isfinite, flashes)) else math.nan,
     }
     return row | _resonance(case, row, std)
+
+
+def _friction(solved: Sequence[SolvedPosition]) -> Row:
+    """Return the mean friction coefficient and its interval: oil, heat, scatter of positions."""
+    parts = [FrictionInterval.of_oil(position.friction) for position in solved]
+    values = [part.value for part in parts]
+    scatter = prediction_interval(values, share=False)[1] if len(values) > 1 else (0.0, 0.0)
+    (below, above), heat = np.mean([part.oil for part in parts], axis=0), [p.heat for p in parts]
+    interval = FrictionInterval(
+        value=float(np.mean(values)),
+        oil=(float(below), float(above)),
+        heat=float(np.mean(heat)),
+        numerical=0.0,
+        surfaces=scatter,
+    )
+    low, high = interval.low, interval.high
+    assert low is not None
+    assert high is not None
+    ends = {"friction_coefficient_low": low, "friction_coefficient_high": high}
+    return {"friction_coefficient": interval.value, **ends}
 
 
 def _mean_state(solved: Sequence[SolvedPosition]) -> Row:
