@@ -1,5 +1,6 @@
 """`asperity demo` and `asperity solve`: single contacts, from case file to numbers."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,7 +19,7 @@ from asperity.cli.options import (
     chosen_case,
     require_output,
 )
-from asperity.cli.output import Block, SolverSteps, known_rows, progress, show, table, text
+from asperity.cli.output import Block, Row, SolverSteps, known_rows, progress, show, table, text
 from asperity.core import files, processes
 from asperity.core.errors import AsperityError
 from asperity.core.quantities import quantity
@@ -140,11 +141,22 @@ def _solve(
         )
 
 
+def _numbers(run: "Run") -> Iterator[Row]:
+    """Yield the numbers of the catalogue; the central film of standing roughness is one spot."""
+    central = quantity("h_central_m").title
+    spot = run.running is None and run.state.sq > 0.0 and run.solution.lubricant is not None
+    for title, value in known_rows(run.scalars()):
+        yield (
+            title,
+            f"{value}, at one spot of the roughness" if spot and title == central else value,
+        )
+
+
 def run_table(run: "Run") -> Block:
     """Return the rows of a run: numbers of the catalogue, solver status, and notes."""
     touching = 0.0 if run.solution.lubricant is None else run.solution.options.contact_film
     rows = [
-        *known_rows(run.scalars()),
+        *_numbers(run),
         *results.uncertainty_rows(run.error, run.friction_interval),
         (quantity("contact_film_m").title, text("contact_film_m", touching)),
         ("cells", " x ".join(map(str, run.solution.grid.cells))),

@@ -7,6 +7,8 @@ from .curves import traction_curve as traction_curve
 from .dynamic import FREQUENCIES as FREQUENCIES
 from .dynamic import DynamicBranch as DynamicBranch
 from .dynamic import DynamicCurve as DynamicCurve
+from .fields import FIELD_SUFFIXES as FIELD_SUFFIXES
+from .fields import write_fields as write_fields
 from .friction_interval import FrictionInterval as FrictionInterval
 from .roughness_levels import levels_verdict as levels_verdict
 from .roughness_levels import not_converged as not_converged

@@ -52,6 +52,10 @@ from asperity.solution import (
 if TYPE_CHECKING:
     import xarray
 
+PURE_ROLLING = (
+    "In pure rolling friction is zero; what resists is rolling friction "
+    "(rolling_friction_coefficient)."
+)
 FULL_FILM_BELOW = 0.01  # share of the load on asperities
 BOUNDARY_FROM = 0.9
 
@@ -133,6 +137,8 @@ class Run:
         if curve.reason:
             failures = (f"no stiffness over frequency: {curve.reason}",)
         notes = (*self.notes, *(f"{sentence[:1].upper()}{sentence[1:]}." for sentence in failures))
+        if self.solution.lubricant is not None and self.case.conditions.sliding_speed == 0.0:
+            notes = (*notes, PURE_ROLLING)
         if (
             heat is None
             or self.case.thermal.feedback

@@ -105,6 +105,15 @@ class RegimeCard:
             ],
         }
 
+    def _film_ratio(self) -> str:
+        """Return the film ratio with the film that it uses; empty without one."""
+        if self.lambda_ratio is None:
+            return ""
+        least = [fit.film for fit in self.fits if fit.place == "least"]
+        film = quantity("film_thickness_m").text(least[0]) if least else "its regime"
+        ratio = quantity("lambda_ratio").named(self.lambda_ratio)
+        return f"{ratio} (fitted minimum film of {film} over Sq), "
+
     def rows(self) -> list[tuple[str, str]]:
         """Return the card as named rows in display units."""
         values = self.to_dict()
@@ -120,8 +129,8 @@ class RegimeCard:
         ]
         rows = [("Hertz zone", ", ".join(hertz))]
         if self.rms_slope > 0.0:
-            keys = ("rms_slope",) if self.lambda_ratio is None else ("lambda_ratio", "rms_slope")
-            rows.append(("roughness", ", ".join(quantity(key).named(values[key]) for key in keys)))
+            slope = quantity("rms_slope").named(self.rms_slope)
+            rows.append(("roughness", f"{self._film_ratio()}{slope}"))
         if self.numbers is None:
             return rows
         numbers = ", ".join(quantity(key).named(values[key]) for key in _NUMBERS)
