@@ -10,7 +10,7 @@ import pytest
 from asperity.case import load_machine
 from asperity.core.quantities import catalogue
 from asperity.lubricant import ESTIMATORS, OilSheet
-from asperity.machines import machine_conditions
+from asperity.machines import fatigue_ratings, gear_ratings, machine_conditions
 from asperity.machines import ratings as rated
 from asperity.machines.rating_facts import FACTS
 from asperity.rating import GearOil, Mesh, MeshPoint, life_factor, specific_film
@@ -120,12 +120,12 @@ def test_gears_are_rated_with_their_own_values():
 def test_ra_of_both_flanks():
     case = load_machine(EXAMPLES / "fzg-c.toml")
     composite = case.case(case.contacts[0])
-    assert rated._mean_ra(composite) == pytest.approx(0.5e-6 / math.sqrt(math.pi), rel=1e-6)
+    assert gear_ratings._mean_ra(composite) == pytest.approx(0.5e-6 / math.sqrt(math.pi), rel=1e-6)
     kind = {"kind": "gaussian", "correlation_length": "30 um"}
     two_surfaces = composite.with_overrides(
         {"surface": kind | {"sq": "0.6 um", "second": kind | {"sq": "0.2 um"}}}
     )
-    assert rated._mean_ra(two_surfaces) == pytest.approx(
+    assert gear_ratings._mean_ra(two_surfaces) == pytest.approx(
         math.sqrt(2.0 / math.pi) * 0.4e-6, rel=1e-6
     )
 
@@ -174,7 +174,7 @@ def test_limits_of_gears_are_given_or_missing():
 )
 def test_gears_that_cannot_be_rated_state_the_reason(changed, reason):
     found = rated.machine_ratings(load_machine(EXAMPLES / "fzg-c.toml").with_overrides(changed))
-    assert [rating.key for rating in found] == list(rated.GEAR_KEYS)
+    assert [rating.key for rating in found] == list(gear_ratings.GEAR_KEYS)
     assert all(reason in rating.reason for rating in found)
     assert all(rating.to_dict()["value"] is None for rating in found)
 
@@ -184,7 +184,7 @@ def test_gears_in_thin_oil_are_rated(grade):
     """The standard uses alpha at 38 °C, whatever viscosity the flash temperature gives."""
     case = load_machine(EXAMPLES / "fzg-c.toml", {"lubricant.grade": grade})
     found = by_key(case)
-    assert not any(found[key].reason for key in rated.GEAR_KEYS)
+    assert not any(found[key].reason for key in gear_ratings.GEAR_KEYS)
     films = found["rated_film"].values
     assert min(films, key=films.get) == "A"
     assert 0.02 < films["A"] < 0.25  # 0.256 with VG 220
@@ -286,7 +286,7 @@ def test_fatigue_below_a_smooth_contact_agrees_with_hertz():
     case = load_machine(EXAMPLES / "nu206.toml").with_overrides(LIMITS)
     dry = {"surface": "flat", "lubricant": "none", "grid.cells": [192, 24], "grid.x": [-3.0, 3.0]}
     run = solve_case(case.case(case.contacts[0]).with_overrides(dry))
-    found = rated.dang_van_below(run, (350e6, 600e6))
+    found = fatigue_ratings.dang_van_below(run, (350e6, 600e6))
     core = found.depths >= found.core_depth
     assert found.solved[core] == pytest.approx(found.smooth[core], rel=0.02)
     assert found.slope == pytest.approx(0.25)
@@ -305,6 +305,6 @@ def test_asperities_raise_the_fatigue_measure():
     case = load_machine(EXAMPLES / "nu206.toml").with_overrides(LIMITS | {"surface.sq": "0.4 um"})
     rough = {"grid.cells": [96, 48], "solver.surfaces": 1}
     run = solve_case(case.case(case.contacts[0]).with_overrides(rough))
-    found = rated.dang_van_below(run, (350e6, 600e6))
+    found = fatigue_ratings.dang_van_below(run, (350e6, 600e6))
     assert found.solved.max() > 1.3 * found.smooth.max()
     assert np.argmax(found.solved) < np.argmax(found.smooth)  # and nearer to the surface

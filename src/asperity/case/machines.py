@@ -34,8 +34,10 @@ from asperity.contact.conditions import ElasticPair
 from asperity.contact.materials import material
 from asperity.core.documents import Table
 from asperity.core.errors import BadInput
+from asperity.core.files import require_file
 from asperity.machine import (
     BallBearing,
+    CatalogueBearing,
     CylindricalRollerBearing,
     FlatCam,
     Machine,
@@ -44,7 +46,9 @@ from asperity.machine import (
     RollerProfile,
     SpurGear,
     TwinDisc,
+    catalogue_bearing,
 )
+from asperity.surface import read_table
 
 Rotation: TypeAlias = Annotated[float, amount_in("rad/s")]
 RotationOrNone: TypeAlias = Annotated[float, amount_in("rad/s", 0.0)]
@@ -125,8 +129,9 @@ class FlatCamSection(Section):
 
     kind: Literal["cam-flat"]
     base_radius: Length
-    lift: Length
-    half_angle: Angle
+    lift: Annotated[Length | None, OPTIONAL] = None
+    half_angle: Annotated[Angle | None, OPTIONAL] = None
+    lift_table: Annotated[str | None, OPTIONAL] = None  # file of angles [deg] and lifts [mm]
     width: Length
     speed: Rotation
     spring_load: Force
@@ -173,7 +178,7 @@ class MachineCase:
 
     `hardness` [Pa] bounds the pressure, None for elastic bodies. `tables` are the file's, `folder`
     is the base of surface files, `source` the name of the case in messages. `rating` has further
-    data for rating standards.
+    data for rating standards. `catalogue` is the bearing that the file designates, if any.
     """
 
     tables: Table
@@ -183,6 +188,7 @@ class MachineCase:
     rating: RatingSection
     folder: Path = field(compare=False, repr=False)
     source: str = field(compare=False)
+    catalogue: CatalogueBearing | None = None
 
     @cached_property
     def contacts(self) -> tuple[MachineContact, ...]:
@@ -193,6 +199,8 @@ class MachineCase:
     def notes(self) -> tuple[str, ...]:
         """Notes for a reader of the contacts, one sentence each."""
         notes = self.machine.notes(self.pair)
+        if self.catalogue is not None:
+            notes = (*notes, _catalogue_note(self.catalogue))
         if "material" in self.tables:
             return notes
         assumed = material(self.default_material)
@@ -289,6 +297,7 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
             f"contact.{', '.join(OF_ALL_CONTACTS)}"
         )
     present = {key: tables[key] for key in _MachineTables.model_fields if key in tables}
+    catalogue = _designated(present, source)
     steel = {"name": BEARING_STEEL}  # elastic constants are those of any steel
     parsed = parse_section(_MachineTables, {"material": steel, **present}, source)
     section = parsed.machine
@@ -298,18 +307,79 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
         name: plain(getattr(section, name)) for name in type(section).model_fields if name != "kind"
     }
     try:
+        if arguments.get("lift_table") is not None:
+            arguments["lift_table"] = _lift_table(folder / arguments["lift_table"])
         machine = MACHINES[section.kind][1](**arguments)
         parsed.rating.require_applicable(section.kind)
         hardness = plain(stated.hardness)
         if "material" not in tables:
             hardness = material(_default_material(machine)).hardness
-        machine_case = MachineCase(tables, machine, pair, hardness, parsed.rating, folder, source)
+        machine_case = MachineCase(
+            tables, machine, pair, hardness, parsed.rating, folder, source, catalogue
+        )
         drawn = [contact for contact in machine_case.contacts if not contact.stands_still]
     except BadInput as refusal:
         raise BadInput(f"{source}: machine: {refusal}") from None
     if machine_case.complete and drawn:
         machine_case.case(drawn[0])  # checks the remaining tables
     return machine_case
+
+
+def _lift_table(path: Path) -> tuple[tuple[float, float], ...]:
+    """Read angles [deg] and lifts [mm] from two columns; return them in SI."""
+    require_file(path)
+    table = read_table(path)
+    if table.shape[1] != 2:
+        raise BadInput(
+            f"lift_table must have two columns, angle in degrees and lift in mm, got "
+            f"{table.shape[1]} in {path}"
+        )
+    return tuple((math.radians(angle), 1e-3 * lift) for angle, lift in table)
+
+
+def _designated(tables: Tables, source: str) -> CatalogueBearing | None:
+    """Complete the tables of a bearing by its designation; stated values take precedence."""
+    machine = tables.get("machine")
+    if not isinstance(machine, Mapping) or "designation" not in machine:
+        return None
+    stated = dict(machine)
+    try:
+        bearing = catalogue_bearing(str(stated.pop("designation")))
+    except BadInput as refusal:
+        raise BadInput(f"{source}: machine.{refusal}") from None
+    if stated.get("kind", bearing.kind) != bearing.kind:
+        raise BadInput(
+            f"{source}: machine.kind is {stated['kind']}, but {bearing.designation} is a "
+            f"{bearing.kind}; leave kind out"
+        )
+    rollers = bearing.length is not None
+    element = "roller" if rollers else "ball"
+    geometry: dict[str, object] = {
+        "kind": bearing.kind,
+        f"{element}s": bearing.elements,
+        f"{element}_diameter": _written(bearing.diameter, "m"),
+        "pitch_diameter": _written(bearing.pitch_diameter, "m"),
+    }
+    if bearing.length is not None:
+        geometry |= {"roller_length": _written(bearing.length, "m"), "profile": "iso"}
+    ratings = {
+        "dynamic_load_rating": _written(bearing.dynamic_load_rating, "N"),
+        "fatigue_load_limit": _written(bearing.fatigue_load_limit, "N"),
+    }
+    tables["machine"] = {**geometry, **stated}
+    tables["rating"] = {**ratings, **tables.get("rating", {})}
+    return bearing
+
+
+def _catalogue_note(bearing: CatalogueBearing) -> str:
+    elements = "balls" if bearing.length is None else "rollers"
+    return (
+        f"{bearing.designation} by its designation: {bearing.elements} {elements} of "
+        f"{1e3 * bearing.diameter:.4g} mm on a pitch diameter of "
+        f"{1e3 * bearing.pitch_diameter:.4g} mm, C {1e-3 * bearing.dynamic_load_rating:.4g} kN, "
+        f"C0 {1e-3 * bearing.static_load_rating:.4g} kN. Internal geometry is not standardised: "
+        "state that of the maker if it is known."
+    )
 
 
 def _default_material(machine: Machine) -> str:

@@ -6,8 +6,31 @@ from asperity.case.messages import Section
 from asperity.case.units import OPTIONAL, Force, Length, Number, Pressure, amount_in
 from asperity.core.errors import BadInput
 
-OF_BEARINGS = ("dynamic_load_rating", "fatigue_load_limit", "contamination")
-OF_GEARS = ("scuffing_stage", "permissible_film", "roughness_ra", "bulk_temperature", "oil_supply")
+OF_BEARINGS = (
+    "dynamic_load_rating",
+    "fatigue_load_limit",
+    "contamination",
+    "reliability",
+    "spectrum",
+)
+OF_GEARS = (
+    "scuffing_stage",
+    "micropitting_stage",
+    "permissible_film",
+    "roughness_ra",
+    "bulk_temperature",
+    "oil_supply",
+)
+SHARES_TOLERANCE = 1e-3
+RELIABILITIES = 0.9, 0.9995  # of ISO 281, table 12
+
+
+class SpectrumEntry(Section):
+    """[[rating.spectrum]]: share of the time at factors of the stated load and speed."""
+
+    share: Number
+    load: Number
+    speed: Number = 1.0
 
 
 class RatingSection(Section):
@@ -16,8 +39,13 @@ class RatingSection(Section):
     dynamic_load_rating: Annotated[Force | None, OPTIONAL] = None  # C of a bearing
     fatigue_load_limit: Annotated[Force | None, OPTIONAL] = None  # C_u
     contamination: Annotated[Number | None, OPTIONAL] = None  # e_C of ISO 281, 0 to 1
+    reliability: Number = 0.9  # share of bearings that survive the life
+    spectrum: tuple[SpectrumEntry, ...] = ()
     scuffing_stage: Annotated[Number | None, OPTIONAL] = (
         None  # FZG load stage of A/8.3/90 in which the oil fails
+    )
+    micropitting_stage: Annotated[Number | None, OPTIONAL] = (
+        None  # FZG load stage of C-GF/8.3/90 in which the oil fails, 5 to 10
     )
     permissible_film: Annotated[Number | None, OPTIONAL] = None  # λ_GFP of the oil, from a test
     roughness_ra: Annotated[Length | None, OPTIONAL] = (
@@ -38,6 +66,31 @@ class RatingSection(Section):
         for key in inapplicable:
             if key in self.model_fields_set:
                 raise BadInput(f"rating.{key} does not apply to a {machine}; leave it out")
+        self._require_plausible()
+
+    def _require_plausible(self) -> None:
+        low, high = RELIABILITIES
+        if not low <= self.reliability <= high:
+            raise BadInput(
+                f"rating.reliability must lie between {low:g} and {high:g}, got "
+                f"{self.reliability:g}; 0.9 is that of the basic life"
+            )
+        for entry in self.spectrum:
+            if min(entry.share, entry.load, entry.speed) <= 0.0:
+                raise BadInput(
+                    "rating.spectrum must have positive share, load and speed, got "
+                    f"{min(entry.share, entry.load, entry.speed):g}; leave idle time out"
+                )
+        total = sum(entry.share for entry in self.spectrum)
+        if self.spectrum and abs(total - 1.0) > SHARES_TOLERANCE:
+            raise BadInput(
+                f"the shares of rating.spectrum must add up to 1, got {total:.4g}; correct them"
+            )
+        if self.micropitting_stage is not None and self.permissible_film is not None:
+            raise BadInput(
+                "rating.micropitting_stage and rating.permissible_film both state the oil's limit; "
+                "give one of them"
+            )
         if self.contamination is not None and not 0.0 <= self.contamination <= 1.0:
             raise BadInput(
                 f"rating.contamination must lie between 0 and 1, got {self.contamination:g}; "

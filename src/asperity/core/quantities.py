@@ -38,6 +38,7 @@ _FACTORS |= {
     "mm/s": 1e3,
     "N/µm": 1e-6,
     "N/mm": 1e-3,
+    "N mm": 1e3,
     "mJ": 1e3,
     "mm²/s": 1e6,
     "mPa s": 1e3,

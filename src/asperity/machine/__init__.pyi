@@ -3,6 +3,10 @@ from .cam import Cam as Cam
 from .cam import CamPoint as CamPoint
 from .cam import FlatCam as FlatCam
 from .cam import RollerCam as RollerCam
+from .designations import LOAD_PER_LIMIT as LOAD_PER_LIMIT
+from .designations import CatalogueBearing as CatalogueBearing
+from .designations import catalogue_bearing as catalogue_bearing
+from .designations import catalogue_bearings as catalogue_bearings
 from .discs import TwinDisc as TwinDisc
 from .element import Machine as Machine
 from .element import MachineContact as MachineContact

@@ -1,11 +1,12 @@
 """Cams with flat-faced or roller follower: contacts from the nose to the base circle.
 
-The lift is harmonic; each angle is treated as a steady contact.
+The lift is harmonic or a table; each angle is treated as a steady contact.
 """
 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Self
 
 import scipy
@@ -13,6 +14,7 @@ import scipy
 from asperity.contact.conditions import ElasticPair
 from asperity.core.errors import BadInput, require_positive
 from asperity.machine.element import MIN_ENTRAINMENT, MachineContact, rotation_hz
+from asperity.machine.lift import LiftLaw, TabulatedLift, lift_law
 
 ANGLES = 9  # number of contacts from the nose to the start of the lift
 USUAL_PRESSURE_ANGLE = 30.0  # usual upper limit [deg]
@@ -20,7 +22,7 @@ USUAL_PRESSURE_ANGLE = 30.0  # usual upper limit [deg]
 
 @dataclass(frozen=True, kw_only=True)
 class Cam(ABC):
-    """Cam of harmonic lift s = (L/2)(1 + cos(π θ/β)), θ from the nose; base of all followers.
+    """Cam; base of all followers. Its lift is harmonic, s = (L/2)(1 + cos(π θ/β)), or a table.
 
     Parameters
     ----------
@@ -28,6 +30,7 @@ class Cam(ABC):
     lift : maximum lift L [m]
     half_angle : β, from the nose to the start of the lift [rad]; π with a flat follower: an
         eccentric disc
+    lift_table : pairs of angle [rad], from any origin, and lift [m], in place of both
     width : width of the contact [m]
     speed : speed of the cam [rad/s]
     spring_load : spring load on the base circle [N]
@@ -43,8 +46,9 @@ class Cam(ABC):
     place: ClassVar[str] = "cycle_angle"
 
     base_radius: float
-    lift: float
-    half_angle: float
+    lift: float | None = None
+    half_angle: float | None = None
+    lift_table: tuple[tuple[float, float], ...] | None = None
     width: float
     speed: float
     spring_load: float
@@ -54,13 +58,13 @@ class Cam(ABC):
     def __post_init__(self) -> None:
         for name, value, unit in (
             ("base_radius", self.base_radius, "m"),
-            ("lift", self.lift, "m"),
+            ("lift", self.law.largest, "m"),
             ("width", self.width, "m"),
             ("speed", self.speed, "rad/s"),
             ("spring_load", self.spring_load, "N"),
         ):
             require_positive(name, value, unit)
-        if not 0.0 < self.half_angle <= math.pi:
+        if self.half_angle is not None and not 0.0 < self.half_angle <= math.pi:
             degrees = math.degrees(self.half_angle)
             raise BadInput(
                 f"half_angle must lie above 0 and be at most 180 deg, got {degrees:g} deg; correct "
@@ -75,14 +79,22 @@ class Cam(ABC):
                     "spring_rate, or lower speed"
                 )
 
+    @cached_property
+    def law(self) -> LiftLaw:
+        """Lift over the angle from the nose."""
+        return lift_law(self.lift, self.half_angle, self.lift_table)
+
     @property
     def angles(self) -> tuple[float, ...]:
-        """Angles of the contacts, from the nose [rad]."""
-        return tuple(self.half_angle * number / (ANGLES - 1) for number in range(ANGLES))
+        """Angles of the contacts, from the nose [rad]: one flank, or both if they differ."""
+        first, last = self.law.ends
+        flanks = [last] if self.law.symmetric else [first, last]
+        steps = [number / (ANGLES - 1) for number in range(ANGLES)]
+        return tuple(sorted({flank * step + 0.0 for flank in flanks for step in steps}))
 
     def lift_at(self, angle: float) -> float:
         """Return the lift s [m]."""
-        return 0.5 * self.lift * (1.0 + math.cos(math.pi * angle / self.half_angle))
+        return self.law(angle)
 
     def follower_force(self, angle: float) -> float:
         """Return the force of spring and inertia along the follower's path [N]."""
@@ -91,7 +103,7 @@ class Cam(ABC):
 
     @abstractmethod
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:
-        """Return the contacts from the nose to the start of the lift; the other flank is alike."""
+        """Return the contacts at `angles`."""
 
     @property
     def frequencies(self) -> dict[str, float]:
@@ -102,6 +114,12 @@ class Cam(ABC):
         """Return the limits of the model, and angles of opposing speeds and no entrainment."""
         contacts = self.contacts(pair)
         notes = ["Each angle is treated as steady; squeeze and film history are not covered."]
+        if isinstance(self.law, TabulatedLift):
+            notes.append(
+                f"The table of {len(self.law.table)} lifts is smoothed by "
+                f"{1e6 * self.law.rounding:.2g} um root mean square; its curvature is that of the "
+                "spline."
+            )
         opposing = [
             contact.name
             for contact in contacts
@@ -132,13 +150,11 @@ class Cam(ABC):
 
     def _lift_slope(self, angle: float) -> float:
         """Return s' [m]."""
-        rate = math.pi / self.half_angle
-        return -0.5 * self.lift * rate * math.sin(rate * angle)
+        return self.law(angle, 1)
 
     def _lift_bend(self, angle: float) -> float:
         """Return s'' [m]."""
-        rate = math.pi / self.half_angle
-        return -0.5 * self.lift * rate**2 * math.cos(rate * angle)
+        return self.law(angle, 2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +166,7 @@ class FlatCam(Cam):
         return self.base_radius + self.lift_at(angle) + self._lift_bend(angle)
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (rigid valve train)
-        """Return the contacts from the nose to the start of the lift: u1 = ω ρ, u2 = ω s''."""
+        """Return the contacts at `angles`: u1 = ω ρ, u2 = ω s''."""
         return tuple(
             MachineContact(
                 name=f"{math.degrees(angle):.4g} deg from the nose",
@@ -174,11 +190,14 @@ class FlatCam(Cam):
         return "Cam with flat follower"
 
     def _require_shape(self) -> None:
-        if self.radius_at(0.0) <= 0.0:
-            limit = -(self._lift_bend(0.0) + self.lift)
+        sharpest = min(self.angles, key=self.radius_at)
+        if self.radius_at(sharpest) <= 0.0:
+            limit = -(self._lift_bend(sharpest) + self.lift_at(sharpest))
+            where = "nose" if sharpest == 0.0 else f"flank, {math.degrees(sharpest):.0f} deg"
             raise BadInput(
-                f"the cam's nose is undercut, its radius is {1e3 * self.radius_at(0.0):.3g} mm; "
-                f"raise base_radius above {1e3 * limit:.3g} mm, or half_angle"
+                f"the cam's {where} is undercut, its radius is "
+                f"{1e3 * self.radius_at(sharpest):.3g} mm; raise base_radius above "
+                f"{1e3 * limit:.3g} mm, or half_angle"
             )
 
 
@@ -241,7 +260,7 @@ class RollerCam(Cam):
         )
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (rigid valve train)
-        """Return the contacts from the nose to the start of the lift.
+        """Return the contacts at `angles`.
 
         1/R = 1/ρ + 1/r, F = follower force/cos φ, u1 = ω times the path; slip changes only u2.
         """
@@ -269,10 +288,12 @@ class RollerCam(Cam):
     @property
     def frequencies(self) -> dict[str, float]:
         """Rotational frequencies of the cam, and of the roller averaged over a cam turn [Hz]."""
-        path = 2.0 * float(
-            scipy.integrate.quad(lambda angle: self.point_at(angle).path, 0.0, self.half_angle)[0]
+        first, last = self.law.ends
+        flanks = 2.0 if self.law.symmetric else 1.0
+        path = flanks * float(
+            scipy.integrate.quad(lambda angle: self.point_at(angle).path, first, last, limit=200)[0]
         )
-        path += 2.0 * (math.pi - self.half_angle) * self.base_radius
+        path += (math.tau - flanks * (last - first)) * self.base_radius
         return {
             "cam_hz": rotation_hz(self.speed),
             "roller_hz": rotation_hz(self.speed)

@@ -1,5 +1,5 @@
-from .ratings import DangVan as DangVan
-from .ratings import Rating as Rating
+from .fatigue_ratings import DangVan as DangVan
+from .rating_facts import Rating as Rating
 from .result import MachineResult as MachineResult
 from .solve import machine_conditions as machine_conditions
 from .solve import solve_machine as solve_machine

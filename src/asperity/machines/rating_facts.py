@@ -1,6 +1,10 @@
-"""Source, formula and validity of each rating."""
+"""A rating with its source, formula and validity."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
+
+from asperity.case import Case, MachineCase
 
 
 class RatingFacts(NamedTuple):
@@ -48,8 +52,26 @@ FACTS: dict[str, RatingFacts] = {
         "κ of 0.1 to 4; one factor for the whole bearing, also of rollers, where ISO/TS 16281 uses "
         "one per slice. Roughness enters through κ, not through the solved film",
     ),
+    "reliability_factor": RatingFacts(
+        "ISO 281:2007, 9.2",
+        "a₁ = 0.95 (ln S/ln 0.9)^(2/3) + 0.05",
+        "S from 0.9, where a₁ is 1, to 0.9995",
+    ),
     "modified_life_s": RatingFacts(
-        "ISO 281:2007", "L_10m = a_ISO L₁₀r at the stated speed", "90 % survive"
+        "ISO 281:2007",
+        "L_nm = a₁ a_ISO L₁₀r at the stated speed",
+        "the stated reliability, by default 90 %",
+    ),
+    "spectrum_life_s": RatingFacts(
+        "ISO 281:2007; Palmgren 1924, Miner 1945",
+        "1/L = Σ share/L_nm of every entry of the spectrum",
+        "damage adds up without regard to its order; κ follows the speed of each entry",
+    ),
+    "rated_friction_torque_n_m": RatingFacts(
+        "Palmgren; Harris, Rolling Bearing Analysis",
+        "1e-7 f₀ (ν n)^(2/3) D_pw³ + f₁ P D_pw [mm²/s, r/min, mm]; balls: f₀ 2, f₁ 0.0005 "
+        "(P/C₀)^0.55; rollers: 2.2, 0.0003",
+        "oil bath, without seals; makers' figures scatter by half",
     ),
     "mesh_friction": RatingFacts(
         _MICROPITTING,
@@ -78,6 +100,11 @@ FACTS: dict[str, RatingFacts] = {
         "S_λ = smallest λ_GF/λ_GFP",
         "risk is high below 1, low from 2; λ_GFP is from a test of this oil",
     ),
+    "permissible_film": RatingFacts(
+        f"{_MICROPITTING} (ISO/TS 6336-22:2018)",
+        "λ_GFP = 1.4 times the smallest λ_GF of the test gears C-GF at the failure stage",
+        "FVA 54: 8.3 m/s, 90 °C, Ra 0.5 µm; case-carburised steel (W_W = 1)",
+    ),
     "scuffing_limit_k": RatingFacts(
         "ISO/TR 13989-1:2000 (ISO/TS 6336-20)",
         "θ_S = 80 °C + (0.85 + 1.4 X_W) X_L S², S the stage of A/8.3/90",
@@ -103,3 +130,65 @@ FACTS: dict[str, RatingFacts] = {
     ),
     "dang_van_safety": RatingFacts("Dang Van et al. 1989", "τ₋₁ over the core value", _STRESS),
 }
+
+
+@dataclass(frozen=True)
+class Rating:
+    """A rating: its quantity key, and its values by contact; "" is the whole machine.
+
+    `reason` states why values are missing, `beyond` what lies outside the scope of the standard.
+    """
+
+    key: str
+    values: Mapping[str, float | None]
+    reason: str = ""
+    beyond: str = ""
+
+    @property
+    def standard(self) -> str:
+        """Standard that defines the rating."""
+        return FACTS[self.key].standard
+
+    @property
+    def formula(self) -> str:
+        """Formula of the rating."""
+        return FACTS[self.key].formula
+
+    @property
+    def validity(self) -> str:
+        """Scope of the rating, and simplifications made here."""
+        return FACTS[self.key].validity
+
+    @property
+    def machine_value(self) -> float | None:
+        """Value of the whole machine; None if it is by contact or missing."""
+        return self.values.get("")
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the JSON output of the rating."""
+        value: dict[str, object] = (
+            {"value": self.machine_value}
+            if set(self.values) <= {""}
+            else {"values": dict(self.values)}
+        )
+        facts = {"standard": self.standard, "formula": self.formula, "validity": self.validity}
+        return {"key": self.key, **value, **facts, "reason": self.reason, "beyond": self.beyond}
+
+
+def missing_ratings(keys: Sequence[str], reason: str) -> tuple[Rating, ...]:
+    """Return ratings without values, for one reason."""
+    return tuple(machine_rating(key, None, reason) for key in keys)
+
+
+def machine_rating(key: str, value: float | None, reason: str = "") -> Rating:
+    """Return a rating of the whole machine."""
+    return Rating(key, {"": value}, reason if value is None else "")
+
+
+def rated_case(case: MachineCase) -> Case | None:
+    """Return the case of a contact, for oil and roughness; None if it states too little."""
+    moving = [contact for contact in case.contacts if not contact.stands_still]
+    if not case.complete or not moving:
+        return None
+    stated = case.case(moving[0])
+    return None if stated.lubricant is None else stated

@@ -10,7 +10,10 @@ from asperity.case import MachineCase
 from asperity.contact.materials import material
 from asperity.core.quantities import quantity
 from asperity.machine import MachineContact
-from asperity.machines.ratings import DangVan, Rating, dang_van_below, machine_ratings, warmer_teeth
+from asperity.machines.fatigue_ratings import DangVan, dang_van_below
+from asperity.machines.gear_ratings import warmer_teeth
+from asperity.machines.rating_facts import Rating
+from asperity.machines.ratings import machine_ratings
 from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW, Run
 
 STATIC_LIMIT = 4.2e9  # Hertz pressure of hardened bearing steel, ISO 76 [Pa]

@@ -2,7 +2,9 @@ from .bearing import BallRaceway as BallRaceway
 from .bearing import RollingElement as RollingElement
 from .bearing import ball_life as ball_life
 from .bearing import life_factor as life_factor
+from .bearing import palmgren_torque as palmgren_torque
 from .bearing import reference_viscosity as reference_viscosity
+from .bearing import reliability_factor as reliability_factor
 from .bearing import roller_life as roller_life
 from .fatigue import dang_van as dang_van
 from .fatigue import dang_van_per_path as dang_van_per_path

@@ -18,6 +18,7 @@ BRANCH_SPEED = 1000.0  # r/min; the reference viscosity has another law below
 MAX_KAPPA = 4.0  # upper limit of the viscosity ratio in the rating
 MIN_KAPPA = 0.1  # no rating below this viscosity ratio
 MAX_LIFE_FACTOR = 50.0
+SLOW_TORQUE = 160e-7  # of the oil, over f0 D³, below about 2000 mm²/s r/min
 ROLLER_REDUCTION = 0.83  # λν of radial roller bearings, ISO/TS 16281
 STRAIGHT_EDGE = 0.01, 1.985  # constants of the edge factor of straight rollers, ISO/TS 16281
 
@@ -99,6 +100,54 @@ def life_factor(element: RollingElement, kappa: float, contamination: float) -> 
     if bracket <= 0.0:
         return MAX_LIFE_FACTOR
     return float(min(0.1 * bracket**-law.k, MAX_LIFE_FACTOR))
+
+
+def reliability_factor(reliability: float) -> float:
+    """Return the life factor a1 of a reliability: 0.95 (ln S/ln 0.9)^(2/3) + 0.05.
+
+    The Weibull distribution with a minimum life behind table 12 of ISO 281:2007, which it
+    reproduces to its digits.
+
+    Examples
+    --------
+    >>> from asperity.rating import reliability_factor
+    >>> round(reliability_factor(0.99), 2)
+    0.25
+    """
+    return float(0.95 * (math.log(reliability) / math.log(0.9)) ** (2.0 / 3.0) + 0.05)
+
+
+def palmgren_torque(
+    pitch_diameter: float, speed: float, viscosity: float, load: float, static_rating: float | None
+) -> float:
+    """Return the friction torque of a bearing in an oil bath by Palmgren's formulas [N m].
+
+    M0 = 1e-7 f0 (ν n)^(2/3) D³, at least 160e-7 f0 D³, and M1 = f1 P D, in N, mm, mm²/s and r/min.
+    Deep-groove balls: f0 2, f1 0.0005 (P/C0)^0.55; cylindrical rollers: f0 2.2, f1 0.0003. Source:
+    T. A. Harris, Rolling Bearing Analysis, from memory; makers' figures scatter by half.
+
+    Parameters
+    ----------
+    pitch_diameter : [m]
+    speed : of the rotating ring [rad/s]
+    viscosity : kinematic, at the oil's temperature [m²/s]
+    load : equivalent load P [N]
+    static_rating : C0 of a ball bearing [N]; None for cylindrical rollers
+
+    Examples
+    --------
+    >>> from asperity.rating import palmgren_torque
+    >>> torque = palmgren_torque(0.046, 314.16, 32e-6, 1000.0, static_rating=11300.0)
+    >>> f"{torque * 1e3:.0f} N mm"
+    '47 N mm'
+    """
+    diameter = 1e3 * pitch_diameter
+    product = 1e6 * viscosity * speed * 30.0 / math.pi
+    of_oil, of_load = 2.2, 3e-4
+    if static_rating is not None:
+        of_oil, of_load = 2.0, 5e-4 * (load / static_rating) ** 0.55
+    viscous = max(1e-7 * product ** (2.0 / 3.0), SLOW_TORQUE) * of_oil * diameter**3
+    return float(1e-3 * (viscous + of_load * load * diameter))
 
 
 class BallRaceway(NamedTuple):

@@ -37,4 +37,5 @@ from .read import read_surface as read_surface
 from .read import surface_from_array as surface_from_array
 from .spectrum import SurfaceSpectrum as SurfaceSpectrum
 from .spectrum import surface_spectrum as surface_spectrum
+from .text import read_table as read_table
 from .write import write_surface as write_surface

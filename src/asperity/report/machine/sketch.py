@@ -305,8 +305,8 @@ def _cam(cam: Cam, result: MachineResult, axes: Axes) -> None:
     axes.plot(MM * dots[:, 0], MM * dots[:, 1], "o", color=GREY, markersize=3)
     height = _follower(axes, cam, rotation)
     axes.plot(*(MM * (matrix @ _on_cam(cam, rotation))), "o", color=VERMILION, markersize=6)
-    size = 1.1 * (cam.base_radius + cam.lift)
-    _frame(axes, (-size, size), (-size, 1.05 * (cam.base_radius + cam.lift + height)))
+    size = 1.1 * (cam.base_radius + cam.law.largest)
+    _frame(axes, (-size, size), (-size, 1.05 * (cam.base_radius + cam.law.largest + height)))
 
 
 def _follower(axes: Axes, cam: Cam, rotation: float) -> float:
@@ -325,22 +325,16 @@ def _follower(axes: Axes, cam: Cam, rotation: float) -> float:
 
 def _on_cam(cam: Cam, angle: float) -> Field:
     """Return the contact point at a cam angle, in the cam's frame with the nose up."""
-    limited = abs(angle) if abs(angle) <= cam.half_angle else cam.half_angle
+    law = cam.law
+    limited = abs(angle) if law.symmetric else angle
+    limited = min(max(limited, law.ends[0]), law.ends[1])
     along = np.array([math.sin(angle), math.cos(angle)])
     across = np.array([math.cos(angle), -math.sin(angle)])
     lift = cam.base_radius + cam.lift_at(limited)
-    slope = math.copysign(1.0, angle) * _lift_slope(cam, limited)
+    slope = law(limited, 1) * (math.copysign(1.0, angle) if law.symmetric else 1.0)
     if isinstance(cam, FlatCam):
         return np.asarray(lift * along + slope * across)
     assert isinstance(cam, RollerCam)
     centre = (lift + cam.roller_radius) * along
     normal = (lift + cam.roller_radius) * along - slope * across
     return np.asarray(centre - cam.roller_radius * normal / float(np.hypot(*normal)))
-
-
-def _lift_slope(cam: Cam, angle: float) -> float:
-    """Differentiate the lift over the cam angle numerically [m]."""
-    step = 1e-5
-    angles = (min(max(angle + side * step, 0.0), cam.half_angle) for side in (-1.0, 1.0))
-    low, high = angles
-    return (cam.lift_at(high) - cam.lift_at(low)) / (high - low)
