@@ -33,6 +33,8 @@ SOLVED = [  # from the same section, with further keys of a solved contact
         "clr",
         "car",
         "friction_coefficient",
+        "friction_coefficient_low",
+        "friction_coefficient_high",
         "flash_temperature_max_k",
         "crf_hz",
     ),
@@ -41,7 +43,16 @@ SOLVED = [  # from the same section, with further keys of a solved contact
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
 ]
 RATING = ["beyond", "formula", "key", "reason", "standard", "validity"]
-KEYS = ["contacts", "frequencies", "notes", "ratings", "seconds", "verdict", "worst"]
+KEYS = [
+    "contacts",
+    "frequencies",
+    "notes",
+    "ratings",
+    "seconds",
+    "stiffness_matrix",
+    "verdict",
+    "worst",
+]
 DISCS = """
 [machine]
 kind = "twin-disc"

@@ -16,6 +16,7 @@ from .materials import MaterialSection as MaterialSection
 from .messages import Section as Section
 from .messages import parse_section as parse_section
 from .ratings import RatingSection as RatingSection
+from .ratings import SpectrumEntry as SpectrumEntry
 from .roller_shape import ShapeSection as ShapeSection
 from .sections import CaseFile as CaseFile
 from .sections import ContactSection as ContactSection

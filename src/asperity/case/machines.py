@@ -303,13 +303,8 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
     section = parsed.machine
     stated = parsed.material
     pair = ElasticPair(plain(stated.youngs_modulus), stated.poisson_ratio)
-    arguments = {
-        name: plain(getattr(section, name)) for name in type(section).model_fields if name != "kind"
-    }
     try:
-        if arguments.get("lift_table") is not None:
-            arguments["lift_table"] = _lift_table(folder / arguments["lift_table"])
-        machine = MACHINES[section.kind][1](**arguments)
+        machine = MACHINES[section.kind][1](**_arguments(section, folder))
         parsed.rating.require_applicable(section.kind)
         hardness = plain(stated.hardness)
         if "material" not in tables:
@@ -323,6 +318,15 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
     if machine_case.complete and drawn:
         machine_case.case(drawn[0])  # checks the remaining tables
     return machine_case
+
+
+def _arguments(section: Section, folder: Path) -> dict[str, Any]:
+    """Return the machine's arguments; a lift table is read from its file."""
+    names = (name for name in type(section).model_fields if name != "kind")
+    arguments = {name: plain(getattr(section, name)) for name in names}
+    if arguments.get("lift_table") is not None:
+        arguments["lift_table"] = _lift_table(folder / arguments["lift_table"])
+    return arguments
 
 
 def _lift_table(path: Path) -> tuple[tuple[float, float], ...]:

@@ -40,7 +40,7 @@ class RatingSection(Section):
     fatigue_load_limit: Annotated[Force | None, OPTIONAL] = None  # C_u
     contamination: Annotated[Number | None, OPTIONAL] = None  # e_C of ISO 281, 0 to 1
     reliability: Number = 0.9  # share of bearings that survive the life
-    spectrum: tuple[SpectrumEntry, ...] = ()
+    spectrum: Annotated[tuple[SpectrumEntry, ...] | None, OPTIONAL] = None
     scuffing_stage: Annotated[Number | None, OPTIONAL] = (
         None  # FZG load stage of A/8.3/90 in which the oil fails
     )
@@ -75,14 +75,15 @@ class RatingSection(Section):
                 f"rating.reliability must lie between {low:g} and {high:g}, got "
                 f"{self.reliability:g}; 0.9 is that of the basic life"
             )
-        for entry in self.spectrum:
+        spectrum = self.spectrum or ()
+        for entry in spectrum:
             if min(entry.share, entry.load, entry.speed) <= 0.0:
                 raise BadInput(
                     "rating.spectrum must have positive share, load and speed, got "
                     f"{min(entry.share, entry.load, entry.speed):g}; leave idle time out"
                 )
-        total = sum(entry.share for entry in self.spectrum)
-        if self.spectrum and abs(total - 1.0) > SHARES_TOLERANCE:
+        total = sum(entry.share for entry in spectrum)
+        if spectrum and abs(total - 1.0) > SHARES_TOLERANCE:
             raise BadInput(
                 f"the shares of rating.spectrum must add up to 1, got {total:.4g}; correct them"
             )

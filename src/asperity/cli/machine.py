@@ -39,6 +39,11 @@ CONDITIONS = (  # key of a row, and of the quantity that formats it
     ("slide_to_roll", "slide_to_roll"),
     ("p_hertz_pa", "hertz_pressure_pa"),
 )
+STIFFNESSES = (
+    ("radial", ("N/µm", 1e-6)),
+    ("axial", ("N/µm", 1e-6)),
+    ("tilt", ("N m/mrad", 1e-3)),
+)
 SOLVED = (
     "h_central_m",
     "lambda_ratio",
@@ -81,7 +86,7 @@ def machine_command(
         result.verdict(),
         result.scalars,
         _contacts(result),
-        table(_ratings(result)),
+        table([*_ratings(result), *_stiffness(result)]),
         table(_frequencies(result), [*result.notes, *_unsolved(result)]),
         []
         if out is None or dry_run
@@ -146,6 +151,14 @@ def _contacts(result: "MachineResult") -> Block:
 def _number(row: Table, key: str, entry: "Quantity") -> str:
     """Return the number, with its interval if the row has one."""
     return entry.number_in(row) if key == entry.key else entry.number(row[key])
+
+
+def _stiffness(result: "MachineResult") -> Iterator[Row]:
+    """Yield the diagonal of a bearing's stiffness matrix."""
+    for row, (name, unit) in enumerate(STIFFNESSES[: len(result.stiffness_matrix or [])]):
+        assert result.stiffness_matrix is not None
+        value = result.stiffness_matrix[row][row]
+        yield f"{name} stiffness of the bearing", f"{value * unit[1]:.4g} {unit[0]}"
 
 
 def _frequencies(result: "MachineResult") -> list[Row]:

@@ -26,8 +26,8 @@ from asperity.machine.rolling import (
     double_until,
     load_zone_notes,
 )
+from asperity.machine.stiffness import EXPONENT, tangent_stiffness
 
-EXPONENT = 1.5
 MAX_CONTACT_ANGLE = math.radians(60.0)
 MAX_TILT = 0.02  # rad
 # Thrust over radial load times tan α above which half of the balls are loaded (Sjövall's integrals)
@@ -228,19 +228,20 @@ class BallBearing:
     def _stiffnesses(self, shifts: Field, stiffness: float, elastic: float) -> Field:
         """Return the tangent stiffness, per `elastic` and the larger load, shape (3, 3)."""
         loads, angles = self._balls(elastic * shifts, stiffness)
-        approaches = (loads / stiffness) ** (1.0 / EXPONENT)
-        cosines = np.cos(self.angles)
-        across = np.cos(angles)
-        along = np.sin(angles)
-        normal = np.stack([across * cosines, along, along * cosines])
-        tangential = np.stack([-along * cosines, across, across * cosines])
-        stiffnesses = (
-            EXPONENT * stiffness * np.sqrt(approaches),
-            loads / (self.groove_distance + approaches),
-        )
-        slopes = (normal * stiffnesses[0]) @ normal.T
-        slopes = slopes + (tangential * stiffnesses[1]) @ tangential.T
+        slopes = tangent_stiffness(loads, angles, self.angles, stiffness, self.groove_distance)
         return np.asarray(slopes * elastic / max(self.radial_load, self.axial_load))
+
+    def stiffness_matrix(self, pair: ElasticPair) -> Field:
+        """Return d(force)/d(shift) of the inner ring, shape (3, 3): radial, axial, tilt.
+
+        Forces [N] and moment [N m] by shifts [m] and tilt [rad].
+        """
+        loads, angles = self.loads(pair)
+        slopes = tangent_stiffness(
+            loads, angles, self.angles, self.stiffness(pair), self.groove_distance
+        )
+        arms = np.array([1.0, 1.0, self._arm])
+        return np.asarray(slopes * np.outer(arms, arms))
 
     def _under_one_load(self, stiffness: float, elastic: float) -> tuple[float, float, float]:
         """Return the shifts under a radial or an axial load alone, along one axis only."""

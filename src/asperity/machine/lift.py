@@ -9,10 +9,12 @@ from typing import Protocol
 import numpy as np
 import scipy
 
+from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 
 FEWEST_LIFTS = 12  # of a table, for a curvature
-LIFTED = 1e-3  # of the largest lift, above which the follower is lifted
+ON_BASE = 1e-3  # of the largest lift, below which the follower is on the base circle
+MOST_DECIMALS = 8  # of a lift in mm
 MAX_SPAN = math.tau  # rad
 
 
@@ -66,9 +68,9 @@ class HarmonicLift:
 class TabulatedLift:
     """Lift by a table, as a smoothing spline; the nose is at its maximum.
 
-    Curvature is a second derivative, which amplifies rounded lifts: the spline's smoothness follows
-    from generalised cross-validation (G. Wahba 1990). `table` holds pairs of angle [rad], from any
-    origin, and lift [m].
+    Curvature is a second derivative, which amplifies rounding: the spline deviates from the lifts
+    by as much as their last decimal allows. `table` holds pairs of angle [rad], from any origin,
+    and lift [m].
 
     Raises
     ------
@@ -95,7 +97,7 @@ class TabulatedLift:
                 f"lift_table spans {span:.0f} deg, more than a turn; give one lift, in degrees of "
                 "the cam"
             )
-        if not np.all(np.isfinite(lifts)) or lifts.min() < -LIFTED * lifts.max():
+        if not np.all(np.isfinite(lifts)) or lifts.min() < -ON_BASE * lifts.max():
             raise BadInput(
                 f"lift_table has a lift of {1e3 * lifts.min():.4g} mm; give positive ones"
             )
@@ -103,15 +105,14 @@ class TabulatedLift:
             raise BadInput("lift_table has its largest lift at an end; give both flanks")
 
     @cached_property
-    def _spline(self) -> tuple[scipy.interpolate.BSpline, float]:
+    def _spline(self) -> tuple[scipy.interpolate.UnivariateSpline, float]:
         """Spline of the lift over the angle, and the angle of the nose."""
         angles, lifts = np.array(self.table).T
-        scale = float(lifts.max())
-        smooth = scipy.interpolate.make_smoothing_spline(np.degrees(angles), lifts / scale)
-        spline = scipy.interpolate.BSpline(np.radians(smooth.t), scale * smooth.c, smooth.k)
+        allowed = angles.size * (_resolution(lifts) / math.sqrt(12.0)) ** 2
+        spline = scipy.interpolate.UnivariateSpline(angles, lifts, k=5, s=allowed)
         top = int(lifts.argmax())
         nose = scipy.optimize.minimize_scalar(
-            lambda angle: -float(spline(angle)),
+            lambda angle: -float(spline([angle])[0]),
             bounds=(angles[top - 1], angles[top + 1]),
             method="bounded",
             options={"xatol": 1e-9},
@@ -127,9 +128,9 @@ class TabulatedLift:
     def ends(self) -> tuple[float, float]:
         """Start and end of the lift."""
         angles, lifts = np.array(self.table).T
-        lifted = np.flatnonzero(lifts > LIFTED * lifts.max())
-        first = angles[max(lifted[0] - 1, 0)]
-        last = angles[min(lifted[-1] + 1, angles.size - 1)]
+        above = np.flatnonzero(lifts > ON_BASE * lifts.max())
+        first = angles[max(above[0] - 1, 0)]
+        last = angles[min(above[-1] + 1, angles.size - 1)]
         return float(first - self._spline[1]), float(last - self._spline[1])
 
     @property
@@ -146,7 +147,17 @@ class TabulatedLift:
             return 0.0
         spline, nose = self._spline
         inside = min(max(angle, first), last)
-        return float(spline(inside + nose, derivative))
+        return float(spline([inside + nose], derivative)[0])
+
+
+def _resolution(lifts: Field) -> float:
+    """Return the largest step of 1, 2 or 5 in a decimal of which all lifts are multiples [m]."""
+    steps = (factor * 10.0**-decimals for decimals in range(MOST_DECIMALS) for factor in (5, 2, 1))
+    millimetres = 1e3 * lifts
+    for step in steps:
+        if np.allclose(np.round(millimetres / step) * step, millimetres, rtol=0.0, atol=1e-9):
+            break
+    return 1e-3 * step
 
 
 def lift_law(

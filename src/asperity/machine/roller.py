@@ -139,6 +139,14 @@ class CylindricalRollerBearing:
         """Loads of all slices [N], shape (rollers, slices)."""
         return self._slice_loads(self.shift)
 
+    def stiffness_matrix(self, pair: ElasticPair) -> Field:  # noqa: ARG002 (ISO's stiffness of steel)
+        """Return d(force)/d(shift) of the inner ring along the load [N/m], shape (1, 1)."""
+        approach = np.cos(self.angles) * self.shift - self.clearance / 2.0
+        elastic = np.maximum(approach[:, None] - 2.0 * self.drop, 0.0)
+        loads = self.slice_loads
+        slopes = EXPONENT * np.divide(loads, elastic, out=np.zeros_like(loads), where=elastic > 0.0)
+        return np.array([[float(np.cos(self.angles) ** 2 @ slopes.sum(axis=1))]])
+
     @property
     def loads(self) -> Field:
         """Loads of the rollers [N]."""

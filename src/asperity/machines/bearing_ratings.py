@@ -98,12 +98,12 @@ def _spectrum_life(case: MachineCase) -> Iterator[Rating]:
     assert isinstance(bearing, CylindricalRollerBearing | BallBearing)
     loads = [name for name in ("radial_load", "axial_load") if hasattr(bearing, name)]
     damage, reason = 0.0, ""
-    for entry in case.rating.spectrum:
+    for entry in case.rating.spectrum or ():
         factors = {**dict.fromkeys(loads, entry.load), "speed": entry.speed}
         values = {
             f"machine.{key}": factor * getattr(bearing, key) for key, factor in factors.items()
         }
-        changed = case.with_overrides({**values, "rating.spectrum": []})
+        changed = case.with_overrides({**values, "rating.spectrum": "none"})
         stated = rated_case(changed)
         assert stated is not None  # like the case
         assert isinstance(changed.machine, CylindricalRollerBearing | BallBearing)

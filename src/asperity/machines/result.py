@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 from asperity.case import MachineCase
 from asperity.contact.materials import material
 from asperity.core.quantities import quantity
-from asperity.machine import MachineContact
+from asperity.machine import BallBearing, CylindricalRollerBearing, MachineContact
 from asperity.machines.fatigue_ratings import DangVan, dang_van_below
 from asperity.machines.gear_ratings import warmer_teeth
 from asperity.machines.rating_facts import Rating
@@ -120,12 +120,25 @@ class MachineResult:
                 "and the elastic solution does not apply."
             )
 
+    @property
+    def stiffness_matrix(self) -> list[list[float]] | None:
+        """Stiffness of a bearing's inner ring; None for other machines.
+
+        Ball bearings: radial and axial [N/m], tilt [N m/rad]; roller bearings: radial.
+        """
+        machine = self.case.machine
+        if not isinstance(machine, BallBearing | CylindricalRollerBearing):
+            return None
+        matrix: list[list[float]] = machine.stiffness_matrix(self.case.pair).tolist()
+        return matrix
+
     def scalars(self) -> dict[str, object]:
         """Return the JSON output of `asperity machine`."""
         return {
             "verdict": self.verdict(),
             "contacts": list(self.rows),
             "frequencies": self.case.machine.frequencies,
+            "stiffness_matrix": self.stiffness_matrix,
             "worst": self.worst["name"],
             "ratings": [rating.to_dict() for rating in self.ratings],
             "notes": list(self.notes),
