@@ -146,7 +146,7 @@ def test_every_contact_is_solved_and_stored_once(asp):
     assert rows["roller 0, outer ring"]["h_min_m"] > films[0]  # of larger radius
     assert (result["worst"], rows["roller 0, inner ring"]["clr"]) == ("roller 0, inner ring", 0.0)
     assert json.loads(Path("kept/machine.json").read_text("utf-8")) == result
-    assert [sorted(rating)[:-1] for rating in result["ratings"]] == [RATING] * 5
+    assert [sorted(rating)[:-1] for rating in result["ratings"]] == [RATING] * 7
     page = Path("kept/machine.html").read_text("utf-8")
     assert result["verdict"].split(",")[0] in page
     assert 'href="worst.html"' in page

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pandas
 import pytest
 
 from asperity.case import load_machine
@@ -15,7 +16,7 @@ from asperity.machine import (
     RollerCam,
     catalogue_bearings,
 )
-from asperity.machines import machine_conditions
+from asperity.machines import machine_conditions, sweep_machine, sweep_points
 from asperity.machines.ratings import machine_ratings
 from asperity.rating import palmgren_torque, reliability_factor
 from support.golden_numbers import EXAMPLES
@@ -291,3 +292,48 @@ spring_load = "300 N"
 def test_impossible_lift_tables_are_refused(table, message):
     with pytest.raises(BadInput, match=message):
         FlatCam(lift_table=table, **CAM)
+
+
+SWEPT = BEARING.replace(
+    "[rating]",
+    """[study]
+machine.radial_load = ["1 kN", "3 kN"]
+lubricant.temperature = ["70 degC", "90 degC"]
+[contact]
+roughness = "standing"
+[solver]
+surfaces = 1
+[rating]""",
+).replace('designation = "6206"', 'designation = "6206"\nclearance = "60 um"')
+
+
+def test_a_study_solves_a_machine_at_every_point(machine, tmp_path):
+    case = machine(SWEPT, {"surface": "flat"})
+    swept = sweep_machine(case, out=tmp_path / "sweep", workers=1)
+    assert swept.axes == ("machine.radial_load", "lubricant.temperature")
+    loads, temperatures = ([row[key] for row in swept.rows] for key in swept.axes)
+    assert loads == ["1 kN", "1 kN", "3 kN", "3 kN"]
+    assert temperatures == ["70 degC", "90 degC"] * 2
+    films = [row["h_min_m"] for row in swept.rows]
+    assert films[0] > films[1]  # a thinner oil
+    assert films[0] > films[2]  # a higher load
+    lives = [row["reference_life"] for row in swept.rows]
+    assert lives[0] == lives[1] > lives[2]
+    table = pandas.read_csv(tmp_path / "sweep" / "study.csv")
+    assert table["h_min_m"].tolist() == pytest.approx(films)
+    again = sweep_machine(case, out=tmp_path / "sweep", workers=1)
+    assert [row["h_min_m"] for row in again.rows] == films
+    alone = machine(SWEPT, {"study": "none", "machine.radial_load": "3 kN"})
+    assert sweep_points(case)[2] == {
+        "machine.radial_load": "3 kN",
+        "lubricant.temperature": "70 degC",
+    }
+    assert alone.sweep == {}
+
+
+def test_a_machine_without_a_study_is_not_swept(machine):
+    with pytest.raises(BadInput, match=r"study is missing; add .study. with lists of values"):
+        sweep_machine(machine(BEARING))
+    ranged = SWEPT.replace('["1 kN", "3 kN"]', '{ from = "1 kN", to = "3 kN", count = 3 }')
+    with pytest.raises(BadInput, match=r"study.machine.radial_load must be a list of values"):
+        sweep_machine(machine(ranged))

@@ -16,6 +16,7 @@ from asperity.case.materials import MaterialSection
 from asperity.case.messages import Section, choose, parse_section
 from asperity.case.ratings import RatingSection
 from asperity.case.sections import CaseFile
+from asperity.case.study import RangeSection, parse_study
 from asperity.case.text import Tables, parse_toml, read_text, replaced
 from asperity.case.units import (
     OPTIONAL,
@@ -61,7 +62,7 @@ Tilt: TypeAlias = Annotated[
     Annotated[float, amount_in("rad", -math.inf)] | None,
     BeforeValidator(lambda value: None if value == "free" else value),
 ]
-MACHINE_TABLES = ("machine", "rating")  # not in the case of a contact
+MACHINE_TABLES = ("machine", "rating", "study")  # not in the case of a contact
 OF_ALL_CONTACTS = ("roughness",)  # keys of [contact] beside a [machine]
 DIGITS = 10  # of the values of a derived contact
 
@@ -178,7 +179,8 @@ class MachineCase:
 
     `hardness` [Pa] bounds the pressure, None for elastic bodies. `tables` are the file's, `folder`
     is the base of surface files, `source` the name of the case in messages. `rating` has further
-    data for rating standards. `catalogue` is the bearing that the file designates, if any.
+    data for rating standards. `catalogue` is the bearing that the file designates, if any; `sweep`
+    has the values of its [study] by dotted key.
     """
 
     tables: Table
@@ -189,6 +191,7 @@ class MachineCase:
     folder: Path = field(compare=False, repr=False)
     source: str = field(compare=False)
     catalogue: CatalogueBearing | None = None
+    sweep: Mapping[str, tuple[object, ...] | RangeSection] = field(default_factory=dict)
 
     @cached_property
     def contacts(self) -> tuple[MachineContact, ...]:
@@ -298,6 +301,7 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
         )
     present = {key: tables[key] for key in _MachineTables.model_fields if key in tables}
     catalogue = _designated(present, source)
+    sweep = _sweep(tables, source)
     steel = {"name": BEARING_STEEL}  # elastic constants are those of any steel
     parsed = parse_section(_MachineTables, {"material": steel, **present}, source)
     section = parsed.machine
@@ -310,7 +314,7 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
         if "material" not in tables:
             hardness = material(_default_material(machine)).hardness
         machine_case = MachineCase(
-            tables, machine, pair, hardness, parsed.rating, folder, source, catalogue
+            tables, machine, pair, hardness, parsed.rating, folder, source, catalogue, sweep
         )
         drawn = [contact for contact in machine_case.contacts if not contact.stands_still]
     except BadInput as refusal:
@@ -318,6 +322,15 @@ def _machine_case(tables: Tables, folder: Path, source: str) -> MachineCase:
     if machine_case.complete and drawn:
         machine_case.case(drawn[0])  # checks the remaining tables
     return machine_case
+
+
+def _sweep(tables: Tables, source: str) -> Mapping[str, tuple[object, ...] | RangeSection]:
+    """Return the values of [study] by dotted key."""
+    try:
+        study = parse_study(tables.get("study"))
+    except BadInput as refusal:
+        raise BadInput(f"{source}: study: {refusal}") from None
+    return {} if study is None else study.axes
 
 
 def _arguments(section: Section, folder: Path) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import report, study
+from asperity import case, machines, report, study
 from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
@@ -20,6 +20,7 @@ from asperity.cli.options import (
     StudyFigures,
     Workers,
     chosen_case,
+    read_overrides,
     require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, table, text
@@ -79,15 +80,14 @@ def study_command(
 ) -> None:
     """Sweep a case: every point of its [study], on several surfaces each; resumable."""
     part = _shard(shard)
-    if out is None and not dry_run:
-        raise BadInput("asperity study needs a folder for its cases; state --out DIR")
-    if page is not None and not _in_new_folder(page, out):
-        require_output(page, ".html", option="--report")
+    _require_places(out, page, dry_run=dry_run)
+    if path.suffix != ".nc" and case.has_machine(path):
+        replaced = read_overrides(overrides, snapshot=snapshot)
+        return _sweep_machine(path, replaced, out, workers, (dry_run, as_json, quiet))
     plan = study.plan_study(chosen_case(path, overrides, snapshot=snapshot))
     if dry_run:
         cost = study.estimate_study(plan, out=out, workers=workers, shard=part)
-        _show_estimate(plan, cost, as_json=as_json, quiet=quiet)
-        return
+        return _show_estimate(plan, cost, as_json=as_json, quiet=quiet)
     with _executor(executor) as pool, study_progress(path.name, quiet=quiet) as step:
         if merge:
             assert out is not None
@@ -103,6 +103,21 @@ def study_command(
             progress=step,
         )
     page_rows = _make_page(result, page, figures, quiet=quiet)
+    _show_result(result, page_rows, as_json=as_json, quiet=quiet)
+    return _require_whole(result, part)
+
+
+def _require_places(out: Path | None, page: Path | None, *, dry_run: bool) -> None:
+    """Raise BadInput without a folder, or for a page that cannot be written."""
+    if out is None and not dry_run:
+        raise BadInput("asperity study needs a folder for its cases; state --out DIR")
+    if page is not None and not _in_new_folder(page, out):
+        require_output(page, ".html", option="--report")
+
+
+def _show_result(
+    result: "StudyResult", page_rows: dict[str, str], *, as_json: bool, quiet: bool
+) -> None:
     show(
         study.study_verdict(result),
         lambda: {**study.study_scalars(result), **page_rows},
@@ -111,7 +126,50 @@ def study_command(
         as_json=as_json,
         quiet=quiet,
     )
-    _require_whole(result, part)
+
+
+def _sweep_machine(
+    path: Path,
+    overrides: dict[str, object],
+    out: Path | None,
+    workers: int | None,
+    flags: tuple[bool, bool, bool],
+) -> None:
+    """Sweep a machine, or list its points; `flags` are those of a dry run, JSON and quiet."""
+    dry_run, as_json, quiet = flags
+    chosen = case.load_machine(path, overrides)
+    if dry_run:
+        points = machines.sweep_points(chosen)
+        show(
+            f"{len(points)} machines of {len(chosen.contacts)} contacts each.",
+            lambda: {"points": points},
+            as_json=as_json,
+            quiet=quiet,
+        )
+        return
+    with study_progress(chosen.source, quiet=quiet) as step:
+        swept = machines.sweep_machine(chosen, out=out, workers=workers, progress=step)
+    keys = ("clr", "lambda_ratio", "h_min_m", "friction_coefficient", "flash_temperature_max_k")
+    entries = [quantity(key) for key in keys]
+    show(
+        swept.verdict(),
+        swept.scalars,
+        columns(
+            [*(key.rpartition(".")[2] for key in swept.axes), "worst contact"]
+            + [entry.label for entry in entries],
+            (
+                [*(str(row[key]) for key in swept.axes), str(row["worst"])]
+                + [entry.number_in(row) for entry in entries]
+                for row in swept.rows
+            ),
+            left=len(swept.axes) + 1,
+        ),
+        [f"Table: {swept.scalars()['table']}"],
+        as_json=as_json,
+        quiet=quiet,
+    )
+    if failed := sum(bool(row["failed"]) for row in swept.rows):
+        raise AsperityError(f"contacts of {failed} machines were not solved; see {out}")
 
 
 def _require_whole(result: "StudyResult", part: tuple[int, int]) -> None:
