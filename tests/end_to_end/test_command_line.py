@@ -39,6 +39,8 @@ KEYS = [
         "lambda_ratio",
     ),
     *("friction_coefficient", "friction_asperity_part", "friction_oil_part", "friction_power_w"),
+    *(f"friction_{name}" for name in ("error", "oil_below", "oil_above", "heat_below")),
+    *("friction_coefficient_low", "friction_coefficient_high"),
     *(f"rolling_friction_{name}" for name in ("coefficient", "force_n", "power_w")),
     *("flash_temperature_max_k", "film_temperature_max_k"),
     *("von_mises_max_pa", "von_mises_depth_m", "von_mises_core_pa", "von_mises_core_depth_m"),

@@ -290,10 +290,12 @@ def test_bad_machines_are_refused_in_one_sentence(asp, name, setting, words):
 
 
 def test_a_machine_file_is_not_a_single_contact(asp):
-    for command in ("solve", "study", "run", "vibrate"):
-        code, _, err = asp(command, "nu206.toml", *(("--dry-run",) if command == "study" else ()))
+    for command in ("solve", "run", "vibrate"):
+        code, _, err = asp(command, "nu206.toml")
         assert code == 2
         assert "has a [machine] with several contacts; solve them with asperity machine" in err
+    code, _, err = asp("study", "nu206.toml", "--dry-run")
+    assert (code, "study is missing; add [study] with lists of values" in err) == (2, True)
     shutil.copy(EXAMPLES / "paper.toml", "paper.toml")
     assert "has no [machine]" in asp("machine", "paper.toml")[2]
 

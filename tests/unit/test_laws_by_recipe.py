@@ -105,7 +105,7 @@ def test_a_new_law_works_from_case_to_report(tmp_path):
     [
         ({"lubricant.viscosity.z": "0.6 m"}, "lubricant.viscosity.z must be a valid number"),
         (
-            {"lubricant.viscosity.p_ref": 196e6},
+            {"lubricant.viscosity.p_ref": "196e6"},
             'p_ref must be a pressure such as "2 GPa", got the bare number',
         ),
         (

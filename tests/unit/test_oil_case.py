@@ -124,7 +124,7 @@ def test_a_measured_oil_is_selected_by_name():
         ),
         ({"lubricant": {"grade": "VG 100"}}, "lubricant.temperature is missing; add it"),
         (
-            {"lubricant": {"grade": "VG 100", "temperature": 70}},
+            {"lubricant.temperature": "70"},
             'temperature must be a temperature such as "40 degC"',
         ),
         (

@@ -262,3 +262,15 @@ def test_log_messages_of_a_reader_do_not_reach_the_terminal(caplog):
     assert notes == ["the reader warns: odd header"]
     logging.getLogger("reader").error("and afterwards it does")
     assert len(caplog.records) == 1
+
+
+def test_a_declared_marker_is_a_missing_height(tmp_path):
+    """Header of an ESRI grid."""
+    path = tmp_path / "map.asc"
+    rows = [[f"{(i * j) % 7 * 1e-7:.3e}" for j in range(12)] for i in range(10)]
+    rows[3][4] = rows[8][2] = "-9999"
+    lines = ["ncols 12", "nrows 10", "NODATA_value -9999", *(" ".join(row) for row in rows)]
+    path.write_text("\n".join(lines), "utf-8")
+    surface = read_surface(path, unit="m", pixel=2e-6)
+    assert np.isnan(surface.heights).sum() == 2
+    assert np.nanmax(np.abs(surface.heights)) < 1e-6

@@ -53,7 +53,11 @@ def test_thermal_keys_are_converted_to_si_and_restated():
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("thermal.ambient", 60, 'must be a temperature such as "40 degC", got the bare number 60'),
+        (
+            "thermal.ambient",
+            "60",
+            'must be a temperature such as "40 degC", got the bare number 60',
+        ),
         (
             "thermal.ambient",
             "1000 degC",

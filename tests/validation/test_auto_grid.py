@@ -8,6 +8,7 @@ reference solver in `support.line` gives 3.456, 3.481 and 3.487 on 801, 1601 and
 package 3.495 on 4096 cells.
 """
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from benchmarks.films import line_case
 from asperity import load_case, solve_case
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput
-from asperity.ehl import Texture, auto_grid, film_fits, grid_shortfalls, solve_contact
+from asperity.ehl import Texture, auto_grid, film_fits, grid_shortfalls, least_film, solve_contact
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.solution import contact_state, regime_card
 from asperity.surface import flat_surface, gaussian_surface
@@ -296,12 +297,14 @@ def test_the_solved_film_agrees_with_every_valid_fit():
             assert abs(fit.deviation) < 0.15, (fit, fit.deviation)
 
 
-@pytest.mark.parametrize(("load", "outlet"), [(0.765, 8.1), (0.1, 30.0)])
-def test_the_outlet_of_a_light_fast_ball_is_bounded_like_its_inlet(load, outlet):
-    """The rigid film of a light ball is thousands of a²/R."""
-    grid, a = light_ball(load, 1.57)
-    assert grid.upper[0] / a == pytest.approx(outlet, abs=0.1)
-    assert grid.lower[0] / a == pytest.approx(-30.0)
+@pytest.mark.parametrize(("load", "reach"), [(0.765, 88.2), (0.1, 5.07)])
+def test_the_grid_of_a_light_ball_has_the_scale_of_its_pressure(load, reach):
+    """In lengths sqrt(2 R h) of pressure build-up; that of 0.1 N ends with the ball."""
+    grid, length = light_ball(load, 1.57)
+    assert -grid.lower[0] / length == pytest.approx(reach, rel=0.01)
+    assert grid.upper[1] / length == pytest.approx(reach, rel=0.01)
+    assert grid.upper[0] / length == pytest.approx(5.0, rel=0.01)
+    assert grid.spacing[0] < length / 6.0 * 1.01
 
 
 def test_a_film_that_is_not_thin_against_the_radius_is_refused():
@@ -312,10 +315,10 @@ def test_a_film_that_is_not_thin_against_the_radius_is_refused():
 
 
 def light_ball(load, speed):
-    """Return the chosen grid of a light, fast ball and its Hertz radius."""
+    """Return the chosen grid of a light, fast ball and its length of pressure build-up."""
     speeds = (speed, speed)
     ball = contact(geometry="point", radius=0.015, load=load, length=None, surface_speeds=speeds)
     thick = Lubricant(
         viscosity=Barus(0.05, 22e-9), density=DowsonHigginson(870.0), rheology=Newtonian()
     )
-    return auto_grid(ball, thick), ball.hertz.half_widths[0]
+    return auto_grid(ball, thick), math.sqrt(2.0 * 0.015 * least_film(ball, thick))

@@ -105,7 +105,7 @@ class TabulatedLift:
             raise BadInput("lift_table has its largest lift at an end; give both flanks")
 
     @cached_property
-    def _spline(self) -> tuple[scipy.interpolate.UnivariateSpline, float]:
+    def _spline(self) -> "tuple[scipy.interpolate.UnivariateSpline, float]":
         """Spline of the lift over the angle, and the angle of the nose."""
         angles, lifts = np.array(self.table).T
         allowed = angles.size * (_resolution(lifts) / math.sqrt(12.0)) ** 2

@@ -14,10 +14,13 @@ from asperity.core.text_dialect import sniff_dialect
 
 SUFFIXES = {"txt", "csv", "tsv", "asc", "dat", "xyz", "hfm", "prf"}
 _MAX_HEADER = 200  # lines
+_NO_DATA = re.compile(r"^\s*no_?data(?:_?value)?[\s=:]+(-?\d+(?:\.\d+)?)\s*$", re.I | re.M)
 
 
 def read_table(path: Path) -> Field:
     """Read the numbers of a text file, one row per line; nan for markers of missing values.
+
+    A header such as "NODATA_value -9999" declares such a marker.
 
     Raises
     ------
@@ -53,4 +56,7 @@ def read_table(path: Path) -> Field:
         rows.append(row)
     if not rows:
         raise UnreadableFile(f"{path.name} holds no table of numbers; export it again as text")
-    return np.array(rows)
+    table = np.array(rows)
+    for marker in _NO_DATA.findall("\n".join(lines[:_MAX_HEADER])):
+        table[table == float(marker)] = np.nan
+    return table
