@@ -316,5 +316,10 @@ def test_numbers_from_python_are_in_si():
     texts = {"contact.load": "400 N", "surface.sq": "1e-06 m"}
     assert case == paper.with_overrides({**plain, **texts, "lubricant.viscosity.eta0": "0.05 Pa s"})
     assert load_case(case.text) == case
-    with pytest.raises(BadInput, match="must be positive and finite"):
-        paper.with_overrides({"contact.load": -3.0})
+    for number in (np.int64(400), np.float32(400.0), 400):
+        assert paper.with_overrides({"contact.load": number}).conditions.load == 400.0
+    for wrong in (-3.0, 10**400, float("nan")):
+        with pytest.raises(BadInput, match="must be"):
+            paper.with_overrides({"contact.load": wrong})
+    with pytest.raises(BadInput, match="got the bare number 400"):
+        paper.with_written({"contact.load": 400})

@@ -211,3 +211,18 @@ def test_barus_and_laws_without_alpha_have_the_same_doubt():
         viscosity=Barus(0.1, 1e-8), density=DowsonHigginson(880.0), rheology=Newtonian()
     )
     assert oil.alpha_error == 0.1
+
+
+def test_dry_contacts_have_boundary_friction_without_doubt():
+    flat = {"lubricant": "none", "contact.slip": 0.1, "grid.cells": [64, 64]}
+    run = solve_case(load_case(MTM).with_overrides(flat))
+    interval = run.friction_interval
+    assert interval.low == interval.value == interval.high
+    assert interval.value == pytest.approx(run.case.boundary_friction)
+
+
+def test_rows_of_an_earlier_version_have_no_interval(run):
+    row = {key: value for key, value in run.own_scalars.items() if "oil_below" not in key}
+    interval = friction_interval([row])
+    assert interval.low is None
+    assert interval.value == pytest.approx(run.friction.coefficient)

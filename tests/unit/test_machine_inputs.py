@@ -108,6 +108,7 @@ def test_a_designation_replaces_geometry_and_load_ratings(machine):
         ({"rating.reliability": 0.5}, "rating.reliability must lie between 0.9 and 0.9995"),
         ({"rating.spectrum": [{"share": 0.5, "load": 1.0}]}, "must add up to 1, got 0.5"),
         ({"rating.spectrum": [{"share": 1.0, "load": 0.0}]}, "must have positive share, load"),
+        ({"rating": 5}, "rating must be a table"),
     ],
 )
 def test_impossible_bearing_inputs_are_refused(machine, overrides, message):
@@ -220,7 +221,7 @@ def test_the_oil_of_the_micropitting_test_fails_on_its_own_gears():
     better = ratings_of(case.with_overrides({"rating.micropitting_stage": 10}))
     assert better["permissible_film"] < found["permissible_film"]
     with pytest.raises(BadInput, match="micropitting_stage must be a load stage from 5 to 10"):
-        machine_ratings(case.with_overrides({"rating.micropitting_stage": 4}))
+        case.with_overrides({"rating.micropitting_stage": 4})
 
 
 def harmonic_table(step, rounding, offset=0.0):
@@ -337,3 +338,34 @@ def test_a_machine_without_a_study_is_not_swept(machine):
     ranged = SWEPT.replace('["1 kN", "3 kN"]', '{ from = "1 kN", to = "3 kN", count = 3 }')
     with pytest.raises(BadInput, match=r"study.machine.radial_load must be a list of values"):
         sweep_machine(machine(ranged))
+
+
+@pytest.mark.parametrize(
+    ("study", "message"),
+    [
+        ("machine.speed = [3000]", "got the bare number 3000"),
+        ('machine.flow = ["1 N"]', "machine.flow"),
+        ('seeds = 4\nmachine.radial_load = ["1 kN"]', "study.seeds does not apply to a machine"),
+    ],
+)
+def test_points_of_a_study_are_checked_before_they_are_solved(machine, study, message):
+    with pytest.raises(BadInput, match=message):
+        sweep_points(machine(BEARING.replace("[rating]", f"[study]\n{study}\n[rating]")))
+
+
+def test_an_edge_between_the_contacts_of_a_cam_is_found():
+    """A bump of 50 um between two of the seventeen contacts."""
+    angles = np.radians(np.arange(-60.0, 60.5, 1.0))
+    lifts = 0.5 * LIFT * (1.0 + np.cos(np.pi * angles / HALF_ANGLE))
+    lifts[np.argmin(np.abs(angles - np.radians(26.0)))] += 50e-6
+    with pytest.raises(BadInput, match="is undercut"):
+        FlatCam(lift_table=tuple(zip(angles.tolist(), lifts.tolist(), strict=True)), **CAM)
+
+
+def test_missing_inputs_of_a_life_are_named(machine):
+    entries = [{"share": 1.0, "load": 1.0}]
+    case = machine(BEARING, {"rating.contamination": "none", "rating.spectrum": entries})
+    found = {entry.key: entry for entry in machine_ratings(case)}
+    for key in ("life_factor", "reliability_factor", "modified_life_s", "spectrum_life_s"):
+        assert found[key].machine_value is None
+        assert found[key].reason == "[rating] has no contamination"

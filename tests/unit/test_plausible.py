@@ -305,3 +305,18 @@ def test_far_pressure_carries_the_load_beyond_a_grid(ratio):
     load = scipy.integrate.dblquad(at, reach, np.inf, -np.pi / 2.0, np.pi / 2.0)[0]
     share = ELASTIC_SHARE * flooded_reach(conditions, case.lubricant)[0] / reach
     assert share * conditions.load == pytest.approx(load, rel=1e-6)
+
+
+def test_a_rough_light_ball_keeps_the_grid_of_its_roughness():
+    rough = {"kind": "gaussian", "sq": "0.1 um", "correlation_length": "60 um"}
+    case = light_ball("0.765 N", surface=rough)
+    (note,) = [note for note in case.notes if "too thin" in note]
+    assert "reaches beyond the grid of its roughness" in note
+    assert "grid.x" not in note
+
+
+def test_a_light_film_without_an_error_bar_is_not_determined():
+    case = light_ball("0.765 N", model="conserving")
+    run = solve_case(case, strict=False)
+    assert run.film_determined is False
+    assert "no coarser grid to compare with" in run.verdict()

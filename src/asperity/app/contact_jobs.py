@@ -138,7 +138,7 @@ def run_job(work: Callable[..., object], *arguments: object) -> object:
 def warm_up() -> float:
     """Solve a small contact to load and compile everything; return the time [s]."""
     start = time.perf_counter()
-    case = papers_case().with_overrides(
+    case = papers_case().with_written(
         {"grid.cells": [64, 64], "surface.correlation_length": "40 um"}
     )
     result_of_run(solve_case(case, strict=False), 0.0)
@@ -241,7 +241,7 @@ def make_report(ticket: Ticket, case: Case, write: ReportWriter) -> str:
 def open_surface(ticket: Ticket, case: Case, path: Path) -> tuple[Case, str, tuple[str, ...]]:  # noqa: ARG001
     """Return the case with a dropped surface, its key, and the processing steps of the surface."""
     relocated = replace(case, folder=path.parent, stored=None, stored_notes=())
-    changed = relocated.with_overrides({"surface": {"file": path.name}})
+    changed = relocated.with_written({"surface": {"file": path.name}})
     limit_cells(changed.source, changed.grid.cells)
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256")

@@ -100,7 +100,7 @@ def open_study(ticket: Ticket, folder: Path) -> StudyData:  # noqa: ARG001
 def solve_row(ticket: Ticket, folder: Path, number: int) -> ContactResult:
     """Solve the contact of one case of a study."""
     plan = _study(folder, _stamp(folder)).plan
-    return solve_fully(ticket, plan.case.with_overrides(plan.cases[number].overrides))
+    return solve_fully(ticket, plan.case.with_written(plan.cases[number].overrides))
 
 
 def _stamp(folder: Path) -> float:

@@ -33,7 +33,7 @@ class OpenedPage:
 
 def default_case() -> Case:
     """Return the contact of the paper on a grid that is quick to solve."""
-    return papers_case().with_overrides(DEFAULT_GRID)
+    return papers_case().with_written(DEFAULT_GRID)
 
 
 def open_page(path: Path | None) -> OpenedPage:

@@ -56,7 +56,7 @@ class Settings:
         """Case with the changes; raises BadInput for invalid ones."""
         if not self.changes:
             return self.opened
-        case = self.opened.with_overrides(overrides(self.opened, self.changes))
+        case = self.opened.with_written(overrides(self.opened, self.changes))
         if case.contents.grid.cells != "auto":  # choosing cells may read a file: left to a worker
             limit_cells(case.source, case.contents.grid.cells)
         return case

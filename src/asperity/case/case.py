@@ -15,7 +15,7 @@ from asperity.case.roughness_scale import texture_of
 from asperity.case.sections import CaseFile, MotionSection
 from asperity.case.surfaces import FileSection, composite_roughness, moving_roughness, two_bodies
 from asperity.case.text import parse_toml, read_text, replaced, restated
-from asperity.case.units import plain
+from asperity.case.units import numbers_in_si, plain
 from asperity.case.vibration import vibration_model
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.contact.grid import Grid
@@ -249,7 +249,7 @@ class Case:
         """The case with fewer cells of a running contact, unless it states cells or an accuracy."""
         if self.contents.solver.running_cells or self.contents.grid.accuracy:
             return self
-        return self.with_overrides({"solver.running_cells": MANY_RUNNING_CELLS})
+        return self.with_written({"solver.running_cells": MANY_RUNNING_CELLS})
 
     def running_cells(self) -> tuple[int, int]:
         """Return the cells of the running contact's fine grid, at most those of `grid`."""
@@ -345,7 +345,7 @@ class Case:
     def on_surface(self, number: int) -> "Case":
         """Return the case on another surface: a later seed or map position; 0 is its own."""
         return (
-            self.with_overrides(self.contents.surface.variant_overrides(number)) if number else self
+            self.with_written(self.contents.surface.variant_overrides(number)) if number else self
         )
 
     @property
@@ -358,12 +358,12 @@ class Case:
     def notes(self) -> tuple[str, ...]:
         """Notes on the case for a reader of the results, one sentence each."""
         conditions = self.conditions
-        oil = self.lubricant
+        oil, texture = self.lubricant, texture_of(self.contents.surface, self.folder)
         of_oil = () if self._sheet is None else self._sheet.notes()
         return (
             *of_oil,
             *plausibility_notes(conditions, oil),
-            *inlet_notes(conditions, oil, self.grid),
+            *inlet_notes(conditions, oil, self.grid, rough=bool(getattr(texture, "sq", 0.0))),
         )
 
     @property
@@ -379,6 +379,10 @@ class Case:
         as neither the surface nor the grid changes. `vibration.preset` replaces all values that
         presets determine. Raises BadInput as for a case file.
         """
+        return self.with_written(numbers_in_si(overrides))
+
+    def with_written(self, overrides: Mapping[str, object]) -> "Case":
+        """Return the case with values replaced as in a file, where a quantity has its unit."""
         tables = replaced(parse_toml(self.text, self.source), overrides, self.source)
         case = Case(parse_section(CaseFile, tables, self.source), self.folder, self.source)
         same = case.grid == self.grid and case.contents.surface == self.contents.surface

@@ -29,6 +29,7 @@ from asperity.case.units import (
     Speed,
     amount_in,
     default_amount,
+    numbers_in_si,
     plain,
 )
 from asperity.contact.conditions import ElasticPair
@@ -259,7 +260,14 @@ class MachineCase:
         return Case(contents, self.folder, self.source)
 
     def with_overrides(self, overrides: Mapping[str, object]) -> "MachineCase":
-        """Return the machine with values replaced, such as `{"machine.torque": "300 N m"}`."""
+        """Return the machine with values replaced, such as `{"machine.torque": "300 N m"}`.
+
+        Numbers are in SI, those in text need their unit.
+        """
+        return self.with_written(numbers_in_si(overrides))
+
+    def with_written(self, overrides: Mapping[str, object]) -> "MachineCase":
+        """Return the machine with values replaced as in a file, where a quantity has its unit."""
         return _machine_case(
             replaced(deepcopy(dict(self.tables)), overrides, self.source), self.folder, self.source
         )
@@ -330,7 +338,14 @@ def _sweep(tables: Tables, source: str) -> Mapping[str, tuple[object, ...] | Ran
         study = parse_study(tables.get("study"))
     except BadInput as refusal:
         raise BadInput(f"{source}: study: {refusal}") from None
-    return {} if study is None else study.axes
+    if study is None:
+        return {}
+    if other := sorted(study.model_fields_set - {"axes"}):
+        raise BadInput(
+            f"{source}: study.{other[0]} does not apply to a machine; its [study] has lists of "
+            "values only"
+        )
+    return study.axes
 
 
 def _arguments(section: Section, folder: Path) -> dict[str, Any]:
@@ -384,7 +399,9 @@ def _designated(tables: Tables, source: str) -> CatalogueBearing | None:
         "fatigue_load_limit": _written(bearing.fatigue_load_limit, "N"),
     }
     tables["machine"] = {**geometry, **stated}
-    tables["rating"] = {**ratings, **tables.get("rating", {})}
+    rating = tables.get("rating", {})
+    if isinstance(rating, Mapping):
+        tables["rating"] = {**ratings, **rating}
     return bearing
 
 
@@ -394,8 +411,8 @@ def _catalogue_note(bearing: CatalogueBearing) -> str:
         f"{bearing.designation} by its designation: {bearing.elements} {elements} of "
         f"{1e3 * bearing.diameter:.4g} mm on a pitch diameter of "
         f"{1e3 * bearing.pitch_diameter:.4g} mm, C {1e-3 * bearing.dynamic_load_rating:.4g} kN, "
-        f"C0 {1e-3 * bearing.static_load_rating:.4g} kN. Internal geometry is not standardised: "
-        "state that of the maker if it is known."
+        f"C0 {1e-3 * bearing.static_load_rating:.4g} kN, unless the case states other values. "
+        "Internal geometry is not standardised: state that of the maker if it is known."
     )
 
 

@@ -21,6 +21,7 @@ OF_GEARS = (
     "bulk_temperature",
     "oil_supply",
 )
+STAGES = 5, 10  # of the micropitting test
 SHARES_TOLERANCE = 1e-3
 RELIABILITIES = 0.9, 0.9995  # of ISO 281, table 12
 
@@ -86,6 +87,15 @@ class RatingSection(Section):
         if spectrum and abs(total - 1.0) > SHARES_TOLERANCE:
             raise BadInput(
                 f"the shares of rating.spectrum must add up to 1, got {total:.4g}; correct them"
+            )
+        low_stage, high_stage = STAGES
+        if self.micropitting_stage is not None and not (
+            low_stage <= self.micropitting_stage <= high_stage
+            and float(self.micropitting_stage).is_integer()
+        ):
+            raise BadInput(
+                f"rating.micropitting_stage must be a load stage from {low_stage} to "
+                f"{high_stage}, got {self.micropitting_stage:g}; correct it"
             )
         if self.micropitting_stage is not None and self.permissible_film is not None:
             raise BadInput(

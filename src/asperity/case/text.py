@@ -16,7 +16,7 @@ from asperity.case.materials import NAMED, NAMED_THERMAL
 from asperity.case.messages import Section, parse_section, quoted
 from asperity.case.sections import CaseFile
 from asperity.case.study import StudySection
-from asperity.case.units import Amount, in_si
+from asperity.case.units import Amount
 from asperity.case.vibration import preset_keys
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import require_file
@@ -78,8 +78,6 @@ copyreg.pickle(CaseFile, _as_text)
 def replaced(tables: Tables, overrides: Mapping[str, object], source: str) -> Tables:
     """Return the tables with values replaced by dotted keys; text is parsed as TOML if possible.
 
-    Numbers are in SI; those in text need their unit.
-
     `vibration.preset` and `material.name` replace all keys that they determine. Raises BadInput
     for an invalid key.
     """
@@ -101,7 +99,7 @@ def replaced(tables: Tables, overrides: Mapping[str, object], source: str) -> Ta
                 table[parent] = {}
             table = table[parent]
         # a copy, because a later key may modify it
-        table[key] = _toml_value(value) if isinstance(value, str) else in_si(deepcopy(value))
+        table[key] = _toml_value(value) if isinstance(value, str) else deepcopy(value)
     return tables
 
 

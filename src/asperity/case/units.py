@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping
 from decimal import Decimal
 from functools import cache, lru_cache, partial
+from numbers import Integral, Real
 from tokenize import TokenError
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -97,6 +98,8 @@ _CUSTOM = {
 }
 # confusing the two would be wrong by a factor of 2 pi
 _FREQUENCIES = {"Hz": "in hertz", "rad/s": "in r/min or rad/s"}
+HUGE = 1e300
+WRITTEN_TABLES = "study", "infer"
 TINY = math.ulp(0.0)  # the smallest positive number
 _WRITTEN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([\w\s.*/^()·⁻-]*)")
 
@@ -124,16 +127,27 @@ class SiInt(int):
     """Whole number that a program states, in SI where its key has a unit."""
 
 
-def in_si(value: object) -> object:
-    """Return a value with all numbers in it marked as SI."""
+def numbers_in_si(overrides: Mapping[str, object]) -> dict[str, object]:
+    """Return overrides with all numbers marked as SI, but those of [study] and [infer].
+
+    These are values of many quantities, which are written as in a file.
+    """
+    return {
+        key: value if key.partition(".")[0] in WRITTEN_TABLES else _in_si(value)
+        for key, value in overrides.items()
+    }
+
+
+def _in_si(value: object) -> object:
     if isinstance(value, Mapping):
-        return {key: in_si(part) for key, part in value.items()}
+        return {key: _in_si(part) for key, part in value.items()}
     if isinstance(value, list | tuple):
-        return [in_si(part) for part in value]
+        return [_in_si(part) for part in value]
     if isinstance(value, bool | Amount):
         return value
-    kind = SiInt if isinstance(value, int) else SiFloat
-    return kind(value) if isinstance(value, int | float) else value
+    if isinstance(value, Integral):
+        return SiInt(value)
+    return SiFloat(value) if isinstance(value, Real) else value
 
 
 def plain(value: object) -> Any:
@@ -241,7 +255,7 @@ def parse_amount(unit: str, value: object, least: float = TINY) -> Amount:
 def _as_text(value: object, unit: str) -> object:
     """Return a number that a program states as text in an SI unit; others unchanged."""
     if isinstance(value, SiFloat | SiInt):
-        return default_amount(float(value), unit).text
+        return default_amount(float(value) if abs(value) < HUGE else math.inf, unit).text
     return value
 
 

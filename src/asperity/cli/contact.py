@@ -47,7 +47,7 @@ def demo(
     chosen = case.load_case(case_file)
     runs = {}
     for sq in DEMO_SQ:
-        runs[sq] = _solve(chosen.with_overrides({"surface.sq": sq}), label=f"Sq {sq}", quiet=quiet)
+        runs[sq] = _solve(chosen.with_written({"surface.sq": sq}), label=f"Sq {sq}", quiet=quiet)
         runs[sq].save(out / f"run-sq-{sq.replace(' ', '')}.nc")
     report.write_report(list(runs.values()), page)
     verdict = results.levels_verdict(runs)
@@ -103,9 +103,9 @@ def solve(
     require_output(out, ".nc")
     chosen = chosen_case(path, overrides, surface, accuracy, snapshot=snapshot)
     if surfaces is not None:
-        chosen = chosen.with_overrides({"solver.surfaces": surfaces})
+        chosen = chosen.with_written({"solver.surfaces": surfaces})
     if dynamic and not chosen.contents.solver.dynamic:
-        chosen = chosen.with_overrides({"solver.dynamic": results.FREQUENCIES})
+        chosen = chosen.with_written({"solver.dynamic": results.FREQUENCIES})
     displayed = () if quiet else results.SHORT_GROUPS
     groups = displayed if out is None and not as_json else results.RUN_GROUPS
     run = _solve(chosen, label=path.name, quiet=quiet, surfaces=None, groups=groups)

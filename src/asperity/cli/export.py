@@ -21,7 +21,7 @@ def export_command(
     quiet: Quiet = False,
 ) -> None:
     """Write the fields of a saved run: film, pressure, contact, stress, temperatures."""
-    require_output(out, *results.FIELD_SUFFIXES)
+    require_output(out, *results.FIELD_SUFFIXES, option="OUT")
     run = results.load_run(path)
     results.write_fields(run, out)
     show(

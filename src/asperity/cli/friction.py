@@ -87,9 +87,7 @@ def _cases(
     path: Path, roughness: list[str] | None, overrides: list[str] | None, *, snapshot: bool
 ) -> "list[Case]":
     chosen = chosen_case(path, overrides, snapshot=snapshot)
-    return (
-        [chosen.with_overrides({"surface.sq": sq}) for sq in roughness] if roughness else [chosen]
-    )
+    return [chosen.with_written({"surface.sq": sq}) for sq in roughness] if roughness else [chosen]
 
 
 def _friction_command(

@@ -265,14 +265,14 @@ def chosen_case(
     chosen = results.load_run(path).case if path.suffix == ".nc" else case.load_case(path)
     if surface is not None:
         files.require_file(surface)
-        chosen = chosen.with_overrides(
+        chosen = chosen.with_written(
             {"surface": {"file": case.relative_path(surface, chosen.folder)}}
         )
     replaced: dict[str, object] = {}
     if accuracy is not None:
         replaced = {"grid.cells": "auto", "grid.accuracy": accuracy}
     replaced |= read_overrides(overrides, snapshot=snapshot)
-    return chosen.with_overrides(replaced) if replaced else chosen
+    return chosen.with_written(replaced) if replaced else chosen
 
 
 def read_overrides(overrides: list[str] | None, *, snapshot: bool = False) -> dict[str, object]:

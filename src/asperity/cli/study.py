@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from asperity.study import StudyCost, StudyPlan, StudyProgress, StudyResult, WearCurve
 
 SHOWN_FAILURES = 5
+NOT_OF_MACHINES = (
+    *("--report", "--figures", "--merge", "--executor", "--fields", "--retry-failed"),
+    "--shard",
+)
 CURVE = ("car", "car_domain", "clr", "crf_sound_hz", "crfa_sound")
 
 
@@ -81,7 +85,8 @@ def study_command(
     """Sweep a case: every point of its [study], on several surfaces each; resumable."""
     part = _shard(shard)
     _require_places(out, page, dry_run=dry_run)
-    if path.suffix != ".nc" and case.has_machine(path):
+    if _has_machine(path):
+        _refuse_for_machine(page, figures, merge, executor, fields, retry_failed, part != (1, 1))
         replaced = read_overrides(overrides, snapshot=snapshot)
         return _sweep_machine(path, replaced, out, workers, (dry_run, as_json, quiet))
     plan = study.plan_study(chosen_case(path, overrides, snapshot=snapshot))
@@ -99,12 +104,27 @@ def study_command(
             workers=workers,
             shard=part,
             retry_failed=retry_failed,
-            fields=tuple(name.strip() for name in (fields or "").split(",") if name.strip()),
+            fields=_fields(fields),
             progress=step,
         )
     page_rows = _make_page(result, page, figures, quiet=quiet)
     _show_result(result, page_rows, as_json=as_json, quiet=quiet)
     return _require_whole(result, part)
+
+
+def _has_machine(path: Path) -> bool:
+    return path.suffix != ".nc" and case.has_machine(path)
+
+
+def _fields(names: str | None) -> tuple[str, ...]:
+    return tuple(name.strip() for name in (names or "").split(",") if name.strip())
+
+
+def _refuse_for_machine(*values: object) -> None:
+    """Raise BadInput for an option that does not apply to the study of a machine."""
+    for name, value in zip(NOT_OF_MACHINES, values, strict=True):
+        if value:
+            raise BadInput(f"{name} does not apply to the study of a machine; leave it out")
 
 
 def _require_places(out: Path | None, page: Path | None, *, dry_run: bool) -> None:

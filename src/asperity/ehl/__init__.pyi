@@ -4,6 +4,7 @@ from .cavitation import solve_film as solve_film
 from .contact_solution import ContactSolution as ContactSolution
 from .contact_solution import FileContents as FileContents
 from .contact_solution import Oil as Oil
+from .far_pressure import build_up_lengths as build_up_lengths
 from .far_pressure import film_loss as film_loss
 from .far_pressure import flooded_reach as flooded_reach
 from .far_pressure import loss_beyond_body as loss_beyond_body

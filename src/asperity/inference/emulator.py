@@ -307,7 +307,7 @@ def _finer(
     case = setting.case.among_many
     doubled = [2 * count if count > 1 else 1 for count in case.grid.cells]
     fourfold = {"solver.running_cells": 4 * math.prod(case.solved_cells)}
-    refined = case.with_overrides({"grid.cells": doubled, **fourfold})
+    refined = case.with_written({"grid.cells": doubled, **fourfold})
     points = [overrides_at(refined, setting.ranges, shares) for shares in sobol[:FINER_POINTS]]
     plan = plan_points(refined, points, seeds=setting.surfaces, kind="still")
     return run(plan, out=home / FINER).table

@@ -59,7 +59,7 @@ def emulator_features(setting: Setting) -> EmulatorFeatures:
         return EmulatorFeatures(ranges)
     shares, logs = np.linspace(0.0, 1.0, 9), []
     for share in shares:
-        oil = setting.case.with_overrides(overrides_at(setting.case, [entry], [share])).lubricant
+        oil = setting.case.with_written(overrides_at(setting.case, [entry], [share])).lubricant
         assert oil is not None
         zero = np.zeros(1)
         viscosity = float(oil.viscosity(zero)[0])

@@ -109,7 +109,7 @@ def resonance_band(setting: Setting) -> tuple[float, float]:
     loads = next(entry for entry in setting.operating if entry.key == LOAD)
     bands = [
         search_band(
-            setting.case.with_overrides(overrides_at(setting.case, [loads], [end])).conditions,
+            setting.case.with_written(overrides_at(setting.case, [loads], [end])).conditions,
             model,
         )
         for end in (0.0, 1.0)

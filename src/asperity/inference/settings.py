@@ -113,9 +113,7 @@ def inference_setting(case: Case) -> Setting:
     """
     _require_inferable(case)
     section = case.contents.infer or InferSection()
-    base = case.with_overrides(
-        {"infer": "none", "study": "none", "grid.cells": list(section.cells)}
-    )
+    base = case.with_written({"infer": "none", "study": "none", "grid.cells": list(section.cells)})
     priors = {_key_of(case, name): prior for name, prior in section.axes.items()}
     operating = _operating(base, priors)
     unknowns = [
@@ -290,7 +288,7 @@ def _resolved(
     if lengths.key not in LENGTHS:
         return lengths
     loads = next(entry for entry in operating if entry.key == LOAD)
-    grids = [case.with_overrides(overrides_at(case, [loads], [end])).grid for end in (0.0, 1.0)]
+    grids = [case.with_written(overrides_at(case, [loads], [end])).grid for end in (0.0, 1.0)]
     scale = 1.0 / float(Unknown("", lengths).to_si(1.0))  # type: ignore[arg-type]
     low = MIN_CELLS_PER_LENGTH * scale * max(max(grid.spacing) for grid in grids)
     high = 0.49 * scale * min(min(grid.extent) for grid in grids)

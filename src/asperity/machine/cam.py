@@ -16,6 +16,7 @@ from asperity.core.errors import BadInput, require_positive
 from asperity.machine.element import MIN_ENTRAINMENT, MachineContact, rotation_hz
 from asperity.machine.lift import LiftLaw, TabulatedLift, lift_law
 
+FINE_STEPS = 360  # of the lift, between which no edge hides
 ANGLES = 9  # number of contacts from the nose to the start of the lift
 USUAL_PRESSURE_ANGLE = 30.0  # usual upper limit [deg]
 
@@ -71,7 +72,7 @@ class Cam(ABC):
                 "it"
             )
         self._require_shape()
-        for angle in self.angles:
+        for angle in self._fine_angles:
             if self.follower_force(angle) <= 0.0:
                 raise BadInput(
                     f"the follower lifts off at {math.degrees(angle):.0f} deg from the nose, where "
@@ -91,6 +92,13 @@ class Cam(ABC):
         flanks = [last] if self.law.symmetric else [first, last]
         steps = [number / (ANGLES - 1) for number in range(ANGLES)]
         return tuple(sorted({flank * step + 0.0 for flank in flanks for step in steps}))
+
+    @cached_property
+    def _fine_angles(self) -> tuple[float, ...]:
+        """Angles at which shape and force are checked [rad]."""
+        first, last = self.law.ends
+        fine = (first + (last - first) * step / FINE_STEPS for step in range(FINE_STEPS + 1))
+        return tuple(sorted({*fine, *self.angles}, key=abs))
 
     def lift_at(self, angle: float) -> float:
         """Return the lift s [m]."""
@@ -190,14 +198,14 @@ class FlatCam(Cam):
         return "Cam with flat follower"
 
     def _require_shape(self) -> None:
-        sharpest = min(self.angles, key=self.radius_at)
+        sharpest = min(self._fine_angles, key=self.radius_at)
         if self.radius_at(sharpest) <= 0.0:
             limit = -(self._lift_bend(sharpest) + self.lift_at(sharpest))
             where = "nose" if sharpest == 0.0 else f"flank, {math.degrees(sharpest):.0f} deg"
             raise BadInput(
                 f"the cam's {where} is undercut, its radius is "
                 f"{1e3 * self.radius_at(sharpest):.3g} mm; raise base_radius above "
-                f"{1e3 * limit:.3g} mm, or half_angle"
+                f"{1e3 * limit:.3g} mm, or stretch the lift"
             )
 
 
@@ -334,7 +342,7 @@ class RollerCam(Cam):
         sharpest = min(
             (
                 radius
-                for angle in self.angles
+                for angle in self._fine_angles
                 if (radius := self.point_at(angle).pitch_radius) > 0.0
             ),
             default=math.inf,

@@ -102,7 +102,10 @@ class TabulatedLift:
                 f"lift_table has a lift of {1e3 * lifts.min():.4g} mm; give positive ones"
             )
         if lifts.argmax() in (0, lifts.size - 1):
-            raise BadInput("lift_table has its largest lift at an end; give both flanks")
+            raise BadInput(
+                "lift_table has its largest lift at an end; give both flanks, and begin a table "
+                "over a full turn on the base circle"
+            )
 
     @cached_property
     def _spline(self) -> "tuple[scipy.interpolate.UnivariateSpline, float]":

@@ -20,7 +20,7 @@ def bearing_ratings(
     reference = rating.reference_viscosity(bearing.speed, bearing.pitch_diameter)
     kappa = oil.viscosity.eta0 / oil.density.rho0 / reference
     if capacity is None:
-        keys = "reference_life", "life_factor", "reliability_factor", "modified_life_s"
+        keys = "reference_life", *_modified_keys(case)
         lives = missing_ratings(keys, "[rating] has no dynamic_load_rating")
     else:
         lives = _bearing_lives(case, bearing, float(capacity), kappa)
@@ -69,7 +69,7 @@ def _bearing_lives(
     ]
     if missing:
         reason = f"[rating] has no {' and no '.join(missing)}"
-        return (*lives, *missing_ratings(("life_factor", "modified_life_s"), reason))
+        return (*lives, *missing_ratings(_modified_keys(case), reason))
     assert inputs.fatigue_load_limit is not None
     assert inputs.contamination is not None
     # a_ISO depends on stress: slices and clearance may lengthen the life, but they do not reduce a
@@ -90,6 +90,11 @@ def _bearing_lives(
         machine_rating("modified_life_s", seconds, reason),
         *_spectrum_life(case),
     )
+
+
+def _modified_keys(case: MachineCase) -> tuple[str, ...]:
+    keys = "life_factor", "reliability_factor", "modified_life_s"
+    return (*keys, "spectrum_life_s") if case.rating.spectrum else keys
 
 
 def _spectrum_life(case: MachineCase) -> Iterator[Rating]:

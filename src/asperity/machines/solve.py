@@ -104,7 +104,7 @@ def solve_machine(
     if study.folder is None or result.worst.get("clr") is None:
         return result
     point = next(entry for entry in plan.cases if entry.point == points[result.worst["name"]])
-    run = _load_or_solve(plan.case.with_overrides(point.overrides), study.folder / WORST)
+    run = _load_or_solve(plan.case.with_written(point.overrides), study.folder / WORST)
     return replace(result, run=run, seconds=time.perf_counter() - start)
 
 
@@ -144,7 +144,7 @@ def _plan(
 def _effort(case: Case, max_cells: int) -> JsonObject:
     """Return overrides for the cells and surfaces of a contact."""
     smaller = _smaller_grid(case, max_cells)
-    coarse = case.with_overrides(smaller) if smaller else case
+    coarse = case.with_written(smaller) if smaller else case
     nx, ny = coarse.grid.cells
     surfaces = DEFAULT_SURFACES if nx * ny <= FINE_CONTACT_GRID else DEFAULT_SURFACES_FINE
     stated = case.contents.solver.surfaces

@@ -91,7 +91,7 @@ def sweep_machine(
     """
     start = time.perf_counter()
     points = sweep_points(case)
-    machines = [case.with_overrides({**point, "study": "none"}) for point in points]
+    machines = [_machine_of(case, point) for point in points]
     folder = None if out is None else Path(out)
     rows = []
     for number, (point, machine) in enumerate(zip(points, machines, strict=True), 1):
@@ -124,18 +124,27 @@ def sweep_points(case: MachineCase) -> list[dict[str, object]]:
             f"{case.source}: study has {len(points)} machines, more than {MAX_POINTS}; shorten its "
             "lists"
         )
+    for point in points:
+        _machine_of(case, point)  # checks the values
     return points
+
+
+def _machine_of(case: MachineCase, point: Mapping[str, object]) -> MachineCase:
+    return case.with_written({**point, "study": "none"})
 
 
 def _row(result: MachineResult) -> dict[str, object]:
     """Return the numbers of a solved machine."""
     worst: Mapping[str, object] = result.worst
-    losses = {
-        key: sum(float(row[key]) for row in result.rows if row.get(key) is not None)
-        for key in LOSSES
-    }
+    losses = {key: _total(result, key) for key in LOSSES}
     ratings = {
         rating.key: rating.machine_value for rating in result.ratings if set(rating.values) <= {""}
     }
     numbers = {key: worst.get(key) for key in OF_WORST}
     return {"worst": worst["name"], **numbers, **losses, **ratings, "failed": len(result.failures)}
+
+
+def _total(result: MachineResult, key: str) -> float | None:
+    """Return the sum over all contacts; None if one was not solved."""
+    values = [row.get(key) for row in result.rows]
+    return None if None in values else sum(float(value) for value in values if value is not None)

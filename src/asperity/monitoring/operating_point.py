@@ -225,7 +225,7 @@ def contact_exponents(case: Case) -> ResponseExponents:
         ("contact.entrainment_speed", conditions.entrainment_speed, "m/s"),
     ):
         frequencies = [
-            _resonance(case.with_overrides({key: f"{value * by:.10g} {unit}"}))
+            _resonance(case.with_written({key: f"{value * by:.10g} {unit}"}))
             for by in (1.0 / STEP, STEP)
         ]
         exponents.append(math.log(frequencies[1] / frequencies[0]) / (2.0 * math.log(STEP)))

@@ -32,7 +32,7 @@ def papers_case() -> Case:
 def rig_case() -> Case:
     """Return the paper's case with the Young's modulus of the rig's steel (section 4)."""
     moduli = [f"{modulus * 1e-9:g} GPa" for modulus in PAIR.youngs_moduli]
-    return papers_case().with_overrides({"material.youngs_modulus": moduli})
+    return papers_case().with_written({"material.youngs_modulus": moduli})
 
 
 def is_papers_contact(case: Case) -> bool:

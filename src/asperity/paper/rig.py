@@ -347,7 +347,7 @@ def _contact(case: Case | None) -> tuple[ContactConditions, VibrationModel]:
 
 def _solved(case: Case, sq: float, model: VibrationModel) -> tuple[ContactState, VibrationModel]:
     """Return the case's contact at another Sq, and the model with that contact's damping."""
-    rough = case.with_overrides({"surface.sq": f"{sq * 1e6!r} um"})
+    rough = case.with_written({"surface.sq": f"{sq * 1e6!r} um"})
     solution = ehl.solve_contact(
         rough.conditions, rough.lubricant, rough.surface(), options=rough.options
     )

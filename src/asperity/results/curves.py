@@ -192,9 +192,9 @@ def _curve(
     """Solve the case with the overrides of each point."""
     if not points:
         raise BadInput("a curve needs at least one point, got none")
-    case = case.among_many.with_overrides({"vibration": "none", "solver.surfaces": 1})
+    case = case.among_many.with_written({"vibration": "none", "solver.surfaces": 1})
     runs = (
-        solve_case(case.with_overrides(point), strict=False, groups=GROUPS, progress=progress)
+        solve_case(case.with_written(point), strict=False, groups=GROUPS, progress=progress)
         for point in points
     )
     return FrictionCurve(

@@ -69,10 +69,13 @@ def friction_interval(rows: Sequence[Row]) -> FrictionInterval | None:
     if len(rows) > 1:
         values = [float(row[KEY] or 0.0) for row in rows]
         surfaces = prediction_interval(values, share=False)[1]
-    error = means["friction_error"]
+    error = means.get("friction_error")
+    below, above = (means.get(f"friction_oil_{side}") for side in ("below", "above"))
+    if below is None or above is None:  # of a run of an earlier version
+        error, below, above = None, 0.0, 0.0
     return FrictionInterval(
         value=float(means[KEY]),
-        oil=(float(means["friction_oil_below"]), float(means["friction_oil_above"])),
+        oil=(float(below), float(above)),
         heat=float(means.get("friction_heat_below") or 0.0),
         numerical=None if error is None else float(error),
         surfaces=surfaces,
@@ -84,14 +87,12 @@ def numerical_error(friction: Friction, solution: ContactSolution, clr: float) -
 
     The oil's stress follows the shear rate at most linearly: the film's part is an upper bound.
     """
-    if friction.power == 0.0:
-        return 0.0
+    if friction.power == 0.0 or solution.lubricant is None:
+        return 0.0  # a dry contact has boundary friction at any load share
     error = solution.convergence.error
     if error is None:
         return None
     oil_traction = friction.oil_part / (1.0 - clr) if clr < 1.0 else 0.0
     sharing = abs(friction.boundary_friction - oil_traction) * error.clr
-    film = 0.0
-    if solution.lubricant is not None:
-        film = friction.oil_part * error.h_central / contact_state(solution).h_central
+    film = friction.oil_part * error.h_central / contact_state(solution).h_central
     return math.hypot(sharing, film)

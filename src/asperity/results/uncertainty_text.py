@@ -68,8 +68,9 @@ def _friction_rows(friction: FrictionInterval) -> list[tuple[str, str]]:
         ("oil under pressure and shear", _sides(entry, friction.oil)),
         ("viscosity of the cold oil", _sides(entry, (friction.heat, 0.0))),
         ("cell size and iteration", UNDETERMINED if cells is None else _sides(entry, (cells,) * 2)),
-        ("surface to surface", _sides(entry, friction.surfaces)),
     ]
+    if friction.surfaces != (0.0, 0.0):
+        rows.append(("surface to surface", _sides(entry, friction.surfaces)))
     return [(f"{entry.short}, {name}", text) for name, text in rows]
 
 

@@ -10,6 +10,7 @@ from asperity.core.quantities import quantity
 from asperity.ehl import (
     ContactSolution,
     Uncertainty,
+    build_up_lengths,
     film_loss,
     flooded_inlet,
     flooded_reach,
@@ -33,6 +34,7 @@ MIN_RUBBER_POISSON = 0.4  # Poisson's ratio below which a body is not rubber
 MAX_MODULUS = 1.3e12  # [Pa]; diamond has 1.1 TPa
 MAX_BARUS_EXPONENT = 15.0  # alpha p_h
 MIN_MODULUS_RATIO = 20.0  # E' over the pressure, below which strains are not small
+FARTHER = "farther out"
 MIN_STARVATION = 0.03  # relative loss of film that is noted
 # Ridges count as edges if cells twice as wide increase their radius by this factor.
 EDGE_RATIO, MIN_RIDGES = 1.6, 20
@@ -51,7 +53,7 @@ def plausibility_notes(
 
 
 def inlet_notes(
-    conditions: ContactConditions, lubricant: Lubricant | None, grid: Grid
+    conditions: ContactConditions, lubricant: Lubricant | None, grid: Grid, *, rough: bool = False
 ) -> tuple[str, ...]:
     """Return a note if the inlet is too short (starved) or longer than the film needs.
 
@@ -62,28 +64,58 @@ def inlet_notes(
     if lubricant is None:
         return ()
     a = conditions.hertz.half_widths[0]
-    inlet_start = -grid.lower[0]
-    reach = flooded_reach(conditions, lubricant)
-    flooded = max(flooded_inlet(conditions, lubricant), reach[0]) / a
+    flooded = max(flooded_inlet(conditions, lubricant), flooded_reach(conditions, lubricant)[0]) / a
     length = inlet_length(conditions, lubricant)
-    fully_flooded = f"m* = {1.0 + 3.06 * (length / a) ** (1.5 * 0.58):.2g}"
-    present = f"The inlet of {inlet_start / a:.3g} half-widths is"
-    loss, beyond = _starvation(conditions, lubricant, grid), _beyond_body(conditions, lubricant)
-    if loss > MIN_STARVATION and not (beyond and reach[0] <= 1.01 * inlet_start):
-        sides = _sides(reach[1], grid.upper[1], conditions.hertz.half_widths[-1])
-        return (
-            f"{present} starved: the film is about {100.0 * loss:.2g} % too thin. A flooded inlet "
-            f"needs {flooded:.3g} half-widths ({fully_flooded}); start grid.x at {-flooded:.3g}"
-            f"{sides} unless starvation is intended.",
-        )
-    if beyond:
+    present = f"The inlet of {-grid.lower[0] / a:.3g} half-widths is"
+    if (loss := _starvation(conditions, lubricant, grid)) > MIN_STARVATION:
+        if rough and film_loss(conditions, lubricant, grid) == loss:
+            return (_beyond_roughness(loss),)
+        if remedy := _remedy(conditions, lubricant, grid, flooded):
+            statement = f"{present} starved: the film is about {100.0 * loss:.2g} % too thin"
+            return (_starved(statement, flooded, _fully_flooded(length / a), remedy),)
+    if beyond := _beyond_body(conditions, lubricant):
         return (beyond,)
-    sufficient, cells = max(flooded, 1.6), length / grid.spacing[0]
-    if inlet_start <= 2.0 * sufficient * a or cells >= CELLS_IN_INLET["rough"]:
+    enough, cells = max(flooded, 1.6), length / grid.spacing[0]
+    if -grid.lower[0] <= 2.0 * enough * a or cells >= CELLS_IN_INLET["rough"]:
         return ()
+    statement = f"{present} longer than necessary ({_fully_flooded(length / a)})"
+    return (_too_long(statement, enough, cells),)
+
+
+def _remedy(conditions: ContactConditions, lubricant: Lubricant, grid: Grid, flooded: float) -> str:
+    """Return where a starved grid should start; empty where it is as large as one is chosen."""
+    a, b = conditions.hertz.half_widths[0], conditions.hertz.half_widths[-1]
+    side = flooded_reach(conditions, lubricant)[1]
+    if flooded * a > -1.01 * grid.lower[0] or side > 1.01 * grid.upper[1]:
+        sides = f" and grid.y at {-side / b:.3g}" if side > grid.upper[1] else ""
+        return f"at {-flooded:.3g}{sides}"
+    return "" if side > 0.0 else FARTHER
+
+
+def _fully_flooded(length: float) -> str:
+    """Return Hamrock and Dowson's fully flooded inlet, from the inlet length in half-widths."""
+    return f"m* = {1.0 + 3.06 * length ** (1.5 * 0.58):.2g}"
+
+
+def _starved(statement: str, flooded: float, fully_flooded: str, remedy: str) -> str:
+    more = "more than " if remedy == FARTHER else ""
     return (
-        f"{present} longer than necessary ({fully_flooded}): starting grid.x at "
-        f"{-sufficient:.3g} gives more than the present {cells:.2g} cells where the film forms.",
+        f"{statement}. A flooded inlet needs {more}{flooded:.3g} half-widths ({fully_flooded}); "
+        f"start grid.x {remedy} unless starvation is intended."
+    )
+
+
+def _too_long(statement: str, needed: float, cells: float) -> str:
+    return (
+        f"{statement}: starting grid.x at {-needed:.3g} gives more than the present {cells:.2g} "
+        "cells where the film forms."
+    )
+
+
+def _beyond_roughness(loss: float) -> str:
+    return (
+        f"The film is about {100.0 * loss:.2g} % too thin: the pressure of so light a contact "
+        "reaches beyond the grid of its roughness."
     )
 
 
@@ -91,10 +123,6 @@ def _starvation(conditions: ContactConditions, lubricant: Lubricant, grid: Grid)
     """Return the share of the film lost by the ends of the grid."""
     inlet = missing_inlet(conditions, lubricant, -grid.lower[0])
     return max(FILM_LOSS_PER_PRESSURE_LOSS * inlet, film_loss(conditions, lubricant, grid))
-
-
-def _sides(needed: float, reached: float, half_width: float) -> str:
-    return f" and grid.y at {-needed / half_width:.3g}" if needed > reached else ""
 
 
 def _beyond_body(conditions: ContactConditions, lubricant: Lubricant) -> str:
@@ -150,7 +178,10 @@ def uncertain_films(
     if (
         solution is not None
         and oil is not None
-        and (reason := _cut_off(solution.conditions, oil, solution.grid))
+        and (
+            reason := _cut_off(solution.conditions, oil, solution.grid)
+            or _unchecked(solution.conditions, oil, numbers)
+        )
     ):
         return (reason,)
     values = ((f"{name}_m", f"{name}_error_m") for name in ("h_min", "h_central"))
@@ -168,6 +199,14 @@ def _cut_off(conditions: ContactConditions, oil: Lubricant, grid: Grid) -> str:
     if film_loss(conditions, oil, grid) > MAX_FILM_ERROR:
         return "the grid is too small for so light a contact"
     return ""
+
+
+def _unchecked(
+    conditions: ContactConditions, oil: Lubricant, numbers: Mapping[str, float | None]
+) -> str:
+    """Return the reason why the error of a rigid ball's film is unknown; empty if it is known."""
+    light = build_up_lengths(conditions, oil)[0] > 0.0
+    return "no coarser grid to compare with" if light and numbers["h_min_error_m"] is None else ""
 
 
 def is_below_contact_film(solution: ContactSolution) -> bool:

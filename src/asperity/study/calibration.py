@@ -221,7 +221,7 @@ def _calibrated(case: Case, ranges: Sequence[ParameterRange], best: Field) -> Ca
             "sq": {"from": "0.5 um", "to": "4 um", "step": "0.1 um"},
             "seeds": CHECK_SEEDS,
         }
-    return case.with_overrides(overrides)
+    return case.with_written(overrides)
 
 
 def _parameters(

@@ -39,4 +39,4 @@ def _relocated(case: Case, folder: Path) -> Case:
         for key, name in files.items()
         if name is not None
     }
-    return case.with_overrides(moved) if moved else case
+    return case.with_written(moved) if moved else case

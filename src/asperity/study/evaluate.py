@@ -60,7 +60,7 @@ def evaluate(
 ) -> tuple[Row, dict[str, Field]]:
     """Return the row of one case: `status`, `reason` and every scalar, and the requested fields."""
     try:
-        return EVALUATIONS[kind](case.with_overrides(overrides).among_many, fields)
+        return EVALUATIONS[kind](case.with_written(overrides).among_many, fields)
     except AsperityError as refusal:
         return {"status": FAILED, "reason": str(refusal)}, {}
     except Exception as error:  # an internal error must not lose the other cases
@@ -99,7 +99,7 @@ def _solve_surfaces(case: Case, _fields: tuple[str, ...]) -> tuple[Row, dict[str
 
 def _solve_dynamic(case: Case, _fields: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
     """Solve the contact with its own dynamic stiffness and damping, without a vibration record."""
-    run = solve_case(case.with_overrides({"vibration": "none"}), strict=False)
+    run = solve_case(case.with_written({"vibration": "none"}), strict=False)
     return {**_status(run), **replace(run, case=case).numbers(STILL)}, {}
 
 
@@ -120,7 +120,7 @@ def _both_presets(case: Case, run: Run) -> Row:
     """Return CRF and CRFA of a contact for both vibration presets, "sound" and "paper"."""
     row: Row = {}
     for preset in BOTH_PRESETS:
-        model = case.with_overrides({"vibration.preset": preset}).vibration
+        model = case.with_written({"vibration.preset": preset}).vibration
         assert model is not None
         vibration: Vibration | None = run.vibration
         row[f"reason_{preset}"] = ""

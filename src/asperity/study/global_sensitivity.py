@@ -187,7 +187,7 @@ class _Design(NamedTuple):
             if number // self.sample.block not in refused:
                 try:
                     chosen = overrides_at(self.case, self.ranges, shares[: len(self.ranges)])
-                    self.case.with_overrides(chosen).surface()
+                    self.case.with_written(chosen).surface()
                 except BadInput as refusal:
                     refused[number // self.sample.block] = str(refusal)
         if len(self.sample.shares) // self.sample.block - len(refused) < FEWEST_BLOCKS:

@@ -151,9 +151,7 @@ class StudyOverview:
             if self.progress is not None:
                 self.progress(f"map {count} of {len(self.mapped)}")
             try:
-                case = self.result.plan.case.with_overrides(
-                    self.result.plan.cases[number].overrides
-                )
+                case = self.result.plan.case.with_written(self.result.plan.cases[number].overrides)
                 with threadpool_limits(1):  # as in the study, for bit-identical results
                     runs.append(solve_case(case, strict=False))
             except AsperityError as refusal:

@@ -113,7 +113,7 @@ class StudyPlan:
         number = 0
         for position, point in enumerate(self.points):
             values = {key: to_si(value) for key, value in point.items()}
-            shaped = self.case if SHAPING.isdisjoint(point) else self.case.with_overrides(point)
+            shaped = self.case if SHAPING.isdisjoint(point) else self.case.with_written(point)
             seeded = [
                 key for key in SEED_KEYS if _has_seed(shaped, key) and not _states(point, key)
             ]
@@ -242,14 +242,14 @@ def plan_points(
 
 
 def _require_values(case: Case, axes: Sequence[str], points: Sequence[Table]) -> None:
-    """Raise BadInput for an invalid value or one without its unit; of many, check the extremes."""
+    """Raise BadInput for an invalid value; of many values of a quantity, check the extremes."""
     for key in axes:
         values = {json.dumps(to_si(point[key])): point[key] for point in points if key in point}
         chosen = list(values.values())
         if len(chosen) > 100 and all(isinstance(to_si(value), float | int) for value in chosen):
             chosen = [min(chosen, key=to_si), max(chosen, key=to_si)]
         for value in chosen:
-            case.with_overrides({key: str(value) if type(value) in (int, float) else value})
+            case.with_written({key: value})
 
 
 def _require_distinct(case: Case, points: Sequence[Table]) -> None:

@@ -280,7 +280,7 @@ def require_ranges(
     for number in range(len(ranges)):
         for end in (0.0, 1.0):
             shares = [end if other == number else 0.5 for other in range(len(ranges))]
-            case.with_overrides(overrides_at(case, ranges, shares))
+            case.with_written(overrides_at(case, ranges, shares))
 
 
 STANDING = {"contact.roughness": "standing"}
@@ -291,11 +291,11 @@ def at_cells(case: Case, cells: int | None) -> Case:
 
     Roughness stands still, as in the paper: hundreds of contacts with running roughness take hours.
     """
-    case = case.with_overrides(STANDING)
+    case = case.with_written(STANDING)
     if cells is None:
         return case
     if cells < FEWEST_CELLS:
         raise BadInput(f"cells must be {FEWEST_CELLS} or more, got {cells}; 128 is the default")
-    return case.with_overrides(
+    return case.with_written(
         {"grid.cells": [cells if count > 1 else 1 for count in case.grid.cells]}
     )

@@ -246,7 +246,9 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
 
 def lay_text(surface: Surface) -> str:
     """Return the direction of a surface's lay as text."""
-    _, texture, bounded, lay = _texture(surface.heights, surface.grid, directions=36)
+    _, texture, bounded, lay = _texture(surface.heights, surface.grid)
+    if np.isnan(texture):
+        return "has no lay that its size determines"
     ratio = f"Str {'below ' if bounded else ''}{texture:.2g}"
     if np.isnan(lay):
         return f"has no lay ({ratio})"
@@ -354,13 +356,11 @@ def _pairs(cells: int, reach: int, periodic: bool) -> Field:
     )
 
 
-def _texture(
-    heights: Field, grid: Grid, directions: int = _DIRECTIONS
-) -> tuple[float, float, bool, float]:
+def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool, float]:
     """Return Sal, Str, true if Str is only an upper bound, and the lay [degrees] or nan."""
     nan = float("nan")
     correlation, middle = _autocorrelation(heights, grid)
-    angles = np.arange(directions) * np.pi / directions
+    angles = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
     distances, lengths = _decay(correlation, middle, grid, angles, _DECAY_THRESHOLD)
     unbounded = np.isnan(distances)
     if unbounded.all():
@@ -372,6 +372,7 @@ def _texture(
     far = unbounded if unbounded.any() else distances > (1.0 - 1e-9) * longest
     axis = 0.5 * float(np.angle(np.exp(2j * angles[far]).sum()))
     lay = float(np.degrees(axis)) if texture < NO_LAY else nan
+    lay += 180.0 if lay < -90.0 + 0.5 * 180.0 / _DIRECTIONS else 0.0
     return shortest, texture, bool(unbounded.any()), lay
 
 

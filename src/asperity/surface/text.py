@@ -56,7 +56,11 @@ def read_table(path: Path) -> Field:
         rows.append(row)
     if not rows:
         raise UnreadableFile(f"{path.name} holds no table of numbers; export it again as text")
-    table = np.array(rows)
-    for marker in _NO_DATA.findall("\n".join(lines[:_MAX_HEADER])):
+    return _without_markers(np.array(rows), lines[:_MAX_HEADER])
+
+
+def _without_markers(table: Field, header: list[str]) -> Field:
+    """Return the table with nan for values that its header declares as missing."""
+    for marker in _NO_DATA.findall("\n".join(header)):
         table[table == float(marker)] = np.nan
     return table

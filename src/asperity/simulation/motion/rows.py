@@ -81,7 +81,7 @@ class _StepSources:
 
     @property
     def friction_interval(self) -> FrictionInterval:
-        """Interval of one step; that of the means contains the scatter over time."""
+        """Interval of one step by the oil."""
         return FrictionInterval.of_oil(self.friction)
 
     @property

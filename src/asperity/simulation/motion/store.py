@@ -35,7 +35,7 @@ from asperity.transient import Memory, Snapshot
 
 MAPS = "fields"
 LAYOUT = FolderLayout(
-    kind="history", version=2, contents="history", table="history.parquet", subfolders=(MAPS,)
+    kind="history", version=3, contents="history", table="history.parquet", subfolders=(MAPS,)
 )
 DEFAULT_MAPS = 40  # in a whole history
 
