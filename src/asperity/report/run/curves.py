@@ -69,6 +69,7 @@ def _draw_panel(axes: Axes, curves: Sequence[FrictionCurve], key: str, name: str
     if abscissa == "entrainment_speed_m_s":
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(FuncFormatter(_two_or_five))
     name_axes(axes, abscissa)
     axes.set_ylim(0.0, None)
 
@@ -80,7 +81,14 @@ def _shade_interval(axes: Axes, curve: FrictionCurve, key: str, colour: str) -> 
     if all(value is not None for end in ends for value in end):
         x = display(ABSCISSA[curve.kind], _column(points, ABSCISSA[curve.kind]))
         low, high = (np.array(end, float) for end in ends)
-        axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0.0)
+        label = "90 % interval" if colour == STYLES[0][0] else None
+        axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0.0, label=label)
+
+
+def _two_or_five(value: float, _: object) -> str:
+    """Label a minor tick of a logarithmic axis, if it is 2 or 5 times a power of ten."""
+    text = f"{value:g}"
+    return text if text.strip("0.").split("e")[0] in ("2", "5") else ""
 
 
 def _column(points: Sequence[FrictionPoint], name: str) -> Field:
