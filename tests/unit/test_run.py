@@ -8,6 +8,7 @@ import xarray
 
 import asperity.results.run as results
 from asperity import AsperityError, BadInput, Run, load_case, load_run, solve_case
+from asperity.case import case_template
 from asperity.cli.contact import run_table
 from asperity.core.quantities import NO_VALUE, catalogue, quantity
 from asperity.coupling import contact_vibration
@@ -256,3 +257,18 @@ def test_invalid_boundary_friction_is_refused_before_the_solve(coefficient):
     case = load_case(files("asperity.paper").joinpath("paper.toml").read_text("utf-8"))
     with pytest.raises(BadInput, match="boundary_friction must be"):
         case.with_overrides({"material.boundary_friction": coefficient})
+
+
+@pytest.mark.parametrize(
+    ("surface", "remedy"),
+    [({}, 'contact.roughness = "running"'), ({"surface": "flat"}, "other grid.cells")],
+)
+def test_a_contact_that_does_not_converge_names_a_remedy(surface, remedy):
+    overrides = {"solver.max_iterations": 1, "grid.cells": [128, 48], "solver.surfaces": 1}
+    case = load_case(case_template("line")).with_overrides(
+        {**overrides, "contact.roughness": "standing", "vibration": "none", **surface}
+    )
+    run = solve_case(case, strict=False)
+    assert not run.converged
+    assert run.notes[0].startswith("Not converged: ")
+    assert run.notes[0].endswith(f"Try {remedy}.")

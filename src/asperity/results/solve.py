@@ -284,7 +284,9 @@ def run_of(
     if solution.options.model == "conserving":
         notes = (*notes, threshold_note(solution))
     if not solution.convergence.converged:
-        notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
+        standing = running is None and case.roughness_moves
+        remedy = 'contact.roughness = "running"' if standing else "other grid.cells"
+        notes = (f"Not converged: {solution.convergence.explain()}. Try {remedy}.", *notes)
     rows = tuple(others)
     run = Run(
         case=case,
