@@ -369,3 +369,12 @@ def test_missing_inputs_of_a_life_are_named(machine):
     for key in ("life_factor", "reliability_factor", "modified_life_s", "spectrum_life_s"):
         assert found[key].machine_value is None
         assert found[key].reason == "[rating] has no contamination"
+
+
+def test_losses_of_a_machine_with_an_unsolved_contact_are_unknown(machine, tmp_path):
+    """Cells too large for the roughness: every contact is refused."""
+    case = machine(SWEPT, {"grid.cells": [32, 32], "study": {"machine.radial_load": ["1 kN"]}})
+    (row,) = sweep_machine(case, out=tmp_path / "sweep", workers=1).rows
+    assert row["failed"] > 0
+    assert row["friction_power_w"] is None
+    assert row["rolling_friction_power_w"] is None
