@@ -358,12 +358,12 @@ class Case:
     def notes(self) -> tuple[str, ...]:
         """Notes on the case for a reader of the results, one sentence each."""
         conditions = self.conditions
-        oil, texture = self.lubricant, texture_of(self.contents.surface, self.folder)
+        oil = self.lubricant
         of_oil = () if self._sheet is None else self._sheet.notes()
         return (
             *of_oil,
             *plausibility_notes(conditions, oil),
-            *inlet_notes(conditions, oil, self.grid, rough=bool(getattr(texture, "sq", 0.0))),
+            *inlet_notes(conditions, oil, self.grid, rough=self.surface().sq > 0.0),
         )
 
     @property
