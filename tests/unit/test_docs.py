@@ -38,7 +38,6 @@ EXCEPTIONS = {  # valid spans of no known kind
     "ground_lay.plu": "a file of the developers' data",
     "build/robustness.csv": "written by a benchmark",
     "bearing.gs": "content of a user's file",
-    "2/name": "content of a user's file",
     "acc_g": "content of a user's file",
     "acc [g]": "content of a user's file",
     "8.0 X (100g)": "content of a user's file",
