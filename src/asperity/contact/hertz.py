@@ -172,8 +172,10 @@ def line_pressure(x: Field, half_width: float, p_max: float) -> Field:
     return np.asarray(p_max * np.sqrt(np.maximum(1.0 - (x / half_width) ** 2, 0.0)))
 
 
-def ellipse_pressure(x: Field, y: float, half_widths: tuple[float, float], p_max: float) -> Field:
-    """Return the pressure of a point or elliptic contact along the line at y [Pa].
+def ellipse_pressure(
+    x: Field, y: Field | float, half_widths: tuple[float, float], p_max: float
+) -> Field:
+    """Return the pressure of a point or elliptic contact at x and y, which broadcast [Pa].
 
     p = p_h sqrt(1 - (x/a)^2 - (y/b)^2), zero outside.
     Source: K. L. Johnson, Contact Mechanics (1985), section 3.2 and eq. 4.24.

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity import rating
+from asperity.contact.hertz import ellipse_pressure
 from asperity.core.arrays import Field
 from asperity.machines.rating_facts import Rating, machine_rating
 from asperity.results import Run
@@ -54,14 +55,8 @@ def dang_van_below(run: Run, limits: tuple[float, float]) -> DangVan:
     slope = rating.dang_van_slope(*limits)
     stress, solution = run.stress, run.solution
     grid, conditions = solution.grid, solution.conditions
-    (a, b), line = conditions.hertz.half_widths, conditions.geometry == "line"
-    inside = (
-        1.0
-        - (grid.x[:, None] / a) ** 2
-        - (0.0 if line else (grid.y / b) ** 2)
-        + np.zeros(grid.cells)
-    )
-    pressure = conditions.hertz.p_max * np.sqrt(np.maximum(inside, 0.0))
+    hertz, y = conditions.hertz, grid.y if conditions.geometry != "line" else 0.0 * grid.y
+    pressure = ellipse_pressure(grid.x[:, None], y, hertz.half_widths, hertz.p_max)
     friction = 0.0 if run.friction is None else run.friction.coefficient
     smooth = stress_below(
         pressure,

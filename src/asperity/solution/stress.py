@@ -13,6 +13,7 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import MIN_CELLS, Grid
+from asperity.contact.hertz import ellipse_pressure
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.ehl import ContactSolution
@@ -197,13 +198,8 @@ def hertz_stress(
     cells = HERTZ_CELLS
     reach = (1.25 * a, a if line else 1.25 * b)
     grid = Grid((cells, MIN_CELLS if line else cells), (-reach[0], -reach[1]), reach, (False, line))
-    inside = (
-        1.0
-        - (grid.x[:, None] / a) ** 2
-        - (0.0 if line else (grid.y / b) ** 2)
-        + np.zeros(grid.cells)
-    )
-    pressure = conditions.hertz.p_max * np.sqrt(np.maximum(inside, 0.0))
+    y = 0.0 * grid.y if line else grid.y
+    pressure = ellipse_pressure(grid.x[:, None], y, (a, b), conditions.hertz.p_max)
     ratio = conditions.pair.poisson_ratios[body - 1]
     core = CORE * _half_width(conditions)
     return stress_below(
