@@ -42,6 +42,7 @@ from asperity.machine import (
     CatalogueBearing,
     CylindricalRollerBearing,
     FlatCam,
+    HelicalGear,
     Machine,
     MachineContact,
     RollerCam,
@@ -81,6 +82,13 @@ class SpurGearSection(Section):
     tip_diameters: Annotated[LengthPair | None, OPTIONAL] = None
     torque: Annotated[float, amount_in("N m")]
     speed: Rotation
+
+
+class HelicalGearSection(SpurGearSection):
+    """[machine] kind = "helical-gear"."""
+
+    kind: Literal["helical-gear"]  # type: ignore[assignment]
+    helix_angle: Angle
 
 
 class CylindricalRollerBearingSection(Section):
@@ -151,6 +159,7 @@ class RollerCamSection(FlatCamSection):
 
 MACHINES: dict[str, tuple[type[Section], type[Machine]]] = {
     "spur-gear": (SpurGearSection, SpurGear),
+    "helical-gear": (HelicalGearSection, HelicalGear),
     "cylindrical-roller-bearing": (CylindricalRollerBearingSection, CylindricalRollerBearing),
     "ball-bearing": (BallBearingSection, BallBearing),
     "twin-disc": (TwinDiscSection, TwinDisc),

@@ -62,7 +62,7 @@ class RatingSection(Section):
 
     def require_applicable(self, machine: str) -> None:
         """Raise BadInput for keys that do not apply to this kind of machine."""
-        inapplicable: tuple[str, ...] = () if machine == "spur-gear" else OF_GEARS
+        inapplicable: tuple[str, ...] = () if machine.endswith("-gear") else OF_GEARS
         inapplicable += () if machine.endswith("-bearing") else OF_BEARINGS
         for key in inapplicable:
             if key in self.model_fields_set:

@@ -12,6 +12,7 @@ from .element import Machine as Machine
 from .element import MachineContact as MachineContact
 from .gear import PathPoint as PathPoint
 from .gear import SpurGear as SpurGear
+from .helical import HelicalGear as HelicalGear
 from .lift import LiftLaw as LiftLaw
 from .roller import CylindricalRollerBearing as CylindricalRollerBearing
 from .roller import RollerProfile as RollerProfile

@@ -95,11 +95,37 @@ class SpurGear:
         for body in (0, 1):
             self._require_sound_teeth(body)
 
+    @property
+    def transverse_module(self) -> float:
+        """Module in the section across the axis [m]."""
+        return self.module
+
+    @property
+    def transverse_pressure_angle(self) -> float:
+        """Pressure angle of the basic rack in the section across the axis [rad]."""
+        return self.pressure_angle
+
+    @property
+    def base_helix_angle(self) -> float:
+        """Helix angle at the base cylinder [rad]; 0 without a helix."""
+        return 0.0
+
+    @property
+    def overlap_ratio(self) -> float:
+        """Overlap ratio of the face; 0 without a helix."""
+        return 0.0
+
+    @cached_property
+    def reference_radii(self) -> tuple[float, float]:
+        """Reference radii of pinion and wheel [m]."""
+        first, second = (0.5 * self.transverse_module * count for count in self.teeth)
+        return first, second
+
     @cached_property
     def base_radii(self) -> tuple[float, float]:
         """Base radii of pinion and wheel [m]."""
         first, second = (
-            0.5 * self.module * count * math.cos(self.pressure_angle) for count in self.teeth
+            radius * math.cos(self.transverse_pressure_angle) for radius in self.reference_radii
         )
         return first, second
 
@@ -109,8 +135,17 @@ class SpurGear:
         if self.tip_diameters is not None:
             return self.tip_diameters[0] / 2.0, self.tip_diameters[1] / 2.0
         first, second = (
-            0.5 * self.module * (count + 2.0 * (ADDENDUM + shift))
-            for count, shift in zip(self.teeth, self.profile_shift, strict=True)
+            radius + self.module * (ADDENDUM + shift)
+            for radius, shift in zip(self.reference_radii, self.profile_shift, strict=True)
+        )
+        return first, second
+
+    @cached_property
+    def root_radii(self) -> tuple[float, float]:
+        """Root radii of pinion and wheel by the basic rack [m]."""
+        first, second = (
+            radius - self.module * (DEDENDUM - shift)
+            for radius, shift in zip(self.reference_radii, self.profile_shift, strict=True)
         )
         return first, second
 
@@ -120,14 +155,14 @@ class SpurGear:
         if self.centre_distance is not None:
             return self.centre_distance
         shift = 2.0 * sum(self.profile_shift) * math.tan(self.pressure_angle) / sum(self.teeth)
-        target = _involute(self.pressure_angle) + shift
+        target = involute(self.transverse_pressure_angle) + shift
         if target <= 0.0:
             total = sum(self.profile_shift)
             raise BadInput(
                 f"the sum of profile_shift, {total:g}, leaves no room between the axes; raise it"
             )
         angle = float(
-            scipy.optimize.brentq(lambda trial: _involute(trial) - target, 1e-6, 1.5, xtol=1e-15)
+            scipy.optimize.brentq(lambda trial: involute(trial) - target, 1e-6, 1.5, xtol=1e-15)
         )
         return sum(self.base_radii) / math.cos(angle)
 
@@ -136,10 +171,20 @@ class SpurGear:
         """Working pressure angle [rad]: cos = (r_b1 + r_b2)/a."""
         return math.acos(sum(self.base_radii) / self.centres)
 
+    @cached_property
+    def half_tooth_angles(self) -> tuple[float, float]:
+        """Half the angles of the teeth of pinion and wheel at their base circles [rad]."""
+        first, second = (
+            (0.5 * math.pi + 2.0 * shift * math.tan(self.pressure_angle)) / count
+            + involute(self.transverse_pressure_angle)
+            for count, shift in zip(self.teeth, self.profile_shift, strict=True)
+        )
+        return first, second
+
     @property
     def base_pitch(self) -> float:
-        """Base pitch π m cos α [m]."""
-        return math.pi * self.module * math.cos(self.pressure_angle)
+        """Base pitch 2π r_b1/z1 [m]."""
+        return math.tau * self.base_radii[0] / self.teeth[0]
 
     @property
     def line_of_action(self) -> float:
@@ -190,6 +235,10 @@ class SpurGear:
         if distance > last + tolerance:
             return 1.0 / 3.0 + (end - distance) / (end - last) / 3.0
         return 1.0
+
+    def rated_line_load(self, distance: float) -> float:
+        """Return the line load [N/m] at a distance [m] by ISO/TR 15144-1, for ratings."""
+        return self.share(distance) * self.normal_force / self.face_width
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (rigid teeth)
         """Return the contacts at the points of `path`."""
@@ -263,7 +312,9 @@ class SpurGear:
                 f"at centre_distance {self.centres * millimetres:g} mm the base circles overlap "
                 f"and the teeth cannot mesh; it must be above {bases * millimetres:.4g} mm"
             )
-        opening = (_involute(self.working_angle) - _involute(self.pressure_angle)) * sum(self.teeth)
+        opening = (involute(self.working_angle) - involute(self.transverse_pressure_angle)) * sum(
+            self.teeth
+        )
         limit = opening / (2.0 * math.tan(self.pressure_angle))
         if sum(self.profile_shift) > limit + SHIFT_TOLERANCE:
             raise BadInput(
@@ -307,9 +358,7 @@ class SpurGear:
         if self.tip_diameters is not None:
             return
         for body, (name, other) in enumerate((("pinion", "wheel"), ("wheel", "pinion"))):
-            shift = self.profile_shift[1 - body]
-            root = 0.5 * self.module * (self.teeth[1 - body] - 2.0 * (DEDENDUM - shift))
-            room = self.centres - self.tip_radii[body] - root
+            room = self.centres - self.tip_radii[body] - self.root_radii[1 - body]
             if room < 0.0:
                 raise BadInput(
                     f"the {name}'s tips interfere with the {other}'s roots by {-1e3 * room:.3f} "
@@ -321,14 +370,8 @@ class SpurGear:
         name = ("pinion", "wheel")[body]
         tip = self.tip_radii[body]
         base = self.base_radii[body]
-        count = self.teeth[body]
         shift = self.profile_shift[body]
-        half = (
-            math.pi / (2.0 * count)
-            + 2.0 * shift * math.tan(self.pressure_angle) / count
-            + _involute(self.pressure_angle)
-            - _involute(math.acos(base / tip))
-        )
+        half = self.half_tooth_angles[body] - involute(math.acos(base / tip))
         if half <= 0.0:
             raise BadInput(
                 f"the {name}'s teeth end in a point inside their tip circle of {2e3 * tip:g} mm; "
@@ -336,9 +379,11 @@ class SpurGear:
             )
         start, end = self._ends
         used = math.hypot(base, start if body == 0 else self.line_of_action - end)
-        cut = _undercut_radius(count, shift, self.module, self.pressure_angle)
+        depth = (ADDENDUM - shift) * self.module
+        pitch, angle = self.reference_radii[body], self.transverse_pressure_angle
+        cut = _undercut_radius(depth, pitch, angle)
         if cut > used:
-            least = ADDENDUM - count * math.sin(self.pressure_angle) ** 2 / 2.0
+            least = ADDENDUM - pitch * math.sin(angle) ** 2 / self.module
             raise BadInput(
                 f"the {name}'s teeth are undercut up to a radius of {1e3 * cut:.3f} mm, but "
                 f"contact starts at {1e3 * used:.3f} mm; raise its profile shift to {least:.3f}, "
@@ -346,19 +391,18 @@ class SpurGear:
             )
 
 
-def _involute(angle: float) -> float:
+def involute(angle: float) -> float:
+    """Return the involute of an angle [rad]."""
     return math.tan(angle) - angle
 
 
-def _undercut_radius(count: int, shift: float, module: float, angle: float) -> float:
+def _undercut_radius(depth: float, pitch: float, angle: float) -> float:
     """Return the radius [m] up to which the rack's corner cuts the involute away; 0 for none.
 
-    The corner, at the depth h below the pitch line, moves on a trochoid; the undercut ends where it
-    intersects the involute.
+    The corner, at `depth` below the pitch line [m], moves on a trochoid; the undercut ends where it
+    intersects the involute. `pitch` is the reference radius [m].
     """
-    pitch = 0.5 * module * count
     base = pitch * math.cos(angle)
-    depth = (ADDENDUM - shift) * module
     if depth <= pitch * math.sin(angle) ** 2:
         return 0.0
     # travel of the rack from the position with the flank at the pitch point; the gear turns by
@@ -369,5 +413,5 @@ def _undercut_radius(count: int, shift: float, module: float, angle: float) -> f
     radius = np.hypot(across, up)
     corner = np.arctan2(across, up) - travel / pitch  # polar angles on the gear
     at_radius = np.arccos(np.minimum(base / radius, 1.0))
-    flank = _involute(angle) - (np.tan(at_radius) - at_radius)
+    flank = involute(angle) - (np.tan(at_radius) - at_radius)
     return float(np.max(radius[(radius > base) & (corner < flank)], initial=base))

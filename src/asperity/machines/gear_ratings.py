@@ -13,7 +13,8 @@ from asperity.machine import MachineContact, SpurGear
 from asperity.machines.rating_facts import Rating, machine_rating, missing_ratings, rated_case
 
 PITCH_LINE_SPEEDS = 2.0, 80.0  # m/s, scope of the standards for gears
-WORKING_ANGLES = 15.0, 25.0  # deg, of the working pressure angle, their scope
+WORKING_ANGLES = 15.0, 25.0  # deg, of the normal working pressure angle, their scope
+HELIX_ANGLE = 30.0  # deg, up to which the standards are validated
 WARMER = 3.0  # K of the teeth above the oil from which on a note is given
 # micropitting test C-GF/8.3/90 (FVA 54): gears, oil, roughness, and pinion torques by load stage
 TEST_GEARS = {
@@ -72,7 +73,7 @@ def _mesh_ratings(
     mesh = rating.Mesh(
         roughness, case.pair.effective_modulus, (solids[0].effusivity, solids[1].effusivity)
     )
-    points = {contact.name: _mesh_point(case, contact) for contact in case.contacts}
+    points = {contact.name: _mesh_point(case, gears, contact) for contact in case.contacts}
     films = {
         name: rating.specific_film(point, mesh, oil, friction, bulk)
         for name, point in points.items()
@@ -92,8 +93,9 @@ def _mesh_ratings(
 def _mesh_friction(gears: SpurGear, oil: rating.GearOil, supply: float, roughness: float) -> float:
     pitch = gears.contact("C", gears.path["C"])
     assert not isinstance(pitch.radius, tuple)
+    load_factor = rating.helical_load_factor(gears.contact_ratio + gears.overlap_ratio)
     return rating.mesh_friction(
-        gears.normal_force / gears.face_width,
+        load_factor * gears.normal_force / gears.face_width,
         pitch.radius,
         sum(pitch.surface_speeds),
         roughness,
@@ -110,18 +112,20 @@ def _heat_scope(points: Iterable[rating.MeshPoint], solid: Solid) -> str:
     return "" if peclet >= SLOW_HEAT else f"a Peclet number of {peclet:.2g} (1 or more)"
 
 
-def _mesh_point(case: MachineCase, contact: MachineContact) -> rating.MeshPoint:
-    hertz = contact.hertz(case.pair)
-    assert contact.line_load is not None
+def _mesh_point(case: MachineCase, gears: SpurGear, contact: MachineContact) -> rating.MeshPoint:
+    line_load = gears.rated_line_load(contact.position)
+    assert contact.length is not None
     assert not isinstance(contact.radius, tuple)
+    hertz = replace(contact, load=line_load * contact.length).hertz(case.pair)
     return rating.MeshPoint(
-        contact.radius, hertz.p_max, contact.line_load, hertz.half_widths[0], contact.surface_speeds
+        contact.radius, hertz.p_max, line_load, hertz.half_widths[0], contact.surface_speeds
     )
 
 
 def _outside_scope(gears: SpurGear) -> str:
     """Return the properties of the gears outside the scope of the standards, or ""."""
-    working, outside = math.degrees(gears.working_angle), []
+    helix, outside = gears.base_helix_angle, []
+    working = math.degrees(math.asin(math.sin(gears.working_angle) * math.cos(helix)))
     pitch_line = gears.speed * gears.base_radii[0] / math.cos(gears.working_angle)
     low, high = PITCH_LINE_SPEEDS
     if not low <= pitch_line <= high:
@@ -129,6 +133,9 @@ def _outside_scope(gears: SpurGear) -> str:
     low, high = WORKING_ANGLES
     if not low <= working <= high:
         outside.append(f"a working pressure angle of {working:.3g} deg ({low:g} to {high:g})")
+    reference = math.degrees(math.asin(math.sin(helix) / math.cos(gears.pressure_angle)))
+    if reference > HELIX_ANGLE:
+        outside.append(f"a helix angle of {reference:.3g} deg ({HELIX_ANGLE:g} at most)")
     return ", ".join(outside)
 
 
@@ -209,7 +216,7 @@ def _bulk(case: MachineCase, gears: SpurGear, friction: float, supply: float) ->
         gears.torque
         * gears.speed
         * friction
-        * rating.loss_factor(parts, gears.contact_ratio, gears.teeth)
+        * rating.loss_factor(parts, gears.contact_ratio, gears.teeth, gears.base_helix_angle)
     )
     return rating.bulk_temperature(
         supply, loss, gears.centres, gears.face_width, spray=inputs.oil_supply == "spray"

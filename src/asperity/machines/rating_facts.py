@@ -18,7 +18,7 @@ class RatingFacts(NamedTuple):
 _LIFE = "ISO/TS 16281:2008"
 _MICROPITTING = "ISO/TR 15144-1:2014"
 _TEETH = (
-    "unmodified spur gears in mineral or PAO oil, tested at modules of 3 to 11 mm, "
+    "unmodified spur and helical gears in mineral or PAO oil, tested at modules of 3 to 11 mm, "
     "working pressure angles to 25 deg, above 2 m/s at the pitch line; dynamic factors, "
     "tip relief and coatings are taken as 1"
 )
@@ -75,7 +75,7 @@ FACTS: dict[str, RatingFacts] = {
     ),
     "mesh_friction": RatingFacts(
         _MICROPITTING,
-        "μ = 0.045 (F_bt/(b v_ΣC ρ_C))^0.2 η_oil^-0.05 · 2.2 (Ra/ρ_C)^0.25 X_L "
+        "μ = 0.045 (K_Bγ F_bt/(b v_ΣC ρ_C))^0.2 η_oil^-0.05 · 2.2 (Ra/ρ_C)^0.25 X_L "
         "[N, mm, m/s, mPa s, µm]",
         f"{_TEETH}; roughness enters as Ra, by default Sq/√π of two equal flanks",
     ),

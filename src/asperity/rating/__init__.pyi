@@ -16,6 +16,7 @@ from .micropitting import GearOil as GearOil
 from .micropitting import Mesh as Mesh
 from .micropitting import MeshPoint as MeshPoint
 from .micropitting import bulk_temperature as bulk_temperature
+from .micropitting import helical_load_factor as helical_load_factor
 from .micropitting import loss_factor as loss_factor
 from .micropitting import mesh_friction as mesh_friction
 from .micropitting import specific_film as specific_film

@@ -92,13 +92,23 @@ def mesh_friction(
     return float(0.045 * loading * (1e3 * viscosity) ** -0.05 * roughness * oil)
 
 
-def loss_factor(path: tuple[float, float], ratio: float, teeth: tuple[int, int]) -> float:
-    """Return the gear loss factor H_v = π (ε1² + ε2² + 1 - ε)(1/z1 + 1/z2).
+def helical_load_factor(ratio: float) -> float:
+    """Return K_Bγ of the friction for a total contact ratio; 1 up to 2, rising to 1.3 at 3.5."""
+    within = min(max(ratio, 2.0), 3.5)
+    return 1.0 + 0.2 * math.sqrt((within - 2.0) * (5.0 - within))
 
-    `path` = (ε1, ε2) are the parts of the contact ratio ε after and before the pitch point.
+
+def loss_factor(
+    path: tuple[float, float], ratio: float, teeth: tuple[int, int], helix: float = 0.0
+) -> float:
+    """Return the gear loss factor H_v = π (ε1² + ε2² + 1 - ε)(1/z1 + 1/z2)/cos βb.
+
+    `path` = (ε1, ε2) are the parts of the contact ratio ε after and before the pitch point, `helix`
+    is the base helix angle βb [rad].
     """
     after, before = path
-    return math.pi * (after**2 + before**2 + 1.0 - ratio) * (1.0 / teeth[0] + 1.0 / teeth[1])
+    lost = math.pi * (after**2 + before**2 + 1.0 - ratio) * (1.0 / teeth[0] + 1.0 / teeth[1])
+    return lost / math.cos(helix)
 
 
 def bulk_temperature(

@@ -40,8 +40,7 @@ def machine_sketch(result: MachineResult) -> Exhibit:
             partial(_gears, machine, result),
             (
                 "Gear pair in mesh, to scale: the pinion (below) drives. Contact runs along the "
-                "line of action from A to E; between B and D a single pair of teeth carries the "
-                "load. Fillets are not shown."
+                f"line of action from A to E{_single_contact(machine)}. Fillets are not shown."
             ),
         )
     elif isinstance(machine, CylindricalRollerBearing | BallBearing):
@@ -209,6 +208,12 @@ def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
     _frame(axes, (x - size, x + size), (y - 0.8 * size, y + 0.8 * size))
 
 
+def _single_contact(gears: SpurGear) -> str:
+    if gears.overlap_ratio > 0.0:
+        return " in every section across the face, one after the other"
+    return "; between B and D a single pair of teeth carries the load"
+
+
 def _line_of_action(gears: SpurGear) -> tuple[Field, Field]:
     """Return the start of the line of action on the pinion's base circle, and its direction."""
     sine = math.sin(gears.working_angle)
@@ -251,14 +256,8 @@ def _flanks(gears: SpurGear, body: int, contact_point: Field) -> Polyline:
 
 def _tooth(gears: SpurGear, body: int) -> tuple[float, Field, Field]:
     """Return half the angle of a tooth at the base circle, and its outline in polar coordinates."""
-    teeth = gears.teeth[body]
-    shift = gears.profile_shift[body]
-    base = gears.base_radii[body]
-    tip = gears.tip_radii[body]
-    half = (0.5 * math.pi + 2.0 * shift * math.tan(gears.pressure_angle)) / teeth + _involute(
-        gears.pressure_angle
-    )
-    root = gears.module * (0.5 * teeth + shift - 1.25)
+    base, root, tip = gears.base_radii[body], gears.root_radii[body], gears.tip_radii[body]
+    half = gears.half_tooth_angles[body]
     radii = np.linspace(max(base, root), tip, 25)
     pressure_angles = np.arccos(np.clip(base / radii, -1.0, 1.0))
     # angle of a flank from the middle of its tooth, at each radius
