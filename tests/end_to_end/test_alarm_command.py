@@ -40,7 +40,7 @@ def test_a_rising_level_raises_an_alarm_without_a_resonance(asp):
         STEADY < [row["state"] for row in result["recordings"]].index("alarm") < STEADY + LOUD - 5
     )
     assert result["verdict"].startswith("ALARM since s-")
-    assert "no contact resonance found in 36 recordings" in result["verdict"]
+    assert "No contact resonance found in 36 recordings" in result["verdict"]
     assert not any(
         "off" in row["reason"] for row in result["recordings"]
     )  # the recordings before the rise are healthy

@@ -374,9 +374,19 @@ def _searched(tracked: "Track") -> Block:
         ("method", tracked.method),
         *tracked.stage_rows(),
         ("alarm", tracked.alarm.verdict),
+        *_states_rows(tracked),
         ("severity, last recording", tracked.recordings[-1].severity()),
     ]
     yield from table(rows, (*tracked.problems, *tracked.notes))
+
+
+def _states_rows(tracked: "Track") -> list[Row]:
+    """Return rows of the states of contact, level and sensor."""
+    scalars = tracked.scalars(all_sources=False)
+    return [
+        (name, ": ".join(filter(None, (scalars[name]["state"], scalars[name]["reason"]))))
+        for name in ("contact", "level", "sensor")
+    ]
 
 
 @contextmanager

@@ -26,11 +26,13 @@ from asperity.monitoring.reading import Reading
 from asperity.monitoring.recording import TrackedRecording
 from asperity.monitoring.series_state import PreviousStates
 from asperity.monitoring.settings import TrackSettings
+from asperity.monitoring.states import ZONE
 from asperity.trend import (
     Alarm,
     AlarmChecks,
     AlarmHistory,
     Condition,
+    LevelMemory,
     MonitoredSeries,
     RecordingStatus,
     Stages,
@@ -44,7 +46,6 @@ CRF_LEAST = 0.05  # relative change of CRF: the asperities' load share up by a t
 DAMPING_LEAST = 0.2  # change of the logarithm of damping
 LEVEL_LEAST = float(np.log(2.0))  # 6 dB, a significant change according to ISO 13373-1
 BASELINE = 8  # recordings whose median CRF is the reference
-UNSEEN = 3  # consecutive recordings without a resonance from which the contact is not observed
 LAST = "last"
 KURTOSIS = "kurtosis"
 CRF = "CRF"
@@ -87,7 +88,7 @@ def raise_alarm(
     alarm = sequential_alarm(
         x,
         [*contact, *levels],
-        _statuses(tracked, contact),
+        _statuses(tracked),
         false_alarm_rate=false_alarm_rate,
         checks=AlarmChecks(
             confirmed=lambda number: _severe(stages_of(tracked[: number + 1])),
@@ -96,6 +97,7 @@ def raise_alarm(
         acknowledged=_acknowledged(tracked, acknowledge),
         unit=unit,
         history=_previous_states(tracked, previous),
+        level_memory=_level_memory(tracked, previous),
     )
     if (warm_up_note := warming.explanation(len(tracked) - 1)) and acknowledge is None:
         alarm = replace(alarm, explained="; ".join(filter(None, [alarm.explained, warm_up_note])))
@@ -160,6 +162,23 @@ def _previous_states(
             if file in previous.states:
                 states[number] = previous.states[file]
     return AlarmHistory(states, previous.reason, previous.raised_by)
+
+
+def _level_memory(
+    tracked: Sequence[TrackedRecording], previous: PreviousStates | None
+) -> LevelMemory:
+    """Return the memory of the levels, up to the recording after which it was stored."""
+    if previous is None or previous.levels is None:
+        return LevelMemory()
+    judged = next(
+        (
+            number
+            for number, recording in enumerate(tracked, 1)
+            if previous.levels.last in recording.files
+        ),
+        0,
+    )
+    return LevelMemory(judged, previous.levels.monitors) if judged else LevelMemory()
 
 
 def _severe(stages: Stages | None) -> bool:
@@ -371,12 +390,12 @@ def _by_zone(tracked: Sequence[TrackedRecording], first: int, alarm: Alarm) -> A
             return (
                 alarm
                 if raised
-                else alarm.with_alarm_since(number, tracked[number].severity(), "zone")
+                else alarm.with_alarm_since(number, tracked[number].severity(), ZONE)
             )
     latest = zones[-2:]
     current = len(latest) == 2 and latest[-1][0] == len(tracked) - 1
     if current and min(zone for _, zone in latest) == "C" and alarm.state == "none":
-        return alarm.with_alert(tracked[-1].severity(), "zone")
+        return alarm.with_alert(tracked[-1].severity(), ZONE)
     return alarm
 
 
@@ -388,36 +407,14 @@ def _ratio(by: float) -> str:
     return f"{'rose' if by > 0.0 else 'fell'} to {np.exp(by):.3g} times its baseline"
 
 
-def _statuses(
-    tracked: Sequence[TrackedRecording], contact: Sequence[MonitoredSeries]
-) -> list[RecordingStatus]:
-    """Return what each recording shows of the machine: contact, nothing, or a dead sensor."""
-    detected = np.any(
-        [
-            np.zeros(len(tracked), dtype=bool),
-            *(np.isfinite(indicator.values) for indicator in contact),
-        ],
-        axis=0,
-    )
-    statuses = []
-    for number, recording in enumerate(tracked):
-        if recording.dead:
-            statuses.append(
-                RecordingStatus("blind", f"{Path(recording.file).name}: {recording.reading.reason}")
-            )
-        elif detected[max(number - UNSEEN + 1, 0) : number + 1].any():
-            statuses.append(RecordingStatus())
-        else:
-            reason = recording.resonance.reason or "not determined"
-            last = (
-                "first recording" if number == 0 else f"last {min(number + 1, UNSEEN)} recordings"
-            )
-            statuses.append(
-                RecordingStatus(
-                    "cannot-tell", f"no deciding indicator found in the {last} ({reason})"
-                )
-            )
-    return statuses
+def _statuses(tracked: Sequence[TrackedRecording]) -> list[RecordingStatus]:
+    """Return which recordings are from a dead sensor."""
+    return [
+        RecordingStatus("blind", f"{Path(recording.file).name}: {recording.reading.reason}")
+        if recording.dead
+        else RecordingStatus()
+        for recording in tracked
+    ]
 
 
 def _acknowledged(tracked: Sequence[TrackedRecording], name: str | None) -> int:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Mask
+from asperity.core.documents import JsonObject
 from asperity.core.errors import UnreadableFile
 from asperity.core.signals import Spectrum
 from asperity.core.storage import CONTENT_ENTRY, append_digest, strip_digest
@@ -34,12 +35,20 @@ ALWAYS_RELEARNED = 32  # recordings up to which all are separated together each 
 MAX_GROWTH = 0.25  # of a longer series, after which the shared part is learned again
 
 
+class StoredLevels(NamedTuple):
+    """Memory of the levels up to and including the recording of the file `last`, by level."""
+
+    last: str
+    monitors: Mapping[str, JsonObject]
+
+
 class PreviousStates(NamedTuple):
     """States by file from previous judgements; reason and indicator of a standing alarm."""
 
     states: Mapping[str, AlarmState]
     reason: str = ""
     raised_by: str = ""
+    levels: StoredLevels | None = None
 
 
 Key = tuple[str, str]  # of a recording: file and sensor

@@ -20,6 +20,7 @@ from asperity.core.storage import netcdf_bytes
 from asperity.monitoring.forecast import FORECAST, ForecastResult
 from asperity.monitoring.recording import NAMED, TrackedRecording, sensor_summary
 from asperity.monitoring.silence import SILENCE
+from asperity.monitoring.states import causes, contact_state, level_state, sensor_state
 from asperity.monitoring.target import Target
 from asperity.trend import SOURCE_NAMES, Alarm, AlarmState, Stages, StageSource
 
@@ -143,9 +144,9 @@ class Track:
             return f"ALARM since {first}: {alarm.reason}. {finding}"
         if alarm.state == "alert":
             return f"Alert: {alarm.reason}. {finding}"
-        if alarm.state == "blind" or (alarm.state == "cannot-tell" and self.stages is not None):
+        if alarm.state in ("blind", "cannot-tell"):
             return f"{alarm.verdict} {finding}"
-        return finding
+        return finding if self.stages is not None else f"No alarm: {alarm.level.reason}. {finding}"
 
     def _without_resonance(self, recordings: str) -> str:
         """Return the sentence without any resonance, with the most frequent reason."""
@@ -153,7 +154,7 @@ class Track:
         (kind, count), *_ = Counter(map(_without_numbers, reasons)).most_common(1)
         reason = next(reason for reason in reasons if _without_numbers(reason) == kind)
         share = f"{count} of {len(reasons)}: " if count < len(reasons) else ""
-        return f"Cannot tell: no contact resonance found in {recordings} ({share}{reason})."
+        return f"No contact resonance found in {recordings} ({share}{reason})."
 
     def stage_rows(self) -> list[tuple[str, str]]:
         """Return the stages by CRF, damping and both as rows, with the deciding one marked."""
@@ -192,6 +193,9 @@ class Track:
                 source: _stages_row(of_source) for source, of_source in by_source.items()
             },
             "alarm": self._alarm_row(),
+            "contact": contact_state(self.recordings),
+            "level": level_state(self.alarm, self.recordings),
+            "sensor": sensor_state(self.alarm, self.recordings),
             "forecast": None if self.forecast is None else self.forecast.scalars(),
             "x": self.x_name,
             "band_hz": list(self.target.band_hz),
@@ -213,6 +217,7 @@ class Track:
             "raised_by": alarm.raised_by or None,
             "explained": alarm.explained or None,
             "verdict": alarm.verdict,
+            "causes": causes(alarm, self.recordings),
         }
 
     @property

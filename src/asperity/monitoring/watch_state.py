@@ -315,11 +315,9 @@ class WatchState:
             }
         )
         standing = self.sensors.standing
-        previous = (
-            PreviousStates(states)
-            if standing is None
-            else PreviousStates(states, standing.reason, standing.raised_by)
-        )
+        reason, raised_by = ("", "") if standing is None else standing[1:]
+        levels = None if afresh else self.sensors.levels()
+        previous = PreviousStates(states, reason, raised_by, levels)
         if self._memory is None:
             self._memory = self.sensors.series_memory()
         names = {file_name(key) for key in self._readings}

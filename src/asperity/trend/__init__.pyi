@@ -14,6 +14,10 @@ from .comparison import LoadShare as LoadShare
 from .comparison import RecordingFacts as RecordingFacts
 from .comparison import asperity_load_share as asperity_load_share
 from .comparison import comparability as comparability
+from .level_monitors import LevelJudgement as LevelJudgement
+from .level_monitors import LevelMemory as LevelMemory
+from .level_monitors import LevelMonitors as LevelMonitors
+from .level_rule import LevelMonitor as LevelMonitor
 from .regressors import Condition as Condition
 from .regressors import ConditionEffect as ConditionEffect
 from .stage_words import SOURCE_NAMES as SOURCE_NAMES

@@ -20,6 +20,7 @@ from asperity.trend.alarm_inputs import (
     MonitoredSeries,
     RecordingStatus,
 )
+from asperity.trend.level_monitors import LevelJudgement, LevelMemory, LevelMonitors
 from asperity.trend.regressors import BASELINE_RECORDINGS, Condition
 from asperity.trend.sequential import (
     BASELINE_POINTS,
@@ -61,9 +62,8 @@ def knee_weight(x: Field, monitored: Sequence[MonitoredSeries]) -> float:
 
 
 NO_HISTORY = AlarmHistory()
-
-
 NO_CHECKS = AlarmChecks()
+NO_LEVEL = LevelJudgement()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +73,8 @@ class Alarm:
     `states` are those after each recording; `since` is the index of the recording with which the
     present state began, None for "none". `raised_by` names the indicator behind an alert or alarm.
     `reason` is a sentence without its full stop. `explained` states which changes load, speed or
-    temperature explain; empty where they explain none.
+    temperature explain; empty where they explain none. `level` is the judgement of the levels by
+    themselves, `level_memory` what the next judgement of a longer series needs of them.
     """
 
     state: AlarmState
@@ -83,6 +84,8 @@ class Alarm:
     reason: str
     raised_by: str = ""
     explained: str = ""
+    level: LevelJudgement = NO_LEVEL
+    level_memory: LevelMemory = LevelMonitors.NO_MEMORY
 
     @property
     def verdict(self) -> str:
@@ -125,6 +128,7 @@ def sequential_alarm(
     acknowledged: int = 0,
     unit: str = "",
     history: AlarmHistory = NO_HISTORY,
+    level_memory: LevelMemory = LevelMonitors.NO_MEMORY,
 ) -> Alarm:
     """Judge a series after each recording, using only the recordings up to it.
 
@@ -138,6 +142,7 @@ def sequential_alarm(
     acknowledged : number of acknowledged recordings; the baseline restarts after them
     unit : of x
     history : earlier decisions, which stand
+    level_memory : of the earlier recordings' levels
 
     Raises
     ------
@@ -148,7 +153,9 @@ def sequential_alarm(
     states: list[AlarmState] = ["none"] * acknowledged
     reason = history.reason
     raised_by = history.raised_by
+    levels = LevelMonitors(monitored, len(statuses), acknowledged, level_memory)
     for number in range(acknowledged, len(statuses)):
+        levels.add(number)
         earlier = history.states.get(number) if number < len(statuses) - 1 else None
         if earlier is not None:
             states.append(earlier)
@@ -158,6 +165,7 @@ def sequential_alarm(
             continue
         state, reason, raised_by = _decide(
             [(series, _assess(series, x, acknowledged, number)) for series in monitored],
+            levels,
             statuses[number],
             false_alarm_rate,
             unit,
@@ -179,6 +187,8 @@ def sequential_alarm(
         reason=reason,
         raised_by=raised_by,
         explained=_explained_changes(monitored, acknowledged),
+        level=levels.judgement(),
+        level_memory=levels.memory,
     )
 
 
@@ -311,6 +321,7 @@ _Decision = tuple[AlarmState, str, str]  # state, reason, indicator
 
 def _decide(
     assessed: Sequence[tuple[MonitoredSeries, _Assessment]],
+    levels: LevelMonitors,
     status: RecordingStatus,
     rate: float,
     unit: str,
@@ -318,24 +329,27 @@ def _decide(
 ) -> _Decision:
     """Decide the state after one recording, most severe first.
 
-    Order: alarm by a course (knee or growth), alarm by a step, blind, unexplained step
-    (cannot-tell), alert by a course, the recording's own status, incomplete baseline, none.
+    Order: alarm by a course (knee or growth), by the level rule, by a step; blind; alert by the
+    level rule, a course, a step of unknown cause; incomplete baseline; none.
     """
     shares = _false_alarm_shares([series for series, _ in assessed], rate)
     course = _course_decision(assessed, shares, rate, unit, confirmed)
     if course is not None and course[0] == "alarm":
         return course
+    level = levels.judgement()
+    if level.state == "alarm":
+        return "alarm", level.reason, level.name
     if (step_alarm := _step_alarm(assessed, shares, unit)) is not None:
         return step_alarm
     if status.state == "blind":
         return "blind", status.reason, ""
-    if (unexplained := _unexplained_step(assessed, shares, unit)) is not None:
-        return unexplained
+    if level.state == "alert":
+        return "alert", level.reason, level.name
     if course is not None:
         return course
-    if status.state != "none":
-        return status.state, status.reason, ""
-    points = min((assessment.points for _, assessment in assessed), default=0)
+    if (unexplained := _unexplained_step(assessed, shares, unit)) is not None:
+        return unexplained
+    points = max((assessment.points for _, assessment in assessed), default=0)
     if points < BASELINE_POINTS:
         return "cannot-tell", f"baseline incomplete: {points} of {BASELINE_POINTS} points", ""
     return "none", f"no significant change at the set false-alarm rate ({_one_in(rate)})", ""
@@ -386,15 +400,15 @@ def _step_alarm(
 def _unexplained_step(
     assessed: Sequence[tuple[MonitoredSeries, _Assessment]], shares: Sequence[float], unit: str
 ) -> _Decision | None:
-    """Return "cannot-tell" for the first significant step, whose cause recordings do not show."""
+    """Return an alert for the first significant step, whose cause recordings do not show."""
     for (series, assessment), share in zip(assessed, shares, strict=True):
         if assessment.step.log_ratio >= threshold(share):
             return (
-                "cannot-tell",
+                "alert",
                 f"{_describe_step(series, assessment, unit)} and has stayed there (load, gain, a "
                 "moved sensor or damage: the recordings do not show which; acknowledge it once the "
                 "cause is known)",
-                "",
+                series.name,
             )
     return None
 

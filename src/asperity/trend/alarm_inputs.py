@@ -71,7 +71,7 @@ class MonitoredSeries:
 
 
 class RecordingStatus(NamedTuple):
-    """State of a recording before any test: "none" (usable), "blind" or "cannot-tell"; and why."""
+    """State of a recording before any test: "none" (usable) or "blind"; and why."""
 
     state: AlarmState = "none"
     reason: str = ""

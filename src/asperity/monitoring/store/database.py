@@ -18,10 +18,11 @@ from asperity.core.files import require_writable
 from asperity.trend import AlarmState
 
 STORE = "asperity.db"
-VERSION = 3  # 1: no duration of recordings; 2: `learned` is a column of `sensor`
+VERSION = 4  # 1: no duration of recordings; 2: `learned` is a column of `sensor`; 3: no levels
 BUSY_S = 30.0  # timeout while another process writes [s]
 REMEDY = "delete it, and its recordings are read again, or choose another store"
 LEARNED = "CREATE TABLE learned (sensor INTEGER PRIMARY KEY REFERENCES sensor, body BLOB NOT NULL)"
+LEVELS = "CREATE TABLE levels (sensor INTEGER PRIMARY KEY REFERENCES sensor, body TEXT NOT NULL)"
 SCHEMA = f"""
 CREATE TABLE machine (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE point (
@@ -31,6 +32,7 @@ CREATE TABLE sensor (
     id INTEGER PRIMARY KEY, point INTEGER NOT NULL REFERENCES point, name TEXT NOT NULL,
     settings TEXT NOT NULL, asked TEXT, said TEXT, since INTEGER, UNIQUE (point, name));
 {LEARNED};
+{LEVELS};
 CREATE TABLE recording (
     id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL,
     version TEXT NOT NULL, heard TEXT NOT NULL, started TEXT, duration REAL,
@@ -121,7 +123,7 @@ class Store:
             self._connection.execute("PRAGMA foreign_keys = ON")
             if version == 0:
                 self._create()
-            elif version in (1, 2):
+            elif version in (1, 2, 3):
                 self._migrate()
             elif version != VERSION:
                 raise UnreadableFile(
@@ -158,6 +160,9 @@ class Store:
                 # the column stays: not every SQLite can drop columns
                 run("UPDATE sensor SET learned = NULL")
                 run("PRAGMA user_version = 3")
+            if run("PRAGMA user_version").fetchone()[0] == 3:
+                run(LEVELS)
+                run("PRAGMA user_version = 4")
 
     @contextmanager
     def _translated_errors(self) -> Iterator[None]:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 from uuid import uuid4
 
 from asperity.core.documents import JsonObject
@@ -38,17 +38,18 @@ class NotificationQueue:
         recipients: Sequence[str],
         content: JsonObject,
     ) -> None:
-        """Queue a notification to each recipient whose last known state differs.
+        """Queue a notification to each recipient that does not know the state or one of its causes.
 
         `run` is that of the judgement's transaction: neither is stored without the other.
         """
         for name in recipients:
-            last = run(
-                "SELECT state FROM call WHERE sensor = ? AND who = ? ORDER BY id DESC LIMIT 1",
-                (sensor, name),
-            ).fetchone()
-            before = None if last is None else last[0]
-            if before != content["state"] and {before, content["state"]} & {*self.notify_states}:
+            query = "SELECT state, said FROM call WHERE sensor = ? AND who = ? ORDER BY id DESC"
+            last = run(f"{query} LIMIT 1", (sensor, name)).fetchone()
+            before, sent = (None, {}) if last is None else (last[0], json.loads(last[1]))
+            # stores of older versions have no causes
+            active = cast("Sequence[str]", content["causes"])
+            new = before != content["state"] or not {*active} <= {*sent.get("causes", active)}
+            if new and {before, content["state"]} & {*self.notify_states}:
                 notification = {
                     "id": str(uuid4()),
                     "time": now(),

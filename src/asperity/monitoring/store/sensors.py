@@ -13,7 +13,12 @@ from typing import Any
 from asperity.core.documents import JsonObject, Table
 from asperity.core.errors import BadInput
 from asperity.monitoring.reading import Reading
-from asperity.monitoring.series_state import SeriesMemory, pack_shared, unpack_shared
+from asperity.monitoring.series_state import (
+    SeriesMemory,
+    StoredLevels,
+    pack_shared,
+    unpack_shared,
+)
 from asperity.monitoring.silence import SILENCE
 from asperity.monitoring.store.database import (
     FileVersion,
@@ -265,6 +270,14 @@ class Sensors:
         )
         return unpack_shared(stored[0][0], stored[0][1] or 0) if stored else SeriesMemory()
 
+    def levels(self) -> StoredLevels | None:
+        """Return the memory of the levels; None before the first judgement."""
+        if self._first is None:
+            return None
+        query = "SELECT body FROM levels WHERE sensor = ?"
+        stored = self.store.read(query, self._first.number)
+        return StoredLevels(**json.loads(stored[0][0])) if stored else None
+
     def record_judgement(
         self,
         track: Track,
@@ -309,6 +322,7 @@ class Sensors:
                 )
             self._queue(run, recipients, notification_content(judgement, lines[-1]["file"]))
             self._store_memory(run, memory)
+            self._store_levels(run, track)
         self._written = written
         for stored in rows:
             stored.sensor.set_state(stored.key, stored.state)
@@ -370,6 +384,17 @@ class Sensors:
             run("DELETE FROM learned WHERE sensor = ?", (number,))
             if not memory.moved:  # otherwise it covers only a part, and all is separated again
                 run("INSERT INTO learned VALUES (?, ?)", (number, pack_shared(memory.shared)))
+
+    def _store_levels(self, run: Run, track: Track) -> None:
+        """Store the memory of the levels for the next judgement."""
+        judged, monitors = track.alarm.level_memory
+        if self._first is None:
+            return
+        run("DELETE FROM levels WHERE sensor = ?", (self._first.number,))
+        if judged and monitors:
+            stored = StoredLevels(track.recordings[judged - 1].file, monitors)
+            content = json.dumps(stored._asdict())
+            run("INSERT INTO levels VALUES (?, ?)", (self._first.number, content))
 
     def arrivals(self) -> list[datetime]:
         """Return when the last recordings arrived."""

@@ -1,0 +1,112 @@
+"""Level rule over all levels of a series, with a memory between judgements."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from asperity.core.documents import JsonObject
+from asperity.trend.alarm_inputs import MonitoredSeries
+from asperity.trend.level_rule import FEWEST_VALUES, LevelMonitor, LevelState
+
+LATEST_CONDITIONS = 112  # recordings that determine the effect of conditions, with the first ones
+STATES: tuple[LevelState, ...] = ("none", "alert", "alarm")
+
+
+class LevelJudgement(NamedTuple):
+    """Most severe state of all levels after a recording.
+
+    `factor` is the highest present level over its baseline, nan if unknown; `name` the level behind
+    the state, or the highest one.
+    """
+
+    state: LevelState = "none"
+    factor: float = math.nan
+    name: str = ""
+    reason: str = "no level could be measured"
+
+
+class LevelMemory(NamedTuple):
+    """Memory of all levels after `judged` recordings of the series, as JSON by level."""
+
+    judged: int = 0
+    monitors: Mapping[str, JsonObject] = MappingProxyType({})
+
+
+class LevelMonitors:
+    """Monitors of the levels of a series; recordings are added in order.
+
+    `memory` is that before the last recording of the series, which is always judged again.
+    """
+
+    NO_MEMORY: ClassVar[LevelMemory] = LevelMemory()
+
+    def __init__(
+        self, monitored: Sequence[MonitoredSeries], count: int, first: int, memory: LevelMemory
+    ) -> None:
+        self._levels = [series for series in monitored if not series.contact]
+        self._first, self._last = first, count - 1
+        stored = memory.monitors if memory.judged >= first else {}
+        self._next = max(memory.judged, first) if stored else first
+        self._monitors = {
+            series.name: LevelMonitor.from_json(stored[series.name])
+            if series.name in stored
+            else LevelMonitor()
+            for series in self._levels
+        }
+        self.memory = LevelMemory(self._next, stored)
+
+    @property
+    def complete(self) -> bool:
+        """True if the baseline of a level is known."""
+        return any(monitor.complete for monitor in self._monitors.values())
+
+    def add(self, number: int) -> None:
+        """Add a recording of the series, unless the memory includes it."""
+        if number < self._next:
+            return
+        if number == self._last:
+            monitors = {name: monitor.to_json() for name, monitor in self._monitors.items()}
+            self.memory = LevelMemory(number, monitors)
+        for series in self._levels:
+            self._monitors[series.name].update(self._value(series, number))
+        self._next = number + 1
+
+    def judgement(self) -> LevelJudgement:
+        """Return the most severe state of all levels after the recordings so far."""
+        rises = {name: monitor.rise for name, monitor in self._monitors.items()}
+        known = [name for name, rise in rises.items() if math.isfinite(rise)]
+        if not known:
+            return LevelJudgement()
+        name = max(
+            known,
+            key=lambda name: (STATES.index(self._monitors[name].finding.state), rises[name]),
+        )
+        series = next(series for series in self._levels if series.name == name)
+        state, evidence = self._monitors[name].finding
+        words = f"{name} {series.describe(rises[name])}"
+        if state == "none":
+            words = f"no level stays above its baseline; the highest, {name}, is "
+            words += f"{math.exp(rises[name]):.2g} times its baseline"
+        elif evidence:
+            words = f"{words}, {evidence}"
+        return LevelJudgement(state, math.exp(rises[name]), name, words)
+
+    def _value(self, series: MonitoredSeries, number: int) -> float:
+        """Return the level of a recording at the conditions of the baseline."""
+        if not series.conditions or not math.isfinite(series.values[number]):
+            return float(series.values[number])
+        start = max(number - LATEST_CONDITIONS + 1, self._first)
+        rows = np.r_[self._first : min(self._first + FEWEST_VALUES, start), start : number + 1]
+        part = replace(
+            series,
+            values=series.values[rows],
+            conditions=tuple(
+                replace(condition, values=condition.values[rows], shown=condition.shown[rows])
+                for condition in series.conditions
+            ),
+        )
+        return float(part.at_baseline_conditions()[0][-1])
