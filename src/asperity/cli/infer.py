@@ -34,7 +34,7 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, table, written
-from asperity.cli.recordings import EXIT_CODES
+from asperity.cli.series import EXIT_CODES
 from asperity.core import processes
 from asperity.core.errors import BadInput, require_choice
 from asperity.core.quantities import quantity

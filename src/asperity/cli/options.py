@@ -99,7 +99,8 @@ Seeds = Annotated[int, typer.Option(metavar="N", min=1, help="Surfaces averaged 
 SampleSeed = Annotated[int, typer.Option(metavar="SEED", min=0, help="Random seed.")]
 
 RecordingFiles = Annotated[
-    list[Path], typer.Argument(metavar="FILE...", help="Recordings, or folders of recordings.")
+    list[Path] | None,
+    typer.Argument(metavar="FILE...", help="Recordings, or folders of recordings."),
 ]
 Rate = Annotated[
     float | None,

@@ -45,7 +45,9 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import Block, Row, columns, progress, show, span, table, written
+from asperity.cli.series import end_with, track_series
 from asperity.core import files, processes
+from asperity.core.errors import BadInput
 from asperity.core.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
@@ -54,7 +56,6 @@ if TYPE_CHECKING:
     from asperity.resonance import SeriesMethod
     from asperity.trend import AlarmState, StageSource
 
-EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # by state of the alarm; otherwise 0
 PAGE = "report.html"
 
 
@@ -62,6 +63,13 @@ DataFiles = Annotated[
     list[Path] | None,
     typer.Option(
         metavar="FILE", help="Write the table (.csv, .parquet) or all data (.nc); repeatable."
+    ),
+]
+SeriesTable = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Judge a table of time stamps and overall values (.csv, .parquet, .jsonl) instead.",
     ),
 ]
 WatchedFolder = Annotated[
@@ -91,7 +99,8 @@ ExpectedInterval = Annotated[
 
 @app.command()
 def track(
-    paths: RecordingFiles,
+    paths: RecordingFiles = None,
+    series: SeriesTable = None,
     rate: Rate = None,
     unit: Unit = None,
     channel: Channel = None,
@@ -123,6 +132,11 @@ def track(
             files.require_writable(path)
     for path in out or ():
         require_output(path, ".csv", ".parquet", ".nc")
+    if series is not None:
+        track_series(series, paths, page, out or (), acknowledge, as_json=as_json, quiet=quiet)
+        return
+    if not paths:
+        raise BadInput("no recordings are given; name files or folders, or a table with --series")
     read = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
     settings = _track_settings(
         read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
@@ -151,7 +165,7 @@ def track(
         )
     paths_written = [*_write(tracked, out or (), page), *([] if store is None else [store])]
     _show_track(tracked, page, paths_written, as_json=as_json, quiet=quiet)
-    _end(tracked.alarm.state)
+    end_with(tracked.alarm.state)
 
 
 @app.command()
@@ -215,7 +229,7 @@ def watch(
     updates = partial(
         watch_series, case=contact_at(case_file), table=table_file, forecaster=forecaster
     )
-    _end(_show_updates(updates, results, once=once, as_json=as_json, quiet=quiet))
+    end_with(_show_updates(updates, results, once=once, as_json=as_json, quiet=quiet))
 
 
 def _track_settings(
@@ -292,12 +306,6 @@ def _show_updates(
 def _states(tell: str | None) -> "Sequence[AlarmState]":
     """Return the states of `--tell`, all by default."""
     return trend.ALARM_STATES if tell is None else cast("Sequence[AlarmState]", tell.split(","))
-
-
-def _end(state: str) -> None:
-    """End with the exit code of the alarm's state."""
-    if state in EXIT_CODES:
-        raise typer.Exit(EXIT_CODES[state])
 
 
 def _show_update(update: "Update", results: Path, *, as_json: bool, quiet: bool) -> str | None:

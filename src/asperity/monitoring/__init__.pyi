@@ -18,6 +18,10 @@ from .notify import notifiers as notifiers
 from .operating_point import ZERO_CELSIUS as ZERO_CELSIUS
 from .operating_point import OperatingPoint as OperatingPoint
 from .ordering import unacknowledged as unacknowledged
+from .overalls.judge import OverallTrack as OverallTrack
+from .overalls.judge import track_overalls as track_overalls
+from .overalls.table import OverallValues as OverallValues
+from .overalls.table import read_overalls as read_overalls
 from .overview import StoreOverview as StoreOverview
 from .overview import acknowledge_in as acknowledge_in
 from .overview import keep_track as keep_track

@@ -143,7 +143,7 @@ class Warming:
         length = f"{fit.time_constant:.2g} {self.unit}".rstrip()
         return (
             f"this looks like a warm-up: CRF {_relative_change(fit.crf)} and {self.level.name} "
-            f"{_ratio(fit.level)}, time constant {length}; state the oil temperature to confirm"
+            f"{ratio_text(fit.level)}, time constant {length}; state the oil temperature to confirm"
         )
 
     def excuses(self, number: int, name: str) -> str:
@@ -250,7 +250,7 @@ def _damping(tracked: Sequence[TrackedRecording], response: Response) -> Monitor
         values=-np.log(ratio),
         smallest_change=DAMPING_LEAST,
         contact=True,
-        describe=lambda by: _ratio(-by),
+        describe=lambda by: ratio_text(-by),
         conditions=_conditions(tracked, DAMPING, response),
     )
 
@@ -320,7 +320,7 @@ def _levels_on_sensor(
             values=values,
             smallest_change=LEVEL_LEAST,
             contact=False,
-            describe=_ratio,
+            describe=ratio_text,
             gain_dependent=label not in depths and label != KURTOSIS,
             step_alarms=label in depths,
             sensor=sensor,
@@ -403,7 +403,8 @@ def _relative_change(by: float) -> str:
     return f"{'rose' if by > 0.0 else 'fell'} by {abs(100.0 * by):.3g} %"
 
 
-def _ratio(by: float) -> str:
+def ratio_text(by: float) -> str:
+    """Return a change of a logarithmic level in words."""
     return f"{'rose' if by > 0.0 else 'fell'} to {np.exp(by):.3g} times its baseline"
 
 

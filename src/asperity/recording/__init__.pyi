@@ -15,3 +15,5 @@ from .sidecar import OPERATING_KEYS as OPERATING_KEYS
 from .sidecar import is_sidecar as is_sidecar
 from .sidecar import read_sidecar as read_sidecar
 from .sidecar import sidecar_names as sidecar_names
+from .timing import is_time_column as is_time_column
+from .units import name_and_unit as name_and_unit
