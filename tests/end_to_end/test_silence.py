@@ -75,7 +75,7 @@ def test_a_sensor_that_delivers_nothing_is_blind_and_notified_once(asp):
     snapshots("in", np.ones(10))
     Path("listen.py").write_text(LISTENER)
     command = f"'{sys.executable}' listen.py log.jsonl"
-    assert asp("watch", "in", *LOOK, "--on-alarm", command, "--quiet")[0] == 4
+    assert asp("watch", "in", *LOOK, "--on-alarm", command, "--quiet")[0] == 0
     time.sleep(1.2)
     code, out, _ = asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "0.5", "--json")
     result = json.loads(out)
@@ -87,11 +87,11 @@ def test_a_sensor_that_delivers_nothing_is_blind_and_notified_once(asp):
     assert "Blind: no recording has come for" in page
     assert "Check that the machine runs, then sensor, cable and supply" in page
     assert asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "0.5", "--quiet")[0] == 5
-    assert judgements("state") == ["cannot-tell", "blind"]  # shown again, stored once
+    assert judgements("state") == ["none", "blind"]  # shown again, stored once
     snapshots("in", [1.0], first=10)
-    assert asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "60", "--quiet")[0] == 4
+    assert asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "60", "--quiet")[0] == 0
     notifications = [json.loads(line) for line in Path("log.jsonl").read_text().splitlines()]
-    assert [event["state"] for event in notifications] == ["cannot-tell", "blind", "cannot-tell"]
+    assert [event["state"] for event in notifications] == ["none", "blind", "none"]
     assert notifications[1]["raised_by"] == "silence"
 
 

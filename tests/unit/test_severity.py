@@ -124,8 +124,8 @@ def recordings(folder, velocities, depths, seconds=2.0, **sidecar):
                 " enough"
             ),
         ),
-        (6e-3, "C", "cannot-tell", "Cannot tell: no contact"),
-        (3e-3, "B", "cannot-tell", "Cannot tell: no contact"),
+        (6e-3, "C", "cannot-tell", "Cannot tell: baseline incomplete"),
+        (3e-3, "B", "cannot-tell", "Cannot tell: baseline incomplete"),
     ],
 )
 def test_a_zone_raises_the_standards_state(tmp_path, velocity, zone, state, message):

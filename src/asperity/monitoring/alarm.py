@@ -62,6 +62,7 @@ def raise_alarm(
     previous: PreviousStates | None = None,
     unit: str = "",
     response: Response = ANY_CONTACT,
+    of_contact: bool = True,
 ) -> Alarm:
     """Compute the alarm of a series, consistent with its stages.
 
@@ -72,6 +73,7 @@ def raise_alarm(
     previous : states of these recordings from the judgement before
     unit : unit of x
     response : response of CRF to load, speed and temperature
+    of_contact : whether the line belongs to the contact; one of unknown origin raises nothing
 
     Raises
     ------
@@ -81,7 +83,7 @@ def raise_alarm(
     source = settings.stages_from
     acknowledge = settings.acknowledge
     false_alarm_rate = settings.false_alarm_rate
-    contact = _contact_indicators(tracked, source, response)
+    contact = _contact_indicators(tracked, source, response) if of_contact else []
     levels = _level_indicators(tracked, response)
     x = np.array([recording.x for recording in tracked])
     warming = Warming(x, contact, levels, unit)

@@ -16,6 +16,7 @@ from asperity.monitoring.files import RecordingPlace, locate_recordings
 from asperity.monitoring.harmonize import copies, exclude_machine_off, on_common_grid, spectrum_of
 from asperity.monitoring.observations import combine_sensors, tracked_recording
 from asperity.monitoring.operating_point import Response, operating_response, unstated
+from asperity.monitoring.origin import contact_evidence
 from asperity.monitoring.reading import WINDOW, Reading
 from asperity.monitoring.recording import TrackedRecording
 from asperity.monitoring.series_state import PreviousStates, SeriesMemory
@@ -204,7 +205,10 @@ def _staged(
     heights = units == {ACCELERATION} and not remounted
     source = settings.stages_from
     unit = _unit_of(x_name)
-    stages_by = _StagesBySource(tracked, settings.detector, unit, heights)
+    evidence = contact_evidence(tracked, target)
+    stages_by: Mapping[StageSource, Stages] = (
+        _StagesBySource(tracked, settings.detector, unit, heights) if evidence else {}
+    )
     stages = stages_by.get(source)
     alarm = raise_alarm(
         tracked,
@@ -214,6 +218,7 @@ def _staged(
         previous=previous,
         unit=unit,
         response=response,
+        of_contact=bool(evidence),
     )
     tracked = _with_states(tracked, stages, source, response, alarm)
     if target.full_load_crf_hz is not None:
@@ -226,6 +231,7 @@ def _staged(
         stages=stages,
         stages_by=stages_by,
         alarm=alarm,
+        evidence=evidence,
         comparable=units == {ACCELERATION},
         problems=comparability([_facts_of(recording) for recording in series.used]),
         notes=(

@@ -9,19 +9,23 @@ from asperity.monitoring.recording import TrackedRecording
 from asperity.monitoring.silence import SILENCE
 from asperity.trend import Alarm
 
+ORIGIN_REMEDY = "state load or speed, a second sensor, or the case of the contact"
 UNSEEN = 3  # last recordings without a resonance from which the contact is not seen
 ZONE = "zone"  # `raised_by` of a state: zone of ISO 20816-3
 # sources of an alert or alarm of the contact: indicators, stages, forecast
 CONTACT_SOURCES = frozenset(("CRF", "damping", "crf", "both", FORECAST))
 
 
-def contact_state(recordings: Sequence[TrackedRecording]) -> JsonObject:
-    """Return whether the contact is seen in the last recordings, and why not."""
+def contact_state(recordings: Sequence[TrackedRecording], evidence: str) -> JsonObject:
+    """Return whether the contact is seen in the last recordings, and why or why not."""
     latest = recordings[-UNSEEN:]
     seen = [recording for recording in latest if recording.resonance.found]
     if seen:
-        frequency = seen[-1].resonance.crf_hz
-        return {"state": "seen", "reason": f"contact resonance at {frequency:.5g} Hz"}
+        frequency = f"{seen[-1].resonance.crf_hz:.4g} Hz"
+        if evidence:
+            return {"state": "seen", "reason": f"a line at {frequency}; {evidence}"}
+        reason = f"a line of unknown origin at {frequency}; {ORIGIN_REMEDY}"
+        return {"state": "not-seen", "reason": reason}
     why = latest[-1].resonance.reason or "not determined"
     number = f"last {len(latest)} recordings" if len(latest) > 1 else "recording"
     return {"state": "not-seen", "reason": f"no contact resonance in the {number} ({why})"}

@@ -20,7 +20,13 @@ from asperity.core.storage import netcdf_bytes
 from asperity.monitoring.forecast import FORECAST, ForecastResult
 from asperity.monitoring.recording import NAMED, TrackedRecording, sensor_summary
 from asperity.monitoring.silence import SILENCE
-from asperity.monitoring.states import causes, contact_state, level_state, sensor_state
+from asperity.monitoring.states import (
+    ORIGIN_REMEDY,
+    causes,
+    contact_state,
+    level_state,
+    sensor_state,
+)
 from asperity.monitoring.target import Target
 from asperity.trend import SOURCE_NAMES, Alarm, AlarmState, Stages, StageSource
 
@@ -55,9 +61,10 @@ class Track:
     """A judged series of recordings.
 
     `recordings` are ordered by `x`, named `x_name`. `stages` follow from CRF, damping or both, as
-    requested, and decide labels, probabilities and alarm; `stages_by` has all three. Without any
-    resonance these are None and empty. `problems` are reasons not to compare recordings; `notes`
-    state choices made for the user. `forecast` is None unless requested.
+    requested, and decide labels, probabilities and alarm; `stages_by` has all three. Without a
+    resonance of the contact these are None and empty. `evidence` states why the line belongs to
+    the contact, empty for a line of unknown origin. `problems` are reasons not to compare
+    recordings; `notes` state choices made for the user. `forecast` is None unless requested.
     """
 
     recordings: tuple[TrackedRecording, ...]
@@ -70,6 +77,7 @@ class Track:
     comparable: bool
     problems: tuple[str, ...]
     notes: tuple[str, ...]
+    evidence: str = ""
     forecast: ForecastResult | None = None
 
     @property
@@ -149,7 +157,13 @@ class Track:
         return finding if self.stages is not None else f"No alarm: {alarm.level.reason}. {finding}"
 
     def _without_resonance(self, recordings: str) -> str:
-        """Return the sentence without any resonance, with the most frequent reason."""
+        """Return the sentence without stages: no resonance, or a line of unknown origin."""
+        lines = [recording.resonance.crf_hz for recording in self.recordings]
+        if self.resonance_count:
+            return (
+                f"A line of unknown origin at {np.nanmedian(lines):.4g} Hz in "
+                f"{self.resonance_count} of {recordings}; {ORIGIN_REMEDY}."
+            )
         reasons = [recording.resonance.reason for recording in self.recordings]
         (kind, count), *_ = Counter(map(_without_numbers, reasons)).most_common(1)
         reason = next(reason for reason in reasons if _without_numbers(reason) == kind)
@@ -193,7 +207,7 @@ class Track:
                 source: _stages_row(of_source) for source, of_source in by_source.items()
             },
             "alarm": self._alarm_row(),
-            "contact": contact_state(self.recordings),
+            "contact": contact_state(self.recordings, self.evidence),
             "level": level_state(self.alarm, self.recordings),
             "sensor": sensor_state(self.alarm, self.recordings),
             "forecast": None if self.forecast is None else self.forecast.scalars(),
