@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from asperity.monitoring import WatchSettings, watch_folder
-from asperity.monitoring.silence import duration_text, overdue_reason
+from asperity.monitoring.states import duration_text, overdue_reason
 
 NOON = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)
 LOOK = ("--once", "--settle", "0", "--store", "plant.db", "--machine", "Fan 1", "--point", "DE")

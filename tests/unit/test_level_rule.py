@@ -121,7 +121,7 @@ def test_a_stored_memory_continues_as_if_never_interrupted():
 def test_the_most_severe_level_is_reported_with_its_factor():
     quiet, loud = noise(13, 60), noise(14, 60)
     loud[50:] += np.log(5.0)
-    levels = LevelMonitors([series(quiet, "band"), series(loud)], 60, 0, LevelMonitors.NO_MEMORY)
+    levels = LevelMonitors([series(quiet, "band"), series(loud)], 60, 0)
     for number in range(60):
         levels.add(number)
     judgement = levels.judgement()

@@ -127,16 +127,10 @@ def track(
     quiet: Quiet = False,
 ) -> None:
     """Track the contact resonance through recordings: stage of wear, alarm and forecast."""
-    for path in (page, store):
-        if path is not None:
-            files.require_writable(path)
-    for path in out or ():
-        require_output(path, ".csv", ".parquet", ".nc")
+    _require_outputs(out or (), page, store)
     if series is not None:
         track_series(series, paths, page, out or (), acknowledge, as_json=as_json, quiet=quiet)
         return
-    if not paths:
-        raise BadInput("no recordings are given; name files or folders, or a table with --series")
     read = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
     settings = _track_settings(
         read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
@@ -146,7 +140,7 @@ def track(
     )
     with _reading_progress("reading recordings ...", quiet=quiet) as step:
         tracked = monitoring.track_recordings(
-            paths,
+            _given(paths),
             settings,
             case=contact_at(case_file),
             table=table_file,
@@ -163,8 +157,8 @@ def track(
             sensor=sensor,
             acknowledge=acknowledge,
         )
-    paths_written = [*_write(tracked, out or (), page), *([] if store is None else [store])]
-    _show_track(tracked, page, paths_written, as_json=as_json, quiet=quiet)
+    saved = _write(tracked, out or (), page)
+    _show_track(tracked, page, saved, store, as_json=as_json, quiet=quiet)
     end_with(tracked.alarm.state)
 
 
@@ -232,6 +226,22 @@ def watch(
     end_with(_show_updates(updates, results, once=once, as_json=as_json, quiet=quiet))
 
 
+def _given(paths: list[Path] | None) -> list[Path]:
+    """Return the recordings; raise BadInput without any."""
+    if not paths:
+        raise BadInput("no recordings are given; name files or folders, or a table with --series")
+    return paths
+
+
+def _require_outputs(out: "Sequence[Path]", page: Path | None, store: Path | None) -> None:
+    """Raise BadInput for an output that cannot be written."""
+    for path in (page, store):
+        if path is not None:
+            files.require_writable(path)
+    for path in out:
+        require_output(path, ".csv", ".parquet", ".nc")
+
+
 def _track_settings(
     read: "ReadOptions",
     workers: int | None,
@@ -259,9 +269,16 @@ def _track_settings(
 
 
 def _show_track(
-    tracked: "Track", page: Path | None, paths_written: list[Path], *, as_json: bool, quiet: bool
+    tracked: "Track",
+    page: Path | None,
+    saved: list[Path],
+    store: Path | None,
+    *,
+    as_json: bool,
+    quiet: bool,
 ) -> None:
     """Show the verdict of a track, its series and what was written."""
+    paths_written = saved if store is None else [*saved, store]
     hint = ["  Add --report track.html for the page, --out track.csv for the table."]
     show(
         tracked.verdict(),

@@ -193,7 +193,7 @@ class HelicalGear(SpurGear):
         return distances, np.array([END_STIFFNESS, 1.0, 1.0, END_STIFFNESS])
 
     @cached_property
-    def _stiffness_integral(self) -> scipy.interpolate.BSpline:
+    def _stiffness_integral(self) -> "scipy.interpolate.BSpline":
         return scipy.interpolate.make_interp_spline(*self._stiffness_points, k=1).antiderivative()
 
     def _mean_stiffness(self, start: Field | float) -> Field:

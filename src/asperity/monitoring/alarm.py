@@ -99,7 +99,6 @@ def raise_alarm(
         acknowledged=_acknowledged(tracked, acknowledge),
         unit=unit,
         history=_previous_states(tracked, previous),
-        level_memory=_level_memory(tracked, previous),
     )
     if (warm_up_note := warming.explanation(len(tracked) - 1)) and acknowledge is None:
         alarm = replace(alarm, explained="; ".join(filter(None, [alarm.explained, warm_up_note])))
@@ -163,14 +162,13 @@ def _previous_states(
         for file in recording.files:
             if file in previous.states:
                 states[number] = previous.states[file]
-    return AlarmHistory(states, previous.reason, previous.raised_by)
+    levels = _level_memory(tracked, previous)
+    return AlarmHistory(states, previous.reason, previous.raised_by, levels)
 
 
-def _level_memory(
-    tracked: Sequence[TrackedRecording], previous: PreviousStates | None
-) -> LevelMemory:
+def _level_memory(tracked: Sequence[TrackedRecording], previous: PreviousStates) -> LevelMemory:
     """Return the memory of the levels, up to the recording after which it was stored."""
-    if previous is None or previous.levels is None:
+    if previous.levels is None:
         return LevelMemory()
     judged = next(
         (

@@ -16,11 +16,11 @@ from asperity.monitoring.files import RecordingPlace, locate_recordings
 from asperity.monitoring.harmonize import copies, exclude_machine_off, on_common_grid, spectrum_of
 from asperity.monitoring.observations import combine_sensors, tracked_recording
 from asperity.monitoring.operating_point import Response, operating_response, unstated
-from asperity.monitoring.origin import contact_evidence
 from asperity.monitoring.reading import WINDOW, Reading
 from asperity.monitoring.recording import TrackedRecording
 from asperity.monitoring.series_state import PreviousStates, SeriesMemory
 from asperity.monitoring.settings import TrackSettings
+from asperity.monitoring.states import contact_evidence
 from asperity.monitoring.target import Target
 from asperity.monitoring.track_result import Track
 from asperity.recording import ACCELERATION
@@ -198,8 +198,7 @@ def _staged(
     """Add stages, alarm and load share to the recordings of a series."""
     tracked, x_name, method, notes = series
     units = {recording.reading.unit for recording in series.used}
-    conditions = [recording.operating for recording in tracked]
-    response = operating_response(target.case, conditions)
+    response = operating_response(target.case, [recording.operating for recording in tracked])
     tracked = at_reference(tracked, response)
     remounted = _remounted(tracked)
     heights = units == {ACCELERATION} and not remounted
@@ -234,16 +233,19 @@ def _staged(
         evidence=evidence,
         comparable=units == {ACCELERATION},
         problems=comparability([_facts_of(recording) for recording in series.used]),
-        notes=(
-            *notes,
-            *_incomparable_units(units),
-            *filter(None, [response.note]),
-            *unstated(conditions),
-            *_without_damping(tracked),
-            *copies([recording.reading for recording in tracked]),
-            *remounted,
-        ),
+        notes=(*notes, *_notes(tracked, units, response), *remounted),
     )
+
+
+def _notes(
+    tracked: Sequence[TrackedRecording], units: set[str], response: Response
+) -> Iterator[str]:
+    """Yield notes on units, conditions, damping and copies."""
+    yield from _incomparable_units(units)
+    yield from filter(None, [response.note])
+    yield from unstated([recording.operating for recording in tracked])
+    yield from _without_damping(tracked)
+    yield from copies([recording.reading for recording in tracked])
 
 
 def _with_states(

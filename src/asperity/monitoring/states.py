@@ -1,17 +1,35 @@
-"""States of a judged series apart: contact, level and sensor."""
+"""States of a judged series apart: contact, level and sensor; evidence and silence.
+
+A machine's structure has lines in any band. A line counts as the contact's resonance if two sensors
+agree on it, if it follows load or speed as a contact does, or if a case states the contact. Other
+lines are of unknown origin.
+"""
 
 from collections.abc import Sequence
+from datetime import UTC, datetime
+from itertools import pairwise
+from statistics import median
 
-from asperity.core.arrays import finite_or_none
+import numpy as np
+
+from asperity.core.arrays import Field, finite_or_none
 from asperity.core.documents import JsonObject
 from asperity.monitoring.forecast import FORECAST
+from asperity.monitoring.operating_point import CRF, USUAL_OIL, conditions_of
 from asperity.monitoring.recording import TrackedRecording
-from asperity.monitoring.silence import SILENCE
+from asperity.monitoring.target import Target
 from asperity.trend import Alarm
 
-ORIGIN_REMEDY = "state load or speed, a second sensor, or the case of the contact"
 UNSEEN = 3  # last recordings without a resonance from which the contact is not seen
-ZONE = "zone"  # `raised_by` of a state: zone of ISO 20816-3
+ORIGIN_REMEDY = "state load or speed, a second sensor, or the case of the contact"
+FEWEST_CHANGES = 8  # of a condition between recordings
+SMALLEST_CHANGE = 0.05  # of its logarithm, in standard deviation
+SMALLEST_EXPONENT = 0.03  # of CRF on load or speed, that counts as following
+STANDARD_ERRORS = 4.0  # that an exponent is away from 0
+MIN_INTERVALS = 8  # intervals between arrivals from which the usual one is known
+OVERDUE_FACTOR = 5.0  # usual intervals without a recording until it is overdue
+MIN_WAIT_S = 60.0
+SILENCE, ZONE = "silence", "zone"  # `raised_by` of a state: overdue recordings, ISO 20816-3
 # sources of an alert or alarm of the contact: indicators, stages, forecast
 CONTACT_SOURCES = frozenset(("CRF", "damping", "crf", "both", FORECAST))
 
@@ -65,3 +83,81 @@ def sensor_state(alarm: Alarm, recordings: Sequence[TrackedRecording]) -> JsonOb
     if last.dead:
         return {"state": "blind", "reason": last.reading.reason}
     return {"state": "ok", "reason": ""}
+
+
+def contact_evidence(tracked: Sequence[TrackedRecording], target: Target) -> str:
+    """Return in words why the line of a series belongs to the contact; "" if nothing shows it."""
+    if target.case is not None:
+        return f"the contact of {target.case.source} predicts its band"
+    found = [recording for recording in tracked if recording.resonance.found]
+    agreed = [
+        recording
+        for recording in found
+        if sum(sensor.detects for sensor in recording.on_sensors.values()) > 1
+    ]
+    if found and 2 * len(agreed) > len(found):
+        return "two sensors agree on it"
+    return _followed_condition(found)
+
+
+def _followed_condition(found: Sequence[TrackedRecording]) -> str:
+    """Return which condition the line follows with an exponent that a contact can have, or ""."""
+    crf = np.log([recording.resonance.crf_hz for recording in found])
+    conditions = conditions_of([recording.operating for recording in found], CRF, USUAL_OIL)
+    for condition in conditions:
+        finite = np.isfinite(condition.values)
+        exponent, error = _exponent(condition.values[finite], crf[finite])
+        following = STANDARD_ERRORS * error < abs(exponent) and abs(exponent) > SMALLEST_EXPONENT
+        margin = 2.0 * error
+        if following and condition.low - margin <= exponent <= condition.high + margin:
+            return f"it follows the {condition.name} with an exponent of {exponent:.2g}"
+    return ""
+
+
+def _exponent(condition: Field, crf: Field) -> tuple[float, float]:
+    """Return the exponent from changes between recordings, and its standard error."""
+    change, response = np.diff(condition), np.diff(crf)
+    if change.size < FEWEST_CHANGES or np.std(change) < SMALLEST_CHANGE:
+        return 0.0, np.inf
+    change, response = change - change.mean(), response - response.mean()
+    squares = float(change @ change)
+    exponent = float(change @ response) / squares
+    residual = response - exponent * change
+    return exponent, float(np.sqrt(residual @ residual / (change.size - 2) / squares))
+
+
+def overdue_reason(
+    arrivals: Sequence[datetime], limit_s: float | None, now: datetime | None = None
+) -> str:
+    """Return why recordings are overdue, without a full stop; empty if they are not.
+
+    Parameters
+    ----------
+    arrivals : times at which recordings arrived, in order
+    limit_s : longest time between recordings [s]; None: five usual intervals, once these are known
+    """
+    if not arrivals:
+        return ""
+    intervals = [(after - before).total_seconds() for before, after in pairwise(arrivals)]
+    typical = median(intervals) if len(intervals) >= MIN_INTERVALS else None
+    if limit_s is None and typical is None:
+        return ""
+    longest = max(OVERDUE_FACTOR * (typical or 0.0), MIN_WAIT_S) if limit_s is None else limit_s
+    elapsed = ((now or datetime.now(UTC)) - arrivals[-1]).total_seconds()
+    if elapsed <= longest:
+        return ""
+    expected = (
+        f"the usual interval is {duration_text(typical)}"
+        if limit_s is None and typical
+        else f"the limit is {duration_text(longest)}"
+    )
+    last = arrivals[-1].isoformat(timespec="seconds")
+    return f"no recording has come for {duration_text(elapsed)}, since {last}; {expected}"
+
+
+def duration_text(seconds: float) -> str:
+    """Return a duration in its natural unit."""
+    for unit, size in (("days", 86_400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} s"

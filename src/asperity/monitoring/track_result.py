@@ -19,9 +19,9 @@ from asperity.core.quantities import quantity
 from asperity.core.storage import netcdf_bytes
 from asperity.monitoring.forecast import FORECAST, ForecastResult
 from asperity.monitoring.recording import NAMED, TrackedRecording, sensor_summary
-from asperity.monitoring.silence import SILENCE
 from asperity.monitoring.states import (
     ORIGIN_REMEDY,
+    SILENCE,
     causes,
     contact_state,
     level_state,

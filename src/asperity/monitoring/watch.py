@@ -20,7 +20,7 @@ from asperity.monitoring.notify import deliver
 from asperity.monitoring.ordering import file_name, order_recordings
 from asperity.monitoring.reading import Reading
 from asperity.monitoring.settings import TrackSettings, WatchSettings
-from asperity.monitoring.silence import overdue_reason
+from asperity.monitoring.states import overdue_reason
 from asperity.monitoring.store.database import STORE, FileVersion
 from asperity.monitoring.store.sensor_lookup import open_sensors
 from asperity.monitoring.store.sensors import Sensors

@@ -1,7 +1,6 @@
 """Summaries of a simulated rig and of the reproduction of the paper's Table 1."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from asperity.paper.rig import Rig
 from asperity.paper.table1 import Table1Row
@@ -19,7 +18,7 @@ def rig_verdict(rig: Rig) -> str:
     return f"{len(rig.recordings)} recordings of {length}: true CRF from {crf_range}{knee}."
 
 
-def rig_scalars(rig: Rig) -> dict[str, Any]:
+def rig_scalars(rig: Rig) -> dict[str, object]:
     """Return the content of `asperity rig --json`."""
     return {
         "verdict": rig_verdict(rig),

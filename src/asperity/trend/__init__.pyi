@@ -7,6 +7,7 @@ from .alarm import sequential_alarm as sequential_alarm
 from .alarm_inputs import AlarmChecks as AlarmChecks
 from .alarm_inputs import AlarmHistory as AlarmHistory
 from .alarm_inputs import AlarmState as AlarmState
+from .alarm_inputs import LevelMemory as LevelMemory
 from .alarm_inputs import MonitoredSeries as MonitoredSeries
 from .alarm_inputs import RecordingStatus as RecordingStatus
 from .change_points import FEWEST_STAGE_POINTS as FEWEST_STAGE_POINTS
@@ -15,8 +16,8 @@ from .comparison import RecordingFacts as RecordingFacts
 from .comparison import asperity_load_share as asperity_load_share
 from .comparison import comparability as comparability
 from .level_monitors import LevelJudgement as LevelJudgement
-from .level_monitors import LevelMemory as LevelMemory
 from .level_monitors import LevelMonitors as LevelMonitors
+from .level_rule import LevelFinding as LevelFinding
 from .level_rule import LevelMonitor as LevelMonitor
 from .regressors import Condition as Condition
 from .regressors import ConditionEffect as ConditionEffect

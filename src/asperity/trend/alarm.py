@@ -14,13 +14,15 @@ import numpy as np
 from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
 from asperity.trend.alarm_inputs import (
+    NO_MEMORY,
     AlarmChecks,
     AlarmHistory,
     AlarmState,
+    LevelMemory,
     MonitoredSeries,
     RecordingStatus,
 )
-from asperity.trend.level_monitors import LevelJudgement, LevelMemory, LevelMonitors
+from asperity.trend.level_monitors import LevelJudgement, LevelMonitors
 from asperity.trend.regressors import BASELINE_RECORDINGS, Condition
 from asperity.trend.sequential import (
     BASELINE_POINTS,
@@ -85,7 +87,7 @@ class Alarm:
     raised_by: str = ""
     explained: str = ""
     level: LevelJudgement = NO_LEVEL
-    level_memory: LevelMemory = LevelMonitors.NO_MEMORY
+    level_memory: LevelMemory = NO_MEMORY
 
     @property
     def verdict(self) -> str:
@@ -128,7 +130,6 @@ def sequential_alarm(
     acknowledged: int = 0,
     unit: str = "",
     history: AlarmHistory = NO_HISTORY,
-    level_memory: LevelMemory = LevelMonitors.NO_MEMORY,
 ) -> Alarm:
     """Judge a series after each recording, using only the recordings up to it.
 
@@ -141,8 +142,7 @@ def sequential_alarm(
     checks : confirmation by the stage detector, and explanations other than wear
     acknowledged : number of acknowledged recordings; the baseline restarts after them
     unit : of x
-    history : earlier decisions, which stand
-    level_memory : of the earlier recordings' levels
+    history : earlier decisions, which stand, and the memory of the levels
 
     Raises
     ------
@@ -153,7 +153,7 @@ def sequential_alarm(
     states: list[AlarmState] = ["none"] * acknowledged
     reason = history.reason
     raised_by = history.raised_by
-    levels = LevelMonitors(monitored, len(statuses), acknowledged, level_memory)
+    levels = LevelMonitors(monitored, len(statuses), acknowledged, history.levels)
     for number in range(acknowledged, len(statuses)):
         levels.add(number)
         earlier = history.states.get(number) if number < len(statuses) - 1 else None
@@ -163,7 +163,7 @@ def sequential_alarm(
         if states and states[-1] == "alarm" and number > acknowledged:  # latched
             states.append("alarm")
             continue
-        state, reason, raised_by = _decide(
+        decision = _decide(
             [(series, _assess(series, x, acknowledged, number)) for series in monitored],
             levels,
             statuses[number],
@@ -171,16 +171,12 @@ def sequential_alarm(
             unit,
             partial(checks.confirmed, number),
         )
-        if state in ("alert", "alarm") and (other := checks.explanation(number, raised_by)):
-            state = "none"
-            reason = other
-            raised_by = ""
+        state, reason, raised_by = _unless_explained(decision, number, checks)
         states.append(state)
-    state = states[-1] if len(states) > acknowledged else "none"
     if len(states) == acknowledged:
         reason = f"all {acknowledged} recordings are acknowledged and no newer one has arrived"
     return Alarm(
-        state=state,
+        state=states[-1] if len(states) > acknowledged else "none",
         states=tuple(states),
         since=_start_of_last_state(states, acknowledged),
         false_alarm_rate=false_alarm_rate,
@@ -317,6 +313,14 @@ def _false_alarm_shares(monitored: Sequence[MonitoredSeries], rate: float) -> li
 
 
 _Decision = tuple[AlarmState, str, str]  # state, reason, indicator
+
+
+def _unless_explained(decision: _Decision, number: int, checks: AlarmChecks) -> _Decision:
+    """Return the decision, withheld where something else than wear explains the change."""
+    state, _, raised_by = decision
+    if state in ("alert", "alarm") and (other := checks.explanation(number, raised_by)):
+        return "none", other, ""
+    return decision
 
 
 def _decide(

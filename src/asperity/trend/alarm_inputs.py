@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.core.documents import JsonObject
 from asperity.trend.regressors import (
     NO_CONDITION_EFFECT,
     Condition,
@@ -77,8 +78,18 @@ class RecordingStatus(NamedTuple):
     reason: str = ""
 
 
+class LevelMemory(NamedTuple):
+    """Memory of all levels after `judged` recordings of the series, as JSON by level."""
+
+    judged: int = 0
+    monitors: Mapping[str, JsonObject] = MappingProxyType({})
+
+
+NO_MEMORY = LevelMemory()
+
+
 class AlarmHistory(NamedTuple):
-    """Earlier decisions: states by recording number, and the reason and source of a standing alarm.
+    """Earlier decisions: states by recording number, reason and source of a standing alarm, levels.
 
     Stored states are final, except that the last recording is always judged again.
     """
@@ -86,6 +97,7 @@ class AlarmHistory(NamedTuple):
     states: Mapping[int, AlarmState] = MappingProxyType({})
     reason: str = ""
     raised_by: str = ""
+    levels: LevelMemory = NO_MEMORY
 
 
 class AlarmChecks(NamedTuple):

@@ -1,15 +1,13 @@
 """Level rule over all levels of a series, with a memory between judgements."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from types import MappingProxyType
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from asperity.core.documents import JsonObject
-from asperity.trend.alarm_inputs import MonitoredSeries
+from asperity.trend.alarm_inputs import NO_MEMORY, LevelMemory, MonitoredSeries
 from asperity.trend.level_rule import FEWEST_VALUES, LevelMonitor, LevelState
 
 LATEST_CONDITIONS = 112  # recordings that determine the effect of conditions, with the first ones
@@ -29,23 +27,18 @@ class LevelJudgement(NamedTuple):
     reason: str = "no level could be measured"
 
 
-class LevelMemory(NamedTuple):
-    """Memory of all levels after `judged` recordings of the series, as JSON by level."""
-
-    judged: int = 0
-    monitors: Mapping[str, JsonObject] = MappingProxyType({})
-
-
 class LevelMonitors:
     """Monitors of the levels of a series; recordings are added in order.
 
     `memory` is that before the last recording of the series, which is always judged again.
     """
 
-    NO_MEMORY: ClassVar[LevelMemory] = LevelMemory()
-
     def __init__(
-        self, monitored: Sequence[MonitoredSeries], count: int, first: int, memory: LevelMemory
+        self,
+        monitored: Sequence[MonitoredSeries],
+        count: int,
+        first: int,
+        memory: LevelMemory = NO_MEMORY,
     ) -> None:
         self._levels = [series for series in monitored if not series.contact]
         self._first, self._last = first, count - 1

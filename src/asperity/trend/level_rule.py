@@ -11,7 +11,7 @@ from collections import Counter
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from statistics import median
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, cast
 
 import scipy
 
@@ -115,11 +115,17 @@ class LevelMonitor:
     @classmethod
     def from_json(cls, stored: JsonObject) -> "LevelMonitor":
         """Return the monitor of a stored memory."""
-        values: dict[str, Any] = dict(stored)
-        values["bins"] = Counter({int(number): n for number, n in values["bins"].items()})
-        values["latest"] = [(level, passed) for level, passed in values["latest"]]
-        values["finding"] = LevelFinding(*values["finding"])
-        return cls(**values)
+        bins = cast("dict[str, int]", stored["bins"])
+        latest = cast("list[tuple[float, int]]", stored["latest"])
+        finding = cast("tuple[LevelState, str]", stored["finding"])
+        return cls(
+            **cast("dict[str, Any]", stored)
+            | {
+                "bins": Counter({int(number): count for number, count in bins.items()}),
+                "latest": [(level, passed) for level, passed in latest],
+                "finding": LevelFinding(*finding),
+            }
+        )
 
     def _add_to_baseline(self, level: float) -> None:
         """Add a value to the distribution, and to the baseline until it is complete."""
@@ -133,10 +139,10 @@ class LevelMonitor:
         self.baseline = median(self.early[: max(self.count // BASELINE_SHARE, FEWEST_VALUES)])
 
     def _quantile(self, share: float) -> float:
-        wanted, total = share * self.count, 0
+        required, total = share * self.count, 0
         for number in sorted(self.bins):
             total += self.bins[number]
-            if total >= wanted:
+            if total >= required:
                 return BIN * number
         return math.nan
 

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
+import pandas
 
 from asperity.core.arrays import finite_or_none
 from asperity.core.documents import JsonObject
@@ -17,9 +18,6 @@ from asperity.monitoring.overalls.table import OverallValues, read_overalls
 from asperity.monitoring.states import ZONE
 from asperity.rating import severity_zone
 from asperity.trend import AlarmState, LevelJudgement, LevelMonitors, MonitoredSeries
-
-if TYPE_CHECKING:
-    import pandas
 
 METRES_PER_SECOND = {"m/s": 1.0, "mm/s": 1e-3, "in/s": 0.0254, "ips": 0.0254}
 STUCK = 30  # last equal rows from which a sensor that varied before counts as blind
@@ -101,10 +99,8 @@ class OverallTrack:
         ]
 
     @property
-    def table(self) -> "pandas.DataFrame":
+    def table(self) -> pandas.DataFrame:
         """One row per time stamp."""
-        import pandas
-
         return pandas.DataFrame(self.rows())
 
     def save(self, path: str | Path) -> Path:
@@ -145,41 +141,57 @@ def track_overalls(path: str | Path, *, acknowledge: str | None = None) -> Overa
     """
     overalls = read_overalls(path)
     first = _acknowledged(overalls, acknowledge)
-    count = overalls.x.size
-    levels = LevelMonitors(_monitored(overalls), count, first, LevelMonitors.NO_MEMORY)
+    levels = LevelMonitors(_monitored(overalls), overalls.x.size, first)
     zones = _zones(overalls)
     states: list[AlarmState] = ["none"] * first
-    latched, reason, raised_by = False, "all rows are acknowledged", ""
-    for number in range(first, count):
+    decision = _Decision("none", "all rows are acknowledged")
+    for number in range(first, overalls.x.size):
         levels.add(number)
-        if latched:
-            states.append("alarm")
-            continue
-        judgement = levels.judgement()
-        state: AlarmState = judgement.state
-        reason, raised_by = judgement.reason, judgement.name if state != "none" else ""
-        zone, zone_reason = _lasting_zone(zones, number, first)
-        if (zone == "D" and state != "alarm") or (zone == "C" and state == "none"):
-            state, reason, raised_by = ("alarm" if zone == "D" else "alert"), zone_reason, ZONE
-        if state == "none" and not levels.complete:
-            state, reason = "cannot-tell", "baseline incomplete: fewer than 8 rows with values"
-        latched = state == "alarm"
-        states.append(state)
+        if decision.state != "alarm":  # latched
+            decision = _decide(levels, _lasting_zone(zones, number, first))
+        states.append(decision.state)
     blind = _blind(overalls)
-    if blind and states[-1] not in ("alarm",):
-        states[-1], reason, raised_by = "blind", blind, ""
-    since = next(
-        (number + 1 for number in range(count - 2, -1, -1) if states[number] != states[-1]), 0
-    )
+    if blind and decision.state != "alarm":
+        decision = _Decision("blind", blind)
+        states[-1] = "blind"
     return OverallTrack(
         overalls=overalls,
         states=tuple(states),
-        since=None if states[-1] == "none" else since,
-        raised_by=raised_by,
-        reason=reason,
+        since=_since(states),
+        raised_by=decision.raised_by,
+        reason=decision.reason,
         level=levels.judgement(),
         blind=blind,
     )
+
+
+class _Decision(NamedTuple):
+    """State after a row, the reason, and what raised it."""
+
+    state: AlarmState
+    reason: str
+    raised_by: str = ""
+
+
+def _decide(levels: LevelMonitors, zone: tuple[str, str]) -> _Decision:
+    """Decide the state after a row from the levels and the lasting zone."""
+    level = levels.judgement()
+    letter, reason = zone
+    if letter == "D" and level.state != "alarm":
+        return _Decision("alarm", reason, ZONE)
+    if letter == "C" and level.state == "none":
+        return _Decision("alert", reason, ZONE)
+    if level.state == "none" and not levels.complete:
+        return _Decision("cannot-tell", "baseline incomplete: fewer than 8 rows with values")
+    return _Decision(level.state, level.reason, "" if level.state == "none" else level.name)
+
+
+def _since(states: Sequence[AlarmState]) -> int | None:
+    """Return the row with which the last state began; None for "none"."""
+    if states[-1] == "none":
+        return None
+    others = [number for number, state in enumerate(states, 1) if state != states[-1]]
+    return others[-1] if others else 0
 
 
 def _monitored(overalls: OverallValues) -> list[MonitoredSeries]:
@@ -265,9 +277,9 @@ def _acknowledged(overalls: OverallValues, time: str | None) -> int:
         return 0
     if time == LAST:
         return int(overalls.x.size)
-    wanted = time.strip().replace(" ", "T")
+    stamp = time.strip().replace(" ", "T")
     places = overalls.times or [f"{x:g}" for x in overalls.x]
-    numbers = [number for number, place in enumerate(places, 1) if place == wanted]
+    numbers = [number for number, place in enumerate(places, 1) if place == stamp]
     if not numbers:
         raise BadInput(
             f"{time} is no time stamp of {overalls.path.name}; acknowledge one, such as "

@@ -5,9 +5,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 import numpy as np
+import pandas
+from numpy.typing import NDArray
 
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, UnreadableFile
@@ -15,9 +17,7 @@ from asperity.core.files import require_file
 from asperity.core.third_party import first_line
 from asperity.recording import OPERATING_KEYS, is_time_column, name_and_unit, read_sidecar
 
-if TYPE_CHECKING:
-    import pandas
-
+Column: TypeAlias = "pandas.Series[Any]"
 SUFFIXES = (".csv", ".txt", ".parquet", ".jsonl", ".ndjson")
 MOST_BYTES = 500_000_000
 SAMPLE_LINES = 50  # that decide the decimal sign
@@ -69,28 +69,15 @@ def read_overalls(path: str | Path) -> OverallValues:
     table = _read(path)
     notes: list[str] = []
     name = _time_column(table, path)
-    stamps = table[name]
-    x, unit, times = _axis(stamps, name, path, notes)
-    order = np.argsort(x, kind="stable")
-    order = order[np.isfinite(x[order])]
-    if order.size < len(table):
-        notes.append(f"{len(table) - order.size} rows without a time are left out.")
-    if (np.diff(x) < 0.0).any():
-        notes.append("Rows are sorted by time.")
-    columns = {
-        column: _numbers(table[column])[order]
-        for column in table.columns
-        if column != name and _mostly_numbers(table[column])
-    }
-    counters = [column for column, values in columns.items() if _counts_rows(values)]
-    for column in counters:
-        del columns[column]
-        notes.append(f"Column {column} counts rows and is left out.")
+    x, unit, times = _axis(table[name], name, path, notes)
+    order = _order(x, notes)
+    columns = _columns(table.drop(columns=name), order, notes)
     conditions = {key: columns.pop(key) for key in OPERATING_KEYS if key in columns}
     if not columns:
         raise BadInput(f"{path.name} has no column of values beside {name}; add one, such as rms")
     labels = {column: name_and_unit(column) for column in columns}
     stated, _ = read_sidecar(path)
+    machine_class = stated.get("machine_class")
     return OverallValues(
         path=path,
         x=x[order],
@@ -99,14 +86,38 @@ def read_overalls(path: str | Path) -> OverallValues:
         values={labels[column][0]: values for column, values in columns.items()},
         units={label: unit or str(stated.get("unit", "")) for label, unit in labels.values()},
         conditions=conditions,
-        machine_class=None if "machine_class" not in stated else str(stated["machine_class"]),
+        machine_class=None if machine_class is None else str(machine_class),
         notes=tuple(notes),
     )
 
 
-def _read(path: Path) -> "pandas.DataFrame":
-    import pandas
+def _order(x: Field, notes: list[str]) -> NDArray[np.int64]:
+    """Return the rows that have a time, by time."""
+    order = np.argsort(x, kind="stable")
+    order = order[np.isfinite(x[order])]
+    if order.size < x.size:
+        notes.append(f"{x.size - order.size} rows without a time are left out.")
+    if (np.diff(order) < 0).any():
+        notes.append("Rows are sorted by time.")
+    return order
 
+
+def _columns(
+    table: pandas.DataFrame, order: NDArray[np.int64], notes: list[str]
+) -> dict[str, Field]:
+    """Return the columns of numbers, without row numbers."""
+    columns = {
+        str(column): _numbers(table[column])[order]
+        for column in table.columns
+        if _mostly_numbers(table[column])
+    }
+    for column in [column for column, values in columns.items() if _counts_rows(values)]:
+        del columns[column]
+        notes.append(f"Column {column} counts rows and is left out.")
+    return columns
+
+
+def _read(path: Path) -> pandas.DataFrame:
     require_file(path)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
@@ -136,9 +147,7 @@ def _read(path: Path) -> "pandas.DataFrame":
     return table.rename(columns=str)
 
 
-def _read_csv(path: Path) -> "pandas.DataFrame":
-    import pandas
-
+def _read_csv(path: Path) -> pandas.DataFrame:
     with path.open(encoding="utf-8-sig") as stream:
         lines = [line for _, line in zip(range(SAMPLE_LINES), stream, strict=False)]
     heading, *rows = lines or [""]
@@ -155,7 +164,7 @@ def _read_csv(path: Path) -> "pandas.DataFrame":
     )
 
 
-def _json_rows(path: Path) -> Iterator[dict[str, Any]]:
+def _json_rows(path: Path) -> Iterator[dict[str, object]]:
     """Yield the rows of JSON lines; samples are reduced to rms and kurtosis."""
     with path.open(encoding="utf-8-sig") as stream:
         for number, line in enumerate(stream, 1):
@@ -175,10 +184,8 @@ def _json_rows(path: Path) -> Iterator[dict[str, Any]]:
             yield row
 
 
-def _time_column(table: "pandas.DataFrame", path: Path) -> str:
+def _time_column(table: pandas.DataFrame, path: Path) -> str:
     """Return the column of times: by its name, or else the first that holds dates."""
-    import pandas
-
     for column in table.columns:
         if is_time_column(name_and_unit(column)[0]):
             return str(column)
@@ -197,12 +204,8 @@ def _time_column(table: "pandas.DataFrame", path: Path) -> str:
     raise BadInput(f"{path.name} has no column of times; name one of its columns time")
 
 
-def _axis(
-    stamps: "pandas.Series[Any]", name: str, path: Path, notes: list[str]
-) -> tuple[Field, str, list[str]]:
+def _axis(stamps: Column, name: str, path: Path, notes: list[str]) -> tuple[Field, str, list[str]]:
     """Return x, its unit, and the time stamps as text; hours since the first one for dates."""
-    import pandas
-
     if _mostly_numbers(stamps) and not pandas.api.types.is_datetime64_any_dtype(stamps):
         numbers = _numbers(stamps)
         middle = float(np.nanmedian(np.abs(numbers)))
@@ -220,10 +223,8 @@ def _axis(
     return seconds / 3600.0, "h", text.fillna("").tolist()
 
 
-def _dates(stamps: "pandas.Series[Any]", notes: list[str]) -> "pandas.Series[Any]":
+def _dates(stamps: Column, notes: list[str]) -> Column:
     """Return dates; of 03/04/2024 the order of day and month with the more even steps."""
-    import pandas
-
     if pandas.api.types.is_datetime64_any_dtype(stamps):
         return stamps
     text = stamps.astype(str)
@@ -250,7 +251,7 @@ def _dates(stamps: "pandas.Series[Any]", notes: list[str]) -> "pandas.Series[Any
     return read[day_first]
 
 
-def _unevenness(dates: "pandas.Series[Any]") -> float:
+def _unevenness(dates: Column) -> float:
     """Return the standard deviation of the steps over their mean; infinite if times fall."""
     steps = np.diff(dates.to_numpy(dtype="M8[s]").astype(float))
     if steps.size == 0 or (steps < 0.0).any() or not steps.any():
@@ -263,15 +264,11 @@ def _counts_rows(values: Field) -> bool:
     return bool(values.size > 2 and (np.abs(np.diff(values)) == 1.0).all())
 
 
-def _numbers(column: "pandas.Series[Any]") -> Field:
-    import pandas
-
+def _numbers(column: Column) -> Field:
     return np.asarray(pandas.to_numeric(column, errors="coerce"), dtype=float)
 
 
-def _mostly_numbers(column: "pandas.Series[Any]") -> bool:
-    import pandas
-
+def _mostly_numbers(column: Column) -> bool:
     if pandas.api.types.is_datetime64_any_dtype(column):
         return False
     return bool(np.isfinite(_numbers(column)).mean() > FEWEST_NUMBERS)

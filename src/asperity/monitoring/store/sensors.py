@@ -19,7 +19,7 @@ from asperity.monitoring.series_state import (
     pack_shared,
     unpack_shared,
 )
-from asperity.monitoring.silence import SILENCE
+from asperity.monitoring.states import SILENCE
 from asperity.monitoring.store.database import (
     FileVersion,
     Run,
