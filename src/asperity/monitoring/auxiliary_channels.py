@@ -16,16 +16,19 @@ from asperity.monitoring.files import RecordingPlace
 from asperity.monitoring.target import Target
 from asperity.recording import OPERATING_KEYS, OpenRecording, raw_channel
 from asperity.vibration import (
+    HARMONICS,
     Envelope,
     Turning,
+    attributed_power,
     resample_to_constant_speed,
+    separable_harmonics,
+    tolerance_hz,
     turning_by_pulses,
     turning_by_speed,
 )
 
 MAX_SAMPLES = 1 << 21  # for order tracking, which holds them in memory
-HARMONICS = 3
-RATE_TOLERANCE = 0.015  # relative, in both directions: rolling elements slip
+MIN_WIDTH = 1.5  # spectral lines on either side of a rate: the main lobe of a Hann window
 MIN_LINES = 4  # spectral lines below a rate for its line to be resolved
 UNITS: dict[str, dict[str, float]] = {  # factors from the unit of a channel to that of a key
     "load_n": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "MN": 1e6},
@@ -163,16 +166,22 @@ def envelope_and_lines(
 
 
 def lines(frequency_hz: Field, density: Field, rates_hz: Mapping[str, float]) -> dict[str, float]:
-    """Return the rms at each rate and its next two harmonics; nan if they are not resolved."""
+    """Return the rms at each rate and its next two harmonics; nan if they are not resolved.
+
+    A harmonic that several rates share counts for the one whose own lines are present.
+    """
     spacing = float(frequency_hz[1])
+    resolution = MIN_WIDTH * spacing
+    separable = separable_harmonics(rates_hz, resolution)
     levels = {}
     for name, rate in rates_hz.items():
-        total = 0.0
-        for number in range(1, HARMONICS + 1):
-            half_width = max(RATE_TOLERANCE * number * rate, 1.5 * spacing)
-            total += float(density[np.abs(frequency_hz - number * rate) <= half_width].sum())
+        powers = []
+        for centre in (number * rate for number in range(1, HARMONICS + 1)):
+            within = np.abs(frequency_hz - centre) <= tolerance_hz(centre, resolution)
+            powers.append(float(density[within].sum() * spacing))
         resolved = rate >= MIN_LINES * spacing and rate < frequency_hz[-1]
-        levels[name] = float(np.sqrt(total * spacing)) if resolved else float("nan")
+        power = attributed_power(powers, separable[name])
+        levels[name] = float(np.sqrt(power)) if resolved else float("nan")
     return levels
 
 

@@ -10,6 +10,10 @@ from .excitation import PatchAverage as PatchAverage
 from .excitation import PatchShape as PatchShape
 from .excitation import SurfaceTrack as SurfaceTrack
 from .excitation import white_noise as white_noise
+from .harmonics import HARMONICS as HARMONICS
+from .harmonics import attributed_power as attributed_power
+from .harmonics import separable_harmonics as separable_harmonics
+from .harmonics import tolerance_hz as tolerance_hz
 from .orders import Turning as Turning
 from .orders import resample_to_constant_speed as resample_to_constant_speed
 from .orders import turning_by_pulses as turning_by_pulses
