@@ -15,6 +15,7 @@ from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.signals import Signal
 from asperity.core.third_party import suppress_output
+from asperity.recording.units import velocity_scale
 
 ACCELERATION = "m/s^2"
 UNKNOWN = "unknown"  # unit of values where nothing states one
@@ -145,6 +146,11 @@ class OpenRecording:
     def comparable(self) -> bool:
         """True for accelerations: amplitudes such as CRFA can be compared with others."""
         return self.unit == ACCELERATION
+
+    @property
+    def velocity_factor(self) -> float | None:
+        """Metres per second in one `unit`; None if it is not a unit of velocity."""
+        return velocity_scale(self.unit)
 
     def blocks(self, samples: int = BLOCK) -> Iterator[Field]:
         """Yield the values in `unit`, at most `samples` at a time; NaN where missing or impossible.
