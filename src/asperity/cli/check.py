@@ -105,7 +105,7 @@ def _details(checked: "CheckedRecording") -> Block:
         ),
         *(
             (name, f"{facts[name].value}, stated by {facts[name].source}")
-            for name in ("unit", "scale", "started")
+            for name in ("unit", "scale", "sensitivity", "started")
             if name in facts
         ),
         (

@@ -40,6 +40,7 @@ class ChannelFacts(TypedDict, total=False):
     rate_source: str
     rate_hint: str
     unit: str
+    sensitivity: str
     started: datetime
 
 
@@ -59,6 +60,7 @@ class Channel:
     rate_source: str = "file"
     rate_hint: str = ""  # added to "states no sampling rate"
     unit: str | None = None
+    sensitivity: str | None = None  # of its sensor, such as 100 mV/g
     started: datetime | None = None
     full_scale: bool = False  # values are shares of the converter's full scale
 

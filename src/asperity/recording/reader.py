@@ -14,6 +14,7 @@ from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.third_party import first_line
 from asperity.recording.model import Channel, ChannelFacts
+from asperity.recording.sensitivity import sensitivity_text
 from asperity.recording.units import RATE_NAMES, START_NAMES, STEP_NAMES, UNIT_NAMES, stated
 
 MOST_CHANNELS = 512  # an array with more columns is not a recording
@@ -34,7 +35,7 @@ def reject_as(path: Path, description: str) -> Iterator[None]:
 
 
 def stated_facts(name: str, attributes: Mapping[str, object]) -> ChannelFacts:
-    """Return `rate_hz`, `rate_source`, `unit`, `started` of a channel, as far as stated.
+    """Return `rate_hz`, `rate_source`, `unit`, `sensitivity`, `started` of a channel, if stated.
 
     Raises
     ------
@@ -65,6 +66,8 @@ def stated_facts(name: str, attributes: Mapping[str, object]) -> ChannelFacts:
         text = _text(value)
         if text:
             facts["unit"] = text
+    if sensitivity := sensitivity_text(attributes.items()):
+        facts["sensitivity"] = sensitivity
     for _, value in stated(attributes.items(), START_NAMES):
         started = parse_time(value)
         if started is not None:

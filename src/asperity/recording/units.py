@@ -35,6 +35,15 @@ _VELOCITIES = {
     "ft/s": 0.3048,
     "ips": 0.0254,
 }
+_VOLTAGES = {
+    "v": 1.0,
+    "volt": 1.0,
+    "volts": 1.0,
+    "mv": 1e-3,
+    "millivolt": 1e-3,
+    "millivolts": 1e-3,
+    "uv": 1e-6,
+}
 _TIMES = {
     "s": 1.0,
     "sec": 1.0,
@@ -52,8 +61,6 @@ _TIMES = {
     "h": 3600.0,
 }
 _OTHERS = {
-    "v",
-    "mv",
     "pa",
     "n",
     "kn",
@@ -140,6 +147,11 @@ def velocity_scale(unit: str) -> float | None:
     return _VELOCITIES.get(_PER_SECOND.sub(r"\1/s", _plain(unit)))
 
 
+def voltage_scale(unit: str) -> float | None:
+    """Return volts in one `unit`; None for other units."""
+    return _VOLTAGES.get(_plain(unit))
+
+
 def time_scale(unit: str) -> float | None:
     """Return seconds in one `unit`; None for other units."""
     return _TIMES.get(_plain(unit))
@@ -149,7 +161,7 @@ def known_unit(text: str) -> bool:
     """Return whether the text is a unit, as opposed to the end of a name."""
     return bool(text) and (
         velocity_scale(text) is not None
-        or any(_plain(text) in units for units in (_ACCELERATIONS, _TIMES, _OTHERS))
+        or any(_plain(text) in units for units in (_ACCELERATIONS, _VOLTAGES, _TIMES, _OTHERS))
     )
 
 
