@@ -245,7 +245,12 @@ def common_spacing(paths: Sequence[Path], options: ReadOptions, target: Target) 
             lengths.append(opened.samples / opened.rate_hz)
     if not lengths:
         return FINEST_HZ
-    return max(FINEST_HZ, min(PIECES / median(lengths), target.width_hz / LINES_IN_WIDTH))
+    return line_spacing(median(lengths), target)
+
+
+def line_spacing(duration_s: float, target: Target) -> float:
+    """Return the line spacing [Hz] for recordings of a length."""
+    return max(FINEST_HZ, min(PIECES / duration_s, target.width_hz / LINES_IN_WIDTH))
 
 
 def read_channels(

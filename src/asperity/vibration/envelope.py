@@ -20,6 +20,7 @@ from asperity.vibration.harmonics import (
 CHUNK_S = 4.0  # length of a Fourier transform [s]: lines 0.25 Hz apart
 BAND = (0.1, 0.4)  # of the sampling rate: above shafts and meshes, below the anti-alias filter
 MIN_SAMPLES = 64  # of an envelope
+MIN_LINES = 4.0  # spectral lines below a rate
 
 
 class Envelope:
@@ -75,6 +76,13 @@ class Envelope:
         self.squares = float(np.sum(weights) ** 2)
         self.chunks += 1
 
+    def range_hz(self, samples: int) -> tuple[float, float]:
+        """Return the lowest and highest rate [Hz] that the envelope of so many samples resolves."""
+        size = min(samples, self.chunk)
+        if (BAND[1] - BAND[0]) * size < MIN_SAMPLES:
+            return np.inf, 0.0
+        return MIN_LINES * self.rate_hz / size, 0.5 * (BAND[1] - BAND[0]) * self.rate_hz
+
     def depths(self, rates_hz: Mapping[str, float]) -> dict[str, float]:
         """Return the modulation depth (rms over mean) at each rate [Hz] with its first harmonics.
 
@@ -85,7 +93,7 @@ class Envelope:
         return {name: self._depth(rate, separable[name]) for name, rate in rates_hz.items()}
 
     def _depth(self, rate_hz: float, separable: Sequence[int]) -> float:
-        if self.chunks == 0 or rate_hz < 4.0 * self.spacing_hz:
+        if self.chunks == 0 or rate_hz < MIN_LINES * self.spacing_hz:
             return float("nan")
         powers = [self._power(number * rate_hz) for number in range(1, HARMONICS + 1)]
         mean = self.mean / self.chunks
