@@ -15,3 +15,4 @@ from .sidecar import OPERATING_KEYS as OPERATING_KEYS
 from .sidecar import is_sidecar as is_sidecar
 from .sidecar import read_sidecar as read_sidecar
 from .sidecar import sidecar_names as sidecar_names
+from .units import time_scale as time_scale

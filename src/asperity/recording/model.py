@@ -63,6 +63,7 @@ class Channel:
     sensitivity: str | None = None  # of its sensor, such as 100 mV/g
     started: datetime | None = None
     full_scale: bool = False  # values are shares of the converter's full scale
+    short: bool = False  # a few values, such as times of a tacho's pulses: read by name only
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +73,11 @@ class Contents:
     format: str
     channels: Sequence[Channel]
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def recorded(self) -> list[Channel]:
+        """Channels that are recordings of a signal."""
+        return [channel for channel in self.channels if not channel.short]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -124,12 +124,12 @@ def open_channels(path: str | Path, **stated: Any) -> list[OpenRecording]:
         if (
             options.channel is not None
             or "channel" in read_sidecar(path)[0]
-            or len(contents.channels) == 1
+            or len(contents.recorded) == 1
         ):
             return [_open_chosen(path, contents, options)]
         opened_channels = [
             _open_chosen(path, contents, replace(options, channel=channel.name))
-            for channel in contents.channels
+            for channel in contents.recorded
         ]
     return [
         replace(opened, facts=opened.facts | {"channel": Fact(opened.channel.name, "file")})
@@ -172,7 +172,7 @@ def read_contents(path: Path) -> Contents:
             f"{REMEDY}"
         )
     require_unpacked(path, 8.0 * sum(channel.samples or 0 for channel in contents.channels), REMEDY)
-    if not contents.channels:
+    if not contents.recorded:
         raise UnreadableFile(
             f"{path.name} holds no row of samples; give a file with a recording in it"
         )
@@ -271,9 +271,11 @@ def _start(path: Path, channel: Channel) -> Fact | None:
 
 
 def _channel(path: Path, contents: Contents, requested: str | None) -> Channel:
-    channels = contents.channels
+    channels = sorted(contents.channels, key=lambda channel: channel.short)
     names = [channel.name for channel in channels]
     if requested is None:
+        channels = contents.recorded
+        names = [channel.name for channel in channels]
         if len(channels) == 1:
             return channels[0]
         rates = sorted({channel.rate_hz for channel in channels if channel.rate_hz is not None})
