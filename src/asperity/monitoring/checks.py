@@ -9,11 +9,22 @@ from asperity.case import Case, MachineCase
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.monitoring.auxiliary_channels import fault_rates, read_auxiliary
+from asperity.monitoring.file_dates import name_order_remark
 from asperity.monitoring.files import recordings_in
 from asperity.monitoring.reading import channels_in
-from asperity.monitoring.suitability import USES, Suitability, good_for, suitabilities
+from asperity.monitoring.suitability import (
+    USES,
+    Suitability,
+    good_for,
+    suitabilities,
+)
 from asperity.monitoring.target import Target, search_target
-from asperity.recording import OpenRecording, Quality, SampleStatistics, open_channels
+from asperity.recording import (
+    OpenRecording,
+    Quality,
+    SampleStatistics,
+    open_channels,
+)
 
 
 class CheckedRecording(NamedTuple):
@@ -114,6 +125,18 @@ def _check(opened: OpenRecording, target: Target) -> CheckedRecording:
     return CheckedRecording(opened, replace(quality, remarks=remarks), uses)
 
 
+def _with_name_order(checked: Sequence[CheckedRecording]) -> list[CheckedRecording]:
+    """Add the remark on dates in names to recordings that do not state their start."""
+    undated = [entry.recording.path for entry in checked if entry.recording.started is None]
+    remark = name_order_remark(list(dict.fromkeys(undated)))
+    return [
+        entry._replace(quality=replace(entry.quality, remarks=(*entry.quality.remarks, remark)))
+        if remark and entry.recording.path in undated
+        else entry
+        for entry in checked
+    ]
+
+
 def check_recordings(
     files: Sequence[Path],
     *,
@@ -152,4 +175,5 @@ def check_recordings(
                 checked.extend(_check(opened, target) for opened in channels)
         except BadInput as error:
             refused.append((path, str(error)))
+    checked = _with_name_order(checked)
     return RecordingChecks(checked=tuple(checked), refused=tuple(refused), target=target)

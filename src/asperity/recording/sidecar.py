@@ -31,7 +31,14 @@ MACHINE_KEYS = (
     "pulses_per_turn",
     "condition_channels",
 )
-SIGNAL_KEYS = ("rate_hz", "unit", "channel", "scale", "sensitivity", "started")
+SIGNAL_KEYS = (
+    "rate_hz",
+    "unit",
+    "channel",
+    "scale",
+    "sensitivity",
+    "started",
+)
 SIDECAR_KEYS = (*SIGNAL_KEYS, *MACHINE_KEYS, *OPERATING_KEYS)
 SUFFIXES = (".toml", ".json")
 TEXT_KEYS = ("channel", "tacho", "sensor")  # which may be numbers
