@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from asperity.monitoring import TrackSettings, check_recordings, recordings_in, track_recordings
-from asperity.monitoring.file_dates import name_order_remark
+from asperity.recording.file_dates import name_order_remark
 
 DAY_FIRST = ["05-11-2024_1405.npz", "09-11-2024_1405.npz", "03-12-2024_1405.npz"]  # in time
 BAND = (2000.0, 4000.0)

@@ -57,10 +57,18 @@ def test_millivolts_and_a_sidecar(tmp_path):
         read_recording(path, unit="mm/s")
 
 
-def test_attributes_of_a_file_state_a_sensitivity(tmp_path):
+@pytest.mark.parametrize(
+    "stated",
+    [
+        {"sensitivity": "100 mV/g"},
+        {"sensitivity_unit": "mV/g", "sensitivity": 100.0},
+        {"Sensitivity": 100, "Sensitivity Units": "mV/g"},
+    ],
+)
+def test_attributes_of_a_file_state_a_sensitivity(tmp_path, stated):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         data = file.create_dataset("acc", data=VOLTS)
-        data.attrs.update({"fs_hz": RATE, "unit": "V", "sensitivity": "100 mV/g"})
+        data.attrs.update({"fs_hz": RATE, "unit": "V"} | stated)
     assert read_recording(tmp_path / "a.h5").values == pytest.approx(VOLTS / 0.1 * G)
 
 

@@ -110,5 +110,5 @@ def test_the_verdict_on_several_states_for_what_the_others_are_good(tmp_path):
     write(tmp_path / "c.npz", scale=1e-4)
     assert check_recordings([tmp_path], band_hz=BAND).verdict() == (
         "1 of 3 recordings can be used: too short; the machine was off, or the sensor "
-        "disconnected. The others are good for: envelope at fault rates (1), level trend (1)."
+        "disconnected. Other uses: envelope at fault rates (1), level trend (1)."
     )

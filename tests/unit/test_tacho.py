@@ -172,6 +172,14 @@ def test_a_channel_of_pulse_times_is_a_tacho(tmp_path, form):
     assert reading.quality.remarks == ()
 
 
+def test_a_rising_signal_is_not_taken_for_times(tmp_path):
+    np.savez(tmp_path / "a.npz", acc=vibration(), pulse=TIME, fs=RATE, unit="m/s^2")
+    reading = read(tmp_path / "a.npz")
+    assert reading.quality.remarks == (
+        "the tacho signal has 1 pulses, but 4 are required; use another channel",
+    )
+
+
 def test_remarks_on_the_tacho_reach_the_reading_and_the_check(tmp_path):
     marks = np.sort(np.concatenate([MARKS, MARKS + 0.4]))
     pulse = signal(times_of(marks, "rising"))

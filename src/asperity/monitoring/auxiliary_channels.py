@@ -121,8 +121,8 @@ def _tacho(opened: OpenRecording) -> AuxiliaryData:
 def _turning(opened: OpenRecording, name: str, per_turn: float) -> Turning:
     """Return the shaft's angle from a tacho signal, or from a channel of the times of pulses."""
     values = _values(opened.path, name, MAX_SAMPLES)
-    if are_times(values):
-        samples = min(opened.samples or MAX_SAMPLES, MAX_SAMPLES)
+    samples = min(opened.samples or MAX_SAMPLES, MAX_SAMPLES)
+    if are_times(values) and 2 * np.isfinite(values).sum() < samples:
         to_seconds = time_scale(raw_channel(opened.path, name).unit or "") or 1.0
         return turning_by_times(to_seconds * values, samples, opened.rate_hz, per_turn)
     _require_same_clock(opened, name)

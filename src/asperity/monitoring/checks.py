@@ -9,7 +9,6 @@ from asperity.case import Case, MachineCase
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.monitoring.auxiliary_channels import fault_rates, read_auxiliary
-from asperity.monitoring.file_dates import name_order_remark
 from asperity.monitoring.files import recordings_in
 from asperity.monitoring.reading import channels_in
 from asperity.monitoring.suitability import (
@@ -23,6 +22,7 @@ from asperity.recording import (
     OpenRecording,
     Quality,
     SampleStatistics,
+    name_order_remark,
     open_channels,
 )
 
@@ -100,7 +100,7 @@ class RecordingChecks:
             label: sum(uses[name].possible for uses in unusable) for name, label in USES.items()
         }
         parts = [f"{label} ({count})" for label, count in counts.items() if count]
-        return f" The others are good for: {', '.join(parts)}." if parts else ""
+        return f" Other uses: {', '.join(parts)}." if parts else ""
 
     def scalars(self) -> JsonObject:
         """Return the JSON of `asperity check`."""

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from asperity.case import Case, MachineCase
 from asperity.core.errors import BadInput
-from asperity.monitoring.file_dates import name_order_remark
 from asperity.monitoring.files import RecordingPlace, RecordingTable, read_table, recordings_in
 from asperity.monitoring.forecast import Forecaster
 from asperity.monitoring.judgement import judge
@@ -21,6 +20,7 @@ from asperity.monitoring.reading import (
 from asperity.monitoring.settings import TrackSettings
 from asperity.monitoring.target import Target, search_target
 from asperity.monitoring.track_result import Track
+from asperity.recording import name_order_remark
 
 DEFAULTS = TrackSettings()
 

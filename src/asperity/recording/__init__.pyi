@@ -1,6 +1,7 @@
 from .check import Quality as Quality
 from .check import SampleStatistics as SampleStatistics
 from .check import check_recording as check_recording
+from .file_dates import name_order_remark as name_order_remark
 from .model import ACCELERATION as ACCELERATION
 from .model import Channel as Channel
 from .model import Fact as Fact

@@ -13,7 +13,9 @@ from asperity.recording.units import (
 
 EXAMPLE = "100 mV/g"
 _NAMED = re.compile(r"(?i)sensitivity|empfindlichkeit|sensibilit|übertragungsfaktor")
+_UNIT = re.compile(r"(?i)[\s_-]units?$")
 _NUMBER = r"[-+]?\d[\d.,]*(?:e[-+]?\d+)?"
+_BARE = re.compile(rf"(?i){_NUMBER}")
 _CHARGE = re.compile(r"^[pnµu]?c(?:oul\w*)?$")
 
 
@@ -60,15 +62,22 @@ def sensitivity_text(attributes: Iterable[tuple[str, object]]) -> str | None:
 
     Several values, one for each channel, are separated by semicolons.
     """
-    for key, value in attributes:
-        if not _NAMED.search(str(key)):
+    named = {str(key): _text(value) for key, value in attributes if _NAMED.search(str(key))}
+    units = [text for key, text in named.items() if _UNIT.search(key)]
+    for key, text in named.items():
+        if _UNIT.search(key):
             continue
-        text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
-        unit = _unit_in_name(str(key))
+        unit = _unit_in_name(key) or next(iter(units), "")
         parts = [part.strip() for part in re.split(r"[\t;]", text) if part.strip()]
         bare = re.compile(rf"(?i){_NUMBER}")
-        return "; ".join(f"{part} {unit}" if bare.fullmatch(part) else part for part in parts)
+        return "; ".join(
+            f"{part} {unit}".strip() if bare.fullmatch(part) else part for part in parts
+        )
     return None
+
+
+def _text(value: object) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
 def _unit_in_name(name: str) -> str:
