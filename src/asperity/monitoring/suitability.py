@@ -6,7 +6,7 @@ Each is judged by the requirements of its own method; `reading` computes the num
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from asperity.monitoring.reading import line_spacing, segment_length
+from asperity.monitoring.reading import line_spacing
 from asperity.monitoring.target import Target
 from asperity.rating import (
     HIGHEST_HZ,
@@ -108,8 +108,7 @@ def _zone(opened: OpenRecording, quality: Quality, target: Target) -> Suitabilit
             "2500 Hz",
         )
     spacing = line_spacing(quality.duration_s, target)
-    segment = segment_length(opened.rate_hz, spacing)
-    if opened.rate_hz / segment > MAX_SPACING_HZ or segment > quality.samples:
+    if spacing > MAX_SPACING_HZ or quality.duration_s * spacing < 1.0:  # a segment
         return Suitability(
             False,
             f"too short: {quality.duration_s:.3g} s; velocities from {LOWEST_HZ:g} Hz need 3.2 s",
