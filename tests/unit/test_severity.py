@@ -42,6 +42,33 @@ def test_velocity_is_undetermined_for_coarse_lines_or_a_low_rate():
     assert np.isnan(velocity_rms(np.arange(0.0, 900.0, 1.0), np.ones(900)))
 
 
+def test_velocity_of_a_velocity_is_the_integral_of_its_density():
+    frequency = np.arange(0.0, 2000.0)
+    assert velocity_rms(frequency, np.full(2000, 4e-6), "velocity") == pytest.approx(
+        np.sqrt(991 * 4e-6)
+    )
+    with pytest.raises(BadInput, match="measured must be one of"):
+        velocity_rms(frequency, np.ones(2000), "displacement")
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("mm/s", 1e-3), ("in/s", 0.0254), ("m/s", 1.0), ("mm/s rms", 1e-3)]
+)
+def test_recorded_velocities_have_their_zone(tmp_path, unit, factor):
+    """A velocity of 6 mm/s rms at 50 Hz, and 20 mm/s at 5 Hz below the range of the standard."""
+    time = np.arange(round(4.0 * RATE)) / RATE
+    for number in range(3):
+        wave = 6e-3 * np.sin(2.0 * np.pi * 50.0 * time) + 20e-3 * np.sin(2.0 * np.pi * 5.0 * time)
+        noise = 1e-5 * np.random.default_rng(number).standard_normal(time.size)
+        values = (np.sqrt(2.0) * wave + noise) / factor
+        np.savez(tmp_path / f"v-{number}.npz", v=values, fs=RATE, unit=unit)
+    (tmp_path / "recordings.json").write_text('{"machine_class": "large-rigid"}')
+    track = track_recordings([tmp_path], TrackSettings(band_hz=(2000.0, 4000.0)))
+    assert {recording.zone for recording in track.recordings} == {"C"}
+    row = track.scalars()["recordings"][0]
+    assert (row["velocity_rms"], row["unit"]) == (pytest.approx(6e-3, rel=0.01), unit)
+
+
 @pytest.mark.parametrize(
     (
         "machine",

@@ -1,5 +1,6 @@
 """`asperity check`: whether recordings, or a data set, are complete and usable."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +15,7 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
-    from asperity.monitoring import CheckedRecording, RecordingChecks
+    from asperity.monitoring import CheckedRecording, RecordingChecks, Suitability
 
 MAX_DETAILED = 4  # recordings up to which `check` shows every fact
 
@@ -41,7 +42,7 @@ def check(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Check recordings: rate, unit, length, channels, gaps, clipping, offset, machine off."""
+    """Check recordings: rate, unit, length, gaps, clipping, and for what they are good."""
     if data_set is not None:
         if paths:
             raise BadInput(
@@ -92,9 +93,8 @@ def _show_set(folder: Path, *, as_json: bool, quiet: bool) -> None:
 
 def _details(checked: "CheckedRecording") -> Block:
     """Yield every fact of a recording with its source."""
-    recording, quality = checked
+    recording, quality, uses = checked
     facts = recording.facts
-    state = "usable" if quality.usable else "NOT USABLE"
     values = checked.scalars()
     level = ", ".join(quantity(key).number_in(values) for key in ("rms", "peak", "offset"))
     rows = [
@@ -105,7 +105,7 @@ def _details(checked: "CheckedRecording") -> Block:
         ),
         *(
             (name, f"{facts[name].value}, stated by {facts[name].source}")
-            for name in ("unit", "scale", "started")
+            for name in ("unit", "scale", "sensitivity", "started")
             if name in facts
         ),
         (
@@ -114,9 +114,19 @@ def _details(checked: "CheckedRecording") -> Block:
         ),
         ("rms, peak, offset", f"{level}; unit: {recording.unit}"),
     ]
-    yield f"{recording.path}, channel {recording.channel.name}: {state}"
+    for name, use in uses.items():
+        rows.append((monitoring.USES[name], f"{'yes' if use.possible else 'NO'}: {use.reason}"))
+    yield f"{recording.path}, channel {recording.channel.name}: {_state(uses)}"
     yield from table(rows, quality.remarks)
     yield from (f"  fault: {fault}" for fault in quality.faults)
+
+
+def _state(uses: Mapping[str, "Suitability"]) -> str:
+    """Return for what a recording is good, in a few words."""
+    purposes = monitoring.good_for(uses)
+    if uses["contact_resonance"].possible:
+        return "usable" if purposes == "all" else f"usable: {purposes}"
+    return "NOT USABLE" if purposes == "nothing" else f"no contact resonance; {purposes}"
 
 
 def _summary(checks: "RecordingChecks") -> Block:
@@ -126,12 +136,17 @@ def _summary(checks: "RecordingChecks") -> Block:
     holders: dict[str, list[str]] = {}
     for checked in checks.checked:
         values = checked.scalars()
-        recording = checked.recording
-        quality = checked.quality
+        recording, quality, uses = checked
         name = f"{recording.path.name}, {values['channel']}"
-        state = "usable" if quality.usable else "NOT USABLE"
-        rows.append([name, *(entry.number_in(values) for entry in selected), recording.unit, state])
-        for sentence in (*quality.faults, *quality.remarks):
+        rows.append(
+            [name, *(entry.number_in(values) for entry in selected), recording.unit, _state(uses)]
+        )
+        lacks = [
+            f"{monitoring.USES[key]}: {use.reason}"
+            for key, use in uses.items()
+            if not use.possible and key != "contact_resonance" and use.reason not in quality.faults
+        ]
+        for sentence in (*quality.faults, *lacks, *quality.remarks):
             holders.setdefault(sentence, []).append(name)
     yield from columns(
         ["recording", *(entry.label for entry in selected), "unit", ""], rows, left=1

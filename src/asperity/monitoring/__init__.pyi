@@ -32,6 +32,9 @@ from .recording import TrackedRecording as TrackedRecording
 from .settings import Notifier as Notifier
 from .settings import TrackSettings as TrackSettings
 from .settings import WatchSettings as WatchSettings
+from .suitability import USES as USES
+from .suitability import Suitability as Suitability
+from .suitability import good_for as good_for
 from .target import Target as Target
 from .target import search_target as search_target
 from .track import track_recordings as track_recordings

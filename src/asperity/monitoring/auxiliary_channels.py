@@ -14,18 +14,23 @@ from asperity.core.errors import BadInput
 from asperity.core.signals import averaged_spectrum
 from asperity.monitoring.files import RecordingPlace
 from asperity.monitoring.target import Target
-from asperity.recording import OPERATING_KEYS, OpenRecording, raw_channel
+from asperity.recording import OPERATING_KEYS, OpenRecording, raw_channel, time_scale
 from asperity.vibration import (
+    HARMONICS,
     Envelope,
     Turning,
+    are_times,
+    attributed_power,
     resample_to_constant_speed,
+    separable_harmonics,
+    tolerance_hz,
     turning_by_pulses,
     turning_by_speed,
+    turning_by_times,
 )
 
 MAX_SAMPLES = 1 << 21  # for order tracking, which holds them in memory
-HARMONICS = 3
-RATE_TOLERANCE = 0.015  # relative, in both directions: rolling elements slip
+MIN_WIDTH = 1.5  # spectral lines on either side of a rate: the main lobe of a Hann window
 MIN_LINES = 4  # spectral lines below a rate for its line to be resolved
 UNITS: dict[str, dict[str, float]] = {  # factors from the unit of a channel to that of a key
     "load_n": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "MN": 1e6},
@@ -45,6 +50,7 @@ DEFAULT_BANDS = {
     "1 to 5 kHz": (1000.0, 5000.0),
     "above 5 kHz": (5000.0, np.inf),
 }
+SPEED_TOLERANCE = 0.1  # relative difference of stated speed and tacho, above which it is remarked
 CLOCK_TOLERANCE = 1e-6  # relative difference of equal rates
 USABLE_BANDWIDTH = 0.4  # of the sampling rate; the anti-alias filter cuts above it
 
@@ -104,13 +110,34 @@ def _tacho(opened: OpenRecording) -> AuxiliaryData:
     name = opened.facts["tacho"].value
     per_turn = opened.facts["pulses_per_turn"].value if "pulses_per_turn" in opened.facts else 1.0
     try:
-        _require_same_clock(opened, name)
-        pulses = _values(opened.path, name, MAX_SAMPLES)
-        turning = turning_by_pulses(pulses, opened.rate_hz, per_turn)
+        turning = _turning(opened, name, per_turn)
     except BadInput as refusal:
         return AuxiliaryData(facts={}, turning=None, remarks=(str(refusal),))
     speed = (f"{turning.speed_hz:.10g}", f"file (tacho, channel {name})")
-    return AuxiliaryData(facts={"speed_hz": speed}, turning=turning, remarks=())
+    remarks = (*turning.remarks, *_contradiction(opened, turning))
+    return AuxiliaryData(facts={"speed_hz": speed}, turning=turning, remarks=remarks)
+
+
+def _turning(opened: OpenRecording, name: str, per_turn: float) -> Turning:
+    """Return the shaft's angle from a tacho signal, or from a channel of the times of pulses."""
+    values = _values(opened.path, name, MAX_SAMPLES)
+    samples = min(opened.samples or MAX_SAMPLES, MAX_SAMPLES)
+    if are_times(values) and 2 * np.isfinite(values).sum() < samples:
+        to_seconds = time_scale(raw_channel(opened.path, name).unit or "") or 1.0
+        return turning_by_times(to_seconds * values, samples, opened.rate_hz, per_turn)
+    _require_same_clock(opened, name)
+    return turning_by_pulses(values, opened.rate_hz, per_turn)
+
+
+def _contradiction(opened: OpenRecording, turning: Turning) -> tuple[str, ...]:
+    """Return a remark if the sidecar states another speed than the tacho."""
+    fact = opened.facts.get("speed_hz")
+    if fact is None or abs(turning.speed_hz / float(fact.value) - 1.0) <= SPEED_TOLERANCE:
+        return ()
+    return (
+        f"the tacho gives {turning.speed_hz:.4g} Hz, the {fact.source} {float(fact.value):.4g} Hz; "
+        "the tacho is used, check its pulses_per_turn",
+    )
 
 
 def fault_rates(
@@ -145,10 +172,12 @@ def order_tracked(opened: OpenRecording, auxiliary: AuxiliaryData) -> tuple[Fiel
         count += block.size
         if count >= MAX_SAMPLES:
             break
-    values = np.concatenate(blocks)[: auxiliary.turning.turns.size]
+    turning = auxiliary.turning
+    values = np.concatenate(blocks)[: turning.turns.size]
+    turning = turning._replace(turns=turning.turns[: values.size])
     if not np.isfinite(values).all():
         raise BadInput("samples are missing, so that order tracking is not possible")
-    return resample_to_constant_speed(values, auxiliary.turning, opened.rate_hz)
+    return resample_to_constant_speed(values, turning, opened.rate_hz)
 
 
 def envelope_and_lines(
@@ -163,16 +192,22 @@ def envelope_and_lines(
 
 
 def lines(frequency_hz: Field, density: Field, rates_hz: Mapping[str, float]) -> dict[str, float]:
-    """Return the rms at each rate and its next two harmonics; nan if they are not resolved."""
+    """Return the rms at each rate and its next two harmonics; nan if they are not resolved.
+
+    A harmonic that several rates share counts for the one whose own lines are present.
+    """
     spacing = float(frequency_hz[1])
+    resolution = MIN_WIDTH * spacing
+    separable = separable_harmonics(rates_hz, resolution)
     levels = {}
     for name, rate in rates_hz.items():
-        total = 0.0
-        for number in range(1, HARMONICS + 1):
-            half_width = max(RATE_TOLERANCE * number * rate, 1.5 * spacing)
-            total += float(density[np.abs(frequency_hz - number * rate) <= half_width].sum())
+        powers = []
+        for centre in (number * rate for number in range(1, HARMONICS + 1)):
+            within = np.abs(frequency_hz - centre) <= tolerance_hz(centre, resolution)
+            powers.append(float(density[within].sum() * spacing))
         resolved = rate >= MIN_LINES * spacing and rate < frequency_hz[-1]
-        levels[name] = float(np.sqrt(total * spacing)) if resolved else float("nan")
+        power = attributed_power(powers, separable[name])
+        levels[name] = float(np.sqrt(power)) if resolved else float("nan")
     return levels
 
 

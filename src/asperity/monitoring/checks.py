@@ -1,28 +1,42 @@
 """Check of recordings before tracking: content and usability."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
 from asperity.case import Case, MachineCase
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
+from asperity.monitoring.auxiliary_channels import fault_rates, read_auxiliary
 from asperity.monitoring.files import recordings_in
 from asperity.monitoring.reading import channels_in
+from asperity.monitoring.suitability import (
+    USES,
+    Suitability,
+    good_for,
+    suitabilities,
+)
 from asperity.monitoring.target import Target, search_target
-from asperity.recording import OpenRecording, Quality, check_recording, open_channels
+from asperity.recording import (
+    OpenRecording,
+    Quality,
+    SampleStatistics,
+    name_order_remark,
+    open_channels,
+)
 
 
 class CheckedRecording(NamedTuple):
-    """A channel of a recording, read to its end."""
+    """A channel of a recording, read to its end, and for what it is good."""
 
     recording: OpenRecording
     quality: Quality
+    uses: Mapping[str, Suitability]
 
     def scalars(self) -> JsonObject:
         """Return its row of `asperity check --json`."""
-        recording, quality = self
+        recording, quality, uses = self
         numbers = (
             "samples",
             "duration_s",
@@ -38,6 +52,7 @@ class CheckedRecording(NamedTuple):
             "file": str(recording.path),
             "channel": recording.channel.name,
             "usable": quality.usable,
+            "good_for": {name: asdict(use) for name, use in uses.items()},
             "off": quality.off,
             "rate_hz": recording.rate_hz,
             "unit": recording.unit,
@@ -64,15 +79,28 @@ class RecordingChecks:
         """Return how many are usable, and the faults of the others."""
         total = len(self.checked) + len(self.refused)
         if total == 1 and self.checked:
-            recording, quality = self.checked[0]
-            judged = "can be used." if quality.usable else f"cannot be used: {quality.faults[0]}."
-            return f"{recording.path.name}: {judged}"
+            recording, quality, uses = self.checked[0]
+            if quality.usable:
+                return f"{recording.path.name}: can be used."
+            others = good_for(uses)
+            purpose = "" if others == "nothing" else " for a contact resonance"
+            ending = "" if others == "nothing" else f"; good for: {others}"
+            return f"{recording.path.name}: cannot be used{purpose}: {quality.faults[0]}{ending}."
         files = {checked.recording.path for checked in self.checked}
         noun = "channels" if len(files) < len(self.checked) else "recordings"
         unusable = [checked.quality for checked in self.checked if not checked.quality.usable]
         reasons = dict.fromkeys(quality.faults[0].partition(":")[0] for quality in unusable)
         sentence = f"{len(self.checked) - len(unusable)} of {total} {noun} can be used"
-        return f"{sentence}{': ' if reasons else ''}{'; '.join(reasons)}."
+        return f"{sentence}{': ' if reasons else ''}{'; '.join(reasons)}.{self._other_uses()}"
+
+    def _other_uses(self) -> str:
+        """Return for what those are good that cannot be used for a contact resonance."""
+        unusable = [checked.uses for checked in self.checked if not checked.quality.usable]
+        counts = {
+            label: sum(uses[name].possible for uses in unusable) for name, label in USES.items()
+        }
+        parts = [f"{label} ({count})" for label, count in counts.items() if count]
+        return f" Other uses: {', '.join(parts)}." if parts else ""
 
     def scalars(self) -> JsonObject:
         """Return the JSON of `asperity check`."""
@@ -85,6 +113,30 @@ class RecordingChecks:
         }
 
 
+def _check(opened: OpenRecording, target: Target) -> CheckedRecording:
+    """Read a channel to its end and judge it."""
+    statistics = SampleStatistics()
+    for _ in statistics.pass_through(opened.blocks()):
+        pass
+    auxiliary = read_auxiliary(opened, None)
+    uses = suitabilities(opened, statistics, target, fault_rates(opened, auxiliary, target))
+    quality = statistics.quality(opened, width_hz=target.width_hz, band_hz=target.band_hz)
+    remarks = (*quality.remarks, *auxiliary.remarks)
+    return CheckedRecording(opened, replace(quality, remarks=remarks), uses)
+
+
+def _with_name_order(checked: Sequence[CheckedRecording]) -> list[CheckedRecording]:
+    """Add the remark on dates in names to recordings that do not state their start."""
+    undated = [entry.recording.path for entry in checked if entry.recording.started is None]
+    remark = name_order_remark(list(dict.fromkeys(undated)))
+    return [
+        entry._replace(quality=replace(entry.quality, remarks=(*entry.quality.remarks, remark)))
+        if remark and entry.recording.path in undated
+        else entry
+        for entry in checked
+    ]
+
+
 def check_recordings(
     files: Sequence[Path],
     *,
@@ -95,7 +147,7 @@ def check_recordings(
     channel: str | None = None,
     scale: float | None = None,
 ) -> RecordingChecks:
-    """Read recordings to their end and check whether the search target can be found in them.
+    """Read recordings to their end and check for what they are good.
 
     Parameters
     ----------
@@ -117,13 +169,11 @@ def check_recordings(
     for path in [*(recordings_in(present) if present else []), *absent]:
         try:
             for name in channels_in(channel):
-                for opened in open_channels(
+                channels = open_channels(
                     path, rate_hz=rate_hz, unit=unit, channel=name, scale=scale
-                ):
-                    quality = check_recording(
-                        opened, width_hz=target.width_hz, band_hz=target.band_hz
-                    )
-                    checked.append(CheckedRecording(opened, quality))
+                )
+                checked.extend(_check(opened, target) for opened in channels)
         except BadInput as error:
             refused.append((path, str(error)))
+    checked = _with_name_order(checked)
     return RecordingChecks(checked=tuple(checked), refused=tuple(refused), target=target)

@@ -182,7 +182,7 @@ def _recording_faults(folder: Path, rows: list[dict[str, str]], case: Case | Non
             continue
         checks = check_recordings([path], case=case)
         yield from (reason for _, reason in checks.refused)
-        for recording, quality in checks.checked:
+        for recording, quality, _ in checks.checked:
             if recording.rate_hz < MIN_RATE_HZ:
                 yield (
                     f"{row['file']}: sampled at {recording.rate_hz:g} Hz, "

@@ -2,6 +2,7 @@
 
 import csv
 import math
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -36,10 +37,16 @@ _OTHER_SUFFIXES = {
     ".download",
     ".tmp",
     ".tdms_index",
+    ".db",
+    ".db-wal",
+    ".db-shm",
+    ".db-journal",
+    ".sqlite",
     ".gz",
     ".7z",
     ".rar",
 }
+RESULTS_FOLDER, STORE_NAME = "asperity-watch", "asperity.db"  # of a watch, beside its recordings
 ABSOLUTE_ZERO = -273.15  # degC
 SENSOR = "sensor"  # heading of the column with the name of the sensor
 _CONDITION_WORDS = {  # words in headings of operating conditions
@@ -173,9 +180,10 @@ def place_at(x: float, stated: RecordingPlace | None) -> RecordingPlace:
 
 
 def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
-    """Return the given files and those in the given folders, in natural order of names.
+    """Return the given files and those in the given folders and their subfolders.
 
-    Subfolders, hidden files, sidecars, tables with a column `file`, and results are excluded.
+    They are in natural order of folders and names. Hidden files and folders, results, sidecars and
+    tables with a column `file` are excluded.
 
     Raises
     ------
@@ -185,15 +193,38 @@ def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
     recordings: list[Path] = []
     for path in map(Path, paths):
         if path.is_dir():
-            inside = [file for file in path.iterdir() if may_be_recording(file)]
-            if not inside:
-                raise BadInput(f"{path} contains no recordings; name files, or their folder")
-            recordings += sorted(inside, key=lambda file: natural_order(file.name))
+            recordings += _recordings_below(path)
         elif path.exists():
             recordings.append(path)
         else:
             raise BadInput(f"{path} does not exist; check its name")
     return list(dict.fromkeys(recordings))
+
+
+def _recordings_below(folder: Path) -> list[Path]:
+    """Return the recordings in a folder and its subfolders."""
+    inside: list[Path] = []
+    subfolders = 0
+    for place, folders, names in os.walk(folder):
+        folders[:] = [name for name in folders if _may_hold_recordings(Path(place, name))]
+        subfolders += len(folders)
+        inside += [file for name in names if may_be_recording(file := Path(place, name))]
+    if not inside:
+        below = f", nor do its {subfolders} subfolders" if subfolders else ""
+        raise BadInput(f"{folder} contains no recordings{below}; name files, or their folder")
+    return sorted(
+        inside,
+        key=lambda file: [natural_order(part) for part in file.relative_to(folder).parts],
+    )
+
+
+def _may_hold_recordings(folder: Path) -> bool:
+    """Return whether a subfolder is neither hidden nor one of results of a watch."""
+    return not (
+        folder.name.startswith((".", "__"))
+        or folder.name == RESULTS_FOLDER
+        or (folder / STORE_NAME).exists()
+    )
 
 
 def may_be_recording(path: Path) -> bool:

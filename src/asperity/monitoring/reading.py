@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import scipy
 
+from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.processes import ignore_interrupts
 from asperity.core.signals import Spectrum, averaged_spectrum
@@ -59,7 +60,8 @@ class Reading:
     faults and meshes with two harmonics. `rate_doubt` is the relative standard deviation of the
     sampling rate. `facts` are texts by name with their sources; `started` is in ISO format or
     empty. `depths` are the modulation depths of the envelope at the rates of faults; `velocity` is
-    rms from 10 to 1000 Hz [m/s], nan if the values are not accelerations or too short.
+    rms from 10 to 1000 Hz [m/s], nan for other values than accelerations and velocities, and for
+    short ones.
     """
 
     file: str
@@ -169,8 +171,16 @@ def _with_levels(
         reading,
         bands=bands(opened, frequency_hz, density),
         lines=lines(frequency_hz, density, rates_hz),
-        velocity=velocity_rms(frequency_hz, density) if opened.comparable else np.nan,
+        velocity=_velocity(opened, frequency_hz, density),
     )
+
+
+def _velocity(opened: OpenRecording, frequency_hz: Field, density: Field) -> float:
+    """Return the rms velocity [m/s] of an acceleration or a velocity; nan for other units."""
+    if opened.comparable:
+        return velocity_rms(frequency_hz, density)
+    factor = opened.velocity_factor
+    return np.nan if factor is None else velocity_rms(frequency_hz, factor**2 * density, "velocity")
 
 
 def _with_order_tracking(
@@ -235,7 +245,12 @@ def common_spacing(paths: Sequence[Path], options: ReadOptions, target: Target) 
             lengths.append(opened.samples / opened.rate_hz)
     if not lengths:
         return FINEST_HZ
-    return max(FINEST_HZ, min(PIECES / median(lengths), target.width_hz / LINES_IN_WIDTH))
+    return line_spacing(median(lengths), target)
+
+
+def line_spacing(duration_s: float, target: Target) -> float:
+    """Return the line spacing [Hz] for recordings of a length."""
+    return max(FINEST_HZ, min(PIECES / duration_s, target.width_hz / LINES_IN_WIDTH))
 
 
 def read_channels(

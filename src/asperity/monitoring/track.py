@@ -1,6 +1,7 @@
 """A series of recordings, from files to stages and alarm."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from asperity.case import Case, MachineCase
@@ -19,6 +20,7 @@ from asperity.monitoring.reading import (
 from asperity.monitoring.settings import TrackSettings
 from asperity.monitoring.target import Target, search_target
 from asperity.monitoring.track_result import Track
+from asperity.recording import name_order_remark
 
 DEFAULTS = TrackSettings()
 
@@ -59,6 +61,8 @@ def track_recordings(
     x_name, places = _stated_places(files, x, parsed)
     readings = require_readable(_read_files(files, settings, target, places, progress))
     track = judge(readings, target, settings, places=places, x_name=x_name)
+    if track.x_name == "recording" and (remark := name_order_remark(files)):
+        track = replace(track, notes=(*track.notes, f"{remark[:1].upper()}{remark[1:]}."))
     if forecaster is None:
         return track
     rows = unacknowledged([recording.row() for recording in track.recordings], settings.acknowledge)

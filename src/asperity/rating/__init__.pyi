@@ -20,6 +20,9 @@ from .micropitting import helical_load_factor as helical_load_factor
 from .micropitting import loss_factor as loss_factor
 from .micropitting import mesh_friction as mesh_friction
 from .micropitting import specific_film as specific_film
+from .severity import HIGHEST_HZ as HIGHEST_HZ
+from .severity import LOWEST_HZ as LOWEST_HZ
+from .severity import MAX_SPACING_HZ as MAX_SPACING_HZ
 from .severity import ZONES as ZONES
 from .severity import severity_zone as severity_zone
 from .severity import velocity_rms as velocity_rms

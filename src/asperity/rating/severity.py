@@ -4,6 +4,8 @@ The standard holds for machines above 15 kW in situ, measured on bearing housing
 Hz for machines below 600 1/min is not implemented.
 """
 
+from typing import Literal
+
 import numpy as np
 
 from asperity.core.arrays import Field
@@ -26,15 +28,20 @@ ZONES = {
 }
 
 
-def velocity_rms(frequency_hz: Field, density: Field) -> float:
-    """Return the rms velocity from 10 to 1000 Hz [m/s], v² = Σ S_a/(2π f)² Δf.
+def velocity_rms(
+    frequency_hz: Field,
+    density: Field,
+    measured: Literal["acceleration", "velocity"] = "acceleration",
+) -> float:
+    """Return the rms velocity from 10 to 1000 Hz [m/s], v² = Σ S_a/(2π f)² Δf or Σ S_v Δf.
 
     The result is nan if the lines are too coarse or end below 1000 Hz.
 
     Parameters
     ----------
-    frequency_hz, density : power spectral density of an acceleration [(m/s²)²/Hz], on evenly spaced
-        lines from 0
+    frequency_hz, density : power spectral density of an acceleration [(m/s²)²/Hz] or a velocity
+        [(m/s)²/Hz], on evenly spaced lines from 0
+    measured : which of the two
 
     Examples
     --------
@@ -44,13 +51,15 @@ def velocity_rms(frequency_hz: Field, density: Field) -> float:
     >>> f"{velocity_rms(frequency_hz, np.full(1001, 1e-3)) * 1e3:.2f} mm/s"
     '1.62 mm/s'
     """
+    require_choice("measured", measured, ("acceleration", "velocity"))
     spacing = float(frequency_hz[1])
     if spacing > MAX_SPACING_HZ or frequency_hz[-1] < HIGHEST_HZ:
         return float("nan")
     inside = (frequency_hz >= LOWEST_HZ) & (frequency_hz <= HIGHEST_HZ)
-    return float(
-        np.sqrt(np.sum(density[inside] / (2.0 * np.pi * frequency_hz[inside]) ** 2) * spacing)
-    )
+    squares = density[inside]
+    if measured == "acceleration":
+        squares = squares / (2.0 * np.pi * frequency_hz[inside]) ** 2
+    return float(np.sqrt(np.sum(squares) * spacing))
 
 
 def severity_zone(velocity: float, machine_class: str) -> str:

@@ -1,6 +1,7 @@
 from .check import Quality as Quality
 from .check import SampleStatistics as SampleStatistics
 from .check import check_recording as check_recording
+from .file_dates import name_order_remark as name_order_remark
 from .model import ACCELERATION as ACCELERATION
 from .model import Channel as Channel
 from .model import Fact as Fact
@@ -17,3 +18,4 @@ from .sidecar import read_sidecar as read_sidecar
 from .sidecar import sidecar_names as sidecar_names
 from .timing import is_time_column as is_time_column
 from .units import name_and_unit as name_and_unit
+from .units import time_scale as time_scale

@@ -5,6 +5,7 @@ it.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,14 @@ import numpy.typing as npt
 
 from asperity.core.errors import UnreadableFile
 from asperity.recording.model import Channel, Contents
-from asperity.recording.reader import columns, numeric, reject_as, stated_facts
+from asperity.recording.reader import (
+    FEWEST_SAMPLES,
+    columns,
+    holds_series,
+    numeric,
+    reject_as,
+    stated_facts,
+)
 
 _MAX_DEPTH = 8  # levels of nested groups
 
@@ -54,7 +62,11 @@ def _channels(
     attributes = inherited | dict(group.attrs)
     members = [(str(key), group.get(key)) for key in group if not str(key).startswith("#")]
     for key, member in members:
-        if isinstance(member, h5py.Dataset) and member.size is not None and member.size <= 64:
+        if (
+            isinstance(member, h5py.Dataset)
+            and member.size is not None
+            and member.size <= FEWEST_SAMPLES
+        ):
             attributes[key] = _scalar(member)
     for key, member in members:
         path_in_file = f"{name}/{key}" if name else key
@@ -64,13 +76,13 @@ def _channels(
             isinstance(member, h5py.Dataset)
             and numeric(member)
             and member.size is not None
-            and member.size > 64
+            and holds_series(member.shape, member.dtype.kind)
         ):
             facts = stated_facts(path.name, attributes | dict(member.attrs))
             packed = _packing(member, "scale_factor", 1.0), _packing(member, "add_offset", 0.0)
-            yield from columns(
-                path_in_file, _OnDisk(path, member.name, member.shape, packed), notes, **facts
-            )
+            stored = _OnDisk(path, member.name, member.shape, packed)
+            for channel in columns(path_in_file, stored, notes, **facts):
+                yield replace(channel, short=member.size <= FEWEST_SAMPLES)
 
 
 def _packing(member: Any, name: str, usual: float) -> float:

@@ -4,6 +4,7 @@ A rate or unit in a struct applies to the arrays in it.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,14 @@ import numpy.typing as npt
 import scipy
 
 from asperity.recording.model import ChannelFacts, Contents
-from asperity.recording.reader import columns, numeric, reject_as, stated_facts
+from asperity.recording.reader import (
+    FEWEST_SAMPLES,
+    columns,
+    holds_series,
+    numeric,
+    reject_as,
+    stated_facts,
+)
 
 _MAX_DEPTH = 8
 
@@ -38,7 +46,9 @@ def read(path: Path) -> Contents:
         variables = {key: value for key, value in variables.items() if not key.startswith("__")}
         rows = list(_rows(path.name, variables, "", {}))
     channels = [
-        channel for name, values, facts in rows for channel in columns(name, values, notes, **facts)
+        replace(channel, short=values.size <= FEWEST_SAMPLES)
+        for name, values, facts in rows
+        for channel in columns(name, values, notes, **facts)
     ]
     return Contents(format="mat v5", channels=channels, notes=notes)
 
@@ -64,9 +74,15 @@ def _rows(
             for number, entry in enumerate(value.reshape(-1)[:64], 1):
                 if fields := _fields(entry):
                     yield from _rows(file, fields, f"{full_name}({number})", scalars)
-                elif isinstance(entry, np.ndarray) and numeric(entry) and entry.size > 64:
+                elif (
+                    isinstance(entry, np.ndarray) and numeric(entry) and entry.size > FEWEST_SAMPLES
+                ):
                     yield f"{full_name}({number})", entry, stated_facts(file, scalars)
-        elif isinstance(value, np.ndarray) and numeric(value) and value.size > 64:
+        elif (
+            isinstance(value, np.ndarray)
+            and numeric(value)
+            and holds_series(value.shape, value.dtype.kind)
+        ):
             yield full_name, value, stated_facts(file, scalars)
 
 

@@ -15,6 +15,7 @@ from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.signals import Signal
 from asperity.core.third_party import suppress_output
+from asperity.recording.units import velocity_scale
 
 ACCELERATION = "m/s^2"
 UNKNOWN = "unknown"  # unit of values where nothing states one
@@ -39,6 +40,7 @@ class ChannelFacts(TypedDict, total=False):
     rate_source: str
     rate_hint: str
     unit: str
+    sensitivity: str
     started: datetime
 
 
@@ -58,8 +60,10 @@ class Channel:
     rate_source: str = "file"
     rate_hint: str = ""  # added to "states no sampling rate"
     unit: str | None = None
+    sensitivity: str | None = None  # of its sensor, such as 100 mV/g
     started: datetime | None = None
     full_scale: bool = False  # values are shares of the converter's full scale
+    short: bool = False  # a few values, such as times of a tacho's pulses: read by name only
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +73,11 @@ class Contents:
     format: str
     channels: Sequence[Channel]
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def recorded(self) -> list[Channel]:
+        """Channels that are recordings of a signal."""
+        return [channel for channel in self.channels if not channel.short]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,6 +154,11 @@ class OpenRecording:
     def comparable(self) -> bool:
         """True for accelerations: amplitudes such as CRFA can be compared with others."""
         return self.unit == ACCELERATION
+
+    @property
+    def velocity_factor(self) -> float | None:
+        """Metres per second in one `unit`; None if it is not a unit of velocity."""
+        return velocity_scale(self.unit)
 
     def blocks(self, samples: int = BLOCK) -> Iterator[Field]:
         """Yield the values in `unit`, at most `samples` at a time; NaN where missing or impossible.

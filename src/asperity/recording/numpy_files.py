@@ -14,9 +14,16 @@ from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.third_party import first_line
 from asperity.recording.model import Channel, Contents
-from asperity.recording.reader import MOST_CHANNELS, REMEDY, columns, reject_as, stated_facts
+from asperity.recording.reader import (
+    FEWEST_SAMPLES,
+    MOST_CHANNELS,
+    REMEDY,
+    columns,
+    holds_series,
+    reject_as,
+    stated_facts,
+)
 
-_SMALL = 64  # samples: shorter arrays describe the others
 _LARGEST_HEADER = 1 << 16
 Type: TypeAlias = np.dtype[Any]
 Header: TypeAlias = tuple[tuple[int, ...], bool, Type]  # shape, Fortran order, type
@@ -94,10 +101,10 @@ def read_npz(path: Path) -> Contents:
                 shape, fortran, dtype = _header(file)
                 count = int(np.prod(shape, dtype=object))
                 name = member.removesuffix(".npy")
-                if count <= _SMALL and dtype.kind in "iufUSM":
+                if count <= FEWEST_SAMPLES and dtype.kind in "iufUSM":
                     data = file.read(count * dtype.itemsize)
                     scalars[name] = np.frombuffer(data, dtype, count).reshape(shape)
-                elif dtype.kind in "iuf":
+                if dtype.kind in "iuf" and holds_series(shape, dtype.kind):
                     arrays.append((member, (shape, fortran, dtype)))
     facts = stated_facts(
         path.name,
@@ -133,7 +140,10 @@ def _member_channels(
         first, stride = (k * samples, 1) if rows_last else (k, count)
         blocks = partial(_unpacked, path, member, dtype, (first, stride, samples), notes)
         yield Channel(
-            name=name if count == 1 else f"{name}[{k + 1}]", blocks=blocks, samples=samples
+            name=name if count == 1 else f"{name}[{k + 1}]",
+            blocks=blocks,
+            samples=samples,
+            short=samples * count <= FEWEST_SAMPLES,
         )
 
 

@@ -4,8 +4,6 @@ Nothing is guessed: facts that neither the file, nor its sidecar, nor the caller
 requested.
 """
 
-import math
-import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -29,10 +27,8 @@ from asperity.recording import (
     uff,
     wav,
 )
+from asperity.recording.conversion import convert
 from asperity.recording.model import (
-    ACCELERATION,
-    FULL_SCALE,
-    UNKNOWN,
     Channel,
     Contents,
     Fact,
@@ -43,7 +39,6 @@ from asperity.recording.model import (
 from asperity.recording.reader import MOST_CHANNELS, REMEDY, parse_time
 from asperity.recording.sidecar import MACHINE_KEYS, OPERATING_KEYS, read_sidecar
 from asperity.recording.text_header import looks_like_text
-from asperity.recording.units import acceleration_scale
 
 _SAME_RATE = 1e-4  # relative difference of rates that agree
 _HEAD_BYTES = 4096
@@ -129,12 +124,12 @@ def open_channels(path: str | Path, **stated: Any) -> list[OpenRecording]:
         if (
             options.channel is not None
             or "channel" in read_sidecar(path)[0]
-            or len(contents.channels) == 1
+            or len(contents.recorded) == 1
         ):
             return [_open_chosen(path, contents, options)]
         opened_channels = [
             _open_chosen(path, contents, replace(options, channel=channel.name))
-            for channel in contents.channels
+            for channel in contents.recorded
         ]
     return [
         replace(opened, facts=opened.facts | {"channel": Fact(opened.channel.name, "file")})
@@ -177,7 +172,7 @@ def read_contents(path: Path) -> Contents:
             f"{REMEDY}"
         )
     require_unpacked(path, 8.0 * sum(channel.samples or 0 for channel in contents.channels), REMEDY)
-    if not contents.channels:
+    if not contents.recorded:
         raise UnreadableFile(
             f"{path.name} holds no row of samples; give a file with a recording in it"
         )
@@ -240,19 +235,8 @@ def _open_chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRe
         "channel": Fact(selected.name, requested.source),
         "rate": _rate(path, selected, stated.get("rate_hz")),
     }
-    notes: tuple[str, ...] = ()
-    total = 1.0
-    if (scale := stated.get("scale")) is not None:
-        total = _scale(scale)
-        facts["scale"] = Fact(total, scale.source)
-    facts["unit"] = _unit(path, selected, stated.get("unit"), scaled=scale is not None)
-    unit_text = str(facts["unit"].value)
-    to_metres = None if _is_force(selected.name, unit_text) else acceleration_scale(unit_text)
-    if to_metres is not None:
-        total, unit_text = total * to_metres, ACCELERATION
-    elif unit_text == "g":
-        unit_text = "gram-force"
-        notes = (f"g means grams of force, because the channel is called {selected.name}",)
+    conversion = convert(path, selected, stated)
+    facts |= conversion.facts
     facts |= {key: stated[key] for key in (*OPERATING_KEYS, *MACHINE_KEYS) if key in stated}
     started = stated.get("started") or _start(path, selected)
     if started is not None:
@@ -261,10 +245,10 @@ def _open_chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRe
         path=path,
         channel=selected,
         rate_hz=float(facts["rate"].value),
-        unit=unit_text,
-        scale=total,
+        unit=conversion.unit,
+        scale=conversion.scale,
         facts=facts,
-        first_notes=notes,
+        first_notes=conversion.notes,
         later_notes=contents.notes,
     )
 
@@ -278,15 +262,6 @@ def _stated_facts(path: Path, options: ReadOptions) -> dict[str, Fact]:
     }
 
 
-def _scale(stated: Fact) -> float:
-    scale = float(stated.value)
-    if not 0.0 < abs(scale) < math.inf:
-        raise BadInput(
-            f"scale must be finite and not 0, got {scale:g}; give `scale`, the value of a stored 1"
-        )
-    return scale
-
-
 def _start(path: Path, channel: Channel) -> Fact | None:
     """Return the start stated in the file or by its name, or None."""
     if channel.started is not None:
@@ -296,9 +271,11 @@ def _start(path: Path, channel: Channel) -> Fact | None:
 
 
 def _channel(path: Path, contents: Contents, requested: str | None) -> Channel:
-    channels = contents.channels
+    channels = sorted(contents.channels, key=lambda channel: channel.short)
     names = [channel.name for channel in channels]
     if requested is None:
+        channels = contents.recorded
+        names = [channel.name for channel in channels]
         if len(channels) == 1:
             return channels[0]
         rates = sorted({channel.rate_hz for channel in channels if channel.rate_hz is not None})
@@ -357,35 +334,3 @@ def _rate(path: Path, channel: Channel, stated: Fact | None) -> Fact:
             f"or state it as rate_hz in {path.name}.toml beside it"
         )
     return Fact(rate, stated.source)
-
-
-def _unit(path: Path, channel: Channel, stated: Fact | None, *, scaled: bool) -> Fact:
-    if stated is None:
-        if channel.full_scale:
-            return Fact(FULL_SCALE, "file (integer samples)")
-        return Fact(UNKNOWN, "not stated") if channel.unit is None else Fact(channel.unit, "file")
-    if channel.full_scale and not scaled:
-        raise BadInput(
-            f"{path.name} holds shares of full scale, so a unit needs its scale; "
-            f"give `scale`, the {stated.value} at full scale"
-        )
-    if channel.full_scale or channel.unit is None or scaled:
-        return stated
-    if not _same_unit(channel.unit, stated.value):
-        raise BadInput(
-            f"{path.name} states its unit as {channel.unit}, the {stated.source} as "
-            f"{stated.value}; remove the wrong one, or give its scale too"
-        )
-    return Fact(stated.value, "file")
-
-
-def _same_unit(unit: str, other: str) -> bool:
-    first = acceleration_scale(unit)
-    second = acceleration_scale(other)
-    return unit.strip().lower() == other.strip().lower() or (first is not None and first == second)
-
-
-def _is_force(name: str, unit: str) -> bool:
-    """Return whether "g" means grams of force, as in friction testers' force channels."""
-    last = name.split("/")[-1].split(".")[-1]
-    return unit == "g" and re.fullmatch(r"(?i)F[xyznfrt]?|.*(force|load|kraft).*", last) is not None

@@ -14,8 +14,11 @@ from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile
 from asperity.core.third_party import first_line
 from asperity.recording.model import Channel, ChannelFacts
+from asperity.recording.sensitivity import sensitivity_text
 from asperity.recording.units import RATE_NAMES, START_NAMES, STEP_NAMES, UNIT_NAMES, stated
 
+FEWEST_SAMPLES = 64  # of an array that is a channel; shorter ones describe it
+FEWEST_PULSES = 4  # of an array that may hold times of pulses
 MOST_CHANNELS = 512  # an array with more columns is not a recording
 REMEDY = "copy or export it again"
 
@@ -34,7 +37,7 @@ def reject_as(path: Path, description: str) -> Iterator[None]:
 
 
 def stated_facts(name: str, attributes: Mapping[str, object]) -> ChannelFacts:
-    """Return `rate_hz`, `rate_source`, `unit`, `started` of a channel, as far as stated.
+    """Return `rate_hz`, `rate_source`, `unit`, `sensitivity`, `started` of a channel, if stated.
 
     Raises
     ------
@@ -65,6 +68,8 @@ def stated_facts(name: str, attributes: Mapping[str, object]) -> ChannelFacts:
         text = _text(value)
         if text:
             facts["unit"] = text
+    if sensitivity := sensitivity_text(attributes.items()):
+        facts["sensitivity"] = sensitivity
     for _, value in stated(attributes.items(), START_NAMES):
         started = parse_time(value)
         if started is not None:
@@ -212,6 +217,13 @@ def _row(array: StoredArray, k: int, first: int, last: int) -> Field:
     along = int(np.argmax(array.shape))
     where = (slice(first, last) if axis == along else k for axis in range(len(array.shape)))
     return np.asarray(array[tuple(where)])
+
+
+def holds_series(shape: tuple[int, ...], kind: str) -> bool:
+    """Return whether an array holds samples, or at least a `short` row such as times of pulses."""
+    size = int(np.prod(shape, dtype=object))
+    few = size >= FEWEST_PULSES and kind == "f" and sum(n != 1 for n in shape) == 1
+    return size > FEWEST_SAMPLES or few
 
 
 def numeric(array: object) -> bool:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from asperity.core.errors import BadInput
 from asperity.recording.reader import parse_time
+from asperity.recording.sensitivity import parse_sensitivity
 
 FOLDER_WIDE = "recordings"
 OPERATING_KEYS = (
@@ -30,7 +31,15 @@ MACHINE_KEYS = (
     "pulses_per_turn",
     "condition_channels",
 )
-SIDECAR_KEYS = ("rate_hz", "unit", "channel", "scale", "started", *MACHINE_KEYS, *OPERATING_KEYS)
+SIGNAL_KEYS = (
+    "rate_hz",
+    "unit",
+    "channel",
+    "scale",
+    "sensitivity",
+    "started",
+)
+SIDECAR_KEYS = (*SIGNAL_KEYS, *MACHINE_KEYS, *OPERATING_KEYS)
 SUFFIXES = (".toml", ".json")
 TEXT_KEYS = ("channel", "tacho", "sensor")  # which may be numbers
 MACHINE_CLASSES = (
@@ -90,6 +99,11 @@ def _checked(path: Path) -> dict[str, object]:
                 f"{path.name}: started must be a date and time such as 2025-01-31 12:00:00"
             )
         stated["started"] = started
+    if "sensitivity" in stated:
+        try:
+            parse_sensitivity(str(stated["sensitivity"]))
+        except BadInput as refusal:
+            raise BadInput(f"{path.name}: {refusal}") from None
     return stated | {key: str(stated[key]) for key in TEXT_KEYS if key in stated}
 
 
@@ -118,8 +132,8 @@ def _requirement(key: str, value: object) -> tuple[bool, str]:
         return 0.0 < size < math.inf, "be a positive number"
     if key == "machine_class":
         return value in MACHINE_CLASSES, f"be one of {', '.join(MACHINE_CLASSES)}"
-    if key in ("unit", *TEXT_KEYS):
-        return isinstance(value, str) or (key != "unit" and number is not None), "be text"
+    if key in ("unit", "sensitivity", *TEXT_KEYS):
+        return isinstance(value, str) or (key in TEXT_KEYS and number is not None), "be text"
     return _table_requirement(key, value)
 
 

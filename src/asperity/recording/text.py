@@ -216,7 +216,8 @@ def _channels(
         if k == clock_at:
             continue
         unit = table.units[k]
-        column_facts: ChannelFacts = facts | {"unit": unit} if unit else facts
+        column_facts = _of_column(facts, table, k, clock_at)
+        column_facts |= {"unit": unit} if unit else {}
         if open_bytes is None:
             values = fill(rows[:, k])
             blocks = partial(_pieces, values)
@@ -256,6 +257,18 @@ def _combined_facts(
             f"times {clock['rate_hz']:g} Hz; the times are used"
         )
     return facts | clock
+
+
+def _of_column(
+    facts: ChannelFacts, table: TextTable, column: int, clock_at: int | None
+) -> ChannelFacts:
+    """Return the facts of one column, with its own sensitivity where the header lists several."""
+    several = facts.get("sensitivity", "").split("; ")
+    channels = [k for k in range(table.columns) if k != clock_at]
+    numbers = channels if len(several) == len(channels) else range(len(several))
+    if len(several) < 2 or len(several) not in (len(channels), table.columns):
+        return facts.copy()
+    return facts | {"sensitivity": several[list(numbers).index(column)]}
 
 
 def _unique(names: list[str]) -> list[str]:

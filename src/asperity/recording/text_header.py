@@ -151,7 +151,7 @@ def _declared(header: list[str]) -> dict[str, str]:
     for line in header:
         pair = re.match(
             r"[#%/\s\"]*([A-Za-z][^:=;\t]{0,40}?)\"?\s*[:=;\t]\s*\"?(.+?)\"?[;\t,\s]*$", line
-        )
+        ) or re.match(r"(?i)[#%/\s\"]*(sensitivity[^,:=;\t]*)\"?,\s*\"?(.+?)\"?[,\s]*$", line)
         if not pair:
             continue
         key = re.sub(r"\s*[\[(]\s*(hz|s|sec)\s*[\])]\s*$", "", pair[1].strip(), flags=re.I)

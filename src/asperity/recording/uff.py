@@ -95,10 +95,14 @@ def _channel(path: Path, record: dict[str, Any], notes: list[str], names: list[s
     step = float(record["abscissa_inc"])
     name = _name(record, names)
     unit = str(record.get("ordinate_axis_units_lab", "")).strip()
-    samples = int(values.size)
     stated = int(record["num_pts"])
+    beyond = values[stated:]  # a last line is filled with zeros
+    values = values[:stated] if stated > 0 else values
+    samples = int(values.size)
     if samples < stated:
         notes.append(f"cut short: {samples} of {stated} samples present")
+    elif stated > 0 and beyond.any():
+        notes.append(f"{beyond.size} values beyond the stated {stated} samples were left out")
     started = next(
         (time for key in ("id3", "id2", "id4", "id5") if (time := parse_time(record.get(key, "")))),
         None,

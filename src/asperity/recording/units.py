@@ -1,4 +1,4 @@
-"""Units of acceleration as written in files, and names under which files state rate, unit or step.
+"""Units as written in files, and names under which files state rate, unit or step.
 
 A table on purpose: to a general unit library, "g" is a gram.
 """
@@ -26,6 +26,24 @@ _ACCELERATIONS = {
     "ug": 1e-6 * STANDARD_GRAVITY,
     "kg": None,  # a mass
 }
+_VELOCITIES = {
+    "m/s": 1.0,
+    "cm/s": 1e-2,
+    "mm/s": 1e-3,
+    "um/s": 1e-6,
+    "in/s": 0.0254,
+    "ft/s": 0.3048,
+    "ips": 0.0254,
+}
+_VOLTAGES = {
+    "v": 1.0,
+    "volt": 1.0,
+    "volts": 1.0,
+    "mv": 1e-3,
+    "millivolt": 1e-3,
+    "millivolts": 1e-3,
+    "uv": 1e-6,
+}
 _TIMES = {
     "s": 1.0,
     "sec": 1.0,
@@ -43,16 +61,11 @@ _TIMES = {
     "h": 3600.0,
 }
 _OTHERS = {
-    "v",
-    "mv",
     "pa",
     "n",
     "kn",
     "mm",
     "um",
-    "mm/s",
-    "m/s",
-    "in/s",
     "°c",
     "degc",
     "rpm",
@@ -61,7 +74,6 @@ _OTHERS = {
     "a",
     "q",
     "nm",
-    "mm/sec",
     "bar",
     "kpa",
     "mpa",
@@ -72,6 +84,9 @@ _OTHERS = {
 
 _PER_SECOND_SQUARED = re.compile(
     r"^([kcmu]?m|in|ft)(?:\s*[*·.]?\s*s(?:ec)?\^?-2|/s(?:ec)?\^?2|/s/s|/\(s\^?2\)|/sec/sec)$"
+)
+_PER_SECOND = re.compile(
+    r"^([cmu]?m|in|ft)(?:ch)?\s*(?:[*·.]?\s*s(?:ec)?\^?-1|/\s*s(?:ec)?)(?:[\s_-]*rms)?$"
 )
 
 RATE_NAMES = {
@@ -127,6 +142,16 @@ def acceleration_scale(unit: str) -> float | None:
     return _ACCELERATIONS.get(_plain(unit))
 
 
+def velocity_scale(unit: str) -> float | None:
+    """Return metres per second in one `unit`; None for other units."""
+    return _VELOCITIES.get(_PER_SECOND.sub(r"\1/s", _plain(unit)))
+
+
+def voltage_scale(unit: str) -> float | None:
+    """Return volts in one `unit`; None for other units."""
+    return _VOLTAGES.get(_plain(unit))
+
+
 def time_scale(unit: str) -> float | None:
     """Return seconds in one `unit`; None for other units."""
     return _TIMES.get(_plain(unit))
@@ -135,7 +160,8 @@ def time_scale(unit: str) -> float | None:
 def known_unit(text: str) -> bool:
     """Return whether the text is a unit, as opposed to the end of a name."""
     return bool(text) and (
-        _plain(text) in _ACCELERATIONS or _plain(text) in _TIMES or _plain(text) in _OTHERS
+        velocity_scale(text) is not None
+        or any(_plain(text) in units for units in (_ACCELERATIONS, _VOLTAGES, _TIMES, _OTHERS))
     )
 
 
@@ -148,6 +174,7 @@ def _plain(unit: str) -> str:
         .replace("µ", "u")
         .replace("μ", "u")
         .replace("⁻^2", "-2")
+        .replace("⁻¹", "-1")
     )
     return _PER_SECOND_SQUARED.sub(r"\1/s^2", text)
 

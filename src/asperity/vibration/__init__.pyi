@@ -10,9 +10,12 @@ from .excitation import PatchAverage as PatchAverage
 from .excitation import PatchShape as PatchShape
 from .excitation import SurfaceTrack as SurfaceTrack
 from .excitation import white_noise as white_noise
+from .harmonics import HARMONICS as HARMONICS
+from .harmonics import attributed_power as attributed_power
+from .harmonics import separable_harmonics as separable_harmonics
+from .harmonics import tolerance_hz as tolerance_hz
 from .orders import Turning as Turning
 from .orders import resample_to_constant_speed as resample_to_constant_speed
-from .orders import turning_by_pulses as turning_by_pulses
 from .orders import turning_by_speed as turning_by_speed
 from .oscillator import RESPONSE_METHODS as RESPONSE_METHODS
 from .oscillator import SUBSTEPS as SUBSTEPS
@@ -23,3 +26,6 @@ from .oscillator import acceleration as acceleration
 from .oscillator import expected_spectrum as expected_spectrum
 from .oscillator import mass_motion as mass_motion
 from .oscillator import require_damping_ratio as require_damping_ratio
+from .tacho import are_times as are_times
+from .tacho import turning_by_pulses as turning_by_pulses
+from .tacho import turning_by_times as turning_by_times

@@ -1,21 +1,26 @@
 """Squared envelope of a frequency band, and its modulation depth at the fault rates of a machine.
 
-`machine` computes these rates; `wear` evaluates whether a depth grows.
+`machine` computes these rates; `trend` evaluates whether a depth grows.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
 from asperity.core.signals import taper
+from asperity.vibration.harmonics import (
+    HARMONICS,
+    attributed_power,
+    separable_harmonics,
+    tolerance_hz,
+)
 
 CHUNK_S = 4.0  # length of a Fourier transform [s]: lines 0.25 Hz apart
 BAND = (0.1, 0.4)  # of the sampling rate: above shafts and meshes, below the anti-alias filter
-HARMONICS = 3
-SLIP = 0.015  # relative tolerance of a rate: rolling elements slip by 1 to 2 %
 MIN_SAMPLES = 64  # of an envelope
+MIN_LINES = 4.0  # spectral lines below a rate
 
 
 class Envelope:
@@ -71,24 +76,35 @@ class Envelope:
         self.squares = float(np.sum(weights) ** 2)
         self.chunks += 1
 
+    def range_hz(self, samples: int) -> tuple[float, float]:
+        """Return the lowest and highest rate [Hz] that the envelope of so many samples resolves."""
+        size = min(samples, self.chunk)
+        if (BAND[1] - BAND[0]) * size < MIN_SAMPLES:
+            return np.inf, 0.0
+        return MIN_LINES * self.rate_hz / size, 0.5 * (BAND[1] - BAND[0]) * self.rate_hz
+
     def depths(self, rates_hz: Mapping[str, float]) -> dict[str, float]:
         """Return the modulation depth (rms over mean) at each rate [Hz] with its first harmonics.
 
-        nan if the record is too short or the band too narrow for the rate.
+        A harmonic that several rates share counts for the one whose own lines are present. nan if
+        the record is too short or the band too narrow for the rate.
         """
-        return {name: self._depth(rate) for name, rate in rates_hz.items()}
+        separable = separable_harmonics(rates_hz, self.spacing_hz)
+        return {name: self._depth(rate, separable[name]) for name, rate in rates_hz.items()}
 
-    def _depth(self, rate_hz: float) -> float:
-        if self.chunks == 0 or rate_hz < 4.0 * self.spacing_hz:
+    def _depth(self, rate_hz: float, separable: Sequence[int]) -> float:
+        if self.chunks == 0 or rate_hz < MIN_LINES * self.spacing_hz:
             return float("nan")
-        power = 0.0
-        for harmonic in range(1, HARMONICS + 1):
-            centre = harmonic * rate_hz / self.spacing_hz
-            reach = max(SLIP * harmonic * rate_hz / self.spacing_hz, 1.0)
-            lines = self.total[max(int(np.ceil(centre - reach)), 2) : int(centre + reach) + 1]
-            if harmonic == 1 and not lines.size:
-                return float("nan")
-            if lines.size:
-                power += 2.0 * float(lines.max()) / self.chunks / self.squares
+        powers = [self._power(number * rate_hz) for number in range(1, HARMONICS + 1)]
         mean = self.mean / self.chunks
-        return float(np.sqrt(power) / mean) if mean > 0.0 else float("nan")
+        if np.isnan(powers[0]) or not mean > 0.0:
+            return float("nan")
+        power = attributed_power(np.nan_to_num(powers).tolist(), separable)
+        return float(np.sqrt(power) / mean)
+
+    def _power(self, frequency_hz: float) -> float:
+        """Return the power of the highest line near a frequency; nan beyond the spectrum."""
+        centre = frequency_hz / self.spacing_hz
+        reach = tolerance_hz(frequency_hz, self.spacing_hz) / self.spacing_hz
+        lines = self.total[max(int(np.ceil(centre - reach)), 2) : int(centre + reach) + 1]
+        return 2.0 * float(lines.max()) / self.chunks / self.squares if lines.size else np.nan

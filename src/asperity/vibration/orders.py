@@ -1,6 +1,6 @@
-"""Order tracking: resample a vibration at constant shaft angle, by tacho pulses or a speed channel.
+"""Order tracking: resample a vibration at constant shaft angle, by a tacho or a speed channel.
 
-The orders of machine elements are in `machine`.
+`tacho` evaluates pulses. The orders of machine elements are in `machine`.
 """
 
 from typing import NamedTuple
@@ -9,51 +9,21 @@ import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
-from asperity.core.errors import BadInput, require_positive
+from asperity.core.errors import BadInput
 
 OVERSAMPLING = 2  # before the spline, which is accurate up to a third of its sampling rate
-MIN_PULSES = 4
 MIN_SPEED = 0.25  # of the mean speed; slower turning would need ever finer samples
-LEVELS = (0.25, 0.75)  # of a tacho's range; a pulse passes both, so that noise makes no pulses
-MAX_INTERVAL_RATIO = 4.0  # of pulse intervals to their median, either way
 
 
 class Turning(NamedTuple):
-    """Shaft angle [turns], shape (samples,), nan if unknown, and mean speed `speed_hz`."""
+    """Shaft angle [turns], shape (samples,), nan if unknown, and mean speed `speed_hz`.
+
+    `remarks` are sentences on corrections.
+    """
 
     turns: Field
     speed_hz: float
-
-
-def turning_by_pulses(pulses: Field, rate_hz: float, per_turn: float = 1.0) -> Turning:
-    """Return the shaft angle from the rising edges of a tacho signal.
-
-    Edges are located between samples and interpolated smoothly.
-
-    Raises
-    ------
-    BadInput
-        for fewer than four pulses, irregular pulse intervals, or pulses per turn that are not
-        positive.
-    """
-    require_positive("pulses per turn", per_turn)
-    edges = _rising(pulses)
-    if edges.size < MIN_PULSES:
-        raise BadInput(
-            f"the tacho signal has {edges.size} pulses, but {MIN_PULSES} are required; use "
-            "another channel"
-        )
-    intervals = np.diff(edges) / np.median(np.diff(edges))
-    if intervals.min() < 1.0 / MAX_INTERVAL_RATIO or intervals.max() > MAX_INTERVAL_RATIO:
-        raise BadInput(
-            f"the tacho's pulse intervals are {intervals.min():.2g} to {intervals.max():.2g} "
-            "times their median, which no shaft produces; use another channel"
-        )
-    angle = scipy.interpolate.PchipInterpolator(
-        edges, np.arange(edges.size) / per_turn, extrapolate=False
-    )
-    turns = angle(np.arange(pulses.size))
-    return Turning(turns, float((edges.size - 1) / per_turn / (edges[-1] - edges[0]) * rate_hz))
+    remarks: tuple[str, ...] = ()
 
 
 def turning_by_speed(speed_hz: Field, rate_hz: float) -> Turning:
@@ -105,23 +75,3 @@ def resample_to_constant_speed(
         oversampled, [OVERSAMPLING * positions], order=3, mode="mirror"
     )
     return np.asarray(resampled), rate_hz * step / slowest
-
-
-def _rising(pulses: Field) -> Field:
-    """Return the positions of rising edges [samples] between which the signal returns to low."""
-    # the full range, since a pulse may last two samples of ten thousand
-    low = float(np.nanmin(pulses))
-    high = float(np.nanmax(pulses))
-    middle = 0.5 * (low + high)
-    (low_level, high_level) = (low + level * (high - low) for level in LEVELS)
-    state = np.where(pulses > high_level, 1, np.where(pulses < low_level, -1, 0))
-    decided = np.flatnonzero(state)
-    edges = decided[1:][(state[decided[1:]] == 1) & (state[decided[:-1]] == -1)]
-    crossings = []
-    for edge in edges:
-        first = edge
-        while pulses[first - 1] > middle:
-            first -= 1
-        rise = pulses[first] - pulses[first - 1]
-        crossings.append(first - (pulses[first] - middle) / rise if rise > 0.0 else float(first))
-    return np.array(crossings)
