@@ -58,6 +58,7 @@ ABREAST = (
     ("sensors",),
     ("failures",),
     ("alarms", "soonest"),
+    ("level_alarms",),
     ("hostile",),
     ("motion_table",),
     ("robustness",),

@@ -1,16 +1,13 @@
 """Level rule on healthy and failing courses, beside CUSUM, EWMA and a doubled level.
 
 Courses are logarithmic levels. Healthy ones have 2000 recordings. Failing ones last 20 h and are
-sampled every 10 s, 1 min and 10 min. `python -m benchmarks.level_alarms` writes
-docs/benchmarks/level-alarms*.csv; `--whole` judges two series of each healthy kind by the whole
-alarm.
+sampled every 10 s, 1 min and 10 min. `python -m benchmarks.level_alarms` runs this part alone;
+`--fast` uses a tenth of the series, `--whole` judges two of each healthy kind by the whole alarm.
 """
 
 import argparse
-import csv
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +17,6 @@ from asperity.trend import LevelMonitor, MonitoredSeries, RecordingStatus, seque
 
 Levels = np.ndarray
 Course = Callable[[np.random.Generator, int], Levels]
-FOLDER = Path(__file__).parents[1] / "docs" / "benchmarks"
 SERIES, RECORDINGS = 50, 2000
 LIFE_S, SAMPLING_S = 72_000.0, (10.0, 60.0, 600.0)
 LATEST_S = 300.0  # before the end, for an alarm in time
@@ -195,9 +191,9 @@ FAILING: dict[str, Course] = {
 def level_rule(levels: Levels, state: str) -> int | None:
     """Return when the level rule first reports a state, or a more severe one."""
     monitor = LevelMonitor()
-    wanted = {"alert": ("alert", "alarm"), "alarm": ("alarm",)}[state]
+    reported = {"alert": ("alert", "alarm"), "alarm": ("alarm",)}[state]
     for number, level in enumerate(levels):
-        if monitor.update(float(level)).state in wanted:
+        if monitor.update(float(level)).state in reported:
             return number
     return None
 
@@ -247,44 +243,46 @@ RULES: dict[str, Callable[[Levels], int | None]] = {
 }
 
 
-class Failing(NamedTuple):
-    """Share of failing courses reported in time, and the median delay [recordings]."""
+class Reported(NamedTuple):
+    """Share of failing courses reported early enough, and the median delay [recordings]."""
 
-    in_time: float
+    share: float
     delay: float
-
-
-def healthy_rows(series: int) -> Iterator[list[str]]:
-    """Yield the share of healthy series of each kind that each rule reports."""
-    yield ["healthy course", *RULES]
-    for kind, course in HEALTHY.items():
-        drawn = [course(np.random.default_rng([1, seed]), RECORDINGS) for seed in range(series)]
-        shares = [
-            sum(rule(levels) is not None for levels in drawn) / series for rule in RULES.values()
-        ]
-        yield [kind, *(f"{100.0 * share:.0f} %" for share in shares)]
 
 
 def failing(
     course: Course, rule: Callable[[Levels], int | None], every_s: float, series: int
-) -> Failing:
+) -> Reported:
     """Return how a rule reports a failing course."""
     count = round(LIFE_S / every_s)
     found = [rule(course(np.random.default_rng([2, seed]), count)) for seed in range(series)]
     last = count - 1 - max(1, round(LATEST_S / every_s))
-    in_time = [number for number in found if number is not None and count // 2 <= number <= last]
-    delay = float(np.median(in_time)) - count / 2.0 if in_time else np.nan
-    return Failing(len(in_time) / series, delay)
+    early = [number for number in found if number is not None and count // 2 <= number <= last]
+    delay = float(np.median(early)) - count / 2.0 if early else np.nan
+    return Reported(len(early) / series, delay)
 
 
-def failing_rows(series: int) -> Iterator[list[str]]:
-    """Yield the share reported in time, and the median delay after half the life."""
-    yield ["failing course", "every", *RULES]
+def lines(*, fast: bool = False) -> Iterator[str]:
+    """Yield Markdown lines; `fast` uses a tenth of the series."""
+    series = SERIES // 10 if fast else SERIES
+    yield f"## Levels: {series} series per row, share reported by each rule\n"
+    yield f"| healthy course | {' | '.join(RULES)} |"
+    yield "|---" * (1 + len(RULES)) + "|"
+    for kind, course in HEALTHY.items():
+        drawn = [course(np.random.default_rng([1, seed]), RECORDINGS) for seed in range(series)]
+        shares = [
+            100.0 * sum(rule(levels) is not None for levels in drawn) / series
+            for rule in RULES.values()
+        ]
+        yield f"| {kind} | {' | '.join(f'{share:.0f} %' for share in shares)} |"
+    yield ""
+    yield f"| failing course | every | {' | '.join(RULES)} |"
+    yield "|---" * (2 + len(RULES)) + "|"
     for kind, course in FAILING.items():
         for every_s in SAMPLING_S:
-            outcomes = [failing(course, rule, every_s, series) for rule in RULES.values()]
-            cells = [f"{100.0 * in_time:.0f} % ({delay:.0f})" for in_time, delay in outcomes]
-            yield [kind, f"{every_s:g} s", *cells]
+            reported = [failing(course, rule, every_s, series) for rule in RULES.values()]
+            cells = [f"{100.0 * share:.0f} % ({delay:.0f})" for share, delay in reported]
+            yield f"| {kind} | {every_s:g} s | {' | '.join(cells)} |"
 
 
 def whole_alarm(levels: Levels) -> list[str]:
@@ -300,30 +298,20 @@ def whole_alarm(levels: Levels) -> list[str]:
     return [*sequential_alarm(number, [series], [RecordingStatus()] * levels.size).states]
 
 
-def main() -> None:
-    """Write the tables, or judge a few series by the whole alarm."""
-    arguments = argparse.ArgumentParser(prog="python -m benchmarks.level_alarms")
-    arguments.add_argument("--series", type=int, default=SERIES)
-    arguments.add_argument("--whole", action="store_true")
-    options = arguments.parse_args()
-    if options.whole:
-        for kind, course in HEALTHY.items():
-            states = [
-                whole_alarm(course(np.random.default_rng([1, seed]), RECORDINGS))
-                for seed in range(2)
-            ]
-            counts = [f"{name} {sum(name in of for of in states)}" for name in ("alert", "alarm")]
-            print(f"{kind}: {', '.join(counts)} of 2", flush=True)
-        return
-    for name, rows in (
-        ("level-alarms.csv", healthy_rows(options.series)),
-        ("level-alarms-2.csv", failing_rows(options.series)),
-    ):
-        with (FOLDER / name).open("w", newline="") as file:
-            for row in rows:
-                csv.writer(file).writerow(row)
-                print(*row, sep=", ", flush=True)
+def whole_lines() -> Iterator[str]:
+    """Yield how many of two healthy series of each kind the whole alarm reports."""
+    for kind, course in HEALTHY.items():
+        states = [
+            whole_alarm(course(np.random.default_rng([1, seed]), RECORDINGS)) for seed in range(2)
+        ]
+        counts = [f"{name} {sum(name in of for of in states)}" for name in ("alert", "alarm")]
+        yield f"{kind}: {', '.join(counts)} of 2"
 
 
 if __name__ == "__main__":
-    main()
+    arguments = argparse.ArgumentParser(prog="python -m benchmarks.level_alarms")
+    arguments.add_argument("--fast", action="store_true", help="use a tenth of the series")
+    arguments.add_argument("--whole", action="store_true", help="judge by the whole alarm")
+    options = arguments.parse_args()
+    for line in whole_lines() if options.whole else lines(fast=options.fast):
+        print(line, flush=True)
