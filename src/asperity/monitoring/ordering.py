@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from asperity.core.documents import JsonObject
-from asperity.monitoring.alarm import BASELINE, LAST
+from asperity.monitoring.alarm import LAST
 from asperity.monitoring.files import RecordingPlace, RecordingTable, place_at, x_of_recordings
 from asperity.monitoring.simultaneous import (
     PlacedRecording,
@@ -17,8 +17,7 @@ from asperity.monitoring.simultaneous import (
 )
 from asperity.monitoring.store.database import FileVersion, StoredRecording
 from asperity.monitoring.store.sensors import Sensors
-
-LATEST = 112  # recordings judged with the first BASELINE of a long series: the alarm's memory
+from asperity.trend import FIRST_JUDGED, LATEST_JUDGED
 
 
 class Order(NamedTuple):
@@ -179,14 +178,14 @@ def _wait_notes(waits: Sequence[FileVersion], reason: str, remedy: str) -> tuple
 
 def max_window() -> int:
     """Return the length up to which all recordings of a series are judged."""
-    return BASELINE + LATEST
+    return FIRST_JUDGED + LATEST_JUDGED
 
 
 def judged_window(order: Order, end: int, sensors: Sensors) -> list[FileVersion]:
     """Return the files judged up to `end`.
 
-    Of a long series these are the first after the last acknowledgement, the latest, and the one
-    that raised the standing alarm.
+    Of a long series these are the first after the last acknowledgement, the latest ones of every
+    recording that is not judged yet, and the one that raised the standing alarm.
     """
     instants = order.instants[:end]
     chosen = {*range(end)}
@@ -201,7 +200,10 @@ def judged_window(order: Order, end: int, sensors: Sensors) -> list[FileVersion]
                 if acknowledged in map(file_name, keys)
             )
             start = next(numbers, 0)
-        chosen = {*range(start, min(start + BASELINE, end)), *range(end - LATEST, end)}
+        unjudged = sensors.unjudged()
+        new = sum(unjudged.issuperset(keys) for keys in instants[-LATEST_JUDGED:])
+        latest = max(end - LATEST_JUDGED - max(new - 1, 0), 0)
+        chosen = {*range(start, min(start + FIRST_JUDGED, end)), *range(latest, end)}
         if standing is not None:
             chosen |= {
                 number

@@ -4,6 +4,8 @@ from .alarm import FALSE_ALARM_RATE as FALSE_ALARM_RATE
 from .alarm import Alarm as Alarm
 from .alarm import knee_weight as knee_weight
 from .alarm import sequential_alarm as sequential_alarm
+from .alarm_inputs import FIRST_JUDGED as FIRST_JUDGED
+from .alarm_inputs import LATEST_JUDGED as LATEST_JUDGED
 from .alarm_inputs import AlarmChecks as AlarmChecks
 from .alarm_inputs import AlarmHistory as AlarmHistory
 from .alarm_inputs import AlarmState as AlarmState

@@ -21,6 +21,7 @@ from asperity.trend.alarm_inputs import (
     LevelMemory,
     MonitoredSeries,
     RecordingStatus,
+    judged_rows,
 )
 from asperity.trend.level_monitors import LevelJudgement, LevelMonitors
 from asperity.trend.regressors import BASELINE_RECORDINGS, Condition
@@ -223,8 +224,9 @@ class _Assessment(NamedTuple):
 
 
 def _assess(series: MonitoredSeries, x: Field, first: int, last: int) -> _Assessment:
-    values, fitted = series.at_baseline_conditions(first, last + 1)
-    point_x, (level, *rows) = _averaged_repeats(x[first : last + 1], values, fitted.rows)
+    judged = judged_rows(first, last)
+    values, fitted = series.part(judged).at_baseline_conditions()
+    point_x, (level, *rows) = _averaged_repeats(x[judged], values, fitted.rows)
     conditions = ConditionRows(np.array(rows), fitted.scatter / fitted.widths) if rows else None
     test = knee_test if series.contact else growth_test
     change, stepped = (

@@ -6,6 +6,7 @@ from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.core.arrays import Field
 from asperity.core.documents import JsonObject
@@ -17,6 +18,17 @@ from asperity.trend.regressors import (
 )
 
 AlarmState = Literal["none", "alert", "alarm", "blind", "cannot-tell"]
+
+
+FIRST_JUDGED, LATEST_JUDGED = 8, 112  # recordings that judge the last one of a long series
+
+
+def judged_rows(first: int, last: int) -> NDArray[np.intp]:
+    """Return the recordings that judge `last`: the first ones from `first` on, and the latest."""
+    start = max(last - LATEST_JUDGED + 1, first)
+    return np.concatenate(
+        [np.arange(first, min(first + FIRST_JUDGED, start)), np.arange(start, last + 1)]
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,11 +62,17 @@ class MonitoredSeries:
     conditions: tuple[Condition, ...] = ()
     relative: bool = False
 
-    def at_baseline_conditions(
-        self, first: int = 0, last: int | None = None
-    ) -> tuple[Field, ConditionEffect]:
-        """Return the values of a range of recordings, corrected to the baseline's conditions."""
-        part = slice(first, last)
+    def part(self, rows: NDArray[np.intp]) -> "MonitoredSeries":
+        """Return the series of some recordings."""
+        conditions = tuple(
+            replace(condition, values=condition.values[rows], shown=condition.shown[rows])
+            for condition in self.conditions
+        )
+        return replace(self, values=self.values[rows], conditions=conditions)
+
+    def at_baseline_conditions(self, first: int = 0) -> tuple[Field, ConditionEffect]:
+        """Return the values from a recording on, corrected to the baseline's conditions."""
+        part = slice(first, None)
         values = self.values[part]
         if not self.conditions:
             return values, NO_CONDITION_EFFECT

@@ -2,15 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
+from asperity.trend.alarm_inputs import NO_MEMORY, LevelMemory, MonitoredSeries, judged_rows
+from asperity.trend.level_rule import LevelMonitor, LevelState
 
-from asperity.trend.alarm_inputs import NO_MEMORY, LevelMemory, MonitoredSeries
-from asperity.trend.level_rule import FEWEST_VALUES, LevelMonitor, LevelState
-
-LATEST_CONDITIONS = 112  # recordings that determine the effect of conditions, with the first ones
 STATES: tuple[LevelState, ...] = ("none", "alert", "alarm")
 
 
@@ -92,14 +88,5 @@ class LevelMonitors:
         """Return the level of a recording at the conditions of the baseline."""
         if not series.conditions or not math.isfinite(series.values[number]):
             return float(series.values[number])
-        start = max(number - LATEST_CONDITIONS + 1, self._first)
-        rows = np.r_[self._first : min(self._first + FEWEST_VALUES, start), start : number + 1]
-        part = replace(
-            series,
-            values=series.values[rows],
-            conditions=tuple(
-                replace(condition, values=condition.values[rows], shown=condition.shown[rows])
-                for condition in series.conditions
-            ),
-        )
-        return float(part.at_baseline_conditions()[0][-1])
+        rows = judged_rows(self._first, number)
+        return float(series.part(rows).at_baseline_conditions()[0][-1])
