@@ -39,6 +39,8 @@ SOURCES = [
         for name in (
             "alarm",
             "alarm_inputs",
+            "level_monitors",
+            "level_rule",
             "sequential",
             "regressors",
             "warming",
@@ -340,18 +342,13 @@ def judged(course: Drawn) -> Alarm:
     ]
 
     def severe(number: int) -> bool:
-        reference = crf.at_baseline_conditions(0, number + 1)[0]
+        reference = crf.part(np.arange(number + 1)).at_baseline_conditions()[0]
         return split_stages(NUMBER[: number + 1], CRF_HZ * reference).kind == "severe"
 
-    sight = (
-        RecordingStatus()
-        if np.isfinite(course.crf).any()
-        else RecordingStatus("cannot-tell", "no contact resonance")
-    )
     watched = [crf, *levels] if np.isfinite(course.crf).any() else levels
     excuses = Warming(NUMBER, watched[:1], levels, "").excuses
     return sequential_alarm(
-        NUMBER, watched, [sight] * RECORDINGS, checks=AlarmChecks(severe, excuses)
+        NUMBER, watched, [RecordingStatus()] * RECORDINGS, checks=AlarmChecks(severe, excuses)
     )
 
 
@@ -392,11 +389,8 @@ def lines(*, fast: bool = False) -> Iterator[str]:
         f"## Alarms: {series} series of {RECORDINGS} recordings per row, one false alarm in"
         f" {1.0 / FALSE_ALARM_RATE:.0f}\n"
     )
-    yield (
-        "| series without wear | alarm at any time | alert at any time | cannot-tell after the"
-        " baseline |"
-    )
-    yield "|---|---|---|---|"
+    yield "| series without wear | alarm at any time | alert at any time |"
+    yield "|---|---|---|"
     for name, draw in (WITHOUT_WEAR | GIVEN).items():
         yield f"| {name} | {rows.row(f'{series} {name}', partial(quiet_row, draw, series))} |"
     yield (
@@ -416,7 +410,7 @@ def quiet_row(draw: Callable[[np.random.Generator], Drawn], series: int) -> str:
     ]
     shares = [
         100.0 * np.mean([kind in series_states for series_states in states])
-        for kind in ("alarm", "alert", "cannot-tell")
+        for kind in ("alarm", "alert")
     ]
     return " | ".join(f"{share:.1f} %" for share in shares)
 
