@@ -58,6 +58,9 @@ def test_the_action_block_states_finding_start_confidence_and_action(failing):
     assert entries["Action"].startswith("Find the source of the increase")
 
 
+LASTING = "alert, if it lasts", "alarm, if it lasts"
+
+
 def test_levels_are_drawn_relative_to_the_first_with_the_alarm_threshold(failing):
     with_fault = [
         replace(
@@ -68,11 +71,11 @@ def test_levels_are_drawn_relative_to_the_first_with_the_alarm_threshold(failing
     ]
     figure = levels(replace(failing, recordings=tuple(with_fault))).draw(ON_PAGE)
     drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in figure.axes[0].get_lines()}
-    assert set(drawn) == {"rms", "kurtosis", "envelope BPFO", "alarm threshold"}
+    assert set(drawn) == {"rms", "kurtosis", "envelope BPFO", *LASTING}
     assert drawn["rms"][-1] == pytest.approx(20.0, rel=0.1)
     assert drawn["envelope BPFO"][-1] == pytest.approx(1.1**31.5, rel=0.01)
     assert drawn["kurtosis"] == pytest.approx(np.ones(36), abs=0.2)
-    assert drawn["alarm threshold"][0] == pytest.approx(2.0)
+    assert [drawn[label][0] for label in LASTING] == [2.0, 4.0]
     assert "Levels, bands and fault frequencies" in render_track_page(failing)
     assert levels(replace(failing, recordings=failing.recordings[:1])) is None
 

@@ -19,6 +19,8 @@ from .comparison import asperity_load_share as asperity_load_share
 from .comparison import comparability as comparability
 from .level_monitors import LevelJudgement as LevelJudgement
 from .level_monitors import LevelMonitors as LevelMonitors
+from .level_rule import ALARM_FACTOR as ALARM_FACTOR
+from .level_rule import ALERT_FACTOR as ALERT_FACTOR
 from .level_rule import LevelFinding as LevelFinding
 from .level_rule import LevelMonitor as LevelMonitor
 from .regressors import Condition as Condition

@@ -12,7 +12,7 @@ from asperity.core.arrays import Field
 from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.errors import BadInput
 from asperity.core.quantities import in_print, quantity
-from asperity.monitoring import BASELINE, LEVEL_LEAST, Track, TrackedRecording
+from asperity.monitoring import BASELINE, Track, TrackedRecording
 from asperity.report.base import Exhibit
 from asperity.report.drawing import (
     display,
@@ -23,7 +23,7 @@ from asperity.report.drawing import (
     plain_log_labels,
 )
 from asperity.report.style import BLUE, DASHED, GREEN, GREY, VERMILION, Medium, Style
-from asperity.trend import Stages
+from asperity.trend import ALARM_FACTOR, ALERT_FACTOR, Stages
 
 MIN_CORRECTION = 1e-3  # of the CRF; smaller corrections for operating conditions are not drawn
 MARKERS = "osv^Dp*hXP<>"
@@ -218,13 +218,11 @@ def levels(track: Track) -> Exhibit | None:
         for number, (name, values) in enumerate(trends.items()):
             marker = MARKERS[number % len(MARKERS)]
             axes.plot(x, values, marker, markersize=4, linestyle=":", linewidth=0.8, label=name)
-        axes.axhline(
-            np.exp(LEVEL_LEAST),
-            color=VERMILION,
-            linestyle=DASHED,
-            linewidth=1.0,
-            label="alarm threshold",
-        )
+        for factor, style, label in (
+            (ALERT_FACTOR, ":", "alert, if it lasts"),
+            (ALARM_FACTOR, DASHED, "alarm, if it lasts"),
+        ):
+            axes.axhline(factor, color=VERMILION, linestyle=style, linewidth=1.0, label=label)
         axes.set(
             yscale="log",
             xlabel=x_label(track),

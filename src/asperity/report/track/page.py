@@ -48,11 +48,9 @@ ACTIONS = {  # by state; for an alarm, by the first word of the indicator that r
     "zone": "Shut the machine down in a controlled way, or reduce its load, and find the cause: "
     "balance, alignment, "
     "looseness, bearings.",
-    "alert": "Record ten times as often until the alert becomes an alarm or ends. No stop is "
-    "needed.",
-    "cannot-tell": "Provide what is missing: longer recordings, the case or band of the contact, "
-    "more recordings for "
-    "a baseline, or the cause of a step; then acknowledge.",
+    "alert": "Record ten times as often until the alert becomes an alarm or ends, and find the "
+    "cause of a step. No stop is needed.",
+    "cannot-tell": "Record more: the baseline needs eight recordings.",
     "blind": "Check that the machine runs, then sensor, cable and supply. The machine is not "
     "monitored until then.",
     "none": "None; continue recording as planned.",
@@ -197,7 +195,13 @@ def _probability_text(probability: float) -> str:
 def _tiles(track: Track) -> list[Tile]:
     total = len(track.recordings)
     stages = track.stages
-    tiles = [Tile("Resonance found", f"{track.resonance_count}", f"of {total}")]
+    level = track.alarm.level
+    tiles = [
+        Tile("Line found", f"{track.resonance_count}", f"of {total}"),
+        Tile("Contact", "seen" if track.evidence and track.resonance_count else "not seen", ""),
+    ]
+    if np.isfinite(level.factor):
+        tiles.append(Tile("Highest level, last", f"{level.factor:.3g}", "times its baseline"))
     if stages is not None and stages.found:
         low, high = stages.interval
         label = f"Break at, {exhibits.x_label(track)}"
@@ -212,7 +216,7 @@ def _tiles(track: Track) -> list[Tile]:
         velocity = quantity("velocity_rms").text(track.recordings[-1].reading.velocity)
         tiles.append(Tile("ISO 20816-3, last", f"Zone {zone}", f"{velocity} rms"))
     unusable = sum(not recording.reading.usable for recording in track.recordings)
-    tiles.append(Tile("Not usable", f"{unusable}", f"of {total}"))
+    tiles.append(Tile("Not usable for the contact", f"{unusable}", f"of {total}"))
     return tiles
 
 
