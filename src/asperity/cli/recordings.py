@@ -1,15 +1,15 @@
 """`asperity track` and `watch`: measured recordings, from files to a verdict."""
 
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from asperity import monitoring, recording, report, trend
+from asperity import monitoring, recording, trend
 from asperity.cli.app import app
 from asperity.cli.forecast import series_forecaster
 from asperity.cli.options import (
@@ -42,20 +42,27 @@ from asperity.cli.options import (
     Workers,
     Worn,
     contact_at,
+    duration,
     require_output,
 )
 from asperity.cli.output import Block, Row, columns, progress, show, span, table, written
+from asperity.cli.watch_output import (
+    WatchReports,
+    print_sentences,
+    show_update,
+    termination,
+    write_track,
+)
 from asperity.core import files, processes
 from asperity.core.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
-    from asperity.monitoring import Reading, Track, TrackSettings, Update
+    from asperity.monitoring import Reading, Track, TrackSettings, Update, WatchSettings
     from asperity.recording import ReadOptions
     from asperity.resonance import SeriesMethod
     from asperity.trend import AlarmState, StageSource
 
 EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # by state of the alarm; otherwise 0
-PAGE = "report.html"
 
 
 DataFiles = Annotated[
@@ -78,6 +85,14 @@ PollInterval = Annotated[
 ]
 SettleTime = Annotated[
     float, typer.Option(metavar="SECONDS", min=0.0, help="Time for which a file must be unchanged.")
+]
+ReportInterval = Annotated[
+    float,
+    typer.Option(
+        metavar="AGE",
+        parser=duration("--report-every"),
+        help="Interval between reports, such as 30min or 1d; a change of state has one at once.",
+    ),
 ]
 ExpectedInterval = Annotated[
     float | None,
@@ -149,7 +164,7 @@ def track(
             sensor=sensor,
             acknowledge=acknowledge,
         )
-    paths_written = [*_write(tracked, out or (), page), *([] if store is None else [store])]
+    paths_written = [*write_track(tracked, out or (), page), *([] if store is None else [store])]
     _show_track(tracked, page, paths_written, as_json=as_json, quiet=quiet)
     _end(tracked.alarm.state)
 
@@ -162,6 +177,7 @@ def watch(
     every: PollInterval = 5.0,
     settle: SettleTime = 2.0,
     expect: ExpectedInterval = None,
+    report_every: ReportInterval = 3600.0,
     workers: Workers = None,
     rate: Rate = None,
     unit: Unit = None,
@@ -195,19 +211,8 @@ def watch(
     settings = _track_settings(
         read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
     )
-    watching = monitoring.WatchSettings(
-        store=store,
-        machine=machine,
-        point=point,
-        sensor=sensor,
-        notifiers=monitoring.notifiers(command=on_alarm, webhook=webhook, mqtt=mqtt),
-        notify_states=_states(tell),
-        reuse_judgement=(results / PAGE).is_file(),
-        once=once,
-        poll_interval_s=every,
-        settle_time_s=settle,
-        overdue_after_s=expect,
-    )
+    reports = WatchReports(results, report_every, once=once)
+    watching = _watch_settings(SimpleNamespace(**locals()))
     forecaster = series_forecaster(
         forecast, case_file, worn, emulator, workers=settings.workers, quiet=quiet
     )
@@ -215,7 +220,27 @@ def watch(
     updates = partial(
         watch_series, case=contact_at(case_file), table=table_file, forecaster=forecaster
     )
-    _end(_show_updates(updates, results, once=once, as_json=as_json, quiet=quiet))
+    _end(_show_updates(updates, reports, as_json=as_json, quiet=quiet))
+
+
+def _watch_settings(options: SimpleNamespace) -> "WatchSettings":
+    """Build the settings of `watch` from its options and reports."""
+    return monitoring.WatchSettings(
+        store=options.store,
+        machine=options.machine,
+        point=options.point,
+        sensor=options.sensor,
+        notifiers=monitoring.notifiers(
+            command=options.on_alarm, webhook=options.webhook, mqtt=options.mqtt
+        ),
+        notify_states=_states(options.tell),
+        reuse_judgement=options.once and options.reports.current,
+        once=options.once,
+        poll_interval_s=options.every,
+        settle_time_s=options.settle,
+        overdue_after_s=options.expect,
+        on_check=options.reports.write_due,
+    )
 
 
 def _track_settings(
@@ -267,24 +292,25 @@ def _show_track(
 
 
 def _show_updates(
-    updates: "Callable[..., Iterator[Update]]",
-    results: Path,
+    updates: "Callable[..., Generator[Update]]",
+    reports: WatchReports,
     *,
-    once: bool,
     as_json: bool,
     quiet: bool,
 ) -> str:
     """Write and show every update until Ctrl-C; return the state of the last."""
     state = "cannot-tell"
-    with _reading_progress("watching ...", quiet=quiet) as step:
+    with _reading_progress("watching ...", quiet=quiet) as step, termination():
         try:
-            for update in updates(progress=step):
-                state = _show_update(update, results, as_json=as_json, quiet=quiet) or state
+            with closing(updates(progress=step)) as running:
+                for update in running:
+                    state = show_update(update, reports, as_json=as_json, quiet=quiet) or state
         except KeyboardInterrupt:
-            if once:
+            if reports.once:
                 raise
-            print(
-                f"stopped; results are in {results}, and the next watch continues", file=sys.stderr
+            reports.write()
+            print_sentences(
+                [f"stopped; results are in {reports.results}, and the next watch continues"]
             )
     return state
 
@@ -298,58 +324,6 @@ def _end(state: str) -> None:
     """End with the exit code of the alarm's state."""
     if state in EXIT_CODES:
         raise typer.Exit(EXIT_CODES[state])
-
-
-def _show_update(update: "Update", results: Path, *, as_json: bool, quiet: bool) -> str | None:
-    """Write and show an update; return the alarm's state, None without any recording.
-
-    With `--json` each update is one JSON object on one line.
-    """
-    judgement = update.judgement or (None if update.track is None else update.track.scalars())
-    if update.track is not None:
-        _write(update.track, [results / "track.csv", results / "track.nc"], results / PAGE)
-    verdict = "No recording has arrived yet." if judgement is None else judgement["verdict"]
-    if update.waiting:
-        verdict += (
-            f" {update.waiting} more wait: they may still be written, or are not in the table yet."
-        )
-    values: dict[str, Any] = {"verdict": verdict} if judgement is None else dict(judgement)
-    arrived = [*dict.fromkeys(recording.file for recording in update.new)]
-    show(
-        verdict,
-        lambda: {**values, "new": arrived, "waiting": update.waiting, "results": str(results)},
-        [] if judgement is None else _arrived(update.new, values["recordings"], results),
-        as_json=as_json,
-        quiet=quiet,
-        a_line=True,
-    )
-    for sentence in update.failed:
-        print(sentence, file=sys.stderr)
-    return None if judgement is None else str(judgement["alarm"]["state"])
-
-
-def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results: Path) -> Block:
-    rows = {part["file"]: row for row in recordings for part in (row, *row["sensors"].values())}
-    selected = [quantity(key) for key in ("crf_hz", "severe_probability")]
-    for arrived in {reading.file: reading for reading in new}.values():
-        row = rows.get(arrived.file)
-        if row is None:
-            outcome = arrived.reason
-        elif not row["found"]:
-            outcome = f"no contact resonance: {row['reason']}"
-        else:
-            outcome = ", ".join(
-                f"{entry.short} {entry.text_in(row)}"
-                for entry in selected
-                if row[entry.key] is not None
-            )
-        yield f"  {Path(arrived.file).name}: {outcome}"
-    yield f"  {len(recordings)} recordings so far; results in {results}"
-
-
-def _write(tracked: "Track", out: Sequence[Path], page: Path | None) -> list[Path]:
-    saved = [tracked.save(path) for path in out]
-    return saved if page is None else [*saved, report.write_track_report(tracked, page)]
 
 
 def _series(tracked: "Track") -> Block:

@@ -271,7 +271,8 @@ def deliver(
     failed = []
     for notifier in recipients:
         for pending in sensors.pending_notifications(notifier.name):
-            if not now and pending.due_s > time():
+            # one due after the longest interval was stored before the clock was set back
+            if not now and 0.0 < pending.due_s - time() <= MAX_RETRY_S:
                 break
             try:
                 _within(COMMAND_S + NETWORK_S, partial(notifier.send, json.loads(pending.text)))

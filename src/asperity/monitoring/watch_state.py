@@ -11,6 +11,7 @@ from time import monotonic, sleep, time
 from typing import Any
 
 from asperity.core.errors import BadInput
+from asperity.core.troubles import Troubles
 from asperity.monitoring.alarm import LAST
 from asperity.monitoring.files import RecordingTable, is_utf8, may_be_recording, natural_order
 from asperity.monitoring.forecast import ForecastSchedule
@@ -43,8 +44,8 @@ class Update:
 
     `track` is None as long as there is no recording, and where `judgement` is the stored last
     judgement, as `Track.scalars` returned it. An overdue sensor has both. `failed` are sentences on
-    failed notifications and on files that are left out or have to wait. `waiting` files may still
-    be written, or are not in the table yet.
+    failures that begin or end, and on files that are left out or have to wait; a `notice` has only
+    these. `waiting` files may still be written, or are not in the table yet.
     """
 
     new: tuple[Reading, ...]
@@ -52,6 +53,7 @@ class Update:
     waiting: int = 0
     failed: tuple[str, ...] = ()
     judgement: Mapping[str, Any] | None = None
+    notice: bool = False
 
 
 def version_of(path: Path) -> FileVersion:
@@ -101,6 +103,7 @@ class WatchState:
         self._readings: dict[FileVersion, list[Reading]] = {}
         self._memory: SeriesMemory | None = None
         self._not_utf8: set[str] = set()
+        self.troubles = Troubles()
         # files with a time of change in the future, and when they were first seen
         self._future: dict[FileVersion, float] = {}
 
@@ -184,6 +187,8 @@ class WatchState:
         )
         readings: dict[FileVersion, list[Reading]] = {key: [] for key in keys}
         for number, reading in numbered_readings:
+            if reading.refused and not _is_current(keys[number]):
+                continue  # removed, or its folder lost, while it was read
             self.sensors.add(keys[number], reading)
             readings[keys[number]].append(reading)
         self._readings |= readings
@@ -198,7 +203,6 @@ class WatchState:
         first: bool,
     ) -> Update:
         """Judge the series, or take the stored judgement if it is up to date, and notify."""
-        notifiers = self.watching.notifiers
         acknowledge = self.settings.acknowledge
         question = _digest(
             {**self.settings.judgement(), **self.schedule.question}, table, series, self.target
@@ -211,18 +215,26 @@ class WatchState:
         )
         if judgement is not None:
             self.sensors.queue_notifications(self.recipients, judgement)
-            failed = deliver(self.sensors, notifiers, now=True)
-            return Update(new=(), track=None, judgement=judgement, failed=failed)
+            self.deliver(now=True)
+            return Update(new=(), track=None, judgement=judgement)
         order = order_recordings(series, table, self.sensors)
         track = self.judge(order, len(new), question, acknowledge if first else None)
-        failed = (
-            *self.left_out(),
-            *order.waits,
-            *deliver(self.sensors, notifiers, now=first),
-        )
+        self.deliver(now=first)
         forecast = self.with_forecast()
-        failed += deliver(self.sensors, notifiers) if forecast is not None else ()
+        if forecast is not None:
+            self.deliver()
+        failed = (*self.left_out(), *order.waits)
         return Update(new=new, track=forecast or track, failed=failed)
+
+    def deliver(self, *, now: bool = False) -> None:
+        """Send notifications that are due, or with `now` all; state failures that begin or end."""
+        failed = deliver(self.sensors, self.watching.notifiers, now=now)
+        for name in self.recipients:
+            sentence = next((text for text in failed if text.startswith(f"{name} ")), "")
+            if sentence:
+                self.troubles.begin(name, sentence)
+            elif name in self.troubles.active and not self.sensors.pending_notifications(name):
+                self.troubles.end(name, f"{name} has been notified")
 
     def judge(self, order: Order, new: int, question: str, acknowledge: str | None) -> Track | None:
         """Judge the series and store the judgement, after an acknowledgement; None if it is empty.

@@ -7,9 +7,10 @@ All writing is transactional (write-ahead log): a watch may be killed at any mom
 import json
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
+from time import monotonic
 from typing import Any, NamedTuple, TypeAlias
 
 from asperity.core.documents import JsonObject, Table
@@ -20,6 +21,7 @@ from asperity.trend import AlarmState
 STORE = "asperity.db"
 VERSION = 3  # 1: no duration of recordings; 2: `learned` is a column of `sensor`
 BUSY_S = 30.0  # timeout while another process writes [s]
+MISSING_S = 60.0  # time after which a missing folder of the store is made again [s]
 REMEDY = "delete it, and its recordings are read again, or choose another store"
 LEARNED = "CREATE TABLE learned (sensor INTEGER PRIMARY KEY REFERENCES sensor, body BLOB NOT NULL)"
 SCHEMA = f"""
@@ -57,6 +59,10 @@ CREATE VIEW trend AS
     FROM recording JOIN sensor ON sensor.id = recording.sensor JOIN point ON point.id = sensor.point
         JOIN machine ON machine.id = point.machine;
 """
+
+
+class StoreUnavailable(AsperityError):
+    """A store that cannot be used at present, such as on a full disk; a retry may succeed."""
 
 
 Run: TypeAlias = Callable[..., sqlite3.Cursor]  # runs a statement in a transaction
@@ -109,13 +115,21 @@ class Store:
         if the file is not a store, or of a later version.
     """
 
-    def __init__(self, path: str | Path, *, make: bool = True) -> None:
+    def __init__(self, path: str | Path, *, make: bool = True, in_memory: bool = False) -> None:
         self.path = Path(path)
-        if not self.path.exists() and not make:
+        self._in_memory = in_memory
+        self._missing_since: float | None = None
+        if not (in_memory or make or self.path.exists()):
             raise UnreadableFile(f"{self.path} does not exist; check its name")
-        require_writable(self.path)
-        self._connection = sqlite3.connect(self.path, timeout=BUSY_S, isolation_level=None)
+        self._open()
+
+    def _open(self) -> None:
+        """Connect to the file; create its tables, or convert an older version."""
+        if not self._in_memory:
+            require_writable(self.path)
+        location = ":memory:" if self._in_memory else self.path
         with self._translated_errors():
+            self._connection = sqlite3.connect(location, timeout=BUSY_S, isolation_level=None)
             version = self._connection.execute("PRAGMA user_version").fetchone()[0]
             self._connection.execute("PRAGMA journal_mode = WAL")
             self._connection.execute("PRAGMA foreign_keys = ON")
@@ -128,10 +142,62 @@ class Store:
                     f"{self.path} is a store of version {version}, this asperity writes {VERSION}; "
                     "update asperity, or choose another store"
                 )
+        self._file = None if self._in_memory else _file_number(self.path)
 
     def close(self) -> None:
         """Close the store and merge the write-ahead log into the file."""
         self._connection.close()
+
+    def require_present(self) -> None:
+        """Raise StoreUnavailable if the file was removed or replaced since it was opened."""
+        if not self._in_memory and _file_number(self.path) != self._file:
+            raise StoreUnavailable(
+                f"{self.path} was removed or replaced; restore it, or its folder {self.path.parent}"
+            )
+
+    def recover(self) -> None:
+        """Connect again if the file was removed or replaced.
+
+        A file missing in its folder is restored from the open connection. A missing folder is made
+        again after `MISSING_S`, because it may be moved back or mounted before.
+
+        Raises
+        ------
+        StoreUnavailable
+            if the folder is missing, or the file cannot be written.
+        """
+        if _file_number(self.path) == self._file:
+            self._missing_since = None
+            return
+        folder = self.path.parent
+        if not folder.is_dir():
+            if self._missing_since is None:
+                self._missing_since = monotonic()
+            if monotonic() - self._missing_since < MISSING_S or not folder.parent.is_dir():
+                self.require_present()
+            with self._translated_errors():
+                folder.mkdir()
+        if not self.path.exists():
+            self._restore()
+        former = self._connection
+        try:
+            self._open()
+        except BaseException:
+            self._connection = former
+            raise
+        former.close()
+        self._missing_since = None
+
+    def _restore(self) -> None:
+        """Write the content of the open connection to a new file."""
+        part = self.path.with_name(f".{self.path.name}.part")
+        part.unlink(missing_ok=True)
+        try:
+            with self._translated_errors(), closing(sqlite3.connect(part)) as copy:
+                self._connection.backup(copy)
+            part.replace(self.path)
+        finally:
+            part.unlink(missing_ok=True)
 
     def _create(self) -> None:
         with self.transaction() as run:
@@ -163,9 +229,9 @@ class Store:
     def _translated_errors(self) -> Iterator[None]:
         try:
             yield
-        except sqlite3.OperationalError as error:
+        except (sqlite3.OperationalError, OSError) as error:
             reason = "another program has locked it" if "locked" in str(error) else str(error)
-            raise AsperityError(
+            raise StoreUnavailable(
                 f"{self.path} cannot be used: {reason}; release it or free disk space, and retry"
             ) from error
         except sqlite3.DatabaseError as error:
@@ -180,10 +246,12 @@ class Store:
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield self._connection.execute
+                self._connection.execute("COMMIT")
             except BaseException:
-                self._connection.execute("ROLLBACK")
+                if self._connection.in_transaction:  # SQLite may have ended it on a full disk
+                    with suppress(sqlite3.OperationalError):
+                        self._connection.execute("ROLLBACK")
                 raise
-            self._connection.execute("COMMIT")
 
     def read(self, query: str, *values: object) -> list[Any]:
         """Return the rows of a query."""
@@ -226,3 +294,12 @@ class Store:
                 "SELECT id, settings FROM sensor WHERE point = ? AND name = ?", values[:2]
             ).fetchone()
         return number, json.loads(stored)
+
+
+def _file_number(path: Path) -> tuple[int, int] | None:
+    """Return what identifies a file on this system; None if it does not exist."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino

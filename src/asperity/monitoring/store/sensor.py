@@ -147,10 +147,13 @@ class Sensor:
         self.unjudged.discard(key)
 
     def reading(self, key: FileVersion) -> Reading | None:
-        """Return a stored reading; None, and delete it, if it is damaged."""
-        ((body,),) = self.store.read(
+        """Return a stored reading; None if it is not stored any more, or damaged and deleted."""
+        rows = self.store.read(
             "SELECT reading FROM recording WHERE id = ?", self.recordings[key].number
         )
+        body = rows[0][0] if rows else b""
+        if not body:
+            return None
         try:
             return unpack_reading(body, f"a recording in {self.store.path}")
         except UnreadableFile:

@@ -1,0 +1,175 @@
+"""Output of `asperity watch`: a line per update, and reports that are written at intervals."""
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from asperity import report
+from asperity.cli.output import Block, show
+from asperity.core.quantities import quantity
+from asperity.core.troubles import RetryDelay, Troubles, failure_reason
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+    from asperity.monitoring import Reading, Track, Update
+
+PAGE = "report.html"
+TABLES = ("track.csv", "track.nc")
+DUE = ".report-due"  # marks a page that is older than the last evaluation
+REPORT_RETRY_S = 5.0  # first delay before a failed report is written again [s]
+
+
+def write_track(tracked: "Track", out: Sequence[Path], page: Path | None) -> list[Path]:
+    """Write tables and page of a track; return their paths."""
+    saved = [tracked.save(path) for path in out]
+    return saved if page is None else [*saved, report.write_track_report(tracked, page)]
+
+
+class WatchReports:
+    """Tables and page of a watched folder.
+
+    They are written at the first update, when the alarm's state changes, every `interval_s`, and
+    at the end. With `once` a failure is raised; otherwise it is stated and retried.
+    """
+
+    def __init__(self, results: Path, interval_s: float, *, once: bool) -> None:
+        self.results, self.interval_s, self.once = results, interval_s, once
+        self.troubles = Troubles()
+        self._delay = RetryDelay(REPORT_RETRY_S)
+        self._track: Track | None = None  # not written yet
+        self._state = ""
+        self._next_s = 0.0
+
+    @property
+    def current(self) -> bool:
+        """True if the page shows the last evaluation."""
+        return (self.results / PAGE).is_file() and not (self.results / DUE).exists()
+
+    def add(self, track: "Track") -> None:
+        """Take over a new evaluation, and write it if that is due."""
+        if self._track is None:
+            with suppress(OSError):
+                (self.results / DUE).touch()
+        self._track = track
+        if track.alarm.state != self._state:
+            self._state, self._next_s = track.alarm.state, 0.0
+        self.write_due()
+
+    def write_due(self) -> None:
+        """Write the last evaluation if it is due."""
+        if self._track is not None and not self._delay.waiting and monotonic() >= self._next_s:
+            self.write()
+
+    def write(self) -> None:
+        """Write the last evaluation, unless that has been done."""
+        if self._track is None:
+            return
+        try:
+            write_track(self._track, [self.results / name for name in TABLES], self.results / PAGE)
+            (self.results / DUE).unlink(missing_ok=True)
+        except Exception as error:
+            if self.once:
+                raise
+            self._delay.record(failed=True)
+            reason = failure_reason(error)
+            self.troubles.begin(
+                "report",
+                f"the report in {self.results} could not be written ({reason}); "
+                "the watch continues and retries",
+            )
+        else:
+            self._track, self._next_s = None, monotonic() + self.interval_s
+            self._delay.record(failed=False)
+            self.troubles.end("report", f"the report in {self.results} is written again")
+        print_sentences(self.troubles.take())
+
+
+def print_sentences(sentences: Sequence[str]) -> None:
+    """Print sentences on stderr; one that cannot be written is left out."""
+    with suppress(OSError):
+        for sentence in sentences:
+            print(sentence, file=sys.stderr, flush=True)
+
+
+def show_update(
+    update: "Update", reports: WatchReports, *, as_json: bool, quiet: bool
+) -> str | None:
+    """Write and show an update; return the alarm's state, None without any recording.
+
+    With `--json` each update is one JSON object on one line.
+    """
+    if update.notice:
+        print_sentences(update.failed)
+        return None
+    results = reports.results
+    judgement = update.judgement or (None if update.track is None else update.track.scalars())
+    if update.track is not None:
+        reports.add(update.track)
+    verdict = "No recording has arrived yet." if judgement is None else judgement["verdict"]
+    if update.waiting:
+        verdict += (
+            f" {update.waiting} more wait: they may still be written, or are not in the table yet."
+        )
+    values: dict[str, Any] = {"verdict": verdict} if judgement is None else dict(judgement)
+    arrived = [*dict.fromkeys(recording.file for recording in update.new)]
+    try:
+        show(
+            verdict,
+            lambda: {**values, "new": arrived, "waiting": update.waiting, "results": str(results)},
+            [] if judgement is None else _arrived(update.new, values["recordings"], results),
+            as_json=as_json,
+            quiet=quiet,
+            a_line=True,
+        )
+    except OSError as error:  # such as a log file on a full disk
+        if reports.once or isinstance(error, BrokenPipeError):
+            raise
+    print_sentences(update.failed)
+    return None if judgement is None else str(judgement["alarm"]["state"])
+
+
+def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results: Path) -> Block:
+    rows = {part["file"]: row for row in recordings for part in (row, *row["sensors"].values())}
+    selected = [quantity(key) for key in ("crf_hz", "severe_probability")]
+    for arrived in {reading.file: reading for reading in new}.values():
+        row = rows.get(arrived.file)
+        if row is None:
+            outcome = arrived.reason
+        elif not row["found"]:
+            outcome = f"no contact resonance: {row['reason']}"
+        else:
+            outcome = ", ".join(
+                f"{entry.short} {entry.text_in(row)}"
+                for entry in selected
+                if row[entry.key] is not None
+            )
+        yield f"  {Path(arrived.file).name}: {outcome}"
+    yield f"  {len(recordings)} recordings so far; results in {results}"
+
+
+@contextmanager
+def termination() -> Iterator[None]:
+    """End on SIGTERM as on Ctrl-C, with reports and store complete, and then by the signal."""
+    terminated = False
+
+    def interrupt(_number: int, _frame: "FrameType | None") -> None:
+        nonlocal terminated
+        terminated = True
+        raise KeyboardInterrupt
+
+    previous: Callable[..., object] | int | None = None
+    with suppress(ValueError):  # not in the main thread
+        previous = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        if previous is not None:
+            signal.signal(signal.SIGTERM, previous)
+        if terminated:
+            os.kill(os.getpid(), signal.SIGTERM)
