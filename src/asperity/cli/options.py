@@ -323,6 +323,7 @@ _OPTIONS = {
     "case": "--case",
     "clr": "--design",
     "lateral_unit": "--lateral-unit",
+    "keep_s": "--keep",
     "limit": "--forecast",
     "machine_conditions": "--dry-run",
     "method": "--method",

@@ -86,6 +86,14 @@ PollInterval = Annotated[
 SettleTime = Annotated[
     float, typer.Option(metavar="SECONDS", min=0.0, help="Time for which a file must be unchanged.")
 ]
+KeptAge = Annotated[
+    float | None,
+    typer.Option(
+        metavar="AGE",
+        parser=duration("--keep"),
+        help="Thin out recordings older than this, such as 90d, to one a day (default: keep all).",
+    ),
+]
 ReportInterval = Annotated[
     float,
     typer.Option(
@@ -178,6 +186,7 @@ def watch(
     settle: SettleTime = 2.0,
     expect: ExpectedInterval = None,
     report_every: ReportInterval = 3600.0,
+    keep: KeptAge = None,
     workers: Workers = None,
     rate: Rate = None,
     unit: Unit = None,
@@ -239,6 +248,7 @@ def _watch_settings(options: SimpleNamespace) -> "WatchSettings":
         poll_interval_s=options.every,
         settle_time_s=options.settle,
         overdue_after_s=options.expect,
+        keep_s=options.keep,
         on_check=options.reports.write_due,
     )
 

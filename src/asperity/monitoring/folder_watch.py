@@ -15,9 +15,11 @@ from asperity.monitoring.reading import Reading
 from asperity.monitoring.silence import overdue_reason
 from asperity.monitoring.store.database import FileVersion, Store, StoreUnavailable
 from asperity.monitoring.store.memory_copy import MemoryCopy
+from asperity.monitoring.store.retention import thin_store
 from asperity.monitoring.store.sensors import Sensors
 from asperity.monitoring.watch_state import Update, WatchState
 
+THIN_AFTER = 32  # recordings after which the store is thinned again
 FOLDER, STORE, CHECK = "folder", "store", "check"  # causes of failures
 
 
@@ -49,6 +51,7 @@ class FolderWatch:
         self._copy: MemoryCopy | None = None
         self._delay = RetryDelay(state.watching.poll_interval_s)
         self._first, self._unjudged, self._overdue = True, False, ""
+        self._unthinned = THIN_AFTER  # recordings since the store was thinned
         # last arrival in the store, and by a clock that cannot be set [s]
         self._last_arrival: tuple[datetime, float] | None = None
         self._arrived_s = -math.inf  # last arrival of this run
@@ -188,7 +191,19 @@ class FolderWatch:
                 track = state.overdue(order, overdue)
                 update = Update(new=(), track=track, judgement=judgement)
         self._first, self._overdue = False, overdue
+        self._unthinned += len(new)
+        if self._unthinned >= THIN_AFTER or watching.once:
+            self._thin(table)
         return None if update is None else replace(update, waiting=waiting)
+
+    def _thin(self, table: RecordingTable | None) -> None:
+        """Delete spectra and old recordings that are not needed; not of a copy in memory."""
+        if self._copy is None and not self._unjudged:
+            sensors = self.state.sensors
+            order = order_recordings(_series(sensors), table, sensors)
+            keep_s = self.state.watching.keep_s
+            thin_store(sensors, order.instants, self.state.present, keep_s)
+            self._unthinned = 0
 
     def _arrivals(self) -> tuple[list[FileVersion], RecordingTable | None, int]:
         """Return complete new files that the table contains, the table, and how many wait."""

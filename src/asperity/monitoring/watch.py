@@ -61,6 +61,8 @@ def watch_folder(
         require_positive(
             "the time without a recording (`overdue_after_s`)", watching.overdue_after_s, "s"
         )
+    if watching.keep_s is not None:
+        require_positive("the age of recordings to keep (`keep_s`)", watching.keep_s, "s")
     for alarm_state in watching.notify_states:
         require_choice("tell", alarm_state, ALARM_STATES)
     folder, out = Path(folder).resolve(), Path(out)

@@ -103,6 +103,7 @@ class WatchState:
         self._readings: dict[FileVersion, list[Reading]] = {}
         self._memory: SeriesMemory | None = None
         self._not_utf8: set[str] = set()
+        self.present: set[str] = set()  # files of the folder when it was last read
         self.troubles = Troubles()
         # files with a time of change in the future, and when they were first seen
         self._future: dict[FileVersion, float] = {}
@@ -134,6 +135,7 @@ class WatchState:
                 entry.path, stamp if sidecar is None else f"{stamp} {stamps[sidecar][1]}"
             )
             versions.append(key)
+        self.present = {key.file for key in versions}
         new = [key for key in self.sensors.unread(versions) if may_be_recording(Path(key.file))]
         return sorted(new, key=lambda key: natural_order(file_name(key)))
 
@@ -189,8 +191,8 @@ class WatchState:
         for number, reading in numbered_readings:
             if reading.refused and not _is_current(keys[number]):
                 continue  # removed, or its folder lost, while it was read
-            self.sensors.add(keys[number], reading)
-            readings[keys[number]].append(reading)
+            stored = self.sensors.add(keys[number], reading)
+            readings[keys[number]].append(stored)
         self._readings |= readings
         return tuple(reading for of_file in readings.values() for reading in of_file)
 

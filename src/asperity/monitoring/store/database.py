@@ -19,11 +19,17 @@ from asperity.core.files import require_writable
 from asperity.trend import AlarmState
 
 STORE = "asperity.db"
-VERSION = 3  # 1: no duration of recordings; 2: `learned` is a column of `sensor`
+VERSION = 4  # 1: no duration of recordings; 2: `learned` is a column of `sensor`; 3: no `gap`
 BUSY_S = 30.0  # timeout while another process writes [s]
 MISSING_S = 60.0  # time after which a missing folder of the store is made again [s]
 REMEDY = "delete it, and its recordings are read again, or choose another store"
 LEARNED = "CREATE TABLE learned (sensor INTEGER PRIMARY KEY REFERENCES sensor, body BLOB NOT NULL)"
+# versions of files whose recordings were deleted, and the number deleted before a recording
+DROPPED = (
+    "CREATE TABLE dropped (sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL, "
+    "version TEXT NOT NULL, PRIMARY KEY (sensor, file, version)) WITHOUT ROWID"
+)
+GAP = "CREATE TABLE gap (recording INTEGER PRIMARY KEY REFERENCES recording, count INTEGER)"
 SCHEMA = f"""
 CREATE TABLE machine (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE point (
@@ -33,6 +39,8 @@ CREATE TABLE sensor (
     id INTEGER PRIMARY KEY, point INTEGER NOT NULL REFERENCES point, name TEXT NOT NULL,
     settings TEXT NOT NULL, asked TEXT, said TEXT, since INTEGER, UNIQUE (point, name));
 {LEARNED};
+{DROPPED};
+{GAP};
 CREATE TABLE recording (
     id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL,
     version TEXT NOT NULL, heard TEXT NOT NULL, started TEXT, duration REAL,
@@ -94,7 +102,9 @@ class StandingAlarm(NamedTuple):
 class StoredRecording(NamedTuple):
     """Recording of the store: number, start (None if unknown) and state (None if not judged).
 
-    `refused` if it could not be read; `duration_s` is nan if unknown.
+    `refused` if it could not be read; `duration_s` is nan if unknown. `day` is that of its start or
+    arrival; `complete` if its spectrum is stored; `gap` is the number of recordings deleted
+    directly before it.
     """
 
     number: int
@@ -102,6 +112,9 @@ class StoredRecording(NamedTuple):
     state: AlarmState | None
     refused: bool
     duration_s: float
+    day: str = ""
+    complete: bool = True
+    gap: int = 0
 
 
 class Store:
@@ -131,11 +144,13 @@ class Store:
         with self._translated_errors():
             self._connection = sqlite3.connect(location, timeout=BUSY_S, isolation_level=None)
             version = self._connection.execute("PRAGMA user_version").fetchone()[0]
+            if version == 0:
+                self._connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
             self._connection.execute("PRAGMA journal_mode = WAL")
             self._connection.execute("PRAGMA foreign_keys = ON")
             if version == 0:
                 self._create()
-            elif version in (1, 2):
+            elif version in (1, 2, 3):
                 self._migrate()
             elif version != VERSION:
                 raise UnreadableFile(
@@ -224,6 +239,10 @@ class Store:
                 # the column stays: not every SQLite can drop columns
                 run("UPDATE sensor SET learned = NULL")
                 run("PRAGMA user_version = 3")
+            if run("PRAGMA user_version").fetchone()[0] == 3:
+                run(DROPPED)
+                run(GAP)
+                run("PRAGMA user_version = 4")
 
     @contextmanager
     def _translated_errors(self) -> Iterator[None]:
@@ -252,6 +271,18 @@ class Store:
                     with suppress(sqlite3.OperationalError):
                         self._connection.execute("ROLLBACK")
                 raise
+
+    def shrink(self, share: float) -> None:
+        """Release free pages of the file where they are more than a share of it.
+
+        A store of an older version keeps them for later recordings.
+        """
+        with self._translated_errors():
+            free = self._connection.execute("PRAGMA freelist_count").fetchone()[0]
+            pages = self._connection.execute("PRAGMA page_count").fetchone()[0]
+            if free > share * pages:
+                # `execute` would release a single page
+                self._connection.executescript("PRAGMA incremental_vacuum")
 
     def read(self, query: str, *values: object) -> list[Any]:
         """Return the rows of a query."""

@@ -110,6 +110,7 @@ def _copy_sensor(original: Store, run: Run, sensor: Sensor) -> None:
     copy_rows = partial(_copy_rows, original, run)
     copy_rows("sensor", "id = ?", number)
     copy_rows("learned", "sensor = ?", number)
+    copy_rows("dropped", "sensor = ?", number)
     known = sorted(recording.number for recording in sensor.recordings.values())
     first_row = known[-LATEST_ROWS] if len(known) > LATEST_ROWS else 0
     copy_rows("recording", "sensor = ? AND id >= ?", number, first_row, blank={"reading": "x''"})
@@ -119,6 +120,7 @@ def _copy_sensor(original: Store, run: Run, sensor: Sensor) -> None:
         *(number, first_row),
         blank={"reading": "x''", "row": "NULL"},
     )
+    copy_rows("gap", "recording IN (SELECT id FROM recording WHERE sensor = ?)", number)
     marked = {sensor.acknowledged, sensor.standing and Path(sensor.standing.file).name}
     starts = [
         known.index(recording.number)

@@ -99,8 +99,13 @@ class Sensors:
 
     def unread(self, keys: Sequence[FileVersion]) -> list[FileVersion]:
         """Return the files of which not every channel has been read."""
-        recordings = [sensor.recordings for sensor in self._sensors()]
-        return [key for key in keys if sum(key in read for read in recordings) < self.channels]
+        sensors = [*self._sensors()]
+        return [
+            key
+            for key in keys
+            if sum(key in sensor.recordings or key in sensor.dropped for sensor in sensors)
+            < self.channels
+        ]
 
     def stored(self, key: FileVersion) -> dict[str, StoredRecording]:
         """Return the stored recordings of a file, by sensor."""
@@ -114,6 +119,15 @@ class Sensors:
         """Return the stored recording of a file on the first sensor that could read it."""
         stored = [sensor.recordings[key] for sensor in self._sensors() if key in sensor.recordings]
         return next((recording for recording in stored if not recording.refused), stored[0])
+
+    def complete(self, keys: Sequence[FileVersion]) -> bool:
+        """Tell whether the spectrum of any of the files is stored."""
+        return any(
+            sensor.recordings[key].complete
+            for key in keys
+            for sensor in self._sensors()
+            if key in sensor.recordings
+        )
 
     def readable_names(self, keys: Sequence[FileVersion]) -> set[str]:
         """Return the names of sensors that could read any of the files."""
@@ -164,9 +178,9 @@ class Sensors:
         for sensor in self._sensors():
             sensor.set_spacing(spacing_hz)
 
-    def add(self, key: FileVersion, reading: Reading) -> None:
-        """Store the reading of a file under the name of its sensor."""
-        self._registered(self._name_of(reading)).add(key, reading)
+    def add(self, key: FileVersion, reading: Reading) -> Reading:
+        """Store the reading of a file under the name of its sensor; return it as stored."""
+        return self._registered(self._name_of(reading)).add(key, reading)
 
     def holds(self, key: FileVersion, reading: Reading) -> bool:
         """Tell whether a sensor's reading of a file is stored."""
