@@ -82,9 +82,11 @@ def disk(monkeypatch):
 
 
 def watch(tmp_path, **changes):
+    (tmp_path / "out").mkdir(exist_ok=True)
+    store = changes.pop("store", tmp_path / "out/asperity.db")
     return open_watch(
         (tmp_path / "in").resolve(),
-        tmp_path / "out",
+        database.Store(store),
         TrackSettings(**changes.pop("tracking", {})),
         WatchSettings(**{"poll_interval_s": 0.0, "settle_time_s": 0.0} | changes),
     )

@@ -47,9 +47,8 @@ from asperity.cli.options import (
 )
 from asperity.cli.output import Block, Row, columns, progress, show, span, table, written
 from asperity.cli.watch_output import (
-    WatchReports,
+    WatchDisplay,
     print_sentences,
-    show_update,
     termination,
     write_track,
 )
@@ -94,12 +93,19 @@ KeptAge = Annotated[
         help="Thin out recordings older than this, such as 90d, to one a day (default: keep all).",
     ),
 ]
+Tree = Annotated[
+    bool,
+    typer.Option(
+        "--tree", help="Watch every subfolder as a measuring point (default: if DIR has only such)."
+    ),
+]
 ReportInterval = Annotated[
-    float,
+    float | None,
     typer.Option(
         metavar="AGE",
         parser=duration("--report-every"),
-        help="Interval between reports, such as 30min or 1d; a change of state has one at once.",
+        help="Interval between reports (default: 1h, of a tree 1d); "
+        "also written when the state changes.",
     ),
 ]
 ExpectedInterval = Annotated[
@@ -182,10 +188,11 @@ def watch(
     folder: WatchedFolder,
     out: ResultFolder = None,
     once: Once = False,
+    tree: Tree = False,
     every: PollInterval = 5.0,
     settle: SettleTime = 2.0,
     expect: ExpectedInterval = None,
-    report_every: ReportInterval = 3600.0,
+    report_every: ReportInterval = None,
     keep: KeptAge = None,
     workers: Workers = None,
     rate: Rate = None,
@@ -220,20 +227,27 @@ def watch(
     settings = _track_settings(
         read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
     )
-    reports = WatchReports(results, report_every, once=once)
+    tree = tree or monitoring.is_tree(folder, results)
+    display = WatchDisplay(results, once=once, tree=tree, report_every_s=report_every)
+    display.as_json, display.quiet = as_json, quiet
     watching = _watch_settings(SimpleNamespace(**locals()))
     forecaster = series_forecaster(
         forecast, case_file, worn, emulator, workers=settings.workers, quiet=quiet
     )
-    watch_series = partial(monitoring.watch_folder, folder, results, settings, watching)
     updates = partial(
-        watch_series, case=contact_at(case_file), table=table_file, forecaster=forecaster
+        monitoring.watch_tree if tree else monitoring.watch_folder,
+        *(folder, results, settings, watching),
+        case=contact_at(case_file),
+        table=table_file,
+        forecaster=forecaster,
     )
-    _end(_show_updates(updates, reports, as_json=as_json, quiet=quiet))
+    _show_updates(updates, display, quiet=quiet)
+    _end(display.state)
 
 
 def _watch_settings(options: SimpleNamespace) -> "WatchSettings":
-    """Build the settings of `watch` from its options and reports."""
+    """Build the settings of `watch` from its options and display."""
+    display: WatchDisplay = options.display
     return monitoring.WatchSettings(
         store=options.store,
         machine=options.machine,
@@ -243,13 +257,13 @@ def _watch_settings(options: SimpleNamespace) -> "WatchSettings":
             command=options.on_alarm, webhook=options.webhook, mqtt=options.mqtt
         ),
         notify_states=_states(options.tell),
-        reuse_judgement=options.once and options.reports.current,
+        reuse_judgement=options.once and (options.tree or display.reports().current),
         once=options.once,
         poll_interval_s=options.every,
         settle_time_s=options.settle,
         overdue_after_s=options.expect,
         keep_s=options.keep,
-        on_check=options.reports.write_due,
+        on_check=display.check,
     )
 
 
@@ -302,27 +316,21 @@ def _show_track(
 
 
 def _show_updates(
-    updates: "Callable[..., Generator[Update]]",
-    reports: WatchReports,
-    *,
-    as_json: bool,
-    quiet: bool,
-) -> str:
-    """Write and show every update until Ctrl-C; return the state of the last."""
-    state = "cannot-tell"
+    updates: "Callable[..., Generator[Update]]", display: WatchDisplay, *, quiet: bool
+) -> None:
+    """Write and show every update until Ctrl-C."""
     with _reading_progress("watching ...", quiet=quiet) as step, termination():
         try:
             with closing(updates(progress=step)) as running:
                 for update in running:
-                    state = show_update(update, reports, as_json=as_json, quiet=quiet) or state
+                    display.show(update)
         except KeyboardInterrupt:
-            if reports.once:
+            if display.once:
                 raise
-            reports.write()
+            display.finish()
             print_sentences(
-                [f"stopped; results are in {reports.results}, and the next watch continues"]
+                [f"stopped; results are in {display.results}, and the next watch continues"]
             )
-    return state
 
 
 def _states(tell: str | None) -> "Sequence[AlarmState]":

@@ -3,13 +3,13 @@
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from asperity import report
+from asperity import monitoring, report
 from asperity.cli.output import Block, show
 from asperity.core.quantities import quantity
 from asperity.core.troubles import RetryDelay, Troubles, failure_reason
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 TABLES = ("track.csv", "track.nc")
 DUE = ".report-due"  # marks a page that is older than the last evaluation
+INTERVAL_S, TREE_INTERVAL_S = 3600.0, 86_400.0  # between reports, of a folder and of a tree [s]
+END_S = 20.0  # time for reports at the end of a watch [s]
 REPORT_RETRY_S = 5.0  # first delay before a failed report is written again [s]
 
 
@@ -97,41 +99,91 @@ def print_sentences(sentences: Sequence[str]) -> None:
             print(sentence, file=sys.stderr, flush=True)
 
 
-def show_update(
-    update: "Update", reports: WatchReports, *, as_json: bool, quiet: bool
-) -> str | None:
-    """Write and show an update; return the alarm's state, None without any recording.
+class WatchDisplay:
+    """Output of a watch: lines on stdout, and reports in the folder of results.
 
-    With `--json` each update is one JSON object on one line.
+    In a tree, each place has a folder of reports and one line when its state changes.
     """
-    if update.notice:
+
+    def __init__(
+        self, results: Path, *, once: bool, tree: bool, report_every_s: float | None
+    ) -> None:
+        self.results, self.once, self.tree = results, once, tree
+        self.interval_s = report_every_s or (TREE_INTERVAL_S if tree else INTERVAL_S)
+        self.as_json = self.quiet = False
+        self._reports: dict[str, WatchReports] = {}
+        self._states: dict[str, str] = {}  # of the alarm, by place
+
+    @property
+    def state(self) -> str:
+        """Most severe state of all places."""
+        return min(self._states.values(), key=monitoring.SEVERITY.index, default="cannot-tell")
+
+    def reports(self, place: str = "") -> WatchReports:
+        """Return the reports of a place."""
+        if place not in self._reports:
+            folder = self.results / place
+            if place and self.results.is_dir():
+                with suppress(OSError):
+                    folder.mkdir(parents=True, exist_ok=True)
+            self._reports[place] = WatchReports(folder, self.interval_s, once=self.once)
+        return self._reports[place]
+
+    def show(self, update: "Update") -> None:
+        """Write and show an update. With `--json` it is one JSON object on one line."""
+        if update.notice:
+            print_sentences(update.failed)
+            return
+        reports = self.reports(update.place)
+        judgement = update.judgement or (None if update.track is None else update.track.scalars())
+        if update.track is not None:
+            reports.add(update.track)
+        changed = True
+        if judgement is not None:
+            state = str(judgement["alarm"]["state"])
+            changed = self._states.get(update.place) != state
+            self._states[update.place] = state
+        try:
+            if changed or self.as_json or not self.tree:
+                self._print(update, judgement, reports.results)
+        except OSError as error:  # such as a log file on a full disk
+            if self.once or isinstance(error, BrokenPipeError):
+                raise
         print_sentences(update.failed)
-        return None
-    results = reports.results
-    judgement = update.judgement or (None if update.track is None else update.track.scalars())
-    if update.track is not None:
-        reports.add(update.track)
-    verdict = "No recording has arrived yet." if judgement is None else judgement["verdict"]
-    if update.waiting:
-        verdict += (
-            f" {update.waiting} more wait: they may still be written, or are not in the table yet."
-        )
-    values: dict[str, Any] = {"verdict": verdict} if judgement is None else dict(judgement)
-    arrived = [*dict.fromkeys(recording.file for recording in update.new)]
-    try:
+
+    def _print(self, update: "Update", judgement: Mapping[str, Any] | None, results: Path) -> None:
+        """Print the verdict of an update and what has arrived."""
+        verdict = "No recording has arrived yet." if judgement is None else judgement["verdict"]
+        if update.waiting:
+            verdict += (
+                f" {update.waiting} more wait: they may still be written, "
+                "or are not in the table yet."
+            )
+        values = dict(judgement or {"verdict": verdict})
+        arrived = [*dict.fromkeys(recording.file for recording in update.new)]
+        extra = {"new": arrived, "waiting": update.waiting, "results": str(results)}
         show(
-            verdict,
-            lambda: {**values, "new": arrived, "waiting": update.waiting, "results": str(results)},
-            [] if judgement is None else _arrived(update.new, values["recordings"], results),
-            as_json=as_json,
-            quiet=quiet,
+            f"{update.place}: {verdict}" if update.place else verdict,
+            lambda: {**values, **extra} | ({"place": update.place} if update.place else {}),
+            []
+            if judgement is None or self.tree
+            else _arrived(update.new, values["recordings"], results),
+            as_json=self.as_json,
+            quiet=self.quiet,
             a_line=True,
         )
-    except OSError as error:  # such as a log file on a full disk
-        if reports.once or isinstance(error, BrokenPipeError):
-            raise
-    print_sentences(update.failed)
-    return None if judgement is None else str(judgement["alarm"]["state"])
+
+    def check(self) -> None:
+        """Write reports that are due."""
+        for reports in self._reports.values():
+            reports.write_due()
+
+    def finish(self) -> None:
+        """Write the last evaluations; those of a tree for at most `END_S`."""
+        end_s = monotonic() + END_S
+        for reports in self._reports.values():
+            if monotonic() < end_s:
+                reports.write()
 
 
 def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results: Path) -> Block:

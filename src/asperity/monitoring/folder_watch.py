@@ -88,7 +88,14 @@ class FolderWatch:
         return replace(update, failed=(*update.failed, *sentences))
 
     def close(self) -> None:
-        """Merge a copy in memory into the store and close it.
+        """Merge a copy in memory into the store and close it; raises as `finish`."""
+        try:
+            self.finish()
+        finally:
+            self.store.close()
+
+    def finish(self) -> None:
+        """Merge a copy in memory into the store.
 
         Raises
         ------
@@ -102,13 +109,15 @@ class FolderWatch:
                 f"{failure_reason(error)}; what has arrived since is not stored and will be read "
                 "again from its files"
             ) from error
-        finally:
-            self.store.close()
+
+    def _cause(self, kind: str) -> str:
+        """Return the name of a cause in this folder."""
+        return f"{kind} {self.folder}"
 
     def _record_success(self) -> None:
         """Record a check without failure."""
         self._delay.record(failed=False)
-        self.troubles.end(CHECK, f"{self.folder} is checked again")
+        self.troubles.end(self._cause(CHECK), f"{self.folder} is checked again")
 
     def _record_failure(self, error: Exception) -> None:
         """Record a failed check: recordings that it has read are judged by the next one."""
@@ -116,7 +125,8 @@ class FolderWatch:
         self._delay.record(failed=True)
         reason = failure_reason(error)
         self.troubles.begin(
-            CHECK, f"{self.folder} could not be checked ({reason}); the watch continues and retries"
+            self._cause(CHECK),
+            f"{self.folder} could not be checked ({reason}); the watch continues and retries",
         )
 
     # Store
@@ -214,9 +224,9 @@ class FolderWatch:
             reason = f"{self.folder} cannot be read ({error.strerror or error})"
             if state.watching.once:
                 raise AsperityError(f"{reason}; restore the folder, and retry") from error
-            self.troubles.begin(FOLDER, f"{reason}; the watch continues and retries")
+            self.troubles.begin(self._cause(FOLDER), f"{reason}; the watch continues and retries")
             return [], None, 0
-        self.troubles.end(FOLDER, f"{self.folder} is read again")
+        self.troubles.end(self._cause(FOLDER), f"{self.folder} is read again")
         arrived = state.unchanged(unread)
         table = None
         if self.table_file is not None and (arrived or state.sensors.by_name):

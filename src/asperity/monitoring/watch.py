@@ -14,11 +14,12 @@ from time import sleep
 from asperity.case import Case, MachineCase
 from asperity.core.errors import BadInput, require_choice, require_positive
 from asperity.core.files import make_folder
+from asperity.monitoring.fleet.tree_watch import TreeWatch
 from asperity.monitoring.folder_watch import FolderWatch
 from asperity.monitoring.forecast import Forecaster, ForecastSchedule
 from asperity.monitoring.reading import Reading
 from asperity.monitoring.settings import TrackSettings, WatchSettings
-from asperity.monitoring.store.database import STORE
+from asperity.monitoring.store.database import STORE, Store
 from asperity.monitoring.store.sensor_lookup import open_sensors
 from asperity.monitoring.target import search_target
 from asperity.monitoring.watch_state import Update, WatchState
@@ -57,21 +58,12 @@ def watch_folder(
         if the folder does not exist, a time is not positive, or settings differ from those with
         which the store was begun.
     """
-    if watching.overdue_after_s is not None:
-        require_positive(
-            "the time without a recording (`overdue_after_s`)", watching.overdue_after_s, "s"
-        )
-    if watching.keep_s is not None:
-        require_positive("the age of recordings to keep (`keep_s`)", watching.keep_s, "s")
-    for alarm_state in watching.notify_states:
-        require_choice("tell", alarm_state, ALARM_STATES)
-    folder, out = Path(folder).resolve(), Path(out)
-    if not folder.is_dir():
-        raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
+    folder = _checked(folder, watching)
+    make_folder(Path(out))
     return _updates(
         open_watch(
             folder,
-            out,
+            Store(watching.store or Path(out) / STORE),
             settings,
             watching,
             case=case,
@@ -82,9 +74,70 @@ def watch_folder(
     )
 
 
+def watch_tree(
+    folder: str | Path,
+    out: str | Path,
+    settings: TrackSettings = TRACK_DEFAULTS,
+    watching: WatchSettings = WATCH_DEFAULTS,
+    *,
+    case: Case | MachineCase | None = None,
+    table: str | Path | None = None,
+    forecaster: Forecaster | None = None,
+    progress: Callable[[Reading], None] | None = None,
+) -> Generator[Update]:
+    """Yield updates of all subfolders that contain recordings, each a measuring point.
+
+    The first level of folders names the machine, the others the point. All are stored in one file.
+    A failure of one does not stop the others; an update names its `place`.
+
+    Parameters
+    ----------
+    folder : root of the tree; folders that appear later are watched, too
+    out, settings, watching, case, table, forecaster, progress : as `watch_folder`
+
+    Raises
+    ------
+    BadInput
+        as `watch_folder`, or if machine or point are named.
+    AsperityError
+        at the end of a single run, if a folder could not be evaluated.
+    """
+    if watching.machine is not None or watching.point is not None:
+        raise BadInput(
+            f"folders name machine and point in a tree, got {watching.machine or watching.point}; "
+            "omit it, or watch a single folder"
+        )
+    folder = _checked(folder, watching)
+    make_folder(Path(out))
+    open_place = partial(
+        open_watch,
+        settings=settings,
+        case=case,
+        table=table,
+        forecaster=forecaster,
+        progress=progress,
+    )
+    return _tree_updates(TreeWatch(folder, Path(out), watching, open_place))
+
+
+def _checked(folder: str | Path, watching: WatchSettings) -> Path:
+    """Return the folder in full; raise BadInput if it does not exist, or for a wrong setting."""
+    if watching.overdue_after_s is not None:
+        require_positive(
+            "the time without a recording (`overdue_after_s`)", watching.overdue_after_s, "s"
+        )
+    if watching.keep_s is not None:
+        require_positive("the age of recordings to keep (`keep_s`)", watching.keep_s, "s")
+    for alarm_state in watching.notify_states:
+        require_choice("tell", alarm_state, ALARM_STATES)
+    if not Path(folder).is_dir():
+        raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
+    return Path(folder).resolve()
+
+
 def open_watch(
     folder: Path,
-    out: Path,
+    store: Store,
     settings: TrackSettings,
     watching: WatchSettings,
     *,
@@ -93,8 +146,7 @@ def open_watch(
     forecaster: Forecaster | None = None,
     progress: Callable[[Reading], None] | None = None,
 ) -> FolderWatch:
-    """Return the watch of one folder; arguments as of `watch_folder`."""
-    make_folder(out)
+    """Return the watch of one folder; other arguments as of `watch_folder`."""
     target = search_target(case, settings.band_hz)
     reopen = partial(
         open_sensors,
@@ -103,7 +155,7 @@ def open_watch(
         target=target,
         options=settings.read_options,
     )
-    sensors = reopen(watching.store or out / STORE)
+    sensors = reopen(store)
     sensors.notifications.notify_states = watching.notify_states
     state = WatchState(sensors, target, settings, watching, ForecastSchedule(forecaster))
     return FolderWatch(state, folder, table, progress, reopen)
@@ -120,5 +172,19 @@ def _updates(watch: FolderWatch) -> Generator[Update]:
             if watching.on_check is not None:
                 watching.on_check()
             if watching.once:
+                return
+            sleep(watching.poll_interval_s)
+
+
+def _tree_updates(tree: TreeWatch) -> Generator[Update]:
+    """Yield the updates of all places, in turn."""
+    watching = tree.watching
+    with closing(tree):
+        while True:
+            yield from tree.check()
+            if watching.on_check is not None:
+                watching.on_check()
+            if watching.once:
+                tree.require_complete()
                 return
             sleep(watching.poll_interval_s)

@@ -45,7 +45,8 @@ class Update:
     `track` is None as long as there is no recording, and where `judgement` is the stored last
     judgement, as `Track.scalars` returned it. An overdue sensor has both. `failed` are sentences on
     failures that begin or end, and on files that are left out or have to wait; a `notice` has only
-    these. `waiting` files may still be written, or are not in the table yet.
+    these. `place` names machine and point in a tree of folders. `waiting` files may still be
+    written, or are not in the table yet.
     """
 
     new: tuple[Reading, ...]
@@ -54,6 +55,7 @@ class Update:
     failed: tuple[str, ...] = ()
     judgement: Mapping[str, Any] | None = None
     notice: bool = False
+    place: str = ""
 
 
 def version_of(path: Path) -> FileVersion:
@@ -105,8 +107,24 @@ class WatchState:
         self._not_utf8: set[str] = set()
         self.present: set[str] = set()  # files of the folder when it was last read
         self.troubles = Troubles()
+        self._unreached: set[str] = set()  # recipients whose notification failed
         # files with a time of change in the future, and when they were first seen
         self._future: dict[FileVersion, float] = {}
+
+    @property
+    def cached_bytes(self) -> int:
+        """Memory for spectra: those of the window, cleaned and fitted ones [bytes]."""
+        return 4 * sum(
+            reading.spectrum.density.nbytes
+            for of_file in self._readings.values()
+            for reading in of_file
+            if reading.spectrum is not None
+        )
+
+    def release(self) -> None:
+        """Release the spectra; the next judgement reads them from the store."""
+        self._readings = {}
+        self._memory = None
 
     @property
     def recipients(self) -> list[str]:
@@ -235,8 +253,10 @@ class WatchState:
             sentence = next((text for text in failed if text.startswith(f"{name} ")), "")
             if sentence:
                 self.troubles.begin(name, sentence)
-            elif name in self.troubles.active and not self.sensors.pending_notifications(name):
+                self._unreached.add(name)
+            elif name in self._unreached and not self.sensors.pending_notifications(name):
                 self.troubles.end(name, f"{name} has been notified")
+                self._unreached.remove(name)
 
     def judge(self, order: Order, new: int, question: str, acknowledge: str | None) -> Track | None:
         """Judge the series and store the judgement, after an acknowledgement; None if it is empty.
