@@ -1,7 +1,7 @@
 """`asperity track` and `watch`: measured recordings, from files to a verdict."""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -98,6 +98,18 @@ Tree = Annotated[
     typer.Option(
         "--tree", help="Watch every subfolder as a measuring point (default: if DIR has only such)."
     ),
+]
+LineProtocol = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE|-|URL",
+        envvar="ASPERITY_LINE_PROTOCOL",
+        help="Write measurements by the InfluxDB line protocol: to a file, stdout or an address.",
+    ),
+]
+Prometheus = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.prom", help="Write the latest values for a Prometheus exporter."),
 ]
 ReportInterval = Annotated[
     float | None,
@@ -218,6 +230,8 @@ def watch(
     webhook: WebHook = None,
     mqtt: Mqtt = None,
     tell: Tell = None,
+    line_protocol: LineProtocol = None,
+    prometheus: Prometheus = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -228,8 +242,7 @@ def watch(
         read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
     )
     tree = tree or monitoring.is_tree(folder, results)
-    display = WatchDisplay(results, once=once, tree=tree, report_every_s=report_every)
-    display.as_json, display.quiet = as_json, quiet
+    display = _watch_display(SimpleNamespace(**locals()))
     watching = _watch_settings(SimpleNamespace(**locals()))
     forecaster = series_forecaster(
         forecast, case_file, worn, emulator, workers=settings.workers, quiet=quiet
@@ -241,8 +254,22 @@ def watch(
         table=table_file,
         forecaster=forecaster,
     )
-    _show_updates(updates, display, quiet=quiet)
+    _show_updates(updates, display, mqtt=mqtt, quiet=quiet)
     _end(display.state)
+
+
+def _watch_display(options: SimpleNamespace) -> WatchDisplay:
+    """Build the display of `watch` from its options."""
+    display = WatchDisplay(
+        options.results,
+        once=options.once,
+        tree=options.tree,
+        report_every_s=options.report_every,
+    )
+    display.as_json, display.quiet = options.as_json, options.quiet
+    display.telemetry = monitoring.Telemetry(options.line_protocol, options.prometheus)
+    display.without_lines = options.line_protocol == "-"
+    return display
 
 
 def _watch_settings(options: SimpleNamespace) -> "WatchSettings":
@@ -316,14 +343,24 @@ def _show_track(
 
 
 def _show_updates(
-    updates: "Callable[..., Generator[Update]]", display: WatchDisplay, *, quiet: bool
+    updates: "Callable[..., Generator[Update]]",
+    display: WatchDisplay,
+    *,
+    mqtt: str | None,
+    quiet: bool,
 ) -> None:
     """Write and show every update until Ctrl-C."""
-    with _reading_progress("watching ...", quiet=quiet) as step, termination():
+    presence = None if mqtt is None or display.once else monitoring.Presence(mqtt)
+    with ExitStack() as stack:
+        step = stack.enter_context(_reading_progress("watching ...", quiet=quiet))
+        stack.enter_context(termination())
+        if presence is not None:
+            stack.callback(presence.close)
         try:
             with closing(updates(progress=step)) as running:
                 for update in running:
                     display.show(update)
+            display.telemetry.finish()
         except KeyboardInterrupt:
             if display.once:
                 raise

@@ -110,7 +110,8 @@ class WatchDisplay:
     ) -> None:
         self.results, self.once, self.tree = results, once, tree
         self.interval_s = report_every_s or (TREE_INTERVAL_S if tree else INTERVAL_S)
-        self.as_json = self.quiet = False
+        self.as_json = self.quiet = self.without_lines = False
+        self.telemetry = monitoring.Telemetry()
         self._reports: dict[str, WatchReports] = {}
         self._states: dict[str, str] = {}  # of the alarm, by place
 
@@ -134,6 +135,7 @@ class WatchDisplay:
         if update.notice:
             print_sentences(update.failed)
             return
+        self.telemetry.add(update)
         reports = self.reports(update.place)
         judgement = update.judgement or (None if update.track is None else update.track.scalars())
         if update.track is not None:
@@ -144,7 +146,7 @@ class WatchDisplay:
             changed = self._states.get(update.place) != state
             self._states[update.place] = state
         try:
-            if changed or self.as_json or not self.tree:
+            if not self.without_lines and (changed or self.as_json or not self.tree):
                 self._print(update, judgement, reports.results)
         except OSError as error:  # such as a log file on a full disk
             if self.once or isinstance(error, BrokenPipeError):
@@ -174,7 +176,9 @@ class WatchDisplay:
         )
 
     def check(self) -> None:
-        """Write reports that are due."""
+        """Write reports and telemetry that are due."""
+        self.telemetry.check()
+        print_sentences(self.telemetry.troubles.take())
         for reports in self._reports.values():
             reports.write_due()
 
@@ -184,6 +188,7 @@ class WatchDisplay:
         for reports in self._reports.values():
             if monotonic() < end_s:
                 reports.write()
+        self.telemetry.finish()
 
 
 def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results: Path) -> Block:

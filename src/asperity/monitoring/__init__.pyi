@@ -10,11 +10,13 @@ from .files import RecordingPlace as RecordingPlace
 from .files import RecordingTable as RecordingTable
 from .files import read_table as read_table
 from .files import recordings_in as recordings_in
+from .fleet.telemetry import Telemetry as Telemetry
 from .fleet.tree_watch import is_tree as is_tree
 from .forecast import FORECAST as FORECAST
 from .forecast import Bands as Bands
 from .forecast import Forecaster as Forecaster
 from .forecast import ForecastResult as ForecastResult
+from .notify import Presence as Presence
 from .notify import notifiers as notifiers
 from .operating_point import ZERO_CELSIUS as ZERO_CELSIUS
 from .operating_point import OperatingPoint as OperatingPoint

@@ -85,7 +85,8 @@ class FolderWatch:
         sentences = self.troubles.take()
         if update is None:
             return Update(new=(), track=None, failed=sentences, notice=True) if sentences else None
-        return replace(update, failed=(*update.failed, *sentences))
+        failed = (*update.failed, *sentences)
+        return replace(update, failed=failed, address=(*self.state.sensors.address,))
 
     def close(self) -> None:
         """Merge a copy in memory into the store and close it; raises as `finish`."""

@@ -45,7 +45,8 @@ class Update:
     `track` is None as long as there is no recording, and where `judgement` is the stored last
     judgement, as `Track.scalars` returned it. An overdue sensor has both. `failed` are sentences on
     failures that begin or end, and on files that are left out or have to wait; a `notice` has only
-    these. `place` names machine and point in a tree of folders. `waiting` files may still be
+    these. `address` names machine, point and sensor; `place` the first two in a tree of folders.
+    `waiting` files may still be
     written, or are not in the table yet.
     """
 
@@ -56,6 +57,7 @@ class Update:
     judgement: Mapping[str, Any] | None = None
     notice: bool = False
     place: str = ""
+    address: tuple[str, str, str] = ("", "", "")
 
 
 def version_of(path: Path) -> FileVersion:
