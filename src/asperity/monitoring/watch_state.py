@@ -35,6 +35,7 @@ from asperity.monitoring.track_result import Track
 from asperity.recording import sidecar_names
 
 SUFFIXES = (".toml", ".json")  # of sidecars
+CACHE_FACTOR = 16  # memory of a watch over that of its spectra's densities, as measured
 STRIDE = 80  # recordings per judgement where many arrive at once
 
 
@@ -115,8 +116,8 @@ class WatchState:
 
     @property
     def cached_bytes(self) -> int:
-        """Memory for spectra: those of the window, cleaned and fitted ones [bytes]."""
-        return 4 * sum(
+        """Memory for the spectra of the window, with cleaned and fitted ones [bytes]."""
+        return CACHE_FACTOR * sum(
             reading.spectrum.density.nbytes
             for of_file in self._readings.values()
             for reading in of_file
