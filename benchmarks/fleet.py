@@ -74,7 +74,11 @@ def fill_place(sensors: Sensors, folder: Path, readings: list[Reading], row: str
         sensors.by_name["sensor"].set_state(key, "none")
         if hour % PER_DAY == PER_DAY - 1:
             with sensors.store.transaction() as run:
-                run("UPDATE recording SET state = 'none', row = ? WHERE row IS NULL", (row,))
+                run(
+                    "UPDATE recording SET state = 'none', row = ? "
+                    "WHERE sensor = ? AND state IS NULL",
+                    (row, sensors.by_name["sensor"].number),
+                )
             order = order_recordings(sensors.series(), None, sensors)
             thin_store(sensors, order.instants, (), None)
 
@@ -100,9 +104,9 @@ def watched(root: Path, out: Path, folders: list[Path]) -> Iterator[tuple[str, f
             yield name, process_time() - began, memory_mb()
 
 
-def lines(*, fast: bool = False) -> Iterator[str]:
+def lines(*, fast: bool = False, sensors: int = SENSORS) -> Iterator[str]:
     """Yield the lines of a Markdown table."""
-    count = SENSORS // 10 if fast else SENSORS
+    count = sensors // 10 if fast else sensors
     total = count * DAYS * PER_DAY
     yield f"## Fleet of {count} sensors"
     yield ""
@@ -136,5 +140,7 @@ def lines(*, fast: bool = False) -> Iterator[str]:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fast", action="store_true")
-    for line in lines(fast=parser.parse_args().fast):
+    parser.add_argument("--sensors", type=int, default=SENSORS)
+    arguments = parser.parse_args()
+    for line in lines(fast=arguments.fast, sensors=arguments.sensors):
         print(line, flush=True)

@@ -151,6 +151,40 @@ def test_a_store_written_in_memory_first_equals_an_uninterrupted_one(tmp_path, d
     assert stores[0] == stores[1]
 
 
+def test_a_copy_in_memory_is_merged_only_once(tmp_path, disk):
+    snapshots(tmp_path / "in", np.ones(9))
+    watched = watch(tmp_path, notifiers=[Recorder()])
+    disk.full = True
+    assert len(watched.check().new) == 9
+    disk.full = False
+    reopen = watched.reopen
+    watched.reopen = lambda _: (_ for _ in ()).throw(AsperityError("settings differ"))
+    for _ in range(3):
+        watched.check()
+    watched.reopen = reopen
+    assert "is written again" in watched.check().failed[0]
+    watched.close()
+    store = tmp_path / "out/asperity.db"
+    assert query_store(store, "SELECT count(*) FROM recording") == [(9,)]
+    assert query_store(store, "SELECT count(*) FROM call") == [(1,)]
+    assert query_store(store, "SELECT count(*) FROM judgement WHERE new > 0") == [(1,)]
+
+
+def test_a_store_that_fails_while_it_is_thinned_loses_no_update(tmp_path, disk, monkeypatch):
+    def fail(*_):
+        disk.full = True
+        raise database.StoreUnavailable(FULL)
+
+    snapshots(tmp_path / "in", np.ones(9))
+    watched = watch(tmp_path)
+    monkeypatch.setattr("asperity.monitoring.folder_watch.thin_store", fail)
+    update = watched.check()
+    assert (len(update.new), len(update.failed)) == (9, 1)
+    disk.full = False
+    assert "is written again" in watched.check().failed[0]
+    watched.close()
+
+
 def test_a_full_disk_ends_a_single_run_with_an_error(tmp_path, disk):
     snapshots(tmp_path / "in", np.ones(2))
     watched = watch(tmp_path, once=True)
@@ -257,7 +291,7 @@ def test_a_failing_evaluation_is_stated_once_and_repeated(tmp_path, monkeypatch)
     assert watched.check() is None
     monkeypatch.undo()
     update = watched.check()
-    assert len(update.track.recordings) == 9
+    assert len(update.track.recordings) == len(update.new) == 9
     watched.close()
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from asperity import monitoring, report
 from asperity.cli.output import Block, show
+from asperity.core.errors import AsperityError
 from asperity.core.quantities import quantity
 from asperity.core.troubles import RetryDelay, Troubles, failure_reason
 
@@ -188,7 +189,10 @@ class WatchDisplay:
         for reports in self._reports.values():
             if monotonic() < end_s:
                 reports.write()
-        self.telemetry.finish()
+        try:
+            self.telemetry.finish()
+        except AsperityError as error:
+            print_sentences([str(error)])
 
 
 def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results: Path) -> Block:

@@ -49,6 +49,7 @@ class FolderWatch:
         self.store = state.sensors.store
         self.troubles = state.troubles
         self._copy: MemoryCopy | None = None
+        self._lost = folder  # the folder, or the first of its ancestors that was missing
         self._delay = RetryDelay(state.watching.poll_interval_s)
         self._first, self._unjudged, self._overdue = True, False, ""
         self._unthinned = THIN_AFTER  # recordings since the store was thinned
@@ -74,8 +75,10 @@ class FolderWatch:
         try:
             self._use_store()
             update = self._check()
+            self._thin()
         except StoreUnavailable as error:
-            update = self._check_in_memory(error)
+            evaluated_again = self._check_in_memory(error)
+            update = update or evaluated_again
         except Exception as error:
             if self.state.watching.once or (self._first and isinstance(error, BadInput)):
                 raise
@@ -183,8 +186,10 @@ class FolderWatch:
         """Return an update at first, and if recordings have arrived or are overdue."""
         state, watching = self.state, self.state.watching
         arrived, table, waiting = self._arrivals()
-        new = state.read(arrived, table, self.progress)
-        if new:
+        count = len(state.unreported)
+        state.read(arrived, table, self.progress)
+        new = tuple(sorted(state.unreported, key=lambda reading: natural_order(reading.file)))
+        if len(new) > count:
             self._arrived_s = monotonic()
         overdue = (
             ""
@@ -203,18 +208,18 @@ class FolderWatch:
                 update = Update(new=(), track=track, judgement=judgement)
         self._first, self._overdue = False, overdue
         self._unthinned += len(new)
-        if self._unthinned >= THIN_AFTER or watching.once:
-            self._thin(table)
         return None if update is None else replace(update, waiting=waiting)
 
-    def _thin(self, table: RecordingTable | None) -> None:
+    def _thin(self) -> None:
         """Delete spectra and old recordings that are not needed; not of a copy in memory."""
-        if self._copy is None and not self._unjudged:
-            sensors = self.state.sensors
+        watching, sensors = self.state.watching, self.state.sensors
+        due = self._unthinned >= THIN_AFTER or watching.once
+        if due and self._copy is None and sensors.by_name:
+            table = None if self.table_file is None else read_table(self.table_file)
             order = order_recordings(_series(sensors), table, sensors)
-            keep_s = self.state.watching.keep_s
+            keep_s = watching.keep_s
+            self._unthinned = 0  # also if it fails: not again at the next check
             thin_store(sensors, order.instants, self.state.present, keep_s)
-            self._unthinned = 0
 
     def _arrivals(self) -> tuple[list[FileVersion], RecordingTable | None, int]:
         """Return complete new files that the table contains, the table, and how many wait."""
@@ -222,12 +227,15 @@ class FolderWatch:
         try:
             unread = state.unread(self.folder)
         except OSError as error:
-            reason = f"{self.folder} cannot be read ({error.strerror or error})"
+            ancestors = (*reversed(self.folder.parents), self.folder)
+            lost = next((folder for folder in ancestors if not folder.exists()), self.folder)
+            reason = f"{lost} cannot be read ({error.strerror or error})"
             if state.watching.once:
                 raise AsperityError(f"{reason}; restore the folder, and retry") from error
-            self.troubles.begin(self._cause(FOLDER), f"{reason}; the watch continues and retries")
+            self._lost = lost  # of a tree with many folders, their common ancestor is stated
+            self.troubles.begin(f"{FOLDER} {lost}", f"{reason}; the watch continues and retries")
             return [], None, 0
-        self.troubles.end(self._cause(FOLDER), f"{self.folder} is read again")
+        self.troubles.end(f"{FOLDER} {self._lost}", f"{self._lost} is read again")
         arrived = state.unchanged(unread)
         table = None
         if self.table_file is not None and (arrived or state.sensors.by_name):
@@ -254,6 +262,7 @@ class FolderWatch:
         if new or self._first or self._unjudged:
             update = state.update(_series(state.sensors), table, new, first=self._first)
             self._unjudged = False
+            state.unreported.clear()
             return update
         forecast = state.with_forecast()
         state.deliver()

@@ -108,6 +108,7 @@ class WatchState:
         self._readings: dict[FileVersion, list[Reading]] = {}
         self._memory: SeriesMemory | None = None
         self._not_utf8: set[str] = set()
+        self.unreported: list[Reading] = []  # read, and not in an update yet
         self.present: set[str] = set()  # files of the folder when it was last read
         self.troubles = Troubles()
         self._unreached: set[str] = set()  # recipients whose notification failed
@@ -190,10 +191,10 @@ class WatchState:
         keys: list[FileVersion],
         table: RecordingTable | None,
         progress: Callable[[Reading], None] | None,
-    ) -> tuple[Reading, ...]:
-        """Read files and store each reading at once."""
+    ) -> None:
+        """Read files, store each reading at once, and add it to `unreported`."""
         if not keys:
-            return ()
+            return
         paths = [Path(key.file) for key in keys]
         options = self.settings.read_options
         if self.sensors.spacing_hz is None:
@@ -214,8 +215,8 @@ class WatchState:
                 continue  # removed, or its folder lost, while it was read
             stored = self.sensors.add(keys[number], reading)
             readings[keys[number]].append(stored)
+            self.unreported.append(stored)
         self._readings |= readings
-        return tuple(reading for of_file in readings.values() for reading in of_file)
 
     def update(
         self,

@@ -5,6 +5,7 @@ import sys
 from collections import deque
 from functools import partial
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from asperity.core.errors import AsperityError
 from asperity.core.files import require_writable
@@ -65,7 +66,10 @@ class LineProtocol:
     @property
     def name(self) -> str:
         """Name of the target, without passwords and tokens."""
-        return self.target.partition("?")[0].rpartition("@")[2]
+        if "://" not in self.target:
+            return self.target
+        parts = urlsplit(self.target)
+        return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}{parts.path}"
 
     def add(self, measurement: Measurement) -> None:
         """Append a measurement to the waiting lines."""

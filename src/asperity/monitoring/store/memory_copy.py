@@ -1,6 +1,6 @@
 """Copy of sensors in memory, with which a watch continues while its store cannot be written."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from functools import partial
 from pathlib import Path
@@ -35,17 +35,7 @@ class MemoryCopy:
                 _copy_rows(original, run, table, "1")
             for sensor in sensors.by_name.values():
                 _copy_sensor(original, run, sensor)
-        self._last = {
-            table: max(
-                (
-                    original.read(f"SELECT max(id) FROM {table} WHERE sensor = ?", number)[0][0]
-                    or 0
-                    for number in numbers
-                ),
-                default=0,
-            )
-            for table in ("recording", "judgement", "call")
-        }
+        self._last = _last_numbers(original, numbers)
         self.sensors = Sensors(
             memory,
             sensors.address,
@@ -71,6 +61,8 @@ class MemoryCopy:
         with store.transaction() as run:
             for sensor, number in zip(added, numbers, strict=True):
                 self._merge_sensor(run, sensor, number)
+        added_numbers = [sensor.number for sensor in added]
+        self._last = _last_numbers(self.sensors.store, added_numbers)  # merged only once
 
     def _merge_sensor(self, run: Run, sensor: Sensor, number: int) -> None:
         """Add what the copy of a sensor has and the store lacks."""
@@ -102,6 +94,16 @@ class MemoryCopy:
                 "UPDATE call SET attempts = ?, due = ?, failure = ?, answered = ? WHERE id = ?",
                 attempt,
             )
+
+
+def _last_numbers(store: Store, sensors: Sequence[int]) -> dict[str, int]:
+    """Return the last number of some sensors in each table that grows."""
+    marks = ", ".join("?" * len(sensors))
+    return {
+        table: store.read(f"SELECT max(id) FROM {table} WHERE sensor IN ({marks})", *sensors)[0][0]
+        or 0
+        for table in ("recording", "judgement", "call")
+    }
 
 
 def _copy_sensor(original: Store, run: Run, sensor: Sensor) -> None:
